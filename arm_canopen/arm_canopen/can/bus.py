@@ -1,0 +1,92 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The interface to a CAN bus, whatever stands behind it."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from types import TracebackType
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
+from .frame import Frame
+
+
+@dataclass(slots=True)
+class BusCounters:
+    """What a bus object has seen; it counts up and never back.
+
+    Attributes:
+        sent: Frames handed to the interface.
+        received: Frames from others.
+        lost: Frames that the kernel dropped because the receive buffer was full.
+        send_errors: Frames that the interface refused.
+    """
+
+    sent: int = 0
+    received: int = 0
+    lost: int = 0
+    send_errors: int = 0
+
+
+class Bus(ABC):
+    """A CAN bus. Send from any thread; receive from one thread only.
+
+    Frames that this object sent are never received by it.
+
+    Attributes:
+        name: Name that it was opened by, e.g. ``vcan0`` or ``udp_multicast:239.74.163.2``.
+        counters: What it has seen.
+    """
+
+    def __init__(self, name: str) -> None:
+        """Keep the name."""
+        self.name = name
+        self.counters = BusCounters()
+
+    @abstractmethod
+    def send(self, frame: Frame) -> None:
+        """Hand a frame to the interface, without waiting for the bus.
+
+        Raises:
+            BusError: The interface refuses it (down, transmit queue full).
+        """
+
+    @abstractmethod
+    def receive(self, timeout: float) -> list[Frame]:
+        """Wait for frames.
+
+        Args:
+            timeout: Longest time to wait for the first one in [s]; 0 only looks.
+
+        Returns:
+            All frames that are there, in the order of arrival; empty after the time-out or
+            after :meth:`wake`.
+
+        Raises:
+            BusError: The interface went away.
+        """
+
+    @abstractmethod
+    def wake(self) -> None:
+        """Let a :meth:`receive` that waits in another thread return at once."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Release the interface; closing twice is no error."""
+
+    def __enter__(self) -> Self:
+        """Use it in a with statement."""
+        return self
+
+    def __exit__(
+        self,
+        exc_type: type[BaseException] | None,
+        exc: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """Close it."""
+        self.close()

@@ -1,0 +1,236 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The typed model of a bus: what bus.yml and the EDS files say, checked and in SI units."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from ..standard.dictionary import ObjectDictionary
+from ..standard.drive import DriveState
+from ..standard.pdo import MappedObject
+
+
+@dataclass(frozen=True, slots=True)
+class PdoConfig:
+    """One PDO of a device, named from the device's side.
+
+    Attributes:
+        number: 1 for the objects 0x1400/0x1600 or 0x1800/0x1A00, and so on.
+        enabled: The PDO exists (bit 31 of its COB-ID is clear).
+        cob_id: Its 11-bit CAN identifier; 0 when it is disabled and has none.
+        transmission: Transmission type 0 to 255 (CiA 301, tables 69 and 71).
+        inhibit_time: Shortest time between two transmissions in [s]; None leaves the device's.
+        event_time: Event timer of a TPDO, deadline of an RPDO in [s]; None leaves the device's.
+        sync_start: SYNC counter value at which it starts; None leaves the device's.
+        mapping: The mapped objects.
+        configured: bus.yml names this PDO, so the master writes it at boot.
+    """
+
+    number: int
+    enabled: bool
+    cob_id: int
+    transmission: int
+    inhibit_time: float | None = None
+    event_time: float | None = None
+    sync_start: int | None = None
+    mapping: tuple[MappedObject, ...] = ()
+    configured: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class SdoWrite:
+    """An object to be written at boot.
+
+    Attributes:
+        index: Object index.
+        subindex: Sub-index.
+        data: The value as it is sent.
+    """
+
+    index: int
+    subindex: int
+    data: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Identity:
+    """What a device says of itself in 0x1000 and 0x1018; 0 is not checked."""
+
+    device_type: int = 0
+    vendor_id: int = 0
+    product_code: int = 0
+    revision_number: int = 0
+    serial_number: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class DriveConfig:
+    """Units and sequences of a CiA 402 drive.
+
+    Attributes:
+        scale_pos_to_dev: Device increments per user unit (usually rad).
+        scale_vel_to_dev: Device velocity units per user unit per second.
+        scale_pos_from_dev: User units per device increment.
+        scale_vel_from_dev: User units per second per device velocity unit.
+        scale_eff_from_dev: User units of effort per device unit of torque.
+        offset_pos_to_dev: Added to a target after scaling, in [inc].
+        offset_pos_from_dev: Added to a position after scaling, in user units.
+        switching_state: State in which 0x6060 is written.
+        homing_timeout: Longest time for homing in [s].
+        position_mode: Mode number for position commands, None when bus.yml names none.
+        velocity_mode: Mode number for velocity commands, None when bus.yml names none.
+    """
+
+    scale_pos_to_dev: float = 1000.0
+    scale_vel_to_dev: float = 1000.0
+    scale_pos_from_dev: float = 0.001
+    scale_vel_from_dev: float = 0.001
+    scale_eff_from_dev: float = 0.001
+    offset_pos_to_dev: float = 0.0
+    offset_pos_from_dev: float = 0.0
+    switching_state: DriveState = DriveState.OPERATION_ENABLED
+    homing_timeout: float = 10.0
+    position_mode: int | None = None
+    velocity_mode: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class NodeConfig:
+    """A device of the bus.
+
+    Attributes:
+        name: Key in bus.yml; also the name of its ROS node.
+        node_id: CANopen node id, 1 to 127.
+        driver: Driver class as bus.yml names it, e.g. ``ros2_canopen::Cia402Driver``.
+        namespace: ROS namespace, empty for none.
+        remappings: ROS remappings, from name to name.
+        eds: The EDS or DCF file.
+        dictionary: Its objects, defaults resolved for this node id.
+        identity: Expected identity.
+        heartbeat_producer: Period of the device's heartbeat in [s]; 0 for none.
+        heartbeat_timeout: How long the master waits for a heartbeat in [s]; 0 for no supervision.
+        heartbeat_consumer: The device shall watch the master's heartbeat.
+        mandatory: The network is not operational without it.
+        reset_communication: The device may be reset at boot; false keeps a running one alive.
+        sdo_timeout: How long an SDO answer may take in [s].
+        boot_timeout: How long one boot attempt waits for the device in [s].
+        tpdos: All TPDOs of the device, by ascending number.
+        rpdos: All RPDOs of the device, by ascending number.
+        sdo_writes: The ``sdo`` list of bus.yml.
+        drive: Settings of the CiA 402 drive.
+        line: Line of bus.yml at which the node begins.
+    """
+
+    name: str
+    node_id: int
+    driver: str
+    eds: Path
+    dictionary: ObjectDictionary
+    namespace: str = ''
+    remappings: dict[str, str] = field(default_factory=dict)
+    identity: Identity = Identity()
+    heartbeat_producer: float = 0.0
+    heartbeat_timeout: float = 0.0
+    heartbeat_consumer: bool = False
+    mandatory: bool = False
+    reset_communication: bool = True
+    sdo_timeout: float = 0.02
+    boot_timeout: float = 1.0
+    tpdos: tuple[PdoConfig, ...] = ()
+    rpdos: tuple[PdoConfig, ...] = ()
+    sdo_writes: tuple[SdoWrite, ...] = ()
+    drive: DriveConfig = DriveConfig()
+    line: int = 0
+
+    @property
+    def is_drive(self) -> bool:
+        """The device is driven by the CiA 402 driver."""
+        return 'Cia402' in self.driver
+
+
+@dataclass(frozen=True, slots=True)
+class MasterConfig:
+    """The master's own settings.
+
+    Attributes:
+        node_id: CANopen node id, 1 to 127.
+        name: Key in bus.yml; also the name of its ROS node.
+        driver: Driver class as bus.yml names it.
+        namespace: ROS namespace, empty for none.
+        remappings: ROS remappings, from name to name.
+        bitrate: Bit rate in [bit/s], for the bus load.
+        sync_period: SYNC period in [s]; 0 sends none.
+        sync_overflow: Highest SYNC counter value, 0 for a SYNC without counter.
+        heartbeat_producer: Period of the master's own heartbeat in [s]; 0 for none.
+        start_nodes: The master starts devices when they are booted.
+        boot_timeout: SDO timeout during boot in [s].
+    """
+
+    node_id: int
+    name: str = 'master'
+    driver: str = 'ros2_canopen::MasterDriver'
+    namespace: str = ''
+    remappings: dict[str, str] = field(default_factory=dict)
+    bitrate: int = 1_000_000
+    sync_period: float = 0.0
+    sync_overflow: int = 0
+    heartbeat_producer: float = 0.0
+    start_nodes: bool = True
+    boot_timeout: float = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """Something wrong with a configuration file.
+
+    Attributes:
+        file: The file.
+        line: Line, from 1; 0 when the whole file is meant.
+        key: Path of the key, such as ``nodes.joint1.tpdo.1.mapping``; empty when none applies.
+        message: What is wrong, and with which value.
+        remedy: What to do about it.
+    """
+
+    file: Path
+    line: int
+    key: str
+    message: str
+    remedy: str
+
+    def __str__(self) -> str:
+        """Write it as compilers do: file, line, key, message, remedy."""
+        place = f'{self.file}:{self.line}' if self.line else str(self.file)
+        key = f'{self.key}: ' if self.key else ''
+        remedy = f' ({self.remedy})' if self.remedy else ''
+        return f'{place}: {key}{self.message}{remedy}'
+
+
+@dataclass(frozen=True, slots=True)
+class BusConfig:
+    """A whole bus.
+
+    Attributes:
+        file: The bus.yml that it was read from.
+        master: The master.
+        nodes: The devices in the order of the file.
+        warnings: What was odd but could be understood.
+    """
+
+    file: Path
+    master: MasterConfig
+    nodes: tuple[NodeConfig, ...]
+    warnings: tuple[Problem, ...] = ()
+
+    def node(self, name: str) -> NodeConfig:
+        """Return a device by name.
+
+        Raises:
+            KeyError: No such device; the message lists those that exist.
+        """
+        for node in self.nodes:
+            if node.name == name:
+                return node
+        names = ', '.join(node.name for node in self.nodes)
+        raise KeyError(f'no device {name!r} in {self.file}; it has: {names}')

@@ -1,0 +1,53 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""COB-IDs of the generic pre-defined connection set (CiA 301, 7.3.3, tables 37 and 38)."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+NODE_ID_MIN = 1
+NODE_ID_MAX = 127
+
+COB_ID_INVALID = 0x8000_0000  # bit 31 of a COB-ID object: the service does not exist
+COB_ID_EXTENDED = 0x2000_0000  # bit 29: 29-bit identifier
+SYNC_PRODUCER = 0x4000_0000  # bit 30 of 0x1005: the device generates SYNC
+CAN_ID_MASK = 0x7FF  # 11-bit identifier
+
+
+class CobId(IntEnum):
+    """Function codes as the COB-ID of node 0."""
+
+    NMT = 0x000
+    SYNC = 0x080
+    EMCY = 0x080
+    TIME = 0x100
+    TPDO1 = 0x180
+    RPDO1 = 0x200
+    SDO_RESPONSE = 0x580  # server to client
+    SDO_REQUEST = 0x600  # client to server
+    HEARTBEAT = 0x700
+
+
+def tpdo_default(number: int, node_id: int) -> int:
+    """Return the pre-defined COB-ID of TPDO 1 to 4 of a node.
+
+    Raises:
+        ValueError: The number is not 1 to 4; others have no pre-defined identifier.
+    """
+    return _pdo_default(CobId.TPDO1, number, node_id)
+
+
+def rpdo_default(number: int, node_id: int) -> int:
+    """Return the pre-defined COB-ID of RPDO 1 to 4 of a node.
+
+    Raises:
+        ValueError: The number is not 1 to 4; others have no pre-defined identifier.
+    """
+    return _pdo_default(CobId.RPDO1, number, node_id)
+
+
+def _pdo_default(base: int, number: int, node_id: int) -> int:
+    if not 1 <= number <= 4:
+        raise ValueError(f'PDO {number} has no pre-defined COB-ID; only PDOs 1 to 4 have one')
+    return base + 0x100 * (number - 1) + node_id

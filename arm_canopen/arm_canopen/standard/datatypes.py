@@ -1,0 +1,170 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Data types of CiA 301, 7.4.7 (table 44), and their little-endian encoding (7.1.4)."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+import math
+import struct
+from typing import TypeAlias
+
+from ..exceptions import CodecError
+
+Value: TypeAlias = bool | int | float | str | bytes
+
+
+class DataType(IntEnum):
+    """Static and basic data types by their object dictionary index (CiA 301, table 44)."""
+
+    BOOLEAN = 0x01
+    INTEGER8 = 0x02
+    INTEGER16 = 0x03
+    INTEGER32 = 0x04
+    UNSIGNED8 = 0x05
+    UNSIGNED16 = 0x06
+    UNSIGNED32 = 0x07
+    REAL32 = 0x08
+    VISIBLE_STRING = 0x09
+    OCTET_STRING = 0x0A
+    UNICODE_STRING = 0x0B
+    TIME_OF_DAY = 0x0C
+    TIME_DIFFERENCE = 0x0D
+    DOMAIN = 0x0F
+    INTEGER24 = 0x10
+    REAL64 = 0x11
+    INTEGER40 = 0x12
+    INTEGER48 = 0x13
+    INTEGER56 = 0x14
+    INTEGER64 = 0x15
+    UNSIGNED24 = 0x16
+    UNSIGNED40 = 0x18
+    UNSIGNED48 = 0x19
+    UNSIGNED56 = 0x1A
+    UNSIGNED64 = 0x1B
+
+
+SIGNED_BITS: dict[DataType, int] = {
+    DataType.INTEGER8: 8,
+    DataType.INTEGER16: 16,
+    DataType.INTEGER24: 24,
+    DataType.INTEGER32: 32,
+    DataType.INTEGER40: 40,
+    DataType.INTEGER48: 48,
+    DataType.INTEGER56: 56,
+    DataType.INTEGER64: 64,
+}
+UNSIGNED_BITS: dict[DataType, int] = {
+    DataType.UNSIGNED8: 8,
+    DataType.UNSIGNED16: 16,
+    DataType.UNSIGNED24: 24,
+    DataType.UNSIGNED32: 32,
+    DataType.UNSIGNED40: 40,
+    DataType.UNSIGNED48: 48,
+    DataType.UNSIGNED56: 56,
+    DataType.UNSIGNED64: 64,
+}
+TIME_BITS: dict[DataType, int] = {DataType.TIME_OF_DAY: 48, DataType.TIME_DIFFERENCE: 48}
+REAL_FORMATS: dict[DataType, str] = {DataType.REAL32: '<f', DataType.REAL64: '<d'}
+REAL_BITS: dict[DataType, int] = {DataType.REAL32: 32, DataType.REAL64: 64}
+FIXED_BITS: dict[DataType, int] = {
+    DataType.BOOLEAN: 1,
+    **SIGNED_BITS,
+    **UNSIGNED_BITS,
+    **REAL_BITS,
+    **TIME_BITS,
+}
+
+
+def bit_length(data_type: DataType) -> int | None:
+    """Return the length of a value in [bit], or None for strings and domains."""
+    return FIXED_BITS.get(data_type)
+
+
+def byte_length(data_type: DataType) -> int | None:
+    """Return the length of a value in an SDO in [byte], or None for strings and domains."""
+    bits = FIXED_BITS.get(data_type)
+    return None if bits is None else (bits + 7) // 8
+
+
+def integer_range(data_type: DataType) -> tuple[int, int] | None:
+    """Return the smallest and largest value of an integer type, or None for other types."""
+    if data_type is DataType.BOOLEAN:
+        return 0, 1
+    if (bits := SIGNED_BITS.get(data_type)) is not None:
+        return -(1 << (bits - 1)), (1 << (bits - 1)) - 1
+    if (bits := UNSIGNED_BITS.get(data_type)) is not None:
+        return 0, (1 << bits) - 1
+    return None
+
+
+def encode(data_type: DataType, value: Value) -> bytes:
+    """Encode a value as it travels in an SDO (CiA 301, 7.1.4).
+
+    Args:
+        data_type: Type of the object.
+        value: Number for numeric types, str for strings, bytes for octet strings, times and domains.
+
+    Returns:
+        The bytes, little-endian, of the type's length.
+
+    Raises:
+        CodecError: The value is of another kind or outside the type's range.
+    """
+    if data_type in REAL_FORMATS:
+        return _encode_real(data_type, value)
+    if (limits := integer_range(data_type)) is not None:
+        return _encode_integer(data_type, value, *limits)
+    if isinstance(value, str) and data_type in (DataType.VISIBLE_STRING, DataType.OCTET_STRING):
+        return value.encode('latin-1')
+    if isinstance(value, str) and data_type is DataType.UNICODE_STRING:
+        return value.encode('utf-16-le')
+    if isinstance(value, bytes):
+        expected = byte_length(data_type)
+        if expected in (None, len(value)):
+            return value
+        raise CodecError(f'{data_type.name} takes {expected} bytes, got {len(value)}')
+    raise CodecError(f'{data_type.name} cannot hold {value!r} ({type(value).__name__})')
+
+
+def _encode_real(data_type: DataType, value: Value) -> bytes:
+    if isinstance(value, (str, bytes)):
+        raise CodecError(f'{data_type.name} takes a number, got {value!r}')
+    try:
+        return struct.pack(REAL_FORMATS[data_type], value)
+    except (OverflowError, struct.error) as error:
+        raise CodecError(f'{value!r} does not fit {data_type.name}') from error
+
+
+def _encode_integer(data_type: DataType, value: Value, low: int, high: int) -> bytes:
+    if isinstance(value, float) and math.isfinite(value) and value.is_integer():
+        value = int(value)
+    if not isinstance(value, int):
+        raise CodecError(f'{data_type.name} takes a whole number, got {value!r}')
+    if not low <= value <= high:
+        raise CodecError(f'{value} does not fit {data_type.name} ({low} to {high})')
+    size = (FIXED_BITS[data_type] + 7) // 8
+    return int(value).to_bytes(size, 'little', signed=low < 0)
+
+
+def decode(data_type: DataType, data: bytes) -> Value:
+    """Decode bytes from an SDO into a value; the inverse of :func:`encode`.
+
+    Raises:
+        CodecError: The number of bytes does not fit the type.
+    """
+    expected = byte_length(data_type)
+    if expected is not None and len(data) != expected:
+        raise CodecError(f'{data_type.name} takes {expected} bytes, got {len(data)}')
+    if data_type in REAL_FORMATS:
+        (real,) = struct.unpack(REAL_FORMATS[data_type], data)
+        return float(real)
+    if data_type is DataType.BOOLEAN:
+        return data[0] != 0
+    if data_type in SIGNED_BITS or data_type in UNSIGNED_BITS:
+        return int.from_bytes(data, 'little', signed=data_type in SIGNED_BITS)
+    if data_type is DataType.VISIBLE_STRING:
+        return data.decode('latin-1')
+    if data_type is DataType.UNICODE_STRING:
+        return data.decode('utf-16-le', errors='replace')
+    return data

@@ -1,0 +1,135 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The object dictionary as a description (CiA 301, 7.4): what a device has, not its present values."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from enum import Enum, IntEnum
+
+from .datatypes import DataType, Value
+
+
+class AccessType(Enum):
+    """Who may read or write an object (CiA 306-1, AccessType)."""
+
+    READ_ONLY = 'ro'
+    WRITE_ONLY = 'wo'
+    READ_WRITE = 'rw'
+    READ_WRITE_TPDO = 'rwr'
+    READ_WRITE_RPDO = 'rww'
+    CONSTANT = 'const'
+
+    @property
+    def readable(self) -> bool:
+        """Whether an SDO upload is allowed."""
+        return self is not AccessType.WRITE_ONLY
+
+    @property
+    def writable(self) -> bool:
+        """Whether an SDO download is allowed."""
+        return self not in (AccessType.READ_ONLY, AccessType.CONSTANT)
+
+
+class ObjectCode(IntEnum):
+    """Kind of an object (CiA 301, table 42)."""
+
+    NULL = 0
+    DOMAIN = 2
+    DEFTYPE = 5
+    DEFSTRUCT = 6
+    VAR = 7
+    ARRAY = 8
+    RECORD = 9
+
+
+@dataclass(frozen=True, slots=True)
+class ObjectEntry:
+    """One sub-index of the object dictionary.
+
+    Attributes:
+        index: Object index.
+        subindex: Sub-index, 0 for a VAR.
+        name: ParameterName of the EDS.
+        data_type: Type of the value.
+        access: Who may read or write.
+        default: Value after a reset, None when the EDS gives none.
+        node_relative: The default is to be added to the node id (``$NODEID+...``).
+        low_limit: Smallest allowed value, None for the type's own.
+        high_limit: Largest allowed value, None for the type's own.
+        pdo_mappable: May be mapped into a PDO.
+        line: Line of the EDS that defines it, 0 when it comes from elsewhere.
+    """
+
+    index: int
+    subindex: int
+    name: str
+    data_type: DataType
+    access: AccessType = AccessType.READ_WRITE
+    default: Value | None = None
+    node_relative: bool = False
+    low_limit: int | float | None = None
+    high_limit: int | float | None = None
+    pdo_mappable: bool = False
+    line: int = 0
+
+    @property
+    def address(self) -> tuple[int, int]:
+        """Index and sub-index."""
+        return self.index, self.subindex
+
+    def __str__(self) -> str:
+        """Name the object as a person would: ``0x6041:00 Statusword``."""
+        return f'0x{self.index:04X}:{self.subindex:02X} {self.name}'
+
+
+class ObjectDictionary:
+    """All entries of a device by index and sub-index, in ascending order.
+
+    Attributes:
+        source: Where it was read from, for messages.
+    """
+
+    def __init__(self, entries: Iterable[ObjectEntry], *, source: str = 'object dictionary') -> None:
+        """Collect the entries; of two with one address the later counts."""
+        self.source = source
+        self._entries = {entry.address: entry for entry in sorted(entries, key=lambda e: e.address)}
+        self._indices = frozenset(index for index, _ in self._entries)
+
+    def __iter__(self) -> Iterator[ObjectEntry]:
+        """Iterate in ascending order of index and sub-index."""
+        return iter(self._entries.values())
+
+    def __len__(self) -> int:
+        """Count the entries."""
+        return len(self._entries)
+
+    def __contains__(self, address: tuple[int, int]) -> bool:
+        """Tell whether the sub-index exists."""
+        return address in self._entries
+
+    def get(self, index: int, subindex: int = 0) -> ObjectEntry | None:
+        """Return the entry, or None when the device has no such object."""
+        return self._entries.get((index, subindex))
+
+    def has_index(self, index: int) -> bool:
+        """Tell whether any sub-index of this index exists."""
+        return index in self._indices
+
+    def subindices(self, index: int) -> list[ObjectEntry]:
+        """Return all entries of one index, ascending."""
+        return [entry for entry in self if entry.index == index]
+
+    def for_node(self, node_id: int) -> ObjectDictionary:
+        """Return a copy whose node-relative defaults are resolved for a node id."""
+        return ObjectDictionary(
+            (_resolved(entry, node_id) for entry in self), source=self.source
+        )
+
+
+def _resolved(entry: ObjectEntry, node_id: int) -> ObjectEntry:
+    if not entry.node_relative:
+        return entry
+    offset = entry.default if isinstance(entry.default, int) else 0
+    return replace(entry, default=offset + node_id, node_relative=False)

@@ -1,0 +1,148 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Vocabulary of the drive profile: states, words and modes (CiA 402-2, clauses 6 to 8)."""
+
+from __future__ import annotations
+
+from enum import IntEnum, IntFlag
+
+
+class DriveState(IntEnum):
+    """States of the power drive system (CiA 402-2, figure 4); numbers as ros2_canopen counts them."""
+
+    UNKNOWN = 0
+    NOT_READY_TO_SWITCH_ON = 1
+    SWITCH_ON_DISABLED = 2
+    READY_TO_SWITCH_ON = 3
+    SWITCHED_ON = 4
+    OPERATION_ENABLED = 5
+    QUICK_STOP_ACTIVE = 6
+    FAULT_REACTION_ACTIVE = 7
+    FAULT = 8
+
+    @property
+    def title(self) -> str:
+        """Name as the standard writes it."""
+        return self.name.replace('_', ' ').capitalize()
+
+
+class Controlword(IntFlag):
+    """Bits of 0x6040 (CiA 402-2, table 25); those from 4 to 6 and 9 are named by their mode."""
+
+    SWITCH_ON = 1 << 0
+    ENABLE_VOLTAGE = 1 << 1
+    QUICK_STOP = 1 << 2  # active low
+    ENABLE_OPERATION = 1 << 3
+    NEW_SET_POINT = 1 << 4  # profile position
+    HOMING_START = 1 << 4  # homing
+    ENABLE_INTERPOLATION = 1 << 4  # interpolated position
+    CHANGE_IMMEDIATELY = 1 << 5  # profile position
+    RELATIVE = 1 << 6  # profile position
+    FAULT_RESET = 1 << 7  # rising edge
+    HALT = 1 << 8
+    CHANGE_ON_SET_POINT = 1 << 9  # profile position
+
+
+class Statusword(IntFlag):
+    """Bits of 0x6041 (CiA 402-2, table 30); bits 12 and 13 are named by their mode."""
+
+    READY_TO_SWITCH_ON = 1 << 0
+    SWITCHED_ON = 1 << 1
+    OPERATION_ENABLED = 1 << 2
+    FAULT = 1 << 3
+    VOLTAGE_ENABLED = 1 << 4
+    QUICK_STOP = 1 << 5  # active low
+    SWITCH_ON_DISABLED = 1 << 6
+    WARNING = 1 << 7
+    REMOTE = 1 << 9
+    TARGET_REACHED = 1 << 10
+    INTERNAL_LIMIT = 1 << 11
+    SET_POINT_ACKNOWLEDGE = 1 << 12  # profile position
+    HOMING_ATTAINED = 1 << 12  # homing
+    INTERPOLATION_ACTIVE = 1 << 12  # interpolated position
+    FOLLOWS_COMMAND = 1 << 12  # cyclic synchronous modes
+    ZERO_SPEED = 1 << 12  # profile velocity
+    FOLLOWING_ERROR = 1 << 13  # position modes
+    HOMING_ERROR = 1 << 13  # homing
+
+
+STATE_MASKS: tuple[tuple[int, int, DriveState], ...] = (
+    (0x4F, 0x00, DriveState.NOT_READY_TO_SWITCH_ON),
+    (0x4F, 0x40, DriveState.SWITCH_ON_DISABLED),
+    (0x6F, 0x21, DriveState.READY_TO_SWITCH_ON),
+    (0x6F, 0x23, DriveState.SWITCHED_ON),
+    (0x6F, 0x27, DriveState.OPERATION_ENABLED),
+    (0x6F, 0x07, DriveState.QUICK_STOP_ACTIVE),
+    (0x4F, 0x0F, DriveState.FAULT_REACTION_ACTIVE),
+    (0x4F, 0x08, DriveState.FAULT),
+)
+"""Mask, value and state (CiA 402-2, table 31)."""
+
+STATE_WORDS: dict[DriveState, int] = {state: value for _, value, state in STATE_MASKS}
+"""The state bits that a drive shows in each state."""
+
+
+def _decode_state(statusword: int) -> DriveState:
+    for mask, value, state in STATE_MASKS:
+        if statusword & mask == value:
+            return state
+    return DriveState.UNKNOWN
+
+
+_STATE_BY_LOW_BITS = tuple(_decode_state(word) for word in range(0x80))
+
+
+def drive_state(statusword: int) -> DriveState:
+    """Return the state that a statusword shows, UNKNOWN when no row of the table fits."""
+    return _STATE_BY_LOW_BITS[statusword & 0x7F]
+
+
+class OperationMode(IntEnum):
+    """Values of 0x6060 and 0x6061 (CiA 402-2, table 36)."""
+
+    NO_MODE = 0
+    PROFILE_POSITION = 1
+    VELOCITY = 2
+    PROFILE_VELOCITY = 3
+    PROFILE_TORQUE = 4
+    HOMING = 6
+    INTERPOLATED_POSITION = 7
+    CYCLIC_POSITION = 8
+    CYCLIC_VELOCITY = 9
+    CYCLIC_TORQUE = 10
+
+    @property
+    def title(self) -> str:
+        """Name as a person writes it."""
+        return self.name.replace('_', ' ').capitalize()
+
+    @property
+    def support_bit(self) -> int:
+        """Bit of this mode in 0x6502 (CiA 402-2, figure 48); 0 for no mode."""
+        return 1 << (self - 1) if self else 0
+
+
+def mode_title(number: int) -> str:
+    """Name a mode, also one that the standard does not know (vendor modes are negative)."""
+    try:
+        return OperationMode(number).title
+    except ValueError:
+        return f'Mode {number}'
+
+
+STATUS_TEXTS: tuple[tuple[Statusword, str], ...] = (
+    (Statusword.FAULT, 'fault'),
+    (Statusword.VOLTAGE_ENABLED, 'voltage enabled'),
+    (Statusword.WARNING, 'warning'),
+    (Statusword.REMOTE, 'remote'),
+    (Statusword.TARGET_REACHED, 'target reached'),
+    (Statusword.INTERNAL_LIMIT, 'internal limit active'),
+)
+"""Bits that say something beside the state, in the order of the word."""
+
+
+def statusword_text(statusword: int) -> str:
+    """Say a statusword in words: its state and the bits that are set beside it."""
+    bits = [text for bit, text in STATUS_TEXTS if statusword & bit]
+    extra = f' ({", ".join(bits)})' if bits else ''
+    return f'0x{statusword:04X} {drive_state(statusword).title}{extra}'

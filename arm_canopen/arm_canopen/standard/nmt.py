@@ -1,0 +1,47 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Network management: commands, states and heartbeats (CiA 301, 7.2.8)."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+
+class NmtCommand(IntEnum):
+    """Command specifier of an NMT node control frame (CiA 301, 7.2.8.3.1)."""
+
+    START = 0x01
+    STOP = 0x02
+    ENTER_PRE_OPERATIONAL = 0x80
+    RESET_NODE = 0x81
+    RESET_COMMUNICATION = 0x82
+
+
+class NmtState(IntEnum):
+    """NMT state as a heartbeat carries it (CiA 301, 7.2.8.3.2.2)."""
+
+    BOOT_UP = 0x00
+    STOPPED = 0x04
+    OPERATIONAL = 0x05
+    PRE_OPERATIONAL = 0x7F
+
+
+ALL_NODES = 0
+
+
+def nmt_frame(command: NmtCommand, node_id: int = ALL_NODES) -> bytes:
+    """Return the data of an NMT command for one node, or for all with id 0."""
+    return bytes((command, node_id))
+
+
+def parse_heartbeat(data: bytes) -> NmtState | None:
+    """Return the state in a heartbeat or boot-up frame, None when it is none.
+
+    Bit 7 (the toggle bit of node guarding) is ignored.
+    """
+    if len(data) != 1:
+        return None
+    try:
+        return NmtState(data[0] & 0x7F)
+    except ValueError:
+        return None

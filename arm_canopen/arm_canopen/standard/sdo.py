@@ -1,0 +1,297 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""SDO frames, expedited and segmented (CiA 301, 7.2.4.3), for client and server alike.
+
+Each message is a value with ``encode()``; ``decode_request`` reads what a client sent,
+``decode_response`` what a server sent. The block protocol is refused with its abort code.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+import struct
+from typing import TypeAlias
+
+from ..exceptions import CodecError
+
+EXPEDITED_MAX = 4  # [byte]
+SEGMENT_MAX = 7  # [byte]
+
+
+class AbortCode(IntEnum):
+    """SDO abort codes (CiA 301, table 22)."""
+
+    TOGGLE_BIT = 0x0503_0000
+    TIMED_OUT = 0x0504_0000
+    COMMAND_SPECIFIER = 0x0504_0001
+    BLOCK_SIZE = 0x0504_0002
+    SEQUENCE_NUMBER = 0x0504_0003
+    CRC = 0x0504_0004
+    OUT_OF_MEMORY = 0x0504_0005
+    UNSUPPORTED_ACCESS = 0x0601_0000
+    WRITE_ONLY = 0x0601_0001
+    READ_ONLY = 0x0601_0002
+    NO_OBJECT = 0x0602_0000
+    NOT_MAPPABLE = 0x0604_0041
+    PDO_LENGTH = 0x0604_0042
+    PARAMETER_INCOMPATIBLE = 0x0604_0043
+    INTERNAL_INCOMPATIBLE = 0x0604_0047
+    HARDWARE = 0x0606_0000
+    LENGTH = 0x0607_0010
+    LENGTH_HIGH = 0x0607_0012
+    LENGTH_LOW = 0x0607_0013
+    NO_SUBINDEX = 0x0609_0011
+    VALUE_RANGE = 0x0609_0030
+    VALUE_HIGH = 0x0609_0031
+    VALUE_LOW = 0x0609_0032
+    MAXIMUM_BELOW_MINIMUM = 0x0609_0036
+    RESOURCE_UNAVAILABLE = 0x060A_0023
+    GENERAL = 0x0800_0000
+    DATA_TRANSFER = 0x0800_0020
+    LOCAL_CONTROL = 0x0800_0021
+    DEVICE_STATE = 0x0800_0022
+    NO_DICTIONARY = 0x0800_0023
+    NO_DATA = 0x0800_0024
+
+
+ABORT_TEXTS: dict[AbortCode, str] = {
+    AbortCode.TOGGLE_BIT: 'toggle bit not alternated',
+    AbortCode.TIMED_OUT: 'SDO protocol timed out',
+    AbortCode.COMMAND_SPECIFIER: 'command specifier not valid or unknown',
+    AbortCode.BLOCK_SIZE: 'invalid block size',
+    AbortCode.SEQUENCE_NUMBER: 'invalid sequence number',
+    AbortCode.CRC: 'CRC error',
+    AbortCode.OUT_OF_MEMORY: 'out of memory',
+    AbortCode.UNSUPPORTED_ACCESS: 'unsupported access to an object',
+    AbortCode.WRITE_ONLY: 'attempt to read a write-only object',
+    AbortCode.READ_ONLY: 'attempt to write a read-only object',
+    AbortCode.NO_OBJECT: 'object does not exist in the object dictionary',
+    AbortCode.NOT_MAPPABLE: 'object cannot be mapped to the PDO',
+    AbortCode.PDO_LENGTH: 'mapped objects would exceed the PDO length',
+    AbortCode.PARAMETER_INCOMPATIBLE: 'general parameter incompatibility',
+    AbortCode.INTERNAL_INCOMPATIBLE: 'general internal incompatibility in the device',
+    AbortCode.HARDWARE: 'access failed due to a hardware error',
+    AbortCode.LENGTH: 'data type does not match, length does not match',
+    AbortCode.LENGTH_HIGH: 'data type does not match, length too high',
+    AbortCode.LENGTH_LOW: 'data type does not match, length too low',
+    AbortCode.NO_SUBINDEX: 'sub-index does not exist',
+    AbortCode.VALUE_RANGE: 'invalid value for parameter',
+    AbortCode.VALUE_HIGH: 'value of parameter written too high',
+    AbortCode.VALUE_LOW: 'value of parameter written too low',
+    AbortCode.MAXIMUM_BELOW_MINIMUM: 'maximum value is less than minimum value',
+    AbortCode.RESOURCE_UNAVAILABLE: 'resource not available: SDO connection',
+    AbortCode.GENERAL: 'general error',
+    AbortCode.DATA_TRANSFER: 'data cannot be transferred or stored to the application',
+    AbortCode.LOCAL_CONTROL: 'data cannot be transferred because of local control',
+    AbortCode.DEVICE_STATE: 'data cannot be transferred in the present device state',
+    AbortCode.NO_DICTIONARY: 'object dictionary not present',
+    AbortCode.NO_DATA: 'no data available',
+}
+"""Meaning of the abort codes (CiA 301, table 22)."""
+
+
+def abort_text(code: int) -> str:
+    """Say an abort code in words."""
+    try:
+        return f'{ABORT_TEXTS[AbortCode(code)]} (0x{code:08X})'
+    except ValueError:
+        return f'unknown abort code 0x{code:08X}'
+
+
+@dataclass(frozen=True, slots=True)
+class DownloadRequest:
+    """Initiate a write: expedited when ``data`` is given, else segmented.
+
+    Attributes:
+        index: Object index.
+        subindex: Sub-index.
+        data: The whole value of an expedited transfer, else None.
+        size: Length of the value in [byte] if the frame tells it; without it the server takes
+            from expedited data as many bytes as its object has.
+    """
+
+    index: int
+    subindex: int
+    data: bytes | None
+    size: int | None = None
+
+    def encode(self) -> bytes:
+        """Return the 8 bytes of the frame."""
+        return _encode_initiate(0x20, self.index, self.subindex, self.data, self.size)
+
+
+@dataclass(frozen=True, slots=True)
+class UploadResponse:
+    """Answer to a read: expedited when ``data`` is given, else segmented.
+
+    Attributes:
+        index: Object index.
+        subindex: Sub-index.
+        data: The whole value of an expedited transfer, else None.
+        size: Length of the value in [byte] if the frame tells it.
+    """
+
+    index: int
+    subindex: int
+    data: bytes | None
+    size: int | None = None
+
+    def encode(self) -> bytes:
+        """Return the 8 bytes of the frame."""
+        return _encode_initiate(0x40, self.index, self.subindex, self.data, self.size)
+
+
+@dataclass(frozen=True, slots=True)
+class DownloadResponse:
+    """A write was initiated or, if expedited, done."""
+
+    index: int
+    subindex: int
+
+    def encode(self) -> bytes:
+        """Return the 8 bytes of the frame."""
+        return struct.pack('<BHB4x', 0x60, self.index, self.subindex)
+
+
+@dataclass(frozen=True, slots=True)
+class UploadRequest:
+    """Initiate a read."""
+
+    index: int
+    subindex: int
+
+    def encode(self) -> bytes:
+        """Return the 8 bytes of the frame."""
+        return struct.pack('<BHB4x', 0x40, self.index, self.subindex)
+
+
+@dataclass(frozen=True, slots=True)
+class Segment:
+    """Up to seven bytes of a segmented transfer, in either direction."""
+
+    toggle: bool
+    data: bytes
+    last: bool
+
+    def encode(self) -> bytes:
+        """Return the 8 bytes of the frame."""
+        unused = SEGMENT_MAX - len(self.data)
+        command = self.toggle << 4 | unused << 1 | self.last
+        return bytes((command,)) + self.data + bytes(unused)
+
+
+@dataclass(frozen=True, slots=True)
+class UploadSegmentRequest:
+    """Ask for the next segment of a read."""
+
+    toggle: bool
+
+    def encode(self) -> bytes:
+        """Return the 8 bytes of the frame."""
+        return bytes((0x60 | self.toggle << 4,)) + bytes(7)
+
+
+@dataclass(frozen=True, slots=True)
+class DownloadSegmentResponse:
+    """A segment of a write was taken."""
+
+    toggle: bool
+
+    def encode(self) -> bytes:
+        """Return the 8 bytes of the frame."""
+        return bytes((0x20 | self.toggle << 4,)) + bytes(7)
+
+
+@dataclass(frozen=True, slots=True)
+class Abort:
+    """Either side ends the transfer."""
+
+    index: int
+    subindex: int
+    code: int
+
+    def encode(self) -> bytes:
+        """Return the 8 bytes of the frame."""
+        return struct.pack('<BHBI', 0x80, self.index, self.subindex, self.code)
+
+
+Request: TypeAlias = DownloadRequest | UploadRequest | Segment | UploadSegmentRequest | Abort
+Response: TypeAlias = (
+    DownloadResponse | UploadResponse | Segment | DownloadSegmentResponse | Abort
+)
+
+
+def _encode_initiate(
+    specifier: int, index: int, subindex: int, data: bytes | None, size: int | None
+) -> bytes:
+    indicated = size is not None
+    if data is None:
+        return struct.pack('<BHBI', specifier | indicated, index, subindex, size or 0)
+    unused = EXPEDITED_MAX - len(data)
+    told = unused << 2 | 0x01 if indicated else 0
+    return struct.pack('<BHB', specifier | 0x02 | told, index, subindex) + data + bytes(unused)
+
+
+def _decode_initiate(data: bytes) -> tuple[int, int, bytes | None, int | None]:
+    command, index, subindex, size = struct.unpack('<BHBI', data)
+    indicated = bool(command & 0x01)
+    if not command & 0x02:
+        return index, subindex, None, size if indicated else None
+    if not indicated:
+        return index, subindex, data[4:], None
+    length = EXPEDITED_MAX - (command >> 2 & 0x03)
+    return index, subindex, data[4 : 4 + length], length
+
+
+def _decode_segment(data: bytes) -> Segment:
+    command = data[0]
+    length = SEGMENT_MAX - (command >> 1 & 0x07)
+    return Segment(bool(command & 0x10), data[1 : 1 + length], bool(command & 0x01))
+
+
+def _check_length(data: bytes) -> None:
+    if len(data) != 8:
+        raise CodecError(f'an SDO frame has 8 bytes, got {len(data)}')
+
+
+def decode_request(data: bytes) -> Request:
+    """Read a frame from a client.
+
+    Raises:
+        CodecError: It has not 8 bytes or its command specifier is unknown.
+    """
+    _check_length(data)
+    match data[0] >> 5:
+        case 0:
+            return _decode_segment(data)
+        case 1:
+            return DownloadRequest(*_decode_initiate(data))
+        case 2:
+            return UploadRequest(*struct.unpack('<xHB4x', data))
+        case 3:
+            return UploadSegmentRequest(bool(data[0] & 0x10))
+        case 4:
+            return Abort(*struct.unpack('<xHBI', data))
+    raise CodecError(f'SDO client command specifier {data[0] >> 5} is not supported')
+
+
+def decode_response(data: bytes) -> Response:
+    """Read a frame from a server.
+
+    Raises:
+        CodecError: It has not 8 bytes or its command specifier is unknown.
+    """
+    _check_length(data)
+    match data[0] >> 5:
+        case 0:
+            return _decode_segment(data)
+        case 1:
+            return DownloadSegmentResponse(bool(data[0] & 0x10))
+        case 2:
+            return UploadResponse(*_decode_initiate(data))
+        case 3:
+            return DownloadResponse(*struct.unpack('<xHB4x', data))
+        case 4:
+            return Abort(*struct.unpack('<xHBI', data))
+    raise CodecError(f'SDO server command specifier {data[0] >> 5} is not supported')
