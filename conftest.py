@@ -1,0 +1,15 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Makes one pytest run over all packages possible.
+
+In importlib mode pytest names a test `<folder>.test.<file>`; when nothing of the name `<folder>`
+is imported yet, it registers the folder as an empty namespace. A colcon package's folder has the
+name of the Python package inside it, which would then be hidden; so the real ones come first.
+"""
+
+import importlib
+from pathlib import Path
+
+for _marker in Path(__file__).parent.glob('*/resource/*'):
+    if (_marker.parents[1] / _marker.name / '__init__.py').is_file():
+        importlib.import_module(_marker.name)
