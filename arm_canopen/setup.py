@@ -1,0 +1,34 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Build description of arm_canopen."""
+
+from glob import glob
+
+from setuptools import find_packages, setup
+
+setup(
+    name='arm_canopen',
+    version='0.1.0',
+    packages=find_packages(include=['arm_canopen', 'arm_canopen.*']),
+    package_data={'arm_canopen': ['py.typed']},
+    data_files=[
+        ('share/ament_index/resource_index/packages', ['resource/arm_canopen']),
+        ('share/arm_canopen', ['package.xml']),
+        ('share/arm_canopen/eds', glob('eds/*')),
+    ],
+    install_requires=['setuptools'],
+    zip_safe=True,
+    maintainer='The arm and quad developers',
+    maintainer_email='developers@example.org',
+    description='CANopen master, CiA 402 drives and simulated slaves for ROS 2',
+    license='Apache-2.0',
+    entry_points={
+        'console_scripts': [
+            'candump = arm_canopen.nodes.candump:main',
+            'canopen_joint_state_publisher = arm_canopen.nodes.joint_state_publisher:main',
+            'fake_slave = arm_canopen.nodes.fake_slave:main',
+            'fake_slaves = arm_canopen.nodes.fake_slaves:main',
+            'master = arm_canopen.nodes.master:main',
+        ],
+    },
+)
