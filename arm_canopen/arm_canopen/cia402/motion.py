@@ -1,0 +1,70 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Motion sources: what asks the drives to move, once a cycle, in step with SYNC."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from ..standard.drive import DriveState
+
+
+@dataclass(frozen=True, slots=True)
+class AxisFeedback:
+    """What is known of one drive at the start of a cycle.
+
+    Attributes:
+        name: Name of the drive in bus.yml.
+        online: Booted, and its heartbeat is there.
+        state: State of the power drive system.
+        mode: Mode of operation as displayed in 0x6061.
+        position: Actual position in user units (rad for a revolute joint).
+        velocity: Actual velocity in user units per second.
+        setpoint: Position last commanded in user units; equals ``position`` while disabled.
+        followable: A position set-point of a source would be obeyed this cycle: the drive is
+            online, Operation Enabled and in a cyclic position mode, and nothing else moves it.
+    """
+
+    name: str
+    online: bool
+    state: DriveState
+    mode: int
+    position: float
+    velocity: float
+    setpoint: float
+    followable: bool
+
+
+class MotionSource(Protocol):
+    """Something that commands positions of one or more drives, cycle by cycle.
+
+    It runs in the thread of the SYNC cycle: it must not block, wait or call ROS.
+    """
+
+    @property
+    def axes(self) -> Sequence[str]:
+        """Names of the drives that it commands, fixed for its life."""
+
+    def update(
+        self, now: float, period: float, feedback: Sequence[AxisFeedback]
+    ) -> Sequence[float | None]:
+        """Answer the set-points of this cycle.
+
+        A new stream must start at ``feedback[i].setpoint``; a set-point for an axis that is not
+        ``followable`` is ignored.
+
+        Args:
+            now: Steady time of the cycle in [s].
+            period: Time to the next cycle in [s].
+            feedback: State of each axis, in the order of :attr:`axes`.
+
+        Returns:
+            For each axis the position to command in user units, or None to leave it where it is.
+        """
+
+    def released(self, axis: str, reason: str) -> None:
+        """An axis was taken away (single target, mode change, fault, loss); until attached
+        again, its set-points are ignored.
+        """
