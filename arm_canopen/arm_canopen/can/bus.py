@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-from .frame import Frame
+from .frame import EXTENDED_ID_MAX, Frame, PAYLOAD_MAX, STANDARD_ID_MAX
 
 
 @dataclass(slots=True)
@@ -24,12 +24,14 @@ class BusCounters:
         received: Frames from others.
         lost: Frames that the kernel dropped because the receive buffer was full.
         send_errors: Frames that the interface refused.
+        malformed: Received messages that are no classic CAN frame, and were dropped.
     """
 
     sent: int = 0
     received: int = 0
     lost: int = 0
     send_errors: int = 0
+    malformed: int = 0
 
 
 class Bus(ABC):
@@ -90,3 +92,16 @@ class Bus(ABC):
     ) -> None:
         """Close it."""
         self.close()
+
+
+def checked(frame: Frame) -> Frame:
+    """Return the frame when it is a classic CAN frame.
+
+    Raises:
+        ValueError: The identifier is out of range or the payload too long.
+    """
+    if not 0 <= frame.can_id <= (EXTENDED_ID_MAX if frame.is_extended else STANDARD_ID_MAX):
+        raise ValueError(f'CAN identifier 0x{frame.can_id:X} is out of range')
+    if len(frame.data) > PAYLOAD_MAX:
+        raise ValueError(f'a CAN frame carries at most {PAYLOAD_MAX} bytes, got {len(frame.data)}')
+    return frame

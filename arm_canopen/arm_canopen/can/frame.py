@@ -6,6 +6,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+STANDARD_ID_MAX = 0x7FF  # 11 bits
+EXTENDED_ID_MAX = 0x1FFF_FFFF  # 29 bits
+PAYLOAD_MAX = 8  # [byte]
+
 
 class Frame(NamedTuple):
     """A classic CAN frame (ISO 11898-1). A tuple, because thousands are made each second.

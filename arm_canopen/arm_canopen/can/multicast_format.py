@@ -1,0 +1,169 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The datagram of python-can's ``udp_multicast`` interface: one frame as a msgpack map.
+
+The map has eleven keys in a fixed order, of which only the identifier, the length and the payload
+differ between the data frames of a CANopen bus. So those are joined from ready-made pieces, and
+read by comparing the pieces; every other order, key or type goes through msgpack itself. The bytes
+are those that python-can 4 writes for the same frame.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+import struct
+
+import msgpack
+
+from ..exceptions import CodecError
+from .frame import EXTENDED_ID_MAX, Frame, PAYLOAD_MAX, STANDARD_ID_MAX
+
+# msgpack: 0x80|n map, 0xA0|n short string, 0xC0 nil, 0xC2/0xC3 false/true, 0xC4 n bytes,
+# 0xCB float64, 0xCC/0xCD/0xCE unsigned integer of 8/16/32 bits
+_BOOL = (b'\xc2', b'\xc3')
+
+
+def _key(name: str) -> bytes:
+    return bytes((0xA0 | len(name),)) + name.encode()
+
+
+def _unsigned(number: int) -> bytes:
+    if number < 0x80:
+        return bytes((number,))
+    if number < 0x100:
+        return struct.pack('>BB', 0xCC, number)
+    if number < 0x10000:
+        return struct.pack('>BH', 0xCD, number)
+    return struct.pack('>BI', 0xCE, number)
+
+
+def _flags(is_extended: bool, is_remote: bool, is_error: bool) -> bytes:
+    return (
+        _key('is_extended_id')
+        + _BOOL[is_extended]
+        + _key('is_remote_frame')
+        + _BOOL[is_remote]
+        + _key('is_error_frame')
+        + _BOOL[is_error]
+        + _key('channel')
+        + b'\xc0'
+        + _key('dlc')
+    )
+
+
+_START = b'\x8b' + _key('timestamp') + b'\xcb'
+_STAMP_SIZE = 8  # [byte]; 0.0, because receivers stamp for themselves
+_ID_KEY = _key('arbitration_id')
+_HEAD = _START + bytes(_STAMP_SIZE) + _ID_KEY
+_ID_KEY_AT = len(_START) + _STAMP_SIZE
+_ID_AT = len(_HEAD)
+_LENGTHS = tuple(
+    bytes((size,)) + _key('data') + bytes((0xC4, size)) for size in range(PAYLOAD_MAX + 1)
+)
+"""Length code, key and header of the payload, by its length in [byte]."""
+_LENGTH_SIZE = len(_LENGTHS[0])
+_TAIL = (
+    _key('is_fd')
+    + _BOOL[False]
+    + _key('bitrate_switch')
+    + _BOOL[False]
+    + _key('error_state_indicator')
+    + _BOOL[False]
+)
+_TAIL_SIZE = len(_TAIL)
+_PLAIN_FLAGS = _flags(is_extended=False, is_remote=False, is_error=False)
+_PLAIN_HEADS = tuple(
+    _HEAD + _unsigned(can_id) + _PLAIN_FLAGS for can_id in range(STANDARD_ID_MAX + 1)
+)
+"""Everything before the length of a data frame, by its 11-bit identifier."""
+
+
+def encode(frame: Frame) -> bytes:
+    """Return the datagram of a frame.
+
+    Raises:
+        ValueError: The identifier or the payload does not fit a classic CAN frame.
+    """
+    if not 0 <= frame.can_id <= (EXTENDED_ID_MAX if frame.is_extended else STANDARD_ID_MAX):
+        raise ValueError(f'CAN identifier 0x{frame.can_id:X} is out of range')
+    data = frame.data
+    if len(data) > PAYLOAD_MAX:
+        raise ValueError(f'a CAN frame carries at most {PAYLOAD_MAX} bytes, got {len(data)}')
+    if frame.is_extended or frame.is_remote or frame.is_error:
+        head = _HEAD + _unsigned(frame.can_id) + _flags(*frame[3:])
+    else:
+        head = _PLAIN_HEADS[frame.can_id]
+    return b''.join((head, _LENGTHS[len(data)], data, _TAIL))
+
+
+def decode(datagram: bytes, timestamp: float) -> Frame:
+    """Read a datagram.
+
+    Args:
+        datagram: What was received.
+        timestamp: Time of reception on the steady clock in [s]; the one inside is the sender's.
+
+    Raises:
+        CodecError: It is no classic CAN frame.
+    """
+    frame = _decode_plain(datagram, timestamp)
+    return _decode_any(datagram, timestamp) if frame is None else frame
+
+
+def _decode_plain(datagram: bytes, timestamp: float) -> Frame | None:
+    """Read a data frame with an 11-bit identifier in the usual layout; None for all others."""
+    if (
+        len(datagram) < len(_PLAIN_HEADS[0]) + _LENGTH_SIZE + _TAIL_SIZE
+        or datagram[_ID_KEY_AT:_ID_AT] != _ID_KEY
+        or not datagram.startswith(_START)
+    ):
+        return None
+    can_id = datagram[_ID_AT]
+    flags_at = _ID_AT + 1
+    if can_id == 0xCD:
+        can_id = datagram[flags_at] << 8 | datagram[flags_at + 1]
+        flags_at += 2
+    elif can_id == 0xCC:
+        can_id = datagram[flags_at]
+        flags_at += 1
+    length_at = flags_at + len(_PLAIN_FLAGS)
+    data_at = length_at + _LENGTH_SIZE
+    data = datagram[data_at:-_TAIL_SIZE]
+    if (
+        can_id > STANDARD_ID_MAX
+        or len(data) > PAYLOAD_MAX
+        or datagram[length_at:data_at] != _LENGTHS[len(data)]
+        or datagram[flags_at:length_at] != _PLAIN_FLAGS
+        or not datagram.endswith(_TAIL)
+    ):
+        return None
+    return Frame(can_id, data, timestamp)
+
+
+def _decode_any(datagram: bytes, timestamp: float) -> Frame:
+    try:
+        fields = msgpack.unpackb(datagram, raw=False)
+    except (ValueError, TypeError) as error:
+        raise CodecError(f'datagram of {len(datagram)} bytes is no msgpack: {error}') from error
+    if not isinstance(fields, dict):
+        raise CodecError(f'datagram holds a {type(fields).__name__}, not the map of a CAN frame')
+    if _flag(fields, 'is_fd', default=False):
+        raise CodecError('CAN FD frames are not supported')
+    is_extended = _flag(fields, 'is_extended_id', default=True)
+    is_remote = _flag(fields, 'is_remote_frame', default=False)
+    can_id = fields.get('arbitration_id', 0)
+    data = fields.get('data') or b''
+    if not isinstance(can_id, int) or not isinstance(data, bytes) or len(data) > PAYLOAD_MAX:
+        raise CodecError(f'CAN frame with identifier {can_id!r} and payload {data!r}')
+    if not 0 <= can_id <= (EXTENDED_ID_MAX if is_extended else STANDARD_ID_MAX):
+        raise CodecError(f'CAN identifier 0x{can_id:X} is out of range')
+    is_error = _flag(fields, 'is_error_frame', default=False)
+    return Frame(can_id, b'' if is_remote else data, timestamp, is_extended, is_remote, is_error)
+
+
+def _flag(fields: Mapping[object, object], name: str, *, default: bool) -> bool:
+    """Return a flag of the map; the defaults are those of python-can's message."""
+    value = fields.get(name, default)
+    if not isinstance(value, bool):
+        raise CodecError(f'{name} of a CAN frame is {value!r}, not true or false')
+    return value

@@ -1,0 +1,178 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What a bus on a datagram socket needs: waiting, waking, kernel time stamps and loss counts."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+import contextlib
+import math
+import os
+import select
+import socket
+import struct
+from time import monotonic, monotonic_ns, time_ns
+
+from ..exceptions import BusError
+from .bus import Bus
+from .frame import Frame
+
+# of asm-generic/socket.h; Python's socket module does not name them
+SO_RCVBUFFORCE = 33
+SO_TIMESTAMPNS = 35
+SO_RXQ_OVFL = 40
+
+RECEIVE_BUFFER = 4 << 20  # [byte] thousands of frames; the kernel's default holds some hundred
+BATCH_MAX = 1000  # frames; a flooded bus must not keep the caller inside receive
+_FD_SETSIZE = 1024  # select() takes no descriptors beyond
+_TIMESPEC = struct.Struct('@ll')
+_UINT32 = struct.Struct('=I')
+ANCILLARY_SIZE = socket.CMSG_SPACE(_TIMESPEC.size) + socket.CMSG_SPACE(_UINT32.size)  # [byte]
+_READ_AHEAD = 1e-3  # [s] frames may arrive while a batch is read
+
+
+def prepare_receiver(sock: socket.socket) -> None:
+    """Raise the receive buffer, and ask for time stamps and the count of dropped frames."""
+    try:
+        sock.setsockopt(socket.SOL_SOCKET, SO_RCVBUFFORCE, RECEIVE_BUFFER)
+    except PermissionError:
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
+    sock.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
+    sock.setsockopt(socket.SOL_SOCKET, SO_RXQ_OVFL, 1)
+    sock.setblocking(False)
+
+
+class StampReader:
+    """Turns ancillary data of received datagrams into steady time and a count of losses.
+
+    The kernel stamps with the wall clock. Stamps never go back, also when somebody sets it.
+
+    Attributes:
+        lost: Datagrams that the kernel has dropped since the socket was opened.
+    """
+
+    def __init__(self) -> None:
+        """Begin with nothing lost."""
+        self.lost = 0
+        self._drops = 0
+        self._last = 0.0
+        self._limit = 0.0
+        self._base_seconds = 0
+        self._base_nanoseconds = 0
+
+    def begin_batch(self) -> None:
+        """Measure how far wall clock and steady clock are apart."""
+        now = monotonic_ns()
+        self._base_seconds, self._base_nanoseconds = divmod(time_ns() - now, 1_000_000_000)
+        self._limit = now * 1e-9 + _READ_AHEAD
+
+    def read(self, ancillary: list[tuple[int, int, bytes]]) -> float:
+        """Return the time of arrival on the steady clock in [s], and count losses."""
+        stamp = 0.0
+        for _, kind, content in ancillary:
+            if kind == SO_TIMESTAMPNS:
+                seconds, nanoseconds = _TIMESPEC.unpack(content)
+                stamp = (seconds - self._base_seconds) + (
+                    nanoseconds - self._base_nanoseconds
+                ) * 1e-9
+            elif kind == SO_RXQ_OVFL:
+                (drops,) = _UINT32.unpack(content)
+                self.lost += (drops - self._drops) & 0xFFFF_FFFF
+                self._drops = drops
+        if stamp > self._limit or stamp == 0.0:
+            stamp = monotonic() if stamp == 0.0 else min(stamp, monotonic())
+        self._last = max(stamp, self._last)
+        return self._last
+
+
+class SocketBus(Bus):
+    """A bus that reads datagrams from a socket; subclasses say what is in them."""
+
+    def __init__(self, name: str, receiver: socket.socket) -> None:
+        """Take over a prepared, non-blocking socket."""
+        super().__init__(name)
+        self._receiver = receiver
+        self._stamps = StampReader()
+        self._wake_fd = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
+        self._closed = False
+
+    @abstractmethod
+    def _read_one(self) -> Frame | None:
+        """Read one datagram; None when it is none of ours to deliver.
+
+        Raises:
+            BlockingIOError: There is no more.
+            OSError: The interface went away.
+        """
+
+    @abstractmethod
+    def _explain(self, error: OSError) -> BusError:
+        """Say what a failed system call means for the user, and what to do."""
+
+    def fileno(self) -> int:
+        """Return the descriptor that is readable when there are frames."""
+        return self._receiver.fileno()
+
+    def receive(self, timeout: float) -> list[Frame]:
+        """Wait for frames; see :meth:`Bus.receive`."""
+        if self._closed:
+            raise BusError(f'{self.name} is closed')
+        if timeout > 0.0:
+            self._wait(timeout)
+        try:
+            return self._drain()
+        except OSError as error:
+            if self._closed:
+                raise BusError(f'{self.name} was closed') from error
+            raise self._explain(error) from error
+
+    def _wait(self, timeout: float) -> None:
+        descriptors = (self._receiver.fileno(), self._wake_fd)
+        if min(descriptors) < 0:
+            raise BusError(f'{self.name} was closed')
+        if max(descriptors) < _FD_SETSIZE:
+            # select waits by the microsecond where poll rounds up to a millisecond
+            limit = None if math.isinf(timeout) else timeout
+            readable = select.select(descriptors, (), (), limit)[0]
+        else:
+            readable = _poll(descriptors, timeout)
+        if self._wake_fd in readable:
+            with contextlib.suppress(BlockingIOError):
+                os.eventfd_read(self._wake_fd)
+
+    def _drain(self) -> list[Frame]:
+        frames: list[Frame] = []
+        self._stamps.begin_batch()
+        read_one = self._read_one
+        try:
+            for _ in range(BATCH_MAX):
+                frame = read_one()
+                if frame is not None:
+                    frames.append(frame)
+        except BlockingIOError:
+            pass
+        self.counters.received += len(frames)
+        self.counters.lost = self._stamps.lost
+        return frames
+
+    def wake(self) -> None:
+        """Let a waiting :meth:`receive` return at once."""
+        if not self._closed:
+            os.eventfd_write(self._wake_fd, 1)
+
+    def close(self) -> None:
+        """Close the sockets; end a thread that waits in :meth:`receive` first."""
+        if self._closed:
+            return
+        self.wake()
+        self._closed = True
+        self._receiver.close()
+        os.close(self._wake_fd)
+
+
+def _poll(descriptors: tuple[int, ...], timeout: float) -> list[int]:
+    poller = select.poll()
+    for descriptor in descriptors:
+        poller.register(descriptor, select.POLLIN)
+    limit = None if math.isinf(timeout) else math.ceil(timeout * 1e3)
+    return [descriptor for descriptor, _ in poller.poll(limit)]
