@@ -5,9 +5,9 @@
 ::
 
     CanopenError
-    ├── ConfigError (ValueError)     a bus.yml or EDS is wrong; lists every problem with file, line and remedy
+    ├── ConfigError (ValueError)     a bus.yml or EDS is wrong; lists every problem
     ├── BusError (OSError)           a CAN interface cannot be opened, or refuses a frame
-    ├── CodecError (ValueError)      a value does not fit its data type, or bytes are no valid message
+    ├── CodecError (ValueError)      a value does not fit its type, or bytes are no message
     ├── SdoError                     a device did not do what an SDO asked
     │   ├── SdoAbortError            the device (or we) aborted the transfer with a code
     │   └── SdoTimeoutError (TimeoutError)   the device did not answer
@@ -19,9 +19,30 @@ Arguments of the wrong kind from a *programmer* stay ``ValueError``/``TypeError`
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .config.model import Problem
+
 
 class CanopenError(Exception):
     """Root of all errors of this package."""
+
+
+class ConfigError(CanopenError, ValueError):
+    """A bus.yml or EDS is wrong. The message lists every problem that was found, one per line.
+
+    Scenarios: a file is missing, a key is unknown, a value does not fit, two devices share an id.
+
+    Attributes:
+        problems: Each with file, line, key, message and remedy.
+    """
+
+    def __init__(self, problems: Iterable[Problem]) -> None:
+        """Keep the problems beside the message."""
+        self.problems = tuple(problems)
+        super().__init__('\n'.join(str(problem) for problem in self.problems))
 
 
 class BusError(CanopenError, OSError):

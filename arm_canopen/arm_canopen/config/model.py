@@ -109,17 +109,20 @@ class NodeConfig:
         eds: The EDS or DCF file.
         dictionary: Its objects, defaults resolved for this node id.
         identity: Expected identity.
-        heartbeat_producer: Period of the device's heartbeat in [s]; 0 for none.
+        heartbeat_producer: Period of the device's heartbeat in [s], as bus.yml or else the EDS
+            says; 0 for none.
         heartbeat_timeout: How long the master waits for a heartbeat in [s]; 0 for no supervision.
-        heartbeat_consumer: The device shall watch the master's heartbeat.
+        heartbeat_consumer: The device shall watch the master's heartbeat; it then has 0x1016 and
+            the master sends one.
         mandatory: The network is not operational without it.
         reset_communication: The device may be reset at boot; false keeps a running one alive.
         sdo_timeout: How long an SDO answer may take in [s].
         boot_timeout: How long one boot attempt waits for the device in [s].
         tpdos: All TPDOs of the device, by ascending number.
         rpdos: All RPDOs of the device, by ascending number.
-        sdo_writes: The ``sdo`` list of bus.yml.
+        sdo_writes: ``error_behavior`` and the ``sdo`` list of bus.yml, in the order of writing.
         drive: Settings of the CiA 402 drive.
+        diagnostics_period: Period of its entry in /diagnostics in [s]; 0 for none.
         line: Line of bus.yml at which the node begins.
     """
 
@@ -142,6 +145,7 @@ class NodeConfig:
     rpdos: tuple[PdoConfig, ...] = ()
     sdo_writes: tuple[SdoWrite, ...] = ()
     drive: DriveConfig = DriveConfig()
+    diagnostics_period: float = 0.0
     line: int = 0
 
     @property
@@ -163,7 +167,11 @@ class MasterConfig:
         bitrate: Bit rate in [bit/s], for the bus load.
         sync_period: SYNC period in [s]; 0 sends none.
         sync_overflow: Highest SYNC counter value, 0 for a SYNC without counter.
+        cycle_period: Period of the control cycle in [s]: that of SYNC, without one the shortest
+            ``period`` of a device.
         heartbeat_producer: Period of the master's own heartbeat in [s]; 0 for none.
+        heartbeat_timeout: How long a device that watches the master waits for its heartbeat in
+            [s], for 0x1016; 0 when there is none.
         start_nodes: The master starts devices when they are booted.
         boot_timeout: SDO timeout during boot in [s].
     """
@@ -176,7 +184,9 @@ class MasterConfig:
     bitrate: int = 1_000_000
     sync_period: float = 0.0
     sync_overflow: int = 0
+    cycle_period: float = 0.01
     heartbeat_producer: float = 0.0
+    heartbeat_timeout: float = 0.0
     start_nodes: bool = True
     boot_timeout: float = 2.0
 

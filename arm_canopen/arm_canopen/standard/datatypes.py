@@ -103,7 +103,8 @@ def encode(data_type: DataType, value: Value) -> bytes:
 
     Args:
         data_type: Type of the object.
-        value: Number for numeric types, str for strings, bytes for octet strings, times and domains.
+        value: Number for numeric types, str for strings, bytes for octet strings, times and
+            domains.
 
     Returns:
         The bytes, little-endian, of the type's length.

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The object dictionary as a description (CiA 301, 7.4): what a device has, not its present values."""
+"""The object dictionary as a description (CiA 301, 7.4): what a device has, not what it holds."""
 
 from __future__ import annotations
 
@@ -91,10 +91,13 @@ class ObjectDictionary:
         source: Where it was read from, for messages.
     """
 
-    def __init__(self, entries: Iterable[ObjectEntry], *, source: str = 'object dictionary') -> None:
+    def __init__(
+        self, entries: Iterable[ObjectEntry], *, source: str = 'object dictionary'
+    ) -> None:
         """Collect the entries; of two with one address the later counts."""
         self.source = source
-        self._entries = {entry.address: entry for entry in sorted(entries, key=lambda e: e.address)}
+        ordered = sorted(entries, key=lambda entry: entry.address)
+        self._entries = {entry.address: entry for entry in ordered}
         self._indices = frozenset(index for index, _ in self._entries)
 
     def __iter__(self) -> Iterator[ObjectEntry]:
@@ -123,9 +126,7 @@ class ObjectDictionary:
 
     def for_node(self, node_id: int) -> ObjectDictionary:
         """Return a copy whose node-relative defaults are resolved for a node id."""
-        return ObjectDictionary(
-            (_resolved(entry, node_id) for entry in self), source=self.source
-        )
+        return ObjectDictionary((_resolved(entry, node_id) for entry in self), source=self.source)
 
 
 def _resolved(entry: ObjectEntry, node_id: int) -> ObjectEntry:

@@ -8,7 +8,7 @@ from enum import IntEnum, IntFlag
 
 
 class DriveState(IntEnum):
-    """States of the power drive system (CiA 402-2, figure 4); numbers as ros2_canopen counts them."""
+    """States of the power drive system (CiA 402-2, figure 4), numbered as in ros2_canopen."""
 
     UNKNOWN = 0
     NOT_READY_TO_SWITCH_ON = 1

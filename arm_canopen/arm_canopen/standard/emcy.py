@@ -199,4 +199,5 @@ class Emergency:
     def __str__(self) -> str:
         """Say it in words."""
         vendor = f', vendor {self.vendor.hex()}' if any(self.vendor) else ''
-        return f'{error_code_text(self.code)} (register: {error_register_text(self.register)}{vendor})'
+        register = error_register_text(self.register)
+        return f'{error_code_text(self.code)} (register: {register}{vendor})'

@@ -217,9 +217,7 @@ class Abort:
 
 
 Request: TypeAlias = DownloadRequest | UploadRequest | Segment | UploadSegmentRequest | Abort
-Response: TypeAlias = (
-    DownloadResponse | UploadResponse | Segment | DownloadSegmentResponse | Abort
-)
+Response: TypeAlias = DownloadResponse | UploadResponse | Segment | DownloadSegmentResponse | Abort
 
 
 def _encode_initiate(
