@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-from .frame import EXTENDED_ID_MAX, Frame, PAYLOAD_MAX, STANDARD_ID_MAX
+from .frame import Frame
 
 
 @dataclass(slots=True)
@@ -92,16 +92,3 @@ class Bus(ABC):
     ) -> None:
         """Close it."""
         self.close()
-
-
-def checked(frame: Frame) -> Frame:
-    """Return the frame when it is a classic CAN frame.
-
-    Raises:
-        ValueError: The identifier is out of range or the payload too long.
-    """
-    if not 0 <= frame.can_id <= (EXTENDED_ID_MAX if frame.is_extended else STANDARD_ID_MAX):
-        raise ValueError(f'CAN identifier 0x{frame.can_id:X} is out of range')
-    if len(frame.data) > PAYLOAD_MAX:
-        raise ValueError(f'a CAN frame carries at most {PAYLOAD_MAX} bytes, got {len(frame.data)}')
-    return frame

@@ -30,3 +30,16 @@ class Frame(NamedTuple):
     is_extended: bool = False
     is_remote: bool = False
     is_error: bool = False
+
+
+def checked(frame: Frame) -> Frame:
+    """Return the frame when it is a classic CAN frame.
+
+    Raises:
+        ValueError: The identifier is out of range or the payload too long.
+    """
+    if not 0 <= frame.can_id <= (EXTENDED_ID_MAX if frame.is_extended else STANDARD_ID_MAX):
+        raise ValueError(f'CAN identifier 0x{frame.can_id:X} is out of range')
+    if len(frame.data) > PAYLOAD_MAX:
+        raise ValueError(f'a CAN frame carries at most {PAYLOAD_MAX} bytes, got {len(frame.data)}')
+    return frame

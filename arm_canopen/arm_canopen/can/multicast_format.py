@@ -16,7 +16,7 @@ import struct
 import msgpack
 
 from ..exceptions import CodecError
-from .frame import EXTENDED_ID_MAX, Frame, PAYLOAD_MAX, STANDARD_ID_MAX
+from .frame import checked, Frame, PAYLOAD_MAX, STANDARD_ID_MAX
 
 # msgpack: 0x80|n map, 0xA0|n short string, 0xC0 nil, 0xC2/0xC3 false/true, 0xC4 n bytes,
 # 0xCB float64, 0xCC/0xCD/0xCE unsigned integer of 8/16/32 bits
@@ -84,15 +84,11 @@ def encode(frame: Frame) -> bytes:
     Raises:
         ValueError: The identifier or the payload does not fit a classic CAN frame.
     """
-    if not 0 <= frame.can_id <= (EXTENDED_ID_MAX if frame.is_extended else STANDARD_ID_MAX):
-        raise ValueError(f'CAN identifier 0x{frame.can_id:X} is out of range')
-    data = frame.data
-    if len(data) > PAYLOAD_MAX:
-        raise ValueError(f'a CAN frame carries at most {PAYLOAD_MAX} bytes, got {len(data)}')
-    if frame.is_extended or frame.is_remote or frame.is_error:
-        head = _HEAD + _unsigned(frame.can_id) + _flags(*frame[3:])
+    can_id, data, _, is_extended, is_remote, is_error = checked(frame)
+    if is_extended or is_remote or is_error:
+        head = _HEAD + _unsigned(can_id) + _flags(is_extended, is_remote, is_error)
     else:
-        head = _PLAIN_HEADS[frame.can_id]
+        head = _PLAIN_HEADS[can_id]
     return b''.join((head, _LENGTHS[len(data)], data, _TAIL))
 
 
@@ -153,12 +149,14 @@ def _decode_any(datagram: bytes, timestamp: float) -> Frame:
     is_remote = _flag(fields, 'is_remote_frame', default=False)
     can_id = fields.get('arbitration_id', 0)
     data = fields.get('data') or b''
-    if not isinstance(can_id, int) or not isinstance(data, bytes) or len(data) > PAYLOAD_MAX:
+    if not isinstance(can_id, int) or not isinstance(data, bytes):
         raise CodecError(f'CAN frame with identifier {can_id!r} and payload {data!r}')
-    if not 0 <= can_id <= (EXTENDED_ID_MAX if is_extended else STANDARD_ID_MAX):
-        raise CodecError(f'CAN identifier 0x{can_id:X} is out of range')
     is_error = _flag(fields, 'is_error_frame', default=False)
-    return Frame(can_id, b'' if is_remote else data, timestamp, is_extended, is_remote, is_error)
+    data = b'' if is_remote else data
+    try:
+        return checked(Frame(can_id, data, timestamp, is_extended, is_remote, is_error))
+    except ValueError as error:
+        raise CodecError(str(error)) from error
 
 
 def _flag(fields: Mapping[object, object], name: str, *, default: bool) -> bool:

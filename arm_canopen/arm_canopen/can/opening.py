@@ -2,23 +2,30 @@
 # SPDX-License-Identifier: Apache-2.0
 """Opens a bus by its name.
 
-============================================  ====================================================
-``virtual:NAME``                              inside this process
-``udp_multicast[:239.x.y.z[:PORT]]``          between the processes of this host
-``auto``                                      vcan0 when it is there and up, else the default group
-============================================  ====================================================
+=====================================  ===========================================================
+``can0``, ``vcan0``                    a CAN interface of the kernel (SocketCAN)
+``udp_multicast[:239.x.y.z[:PORT]]``   between the processes of this host
+``virtual:NAME``                       inside this process
+``INTERFACE:CHANNEL[@BITRATE]``        any other adapter, by python-can, e.g.
+                                       ``pcan:PCAN_USBBUS1@500000``
+``auto``                               vcan0 when it exists and is up, else ``udp_multicast``
+=====================================  ===========================================================
 """
 
 from __future__ import annotations
 
 import logging
+import socket
 
 from ..exceptions import BusError
 from .bus import Bus
+from .interfaces import can_interfaces
 from .multicast import check_group, DEFAULT_GROUP, DEFAULT_PORT, MulticastBus
+from .socketcan import SocketCanBus
 from .virtual import open_virtual
 
 AUTO = 'auto'
+_AUTO_INTERFACE = 'vcan0'
 _log = logging.getLogger(__name__)
 
 
@@ -26,7 +33,7 @@ def open_bus(name: str) -> Bus:
     """Open a bus.
 
     Args:
-        name: See the table above; ``auto`` picks one and logs which.
+        name: See the table above; ``auto`` picks one, logs which, and the bus carries its name.
 
     Raises:
         BusError: No such interface, or it is down; the message says what to do.
@@ -34,18 +41,25 @@ def open_bus(name: str) -> Bus:
     resolved = resolve_name(name)
     if resolved != name:
         _log.info('bus %s is %s', name, resolved)
-    kind, _, channel = resolved.partition(':')
-    if kind == 'virtual':
-        return open_virtual(resolved, channel)
+    kind, colon, channel = resolved.partition(':')
     if kind == 'udp_multicast':
         return _open_multicast(resolved, channel)
-    raise BusError(f'no bus is called {name!r}')
+    if not kind or (colon and not channel):
+        raise BusError(f'no bus is called {name!r}; take can0, vcan0, udp_multicast or auto')
+    if not colon:
+        return SocketCanBus(resolved)
+    if kind == 'virtual':
+        return open_virtual(resolved, channel)
+    return _open_adapter(resolved, kind, channel)
 
 
 def resolve_name(name: str) -> str:
     """Return the name of the bus that :func:`open_bus` would open; it is ``name`` but for auto."""
     if name != AUTO:
         return name
+    interface = can_interfaces().get(_AUTO_INTERFACE)
+    if interface is not None and interface.is_up and hasattr(socket, 'AF_CAN'):
+        return interface.name
     return f'udp_multicast:{DEFAULT_GROUP}'
 
 
@@ -57,3 +71,16 @@ def _open_multicast(name: str, channel: str) -> Bus:
     if not digits.isdecimal() or not 0 < int(digits) < 0x10000:
         raise BusError(f'{name}: {digits!r} is no UDP port; take 1 to 65535')
     return MulticastBus(name, group, int(digits))
+
+
+def _open_adapter(name: str, interface: str, channel: str) -> Bus:
+    try:
+        from .adapter import AdapterBus  # noqa: PLC0415  python-can takes long to import
+    except ImportError as error:
+        raise BusError(f'{name} needs python-can ({error}); `pip install python-can`') from error
+    channel, at, digits = channel.rpartition('@')
+    if not at:
+        return AdapterBus(name, interface, digits, None)
+    if not digits.isdecimal() or not int(digits):
+        raise BusError(f'{name}: {digits!r} is no bit rate in bit/s; e.g. 500000 or 1000000')
+    return AdapterBus(name, interface, channel, int(digits))

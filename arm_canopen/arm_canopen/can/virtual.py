@@ -10,8 +10,8 @@ from time import monotonic
 from weakref import WeakValueDictionary
 
 from ..exceptions import BusError
-from .bus import Bus, checked
-from .frame import Frame
+from .bus import Bus
+from .frame import checked, Frame
 
 QUEUE_FRAMES = 100_000  # a bus object that nobody reads must not eat up the memory
 

@@ -1,0 +1,169 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Every adapter that python-can has a driver for, by python-can."""
+
+from __future__ import annotations
+
+import math
+from threading import Event, Lock
+from time import monotonic, time
+from typing import Any
+
+import can
+
+from ..exceptions import BusError
+from .bus import Bus
+from .frame import checked, Frame, PAYLOAD_MAX
+
+_POLL = 0.02  # [s] longest time until wake() is noticed; python-can has no way to end a recv
+_BATCH_MAX = 1000  # frames; a flooded bus must not keep the caller inside receive
+_WALL_CLOCK_SPAN = 1.0  # [s] stamps further from now count from something else than 1970
+
+
+class AdapterBus(Bus):
+    """A bus behind a python-can interface, e.g. PCAN, Kvaser or slcan.
+
+    Options beyond channel and bit rate come from python-can's own configuration files.
+    """
+
+    def __init__(self, name: str, interface: str, channel: str, bitrate: int | None) -> None:
+        """Open the interface.
+
+        Args:
+            name: Name of the bus.
+            interface: python-can's name of the driver.
+            channel: The driver's name of the channel.
+            bitrate: Bit rate in [bit/s]; None leaves the adapter's.
+
+        Raises:
+            BusError: python-can does not know the interface or cannot open it.
+        """
+        super().__init__(name)
+        options: dict[str, Any] = {} if bitrate is None else {'bitrate': bitrate}
+        try:
+            self._bus = can.Bus(
+                channel=channel, interface=interface, receive_own_messages=False, **options
+            )
+        except (can.CanError, NotImplementedError, OSError, ValueError, TypeError) as error:
+            raise BusError(_not_opened(name, interface, error)) from error
+        self._woken = Event()
+        self._send_lock = Lock()
+        self._closed = False
+        self._last = 0.0
+
+    def send(self, frame: Frame) -> None:
+        """Hand the frame to the adapter.
+
+        Raises:
+            BusError: The adapter refuses it.
+            ValueError: It is no classic CAN frame.
+        """
+        message = to_message(checked(frame))
+        if self._closed:
+            raise BusError(f'{self.name} is closed')
+        try:
+            with self._send_lock:
+                self._bus.send(message)
+                self.counters.sent += 1
+        except (can.CanError, OSError) as error:
+            self.counters.send_errors += 1
+            raise BusError(f'{self.name} refuses a frame: {error}') from error
+
+    def receive(self, timeout: float) -> list[Frame]:
+        """Wait for frames; see :meth:`Bus.receive`."""
+        if self._closed:
+            raise BusError(f'{self.name} is closed')
+        try:
+            message = self._wait(monotonic() + timeout) if timeout > 0.0 else self._bus.recv(0)
+            frames = []
+            while message is not None:
+                frame = self._accept(message)
+                if frame is not None:
+                    frames.append(frame)
+                message = self._bus.recv(0) if len(frames) < _BATCH_MAX else None
+        except (can.CanError, OSError) as error:
+            raise BusError(f'{self.name} went away: {error}') from error
+        self.counters.received += len(frames)
+        return frames
+
+    def _wait(self, deadline: float) -> can.Message | None:
+        message = None
+        while message is None and not self._woken.is_set():
+            left = deadline - monotonic()
+            if left <= 0.0:
+                break
+            message = self._bus.recv(min(left, _POLL))
+        self._woken.clear()
+        return message
+
+    def _accept(self, message: can.Message) -> Frame | None:
+        if not message.is_rx:
+            return None
+        if message.is_fd or len(message.data) > PAYLOAD_MAX:
+            self.counters.malformed += 1
+            return None
+        self._last = max(self._last, _steady_stamp(message.timestamp))
+        return from_message(message, self._last)
+
+    def wake(self) -> None:
+        """Let a waiting :meth:`receive` return within 20 ms."""
+        self._woken.set()
+
+    def close(self) -> None:
+        """Close the adapter."""
+        if not self._closed:
+            self._closed = True
+            self._woken.set()
+            self._bus.shutdown()
+
+
+def to_message(frame: Frame, timestamp: float = 0.0) -> can.Message:
+    """Return the frame as python-can's message.
+
+    Args:
+        frame: The frame.
+        timestamp: Time of reception on the wall clock in [s], 0 for a frame to be sent.
+    """
+    return can.Message(
+        timestamp=timestamp,
+        arbitration_id=frame.can_id,
+        is_extended_id=frame.is_extended,
+        is_remote_frame=frame.is_remote,
+        is_error_frame=frame.is_error,
+        data=frame.data,
+    )
+
+
+def from_message(message: can.Message, timestamp: float) -> Frame:
+    """Return python-can's message as a frame.
+
+    Args:
+        message: A classic CAN message.
+        timestamp: Time of reception on the steady clock in [s].
+    """
+    return Frame(
+        message.arbitration_id,
+        bytes(message.data),
+        timestamp,
+        message.is_extended_id,
+        message.is_remote_frame,
+        message.is_error_frame,
+    )
+
+
+def _steady_stamp(stamp: float) -> float:
+    """Move a driver's stamp to the steady clock; those that are no wall clock become now."""
+    age = time() - stamp
+    now = monotonic()
+    if math.isfinite(age) and 0.0 <= age < _WALL_CLOCK_SPAN:
+        return now - age
+    return now
+
+
+def _not_opened(name: str, interface: str, error: Exception) -> str:
+    if interface not in can.VALID_INTERFACES:
+        known = ', '.join(sorted(can.VALID_INTERFACES))
+        return (
+            f'no bus is called {name!r}: python-can has no interface {interface}; it has {known}'
+        )
+    return f'cannot open {name}: {error}'

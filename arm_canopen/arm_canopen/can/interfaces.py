@@ -1,0 +1,79 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Which CAN network interfaces this host has, and what to do when one is missing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import fcntl
+import socket
+import struct
+
+# linux/sockios.h, net/if.h and net/if_arp.h
+_SIOCGIFFLAGS = 0x8913
+_SIOCGIFHWADDR = 0x8927
+_SIOCGIFTXQLEN = 0x8942
+_IFF_UP = 0x1
+_ARPHRD_CAN = 280
+_REQUEST = struct.Struct('16s24x')  # struct ifreq: name and a union
+
+
+@dataclass(frozen=True, slots=True)
+class CanInterface:
+    """A CAN network interface.
+
+    Attributes:
+        name: Its name, e.g. ``can0``.
+        is_up: It is switched on.
+        queue_length: Frames that its transmit queue holds.
+    """
+
+    name: str
+    is_up: bool
+    queue_length: int
+
+
+def can_interfaces() -> dict[str, CanInterface]:
+    """Return the CAN interfaces of this network namespace by name."""
+    found = {}
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        for _, name in socket.if_nameindex():
+            try:
+                interface = _inspect(probe, name)
+            except OSError:
+                continue  # it went away while we looked
+            if interface is not None:
+                found[name] = interface
+    return found
+
+
+def _inspect(probe: socket.socket, name: str) -> CanInterface | None:
+    if _ask(probe, _SIOCGIFHWADDR, name, '=H') != _ARPHRD_CAN:
+        return None
+    return CanInterface(
+        name,
+        is_up=bool(_ask(probe, _SIOCGIFFLAGS, name, '=H') & _IFF_UP),
+        queue_length=_ask(probe, _SIOCGIFTXQLEN, name, '=i'),
+    )
+
+
+def _ask(probe: socket.socket, request: int, name: str, layout: str) -> int:
+    answer = fcntl.ioctl(probe.fileno(), request, _REQUEST.pack(name.encode()))
+    return int(struct.unpack_from(layout, answer, 16)[0])
+
+
+def missing_interface_text(name: str, existing: dict[str, CanInterface]) -> str:
+    """Say that an interface does not exist, which do, and how to make it."""
+    have = ', '.join(sorted(existing)) or 'none'
+    if name.startswith('vcan'):
+        remedy = f'`ip link add dev {name} type vcan && ip link set up {name}`'
+    else:
+        remedy = f'plug the adapter in, then {bring_up_text(name)}'
+    return f'there is no CAN interface {name} (this host has: {have}); {remedy}'
+
+
+def bring_up_text(name: str) -> str:
+    """Return the command that switches an interface on."""
+    if name.startswith('vcan'):
+        return f'`ip link set up {name}`'
+    return f'`ip link set up {name} type can bitrate 1000000` (with the bit rate of your bus)'

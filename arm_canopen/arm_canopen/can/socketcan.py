@@ -1,0 +1,173 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""A CAN interface of the Linux kernel (SocketCAN), by a raw socket.
+
+Other sockets of this host see the frames that are sent; the sending bus itself does not.
+"""
+
+from __future__ import annotations
+
+import errno
+import logging
+import socket
+import struct
+from threading import Lock
+
+from ..exceptions import BusError
+from .frame import checked, EXTENDED_ID_MAX, Frame, STANDARD_ID_MAX
+from .interfaces import bring_up_text, can_interfaces, missing_interface_text
+from .socket_bus import ANCILLARY_SIZE, prepare_receiver, SocketBus
+
+# linux/can.h and linux/can/raw.h
+_SOL_CAN_RAW = 101
+_CAN_RAW_ERR_FILTER = 2
+_EXTENDED_FLAG = 0x8000_0000
+_REMOTE_FLAG = 0x4000_0000
+_ERROR_FLAG = 0x2000_0000
+_ANY_FLAG = _EXTENDED_FLAG | _REMOTE_FLAG | _ERROR_FLAG
+_ERROR_CLASSES = 0x1FFF_FFFF
+_FRAME = struct.Struct('=IB3x8s')  # struct can_frame: identifier with flags, length, payload
+
+_QUEUE_LENGTH_MIN = 100  # frames; the kernel's default of 10 is less than one cycle of an arm
+_log = logging.getLogger(__name__)
+
+
+class SocketCanBus(SocketBus):
+    """A bus on a CAN network interface."""
+
+    def __init__(self, name: str) -> None:
+        """Open a raw socket on the interface.
+
+        Raises:
+            BusError: The kernel has no CAN, or the interface is missing or down.
+        """
+        receiver = _open_socket(name)
+        super().__init__(name, receiver)
+        self._send_lock = Lock()
+
+    def send(self, frame: Frame) -> None:
+        """Put the frame into the interface's transmit queue.
+
+        A full queue is told and not waited for: a cyclic frame is outdated by its successor, and
+        a request is repeated by who waits for the answer.
+
+        Raises:
+            BusError: The queue is full, or the interface is down or gone.
+            ValueError: It is no classic CAN frame.
+        """
+        packed = pack(frame)
+        try:
+            with self._send_lock:
+                self._receiver.send(packed)
+                self.counters.sent += 1
+        except OSError as error:
+            self.counters.send_errors += 1
+            raise self._explain(error) from error
+
+    def _read_one(self) -> Frame | None:
+        packed, ancillary, _, _ = self._receiver.recvmsg(_FRAME.size, ANCILLARY_SIZE)
+        stamp = self._stamps.read(ancillary)
+        if len(packed) != _FRAME.size:
+            self.counters.malformed += 1
+            return None
+        return unpack(packed, stamp)
+
+    def _explain(self, error: OSError) -> BusError:
+        if self._closed:
+            return BusError(f'{self.name} is closed')
+        return BusError(failure_text(self.name, error))
+
+
+def pack(frame: Frame) -> bytes:
+    """Return the kernel's struct can_frame.
+
+    Raises:
+        ValueError: It is no classic CAN frame, or an error frame; nobody can send those.
+    """
+    if frame.is_error:
+        raise ValueError('an error frame is made by the controller and cannot be sent')
+    can_id, data = checked(frame)[:2]
+    if frame.is_extended:
+        can_id |= _EXTENDED_FLAG
+    if frame.is_remote:
+        can_id |= _REMOTE_FLAG
+    return _FRAME.pack(can_id, len(data), data)
+
+
+def unpack(packed: bytes, timestamp: float) -> Frame:
+    """Read the kernel's struct can_frame of 16 bytes.
+
+    Args:
+        packed: What was received.
+        timestamp: Time of reception on the steady clock in [s].
+    """
+    can_id, length, data = _FRAME.unpack(packed)
+    data = data[:length]
+    if not can_id & _ANY_FLAG:
+        return Frame(can_id, data, timestamp)
+    if can_id & _ERROR_FLAG:
+        return Frame(can_id & _ERROR_CLASSES, data, timestamp, is_error=True)
+    is_extended, is_remote = bool(can_id & _EXTENDED_FLAG), bool(can_id & _REMOTE_FLAG)
+    can_id &= EXTENDED_ID_MAX if is_extended else STANDARD_ID_MAX
+    return Frame(can_id, b'' if is_remote else data, timestamp, is_extended, is_remote)
+
+
+def _open_socket(name: str) -> socket.socket:
+    if not hasattr(socket, 'AF_CAN'):
+        raise BusError(f'this Python was built without CAN, so {name} cannot be opened')
+    try:
+        raw = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
+    except OSError as error:
+        raise BusError(no_can_text(name, error)) from error
+    try:
+        _check_interface(name)
+        prepare_receiver(raw)
+        raw.setsockopt(_SOL_CAN_RAW, _CAN_RAW_ERR_FILTER, _ERROR_CLASSES)
+        raw.bind((name,))
+    except BusError:
+        raw.close()
+        raise
+    except OSError as error:
+        raw.close()
+        raise BusError(failure_text(name, error)) from error
+    return raw
+
+
+def _check_interface(name: str) -> None:
+    existing = can_interfaces()
+    interface = existing.get(name)
+    if interface is None:
+        raise BusError(missing_interface_text(name, existing))
+    if not interface.is_up:
+        raise BusError(f'CAN interface {name} is down; {bring_up_text(name)}')
+    if interface.queue_length < _QUEUE_LENGTH_MIN:
+        _log.warning(
+            '%s queues only %d frames, fewer than an arm sends in a cycle; '
+            '`ip link set %s txqueuelen 1000`',
+            name,
+            interface.queue_length,
+            name,
+        )
+
+
+def no_can_text(name: str, error: OSError) -> str:
+    """Say that the kernel has no CAN, and what works without it."""
+    return (
+        f'this kernel has no CAN, so {name} cannot be opened ({error.strerror or error}); '
+        'try `modprobe can_raw`, or take the bus udp_multicast, which needs no kernel support'
+    )
+
+
+def failure_text(name: str, error: OSError) -> str:
+    """Say what a failed system call on an open interface means, and what to do."""
+    if error.errno == errno.ENETDOWN:
+        return f'CAN interface {name} is down; {bring_up_text(name)}'
+    if error.errno in (errno.ENODEV, errno.ENXIO):
+        return f'CAN interface {name} is gone; plug the adapter in again and reopen the bus'
+    if error.errno in (errno.ENOBUFS, errno.EAGAIN):
+        return (
+            f'the transmit queue of {name} is full; either frames are sent faster than the bus '
+            f'carries them (`ip link set {name} txqueuelen 1000` absorbs bursts), or nobody '
+            'acknowledges them (cable, bit rate, termination, device switched off)'
+        )
+    return f'{name}: {error.strerror or error}'
