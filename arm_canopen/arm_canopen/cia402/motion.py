@@ -65,6 +65,9 @@ class MotionSource(Protocol):
         """
 
     def released(self, axis: str, reason: str) -> None:
-        """An axis was taken away (single target, mode change, fault, loss); until attached
-        again, its set-points are ignored.
+        """Learn that an axis was taken away; until attached again its set-points are ignored.
+
+        Args:
+            axis: Name of the drive.
+            reason: Why: a single target, another mode, a fault, a loss.
         """

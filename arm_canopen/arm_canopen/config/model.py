@@ -118,6 +118,7 @@ class NodeConfig:
         reset_communication: The device may be reset at boot; false keeps a running one alive.
         sdo_timeout: How long an SDO answer may take in [s].
         boot_timeout: How long one boot attempt waits for the device in [s].
+        poll_period: How often objects that no PDO carries are read in [s] (``period`` of bus.yml).
         tpdos: All TPDOs of the device, by ascending number.
         rpdos: All RPDOs of the device, by ascending number.
         sdo_writes: ``error_behavior`` and the ``sdo`` list of bus.yml, in the order of writing.
@@ -141,6 +142,7 @@ class NodeConfig:
     reset_communication: bool = True
     sdo_timeout: float = 0.02
     boot_timeout: float = 1.0
+    poll_period: float = 0.01
     tpdos: tuple[PdoConfig, ...] = ()
     rpdos: tuple[PdoConfig, ...] = ()
     sdo_writes: tuple[SdoWrite, ...] = ()

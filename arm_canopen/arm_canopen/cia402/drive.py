@@ -1,0 +1,296 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""One CiA 402 drive in the SYNC cycle: state in, controlword, mode and target out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from ..exceptions import DriveError, SdoError
+from ..master.events import EventKind, Severity
+from ..master.remote_node import RemoteNode
+from ..master.scheduler import Scheduler
+from ..standard.drive import (
+    DriveState,
+    mode_title,
+    OperationMode,
+    statusword_text,
+)
+from ..standard.emcy import error_code_text
+from ..standard.objects import Index
+from .drive_objects import DriveObjects
+from .modes import (
+    CyclicPosition,
+    Homing,
+    InterpolatedPosition,
+    Mode,
+    NO_BITS,
+    NoMode,
+    ProfilePosition,
+    ProfileVelocity,
+)
+from .motion import AxisFeedback
+from .parameters import DriveParameters, read_parameters
+from .state_machine import Command, fault_reset, next_command
+from .units import Units
+
+FAULTY = (DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE)
+
+
+class Drive:
+    """A drive of the bus.
+
+    ``read`` and ``write`` run in each cycle. What leads it somewhere sets its goal, mode and
+    targets from coroutines in the same thread (``drive_commands.py``).
+
+    Attributes:
+        node: The device.
+        units: Its units.
+        objects: Its objects in the process image.
+        state: State shown in the last cycle.
+        mode: The mode that is commanded.
+        modes: The modes that this bus.yml makes possible.
+        parameters: What it told about itself.
+        goal: State that the cycle leads to, None while nobody asked for one.
+        resetting: Send fault resets while the drive is faulted.
+        error: 0x603F in words when it was faulted last, else empty.
+        released: Called with a reason when a motion source loses the drive.
+    """
+
+    def __init__(self, node: RemoteNode, scheduler: Scheduler) -> None:
+        """Bind the drive to its device.
+
+        Args:
+            node: The device.
+            scheduler: Time.
+        """
+        self.node = node
+        self.units = Units(node.config.drive)
+        self.objects = DriveObjects(node)
+        self.state = DriveState.UNKNOWN
+        self.parameters = DriveParameters()
+        self.goal: DriveState | None = None
+        self.error = ''
+        self.released: Callable[[str], None] = lambda reason: None
+        self.resetting = False
+        self.modes = self._build_modes()
+        self.mode: Mode = self.modes[OperationMode.NO_MODE]
+        self._scheduler = scheduler
+        self._controlword = 0
+        self._asked = False
+        self._answered = False
+        node.on_lost = self._on_lost
+
+    @property
+    def name(self) -> str:
+        """Name in bus.yml."""
+        return self.node.name
+
+    @property
+    def position(self) -> float:
+        """Actual position in user units."""
+        return self.units.position_from_device(self.objects.position)
+
+    @property
+    def velocity(self) -> float:
+        """Actual velocity in user units per second."""
+        return self.units.velocity_from_device(self.objects.velocity)
+
+    @property
+    def effort(self) -> float:
+        """Actual torque in user units."""
+        return self.units.effort_from_device(self.objects.torque)
+
+    @property
+    def setpoint(self) -> float:
+        """Position last commanded, the actual one where none is."""
+        commanded = self.mode.setpoint
+        if commanded is None or self.state is not DriveState.OPERATION_ENABLED:
+            return self.position
+        return commanded
+
+    @property
+    def ready(self) -> bool:
+        """Whether its state and its parameters are known."""
+        return self.state is not DriveState.UNKNOWN and self._answered
+
+    @property
+    def obeys(self) -> bool:
+        """Whether the drive follows targets of its mode in this cycle."""
+        return (
+            self.goal is DriveState.OPERATION_ENABLED
+            and self.state is DriveState.OPERATION_ENABLED
+            and self.objects.mode_display == self.mode.number
+        )
+
+    @property
+    def _holds(self) -> bool:
+        """Whether the drive is still powered in this mode, so that its target must stay."""
+        displayed = self.objects.mode_display == self.mode.number
+        return self.state is DriveState.OPERATION_ENABLED and displayed
+
+    @property
+    def followable(self) -> bool:
+        """Whether a stream of positions would be obeyed in this cycle."""
+        mode = self.mode
+        return self.obeys and isinstance(mode, CyclicPosition) and not mode.goes_to_single_target
+
+    def feedback(self) -> AxisFeedback:
+        """Return the state for motion sources."""
+        return AxisFeedback(
+            name=self.name,
+            online=self.node.online,
+            state=self.state,
+            mode=self.objects.mode_display,
+            position=self.position,
+            velocity=self.velocity,
+            setpoint=self.setpoint,
+            followable=self.followable,
+        )
+
+    def describe(self) -> str:
+        """Say in a sentence how the drive is."""
+        if not self.node.online:
+            phase = self.node.phase.value
+            detail = f' ({self.node.phase_detail})' if self.node.phase_detail else ''
+            return f'offline: {phase}{detail}'
+        parts = [
+            statusword_text(self.objects.statusword),
+            f'mode {mode_title(self.objects.mode_display)}',
+        ]
+        if self.error:
+            parts.append(f'error {self.error}')
+        if self.node.last_emergency is not None:
+            parts.append(f'EMCY {self.node.last_emergency}')
+        if self.node.left_operational and self.node.nmt_state is not None:
+            parts.append(f'NMT state {self.node.nmt_state.name}: call ~/nmt_start_node')
+        return '; '.join(parts)
+
+    def read(self) -> None:
+        """Take the state from the process image."""
+        if self.node.online and not self._asked:
+            self._asked = True
+            self._scheduler.spawn(self._ask())
+        if not self.node.online or not self.objects.known:
+            self.state = DriveState.UNKNOWN
+            return
+        before, self.state = self.state, self.objects.state
+        if self.state is not before:
+            self._state_changed(before)
+
+    def write(self, now: float, period: float) -> None:
+        """Write controlword, mode and target for this cycle."""
+        if self.state is DriveState.UNKNOWN:
+            command, bits = Command.DISABLE_VOLTAGE, NO_BITS
+        else:
+            command, bits = self._command(), NO_BITS
+            if command is Command.ENABLE_OPERATION and self.obeys:
+                bits = self.mode.step(now, period, self.objects.statusword)
+            elif not self._holds:
+                self.mode.preload(self.position, self.velocity)
+        self._controlword = int(command) | int(bits)
+        self.objects.controlword.write(self._controlword)
+        self.objects.mode.write(int(self.mode.number))
+
+    def stream(self, setpoint: float) -> None:
+        """Follow a motion source in this cycle.
+
+        Raises:
+            DriveError: The set-point is not finite, does not fit the object or is beyond a limit.
+        """
+        self.check_limits(setpoint)
+        if isinstance(self.mode, CyclicPosition):
+            self.mode.stream(setpoint)
+
+    def select(self, mode: Mode) -> None:
+        """Command another mode, preloaded with where the drive is."""
+        mode.preload(self.position, self.velocity)
+        self.mode = mode
+
+    def check_limits(self, target: float) -> None:
+        """Refuse a position beyond the drive's software limits.
+
+        Raises:
+            DriveError: It is beyond; the message names the limits.
+        """
+        limits = self.parameters.position_limits
+        if limits is not None and not limits[0] <= target <= limits[1]:
+            raise DriveError(
+                f'{self.name}: target {target:g} is beyond the software limits '
+                f'{limits[0]:g} to {limits[1]:g} (0x607D)'
+            )
+
+    async def _ask(self) -> None:
+        self._scheduler.spawn(self.node.poll(self.node.config.poll_period))
+        self.parameters = await read_parameters(self.node, self.units)
+        self._answered = True
+
+    async def know_error(self) -> None:
+        """Read 0x603F, so that the answer can say what is wrong."""
+        if self.state not in FAULTY or (Index.ERROR_CODE, 0) not in self.node.config.dictionary:
+            return
+        try:
+            code = await self.node.read_object(Index.ERROR_CODE)
+        except SdoError:
+            return  # the statusword says that there is a fault, only its code stays unknown
+        self.error = error_code_text(int(code)) if isinstance(code, int) else ''
+
+    def _command(self) -> Command:
+        if self.resetting and self.state is DriveState.FAULT:
+            return Command(fault_reset(self.state, self._controlword))
+        return (
+            Command.DISABLE_VOLTAGE if self.goal is None else next_command(self.state, self.goal)
+        )
+
+    def _state_changed(self, before: DriveState) -> None:
+        left = before is DriveState.OPERATION_ENABLED
+        if self.state in FAULTY and before not in FAULTY:
+            self.goal = DriveState.SWITCH_ON_DISABLED
+            self.released('fault')
+            self._scheduler.spawn(self._report_fault())
+        elif left and self.goal is DriveState.OPERATION_ENABLED:
+            # a drive that lost its enable must not start again when the cause goes away
+            self.goal = DriveState.SWITCH_ON_DISABLED
+            self.released('the drive left Operation enabled')
+            self.report(
+                Severity.ERROR,
+                f'left Operation enabled by itself: {self.describe()}; is the voltage or the '
+                'safe torque off gone? Call ~/enable when it is safe',
+            )
+        elif left:
+            self.released(f'the drive is {self.state.title}')
+
+    async def _report_fault(self) -> None:
+        await self.know_error()
+        self.report(Severity.ERROR, f'FAULT: {self.describe()}; call ~/recover')
+
+    def _on_lost(self, reason: str) -> None:
+        self.goal = None
+        self.resetting = False
+        self._asked = self._answered = False
+        self.state = DriveState.UNKNOWN
+        self.mode = self.modes[OperationMode.NO_MODE]
+        self.released(reason)
+
+    def report(self, severity: Severity, text: str) -> None:
+        """Tell the owner of the network something about this drive."""
+        self.node.report(EventKind.DRIVE, severity, text)
+
+    def _build_modes(self) -> dict[OperationMode, Mode]:
+        modes: list[Mode] = [NoMode(), Homing()]
+        position = self.objects.target_writer(Index.TARGET_POSITION)
+        velocity = self.objects.target_writer(Index.TARGET_VELOCITY)
+        interpolation = self.objects.target_writer(Index.INTERPOLATION_DATA, 1)
+        if position is not None:
+            modes.append(ProfilePosition(self.units, position, self._warn))
+            modes.append(CyclicPosition(self.units, position, lambda: self.parameters.profile))
+        if velocity is not None:
+            modes.append(ProfileVelocity(self.units, velocity))
+        if interpolation is not None:
+            modes.append(
+                InterpolatedPosition(self.units, interpolation, lambda: self.parameters.profile)
+            )
+        return {mode.number: mode for mode in modes}
+
+    def _warn(self, text: str) -> None:
+        self.report(Severity.WARNING, text)

@@ -1,0 +1,71 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The objects of one drive, bound to its process image once (CiA 402-2)."""
+
+from __future__ import annotations
+
+from ..master.process_image import Reader, Writer
+from ..master.remote_node import RemoteNode
+from ..standard.drive import drive_state, DriveState
+from ..standard.objects import Index
+
+
+class DriveObjects:
+    """What the master reads from and writes to a drive in each cycle, in device units."""
+
+    def __init__(self, node: RemoteNode) -> None:
+        """Bind each object to its PDO; what the drive has but no PDO carries goes by SDO."""
+        self._node = node
+        self._statusword = node.reader(Index.STATUSWORD)
+        self._mode = node.reader(Index.MODE_OF_OPERATION_DISPLAY)
+        self._position = node.reader(Index.POSITION_ACTUAL)
+        self._velocity = self._optional_reader(Index.VELOCITY_ACTUAL)
+        self._torque = node.image.reader(Index.TORQUE_ACTUAL)
+        self.controlword = node.writer(Index.CONTROLWORD)
+        self.mode = node.writer(Index.MODE_OF_OPERATION)
+
+    @property
+    def known(self) -> bool:
+        """Whether the drive has sent its state, mode and position."""
+        return None not in (self._statusword.value, self._mode.value, self._position.value)
+
+    @property
+    def statusword(self) -> int:
+        """0x6041; 0 while unknown."""
+        return int(self._statusword.value or 0)
+
+    @property
+    def state(self) -> DriveState:
+        """State that the statusword shows."""
+        word = self._statusword.value
+        return DriveState.UNKNOWN if word is None else drive_state(int(word))
+
+    @property
+    def mode_display(self) -> int:
+        """0x6061; 0 while unknown."""
+        return int(self._mode.value or 0)
+
+    @property
+    def position(self) -> float:
+        """0x6064 in [inc]; 0 while unknown."""
+        return self._position.value or 0
+
+    @property
+    def velocity(self) -> float:
+        """0x606C in device units; 0 when unknown."""
+        return (self._velocity.value or 0) if self._velocity is not None else 0
+
+    @property
+    def torque(self) -> float:
+        """0x6077 in device units; 0 when no PDO carries it."""
+        return (self._torque.value or 0) if self._torque is not None else 0
+
+    def target_writer(self, index: int, subindex: int = 0) -> Writer | None:
+        """Return a writer for a target object that a PDO carries, else None."""
+        return self._node.image.writer(index, subindex)
+
+    def _optional_reader(self, index: int) -> Reader | None:
+        mapped = self._node.image.reader(index)
+        if mapped is not None or (index, 0) not in self._node.config.dictionary:
+            return mapped
+        return self._node.reader(index)

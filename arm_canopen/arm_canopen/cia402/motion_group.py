@@ -1,0 +1,128 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""All drives of a bus in one cycle, and the motion sources that command them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import partial
+
+from ..exceptions import DriveError
+from ..master.events import Event, EventKind, Report, Severity
+from .drive import Drive
+from .motion import MotionSource
+
+HAND_OVER_MARGIN = (
+    2.0  # a stream may start this many cycles of profile velocity from the set-point
+)
+
+
+@dataclass(slots=True)
+class Attachment:
+    """A source, its drives in its order, and which of them it has taken over."""
+
+    source: MotionSource
+    drives: list[Drive]
+    owned: list[Drive] = field(default_factory=list)
+    streaming: set[str] = field(default_factory=set)
+
+
+class MotionGroup:
+    """The drives of one bus by name, in the order of bus.yml.
+
+    A drive belongs to one source at most. It is released when a client commands a single target,
+    another mode or a stop, and when it faults or is lost; its source does not get it back by
+    itself.
+
+    Attributes:
+        drives: The drives.
+    """
+
+    def __init__(self, drives: Sequence[Drive], report: Report) -> None:
+        """Take the drives.
+
+        Args:
+            drives: The drives of the bus.
+            report: Takes events.
+        """
+        self.drives = {drive.name: drive for drive in drives}
+        self._report = report
+        self._attachments: list[Attachment] = []
+        for drive in drives:
+            drive.released = partial(self._release, drive)
+
+    def attach(self, source: MotionSource) -> None:
+        """Let a source command its axes from the next cycle on; again to give it back all axes.
+
+        Raises:
+            KeyError: An axis is no drive of this bus.
+        """
+        unknown = [name for name in source.axes if name not in self.drives]
+        if unknown:
+            raise KeyError(f'no drives {unknown} on this bus; it has {list(self.drives)}')
+        drives = [self.drives[name] for name in source.axes]
+        for drive in drives:
+            self._release(drive, 'another motion source took over')
+        self.detach(source)
+        self._attachments.append(Attachment(source, drives, owned=list(drives)))
+
+    def detach(self, source: MotionSource) -> None:
+        """End a source; drives that it moved are braked."""
+        self._attachments = [entry for entry in self._attachments if entry.source is not source]
+
+    def cycle(self, now: float, period: float) -> None:
+        """Run one cycle: states in, sources, targets out.
+
+        Args:
+            now: Steady time in [s].
+            period: Time to the next cycle in [s].
+        """
+        for drive in self.drives.values():
+            drive.read()
+        for attachment in list(self._attachments):
+            self._run(attachment, now, period)
+        for drive in self.drives.values():
+            drive.write(now, period)
+
+    def _run(self, attachment: Attachment, now: float, period: float) -> None:
+        feedback = [drive.feedback() for drive in attachment.drives]
+        try:
+            setpoints = attachment.source.update(now, period, feedback)
+        except Exception as error:  # noqa: BLE001  # a source must not stop the cycle of the others
+            self._fail(attachment, f'raised {type(error).__name__}: {error}')
+            return
+        for drive, axis, setpoint in zip(attachment.drives, feedback, setpoints, strict=False):
+            if setpoint is None or not axis.followable or drive not in attachment.owned:
+                attachment.streaming.discard(drive.name)
+                continue
+            try:
+                self._stream(attachment, drive, setpoint, period)
+            except DriveError as error:
+                self._release(drive, f'set-point refused: {error}')
+
+    def _stream(
+        self, attachment: Attachment, drive: Drive, setpoint: float, period: float
+    ) -> None:
+        if drive.name not in attachment.streaming:
+            margin = HAND_OVER_MARGIN * drive.parameters.profile.velocity * period
+            if abs(setpoint - drive.setpoint) > margin:
+                raise DriveError(
+                    f'the stream starts at {setpoint:g}, but the set-point is {drive.setpoint:g}; '
+                    'a stream must start where the drive is'
+                )
+            attachment.streaming.add(drive.name)
+        drive.stream(setpoint)
+
+    def _release(self, drive: Drive, reason: str) -> None:
+        for attachment in self._attachments:
+            if drive in attachment.owned:
+                attachment.owned.remove(drive)
+                attachment.streaming.discard(drive.name)
+                attachment.source.released(drive.name, reason)
+
+    def _fail(self, attachment: Attachment, reason: str) -> None:
+        self.detach(attachment.source)
+        name = type(attachment.source).__name__
+        text = f'motion source {name} {reason}; it is detached and its drives are braked'
+        self._report(Event(EventKind.DRIVE, Severity.ERROR, '', text))

@@ -1,0 +1,92 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""A trapezoidal profile, one step a cycle, for single targets in the cyclic position modes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import math
+
+
+@dataclass(frozen=True, slots=True)
+class ProfileLimits:
+    """Limits of a profile, in user units.
+
+    Attributes:
+        velocity: Largest speed in [unit/s].
+        acceleration: Largest acceleration in [unit/s^2].
+        deceleration: Largest deceleration in [unit/s^2].
+    """
+
+    velocity: float
+    acceleration: float
+    deceleration: float
+
+
+class SetpointProfile:
+    """Moves a set-point to a target that may change at any time, without a step in velocity.
+
+    Attributes:
+        position: Set-point of this cycle.
+        velocity: Its rate in [unit/s].
+        target: Where it goes; None brakes to a stop.
+    """
+
+    def __init__(self, position: float, velocity: float = 0.0) -> None:
+        """Start at a position with a rate in [unit/s], and brake."""
+        self.position = position
+        self.velocity = velocity
+        self.target: float | None = None
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether the set-point stands still and has nowhere to go."""
+        return self.velocity == 0.0 and self.target in (None, self.position)
+
+    def follow(self, position: float, period: float) -> None:
+        """Take the set-point of a stream, and remember its rate for a smooth stop.
+
+        Args:
+            position: Set-point of this cycle.
+            period: Time since the last one in [s].
+        """
+        self.velocity = (position - self.position) / period
+        self.position = position
+        self.target = None
+
+    def step(self, period: float, limits: ProfileLimits) -> float:
+        """Advance by a cycle.
+
+        The speed is never above the one from which the target can still be met by braking: of
+        ``v * period + v^2 / (2 * deceleration) = distance`` the positive root.
+
+        Args:
+            period: Length of the cycle in [s].
+            limits: Limits to keep.
+
+        Returns:
+            The new set-point.
+        """
+        if self.at_rest:
+            return self.position
+        wanted = 0.0 if self.target is None else self._wanted(self.target, period, limits)
+        braking = abs(wanted) < abs(self.velocity) or wanted * self.velocity < 0
+        change = (limits.deceleration if braking else limits.acceleration) * period
+        self.velocity += max(-change, min(change, wanted - self.velocity))
+        self.position += self.velocity * period
+        if (
+            self.target is not None
+            and abs(self.target - self.position) < 1e-9
+            and (abs(self.velocity) <= limits.deceleration * period)
+        ):
+            self.position, self.velocity = self.target, 0.0
+        return self.position
+
+    def _wanted(self, target: float, period: float, limits: ProfileLimits) -> float:
+        distance = target - self.position
+        root = math.sqrt(period**2 + 2.0 * abs(distance) / limits.deceleration)
+        speed = min(limits.velocity, limits.deceleration * (root - period))
+        # on the last cycle the rest of the way is taken in one step
+        if abs(distance) <= speed * period:
+            speed = abs(distance) / period
+        return math.copysign(speed, distance)

@@ -1,0 +1,55 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What the network tells its owner: events in words, with the device that they are about."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum, IntEnum
+from typing import TypeAlias
+
+
+class Severity(IntEnum):
+    """How much an event matters; the order counts."""
+
+    INFO = 0
+    WARNING = 1
+    ERROR = 2
+
+
+class EventKind(Enum):
+    """What happened."""
+
+    NMT_STATE = 'nmt state'
+    BOOT = 'boot'
+    BOOT_FAILED = 'boot failed'
+    HEARTBEAT_LOST = 'heartbeat lost'
+    EMERGENCY = 'emergency'
+    PDO = 'pdo'
+    DRIVE = 'drive'
+    BUS = 'bus'
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Something that happened on the network.
+
+    Attributes:
+        kind: What happened.
+        severity: How much it matters.
+        node: Name of the device, empty when it concerns the bus.
+        text: The event in words.
+    """
+
+    kind: EventKind
+    severity: Severity
+    node: str
+    text: str
+
+    def __str__(self) -> str:
+        """Write it as a log line."""
+        return f'{self.node}: {self.text}' if self.node else self.text
+
+
+Report: TypeAlias = Callable[[Event], None]

@@ -1,0 +1,200 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The CANopen network of one bus, as an object without threads, clock or I/O of its own.
+
+Its owner hands it every received frame, tells it the time and starts its cycles; it sends through
+a function. See ``runner.py`` for the thread that does so on a real bus.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeAlias
+
+from ..can.frame import Frame
+from ..config.model import BusConfig
+from ..exceptions import BusError, SdoError
+from ..standard.cob_id import CobId
+from ..standard.nmt import ALL_NODES, nmt_frame, NmtCommand, NmtState
+from .boot import BootProcess
+from .events import Event, EventKind, Report, Severity
+from .process_image import SyncRound
+from .remote_node import RemoteNode
+from .scheduler import Scheduler, Task
+
+CycleHook: TypeAlias = Callable[[float, float], None]
+
+HEARTBEAT_MULTIPLIER = 3.0  # a device may miss two heartbeats of the master
+
+
+class Network:
+    """Master of one bus: boots its devices, keeps watch over them and runs the SYNC cycle.
+
+    Attributes:
+        config: The bus.
+        nodes: Its devices by name.
+        scheduler: Time and coroutines of the network.
+        on_cycle: Called in each cycle before the RPDOs leave, with time and period in [s].
+        on_feedback: Called when all TPDOs of a SYNC have come, or at the next cycle at the latest,
+            with the time of that SYNC in [s].
+        missed_pdos: TPDOs that did not answer a SYNC, over all devices.
+        unknown_frames: Frames with an identifier that nobody on this bus should use.
+    """
+
+    def __init__(self, config: BusConfig, send: Callable[[Frame], None], report: Report) -> None:
+        """Build the network; nothing is sent before :meth:`start`.
+
+        Args:
+            config: The bus.
+            send: Hands a frame to the bus; may raise BusError.
+            report: Takes events.
+        """
+        self.config = config
+        self.scheduler = Scheduler()
+        self.on_cycle: CycleHook = lambda now, period: None
+        self.on_feedback: Callable[[float], None] = lambda sync_time: None
+        self.missed_pdos = 0
+        self.unknown_frames = 0
+        self._send_raw = send
+        self._report = report
+        self._send_failed = False
+        self._sync = SyncRound(self._feedback_complete)
+        self._sync_time = 0.0
+        self._feedback_due = False
+        self._sync_counter = 0
+        self._next_heartbeat = 0.0
+        self.nodes = {
+            node.name: RemoteNode(node, self.scheduler, self._sync, self.send, report)
+            for node in config.nodes
+        }
+        self._boots = {name: self._boot_process(node) for name, node in self.nodes.items()}
+        self._boot_tasks: dict[str, Task[None]] = {}
+        self._handlers: dict[int, Callable[[Frame], None]] = {}
+        for node in self.nodes.values():
+            self._connect(node)
+
+    def start(self, now: float) -> None:
+        """Reset the devices and begin to boot them, all at the same time."""
+        self.scheduler.advance(now)
+        self._next_heartbeat = now
+        if all(node.config.reset_communication for node in self.nodes.values()):
+            self.send_nmt(NmtCommand.RESET_COMMUNICATION, ALL_NODES)
+        else:
+            for node in self.nodes.values():
+                if node.config.reset_communication:
+                    self.send_nmt(NmtCommand.RESET_COMMUNICATION, node.config.node_id)
+        for node in self.nodes.values():
+            self._start_boot(node, announced=False)
+
+    def receive(self, frame: Frame) -> None:
+        """Take a frame from the bus."""
+        handler = self._handlers.get(frame.can_id)
+        if handler is None or frame.is_extended or frame.is_remote or frame.is_error:
+            self.unknown_frames += 1
+            return
+        handler(frame)
+
+    def advance(self, now: float) -> None:
+        """Let time pass: timers, conditions, heartbeats that are overdue."""
+        self.scheduler.advance(now)
+        for node in self.nodes.values():
+            if node.heartbeat_overdue(now):
+                timeout = node.config.heartbeat_timeout * 1000  # [ms]
+                node.lost(f'heartbeat lost: none within its consumer time of {timeout:g} ms')
+                self._start_boot(node, announced=False)
+
+    def cycle(self, now: float, period: float) -> None:
+        """Run one cycle: image, drives, RPDOs, SYNC (DESIGN: one time base).
+
+        Args:
+            now: Steady time in [s].
+            period: Time to the next cycle in [s].
+        """
+        self.advance(now)
+        if self._feedback_due:
+            self.missed_pdos += sum(node.count_missed() for node in self.nodes.values())
+            self._feedback_complete()
+        self.on_cycle(now, period)
+        self._send_heartbeat(now)
+        for node in self.nodes.values():
+            if node.online:
+                for output in node.image.outputs:
+                    self.send(output.frame())
+        if self.config.master.sync_period > 0:
+            self._send_sync(now)
+
+    def send(self, frame: Frame) -> None:
+        """Send a frame; a bus that refuses it is reported once until it works again."""
+        try:
+            self._send_raw(frame)
+        except BusError as error:
+            if not self._send_failed:
+                self._send_failed = True
+                self._report(Event(EventKind.BUS, Severity.ERROR, '', str(error)))
+        else:
+            if self._send_failed:
+                self._send_failed = False
+                self._report(Event(EventKind.BUS, Severity.INFO, '', 'the bus takes frames again'))
+
+    def send_nmt(self, command: NmtCommand, node_id: int) -> None:
+        """Send an NMT command to one device, or to all with id 0."""
+        self.send(Frame(CobId.NMT, nmt_frame(command, node_id)))
+
+    def _boot_process(self, node: RemoteNode) -> BootProcess:
+        master = self.config.master
+        return BootProcess(
+            node,
+            self.scheduler,
+            self.send_nmt,
+            sdo_timeout=master.boot_timeout,
+            start=master.start_nodes,
+            master_id=master.node_id,
+            master_heartbeat_timeout=master.heartbeat_producer * HEARTBEAT_MULTIPLIER,
+        )
+
+    def _connect(self, node: RemoteNode) -> None:
+        node_id = node.config.node_id
+        self._handlers[CobId.HEARTBEAT + node_id] = node.receive_heartbeat
+        self._handlers[CobId.EMCY + node_id] = node.receive_emergency
+        self._handlers[CobId.SDO_RESPONSE + node_id] = node.sdo.receive
+        for entry in node.image.inputs:
+            self._handlers[entry.config.cob_id] = entry.receive
+        node.on_boot_up = lambda: self._booted(node)
+
+    def _booted(self, node: RemoteNode) -> None:
+        if node.online:
+            node.lost('restarted: a boot-up message came while it was operational')
+        else:
+            node.offline('the device restarted')
+        self._start_boot(node, announced=True)
+
+    def _start_boot(self, node: RemoteNode, *, announced: bool) -> None:
+        running = self._boot_tasks.get(node.name)
+        if running is not None:
+            running.cancel(SdoError('the boot starts again'))
+        task = self.scheduler.spawn(self._boots[node.name].run(announced=announced))
+        self._boot_tasks[node.name] = task
+
+    def _send_heartbeat(self, now: float) -> None:
+        """Send the master's heartbeat from the cycle, so that a hung cycle stops it."""
+        period = self.config.master.heartbeat_producer
+        if period > 0 and now >= self._next_heartbeat:
+            self._next_heartbeat = max(self._next_heartbeat + period, now)
+            node_id = self.config.master.node_id
+            self.send(Frame(CobId.HEARTBEAT + node_id, bytes((NmtState.OPERATIONAL,))))
+
+    def _send_sync(self, now: float) -> None:
+        data = b''
+        if self.config.master.sync_overflow:
+            self._sync_counter = self._sync_counter % self.config.master.sync_overflow + 1
+            data = bytes((self._sync_counter,))
+        expected = sum(node.expected_answers for node in self.nodes.values())
+        self._sync.start(expected)
+        self._sync_time = now
+        self._feedback_due = True
+        self.send(Frame(CobId.SYNC, data))
+
+    def _feedback_complete(self) -> None:
+        if self._feedback_due:
+            self._feedback_due = False
+            self.on_feedback(self._sync_time)

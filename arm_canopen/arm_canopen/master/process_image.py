@@ -1,0 +1,225 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The process image of one device: last values of its TPDOs, next values for its RPDOs.
+
+Values are addressed once, by object, when a ``Reader`` or ``Writer`` is made; in the cycle they
+are list look-ups. Objects that no PDO carries are read and written by SDO in the background.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Protocol
+
+from ..can.frame import Frame
+from ..config.model import PdoConfig
+from ..exceptions import CodecError
+from ..standard.pdo import Number, PdoCodec
+
+SYNCHRONOUS_MAX = 240  # transmission types up to this one follow SYNC (CiA 301, table 71)
+
+
+class SyncRound:
+    """Counts the TPDOs that answer one SYNC, over all devices.
+
+    Attributes:
+        number: Number of SYNCs so far.
+        pending: How many expected TPDOs have not yet come.
+        complete: Called when the last one has come.
+    """
+
+    def __init__(self, complete: Callable[[], None]) -> None:
+        """Start before the first SYNC."""
+        self.number = 0
+        self.pending = 0
+        self.complete = complete
+
+    def start(self, expected: int) -> None:
+        """A SYNC is sent; so many TPDOs are expected."""
+        self.number += 1
+        self.pending = expected
+
+
+class Input:
+    """One TPDO of the device.
+
+    Attributes:
+        config: Its configuration.
+        codec: Its compiled mapping.
+        values: Last values in mapping order, None before the first.
+        timestamp: Steady time of arrival of the last in [s].
+        count: Number of PDOs received.
+        length_errors: Number of PDOs that were too short.
+    """
+
+    def __init__(self, config: PdoConfig, sync: SyncRound) -> None:
+        """Compile the mapping."""
+        self.config = config
+        self.codec = PdoCodec(config.mapping)
+        self.values: tuple[Number, ...] | None = None
+        self.timestamp = 0.0
+        self.count = 0
+        self.length_errors = 0
+        self.listener: Callable[[Input], None] | None = None
+        self._sync = sync
+        self._round = 0
+        self._unpack = self.codec.unpack
+
+    @property
+    def every_sync(self) -> bool:
+        """The device sends it after each SYNC."""
+        return self.config.transmission == 1
+
+    @property
+    def answered(self) -> bool:
+        """It came since the last SYNC."""
+        return self._round == self._sync.number
+
+    def clear(self) -> None:
+        """Forget the values, because the device restarted or went away."""
+        self.values = None
+
+    def receive(self, frame: Frame) -> None:
+        """Take a PDO from the bus."""
+        try:
+            self.values = self._unpack(frame.data)
+        except CodecError:
+            self.length_errors += 1
+            return
+        self.timestamp = frame.timestamp
+        self.count += 1
+        if self.listener is not None:
+            self.listener(self)
+        sync = self._sync
+        if self._round != sync.number:
+            self._round = sync.number
+            if self.config.transmission == 1:
+                sync.pending -= 1
+                if sync.pending == 0:
+                    sync.complete()
+
+
+class Output:
+    """One RPDO of the device.
+
+    Attributes:
+        config: Its configuration.
+        codec: Its compiled mapping.
+        values: Next values in mapping order.
+    """
+
+    def __init__(self, config: PdoConfig) -> None:
+        """Start with zeros."""
+        self.config = config
+        self.codec = PdoCodec(config.mapping)
+        self.values: list[Number] = [0] * len(config.mapping)
+
+    def frame(self) -> Frame:
+        """Return the frame that carries the present values."""
+        return Frame(self.config.cob_id, self.codec.pack(self.values))
+
+
+class Reader(Protocol):
+    """Last known value of an object of the device."""
+
+    @property
+    def value(self) -> Number | None:
+        """The value, None while unknown."""
+
+
+class Writer(Protocol):
+    """Next value of an object of the device."""
+
+    def write(self, value: Number) -> None:
+        """Set the value; it leaves with the next PDO, or by SDO when it changed."""
+
+
+class InputReader:
+    """Reads an object from a TPDO."""
+
+    def __init__(self, source: Input, position: int) -> None:
+        """Point to one object of the PDO."""
+        self._source = source
+        self._position = position
+
+    @property
+    def value(self) -> Number | None:
+        """The value, None while unknown."""
+        values = self._source.values
+        return None if values is None else values[self._position]
+
+
+class OutputWriter:
+    """Writes an object into an RPDO."""
+
+    def __init__(self, target: Output, position: int) -> None:
+        """Point to one object of the PDO."""
+        self._values = target.values
+        self._position = position
+
+    def write(self, value: Number) -> None:
+        """Set the value for the next PDO."""
+        self._values[self._position] = value
+
+
+class ProcessImage:
+    """All PDOs of one device that are in use.
+
+    Attributes:
+        inputs: Its TPDOs.
+        outputs: Its RPDOs, in the order in which they are sent.
+    """
+
+    def __init__(
+        self,
+        tpdos: tuple[PdoConfig, ...],
+        rpdos: tuple[PdoConfig, ...],
+        sync: SyncRound,
+        *,
+        send_last: int | None = None,
+    ) -> None:
+        """Compile the enabled PDOs.
+
+        Args:
+            tpdos: What the device sends.
+            rpdos: What it receives.
+            sync: The round that all TPDOs of the bus belong to.
+            send_last: Index of an object whose RPDO leaves after the others, so that a command
+                never overtakes its data.
+        """
+        self.inputs = [Input(pdo, sync) for pdo in tpdos if pdo.enabled and pdo.mapping]
+        outputs = [Output(pdo) for pdo in rpdos if pdo.enabled and pdo.mapping]
+        self.outputs = sorted(
+            outputs, key=lambda output: any(o.index == send_last for o in output.config.mapping)
+        )
+
+    def clear(self) -> None:
+        """Forget what the device sent."""
+        for entry in self.inputs:
+            entry.clear()
+
+    def reader(self, index: int, subindex: int = 0) -> InputReader | None:
+        """Return a reader for an object, None when no TPDO carries it."""
+        for entry in self.inputs:
+            for position, mapped in enumerate(entry.config.mapping):
+                if (mapped.index, mapped.subindex) == (index, subindex):
+                    return InputReader(entry, position)
+        return None
+
+    def writer(self, index: int, subindex: int = 0) -> OutputWriter | None:
+        """Return a writer for an object, None when no RPDO carries it."""
+        for entry, position in self._mapped_outputs(index, subindex):
+            return OutputWriter(entry, position)
+        return None
+
+    def output_of(self, index: int, subindex: int = 0) -> Output | None:
+        """Return the RPDO that carries an object, None when there is none."""
+        for entry, _ in self._mapped_outputs(index, subindex):
+            return entry
+        return None
+
+    def _mapped_outputs(self, index: int, subindex: int) -> Iterator[tuple[Output, int]]:
+        for entry in self.outputs:
+            for position, mapped in enumerate(entry.config.mapping):
+                if (mapped.index, mapped.subindex) == (index, subindex):
+                    yield entry, position

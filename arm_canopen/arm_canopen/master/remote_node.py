@@ -1,0 +1,263 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""A device as the master sees it: NMT state, heartbeat, EMCY, SDO client and process image."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from enum import Enum
+
+from ..can.frame import Frame
+from ..config.model import NodeConfig
+from ..exceptions import CodecError, SdoError
+from ..standard.datatypes import decode, encode, Value
+from ..standard.emcy import Emergency
+from ..standard.nmt import NmtState, parse_heartbeat
+from ..standard.objects import Index
+from ..standard.pdo import Number
+from .events import Event, EventKind, Report, Severity
+from .process_image import ProcessImage, Reader, SyncRound, Writer
+from .scheduler import Promise, Scheduler
+from .sdo_client import SdoClient
+
+
+class BootPhase(Enum):
+    """How far a device has come; the value is how a person reads it."""
+
+    WAITING = 'waiting for the device'
+    IDENTITY = 'checking its identity'
+    CONFIGURING = 'configuring'
+    ERROR_CONTROL = 'waiting for its heartbeat'
+    STARTING = 'starting'
+    OPERATIONAL = 'operational'
+    FAILED = 'failed'
+
+
+class BackgroundReader:
+    """An object that no TPDO carries; it is polled by SDO."""
+
+    def __init__(self) -> None:
+        """Start unknown."""
+        self.value: Number | None = None
+
+
+class BackgroundWriter:
+    """An object that no RPDO carries; it is written by SDO when it changes."""
+
+    def __init__(self, node: RemoteNode, index: int, subindex: int) -> None:
+        """Remember nothing written yet."""
+        self._node = node
+        self._address = (index, subindex)
+        self._written: Number | None = None
+
+    def write(self, value: Number) -> None:
+        """Queue the write unless this is the value that was written last."""
+        if value == self._written or not self._node.online:
+            return
+        self._written = value
+        self._node.write_object(*self._address, value).when_done(self._check)
+
+    def forget(self) -> None:
+        """The device restarted: write again whatever comes."""
+        self._written = None
+
+    def _check(self, promise: Promise[None]) -> None:
+        if promise.error is not None:
+            self._written = None
+            self._node.report(EventKind.PDO, Severity.WARNING, str(promise.error))
+
+
+class RemoteNode:
+    """One device on the bus.
+
+    Attributes:
+        config: What bus.yml and its EDS say.
+        image: Its process image.
+        sdo: Its SDO client.
+        nmt_state: NMT state as received, None before the first heartbeat or boot-up.
+        phase: How far it has booted.
+        phase_detail: What it is doing in that phase, or why it failed.
+        online: Booted, and not lost since.
+        left_operational: Online, but somebody stopped it or sent it to pre-operational.
+        last_heartbeat: Steady time of the last heartbeat in [s].
+        last_emergency: Last EMCY that was no reset, None when the device reported its end.
+        missed_pdos: TPDOs that did not answer a SYNC.
+    """
+
+    def __init__(
+        self,
+        config: NodeConfig,
+        scheduler: Scheduler,
+        sync: SyncRound,
+        send: Callable[[Frame], None],
+        report: Report,
+    ) -> None:
+        """Build the device from its configuration.
+
+        Args:
+            config: What bus.yml and its EDS say.
+            scheduler: Time.
+            sync: The SYNC round of the bus.
+            send: Hands a frame to the bus.
+            report: Takes events.
+        """
+        self.config = config
+        self.image = ProcessImage(config.tpdos, config.rpdos, sync, send_last=Index.CONTROLWORD)
+        self.sdo = SdoClient(config.node_id, config.name, scheduler, send)
+        self.nmt_state: NmtState | None = None
+        self.phase = BootPhase.WAITING
+        self.phase_detail = ''
+        self.online = False
+        self.left_operational = False
+        self.last_heartbeat = 0.0
+        self.last_emergency: Emergency | None = None
+        self.missed_pdos = 0
+        self.on_boot_up: Callable[[], None] = lambda: None
+        self.on_lost: Callable[[str], None] = lambda reason: None  # its driver stops
+        self._supervised = False
+        self._scheduler = scheduler
+        self._report = report
+        self._polled: dict[tuple[int, int], BackgroundReader] = {}
+        self._background_writers: list[BackgroundWriter] = []
+        self._every_sync = [entry for entry in self.image.inputs if entry.every_sync]
+
+    @property
+    def name(self) -> str:
+        """Name in bus.yml."""
+        return self.config.name
+
+    @property
+    def expected_answers(self) -> int:
+        """How many TPDOs answer each SYNC."""
+        return len(self._every_sync) if self.online else 0
+
+    def report(self, kind: EventKind, severity: Severity, text: str) -> None:
+        """Tell the owner of the network something about this device."""
+        self._report(Event(kind, severity, self.name, text))
+
+    def count_missed(self) -> int:
+        """Count the TPDOs that did not answer the last SYNC, and return their number."""
+        if not self.online:
+            return 0
+        missed = sum(not entry.answered for entry in self._every_sync)
+        self.missed_pdos += missed
+        return missed
+
+    def receive_heartbeat(self, frame: Frame) -> None:
+        """Take a heartbeat or boot-up message."""
+        state = parse_heartbeat(frame.data)
+        if state is None:
+            return
+        self.last_heartbeat = frame.timestamp
+        if state is not self.nmt_state:
+            self.left_operational = (
+                self.online
+                and state is not NmtState.OPERATIONAL
+                and (self.left_operational or self.nmt_state is NmtState.OPERATIONAL)
+            )
+            self.nmt_state = state
+            severity = Severity.WARNING if self.left_operational else Severity.INFO
+            self.report(EventKind.NMT_STATE, severity, f'NMT state {state.name}')
+        if state is NmtState.BOOT_UP:
+            self.on_boot_up()
+
+    def receive_emergency(self, frame: Frame) -> None:
+        """Take an EMCY message."""
+        try:
+            emergency = Emergency.decode(frame.data)
+        except CodecError as error:
+            self.report(EventKind.EMERGENCY, Severity.WARNING, f'odd EMCY: {error}')
+            return
+        if emergency.is_reset:
+            self.last_emergency = None
+            self.report(EventKind.EMERGENCY, Severity.INFO, f'EMCY: {emergency}')
+        else:
+            self.last_emergency = emergency
+            self.report(EventKind.EMERGENCY, Severity.ERROR, f'EMCY: {emergency}')
+
+    def supervise(self) -> None:
+        """Watch the heartbeat from now on, when it is configured."""
+        self._supervised = self.config.heartbeat_timeout > 0
+
+    def heartbeat_overdue(self, now: float) -> bool:
+        """Tell whether a supervised heartbeat did not come within its consumer time."""
+        return self._supervised and now - self.last_heartbeat > self.config.heartbeat_timeout
+
+    def lost(self, reason: str) -> None:
+        """The device is gone: forget what it said and tell whoever drives it."""
+        self.report(EventKind.HEARTBEAT_LOST, Severity.ERROR, reason)
+        self.nmt_state = None
+        self.offline(reason)
+        self.on_lost(reason)
+
+    def offline(self, reason: str) -> None:
+        """Stop talking to the device until it is booted again."""
+        self.online = False
+        self.left_operational = False
+        self._supervised = False
+        self.image.clear()
+        self.sdo.cancel_all(reason)
+        for entry in self._polled.values():
+            entry.value = None
+        for writer in self._background_writers:
+            writer.forget()
+
+    def reader(self, index: int, subindex: int = 0) -> Reader:
+        """Return a reader for an object, by TPDO when it is mapped, else by polling."""
+        mapped = self.image.reader(index, subindex)
+        if mapped is not None:
+            return mapped
+        return self._polled.setdefault((index, subindex), BackgroundReader())
+
+    def writer(self, index: int, subindex: int = 0) -> Writer:
+        """Return a writer for an object, by RPDO when it is mapped, else by SDO on change."""
+        mapped = self.image.writer(index, subindex)
+        if mapped is not None:
+            return mapped
+        writer = BackgroundWriter(self, index, subindex)
+        self._background_writers.append(writer)
+        return writer
+
+    async def poll(self, period: float) -> None:
+        """Keep the objects that no TPDO carries up to date while the device is online."""
+        while self._polled and self.online:
+            for address, entry in self._polled.items():
+                try:
+                    value = await self.read_object(*address)
+                except SdoError:
+                    continue  # the SDO counters show it; the value stays as old as it is
+                entry.value = value if isinstance(value, (int, float)) else None
+            await self._scheduler.timer(period)
+
+    async def read_object(self, index: int, subindex: int = 0) -> Value:
+        """Read an object by SDO and decode it by its type in the EDS.
+
+        Raises:
+            SdoError: The device did not answer or aborted, or the EDS does not know the object.
+            CodecError: The answer does not fit the type.
+        """
+        entry = self.config.dictionary.get(index, subindex)
+        if entry is None:
+            raise SdoError(self._unknown_object(index, subindex))
+        data = await self.sdo.read(index, subindex, self.config.sdo_timeout)
+        return decode(entry.data_type, data)
+
+    def write_object(self, index: int, subindex: int, value: Value) -> Promise[None]:
+        """Write an object by SDO, encoded by its type in the EDS; errors reject the promise."""
+        entry = self.config.dictionary.get(index, subindex)
+        promise: Promise[None] = Promise()
+        if entry is None:
+            promise.reject(SdoError(self._unknown_object(index, subindex)))
+            return promise
+        try:
+            data = encode(entry.data_type, value)
+        except CodecError as error:
+            promise.reject(error)
+            return promise
+        return self.sdo.write(index, subindex, data, self.config.sdo_timeout)
+
+    def _unknown_object(self, index: int, subindex: int) -> str:
+        return (
+            f'{self.name} has no object 0x{index:04X}:{subindex:02X} in {self.config.eds.name}; '
+            'read it through the master node, whose request names the data type'
+        )

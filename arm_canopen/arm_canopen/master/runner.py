@@ -1,0 +1,151 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The thread that drives a network on a real bus, on absolute deadlines of the steady clock."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Coroutine
+from concurrent.futures import Future
+from functools import partial
+import logging
+import threading
+import time
+from typing import Any, TypeVar
+
+from ..can.bus import Bus
+from ..exceptions import BusError
+from .network import Network
+from .scheduler import Promise
+from .statistics import CycleFigures, CycleStatistics
+
+T = TypeVar('T')
+
+IDLE_PERIOD = 0.01  # [s] cycle of a bus without SYNC
+REOPEN_PAUSE = 0.1  # [s] between two looks at a bus that went away
+
+logger = logging.getLogger(__name__)
+
+
+class NetworkThread:
+    """Owns the cycle, and all reading and writing of the bus.
+
+    Other threads hand work to it with ``call`` and ``run`` and get a future; nothing is locked.
+
+    Attributes:
+        network: The network that it runs.
+        period: Length of the cycle in [s].
+    """
+
+    def __init__(self, bus: Bus, network: Network) -> None:
+        """Prepare; the thread starts with :meth:`start`.
+
+        Args:
+            bus: An open bus; it stays the caller's to close.
+            network: The network whose frames go over it.
+        """
+        self.network = network
+        self.period = network.config.master.sync_period or IDLE_PERIOD
+        self._bus = bus
+        self._statistics = CycleStatistics(self.period)
+        self._work: deque[Callable[[], None]] = deque()
+        self._stopping = False
+        self._thread = threading.Thread(target=self._run, name='canopen', daemon=True)
+
+    def start(self) -> None:
+        """Start the network and its cycle."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End the thread after the cycle that runs, and wait for it."""
+        self._stopping = True
+        self._bus.wake()
+        if self._thread.is_alive():
+            self._thread.join()
+
+    def call(self, function: Callable[[], T]) -> Future[T]:
+        """Run a function in the thread of the cycle; it must not wait."""
+        future: Future[T] = Future()
+
+        def work() -> None:
+            try:
+                future.set_result(function())
+            except Exception as error:  # noqa: BLE001  # belongs to whoever holds the future
+                future.set_exception(error)
+
+        self._hand_over(work)
+        return future
+
+    def run(self, sequence: Callable[[], Promise[T]]) -> Future[T]:
+        """Start something that ends later; the future gets its result.
+
+        Args:
+            sequence: Called in the thread of the cycle; returns the promise.
+        """
+        future: Future[T] = Future()
+
+        def finish(promise: Promise[T]) -> None:
+            if promise.error is not None:
+                future.set_exception(promise.error)
+            else:
+                future.set_result(promise.result())
+
+        def work() -> None:
+            try:
+                sequence().when_done(finish)
+            except Exception as error:  # noqa: BLE001  # belongs to whoever holds the future
+                future.set_exception(error)
+
+        self._hand_over(work)
+        return future
+
+    def run_coroutine(self, make: Callable[[], Coroutine[Promise[Any], None, T]]) -> Future[T]:
+        """As :meth:`run`, for a coroutine that is made in the thread of the cycle."""
+        return self.run(lambda: self.network.scheduler.spawn(make()))
+
+    def figures(self) -> CycleFigures:
+        """Return the figures of the cycle; call it in the thread of the cycle."""
+        return self._statistics.figures()
+
+    def _hand_over(self, work: Callable[[], None]) -> None:
+        self._work.append(work)
+        self._bus.wake()
+
+    def _run(self) -> None:
+        self.network.start(time.monotonic())
+        deadline = time.monotonic()
+        while not self._stopping:
+            self._serve_until(deadline)
+            now = time.monotonic()
+            skipped = int((now - deadline) / self.period)
+            self._statistics.record(now - deadline, skipped)
+            self._guarded(partial(self.network.cycle, now, self.period))
+            deadline += (skipped + 1) * self.period
+
+    def _serve_until(self, deadline: float) -> None:
+        """Take frames, hand-overs and timers until the deadline of the next cycle."""
+        network = self.network
+        while not self._stopping:
+            now = time.monotonic()
+            if now >= deadline:
+                return
+            timer = network.scheduler.next_deadline()
+            wake = deadline if timer is None else min(deadline, timer)
+            try:
+                frames = self._bus.receive(max(0.0, wake - now))
+            except BusError as error:
+                logger.error('%s', error)
+                time.sleep(min(REOPEN_PAUSE, max(0.0, deadline - now)))
+                return
+            for frame in frames:
+                network.receive(frame)
+            while self._work:
+                self._guarded(self._work.popleft())
+            network.advance(time.monotonic())
+
+    def _guarded(self, work: Callable[[], object]) -> None:
+        """Let no defect in one cycle end the cycles that keep the drives under control."""
+        try:
+            work()
+        except Exception:
+            logger.exception('a defect in the CANopen cycle')

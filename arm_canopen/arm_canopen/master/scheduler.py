@@ -1,0 +1,187 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Sequences as coroutines in the steady time of the network, without threads or an event loop.
+
+A boot-up or a mode switch takes many frames and waits in between. Written as a coroutine it reads
+from top to bottom; the scheduler resumes it when its SDO is answered, its condition holds or its
+time is up. Time is what ``advance`` was last told, so tests run hours in milliseconds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Coroutine, Generator, Sequence
+import heapq
+from itertools import count
+from typing import Any, Generic, TypeVar
+
+T = TypeVar('T')
+
+
+class Promise(Generic[T]):
+    """A result that comes later, once; it can be awaited by coroutines of a scheduler."""
+
+    def __init__(self) -> None:
+        """Start unresolved."""
+        self.done = False
+        self._value: T | None = None
+        self._error: BaseException | None = None
+        self._callbacks: list[Callable[[Promise[T]], None]] = []
+
+    def resolve(self, value: T) -> None:
+        """Give the result; ignored when there is one already."""
+        self._finish(value, None)
+
+    def reject(self, error: BaseException) -> None:
+        """Give an error as the result; ignored when there is one already."""
+        self._finish(None, error)
+
+    def result(self) -> T:
+        """Return the result or raise the error; only once done."""
+        if self._error is not None:
+            raise self._error
+        return self._value  # type: ignore[return-value]  # None only where T allows it
+
+    @property
+    def error(self) -> BaseException | None:
+        """The error that it was rejected with, if any."""
+        return self._error
+
+    def when_done(self, callback: Callable[[Promise[T]], None]) -> None:
+        """Call back when there is a result, at once if there is one already."""
+        if self.done:
+            callback(self)
+        else:
+            self._callbacks.append(callback)
+
+    def __await__(self) -> Generator[Promise[T], None, T]:
+        """Wait for the result inside a coroutine of a scheduler."""
+        if not self.done:
+            yield self
+        return self.result()
+
+    def _finish(self, value: T | None, error: BaseException | None) -> None:
+        if self.done:
+            return
+        self.done, self._value, self._error = True, value, error
+        callbacks, self._callbacks = self._callbacks, []
+        for callback in callbacks:
+            callback(self)
+
+
+class Task(Promise[T]):
+    """A running coroutine; its result is what the coroutine returns."""
+
+    def __init__(self, coroutine: Coroutine[Promise[Any], None, T]) -> None:
+        """Run up to the first wait."""
+        super().__init__()
+        self._coroutine = coroutine
+        self._step(None)
+
+    def cancel(self, reason: BaseException) -> None:
+        """End the coroutine where it waits; awaiting the task raises the reason."""
+        if not self.done:
+            self.reject(reason)
+            self._coroutine.close()
+
+    def _step(self, _: Promise[Any] | None) -> None:
+        if self.done:
+            return
+        try:
+            awaited = self._coroutine.send(None)
+        except StopIteration as stop:
+            self.resolve(stop.value)
+        except Exception as error:  # noqa: BLE001  # handed to whoever awaits the task
+            self.reject(error)
+        else:
+            awaited.when_done(self._step)
+
+
+class Scheduler:
+    """Timers and conditions for coroutines.
+
+    Attributes:
+        now: Steady time of the last ``advance`` in [s].
+    """
+
+    def __init__(self, now: float = 0.0) -> None:
+        """Start at a time, with nothing to do."""
+        self.now = now
+        self._timers: list[tuple[float, int, Promise[None]]] = []
+        self._order = count()
+        self._conditions: list[tuple[Callable[[], bool], Promise[None]]] = []
+
+    def advance(self, now: float) -> None:
+        """Set the time and resume what waited for it, or for a condition that now holds."""
+        self.now = max(self.now, now)
+        while self._timers and self._timers[0][0] <= self.now:
+            heapq.heappop(self._timers)[2].resolve(None)
+        if self._conditions:
+            self._check_conditions()
+
+    def next_deadline(self) -> float | None:
+        """Return the time of the next timer in [s], None when there is none."""
+        while self._timers and self._timers[0][2].done:
+            heapq.heappop(self._timers)
+        return self._timers[0][0] if self._timers else None
+
+    def spawn(self, coroutine: Coroutine[Promise[Any], None, T]) -> Task[T]:
+        """Start a coroutine now."""
+        return Task(coroutine)
+
+    def timer(self, delay: float) -> Promise[None]:
+        """Return a promise that is resolved after a delay in [s]."""
+        promise: Promise[None] = Promise()
+        heapq.heappush(self._timers, (self.now + delay, next(self._order), promise))
+        return promise
+
+    async def wait(self, promise: Promise[T], timeout: float) -> T:
+        """Wait for a promise for at most a time in [s].
+
+        Raises:
+            TimeoutError: There was no result in time.
+        """
+        first: Promise[None] = Promise()
+        timer = self.timer(timeout)
+        promise.when_done(lambda _: first.resolve(None))
+        timer.when_done(lambda _: first.resolve(None))
+        await first
+        timer.resolve(None)
+        if not promise.done:
+            raise TimeoutError(f'nothing within {timeout:g} s')
+        return promise.result()
+
+    async def until(self, condition: Callable[[], bool], timeout: float) -> None:
+        """Wait until a condition holds; it is looked at whenever time advances.
+
+        Raises:
+            TimeoutError: It did not hold within the time-out in [s].
+        """
+        if condition():
+            return
+        promise: Promise[None] = Promise()
+        entry = (condition, promise)
+        self._conditions.append(entry)
+        try:
+            await self.wait(promise, timeout)
+        finally:
+            if entry in self._conditions:
+                self._conditions.remove(entry)
+
+    async def gather(self, tasks: Sequence[Promise[T]]) -> list[T]:
+        """Wait for all; the first error in their order is raised after all are done."""
+        for task in tasks:
+            await self._end_of(task)
+        return [task.result() for task in tasks]
+
+    @staticmethod
+    def _end_of(task: Promise[Any]) -> Promise[None]:
+        """Return a promise that is resolved when the task ends, well or not."""
+        end: Promise[None] = Promise()
+        task.when_done(lambda _: end.resolve(None))
+        return end
+
+    def _check_conditions(self) -> None:
+        ready = [entry for entry in self._conditions if entry[0]()]
+        self._conditions = [entry for entry in self._conditions if entry not in ready]
+        for _, promise in ready:
+            promise.resolve(None)

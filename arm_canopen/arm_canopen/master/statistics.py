@@ -1,0 +1,69 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Figures of the SYNC cycle."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class CycleFigures:
+    """What the cycle did; jitter over the last window, counts since the start.
+
+    Attributes:
+        period: Nominal period in [s].
+        cycles: Number of cycles.
+        overruns: Cycles that were left out because the one before ended too late.
+        jitter_p50: Median lateness of the start of a cycle in [s].
+        jitter_p99: 99th percentile of the lateness in [s].
+        jitter_max: Largest lateness in [s].
+    """
+
+    period: float
+    cycles: int
+    overruns: int
+    jitter_p50: float
+    jitter_p99: float
+    jitter_max: float
+
+
+class CycleStatistics:
+    """Collects the lateness of each cycle against its deadline."""
+
+    def __init__(self, period: float, window: int = 2000) -> None:
+        """Start empty.
+
+        Args:
+            period: Nominal period in [s].
+            window: How many cycles the percentiles look back.
+        """
+        self._period = period
+        self._late: deque[float] = deque(maxlen=window)
+        self._cycles = 0
+        self._overruns = 0
+
+    def record(self, late: float, skipped: int) -> None:
+        """Add a cycle.
+
+        Args:
+            late: Start minus deadline in [s].
+            skipped: Deadlines that had passed as a whole and were left out.
+        """
+        self._late.append(late)
+        self._cycles += 1
+        self._overruns += skipped
+
+    def figures(self) -> CycleFigures:
+        """Return the figures of now."""
+        ordered = sorted(self._late) or [0.0]
+        last = len(ordered) - 1
+        return CycleFigures(
+            period=self._period,
+            cycles=self._cycles,
+            overruns=self._overruns,
+            jitter_p50=ordered[last // 2],
+            jitter_p99=ordered[last * 99 // 100],
+            jitter_max=ordered[-1],
+        )
