@@ -1,0 +1,65 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+#
+# Every target makes what it needs of the environment first (tools/README.md says how).
+
+# with a name, .venv is made from that interpreter: make PYTHON=python3.12 build
+PYTHON ?=
+# seconds; without it the demo runs until Ctrl-C
+DURATION ?=
+# what pytest gets besides: make test ARGS='-k sync -x'
+ARGS ?=
+
+WORKSPACE = cd tools && $(or $(PYTHON),python3) -m workspace $(if $(PYTHON),--python $(PYTHON))
+IN_ENVIRONMENT = bash -c '. "$(CURDIR)/env.sh" && exec "$$@"' environment
+
+.PHONY: help demo test build lint bench setup pins clean distclean
+.DEFAULT_GOAL := help
+
+help:
+	@echo 'make demo       watch a simulated arm move (DURATION=20 ends it after 20 s)'
+	@echo 'make test       build everything and run all tests'
+	@echo 'make build      build every package; then: source env.sh'
+	@echo 'make lint       ruff, its formatter, mypy'
+	@echo 'make bench      print the figures'
+	@echo 'make setup      make the environment only'
+	@echo 'make pins       renew the pinned requirements'
+	@echo 'make clean      remove what was built'
+	@echo 'make distclean  remove the environment too'
+
+demo: system
+	@$(WORKSPACE) build arm_bringup
+	@$(IN_ENVIRONMENT) ros2 run arm_bringup demo panda $(if $(DURATION),--duration $(DURATION))
+
+test: system
+	@$(WORKSPACE) build --dev
+	@$(IN_ENVIRONMENT) python -m pytest $(ARGS)
+
+build: system
+	@$(WORKSPACE) build
+
+lint: system
+	@$(WORKSPACE) lint
+
+bench: system
+	@$(WORKSPACE) build --dev
+	@$(IN_ENVIRONMENT) tools/bench
+
+setup: system
+	@$(WORKSPACE) setup
+
+pins: system
+	@$(WORKSPACE) pins
+
+clean:
+	rm -rf build install log .mypy_cache .pytest_cache .ruff_cache .hypothesis
+
+distclean: clean
+	rm -rf .venv .workspace.lock
+
+# all that can be said before there is a Python to say more
+.PHONY: system
+system:
+	@command -v $(or $(PYTHON),python3) >/dev/null || { \
+	  echo 'error: there is no $(or $(PYTHON),python3). Install with:' >&2; \
+	  echo '    sudo apt-get install python3 python3-venv python3-dev g++ git' >&2; exit 1; }

@@ -1,0 +1,63 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Starts the set-up with a Python that can run it and that no virtual environment hides.
+
+This file alone must be readable for any Python 3, so that an old one gets a message and not a
+traceback.
+"""
+
+import os
+import shutil
+import subprocess
+import sys
+
+OLDEST = (3, 10)
+NEWEST = (3, 14)
+
+
+def _works(path: str) -> bool:
+    """Tell whether a candidate is a supported Python and not an empty shim."""
+    code = f'import sys; sys.exit(not {OLDEST} <= sys.version_info[:2] <= {NEWEST})'
+    try:
+        return subprocess.call([path, '-c', code], stderr=subprocess.DEVNULL) == 0
+    except OSError:
+        return False
+
+
+def _another() -> str:
+    """Find a supported Python among the versioned names on PATH; empty when there is none."""
+    for minor in range(NEWEST[1], OLDEST[1] - 1, -1):
+        path = shutil.which(f'python3.{minor}')
+        if path and _works(path):
+            return path
+    return ''
+
+
+def _better_interpreter() -> str:
+    """Name the interpreter that should run the set-up instead of this one; empty for none."""
+    base = getattr(sys, '_base_executable', '') if sys.prefix != sys.base_prefix else ''
+    if base and base != sys.executable and os.path.exists(base):  # noqa: PTH110
+        return base
+    return '' if OLDEST <= sys.version_info[:2] <= NEWEST else _another()
+
+
+def _start() -> int:
+    """Run the set-up here, or in the Python that fits it."""
+    other = _better_interpreter()
+    if other:
+        os.execv(other, [other, '-m', 'workspace', *sys.argv[1:]])  # noqa: S606
+    if not OLDEST <= sys.version_info[:2] <= NEWEST:
+        sys.stderr.write(
+            f'error: Python {sys.version_info[0]}.{sys.version_info[1]} is not supported.\n'
+            f'  Install one of Python 3.{OLDEST[1]} to 3.{NEWEST[1]}, for example with\n'
+            '    sudo apt-get install python3.12 python3.12-venv python3.12-dev\n'
+            '  and run again; it is found by its name, or named with: make PYTHON=python3.12\n'
+        )
+        return 1
+    from workspace.cli import main
+
+    return main(sys.argv[1:])
+
+
+if __name__ == '__main__':
+    sys.exit(_start())

@@ -1,0 +1,84 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The commands behind the Makefile."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+import os
+import sys
+
+from .environment import choose_python, Environment
+from .errors import WorkspaceError
+from .interpreter import Interpreter, probe
+from .layout import Layout, this_checkout
+from .lint import lint
+from .lock import exclusive
+from .pins import renew
+from .plan import carry_out, plan, Wish
+from .process import Runner
+from .state import read_state
+from .system import missing_packages
+from .underlay import find_underlay
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog='workspace', description=__doc__)
+    parser.add_argument('--python', default='', help='interpreter to make .venv from')
+    commands = parser.add_subparsers(dest='command', required=True)
+    setup = commands.add_parser('setup', help='make the environment')
+    setup.add_argument('--dev', action='store_true', help='with the tools for testing')
+    build = commands.add_parser('build', help='make the environment and build packages')
+    build.add_argument('--dev', action='store_true', help='with the tools for testing')
+    build.add_argument('packages', nargs='*', help='with what they need; none means all')
+    commands.add_parser('lint', help='make the environment and check the code')
+    commands.add_parser('pins', help='renew the pinned requirements')
+    commands.add_parser('missing', help='name the system packages that are missing')
+    return parser
+
+
+def _environment(layout: Layout, asked: str) -> Environment:
+    underlay = find_underlay(os.environ, layout.venv)
+    chosen = choose_python(asked, underlay, read_state(layout.state), sys.executable)
+    path = chosen.path if isinstance(chosen, Interpreter) else chosen
+    return Environment(layout, underlay, path)
+
+
+def _wish(options: argparse.Namespace) -> Wish:
+    if options.command == 'build':
+        return Wish(dev=options.dev, packages=tuple(options.packages))
+    return Wish(dev=options.command in {'lint', 'pins'} or options.dev, build=False)
+
+
+def _run(options: argparse.Namespace) -> int:
+    layout = this_checkout()
+    environment = _environment(layout, options.python)
+    if options.command == 'missing':
+        print(*missing_packages(environment.underlay, probe(environment.python)), sep='\n')
+        return 0
+    with exclusive(layout.lock) as lock:
+        runner = Runner(os.environ, layout.root, lock)
+        carry_out(plan(environment, _wish(options)), runner)
+        if options.command == 'pins':
+            renew(layout, runner)
+    return lint(layout, os.environ) if options.command == 'lint' else 0
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Run a command.
+
+    Args:
+        arguments: What stood behind the program's name.
+
+    Returns:
+        The exit code: 0 done, 1 not done and said why, 130 interrupted.
+    """
+    try:
+        return _run(_parser().parse_args(arguments))
+    except WorkspaceError as error:
+        print(f'error: {error}', file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print('Interrupted; run again to go on.', file=sys.stderr)
+        return 130

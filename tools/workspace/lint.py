@@ -1,0 +1,70 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Runs every check that reads the code: ruff, its formatter, mypy."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+import os
+from pathlib import Path
+import subprocess
+
+from .layout import Layout
+from .packages import find_packages
+from .process import clean_environment
+
+
+def type_check_units(root: Path) -> dict[str, list[Path]]:
+    """Group the folders for mypy: modules of two units may have the same name.
+
+    Args:
+        root: The checkout.
+
+    Returns:
+        For each unit's name the folders to check together.
+    """
+    candidates = {
+        package.name: [package.folder / part for part in (package.name, 'test', 'bench')]
+        for package in find_packages(root).values()
+        if package.build_type == 'ament_python'
+    }
+    tools = root / 'tools'
+    candidates['tools'] = [tools / 'workspace', tools / 'test']
+    front_end = tools / 'ros2_frontend'
+    candidates['ros2_frontend'] = [front_end / 'ros2_frontend', front_end / 'test']
+    candidates['tests'] = [root / 'tests']
+    present = {
+        name: [folder for folder in folders if any(folder.rglob('*.py'))]
+        for name, folders in candidates.items()
+    }
+    return {name: folders for name, folders in present.items() if folders}
+
+
+def lint(layout: Layout, environ: Mapping[str, str]) -> int:
+    """Run all checks, also after one that failed.
+
+    Returns:
+        0 when all passed, else 1.
+    """
+    bin_folder = layout.venv / 'bin'
+    commands: list[list[str | Path]] = [
+        [bin_folder / 'ruff', 'check', '.'],
+        [bin_folder / 'ruff', 'format', '--check', '.'],
+    ]
+    for name, folders in type_check_units(layout.root).items():
+        cache = layout.root / '.mypy_cache' / name
+        commands.append([bin_folder / 'mypy', '--cache-dir', cache, *folders])
+    failed = 0
+    for command in commands:
+        names = [
+            os.path.relpath(part, layout.root) if isinstance(part, Path) else part
+            for part in command
+        ]
+        print('==', ' '.join(names), flush=True)
+        failed += bool(
+            subprocess.run(
+                command, cwd=layout.root, env=clean_environment(environ), check=False
+            ).returncode
+        )
+    print(f'{failed} of {len(commands)} checks failed' if failed else 'All checks passed')
+    return int(failed > 0)

@@ -1,0 +1,137 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The packages of the workspace: what they are, need, and look like at the moment."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+import os
+from pathlib import Path
+import xml.etree.ElementTree as ET
+
+from .errors import UnknownPackageError
+from .state import fingerprint
+from .underlay import Underlay
+
+SEARCH_DEPTH = 2  # packages stand in the checkout, or in one folder of it
+INTERFACE_GROUP = 'rosidl_interface_packages'
+COPIES_FOLDER = 'interfaces'  # public packages that an underlay may have
+_NOT_SOURCE = {'__pycache__', 'build', 'install', 'log'}
+_PYTHON_BUILD_FILES = ('package.xml', 'setup.py', 'setup.cfg')
+
+
+@dataclass(frozen=True, slots=True)
+class Package:
+    """A colcon package.
+
+    Attributes:
+        name: Its name.
+        folder: Where it is.
+        build_type: `ament_cmake` or `ament_python`.
+        dependencies: All packages that its manifest names.
+        is_interface: Whether it consists of messages, services and actions.
+        is_copy: Whether it stands in for a public package.
+    """
+
+    name: str
+    folder: Path
+    build_type: str
+    dependencies: frozenset[str]
+    is_interface: bool
+    is_copy: bool
+
+
+def read_package(manifest: Path) -> Package:
+    """Read a package.xml (REP 149)."""
+    root = ET.parse(manifest).getroot()  # noqa: S314  # our own file
+    needed = {(element.text or '').strip() for element in root if element.tag.endswith('depend')}
+    groups = {(element.text or '').strip() for element in root.iter('member_of_group')}
+    return Package(
+        name=root.findtext('name', '').strip(),
+        folder=manifest.parent,
+        build_type=root.findtext('export/build_type', 'ament_cmake').strip(),
+        dependencies=frozenset(needed),
+        is_interface=INTERFACE_GROUP in groups,
+        is_copy=manifest.parent.parent.name == COPIES_FOLDER,
+    )
+
+
+def find_packages(root: Path) -> dict[str, Package]:
+    """Find the packages of a checkout by their manifests."""
+    patterns = ('*/' * depth + 'package.xml' for depth in range(1, SEARCH_DEPTH + 1))
+    manifests = (path for pattern in patterns for path in sorted(root.glob(pattern)))
+    found = {}
+    for manifest in manifests:
+        parts = manifest.relative_to(root).parts
+        hidden = any(part.startswith('.') or part in _NOT_SOURCE for part in parts)
+        if not hidden and not (manifest.parent / 'COLCON_IGNORE').exists():
+            package = read_package(manifest)
+            found[package.name] = package
+    return found
+
+
+def needed_packages(
+    packages: Mapping[str, Package], targets: Iterable[str], underlay: Underlay
+) -> dict[str, Package]:
+    """Take the targets and what they need, without what the underlay has.
+
+    Args:
+        packages: All packages of the workspace.
+        targets: Names to begin with; none means all.
+        underlay: The ROS below; of a public package it has, our copy is not built.
+
+    Returns:
+        The packages, each after those that it needs.
+
+    Raises:
+        UnknownPackageError: A target is not in the workspace.
+    """
+    ordered: dict[str, Package] = {}
+
+    def visit(name: str) -> None:
+        package = packages.get(name)
+        if package is None or name in ordered:
+            return
+        if package.is_copy and underlay.has_package(name):
+            return
+        for dependency in sorted(package.dependencies):
+            visit(dependency)
+        ordered[name] = package
+
+    for target in sorted(targets) or sorted(packages):
+        if target not in packages:
+            raise UnknownPackageError(
+                f'There is no package {target} in this workspace.',
+                f'It has: {", ".join(sorted(packages))}',
+            )
+        visit(target)
+    return ordered
+
+
+def _files(folder: Path) -> Iterator[Path]:
+    for parent, folders, names in os.walk(folder):
+        folders[:] = sorted(
+            name
+            for name in folders
+            if name not in _NOT_SOURCE
+            and not name.startswith('.')
+            and not name.endswith('.egg-info')
+        )
+        yield from (Path(parent, name) for name in sorted(names))
+
+
+def source_fingerprint(package: Package) -> str:
+    """Hash what decides the build's result.
+
+    Of a Python package the modules and data files are linked, not copied: their contents do not
+    count, and of the data files (which setup.py lists) only the names do.
+    """
+    parts: list[str | bytes] = []
+    for path in _files(package.folder):
+        name = str(path.relative_to(package.folder))
+        if package.build_type != 'ament_python' or name in _PYTHON_BUILD_FILES:
+            parts += [name, path.read_bytes()]
+        elif path.suffix not in {'.py', '.pyc'}:
+            parts.append(name)
+    return fingerprint(*parts)

@@ -1,0 +1,73 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Decides what has to be done, and does it with a word on each step."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+import time
+
+from .build import Builder
+from .environment import Environment, Step
+from .packages import find_packages, needed_packages
+from .process import Runner
+from .state import read_state
+
+
+@dataclass(frozen=True, slots=True)
+class Wish:
+    """What a target needs.
+
+    Attributes:
+        dev: Whether the tools for testing.
+        build: Whether any package.
+        packages: Which ones; none means all.
+    """
+
+    dev: bool = False
+    build: bool = True
+    packages: tuple[str, ...] = ()
+
+
+def plan(environment: Environment, wish: Wish) -> list[Step]:
+    """List the steps from what is there to what is wished for.
+
+    Raises:
+        UnknownPackageError: A package is wished for that the workspace does not have.
+    """
+    layout = environment.layout
+    steps = environment.steps(read_state(layout.state), dev=wish.dev)
+    if not wish.build:
+        return steps
+    found = find_packages(layout.root)
+    packages = needed_packages(found, wish.packages, environment.underlay)
+    builder = Builder(layout, environment.base, environment.underlay.kind)
+    stale = builder.stale(builder.fingerprints(packages))
+    gone = builder.leftovers(needed_packages(found, (), environment.underlay))
+
+    def build(runner: Runner) -> None:
+        builder.remove(gone)
+        builder.build(runner, packages, stale)
+
+    if stale or gone:
+        title = f'Building {", ".join(stale)}' if stale else f'Removing {", ".join(gone)}'
+        steps.append(Step(title, build))
+    return steps
+
+
+def carry_out(steps: Sequence[Step], runner: Runner) -> None:
+    """Do the steps, each announced and timed.
+
+    Raises:
+        WorkspaceError: A step failed; those before it stay done.
+    """
+    begin = time.monotonic()
+    for number, step in enumerate(steps, 1):
+        head = f'[{number}/{len(steps)}] {step.title}'
+        print(f'{head} ...', flush=True)
+        start = time.monotonic()
+        step.run(runner)
+        print(f'      {time.monotonic() - start:.1f} s', flush=True)
+    if steps:
+        print(f'Ready after {time.monotonic() - begin:.0f} s.', flush=True)

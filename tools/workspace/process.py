@@ -1,0 +1,93 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Runs the programs of the set-up, and tells a missing network from another failure."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+import re
+import subprocess
+from typing import TypeAlias
+
+from .errors import NetworkError, StepFailedError
+
+TAIL_LINES = 25
+_UNREACHABLE = re.compile(
+    'dns error|failed to lookup address|name resolution|Name or service not known'
+    '|Network is unreachable|No route to host|Connection refused|Connection reset'
+    '|NewConnectionError|ConnectTimeout|Failed to connect|tcp connect error|Max retries exceeded',
+    re.IGNORECASE,
+)
+# of another ROS, another environment or an outer make: must not leak into what we build
+_FOREIGN = re.compile(
+    'AMENT_|COLCON_|CMAKE_PREFIX_PATH|PYTHONPATH|PYTHONHOME|PYTHONSAFEPATH|VIRTUAL_ENV|ROS_DISTRO'
+    '|ROS_VERSION|ROS_PYTHON_VERSION|LD_LIBRARY_PATH|_ROS_WHEELS|MAKEFLAGS|MFLAGS|MAKELEVEL'
+)
+
+Argument: TypeAlias = str | Path
+
+
+def clean_environment(environ: Mapping[str, str]) -> dict[str, str]:
+    """Copy an environment without what belongs to another ROS, Python or make."""
+    kept = {name: value for name, value in environ.items() if not _FOREIGN.match(name)}
+    return {**kept, 'PIP_DISABLE_PIP_VERSION_CHECK': '1', 'PYTHONUNBUFFERED': '1'}
+
+
+@dataclass(frozen=True, slots=True)
+class Runner:
+    """Starts programs in a clean environment.
+
+    Attributes:
+        environ: Environment to clean and pass on.
+        cwd: Folder to run in.
+        lock: Descriptor of the set-up's lock, held by the programs too.
+    """
+
+    environ: Mapping[str, str]
+    cwd: Path
+    lock: int
+
+    def run(
+        self,
+        what: str,
+        arguments: Sequence[Argument],
+        *,
+        show: Callable[[str], bool] = lambda _line: False,
+        extra: Mapping[str, str] | None = None,
+    ) -> None:
+        """Run a program to its end.
+
+        Args:
+            what: What the program does, for messages.
+            arguments: The program and its arguments.
+            show: Picks the lines of its output that a person wants to see.
+            extra: Variables to add to the environment.
+
+        Raises:
+            NetworkError: It failed for want of a connection.
+            StepFailedError: It failed for another reason.
+        """
+        tail: deque[str] = deque(maxlen=TAIL_LINES)
+        with subprocess.Popen(
+            [str(argument) for argument in arguments],
+            env={**clean_environment(self.environ), **(extra or {})},
+            cwd=self.cwd,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            errors='replace',
+            pass_fds=(self.lock,),
+        ) as process:
+            for line in process.stdout or ():
+                tail.append(line.rstrip())
+                if show(line):
+                    print(f'      {line.strip()}', flush=True)
+        if process.returncode:
+            output = '\n'.join(tail)
+            if _UNREACHABLE.search(output):
+                raise NetworkError(what)
+            raise StepFailedError(what, process.returncode, output)

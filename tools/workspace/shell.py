@@ -1,0 +1,110 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Writes the scripts that bring a shell into the environment."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from shlex import quote
+
+from .state import write_atomically
+from .underlay import Underlay, UnderlayKind
+
+SHELLS = ('sh', 'bash', 'zsh')
+_HEAD = (
+    '# Written by the set-up (tools/workspace/shell.py); sourced by env.sh and install/setup.*\n'
+)
+_PREPEND = """\
+_workspace_prepend() {
+  eval "_workspace_old=\\${$1-}"
+  case ":$_workspace_old:" in
+    *":$2:"*) ;;
+    *) eval "export $1=\\"\\$2\\${_workspace_old:+:\\$_workspace_old}\\"" ;;
+  esac
+}
+"""
+_TAIL = """\
+unset -f _workspace_prepend
+unset _workspace_old
+# a person's own choice counts; without one, DDS stays on this host
+export ROS_AUTOMATIC_DISCOVERY_RANGE="${ROS_AUTOMATIC_DISCOVERY_RANGE:-LOCALHOST}"
+"""
+# A ROS that was sourced before would be found first, and its libraries do not fit the wheels.
+_LEAVE_SYSTEM_ROS = """\
+case ":${AMENT_PREFIX_PATH:-}:" in
+  *:/opt/ros/*)
+    echo "env.sh: leaving the ROS that was sourced before (${ROS_DISTRO:-unknown})" >&2
+    unset AMENT_PREFIX_PATH CMAKE_PREFIX_PATH COLCON_PREFIX_PATH PYTHONPATH LD_LIBRARY_PATH
+    ;;
+esac
+if [ "${RMW_IMPLEMENTATION:-rmw_fastrtps_cpp}" != rmw_fastrtps_cpp ]; then
+  echo "env.sh: there is no $RMW_IMPLEMENTATION among the wheels, using rmw_fastrtps_cpp" >&2
+  export RMW_IMPLEMENTATION=rmw_fastrtps_cpp
+fi
+"""
+_FRONT_END = """\
+#!{python}
+\"\"\"The `ros2` command of this workspace, for a ROS that has none; written by the set-up.\"\"\"
+
+import sys
+
+sys.path.insert(0, {folder!r})
+
+from ros2_frontend.main import main
+
+sys.exit(main())
+"""
+
+
+def setup_script(venv: Path, underlay: Underlay, libraries: Sequence[Path], shell: str) -> str:
+    """Compose what a shell sources.
+
+    Args:
+        venv: The virtual environment.
+        underlay: The ROS below the workspace.
+        libraries: Folders for the library path, where ROS comes from wheels.
+        shell: One of `SHELLS`.
+    """
+    system = underlay.kind is UnderlayKind.SYSTEM
+    lines = [_HEAD, _PREPEND]
+    if system:
+        lines.append(f'. {quote(str(underlay.prefix / f"setup.{shell}"))}\n')
+    else:
+        lines.append(_LEAVE_SYSTEM_ROS)
+        wanted = [
+            ('AMENT_PREFIX_PATH', venv),
+            ('CMAKE_PREFIX_PATH', venv),
+            *(('LD_LIBRARY_PATH', folder) for folder in reversed(libraries)),
+        ]
+        lines += [f'_workspace_prepend {name} {quote(str(path))}\n' for name, path in wanted]
+        lines.append('export ROS_DISTRO=jazzy ROS_VERSION=2 ROS_PYTHON_VERSION=3\n')
+    lines += [
+        f'_workspace_prepend PATH {quote(str(venv / "bin"))}\n',
+        f'export VIRTUAL_ENV={quote(str(venv))}\n',
+        _TAIL,
+    ]
+    return ''.join(lines)
+
+
+def write_setup_scripts(venv: Path, underlay: Underlay, libraries: Sequence[Path]) -> None:
+    """Write `local_setup.*` into the virtual environment, where colcon looks for them too."""
+    for shell in SHELLS:
+        script = setup_script(venv, underlay, libraries, shell)
+        write_atomically(venv / f'local_setup.{shell}', script)
+
+
+def write_front_end(venv: Path, underlay: Underlay, folder: Path) -> None:
+    """Put our `ros2` on PATH, unless the ROS below has its own.
+
+    Args:
+        venv: The virtual environment.
+        underlay: The ROS below the workspace.
+        folder: Folder that holds the Python package `ros2_frontend`.
+    """
+    command = venv / 'bin' / 'ros2'
+    if underlay.kind is UnderlayKind.SYSTEM and underlay.has_command('ros2'):
+        command.unlink(missing_ok=True)
+        return
+    text = _FRONT_END.format(python=venv / 'bin' / 'python', folder=str(folder))
+    write_atomically(command, text, mode=0o755)

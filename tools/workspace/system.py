@@ -1,0 +1,117 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What the system must have before anything is installed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+import shutil
+
+from .errors import MissingPackagesError, UnsupportedSystemError
+from .interpreter import Interpreter
+from .underlay import PREFIX_VARIABLE, SYSTEM_PREFIX, Underlay, UnderlayKind
+
+PYTHON_OLDEST = (3, 10)
+PYTHON_NEWEST = (3, 14)
+WHEEL_MACHINE = 'x86_64'  # the wheels exist for no other
+
+# any one of the programs does; the apt package that brings the usual one
+PROGRAMS: tuple[tuple[tuple[str, ...], str], ...] = (
+    (('c++', 'g++', 'clang++'), 'g++'),
+    (('git',), 'git'),
+)
+
+# of the system's ROS, what the packages and their build use directly
+SYSTEM_ROS_PACKAGES: tuple[str, ...] = (
+    'ament_cmake',
+    'diagnostic_msgs',
+    'geometry_msgs',
+    'rclpy',
+    'rosidl_default_generators',
+    'sensor_msgs',
+    'std_msgs',
+    'std_srvs',
+    'trajectory_msgs',
+)
+
+
+def check_supported(underlay: Underlay, python: Interpreter, root: Path) -> None:
+    """Refuse a system that no remedy on it can mend.
+
+    Raises:
+        UnsupportedSystemError: The machine, the Python or the checkout's place is not supported.
+    """
+    if any(character.isspace() for character in str(root)):
+        raise UnsupportedSystemError(
+            f'The path of the checkout has a space in it: {root}',
+            'CMake rules of ROS break on that. Move the checkout and run again.',
+        )
+    if not PYTHON_OLDEST <= python.version <= PYTHON_NEWEST:
+        raise UnsupportedSystemError(
+            f'Python {python.version[0]}.{python.version[1]} ({python.path}) is not supported.',
+            f'Name one of Python 3.{PYTHON_OLDEST[1]} to 3.{PYTHON_NEWEST[1]}, '
+            'as in: make PYTHON=python3.12',
+        )
+    if underlay.kind is UnderlayKind.WHEELS and python.machine != WHEEL_MACHINE:
+        raise UnsupportedSystemError(
+            f'There are no ROS wheels for {python.machine}, and no {SYSTEM_PREFIX}.',
+            'On Ubuntu 24.04 install ROS 2 Jazzy (package ros-jazzy-ros-base) and run again;\n'
+            f'a ROS in another folder is named with {PREFIX_VARIABLE}.',
+        )
+
+
+def _python_packages(python: Interpreter) -> list[str]:
+    """Name the apt packages that complete an interpreter.
+
+    Raises:
+        UnsupportedSystemError: It is incomplete and apt does not know it.
+    """
+    missing = [
+        f'{python.name}-{part}'
+        for part, present in (('venv', python.has_venv), ('dev', python.has_headers))
+        if not present
+    ]
+    if missing and not python.of_the_system:
+        parts = ' and '.join(part.rpartition('-')[2] for part in missing)
+        raise UnsupportedSystemError(
+            f'{python.path} was installed without {parts} (venv with pip, or the C headers).',
+            'Install it completely, or name another one, as in: make PYTHON=/usr/bin/python3',
+        )
+    return missing
+
+
+def missing_packages(
+    underlay: Underlay,
+    python: Interpreter,
+    which: Callable[[str], str | None] = shutil.which,
+) -> tuple[str, ...]:
+    """Name every apt package that is missing.
+
+    Args:
+        underlay: The ROS to be used.
+        python: The interpreter to be used.
+        which: Finds a program on PATH.
+    """
+    missing = [package for names, package in PROGRAMS if not any(map(which, names))]
+    missing += _python_packages(python)
+    if underlay.kind is UnderlayKind.SYSTEM:
+        missing += [
+            f'ros-jazzy-{name.replace("_", "-")}'
+            for name in SYSTEM_ROS_PACKAGES
+            if not underlay.has_package(name)
+        ]
+    return tuple(missing)
+
+
+def check(underlay: Underlay, python: Interpreter, root: Path) -> None:
+    """Refuse a system that lacks something, naming all of it.
+
+    Raises:
+        UnsupportedSystemError: See `check_supported`.
+        MissingPackagesError: Packages have to be installed.
+    """
+    check_supported(underlay, python, root)
+    missing = missing_packages(underlay, python)
+    if missing:
+        raise MissingPackagesError(missing)

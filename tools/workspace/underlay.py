@@ -1,0 +1,68 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Which ROS 2 Jazzy the workspace stands on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+import re
+
+PREFIX_VARIABLE = 'WORKSPACE_ROS_PREFIX'
+SYSTEM_PREFIX = '/opt/ros/jazzy'
+
+
+class UnderlayKind(Enum):
+    """The two ways to have ROS."""
+
+    SYSTEM = 'system'  # installed by apt or in a container
+    WHEELS = 'wheels'  # Python wheels in the virtual environment
+
+
+@dataclass(frozen=True, slots=True)
+class Underlay:
+    """A ROS installation below the workspace.
+
+    Attributes:
+        kind: Where it came from.
+        prefix: Its folder; for wheels the virtual environment.
+    """
+
+    kind: UnderlayKind
+    prefix: Path
+
+    def has_package(self, name: str) -> bool:
+        """Tell whether the ament index of the installation lists a package."""
+        index = self.prefix / 'share' / 'ament_index' / 'resource_index' / 'packages'
+        return (index / name).exists()
+
+    def has_command(self, name: str) -> bool:
+        """Tell whether the installation brings a program."""
+        return (self.prefix / 'bin' / name).exists()
+
+    @property
+    def python_name(self) -> str | None:
+        """Name of the Python that a system installation is built for; None where any will do."""
+        if self.kind is UnderlayKind.WHEELS:
+            return None
+        for folder in sorted(self.prefix.glob('lib/python3.*/site-packages/rclpy')):
+            match = re.fullmatch(r'python3\.\d+', folder.parents[1].name)
+            if match:
+                return match.group()
+        return None
+
+
+def find_underlay(environ: Mapping[str, str], venv: Path) -> Underlay:
+    """Take the system's ROS when it is there, else the wheels.
+
+    Args:
+        environ: Environment; `WORKSPACE_ROS_PREFIX` replaces /opt/ros/jazzy, and empty it asks
+            for the wheels.
+        venv: Where the wheels are, or will be.
+    """
+    prefix = environ.get(PREFIX_VARIABLE, SYSTEM_PREFIX)
+    if prefix and (Path(prefix) / 'local_setup.bash').is_file():
+        return Underlay(UnderlayKind.SYSTEM, Path(prefix).resolve())
+    return Underlay(UnderlayKind.WHEELS, venv)

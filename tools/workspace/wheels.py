@@ -1,0 +1,96 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Mends what the ROS wheels bring from the machine that built them; safe to run again."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+import re
+
+from .process import Runner
+from .state import write_atomically
+
+# exported by the wheels' CMake files, and absent on every other machine
+_BUILDER_INCLUDE = re.compile(r'/opt/python/cp[\w.-]+/include/python3\.\d+t?')
+_BUILDER_NUMPY = re.compile(
+    r'/opt/python/cp[\w.-]+/lib/python3\.\d+t?/site-packages/numpy/_core/include'
+)
+BOOTSTRAP_FILE = 'ros_wheels_bootstrapper.pth'
+# The wheels' own line starts every interpreter twice, and trusts a variable that another
+# environment's interpreter may have set. Ours looks at what counts, the library path.
+BOOTSTRAP_LINE = (
+    "import os, sys; os.path.join(sys.prefix, 'lib') in "
+    "os.environ.get('LD_LIBRARY_PATH', '').split(os.pathsep) or "
+    "(os.environ.pop('_ROS_WHEELS_BOOTSTRAP_COMPLETE', None), "
+    "__import__('ros_wheels_bootstrapper'))\n"
+)
+
+
+def mend_cmake_text(text: str, include: str, numpy_include: str) -> str:
+    """Replace the builder's include folders by those of this machine.
+
+    Args:
+        text: A CMake file.
+        include: Folder of Python.h.
+        numpy_include: Folder of numpy's headers.
+    """
+    return _BUILDER_NUMPY.sub(
+        lambda _: numpy_include, _BUILDER_INCLUDE.sub(lambda _: include, text)
+    )
+
+
+def mend_cmake_files(prefix: Path, include: str, numpy_include: str) -> int:
+    """Mend every CMake file of an installation.
+
+    Args:
+        prefix: The virtual environment.
+        include: Folder of Python.h.
+        numpy_include: Folder of numpy's headers.
+
+    Returns:
+        How many files had to be changed.
+    """
+    changed = 0
+    for path in sorted((prefix / 'share').rglob('*.cmake')):
+        text = path.read_text(encoding='utf-8', errors='surrogateescape')
+        mended = mend_cmake_text(text, include, numpy_include)
+        if mended != text:
+            write_atomically(path, mended)
+            changed += 1
+    return changed
+
+
+def mend_bootstrapper(site_packages: Path) -> None:
+    """Let an interpreter that has the library path start once."""
+    path = site_packages / BOOTSTRAP_FILE
+    if path.is_file() and path.read_text(encoding='utf-8') != BOOTSTRAP_LINE:
+        write_atomically(path, BOOTSTRAP_LINE)
+
+
+def library_folders(prefix: Path, site_packages: Path) -> list[Path]:
+    """List the folders whose shared libraries the ROS extensions load."""
+    return [prefix / 'lib', *sorted(site_packages.glob('ros_*.libs'))]
+
+
+def mend(runner: Runner, prefix: Path, python: Path) -> list[Path]:
+    """Make the wheels in a virtual environment fit this machine.
+
+    Args:
+        runner: Starts the interpreter.
+        prefix: The virtual environment.
+        python: Its interpreter.
+
+    Returns:
+        The folders for the library path.
+    """
+    answer = prefix / '.paths.json'
+    code = (
+        'import json, numpy, sys, sysconfig; json.dump([sysconfig.get_path("purelib"), '
+        'sysconfig.get_path("include"), numpy.get_include()], open(sys.argv[1], "w"))'
+    )
+    runner.run('Asking the new environment for its paths', [python, '-c', code, answer])
+    site_packages, include, numpy_include = json.loads(answer.read_text(encoding='utf-8'))
+    mend_cmake_files(prefix, include, numpy_include)
+    mend_bootstrapper(Path(site_packages))
+    return library_folders(prefix, Path(site_packages))
