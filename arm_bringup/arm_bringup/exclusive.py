@@ -1,0 +1,44 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""One bring-up per bus and per ROS domain: a second one would only disturb the first."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import contextlib
+import fcntl
+import os
+from pathlib import Path
+import re
+
+from .exceptions import StartError
+
+
+@contextlib.contextmanager
+def exclusive(thing: str, folder: Path) -> Iterator[None]:
+    """Hold a lock on something, as long as the block runs.
+
+    The kernel gives the lock back when this process ends, however it ends.
+
+    Args:
+        thing: What is used, as the user knows it: ``bus vcan0``.
+        folder: Folder for the lock file.
+
+    Raises:
+        StartError: Another process holds it; the message says which.
+    """
+    file = folder / f'arm_bringup-{os.getuid()}-{re.sub("[^A-Za-z0-9.]+", "-", thing)}.lock'
+    # append: the pid in it must stay readable while another process holds the lock
+    with file.open('a+', encoding='ascii') as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            lock.seek(0)
+            raise StartError(
+                f'another bring-up (process {lock.read().strip()}) is on {thing}; stop it, or '
+                'take another bus with --can and another ROS_DOMAIN_ID'
+            ) from error
+        lock.truncate(0)
+        lock.write(f'{os.getpid()}\n')
+        lock.flush()
+        yield

@@ -1,0 +1,129 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What bring-up and demo have in common: from the command line to a list of processes."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator, Mapping
+import contextlib
+from dataclasses import dataclass
+import os
+from pathlib import Path
+import tempfile
+
+from .description import expand_xacro
+from .exceptions import RobotError
+from .exclusive import exclusive
+from .robots import find_robot, installed_robots_folder, Robot, robot_names
+from .stack import arm_processes, Executable, find_executable, Stack, write_parameters
+from .supervisor import ProcessSpec
+
+REAL_BUS = 'can0'
+"""Bus without --can on hardware: never one on which only simulated drives could be."""
+SIMULATED_BUS = 'auto'
+"""Bus without --can in simulation: vcan0 when it exists, else multicast on the loopback."""
+
+
+@dataclass(frozen=True, slots=True)
+class Session:
+    """An arm that is about to be brought up.
+
+    Attributes:
+        robot: The robot.
+        bus: Name of its CAN bus, no longer ``auto``.
+        urdf: Its description.
+        processes: What is to be run.
+    """
+
+    robot: Robot
+    bus: str
+    urdf: str
+    processes: list[ProcessSpec]
+
+
+def add_arguments(parser: argparse.ArgumentParser, *, default_bus: str) -> None:
+    """Declare the arguments that bring-up and demo share.
+
+    Args:
+        parser: Where to.
+        default_bus: What the help says of the bus without --can.
+    """
+    parser.add_argument(
+        'robot',
+        help='name of a robot, or path of a robot folder (with a slash, e.g. ./my_arm)',
+    )
+    parser.add_argument(
+        '--can',
+        metavar='NAME',
+        help='CAN bus: can0, vcan0, udp_multicast[:239.x.y.z[:PORT]], auto, or an adapter of '
+        f'python-can as INTERFACE:CHANNEL@BITRATE (default: {default_bus})',
+    )
+    parser.add_argument(
+        '--timeout',
+        metavar='S',
+        type=float,
+        default=30.0,
+        help='longest time until all is ready in [s]; inf waits for ever (default: %(default)s)',
+    )
+
+
+def robots_epilog() -> str:
+    """Name the robots that are installed, for the help."""
+    with contextlib.suppress(RobotError):
+        return 'robots: ' + ', '.join(robot_names(installed_robots_folder()))
+    return ''
+
+
+def locate(wanted: str) -> Robot:
+    """Find a robot of this package, or by a path.
+
+    Args:
+        wanted: Name or path.
+
+    Raises:
+        RobotError: There is none; the message lists those that exist.
+    """
+    folder = Path() if os.sep in wanted else installed_robots_folder()
+    return find_robot(wanted, folder)
+
+
+@contextlib.contextmanager
+def session(
+    arguments: argparse.Namespace,
+    *,
+    simulate: bool,
+    master: Executable,
+    master_parameters: Mapping[str, str] | None = None,
+) -> Iterator[Session]:
+    """Prepare a bring-up; the bus and the ROS domain are its own as long as the block runs.
+
+    Args:
+        arguments: What :func:`add_arguments` parsed.
+        simulate: With simulated slaves.
+        master: What runs the bus.
+        master_parameters: ROS parameters for it beside the usual ones.
+
+    Raises:
+        RobotError: The robot folder is unknown or incomplete.
+        DescriptionError: Its xacro file cannot be expanded.
+        StartError: An executable is missing, or another bring-up is on this bus or domain.
+    """
+    from arm_canopen.can import resolve_name
+
+    robot = locate(arguments.robot)
+    bus = resolve_name(arguments.can or (SIMULATED_BUS if simulate else REAL_BUS))
+    domain = os.environ.get('ROS_DOMAIN_ID') or '0'
+    locks = Path(tempfile.gettempdir())
+    with contextlib.ExitStack() as stack:
+        stack.enter_context(exclusive(f'bus {bus}', locks))
+        stack.enter_context(exclusive(f'ROS domain {domain}', locks))
+        folder = stack.enter_context(tempfile.TemporaryDirectory(prefix='arm_bringup-'))
+        urdf = expand_xacro(robot.description)
+        parameters = Path(folder) / 'robot_description.yaml'
+        write_parameters(parameters, urdf)
+        wanted = Stack(
+            robot, bus, simulate, arguments.timeout, master, dict(master_parameters or {})
+        )
+        processes = arm_processes(wanted, parameters, find_executable)
+        yield Session(robot, bus, urdf, processes)

@@ -1,0 +1,238 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Runs a supervision with real processes: pipes, signals and the clock."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+import contextlib
+from functools import partial
+import os
+import queue
+import selectors
+import signal
+import socket
+import subprocess
+import threading
+import time
+from types import TracebackType
+from typing import final
+
+from ..exceptions import StartError
+from .guardian import GuardianLink
+from .lines import LineSplitter
+from .spec import ProcessSpec
+from .supervision import Notice, Outcome, Phase, Supervision
+
+CHUNK = 65536
+"""Bytes read from a pipe at once."""
+
+LAST_CHUNKS = 64
+"""How often a pipe is read after its process has ended; what it left behind may write for ever."""
+
+LEAVE_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+"""Signals that ask the supervisor to leave."""
+
+
+class _Child:
+    """A running process with its pipe and the handle that tells its end."""
+
+    def __init__(self, spec: ProcessSpec) -> None:
+        try:
+            self.process = subprocess.Popen(
+                spec.argv,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT,
+                env={**os.environ, **spec.environment},
+                start_new_session=True,  # Ctrl-C of the terminal reaches the supervisor only
+            )
+        except OSError as error:
+            raise StartError(f'{spec.argv[0]}: {error.strerror}') from error
+        self.name = spec.name
+        self.pidfd = os.pidfd_open(self.process.pid)
+        self.splitter = LineSplitter()
+        self.output = self._raw_output()
+
+    def _raw_output(self) -> int:
+        if self.process.stdout is None:
+            raise StartError(f'{self.name}: no pipe for its output')
+        os.set_blocking(self.process.stdout.fileno(), False)
+        return self.process.stdout.fileno()
+
+    def send(self, number: signal.Signals) -> None:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(self.process.pid, number)
+
+    def reap(self) -> int:
+        """Collect the exit code; what it left behind in its group is killed first."""
+        os.waitid(os.P_PID, self.process.pid, os.WEXITED | os.WNOWAIT)
+        self.send(signal.SIGKILL)
+        returncode = self.process.wait()
+        os.close(self.pidfd)
+        if self.process.stdout is not None:
+            self.process.stdout.close()
+        return returncode
+
+
+@final
+class Runner:
+    """Starts the processes of a bring-up and stays with them until they have ended.
+
+    Use it as a context manager, run it in the main thread; :meth:`stop` may be called from any.
+    """
+
+    def __init__(
+        self,
+        specs: Iterable[ProcessSpec],
+        write: Callable[[str, str], None],
+        notify: Callable[[Notice], None],
+        *,
+        on_interrupt: Callable[[], bool] | None = None,
+    ) -> None:
+        """Take the plan; nothing is started yet.
+
+        Args:
+            specs: The processes.
+            write: Takes each line of output, with the name of the process first.
+            notify: Takes each notice of the supervision.
+            on_interrupt: Asked at Ctrl-C before everything is stopped; true when it takes care
+                of stopping, false or None to stop at once.
+        """
+        self._write = write
+        self._on_interrupt = on_interrupt
+        self._children: dict[str, _Child] = {}
+        self._guardian: GuardianLink | None = None
+        self._selector = selectors.DefaultSelector()
+        self._wake_read, self._wake_write = socket.socketpair()
+        self._requests: queue.SimpleQueue[Outcome] = queue.SimpleQueue()
+        self._supervision = Supervision(specs, self._start, self._send, notify)
+        self._restore: list[Callable[[], object]] = []
+
+    def __enter__(self) -> Runner:
+        """Start the guardian and listen to signals."""
+        for end in (self._wake_read, self._wake_write):
+            end.setblocking(False)
+        self._selector.register(self._wake_read, selectors.EVENT_READ, self._wake)
+        if threading.current_thread() is threading.main_thread():
+            self._listen_to_signals()
+        self._guardian = GuardianLink()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Stop what still runs, and give back signals and handles."""
+        self._supervision.stop(Outcome(1, f'{error}'), time.monotonic())
+        self._loop()
+        for restore in reversed(self._restore):
+            restore()
+        if self._guardian is not None:
+            self._guardian.dismiss()
+        self._selector.close()
+        self._wake_read.close()
+        self._wake_write.close()
+
+    def _listen_to_signals(self) -> None:
+        previous = signal.set_wakeup_fd(self._wake_write.fileno(), warn_on_full_buffer=False)
+        self._restore.append(lambda: signal.set_wakeup_fd(previous))
+        for number in LEAVE_SIGNALS:
+            if number is signal.SIGHUP and signal.getsignal(number) is signal.SIG_IGN:
+                continue  # started by nohup
+            handler = signal.signal(number, lambda *_: None)  # the wake-up byte says which
+            self._restore.append(partial(signal.signal, number, handler))
+
+    @property
+    def phase(self) -> Phase:
+        """What the supervision is doing."""
+        return self._supervision.phase
+
+    def run(self) -> Outcome:
+        """Start everything, and return when everything has ended.
+
+        Returns:
+            How it ended.
+        """
+        self._supervision.begin(time.monotonic())
+        self._loop()
+        return self._supervision.outcome or Outcome(0, 'nothing was to be run')
+
+    def stop(self, outcome: Outcome) -> None:
+        """Ask for an orderly end, from any thread.
+
+        Args:
+            outcome: Why, unless something else has already ended it.
+        """
+        self._requests.put(outcome)
+        with contextlib.suppress(BlockingIOError):  # full of wake-ups: it will wake up
+            self._wake_write.send(b'\0')
+
+    def _loop(self) -> None:
+        while self._supervision.phase is not Phase.STOPPED:
+            for key, _ in self._selector.select(self._patience()):
+                # an earlier handler of this round may have closed it
+                if self._selector.get_map().get(key.fd) is key:
+                    key.data()
+            self._supervision.advance(time.monotonic())
+
+    def _patience(self) -> float | None:
+        deadline = self._supervision.next_deadline()
+        return None if deadline is None else max(0.0, deadline - time.monotonic())
+
+    def _start(self, spec: ProcessSpec) -> None:
+        child = _Child(spec)
+        if self._guardian is not None:
+            steps = [(step.signal, step.patience) for step in spec.stop_steps]
+            self._guardian.watch(spec.name, child.process.pid, spec.stop_order, steps)
+        self._children[spec.name] = child
+        self._selector.register(child.output, selectors.EVENT_READ, lambda: self._read(child))
+        self._selector.register(child.pidfd, selectors.EVENT_READ, lambda: self._ended(child))
+
+    def _send(self, name: str, number: signal.Signals) -> None:
+        self._children[name].send(number)
+
+    def _read(self, child: _Child) -> bool:
+        """Read once; false when there is nothing (more) to read."""
+        try:
+            data = os.read(child.output, CHUNK)
+        except BlockingIOError:
+            return False
+        if not data:
+            self._selector.unregister(child.output)
+            return False
+        self._pass_on(child.name, child.splitter.feed(data))
+        return True
+
+    def _ended(self, child: _Child) -> None:
+        for _ in range(LAST_CHUNKS):
+            if child.output not in self._selector.get_map() or not self._read(child):
+                break
+        if child.output in self._selector.get_map():
+            self._selector.unregister(child.output)
+        self._selector.unregister(child.pidfd)
+        self._pass_on(child.name, child.splitter.flush())
+        returncode = child.reap()
+        if self._guardian is not None:
+            self._guardian.gone(child.name)
+        self._supervision.exited(child.name, returncode, time.monotonic())
+
+    def _pass_on(self, name: str, lines: Iterable[str]) -> None:
+        for line in lines:
+            self._write(name, line)
+            self._supervision.line(name, line, time.monotonic())
+
+    def _wake(self) -> None:
+        numbers = self._wake_read.recv(256)
+        while not self._requests.empty():
+            self._supervision.stop(self._requests.get(), time.monotonic())
+        for number in numbers:
+            if number in LEAVE_SIGNALS:
+                self._interrupt()
+
+    def _interrupt(self) -> None:
+        deferred, self._on_interrupt = self._on_interrupt, None
+        if deferred is None or self.phase is Phase.STOPPING or not deferred():
+            self._supervision.interrupt(time.monotonic())

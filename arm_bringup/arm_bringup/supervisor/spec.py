@@ -1,0 +1,74 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What is to be run, and how it is stopped."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+import re
+from signal import Signals
+
+
+@dataclass(frozen=True, slots=True)
+class StopStep:
+    """One rung of the ladder by which a process is stopped.
+
+    Attributes:
+        signal: The signal that is sent to its process group.
+        patience: How long it may take to end before the next step, in [s].
+    """
+
+    signal: Signals
+    patience: float
+
+
+POLITE = (
+    StopStep(Signals.SIGINT, 5.0),
+    StopStep(Signals.SIGTERM, 2.0),
+    StopStep(Signals.SIGKILL, 2.0),
+)
+"""The usual ladder; 5 s because a master needs up to 3 s to stop and disable its drives."""
+
+
+@dataclass(frozen=True, slots=True)
+class ProcessSpec:
+    """A process of a bring-up.
+
+    Attributes:
+        name: Short name, unique in its bring-up; the prefix of its output.
+        argv: Program and arguments.
+        environment: Variables that it gets beside those of the supervisor.
+        ready: Regular expression; the process is ready when a line of its output contains it.
+            None: it is ready when it is started.
+        ready_timeout: How long it may take to be ready in [s]; infinite for no limit.
+        required: The whole bring-up ends when this process ends.
+        stop_order: Those with a lower number are stopped, and gone, before those with a
+            higher one.
+        stop_steps: How it is stopped.
+    """
+
+    name: str
+    argv: tuple[str, ...]
+    environment: Mapping[str, str] = field(default_factory=dict)
+    ready: str | None = None
+    ready_timeout: float = 30.0
+    required: bool = True
+    stop_order: int = 0
+    stop_steps: tuple[StopStep, ...] = POLITE
+
+    def __post_init__(self) -> None:
+        """Refuse what would only fail later.
+
+        Raises:
+            ValueError: Empty argv or steps, or ``ready`` is no regular expression.
+        """
+        if not self.argv:
+            raise ValueError(f'process {self.name}: argv is empty')
+        if not self.stop_steps:
+            raise ValueError(f'process {self.name}: it needs at least one stop step')
+        if self.ready is not None:
+            try:
+                re.compile(self.ready)
+            except re.error as error:
+                raise ValueError(f'process {self.name}: ready {self.ready!r}: {error}') from None

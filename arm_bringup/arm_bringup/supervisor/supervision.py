@@ -1,0 +1,287 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The decisions of a supervisor: no process, no clock and no signal handler in here."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from enum import Enum
+import math
+import re
+from signal import Signals
+
+from ..exceptions import StartError
+from .spec import ProcessSpec
+from .stopping import StopSequence
+
+LAST_LINES = 12
+"""How many lines of a process are kept to explain its end."""
+
+GOOD_ENDS = (0, -Signals.SIGINT, -Signals.SIGTERM)
+"""Return codes of a process that did what it was asked to when it was stopped."""
+
+
+class Phase(Enum):
+    """What a supervision is doing."""
+
+    IDLE = 'idle'
+    STARTING = 'starting'
+    RUNNING = 'running'
+    STOPPING = 'stopping'
+    STOPPED = 'stopped'
+
+
+class Severity(Enum):
+    """How loud a notice is."""
+
+    INFO = 'info'
+    WARNING = 'warning'
+    ERROR = 'error'
+
+
+@dataclass(frozen=True, slots=True)
+class Notice:
+    """Something the user is told.
+
+    Attributes:
+        severity: How loud.
+        text: What happened, and what to do when there is something to do.
+    """
+
+    severity: Severity
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """How a supervision ended.
+
+    Attributes:
+        exit_code: 0 when it ended because it was asked to.
+        reason: Why it ended.
+        process: The process that ended it, empty when none did.
+        last_lines: What that process wrote last.
+    """
+
+    exit_code: int
+    reason: str
+    process: str = ''
+    last_lines: tuple[str, ...] = ()
+
+
+@dataclass(slots=True)
+class _Child:
+    spec: ProcessSpec
+    deadline: float
+    ready: bool = False
+    running: bool = False
+    lines: deque[str] = field(default_factory=lambda: deque(maxlen=LAST_LINES))
+
+
+class Supervision:
+    """Starts processes at once, waits until all are ready, stops all when a required one ends.
+
+    Attributes:
+        phase: What it is doing.
+        outcome: How it ends; None while nothing ends it.
+    """
+
+    def __init__(
+        self,
+        specs: Iterable[ProcessSpec],
+        start: Callable[[ProcessSpec], None],
+        send: Callable[[str, Signals], None],
+        notify: Callable[[Notice], None],
+    ) -> None:
+        """Take the plan; nothing is started yet.
+
+        Args:
+            specs: The processes, started in this order.
+            start: Starts one; raises :class:`.StartError` when that is not possible.
+            send: Sends a signal to a running one.
+            notify: Tells the user something.
+
+        Raises:
+            ValueError: Two processes have the same name.
+        """
+        self.phase = Phase.IDLE
+        self.outcome: Outcome | None = None
+        self._start = start
+        self._notify = notify
+        self._begun = 0.0
+        self._stopping = StopSequence(send)
+        self._children: dict[str, _Child] = {}
+        for spec in specs:
+            if spec.name in self._children:
+                raise ValueError(f'two processes are called {spec.name!r}')
+            self._children[spec.name] = _Child(spec, math.inf)
+
+    @property
+    def running(self) -> tuple[str, ...]:
+        """Names of the processes that run."""
+        return tuple(name for name, child in self._children.items() if child.running)
+
+    @property
+    def waiting(self) -> tuple[str, ...]:
+        """Names of the processes that are not ready yet."""
+        return tuple(name for name, child in self._children.items() if not child.ready)
+
+    def begin(self, now: float) -> None:
+        """Start everything.
+
+        Args:
+            now: Steady time in [s].
+        """
+        self.phase = Phase.STARTING
+        self._begun = now
+        for name, child in self._children.items():
+            child.deadline = now + child.spec.ready_timeout
+            try:
+                self._start(child.spec)
+            except StartError as error:
+                self._fail(name, f'{name} cannot be started: {error}', now)
+                return
+            child.running = True
+            child.ready = child.spec.ready is None
+        self._check_ready(now)
+
+    def line(self, name: str, text: str, now: float) -> None:
+        """Take in a line of output.
+
+        Args:
+            name: The process that wrote it.
+            text: The line, without its end.
+            now: Steady time in [s].
+        """
+        child = self._children[name]
+        child.lines.append(text)
+        if child.ready or child.spec.ready is None or not re.search(child.spec.ready, text):
+            return
+        child.ready = True
+        if self.phase is Phase.STARTING:
+            self._say(f'{name} is ready ({now - self._begun:.1f} s)')
+            self._check_ready(now)
+
+    def _check_ready(self, now: float) -> None:
+        if self.phase is Phase.STARTING and not self.waiting:
+            self.phase = Phase.RUNNING
+            self._say(f'all is ready ({now - self._begun:.1f} s)')
+
+    def exited(self, name: str, returncode: int, now: float) -> None:
+        """Take in the end of a process.
+
+        Args:
+            name: Its name.
+            returncode: Exit code; negative for the signal that killed it.
+            now: Steady time in [s].
+        """
+        child = self._children[name]
+        child.running = False
+        how = describe_exit(returncode)
+        if self.phase is Phase.STOPPING:
+            self._stopping.exited(name)
+            self._say(f'{name} {how}', _severity(returncode))
+            if returncode == -Signals.SIGKILL and self.outcome and not self.outcome.exit_code:
+                self.outcome = Outcome(1, f'{name} had to be killed', name, tuple(child.lines))
+            self._advance_stop(now)
+        elif child.spec.required:
+            early = '' if child.ready else ' before it was ready'
+            self._fail(name, f'{name} {how}{early}', now)
+        else:
+            child.ready = True
+            self._say(f'{name} {how}; going on without it', Severity.WARNING)
+            self._check_ready(now)
+
+    def interrupt(self, now: float) -> None:
+        """Ctrl-C: stop; again: stop at once.
+
+        Args:
+            now: Steady time in [s].
+        """
+        if self.phase is Phase.STOPPING:
+            self._say('forced: killing ' + ', '.join(self.running), Severity.WARNING)
+            self._stopping.force(now)
+        else:
+            self._say('stopping; Ctrl-C again kills everything at once')
+            self.stop(Outcome(0, 'stopped by the user'), now)
+
+    def stop(self, outcome: Outcome, now: float) -> None:
+        """Stop everything in order; the first outcome stays.
+
+        Args:
+            outcome: Why.
+            now: Steady time in [s].
+        """
+        if self.phase in {Phase.STOPPING, Phase.STOPPED}:
+            return
+        self.outcome = outcome
+        self.phase = Phase.STOPPING
+        for name in self.running:
+            spec = self._children[name].spec
+            steps = [(step.signal, step.patience) for step in spec.stop_steps]
+            self._stopping.add(name, spec.stop_order, steps)
+        self._advance_stop(now)
+
+    def advance(self, now: float) -> None:
+        """Do what is due.
+
+        Args:
+            now: Steady time in [s].
+        """
+        if self.phase is Phase.STARTING:
+            self._check_deadlines(now)
+        elif self.phase is Phase.STOPPING:
+            self._advance_stop(now)
+
+    def next_deadline(self) -> float | None:
+        """Steady time in [s] at which :meth:`advance` has something to do, None for never."""
+        if self.phase is Phase.STOPPING:
+            return self._stopping.next_deadline()
+        if self.phase is not Phase.STARTING:
+            return None
+        deadline = min((self._children[name].deadline for name in self.waiting), default=math.inf)
+        return None if math.isinf(deadline) else deadline
+
+    def _check_deadlines(self, now: float) -> None:
+        for name in self.waiting:
+            child = self._children[name]
+            if now >= child.deadline:
+                what = f'no line with {child.spec.ready!r} within {child.spec.ready_timeout:g} s'
+                self._fail(name, f'{name} did not get ready: {what}', now)
+                return
+
+    def _advance_stop(self, now: float) -> None:
+        self._stopping.advance(now)
+        if not self._stopping.finished:
+            return
+        self.phase = Phase.STOPPED
+        if self._stopping.abandoned:
+            names = ', '.join(self._stopping.abandoned)
+            self._say(f'not even SIGKILL ended {names}', Severity.ERROR)
+
+    def _fail(self, name: str, reason: str, now: float) -> None:
+        self._say(reason, Severity.ERROR)
+        self.stop(Outcome(1, reason, name, tuple(self._children[name].lines)), now)
+
+    def _say(self, text: str, severity: Severity = Severity.INFO) -> None:
+        self._notify(Notice(severity, text))
+
+
+def _severity(returncode: int) -> Severity:
+    return Severity.INFO if returncode in GOOD_ENDS else Severity.WARNING
+
+
+def describe_exit(returncode: int) -> str:
+    """Say in words how a process ended.
+
+    Args:
+        returncode: Exit code; negative for the signal that killed it.
+    """
+    if returncode >= 0:
+        return f'ended with exit code {returncode}' if returncode else 'ended'
+    try:
+        return f'was killed by {Signals(-returncode).name}'
+    except ValueError:
+        return f'was killed by signal {-returncode}'

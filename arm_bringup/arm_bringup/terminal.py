@@ -1,0 +1,126 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What a terminal can do, and lines with the name of their process in front."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+import contextlib
+from dataclasses import dataclass
+import re
+from typing import TextIO
+
+from .supervisor import Notice, Severity
+
+RESET = '\x1b[0m'
+BOLD = '\x1b[1m'
+YELLOW = '\x1b[33m'
+RED = '\x1b[31m'
+
+NAME_COLOURS = ('\x1b[36m', '\x1b[32m', '\x1b[35m', '\x1b[34m', '\x1b[96m', '\x1b[92m')
+"""Colours of process names, in the order of the bring-up."""
+
+SEVERITY_COLOURS = {Severity.WARNING: YELLOW, Severity.ERROR: RED}
+"""Colours of notices."""
+
+ROS_SEVERITY = re.compile(r'^\[(WARN|ERROR|FATAL)\]')
+"""Severity at the start of a line of rcutils logging, in the format that the bring-up asks for."""
+
+
+def wants_colour(stream: TextIO, environment: Mapping[str, str]) -> bool:
+    """Say whether output shall be coloured.
+
+    Args:
+        stream: Where it goes.
+        environment: Variables: NO_COLOR (https://no-color.org) and TERM are heard.
+    """
+    return stream.isatty() and not environment.get('NO_COLOR') and is_smart(environment)
+
+
+def is_smart(environment: Mapping[str, str]) -> bool:
+    """Say whether the terminal understands more than plain text.
+
+    Args:
+        environment: Variables: TERM is heard.
+    """
+    return environment.get('TERM', 'dumb') not in {'dumb', 'unknown', ''}
+
+
+def severity_of(line: str) -> Severity:
+    """Say how loud a line of a ROS node's log is.
+
+    Args:
+        line: A line of its output.
+    """
+    match = ROS_SEVERITY.match(line)
+    if match is None:
+        return Severity.INFO
+    return Severity.WARNING if match[1] == 'WARN' else Severity.ERROR
+
+
+@dataclass(frozen=True, slots=True)
+class Painter:
+    """Puts names in front of lines, all as wide as the widest.
+
+    Attributes:
+        own: Name of the supervising program.
+        names: Names of its processes.
+        colour: Use colours.
+    """
+
+    own: str
+    names: Sequence[str]
+    colour: bool
+
+    def line(self, name: str, text: str) -> str:
+        """Format a line of a process.
+
+        Args:
+            name: The process.
+            text: What it wrote.
+        """
+        prefix = self._prefix(name)
+        if not self.colour:
+            return f'{prefix} {text}'
+        shade = NAME_COLOURS[self.names.index(name) % len(NAME_COLOURS)]
+        body = SEVERITY_COLOURS.get(severity_of(text), '')
+        return f'{shade}{prefix}{RESET} {body}{text}{RESET if body else ""}'
+
+    def notice(self, notice: Notice) -> str:
+        """Format a notice of the program itself.
+
+        Args:
+            notice: What is to be said.
+        """
+        prefix = self._prefix(self.own)
+        if not self.colour:
+            mark = {Severity.WARNING: 'warning: ', Severity.ERROR: 'error: '}
+            return f'{prefix} {mark.get(notice.severity, "")}{notice.text}'
+        return f'{BOLD}{prefix} {SEVERITY_COLOURS.get(notice.severity, "")}{notice.text}{RESET}'
+
+    def _prefix(self, name: str) -> str:
+        width = max(len(each) for each in (self.own, *self.names))
+        return f'{name:<{width}} |'
+
+
+class LineWriter:
+    """Writes lines at once; goes on silently when nobody can read them any more."""
+
+    def __init__(self, stream: TextIO) -> None:
+        """Write to a stream.
+
+        Args:
+            stream: Standard output, usually.
+        """
+        self._stream = stream
+
+    def __call__(self, line: str) -> None:
+        """Write a line.
+
+        Args:
+            line: Without its end.
+        """
+        # a closed terminal or pipe must not keep us from stopping the drives
+        with contextlib.suppress(OSError, ValueError):
+            self._stream.write(line + '\n')
+            self._stream.flush()

@@ -1,0 +1,90 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Small real processes for the tests of the supervisor, and how to wait for their end."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+import os
+import select
+from signal import Signals
+import sys
+import time
+
+from arm_bringup.supervisor import ProcessSpec, StopStep
+
+PATIENCE = 30.0
+"""Longest time in [s] that a test waits for something that should happen at once."""
+
+QUICK = tuple(
+    StopStep(signal, patience)
+    for signal, patience in [(Signals.SIGINT, 0.3), (Signals.SIGTERM, 0.3), (Signals.SIGKILL, 9)]
+)
+"""A ladder with little patience, for processes that do not hear."""
+
+PROGRAMS = {
+    # says ready, and good-bye when it is stopped
+    'good': """
+        def leave(number, frame):
+            os.write(1, b'bye\\n')  # print is not re-entrant
+            os._exit(0)
+        signal.signal(signal.SIGINT, leave)
+        signal.signal(signal.SIGTERM, leave)
+        print('ready', os.getpid(), os.getsid(0), flush=True)
+        while True: signal.pause()
+    """,
+    'deaf': """
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)
+        print('ready', os.getpid(), flush=True)
+        while True: signal.pause()
+    """,
+    'dies': """
+        print('first words', flush=True)
+        print('last words', file=sys.stderr, flush=True)
+        sys.exit(7)
+    """,
+    'unfinished': """
+        sys.stdout.write('no end')
+        sys.stdout.flush()
+    """,
+    'floods': """
+        for i in range(50000): print('line', i)
+        print('ready', flush=True)
+        signal.pause()
+    """,
+    # leaves a child behind in its process group
+    'parent': """
+        child = os.fork()
+        if child == 0:
+            while True: signal.pause()
+        print('child', child, flush=True)
+    """,
+}
+"""Source of each program."""
+
+
+def program(kind: str, name: str = '', **options: object) -> ProcessSpec:
+    """Describe one of the programs, named after its kind or otherwise."""
+    lines = PROGRAMS[kind].strip('\n').split('\n')
+    code = 'import os, signal, sys\n' + '\n'.join(line[8:] for line in lines)
+    # isolated and without site: it starts in milliseconds
+    argv = (sys.executable, '-I', '-S', '-c', code)
+    values: dict[str, object] = {'stop_steps': QUICK, 'ready_timeout': PATIENCE, **options}
+    return ProcessSpec(name or kind, argv, **values)  # type: ignore[arg-type]
+
+
+def wait_for_end(pids: Iterable[int]) -> list[int]:
+    """Wait until processes have ended; return those that have not when the patience is over."""
+    deadline = time.monotonic() + PATIENCE
+    left = []
+    for pid in pids:
+        try:
+            pidfd = os.pidfd_open(pid)
+        except ProcessLookupError:
+            continue
+        ended, _, _ = select.select([pidfd], [], [], max(0.0, deadline - time.monotonic()))
+        os.close(pidfd)
+        if not ended:
+            left.append(pid)
+    return left

@@ -1,0 +1,237 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The supervisor with real processes, signals and pipes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import contextlib
+import os
+from pathlib import Path
+import signal
+import subprocess
+import sys
+import textwrap
+import threading
+
+from processes import PATIENCE, program, wait_for_end
+import pytest
+
+from arm_bringup.supervisor import Notice, Outcome, ProcessSpec, Runner
+from arm_bringup.supervisor.runner import LEAVE_SIGNALS
+
+
+class Watch:
+    """Runs a bring-up and keeps what it wrote; does something when all is ready."""
+
+    def __init__(self, *specs: ProcessSpec, when_ready: Callable[[Runner], None]) -> None:
+        self.lines: list[tuple[str, str]] = []
+        self.notices: list[str] = []
+        self._when_ready = when_ready
+        self.runner = Runner(specs, lambda *line: self.lines.append(line), self._notice)
+
+    def _notice(self, notice: Notice) -> None:
+        self.notices.append(notice.text)
+        if notice.text.startswith('all is ready'):
+            self._when_ready(self.runner)
+
+    def run(self) -> Outcome:
+        """Run it in this thread."""
+        with self.runner:
+            return self.runner.run()
+
+    def said(self, name: str) -> list[str]:
+        """Return the lines of one process."""
+        return [text for who, text in self.lines if who == name]
+
+
+def ctrl_c(_: Runner) -> None:
+    """Do as the terminal does."""
+    signal.raise_signal(signal.SIGINT)
+
+
+def nothing(_: Runner) -> None:
+    """Leave it to the processes."""
+
+
+def test_ctrl_c_stops_in_order_and_exits_0() -> None:
+    """The lower stop order says good-bye first, whatever the order of starting."""
+    watch = Watch(
+        program('good', 'slaves', ready='ready', stop_order=2),
+        program('good', 'master', ready='ready', stop_order=0),
+        when_ready=ctrl_c,
+    )
+    assert watch.run() == Outcome(0, 'stopped by the user')
+    byes = [name for name, text in watch.lines if text == 'bye']
+    assert byes == ['master', 'slaves']
+
+
+def test_each_process_has_a_session_of_its_own() -> None:
+    """So Ctrl-C in the terminal reaches the supervisor only."""
+    watch = Watch(program('good', ready='ready'), when_ready=ctrl_c)
+    watch.run()
+    _, pid, session = watch.said('good')[0].split()
+    assert pid == session != str(os.getsid(0))
+
+
+def test_signal_handlers_are_given_back() -> None:
+    """After a bring-up, Ctrl-C means what it meant before."""
+    before = [signal.getsignal(number) for number in LEAVE_SIGNALS]
+    Watch(program('good', ready='ready'), when_ready=ctrl_c).run()
+    assert [signal.getsignal(number) for number in LEAVE_SIGNALS] == before
+    assert signal.set_wakeup_fd(-1) == -1
+
+
+def test_a_process_that_dies_early_ends_all_and_is_quoted() -> None:
+    """Standard error belongs to what it wrote last."""
+    watch = Watch(program('good'), program('dies', ready='ready'), when_ready=nothing)
+    outcome = watch.run()
+    assert outcome.exit_code == 1
+    assert outcome.reason == 'dies ended with exit code 7 before it was ready'
+    assert outcome.last_lines == ('first words', 'last words')
+
+
+def test_a_deaf_process_is_killed_and_that_is_no_success() -> None:
+    """The ladder ends with SIGKILL; the exit code says that it was needed."""
+    outcome = Watch(program('deaf', ready='ready'), when_ready=ctrl_c).run()
+    assert outcome.exit_code == 1
+    assert outcome.reason == 'deaf had to be killed'
+
+
+def test_not_ready_in_time_ends_all() -> None:
+    """The reason names what was waited for."""
+    late = program('good', ready='never said', ready_timeout=0.2)
+    outcome = Watch(late, when_ready=nothing).run()
+    assert outcome.exit_code == 1
+    assert 'never said' in outcome.reason
+
+
+def test_a_flood_of_output_loses_nothing_and_starves_nobody() -> None:
+    """All lines arrive in order, and another process gets ready beside it."""
+    watch = Watch(
+        program('floods', ready='ready'), program('good', ready='ready'), when_ready=ctrl_c
+    )
+    assert watch.run().exit_code == 0
+    assert watch.said('floods')[:50000] == [f'line {i}' for i in range(50000)]
+
+
+def test_a_last_line_without_an_end_is_a_line() -> None:
+    """It is written when the process has ended."""
+    watch = Watch(program('unfinished'), when_ready=nothing)
+    watch.run()
+    assert watch.said('unfinished') == ['no end']
+
+
+def test_what_a_process_leaves_behind_is_killed() -> None:
+    """A child in the same process group does not survive its parent."""
+    watch = Watch(program('parent'), when_ready=nothing)
+    watch.run()
+    assert wait_for_end(int(text.split()[1]) for text in watch.said('parent')) == []
+
+
+def test_a_missing_executable_is_a_failure_with_its_name() -> None:
+    """What was started before it is stopped."""
+    missing = ProcessSpec('master', ('/no/such/master',))
+    watch = Watch(program('good', ready='ready'), missing, when_ready=nothing)
+    outcome = watch.run()
+    assert outcome.exit_code == 1
+    assert '/no/such/master' in outcome.reason
+    assert wait_for_end(int(text.split()[1]) for text in watch.said('good') if ' ' in text) == []
+
+
+def test_stop_works_from_another_thread() -> None:
+    """And its outcome is the one that run returns."""
+
+    def stop(runner: Runner) -> None:
+        threading.Thread(target=runner.stop, args=[Outcome(3, 'enough')]).start()
+
+    assert Watch(program('good', ready='ready'), when_ready=stop).run() == Outcome(3, 'enough')
+
+
+def test_the_first_ctrl_c_can_be_taken_over() -> None:
+    """Then nothing is stopped until the one who took it asks; the next Ctrl-C stops at once."""
+    asked: list[int] = []
+
+    def take() -> bool:
+        asked.append(1)
+        signal.raise_signal(signal.SIGINT)
+        return True
+
+    notices: list[str] = []
+
+    def notify(notice: Notice) -> None:
+        notices.append(notice.text)
+        if notice.text.startswith('all is ready'):
+            signal.raise_signal(signal.SIGINT)
+
+    specs = [program('good', ready='ready')]
+    with Runner(specs, lambda *_: None, notify, on_interrupt=take) as runner:
+        assert runner.run().exit_code == 0
+    assert asked == [1]
+    assert sum(text.startswith('stopping') for text in notices) == 1
+
+
+def test_an_error_in_the_supervisor_stops_its_processes() -> None:
+    """Leaving the context stops what runs, also by an exception."""
+    pids: list[int] = []
+
+    def write(name: str, line: str) -> None:
+        if line.startswith('ready'):
+            pids.append(int(line.split()[1]))
+            raise RuntimeError('broken')
+
+    runner = Runner([program('good', ready='ready')], write, lambda _: None)
+    with pytest.raises(RuntimeError, match='broken'), runner:
+        runner.run()
+    assert len(pids) == 1
+    assert wait_for_end(pids) == []
+
+
+SUPERVISOR = textwrap.dedent("""
+    import sys
+    from arm_bringup.supervisor import Runner
+    from processes import program
+    specs = [
+        program('deaf', 'slaves', ready='ready', stop_order=2),
+        program('good', 'master', ready='ready', stop_order=0),
+    ]
+    def write(name, line):
+        print(name, line, flush=True)
+    with Runner(specs, write, lambda notice: write('supervisor', notice.text)) as runner:
+        print('guardian', 'ready', runner._guardian.pid, flush=True)
+        sys.exit(runner.run().exit_code)
+""")
+
+
+@pytest.mark.parametrize('number', [signal.SIGKILL, signal.SIGTERM], ids=['killed', 'terminated'])
+def test_no_process_outlives_its_supervisor(number: signal.Signals, tmp_path: Path) -> None:
+    """Not even when the supervisor is SIGKILLed, and a process hears nothing but SIGKILL."""
+    folders = [str(Path(__file__).parent), str(Path(__file__).parents[1])]
+    environment = {**os.environ, 'PYTHONPATH': os.pathsep.join(folders)}
+    with subprocess.Popen(
+        [sys.executable, '-c', SUPERVISOR],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        env=environment,
+        start_new_session=True,
+    ) as supervisor:
+        watchdog = threading.Timer(PATIENCE, supervisor.kill)
+        watchdog.start()
+        try:
+            assert supervisor.stdout is not None
+            pids = {'supervisor': supervisor.pid}
+            for line in supervisor.stdout:
+                words = line.split()
+                if words[1:2] == ['ready']:
+                    pids[words[0]] = int(words[2])
+                if 'all is ready' in line:
+                    supervisor.send_signal(number)
+                    break
+            assert set(pids) == {'supervisor', 'guardian', 'master', 'slaves'}
+            supervisor.stdout.read()
+            assert wait_for_end(pids.values()) == []
+        finally:
+            watchdog.cancel()
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(supervisor.pid, signal.SIGKILL)

@@ -1,0 +1,182 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The supervisor's decisions, in virtual time."""
+
+from __future__ import annotations
+
+from signal import Signals
+
+import pytest
+
+from arm_bringup.exceptions import StartError
+from arm_bringup.supervisor import Notice, Outcome, Phase, ProcessSpec, Severity, Supervision
+
+
+class Bench:
+    """A supervision whose processes are names in a list."""
+
+    def __init__(self, *specs: ProcessSpec, missing: str = '') -> None:
+        self.missing = missing
+        self.started: list[str] = []
+        self.sent: list[tuple[str, Signals]] = []
+        self.notices: list[Notice] = []
+        self.supervision = Supervision(specs, self._start, self._send, self.notices.append)
+        self.supervision.begin(0.0)
+
+    def _start(self, spec: ProcessSpec) -> None:
+        if spec.name == self.missing:
+            raise StartError('no such file')
+        self.started.append(spec.name)
+
+    def _send(self, name: str, signal: Signals) -> None:
+        self.sent.append((name, signal))
+
+    @property
+    def outcome(self) -> Outcome:
+        """How it ends."""
+        assert self.supervision.outcome is not None
+        return self.supervision.outcome
+
+
+def spec(name: str, **options: object) -> ProcessSpec:
+    """Describe a process with a ready line."""
+    values: dict[str, object] = {'ready': 'ready', 'ready_timeout': 10.0, **options}
+    return ProcessSpec(name, ('true',), **values)  # type: ignore[arg-type]
+
+
+MASTER = spec('master', ready=r'all \d+ devices operational')
+SLAVES = spec('slaves', stop_order=2)
+
+
+def test_all_start_at_once_and_running_means_all_are_ready() -> None:
+    """No process waits for another to be ready."""
+    bench = Bench(MASTER, SLAVES)
+    assert bench.started == ['master', 'slaves']
+    bench.supervision.line('slaves', '[INFO] [slaves]: ready', 1.0)
+    assert bench.supervision.waiting == ('master',)
+    bench.supervision.line('master', '[INFO] [master]: all 7 devices operational', 2.0)
+    assert bench.supervision.phase is Phase.RUNNING
+    assert bench.supervision.next_deadline() is None
+
+
+def test_a_process_without_ready_line_is_ready_at_once() -> None:
+    """ready=None means started is ready."""
+    assert Bench(spec('viewer', ready=None)).supervision.phase is Phase.RUNNING
+
+
+def test_not_ready_in_time_stops_all_and_names_the_process_and_its_last_lines() -> None:
+    """The outcome says who was late, what was waited for, and what it wrote last."""
+    bench = Bench(MASTER, SLAVES)
+    bench.supervision.line('slaves', 'ready', 1.0)
+    bench.supervision.line('master', 'waiting for panda_joint3', 2.0)
+    assert bench.supervision.next_deadline() == 10.0
+    bench.supervision.advance(10.0)
+    assert bench.supervision.phase is Phase.STOPPING
+    assert bench.outcome.exit_code == 1
+    assert bench.outcome.process == 'master'
+    assert 'devices operational' in bench.outcome.reason
+    assert bench.outcome.last_lines == ('waiting for panda_joint3',)
+
+
+def test_an_infinite_timeout_waits_for_ever() -> None:
+    """ready_timeout=inf has no deadline."""
+    bench = Bench(spec('master', ready_timeout=float('inf')))
+    assert bench.supervision.next_deadline() is None
+    bench.supervision.advance(1e9)
+    assert bench.supervision.phase is Phase.STARTING
+
+
+@pytest.mark.parametrize(
+    ('returncode', 'words'),
+    [(3, 'exit code 3'), (0, 'ended'), (-11, 'SIGSEGV'), (-50, '50')],
+)
+def test_the_end_of_a_required_process_ends_all(returncode: int, words: str) -> None:
+    """Whatever way it ends, also with exit code 0, the rest is stopped and the exit code is 1."""
+    bench = Bench(MASTER, SLAVES)
+    bench.supervision.exited('slaves', returncode, 1.0)
+    assert bench.sent == [('master', Signals.SIGINT)]
+    assert bench.outcome.exit_code == 1
+    assert words in bench.outcome.reason
+    bench.supervision.exited('master', 0, 2.0)
+    assert bench.supervision.phase is Phase.STOPPED
+
+
+def test_the_end_of_an_optional_process_is_a_warning() -> None:
+    """The bring-up goes on, and no longer waits for it."""
+    bench = Bench(spec('viewer', required=False))
+    bench.supervision.exited('viewer', 1, 1.0)
+    assert bench.supervision.phase is Phase.RUNNING
+    assert bench.notices[0].severity is Severity.WARNING
+
+
+def test_interrupt_stops_in_order_and_exits_0() -> None:
+    """The master first; the slaves only when it is gone."""
+    bench = Bench(SLAVES, MASTER)
+    bench.supervision.interrupt(5.0)
+    assert bench.sent == [('master', Signals.SIGINT)]
+    bench.supervision.exited('master', 0, 6.0)
+    assert bench.sent == [('master', Signals.SIGINT), ('slaves', Signals.SIGINT)]
+    bench.supervision.exited('slaves', -2, 6.5)
+    assert bench.supervision.phase is Phase.STOPPED
+    assert bench.outcome == Outcome(0, 'stopped by the user')
+    assert all(notice.severity is Severity.INFO for notice in bench.notices)
+
+
+def test_a_second_interrupt_kills_everybody_and_is_no_success() -> None:
+    """Forced: drives may still be enabled, so the exit code is not 0."""
+    bench = Bench(SLAVES, MASTER)
+    bench.supervision.interrupt(5.0)
+    bench.supervision.interrupt(5.1)
+    assert {('master', Signals.SIGKILL), ('slaves', Signals.SIGKILL)} < set(bench.sent)
+    bench.supervision.exited('master', -9, 5.2)
+    bench.supervision.exited('slaves', -9, 5.2)
+    assert bench.outcome.exit_code == 1
+    assert 'master had to be killed' in bench.outcome.reason
+
+
+def test_a_process_that_does_not_stop_is_killed_in_the_end() -> None:
+    """The ladder's last step is SIGKILL; a process that survives it is named."""
+    bench = Bench(MASTER)
+    bench.supervision.interrupt(0.0)
+    while bench.supervision.phase is not Phase.STOPPED:
+        deadline = bench.supervision.next_deadline()
+        assert deadline is not None
+        bench.supervision.advance(deadline)
+    assert [signal for _, signal in bench.sent] == [
+        Signals.SIGINT,
+        Signals.SIGTERM,
+        Signals.SIGKILL,
+    ]
+    assert 'not even SIGKILL ended master' in bench.notices[-1].text
+
+
+def test_the_first_reason_stays() -> None:
+    """What ends while everything is being stopped does not hide why."""
+    bench = Bench(MASTER, SLAVES)
+    bench.supervision.exited('slaves', 7, 1.0)
+    bench.supervision.stop(Outcome(0, 'done'), 1.1)
+    bench.supervision.exited('master', -9, 2.0)
+    assert bench.outcome.reason == 'slaves ended with exit code 7 before it was ready'
+
+
+def test_what_cannot_be_started_stops_what_was() -> None:
+    """A missing executable is reported; those started before it are stopped."""
+    bench = Bench(SLAVES, MASTER, missing='master')
+    assert bench.sent == [('slaves', Signals.SIGINT)]
+    assert bench.outcome.reason == 'master cannot be started: no such file'
+
+
+def test_two_processes_of_one_name_are_refused() -> None:
+    """Names are the keys of everything."""
+    with pytest.raises(ValueError, match='slaves'):
+        Bench(SLAVES, SLAVES)
+
+
+@pytest.mark.parametrize(
+    'options', [{'argv': ()}, {'ready': '('}, {'stop_steps': ()}], ids=['argv', 'ready', 'steps']
+)
+def test_a_spec_refuses_what_would_only_fail_later(options: dict[str, object]) -> None:
+    """The message names the process."""
+    values = {'argv': ('true',), **options}
+    with pytest.raises(ValueError, match='process master'):
+        ProcessSpec('master', **values)  # type: ignore[arg-type]
