@@ -23,6 +23,7 @@ setup(
     description='CANopen master, CiA 402 drives and simulated slaves for ROS 2',
     license='Apache-2.0',
     entry_points={
+        'can.interface': ['arm_canopen = arm_canopen.can.plugin:ArmCanopenBus'],
         'console_scripts': [
             'candump = arm_canopen.nodes.candump:main',
             'canopen_joint_state_publisher = arm_canopen.nodes.joint_state_publisher:main',

@@ -12,7 +12,6 @@ from functools import lru_cache
 import ipaddress
 import random
 import socket
-import struct
 from threading import Lock
 
 from ..exceptions import BusError, CodecError
@@ -121,6 +120,9 @@ def _open_sender(name: str, group: str, port: int) -> socket.socket:
         sender.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, socket.inet_aton(_LOOPBACK))
         sender.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 0)
         sender.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_LOOP, 1)
+        # a member that blocks nobody: without one the kernel drops for the whole interface what
+        # our receiver blocks, also for python-can, which is a member on another interface
+        sender.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, _membership(group))
         sender.setblocking(False)
         sender.connect((group, port))
     except OSError as error:
@@ -152,14 +154,18 @@ def _open_receiver(group: str, port: int, own_address: str) -> socket.socket:
         prepare_receiver(receiver)
         # the group's own address, so that other groups on the same port do not arrive
         receiver.bind((group, port))
-        membership = socket.inet_aton(group) + socket.inet_aton(_LOOPBACK)
-        receiver.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, membership)
-        block = struct.pack('8s4s', membership, socket.inet_aton(own_address))
-        receiver.setsockopt(socket.IPPROTO_IP, _IP_BLOCK_SOURCE, block)
+        receiver.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, _membership(group))
+        blocked = _membership(group) + socket.inet_aton(own_address)
+        receiver.setsockopt(socket.IPPROTO_IP, _IP_BLOCK_SOURCE, blocked)
     except OSError:
         receiver.close()
         raise
     return receiver
+
+
+def _membership(group: str) -> bytes:
+    """Return the kernel's struct ip_mreq: the group on the loopback interface."""
+    return socket.inet_aton(group) + socket.inet_aton(_LOOPBACK)
 
 
 def _not_opened(name: str, error: OSError) -> BusError:

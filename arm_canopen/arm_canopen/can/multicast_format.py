@@ -149,7 +149,7 @@ def _decode_any(datagram: bytes, timestamp: float) -> Frame:
     is_remote = _flag(fields, 'is_remote_frame', default=False)
     can_id = fields.get('arbitration_id', 0)
     data = fields.get('data') or b''
-    if not isinstance(can_id, int) or not isinstance(data, bytes):
+    if type(can_id) is not int or not isinstance(data, bytes):
         raise CodecError(f'CAN frame with identifier {can_id!r} and payload {data!r}')
     is_error = _flag(fields, 'is_error_frame', default=False)
     data = b'' if is_remote else data

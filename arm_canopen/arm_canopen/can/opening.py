@@ -65,6 +65,8 @@ def resolve_name(name: str) -> str:
 
 def _open_multicast(name: str, channel: str) -> Bus:
     group, colon, digits = (channel or DEFAULT_GROUP).partition(':')
+    if ':' in digits:
+        group, colon = channel, ''  # an IPv6 address, to be refused as one
     check_group(group)
     if not colon:
         return MulticastBus(name, group, DEFAULT_PORT)
@@ -75,7 +77,7 @@ def _open_multicast(name: str, channel: str) -> Bus:
 
 def _open_adapter(name: str, interface: str, channel: str) -> Bus:
     try:
-        from .adapter import AdapterBus  # noqa: PLC0415  python-can takes long to import
+        from .adapter import AdapterBus  # only here, python-can takes long to import
     except ImportError as error:
         raise BusError(f'{name} needs python-can ({error}); `pip install python-can`') from error
     channel, at, digits = channel.rpartition('@')

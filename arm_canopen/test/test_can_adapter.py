@@ -1,0 +1,140 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The bus over python-can: names, echoes, odd messages and failing drivers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from time import monotonic, time
+
+import can
+from can_addresses import free_virtual
+import pytest
+
+from arm_canopen.can import Frame, open_bus
+from arm_canopen.can.adapter import AdapterBus
+from arm_canopen.exceptions import BusError
+
+
+class ScriptedDriver(can.BusABC):
+    """A driver that delivers prepared messages, and refuses to send."""
+
+    def __init__(self, messages: list[can.Message]) -> None:
+        """Keep the messages."""
+        super().__init__('scripted')
+        self.messages = messages
+
+    def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
+        return (self.messages.pop(0) if self.messages else None), True
+
+    def send(self, msg: can.Message, timeout: float | None = None) -> None:
+        """Refuse."""
+        raise can.CanOperationError('bus off')
+
+
+@pytest.fixture
+def opened_with(monkeypatch: pytest.MonkeyPatch) -> dict[str, object]:
+    """Put a scripted driver in place of all drivers, and note what it was opened with."""
+    options: dict[str, object] = {}
+    messages: list[can.Message] = []
+
+    def open_driver(**given: object) -> can.BusABC:
+        options.update(given)
+        options['messages'] = messages
+        return ScriptedDriver(messages)
+
+    monkeypatch.setattr(can, 'Bus', open_driver)
+    options['messages'] = messages
+    return options
+
+
+@pytest.mark.parametrize(
+    ('name', 'interface', 'channel', 'bitrate'),
+    [
+        ('pcan:PCAN_USBBUS1@500000', 'pcan', 'PCAN_USBBUS1', 500_000),
+        ('slcan:/dev/ttyUSB0@1000000', 'slcan', '/dev/ttyUSB0', 1_000_000),
+        ('kvaser:0', 'kvaser', '0', None),
+        ('socketcand:can0:localhost:29536', 'socketcand', 'can0:localhost:29536', None),
+        ('slcan:user@host@125000', 'slcan', 'user@host', 125_000),
+    ],
+)
+def test_a_name_is_interface_channel_and_bit_rate(
+    opened_with: dict[str, object], name: str, interface: str, channel: str, bitrate: int | None
+) -> None:
+    """The parts of the name reach the driver, own messages are not asked for."""
+    with open_bus(name) as bus:
+        assert bus.name == name
+    assert opened_with['interface'] == interface
+    assert opened_with['channel'] == channel
+    assert opened_with.get('bitrate') == bitrate
+    assert opened_with['receive_own_messages'] is False
+
+
+@pytest.mark.parametrize('name', ['pcan:X@', 'pcan:X@fast', 'pcan:X@0', 'pcan:X@-1'])
+def test_a_wrong_bit_rate_is_refused(opened_with: dict[str, object], name: str) -> None:
+    """A bit rate is a positive number."""
+    with pytest.raises(BusError, match='no bit rate'):
+        open_bus(name)
+
+
+def test_an_unknown_interface_lists_the_known_ones() -> None:
+    """A typing mistake shows what could have been meant."""
+    with pytest.raises(BusError, match=r'no interface paecan; it has .*pcan'):
+        open_bus('paecan:PCAN_USBBUS1')
+
+
+def test_a_driver_that_cannot_be_opened_says_why() -> None:
+    """The driver's own reason is kept."""
+    with pytest.raises(BusError, match='cannot open slcan:/nowhere/tty'):
+        open_bus('slcan:/nowhere/tty@500000')
+
+
+def _message(**fields: object) -> can.Message:
+    return can.Message(arbitration_id=0x181, is_extended_id=False, **fields)  # type: ignore[arg-type]
+
+
+def test_echoes_and_fd_messages_are_not_delivered(opened_with: dict[str, object]) -> None:
+    """Drivers that echo mark it; CAN FD messages are counted and dropped."""
+    messages = opened_with['messages']
+    assert isinstance(messages, list)
+    messages += [_message(is_rx=False), _message(is_fd=True, data=bytes(64)), _message(data=b'1')]
+    with open_bus('pcan:X') as bus:
+        frames = bus.receive(0.0)
+        assert [frame[:2] for frame in frames] == [(0x181, b'1')]
+        assert bus.counters.malformed == 1
+
+
+@pytest.mark.parametrize('age', [0.0, 0.5, -5.0, 4e8], ids=['now', 'recent', 'future', 'uptime'])
+def test_stamps_of_drivers_become_steady_time(opened_with: dict[str, object], age: float) -> None:
+    """Wall clock stamps are moved over; those that count from something else become now."""
+    messages = opened_with['messages']
+    assert isinstance(messages, list)
+    messages.append(_message(timestamp=time() - age))
+    before = monotonic()
+    with open_bus('pcan:X') as bus:
+        (frame,) = bus.receive(0.0)
+    expected = before - age if age == 0.5 else before
+    assert expected - 1e-3 <= frame.timestamp <= monotonic()
+
+
+def test_a_refused_frame_is_counted_and_told(opened_with: dict[str, object]) -> None:
+    """The driver's error becomes ours, with its reason."""
+    with open_bus('pcan:X') as bus:
+        with pytest.raises(BusError, match='bus off'):
+            bus.send(Frame(1))
+        assert (bus.counters.sent, bus.counters.send_errors) == (0, 1)
+
+
+@pytest.fixture
+def unplugged() -> Iterator[AdapterBus]:
+    """Open an adapter whose driver was shut down underneath."""
+    bus = AdapterBus('test', 'virtual', free_virtual(), None)
+    bus._bus.shutdown()
+    yield bus
+    bus.close()
+
+
+def test_a_driver_that_goes_away_is_told(unplugged: AdapterBus) -> None:
+    """Receiving from a dead driver is an error and no empty bus."""
+    with pytest.raises(BusError, match='went away'):
+        unplugged.receive(0.1)

@@ -1,0 +1,175 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The multicast bus: python-can as its peer, losses, strangers and the loopback interface."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import socket
+from time import monotonic, time_ns
+
+import can
+from can_addresses import free_multicast
+from can_receiving import DEADLINE, receive_count, unstamped
+import pytest
+
+from arm_canopen.can import Bus, Frame, open_bus
+from arm_canopen.can.adapter import from_message, to_message
+from arm_canopen.can.multicast import _is_local, MulticastBus
+from arm_canopen.exceptions import BusError
+
+FRAMES = [
+    Frame(0x000, b'\x01\x05'),
+    Frame(0x080),
+    Frame(0x181, bytes(range(8))),
+    Frame(0x1FFF_FFFF, b'x', is_extended=True),
+    Frame(0x705, is_remote=True),
+]
+
+
+@pytest.fixture
+def name() -> str:
+    """Name a group of one's own."""
+    return free_multicast()
+
+
+@pytest.fixture
+def bus(name: str) -> Iterator[Bus]:
+    """Open our bus."""
+    with open_bus(name) as opened:
+        yield opened
+
+
+@pytest.fixture
+def peer(name: str) -> Iterator[can.BusABC]:
+    """Open python-can's own udp_multicast on the same group."""
+    _, group, port = name.split(':')
+    try:
+        opened = can.Bus(interface='udp_multicast', channel=group, port=int(port))
+    except can.CanInitializationError as error:
+        pytest.skip(f'python-can finds no multicast route here: {error}')
+    with opened:
+        yield opened
+
+
+def send_raw(name: str, datagram: bytes) -> None:
+    """Send bytes to the group from this host, as any program could."""
+    _, group, port = name.split(':')
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        sender.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, socket.inet_aton('127.0.0.1'))
+        sender.sendto(datagram, (group, int(port)))
+
+
+def test_python_can_receives_ours(bus: Bus, peer: can.BusABC) -> None:
+    """python-can's bus reads what ours sends, in order."""
+    for frame in FRAMES:
+        bus.send(frame)
+    messages = [peer.recv(DEADLINE) for _ in FRAMES]
+    assert [from_message(message, 0.0) for message in messages if message] == FRAMES
+
+
+def test_we_receive_python_can(bus: Bus, peer: can.BusABC) -> None:
+    """Our bus reads what python-can's sends, in order and once."""
+    for frame in FRAMES:
+        peer.send(to_message(frame))
+    assert unstamped(receive_count(bus, len(FRAMES))) == FRAMES
+    assert bus.receive(0.0) == []
+
+
+def test_fd_frames_and_garbage_are_counted_and_dropped(bus: Bus, name: str) -> None:
+    """What is no classic CAN frame costs a count, and what follows still arrives."""
+    for datagram in (b'', b'garbage', bytes(5000), b'\x80'):
+        send_raw(name, datagram)
+    with open_bus(name) as other:
+        other.send(Frame(5))
+    frames = receive_count(bus, 2)  # an empty map is a frame for python-can: all defaults
+    assert unstamped(frames) == [Frame(0, is_extended=True), Frame(5)]
+    assert bus.counters.malformed == 3
+
+
+def test_other_groups_on_the_same_port_are_not_heard(bus: Bus, name: str) -> None:
+    """Two robots may share a port as long as their groups differ."""
+    kind, group, port = name.split(':')
+    head, _, last = group.rpartition('.')
+    neighbour = f'{kind}:{head}.{int(last) % 250 + 3}:{port}'
+    with open_bus(neighbour) as other, open_bus(name) as same:
+        other.send(Frame(1))
+        same.send(Frame(2))
+    assert unstamped(receive_count(bus, 1)) == [Frame(2)]
+    assert bus.receive(0.0) == []
+
+
+def test_losses_are_counted(name: str) -> None:
+    """When the receive buffer is full the kernel drops, and the bus knows how many."""
+    sent = 3000
+    with open_bus(name) as sender, open_bus(name) as late:
+        assert isinstance(late, MulticastBus)
+        late._receiver.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 65536)
+        for _ in range(sent):
+            sender.send(Frame(1))
+        got = len(late.receive(0.0))
+        assert 0 < got < sent
+        sender.send(Frame(2))  # the kernel tells the count with the next frame
+        assert unstamped(receive_count(late, 1)) == [Frame(2)]
+        assert late.counters.lost == sent - got
+
+
+def test_frames_stay_on_the_loopback_interface(bus: Bus) -> None:
+    """The sending socket names the loopback interface and gives no hop."""
+    assert isinstance(bus, MulticastBus)
+    options = bus._sender
+    interface = options.getsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, 4)
+    assert socket.inet_ntoa(interface) == '127.0.0.1'
+    assert options.getsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL) == 0
+    assert bus._own_address[0].startswith('127.')
+
+
+def test_frames_of_other_hosts_are_not_taken() -> None:
+    """python-can opens the group on the network, so a sender's address is looked at."""
+    assert _is_local('127.3.2.1')
+    assert not _is_local('192.0.2.77')  # TEST-NET-1, nobody's
+
+
+def test_buses_send_from_addresses_of_their_own(name: str) -> None:
+    """No two buses share the address that a receiver blocks as its own."""
+    with open_bus(name) as first, open_bus(name) as second:
+        assert isinstance(first, MulticastBus)
+        assert isinstance(second, MulticastBus)
+        assert first._own_address[0] != second._own_address[0]
+
+
+def test_stamps_do_not_go_back_when_the_wall_clock_is_set(
+    bus: Bus, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The kernel stamps with the wall clock; setting it neither ages nor rejuvenates a frame."""
+    stamps = []
+    with open_bus(name) as sender:
+        for shift in (0, 3600, -7200):  # [s]
+            monkeypatch.setattr(
+                'arm_canopen.can.socket_bus.time_ns', lambda s=shift: time_ns() + s * 10**9
+            )
+            sender.send(Frame(1))
+            stamps += [frame.timestamp for frame in receive_count(bus, 1)]
+    assert len(stamps) == 3
+    assert stamps == sorted(stamps)
+    assert stamps[-1] <= monotonic()
+
+
+@pytest.mark.parametrize(
+    ('wrong', 'reason'),
+    [
+        ('udp_multicast:ff15::1', 'IPv6'),
+        ('udp_multicast:[ff15::1]', 'no IP address'),
+        ('udp_multicast:ff15:7079:7468:6f6e:6465:6d6f:6d63:6173', 'IPv6'),
+        ('udp_multicast:10.0.0.1', 'no multicast address'),
+        ('udp_multicast:localhost', 'no IP address'),
+        ('udp_multicast:239.1.2.3:', 'no UDP port'),
+        ('udp_multicast:239.1.2.3:0', 'no UDP port'),
+        ('udp_multicast:239.1.2.3:65536', 'no UDP port'),
+        ('udp_multicast:239.1.2.3:x', 'no UDP port'),
+    ],
+)
+def test_wrong_groups_and_ports_are_refused_with_the_reason(wrong: str, reason: str) -> None:
+    """Each mistake in the name is told, with what would be right."""
+    with pytest.raises(BusError, match=reason):
+        open_bus(wrong)
