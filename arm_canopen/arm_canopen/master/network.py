@@ -21,6 +21,7 @@ from .events import Event, EventKind, Report, Severity
 from .process_image import SyncRound
 from .remote_node import RemoteNode
 from .scheduler import Scheduler, Task
+from .sdo_client import SdoClient
 
 CycleHook: TypeAlias = Callable[[float, float], None]
 
@@ -37,6 +38,7 @@ class Network:
         on_cycle: Called in each cycle before the RPDOs leave, with time and period in [s].
         on_feedback: Called when all TPDOs of a SYNC have come, or at the next cycle at the latest,
             with the time of that SYNC in [s].
+        on_frame: Called with each received frame, for statistics.
         missed_pdos: TPDOs that did not answer a SYNC, over all devices.
         unknown_frames: Frames with an identifier that nobody on this bus should use.
     """
@@ -53,6 +55,7 @@ class Network:
         self.scheduler = Scheduler()
         self.on_cycle: CycleHook = lambda now, period: None
         self.on_feedback: Callable[[float], None] = lambda sync_time: None
+        self.on_frame: Callable[[Frame], None] = lambda frame: None
         self.missed_pdos = 0
         self.unknown_frames = 0
         self._send_raw = send
@@ -70,6 +73,7 @@ class Network:
         self._boots = {name: self._boot_process(node) for name, node in self.nodes.items()}
         self._boot_tasks: dict[str, Task[None]] = {}
         self._handlers: dict[int, Callable[[Frame], None]] = {}
+        self._strangers: dict[int, SdoClient] = {}
         for node in self.nodes.values():
             self._connect(node)
 
@@ -88,6 +92,7 @@ class Network:
 
     def receive(self, frame: Frame) -> None:
         """Take a frame from the bus."""
+        self.on_frame(frame)
         handler = self._handlers.get(frame.can_id)
         if handler is None or frame.is_extended or frame.is_remote or frame.is_error:
             self.unknown_frames += 1
@@ -139,6 +144,18 @@ class Network:
     def send_nmt(self, command: NmtCommand, node_id: int) -> None:
         """Send an NMT command to one device, or to all with id 0."""
         self.send(Frame(CobId.NMT, nmt_frame(command, node_id)))
+
+    def sdo_client(self, node_id: int) -> SdoClient:
+        """Return the SDO client of any node id, also of one that bus.yml does not name."""
+        for node in self.nodes.values():
+            if node.config.node_id == node_id:
+                return node.sdo
+        client = self._strangers.get(node_id)
+        if client is None:
+            client = SdoClient(node_id, f'node {node_id}', self.scheduler, self.send)
+            self._strangers[node_id] = client
+            self._handlers[CobId.SDO_RESPONSE + node_id] = client.receive
+        return client
 
     def _boot_process(self, node: RemoteNode) -> BootProcess:
         master = self.config.master

@@ -11,6 +11,7 @@ from ..can.frame import Frame
 from ..config.model import NodeConfig
 from ..exceptions import CodecError, SdoError
 from ..standard.datatypes import decode, encode, Value
+from ..standard.dictionary import ObjectEntry
 from ..standard.emcy import Emergency
 from ..standard.nmt import NmtState, parse_heartbeat
 from ..standard.objects import Index
@@ -224,10 +225,25 @@ class RemoteNode:
             for address, entry in self._polled.items():
                 try:
                     value = await self.read_object(*address)
-                except SdoError:
+                except (SdoError, CodecError):
                     continue  # the SDO counters show it; the value stays as old as it is
                 entry.value = value if isinstance(value, (int, float)) else None
             await self._scheduler.timer(period)
+
+    def entry(self, index: int, subindex: int = 0) -> ObjectEntry:
+        """Return what the EDS says of an object.
+
+        Raises:
+            SdoError: The EDS does not know it.
+        """
+        entry = self.config.dictionary.get(index, subindex)
+        if entry is None:
+            raise SdoError(
+                f'{self.name} has no object 0x{index:04X}:{subindex:02X} in '
+                f'{self.config.eds.name}; the services of the master node, whose requests name '
+                'the data type, reach it all the same'
+            )
+        return entry
 
     async def read_object(self, index: int, subindex: int = 0) -> Value:
         """Read an object by SDO and decode it by its type in the EDS.
@@ -236,28 +252,17 @@ class RemoteNode:
             SdoError: The device did not answer or aborted, or the EDS does not know the object.
             CodecError: The answer does not fit the type.
         """
-        entry = self.config.dictionary.get(index, subindex)
-        if entry is None:
-            raise SdoError(self._unknown_object(index, subindex))
-        data = await self.sdo.read(index, subindex, self.config.sdo_timeout)
-        return decode(entry.data_type, data)
+        entry = self.entry(index, subindex)
+        return decode(
+            entry.data_type, await self.sdo.read(index, subindex, self.config.sdo_timeout)
+        )
 
     def write_object(self, index: int, subindex: int, value: Value) -> Promise[None]:
         """Write an object by SDO, encoded by its type in the EDS; errors reject the promise."""
-        entry = self.config.dictionary.get(index, subindex)
-        promise: Promise[None] = Promise()
-        if entry is None:
-            promise.reject(SdoError(self._unknown_object(index, subindex)))
-            return promise
         try:
-            data = encode(entry.data_type, value)
-        except CodecError as error:
-            promise.reject(error)
-            return promise
+            data = encode(self.entry(index, subindex).data_type, value)
+        except (SdoError, CodecError) as error:
+            refused: Promise[None] = Promise()
+            refused.reject(error)
+            return refused
         return self.sdo.write(index, subindex, data, self.config.sdo_timeout)
-
-    def _unknown_object(self, index: int, subindex: int) -> str:
-        return (
-            f'{self.name} has no object 0x{index:04X}:{subindex:02X} in {self.config.eds.name}; '
-            'read it through the master node, whose request names the data type'
-        )

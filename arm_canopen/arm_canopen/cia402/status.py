@@ -1,0 +1,72 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Immutable snapshots of drives, for other threads."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..master.status import node_status, NodeStatus
+from ..standard.drive import DriveState, mode_title, Statusword, statusword_text
+from .drive import Drive, FAULTY
+
+
+@dataclass(frozen=True, slots=True)
+class DriveStatus:
+    """How a drive was at one moment.
+
+    Attributes:
+        node: The device below it.
+        state: State of the power drive system.
+        mode: Mode of operation in words.
+        statusword: 0x6041 in words.
+        warning: The statusword shows a warning or an internal limit.
+        error: 0x603F in words, empty when none is known.
+        position: Actual position in user units.
+        velocity: Actual velocity in user units per second.
+        setpoint: Position last commanded in user units.
+        summary: All of it in a sentence.
+    """
+
+    node: NodeStatus
+    state: DriveState
+    mode: str
+    statusword: str
+    warning: bool
+    error: str
+    position: float
+    velocity: float
+    setpoint: float
+    summary: str
+
+    @property
+    def faulted(self) -> bool:
+        """Whether the drive is in a fault or on the way to it."""
+        return self.state in FAULTY
+
+    @property
+    def following_error(self) -> float:
+        """Commanded minus actual position in user units."""
+        return self.setpoint - self.position
+
+
+def drive_status(drive: Drive, now: float) -> DriveStatus:
+    """Take a snapshot of a drive.
+
+    Args:
+        drive: The drive.
+        now: Steady time in [s].
+    """
+    word = drive.objects.statusword
+    return DriveStatus(
+        node=node_status(drive.node, now),
+        state=drive.state,
+        mode=mode_title(drive.objects.mode_display),
+        statusword=statusword_text(word),
+        warning=bool(word & (Statusword.WARNING | Statusword.INTERNAL_LIMIT)),
+        error=drive.error,
+        position=drive.position,
+        velocity=drive.velocity,
+        setpoint=drive.setpoint,
+        summary=drive.describe(),
+    )

@@ -1,0 +1,120 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Puts the states of single joints together, one set for each moment."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from .robot_joints import RobotJoint
+
+STALE_AFTER = 0.5  # [s] without news a joint is no longer published
+
+
+class JointSample(NamedTuple):
+    """State of one joint: position [rad or m], velocity [unit/s], effort [Nm or N]."""
+
+    position: float
+    velocity: float
+    effort: float
+
+
+@dataclass(frozen=True, slots=True)
+class JointSet:
+    """States of many joints at one moment.
+
+    Attributes:
+        stamp: The moment in [ns], on the clock of the samples.
+        names: The joints, in URDF order.
+        samples: Their states.
+    """
+
+    stamp: int
+    names: list[str]
+    samples: list[JointSample]
+
+
+class JointAggregator:
+    """Collects samples into rounds; a round is over when all that were in the last one are there.
+
+    Drives on one bus share the stamp of their SYNC, so a round is one SYNC. A sample of a later
+    stamp, or a second one of the same joint, ends a round that is still incomplete. Joints that are
+    silent are left out after a while instead of being invented.
+    """
+
+    def __init__(self, joints: Sequence[RobotJoint]) -> None:
+        """Start empty.
+
+        Args:
+            joints: The movable joints of the robot, in its order.
+        """
+        self._joints = list(joints)
+        self._samples: dict[str, JointSample] = {}
+        self._heard: dict[str, float] = {}  # steady time in [s]
+        self._stamp = 0
+        self._round: set[str] = set()
+        self._expected: set[str] = set()
+        self._published = False
+
+    def update(self, name: str, stamp: int, sample: JointSample, now: float) -> list[JointSet]:
+        """Take a sample.
+
+        Args:
+            name: The joint.
+            stamp: Its moment in [ns].
+            sample: Its state.
+            now: Steady time in [s].
+
+        Returns:
+            The sets that are ready now: none, one, or two when this sample both ended a round and
+            completed the next.
+        """
+        ready = []
+        if stamp > self._stamp or name in self._round:
+            if not self._published and self._round:
+                ready.append(self._close(now))
+            self._expected = self._round
+            self._round, self._stamp, self._published = set(), stamp, False
+        self._round.add(name)
+        self._samples[name] = sample
+        self._heard[name] = now
+        if not self._published and self._round >= self._expected:
+            ready.append(self._close(now))
+        return ready
+
+    def silent(self, now: float) -> list[str]:
+        """Name the joints that nobody reports, or not any more.
+
+        Args:
+            now: Steady time in [s].
+        """
+        return [
+            joint.name
+            for joint in self._joints
+            if joint.mimic is None and not self._is_heard(joint.name, now)
+        ]
+
+    def _close(self, now: float) -> JointSet:
+        self._published = True
+        names, samples = [], []
+        for joint in self._joints:
+            sample = self._sample_of(joint, now)
+            if sample is not None:
+                names.append(joint.name)
+                samples.append(sample)
+        return JointSet(self._stamp, names, samples)
+
+    def _sample_of(self, joint: RobotJoint, now: float) -> JointSample | None:
+        mimic = joint.mimic
+        if mimic is None or self._is_heard(joint.name, now):
+            return self._samples[joint.name] if self._is_heard(joint.name, now) else None
+        if not self._is_heard(mimic.joint, now):
+            return None
+        leader = self._samples[mimic.joint]
+        position = mimic.multiplier * leader.position + mimic.offset
+        return JointSample(position, mimic.multiplier * leader.velocity, 0.0)
+
+    def _is_heard(self, name: str, now: float) -> bool:
+        return name in self._heard and now - self._heard[name] <= STALE_AFTER

@@ -1,0 +1,65 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Immutable snapshots of devices, for other threads."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..standard.emcy import Emergency
+from ..standard.nmt import NmtState
+from .remote_node import BootPhase, RemoteNode
+from .sdo_client import SdoCounters
+
+
+@dataclass(frozen=True, slots=True)
+class NodeStatus:
+    """How a device was at one moment.
+
+    Attributes:
+        name: Name in bus.yml.
+        node_id: CANopen node id.
+        online: Booted, and not lost since.
+        nmt_state: NMT state as received, None before the first.
+        phase: How far it has booted.
+        phase_detail: What it is doing in that phase, or why it failed.
+        heartbeat_age: Time since the last heartbeat in [s]; None when there was none or none is
+            supervised.
+        emergency: Last EMCY that the device did not take back.
+        missed_pdos: TPDOs that did not answer a SYNC.
+        sdo: What became of the SDO transfers.
+    """
+
+    name: str
+    node_id: int
+    online: bool
+    nmt_state: NmtState | None
+    phase: BootPhase
+    phase_detail: str
+    heartbeat_age: float | None
+    emergency: Emergency | None
+    missed_pdos: int
+    sdo: SdoCounters
+
+
+def node_status(node: RemoteNode, now: float) -> NodeStatus:
+    """Take a snapshot of a device.
+
+    Args:
+        node: The device.
+        now: Steady time in [s].
+    """
+    heard = node.config.heartbeat_timeout > 0 and node.last_heartbeat > 0
+    counters = node.sdo.counters
+    return NodeStatus(
+        name=node.name,
+        node_id=node.config.node_id,
+        online=node.online,
+        nmt_state=node.nmt_state,
+        phase=node.phase,
+        phase_detail=node.phase_detail,
+        heartbeat_age=now - node.last_heartbeat if heard else None,
+        emergency=node.last_emergency,
+        missed_pdos=node.missed_pdos,
+        sdo=SdoCounters(counters.done, counters.aborted, counters.timed_out, counters.stale),
+    )

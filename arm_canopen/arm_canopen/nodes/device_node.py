@@ -1,0 +1,180 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The ROS node of one device: NMT, SDO and raw PDO access, as ros2_canopen's proxy has them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import Future
+from functools import partial
+from typing import Any
+
+from canopen_interfaces.msg import COData
+from canopen_interfaces.srv import CORead, COWrite
+from rcl_interfaces.msg import ParameterDescriptor
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
+
+from ..exceptions import CanopenError, CodecError, SdoError
+from ..master.object_access import bytes_from_raw, number_from_raw, raw_from_bytes, raw_from_number
+from ..master.process_image import Input
+from ..master.remote_node import RemoteNode
+from ..master.runner import NetworkThread
+from ..master.scheduler import Promise
+from ..standard.nmt import NmtCommand, NmtState
+from .deferred_service import DeferredServices
+from .output_thread import OutputThread
+
+NMT_STATE_WORDS: dict[NmtState, str] = {
+    NmtState.BOOT_UP: 'BOOTUP',
+    NmtState.PRE_OPERATIONAL: 'PREOP',
+    NmtState.OPERATIONAL: 'START',
+    NmtState.STOPPED: 'STOP',
+}
+"""What ~/nmt_state says, in ros2_canopen's words; ERROR stands for a device that was lost."""
+
+LATCHED = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+class DeviceNode(Node):
+    """Services and topics of one device."""
+
+    def __init__(self, device: RemoteNode, thread: NetworkThread, output: OutputThread) -> None:
+        """Offer the services.
+
+        Args:
+            device: The device.
+            thread: The thread of its network.
+            output: The thread that publishes and answers.
+        """
+        config = device.config
+        remappings = [f'{old}:={new}' for old, new in config.remappings.items()]
+        arguments = [word for rule in remappings for word in ('-r', rule)]
+        super().__init__(
+            config.name,
+            namespace=config.namespace or None,
+            cli_args=['--ros-args', *arguments] if arguments else None,
+        )
+        self.device = device
+        self.output = output
+        self._thread = thread
+        self._deferred = DeferredServices(output)
+        fixed = ParameterDescriptor(description='CANopen node id', read_only=True)
+        self.declare_parameter('node_id', config.node_id, fixed)
+        self._nmt_state = self.create_publisher(String, '~/nmt_state', LATCHED)
+        self._rpdo = self.create_publisher(COData, '~/rpdo', 10)
+        self.create_subscription(COData, '~/tpdo', self._write_pdo, 10)
+        self._offer_nmt('nmt_reset_node', NmtCommand.RESET_NODE)
+        self._offer_nmt('nmt_start_node', NmtCommand.START)
+        self._deferred.create(self, CORead, '~/sdo_read', self._read, self._answer_read)
+        self._deferred.create(self, COWrite, '~/sdo_write', self._write, self._answer_write)
+
+    def offer_trigger(self, name: str, handler: Callable[[], Future[str]]) -> None:
+        """Offer a std_srvs/Trigger whose message is what the future returns, or why it failed."""
+
+        def respond(response: Any, future: Future[str]) -> None:  # noqa: ANN401
+            error = future.exception()
+            response.success = error is None
+            response.message = future.result() if error is None else str(error)
+            if error is not None:
+                self.get_logger().warning(f'{name}: {error}')
+
+        self._deferred.create(self, Trigger, f'~/{name}', lambda request: handler(), respond)
+
+    def publish_nmt_state(self) -> None:
+        """Publish the NMT state; called when it changes."""
+        state = self.device.nmt_state
+        self._nmt_state.publish(String(data='ERROR' if state is None else NMT_STATE_WORDS[state]))
+
+    def update_listeners(self) -> None:
+        """Publish each received object on ~/rpdo while somebody listens, and only then."""
+        listened = self._rpdo.get_subscription_count() > 0
+        listener = self._received if listened else None
+        for entry in self.device.image.inputs:
+            entry.listener = listener
+
+    def owns_object(self, index: int) -> bool:
+        """Whether the driver of this device writes an object itself in each cycle."""
+        return False
+
+    def _received(self, entry: Input) -> None:
+        values = entry.values or ()
+        self.output.post(partial(self._publish_objects, entry, values))
+
+    def _publish_objects(self, entry: Input, values: tuple[float, ...]) -> None:
+        for mapped, value in zip(entry.config.mapping, values, strict=True):
+            data = raw_from_number(mapped, value)
+            self._rpdo.publish(COData(index=mapped.index, subindex=mapped.subindex, data=data))
+
+    def _write_pdo(self, message: COData) -> None:
+        place = f'0x{message.index:04X}:{message.subindex:02X}'
+        output = self.device.image.output_of(message.index, message.subindex)
+        if output is None:
+            self.get_logger().warning(f'~/tpdo: {place} is in no RPDO of the device; map it')
+            return
+        if self.owns_object(message.index):
+            self.get_logger().warning(
+                f'~/tpdo: {place} is written by the drive in each cycle; use its services'
+            )
+            return
+        for position, mapped in enumerate(output.config.mapping):
+            if (mapped.index, mapped.subindex) == (message.index, message.subindex):
+                try:
+                    value = number_from_raw(mapped, message.data)
+                except CodecError as error:
+                    self.get_logger().warning(f'~/tpdo: {place}: {error}')
+                    return
+                self._thread.call(partial(output.values.__setitem__, position, value))
+
+    def _offer_nmt(self, name: str, command: NmtCommand) -> None:
+        node_id = self.device.config.node_id
+
+        def send() -> str:
+            self._thread.network.send_nmt(command, node_id)
+            return f'NMT {command.name} sent to node {node_id}'
+
+        self.offer_trigger(name, lambda: self._thread.call(send))
+
+    def _read(self, request: CORead.Request) -> Future[int]:
+        device, index, subindex = self.device, request.index, request.subindex
+
+        async def read() -> int:
+            device.entry(index, subindex)
+            data = await device.sdo.read(index, subindex, device.config.sdo_timeout)
+            return raw_from_bytes(data)
+
+        return self._thread.run_coroutine(read)
+
+    def _answer_read(self, response: CORead.Response, future: Future[int]) -> None:
+        answer_read(self, response, future)
+
+    def _write(self, request: COWrite.Request) -> Future[None]:
+        device, index, subindex = self.device, request.index, request.subindex
+
+        def write() -> Promise[None]:
+            data = bytes_from_raw(device.entry(index, subindex).data_type, request.data)
+            return device.sdo.write(index, subindex, data, device.config.sdo_timeout)
+
+        return self._thread.run(write)
+
+    def _answer_write(self, response: COWrite.Response, future: Future[None]) -> None:
+        answer_write(self, response, future)
+
+
+def answer_read(node: Node, response: Any, future: Future[int]) -> None:  # noqa: ANN401
+    """Fill in success and data; a failure, for which there is no field, is logged."""
+    answer_write(node, response, future)
+    if response.success:
+        response.data = future.result()
+
+
+def answer_write(node: Node, response: Any, future: Future[Any]) -> None:  # noqa: ANN401
+    """Fill in success; a failure, for which there is no field, is logged."""
+    error = future.exception()
+    response.success = error is None
+    if isinstance(error, (CanopenError, SdoError)):
+        node.get_logger().warning(str(error))
+    elif error is not None:
+        node.get_logger().error(f'{type(error).__name__}: {error}')

@@ -1,0 +1,141 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Snapshots as /diagnostics messages (REP 107): one status per device, one for the bus."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+
+from ..can.bus import BusCounters
+from ..can.load import LoadFigures
+from ..cia402.status import DriveStatus
+from ..master.statistics import CycleFigures
+from ..master.status import NodeStatus
+from ..standard.drive import DriveState
+
+HIGH_LOAD = 0.7  # share of the bus time above which low-priority frames begin to wait long
+
+
+@dataclass(frozen=True, slots=True)
+class BusStatus:
+    """How the bus was at one moment.
+
+    Attributes:
+        name: Name of the CAN interface.
+        counters: Frames so far.
+        load: Frames per second and load.
+        cycle: Figures of the SYNC cycle.
+        missed_pdos: TPDOs that did not answer a SYNC, over all devices.
+    """
+
+    name: str
+    counters: BusCounters
+    load: LoadFigures
+    cycle: CycleFigures
+    missed_pdos: int
+
+
+def device_diagnostic(bus: str, status: NodeStatus) -> DiagnosticStatus:
+    """Describe a device that is no drive."""
+    level, message = _device_level(status)
+    return DiagnosticStatus(
+        level=level,
+        name=f'{status.name}: device',
+        message=message,
+        hardware_id=f'{bus}/{status.node_id}',
+        values=_values(_device_values(status)),
+    )
+
+
+def drive_diagnostic(bus: str, status: DriveStatus) -> DiagnosticStatus:
+    """Describe a drive."""
+    level, message = _device_level(status.node)
+    if level == DiagnosticStatus.OK:
+        message = status.summary
+    if status.faulted:
+        level = DiagnosticStatus.ERROR
+    elif level == DiagnosticStatus.OK and status.warning:
+        level = DiagnosticStatus.WARN
+    unknown = status.state is DriveState.UNKNOWN
+    return DiagnosticStatus(
+        level=level,
+        name=f'{status.node.name}: drive',
+        message=message,
+        hardware_id=f'{bus}/{status.node.node_id}',
+        values=_values(
+            _device_values(status.node)
+            | {
+                'state': status.state.title,
+                'mode': '' if unknown else status.mode,
+                'statusword': '' if unknown else status.statusword,
+                'error_code': status.error,
+                'position': f'{status.position:.6f}',
+                'velocity': f'{status.velocity:.6f}',
+                'setpoint': f'{status.setpoint:.6f}',
+                'following_error': f'{status.following_error:.6f}',
+            }
+        ),
+    )
+
+
+def bus_diagnostic(master: str, status: BusStatus) -> DiagnosticStatus:
+    """Describe the bus and its cycle."""
+    counters, cycle = status.counters, status.cycle
+    level, message = DiagnosticStatus.OK, f'{status.load.frames_per_second:.0f} frames/s'
+    if counters.lost or counters.send_errors:
+        level = DiagnosticStatus.WARN
+        message = f'{counters.lost} frames lost, {counters.send_errors} not sent since the start'
+    elif status.load.load > HIGH_LOAD:
+        level, message = DiagnosticStatus.WARN, f'bus load {status.load.load:.0%}'
+    return DiagnosticStatus(
+        level=level,
+        name=f'{master}: bus',
+        message=message,
+        hardware_id=status.name,
+        values=_values(
+            {
+                'frames_per_second': f'{status.load.frames_per_second:.1f}',
+                'bus_load': f'{status.load.load * 100:.2f}',
+                'frames_received': str(counters.received),
+                'frames_sent': str(counters.sent),
+                'frames_lost': str(counters.lost),
+                'send_errors': str(counters.send_errors),
+                'sync_period': f'{cycle.period:.6f}',
+                'cycles': str(cycle.cycles),
+                'overruns': str(cycle.overruns),
+                'jitter_p50': f'{cycle.jitter_p50:.6f}',
+                'jitter_p99': f'{cycle.jitter_p99:.6f}',
+                'jitter_max': f'{cycle.jitter_max:.6f}',
+                'missed_pdos': str(status.missed_pdos),
+            }
+        ),
+    )
+
+
+def _device_level(status: NodeStatus) -> tuple[bytes, str]:
+    if not status.online:
+        detail = f': {status.phase_detail}' if status.phase_detail else ''
+        return DiagnosticStatus.ERROR, f'offline, {status.phase.value}{detail}'
+    if status.emergency is not None:
+        return DiagnosticStatus.ERROR, f'EMCY {status.emergency}'
+    return DiagnosticStatus.OK, status.phase.value
+
+
+def _device_values(status: NodeStatus) -> dict[str, str]:
+    return {
+        'online': str(status.online),
+        'nmt_state': status.nmt_state.name if status.nmt_state is not None else 'OFFLINE',
+        'boot_phase': f'{status.phase.value} {status.phase_detail}'.strip(),
+        'heartbeat_age': '' if status.heartbeat_age is None else f'{status.heartbeat_age:.3f}',
+        'emergency': '' if status.emergency is None else str(status.emergency),
+        'missed_pdos': str(status.missed_pdos),
+        'sdo_done': str(status.sdo.done),
+        'sdo_aborted': str(status.sdo.aborted),
+        'sdo_timed_out': str(status.sdo.timed_out),
+    }
+
+
+def _values(values: dict[str, str]) -> list[KeyValue]:
+    return [KeyValue(key=key, value=value) for key, value in values.items()]

@@ -1,0 +1,106 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""``ros2 run arm_canopen canopen_joint_state_publisher``: the drives' states as /joint_states."""
+
+from __future__ import annotations
+
+from functools import partial
+import sys
+import time
+
+from rcl_interfaces.msg import ParameterDescriptor
+import rclpy
+from rclpy.node import Node
+from rclpy.time import Time
+from rclpy.utilities import try_shutdown
+from sensor_msgs.msg import JointState
+
+from ..exceptions import CanopenError
+from ..joints.aggregator import JointAggregator, JointSample, JointSet
+from ..joints.robot_joints import movable_joints
+from .spinning import spin
+
+WATCH_PERIOD = 2.0  # [s] between two looks for joints that are silent
+
+
+class JointStatePublisher(Node):
+    """Subscribes ``/<joint>/joint_states`` of each movable joint and publishes ``/joint_states``."""
+
+    def __init__(self) -> None:
+        """Read the robot description and subscribe.
+
+        Raises:
+            CanopenError: There is no robot description, or it is no URDF.
+        """
+        super().__init__('canopen_joint_state_publisher')
+        descriptor = ParameterDescriptor(description='URDF as XML text', read_only=True)
+        description = self.declare_parameter('robot_description', '', descriptor).value
+        if not description:
+            raise CanopenError(
+                'no robot_description: give the URDF as text, e.g. '
+                '--ros-args -p robot_description:="$(xacro robot.urdf.xacro)"'
+            )
+        joints = movable_joints(str(description))
+        self._aggregator = JointAggregator(joints)
+        self._silent: list[str] = []
+        self._publisher = self.create_publisher(JointState, 'joint_states', 10)
+        for joint in joints:
+            topic = f'{joint.name}/joint_states'
+            self.create_subscription(JointState, topic, partial(self._take, joint.name), 10)
+        self.create_timer(WATCH_PERIOD, self._watch)
+        names = ', '.join(joint.name for joint in joints)
+        self.get_logger().info(f'publishing {len(joints)} joints: {names}')
+
+    def _take(self, joint: str, message: JointState) -> None:
+        if joint not in message.name:
+            return  # a drive of several axes names another one in this message
+        index = message.name.index(joint)
+        if index >= len(message.position):
+            self.get_logger().warning(f'{joint}: message without a position', once=True)
+            return
+        stamp = message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec
+        velocity = message.velocity[index] if index < len(message.velocity) else 0.0
+        effort = message.effort[index] if index < len(message.effort) else 0.0
+        sample = JointSample(message.position[index], velocity, effort)
+        for ready in self._aggregator.update(joint, stamp, sample, time.monotonic()):
+            self._publish(ready)
+
+    def _publish(self, ready: JointSet) -> None:
+        positions, velocities, efforts = zip(*ready.samples, strict=True)
+        message = JointState(
+            name=ready.names, position=positions, velocity=velocities, effort=efforts
+        )
+        # drivers that leave the stamp empty, as ros2_canopen does, get the time of arrival
+        clock = self.get_clock()
+        stamp = Time(nanoseconds=ready.stamp) if ready.stamp else clock.now()
+        message.header.stamp = stamp.to_msg()
+        self._publisher.publish(message)
+
+    def _watch(self) -> None:
+        silent = self._aggregator.silent(time.monotonic())
+        if silent and silent != self._silent:
+            self.get_logger().warning(
+                f'nothing heard of {", ".join(silent)}; is there a drive of that name in bus.yml, '
+                'and is it operational? They are left out of /joint_states'
+            )
+        elif self._silent and not silent:
+            self.get_logger().info('all joints are heard')
+        self._silent = silent
+
+
+def main() -> None:
+    """Entry point."""
+    rclpy.init()
+    try:
+        node = JointStatePublisher()
+    except CanopenError as error:
+        rclpy.logging.get_logger('canopen_joint_state_publisher').fatal(str(error))
+        try_shutdown()
+        sys.exit(1)
+    spin([node])
+    node.destroy_node()
+    try_shutdown()
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,93 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The ROS node of the master: SDO access to any node id, and /diagnostics of the bus."""
+
+from __future__ import annotations
+
+from concurrent.futures import Future
+from typing import Any
+
+from canopen_interfaces.srv import COReadID, COWriteID
+from rclpy.node import Node
+
+from ..exceptions import CanopenError
+from ..master.object_access import bytes_from_raw, raw_from_bytes
+from ..master.runner import NetworkThread
+from ..master.scheduler import Promise
+from ..standard.cob_id import NODE_ID_MAX, NODE_ID_MIN
+from ..standard.datatypes import byte_length, DataType
+from .deferred_service import DeferredServices
+from .device_node import answer_read, answer_write
+from .output_thread import OutputThread
+
+SERVICE_TYPES = (
+    DataType.INTEGER8,
+    DataType.INTEGER16,
+    DataType.INTEGER32,
+    DataType.UNSIGNED8,
+    DataType.UNSIGNED16,
+    DataType.UNSIGNED32,
+)
+"""Data types that COReadID and COWriteID name."""
+
+SDO_TIMEOUT = 0.5  # [s] a stranger's bus.yml entry, which would say, does not exist
+
+
+class MasterServices:
+    """Services of the master node."""
+
+    def __init__(self, node: Node, thread: NetworkThread, output: OutputThread) -> None:
+        """Offer them.
+
+        Args:
+            node: The master's node.
+            thread: The thread of the network.
+            output: The thread that answers.
+        """
+        self._node = node
+        self._thread = thread
+        services = DeferredServices(output)
+        services.create(node, COReadID, '~/sdo_read', self._read, self._answer_read)
+        services.create(node, COWriteID, '~/sdo_write', self._write, self._answer_write)
+
+    def _read(self, request: COReadID.Request) -> Future[int]:
+        async def read() -> int:
+            data_type = _data_type(request.canopen_datatype)
+            client = self._thread.network.sdo_client(_node_id(request.nodeid))
+            data = await client.read(request.index, request.subindex, SDO_TIMEOUT)
+            if len(data) != byte_length(data_type):
+                raise CanopenError(
+                    f'0x{request.index:04X}:{request.subindex:02X} of node {request.nodeid} has '
+                    f'{len(data)} bytes, {data_type.name} has {byte_length(data_type)}'
+                )
+            return raw_from_bytes(data)
+
+        return self._thread.run_coroutine(read)
+
+    def _write(self, request: COWriteID.Request) -> Future[None]:
+        def write() -> Promise[None]:
+            data = bytes_from_raw(_data_type(request.canopen_datatype), request.data)
+            client = self._thread.network.sdo_client(_node_id(request.nodeid))
+            return client.write(request.index, request.subindex, data, SDO_TIMEOUT)
+
+        return self._thread.run(write)
+
+    def _answer_read(self, response: Any, future: Future[int]) -> None:  # noqa: ANN401
+        answer_read(self._node, response, future)
+
+    def _answer_write(self, response: Any, future: Future[None]) -> None:  # noqa: ANN401
+        answer_write(self._node, response, future)
+
+
+def _data_type(number: int) -> DataType:
+    for data_type in SERVICE_TYPES:
+        if data_type == number:
+            return data_type
+    names = ', '.join(f'{data_type.name} {data_type:#04x}' for data_type in SERVICE_TYPES)
+    raise CanopenError(f'canopen_datatype {number:#04x} is none of {names}')
+
+
+def _node_id(number: int) -> int:
+    if not NODE_ID_MIN <= number <= NODE_ID_MAX:
+        raise CanopenError(f'node id {number} is not {NODE_ID_MIN} to {NODE_ID_MAX}')
+    return number

@@ -1,0 +1,210 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""One bus in one process: network, drives and all their ROS nodes."""
+
+from __future__ import annotations
+
+from functools import partial
+import time
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rclpy.node import Node
+from rclpy.time import Time
+
+from ..can.bus import Bus
+from ..can.frame import Frame
+from ..can.load import BusLoad
+from ..cia402.drive import Drive
+from ..cia402.drive_commands import DriveCommands
+from ..cia402.motion import MotionSource
+from ..cia402.motion_group import MotionGroup
+from ..cia402.status import drive_status
+from ..config.model import BusConfig
+from ..master.events import Event, EventKind, Severity
+from ..master.network import Network
+from ..master.runner import NetworkThread
+from ..master.status import node_status
+from .device_node import DeviceNode
+from .diagnostics import bus_diagnostic, BusStatus, device_diagnostic, drive_diagnostic
+from .drive_node import DriveNode
+from .master_node import MasterServices
+from .output_thread import OutputThread
+
+LISTENER_PERIOD = 0.1  # [s] how soon a new subscriber hears something
+STOP_TIMEOUT = 8.0  # [s] for all drives to stop; each has its own shorter limits
+
+JointSample = tuple[DriveNode, float, float, float]
+
+
+class MasterProcess:
+    """Everything that ``ros2 run arm_canopen master`` runs.
+
+    Attributes:
+        bus: The configuration of the bus.
+        nodes: The ROS nodes, the master's first.
+    """
+
+    def __init__(
+        self, node: Node, config: BusConfig, can: Bus, *, diagnostics_period: float
+    ) -> None:
+        """Build it; nothing is sent before :meth:`start`.
+
+        Args:
+            node: The master's node.
+            config: The bus.
+            can: The open CAN interface; it stays the caller's to close.
+            diagnostics_period: Time between two /diagnostics messages in [s].
+        """
+        self.bus = config
+        self._node = node
+        self._can = can
+        self._output = OutputThread(node.get_logger())
+        self._load = BusLoad(config.master.bitrate, time.monotonic())
+        self._network = Network(config, self._send, self._report)
+        self._network.on_frame = self._load.count
+        self._thread = NetworkThread(can, self._network)
+        self._group = self._build_drives()
+        self._network.on_cycle = self._group.cycle
+        self._network.on_feedback = self._feedback
+        self._feedback_posted = False
+        self._operational: set[str] = set()
+        self._devices = {
+            device.name: DeviceNode(device, self._thread, self._output)
+            for device in self._network.nodes.values()
+            if device.name not in self._group.drives
+        }
+        self._drives = {
+            name: DriveNode(drive, self._commands[name], self._thread, self._output)
+            for name, drive in self._group.drives.items()
+        }
+        MasterServices(node, self._thread, self._output)
+        self._diagnostics = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
+        node.create_timer(diagnostics_period, self._ask_diagnostics)
+        node.create_timer(LISTENER_PERIOD, self._update_listeners)
+        self.nodes: list[Node] = [node, *self._devices.values(), *self._drives.values()]
+
+    def start(self) -> None:
+        """Boot the devices and start the cycle."""
+        self._output.start()
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Bring every drive to quick stop and disable it, then end the cycle."""
+        scheduler = self._network.scheduler
+
+        async def leave() -> None:
+            stops = [
+                commands.run('shutdown', commands.shutdown(), preempt=True)
+                for commands in self._commands.values()
+            ]
+            await scheduler.gather(stops)
+
+        try:
+            self._thread.run_coroutine(leave).result(STOP_TIMEOUT)
+        except TimeoutError:
+            self._node.get_logger().error('the drives did not all stop in time')
+        self._thread.stop()
+        self._output.stop()
+
+    def attach(self, source: MotionSource) -> None:
+        """Let a motion source command its axes, from any thread.
+
+        Raises:
+            KeyError: An axis is no drive of this bus.
+        """
+        self._thread.call(lambda: self._group.attach(source)).result()
+
+    def detach(self, source: MotionSource) -> None:
+        """End a motion source, from any thread; drives that it moved are braked."""
+        self._thread.call(lambda: self._group.detach(source)).result()
+
+    def _build_drives(self) -> MotionGroup:
+        scheduler = self._network.scheduler
+        drives = [
+            Drive(device, scheduler)
+            for device in self._network.nodes.values()
+            if device.config.is_drive
+        ]
+        self._commands = {drive.name: DriveCommands(drive, scheduler) for drive in drives}
+        return MotionGroup(drives, self._report)
+
+    def _send(self, frame: Frame) -> None:
+        self._can.send(frame)
+        self._load.count(frame)
+
+    def _report(self, event: Event) -> None:
+        self._output.post(partial(self._tell, event))
+
+    def _feedback(self, sync_time: float) -> None:
+        if self._feedback_posted:
+            return  # the output thread is behind; it gets the newest when it is there again
+        samples: list[JointSample] = [
+            (node, drive.position, drive.velocity, drive.effort)
+            for node in self._drives.values()
+            if node.listened and (drive := node.drive).node.online and drive.objects.known
+        ]
+        if samples:
+            self._feedback_posted = True
+            self._output.post(partial(self._publish_joints, sync_time, samples))
+
+    def _collect(self) -> list[DiagnosticStatus]:
+        now = time.monotonic()
+        status = BusStatus(
+            self._can.name,
+            self._can.counters,
+            self._load.figures(now),
+            self._thread.figures(),
+            self._network.missed_pdos,
+        )
+        statuses = [bus_diagnostic(self._node.get_name(), status)]
+        for device in self._network.nodes.values():
+            drive = self._group.drives.get(device.name)
+            if drive is None:
+                statuses.append(device_diagnostic(self._can.name, node_status(device, now)))
+            else:
+                statuses.append(drive_diagnostic(self._can.name, drive_status(drive, now)))
+        return statuses
+
+    def _publish_joints(self, sync_time: float, samples: list[JointSample]) -> None:
+        self._feedback_posted = False
+        age = int((time.monotonic() - sync_time) * 1e9)  # [ns]
+        stamp = Time(nanoseconds=self._node.get_clock().now().nanoseconds - age)
+        for node, position, velocity, effort in samples:
+            node.publish_joint_state(stamp, position, velocity, effort)
+
+    def _tell(self, event: Event) -> None:
+        logger = self._node.get_logger()
+        if event.severity is Severity.INFO:
+            logger.info(str(event))
+        elif event.severity is Severity.WARNING:
+            logger.warning(str(event))
+        else:
+            logger.error(str(event))
+        self._count_operational(event)
+        node = self._drives.get(event.node) or self._devices.get(event.node)
+        if node is not None and event.kind in (EventKind.NMT_STATE, EventKind.HEARTBEAT_LOST):
+            node.publish_nmt_state()
+
+    def _count_operational(self, event: Event) -> None:
+        if event.kind is EventKind.HEARTBEAT_LOST:
+            self._operational.discard(event.node)
+        elif event.kind is EventKind.BOOT:
+            self._operational.add(event.node)
+            if len(self._operational) == len(self.bus.nodes):
+                count = len(self.bus.nodes)
+                self._node.get_logger().info(f'all {count} devices operational')
+
+    def _ask_diagnostics(self) -> None:
+        future = self._thread.call(self._collect)
+        future.add_done_callback(
+            lambda done: self._output.post(partial(self._publish_diagnostics, done.result()))
+        )
+
+    def _publish_diagnostics(self, statuses: list[DiagnosticStatus]) -> None:
+        message = DiagnosticArray(status=statuses)
+        message.header.stamp = self._node.get_clock().now().to_msg()
+        self._diagnostics.publish(message)
+
+    def _update_listeners(self) -> None:
+        for node in (*self._devices.values(), *self._drives.values()):
+            node.update_listeners()
