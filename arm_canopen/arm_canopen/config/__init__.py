@@ -1,3 +1,34 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Read bus.yml and EDS files into a typed, checked model."""
+"""bus.yml and EDS/DCF files -> a typed, checked model of a bus.
+
+``load_bus`` reads a whole bus, ``load_eds`` one device description. Both collect everything that
+is wrong and raise one ``ConfigError`` whose problems name file, line, key and remedy.
+"""
+
+from .eds import Eds, load_eds
+from .load import load_bus
+from .model import (
+    BusConfig,
+    DriveConfig,
+    Identity,
+    MasterConfig,
+    NodeConfig,
+    PdoConfig,
+    Problem,
+    SdoWrite,
+)
+
+__all__ = [
+    'BusConfig',
+    'DriveConfig',
+    'Eds',
+    'Identity',
+    'MasterConfig',
+    'NodeConfig',
+    'PdoConfig',
+    'Problem',
+    'SdoWrite',
+    'load_bus',
+    'load_eds',
+]

@@ -26,6 +26,7 @@ class PdoConfig:
         sync_start: SYNC counter value at which it starts; None leaves the device's.
         mapping: The mapped objects.
         configured: bus.yml names this PDO, so the master writes it at boot.
+        fixed_mapping: The device's mapping is read-only (and equal to ``mapping``).
     """
 
     number: int
@@ -37,6 +38,7 @@ class PdoConfig:
     sync_start: int | None = None
     mapping: tuple[MappedObject, ...] = ()
     configured: bool = False
+    fixed_mapping: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,7 +125,6 @@ class NodeConfig:
         rpdos: All RPDOs of the device, by ascending number.
         sdo_writes: ``error_behavior`` and the ``sdo`` list of bus.yml, in the order of writing.
         drive: Settings of the CiA 402 drive.
-        diagnostics_period: Period of its entry in /diagnostics in [s]; 0 for none.
         line: Line of bus.yml at which the node begins.
     """
 
@@ -147,7 +148,6 @@ class NodeConfig:
     rpdos: tuple[PdoConfig, ...] = ()
     sdo_writes: tuple[SdoWrite, ...] = ()
     drive: DriveConfig = DriveConfig()
-    diagnostics_period: float = 0.0
     line: int = 0
 
     @property

@@ -79,6 +79,23 @@ class ObjectEntry:
         """Index and sub-index."""
         return self.index, self.subindex
 
+    @property
+    def tpdo_mappable(self) -> bool:
+        """May be mapped into a TPDO (CiA 306-1, AccessType: all but ``wo`` and ``rww``)."""
+        return self.pdo_mappable and self.access not in (
+            AccessType.WRITE_ONLY,
+            AccessType.READ_WRITE_RPDO,
+        )
+
+    @property
+    def rpdo_mappable(self) -> bool:
+        """May be mapped into an RPDO (CiA 306-1, AccessType: ``rw``, ``rww`` and ``wo``)."""
+        return self.pdo_mappable and self.access in (
+            AccessType.WRITE_ONLY,
+            AccessType.READ_WRITE,
+            AccessType.READ_WRITE_RPDO,
+        )
+
     def __str__(self) -> str:
         """Name the object as a person would: ``0x6041:00 Statusword``."""
         return f'0x{self.index:04X}:{self.subindex:02X} {self.name}'

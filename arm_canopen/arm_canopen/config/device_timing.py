@@ -1,0 +1,150 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Completing a device by what depends on the master: heartbeats, and PDOs that fit the cycle."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from ..standard.dictionary import ObjectDictionary
+from ..standard.objects import Index
+from .bus_keys import MILLISECONDS
+from .device_reader import DeviceDraft
+from .findings import Findings
+from .model import MasterConfig, NodeConfig
+from .pdo_direction import Direction, RPDO, TPDO
+from .pdo_resolution import PdoDraft, SYNCHRONOUS_MAX
+from .settings import MasterSettings, Options
+
+CYCLIC_OBJECTS = ((RPDO, Index.CONTROLWORD, 'enabled'), (TPDO, Index.STATUSWORD, 'watched'))
+"""What a drive cannot do without in its PDOs, as no SDO runs inside the cycle."""
+
+
+@dataclass(frozen=True, slots=True)
+class Surroundings:
+    """What a device meets on its bus.
+
+    Attributes:
+        options: Section ``options``.
+        settings: Section ``master``.
+        master: The master.
+    """
+
+    options: Options
+    settings: MasterSettings
+    master: MasterConfig
+
+
+def finish_device(
+    draft: DeviceDraft, config: NodeConfig, around: Surroundings, findings: Findings
+) -> NodeConfig:
+    """Complete a device.
+
+    Args:
+        draft: The device; its PDOs have their final COB-IDs.
+        config: Its configuration so far.
+        around: Its surroundings.
+        findings: Gets what does not fit together.
+    """
+    master = around.master
+    _check_period(draft, master, findings)
+    _check_sync(draft.pdos, master, findings)
+    if config.is_drive:
+        _check_drive_pdos(draft, findings)
+    producer = _heartbeat_producer(draft, config.dictionary, findings)
+    multiplier = draft.settings.heartbeat_multiplier or around.options.heartbeat_multiplier
+    return replace(
+        config,
+        heartbeat_producer=producer,
+        heartbeat_timeout=producer * multiplier if around.settings.watch_devices else 0.0,
+        heartbeat_consumer=_heartbeat_consumer(draft, config.dictionary, master, findings),
+        tpdos=tuple(pdo.config for pdo in draft.pdos if pdo.direction is TPDO),
+        rpdos=tuple(pdo.config for pdo in draft.pdos if pdo.direction is RPDO),
+    )
+
+
+def _heartbeat_producer(
+    draft: DeviceDraft, dictionary: ObjectDictionary, findings: Findings
+) -> float:
+    """Return the period of the device's heartbeat in [s]."""
+    entry = dictionary.get(Index.PRODUCER_HEARTBEAT)
+    wanted = draft.settings.heartbeat_producer
+    if entry is None:
+        if wanted:
+            findings.error(
+                draft.place_of('heartbeat_producer'),
+                'the device has no heartbeat: 0x1017 is not in its EDS',
+                'remove the key, or use the EDS that fits the device',
+            )
+        return 0.0
+    if wanted is not None:
+        return wanted
+    return entry.default / MILLISECONDS if isinstance(entry.default, int) else 0.0
+
+
+def _heartbeat_consumer(
+    draft: DeviceDraft, dictionary: ObjectDictionary, master: MasterConfig, findings: Findings
+) -> bool:
+    """Tell whether the device watches the master; unless told otherwise, it does if it can."""
+    entry = dictionary.get(Index.CONSUMER_HEARTBEAT, 1)
+    capable = entry is not None and entry.access.writable
+    wanted = draft.settings.heartbeat_consumer
+    if wanted and not capable:
+        findings.error(
+            draft.place_of('heartbeat_consumer'),
+            'the device cannot watch the master: no writable 0x1016:01 in its EDS',
+            'remove the key, or use the EDS that fits the device',
+        )
+    if wanted and not master.heartbeat_producer:
+        findings.error(
+            draft.place_of('heartbeat_consumer'),
+            'the master sends no heartbeat that the device could watch',
+            "write 'heartbeat_producer: 200' into the section master",
+        )
+    return capable and master.heartbeat_producer > 0 and wanted is not False
+
+
+def _check_period(draft: DeviceDraft, master: MasterConfig, findings: Findings) -> None:
+    period = draft.settings.period
+    if 'period' in draft.section.entries and master.sync_period not in (0.0, period):
+        findings.warning(
+            draft.place_of('period'),
+            f'SYNC is the clock: the device is served every {master.sync_period * 1e3:g} ms, not '
+            f'every {period * 1e3:g} ms',
+            'make period equal to sync_period',
+        )
+
+
+def _check_sync(pdos: Sequence[PdoDraft], master: MasterConfig, findings: Findings) -> None:
+    """Warn about PDOs that wait for a SYNC that the master does not send."""
+    for pdo in pdos:
+        config = pdo.config
+        synchronous = config.enabled and config.transmission <= SYNCHRONOUS_MAX
+        if config.configured and synchronous and not master.sync_period:
+            findings.warning(
+                pdo.place,
+                f'{pdo.title} waits for SYNC (transmission {config.transmission}), but the master '
+                'sends none',
+                "write 'sync_period: 10000' into the section master, or 'transmission: 255'",
+            )
+
+
+def _check_drive_pdos(draft: DeviceDraft, findings: Findings) -> None:
+    for direction, index, verb in CYCLIC_OBJECTS:
+        if not _is_mapped(draft.pdos, direction, index):
+            findings.warning(
+                draft.section.place,
+                f'no enabled {direction.title} carries 0x{index:04X} ({index.name.lower()}); the '
+                f'drive cannot be {verb} in the cycle',
+                f'map it below {direction.name}',
+            )
+
+
+def _is_mapped(pdos: Sequence[PdoDraft], direction: Direction, index: int) -> bool:
+    return any(
+        mapped.index == index
+        for pdo in pdos
+        if pdo.direction is direction and pdo.config.enabled
+        for mapped in pdo.config.mapping
+    )

@@ -1,0 +1,238 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""A YAML document whose values know their line and their key path.
+
+PyYAML composes the nodes; nothing is constructed from tags, so a file cannot run code. Anchors,
+aliases and merge keys (``<<``) work; a value that is used in several places keeps the place at
+which it is written. Duplicate keys are refused: YAML forbids them, loaders let the last one win.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+import os
+from pathlib import Path
+from typing import TypeAlias
+
+import yaml
+
+from .findings import Findings, Place
+
+TAG_PREFIX = 'tag:yaml.org,2002:'
+MERGE_TAG = TAG_PREFIX + 'merge'
+INTEGER_TAG = TAG_PREFIX + 'int'
+SIZE_MAX = 4 * 1024 * 1024  # [byte]
+
+
+class ScalarKind(Enum):
+    """What YAML 1.1 takes a scalar for."""
+
+    NULL = 'null'
+    BOOLEAN = 'bool'
+    INTEGER = 'int'
+    FLOAT = 'float'
+    TEXT = 'str'
+
+
+@dataclass(frozen=True, slots=True)
+class Scalar:
+    """A single value.
+
+    Attributes:
+        place: Where it is written.
+        text: Its text, without quotes.
+        kind: What YAML takes it for.
+        quoted: It is written in quotes or as a block.
+    """
+
+    place: Place
+    text: str
+    kind: ScalarKind
+    quoted: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Listing:
+    """A sequence."""
+
+    place: Place
+    items: tuple[Item, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Mapping:
+    """A mapping, merge keys resolved.
+
+    Attributes:
+        place: Place of the key that it belongs to.
+        entries: Values by the text of their key; whole numbers as keys are written in decimal.
+    """
+
+    place: Place
+    entries: dict[str, Item] = field(default_factory=dict)
+
+
+Item: TypeAlias = Scalar | Listing | Mapping
+
+
+def read_document(path: str | os.PathLike[str], findings: Findings) -> Mapping:
+    """Read a YAML file whose top level is a mapping.
+
+    Args:
+        path: The file.
+        findings: Gets duplicate keys and the like.
+
+    Raises:
+        ConfigError: The file is missing or unreadable, is not YAML, or is no mapping.
+    """
+    file = Path(path)
+    item = _read(file, findings)
+    if isinstance(item, Mapping):
+        return item
+    findings.error(
+        Place(file),
+        'the file is empty' if item is None else 'the top level is not a mapping',
+        "begin with the sections 'options:', 'master:', 'defaults:' and 'nodes:'",
+    )
+    findings.raise_errors()
+    return Mapping(Place(file))
+
+
+def _read(file: Path, findings: Findings) -> Item | None:
+    item: Item | None = None
+    try:
+        root = yaml.compose(_read_text(file), Loader=yaml.SafeLoader)
+        if root is not None:
+            item = _Converter(file, findings).convert(root, Place(file))
+    except OSError as error:
+        remedy = 'correct the path of the bus.yml (parameter bus_config)'
+        findings.error(Place(file), f'cannot be read: {error.strerror or error}', remedy)
+    except RecursionError:
+        findings.error(Place(file), 'nested too deeply', 'a bus.yml needs five levels')
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        place = Place(file, mark.line + 1, mark.column + 1) if mark else Place(file)
+        said = ', '.join(text for text in (error.context, error.problem) if text)
+        findings.error(
+            place, f'not YAML: {said}', 'check indentation, colons, brackets and quotes'
+        )
+    except (yaml.YAMLError, ValueError) as error:
+        findings.error(Place(file), f'not YAML: {error}', 'save the file as UTF-8 text')
+    else:
+        return item
+    findings.raise_errors()
+    return None
+
+
+def _read_text(file: Path) -> str:
+    if file.exists() and not file.is_file():
+        raise OSError('not a file')
+    if file.stat().st_size > SIZE_MAX:
+        raise ValueError('larger than 4 MiB')
+    return file.read_text(encoding='utf-8-sig')
+
+
+class _Converter:
+    """Turns composed nodes into items, each node once however often it is used."""
+
+    def __init__(self, file: Path, findings: Findings) -> None:
+        self._file = file
+        self._findings = findings
+        self._done: dict[int, Item] = {}
+        self._open: set[int] = set()
+
+    def convert(self, node: yaml.Node, place: Place) -> Item:
+        """Convert a node that is written at a place."""
+        identity = id(node)
+        if identity in self._done:
+            return self._done[identity]
+        if identity in self._open:
+            self._findings.error(
+                place, 'an alias refers to what it is part of', 'write the value out'
+            )
+            return Scalar(place, '', ScalarKind.NULL)
+        self._open.add(identity)
+        item = self._convert(node, place)
+        self._open.discard(identity)
+        self._done[identity] = item
+        return item
+
+    def _convert(self, node: yaml.Node, place: Place) -> Item:
+        if isinstance(node, yaml.MappingNode):
+            return self._mapping(node, place)
+        if isinstance(node, yaml.SequenceNode):
+            return self._listing(node, place)
+        if isinstance(node, yaml.ScalarNode):
+            return self._scalar(node, place)
+        raise TypeError(f'unknown kind of YAML node {node!r}')
+
+    def _listing(self, node: yaml.SequenceNode, place: Place) -> Listing:
+        items = (
+            self.convert(child, self._place(child, f'{place.key}[{number}]'))
+            for number, child in enumerate(node.value)
+        )
+        return Listing(place, tuple(items))
+
+    def _scalar(self, node: yaml.ScalarNode, place: Place) -> Scalar:
+        name = node.tag.removeprefix(TAG_PREFIX)
+        known = {kind.value: kind for kind in ScalarKind}
+        if node.tag.startswith('!'):
+            self._findings.error(place, f'the tag {node.tag!r} has no meaning here', 'remove it')
+        kind = known.get(name, ScalarKind.TEXT)
+        return Scalar(place, str(node.value), kind, quoted=node.style is not None)
+
+    def _mapping(self, node: yaml.MappingNode, place: Place) -> Mapping:
+        own: dict[str, Item] = {}
+        merged: dict[str, Item] = {}
+        for key, value in node.value:
+            if key.tag == MERGE_TAG:
+                self._merge(value, place, merged)
+            else:
+                self._entry(key, value, place, own)
+        return Mapping(place, merged | own)
+
+    def _entry(self, key: yaml.Node, value: yaml.Node, place: Place, own: dict[str, Item]) -> None:
+        if not isinstance(key, yaml.ScalarNode):
+            where = self._place(key, place.key)
+            self._findings.error(where, 'a key must be a single word', 'write it as text')
+            return
+        name = _key_text(key)
+        where = self._place(key, f'{place.key}.{name}' if place.key else name)
+        if name in own:
+            self._findings.error(
+                where,
+                f'the key {name!r} appears twice, first in line {own[name].place.line}',
+                'keep one of them',
+            )
+            return
+        own[name] = self.convert(value, where)
+
+    def _merge(self, value: yaml.Node, place: Place, merged: dict[str, Item]) -> None:
+        """Take over a merge key's mappings; of a list the earlier one counts."""
+        sources = value.value if isinstance(value, yaml.SequenceNode) else [value]
+        for source in sources:
+            where = self._place(source, f'{place.key}.<<')
+            item = self.convert(source, where)
+            if not isinstance(item, Mapping):
+                self._findings.error(
+                    where, "'<<' takes a mapping", "write '<<: *name' for an anchor '&name'"
+                )
+                continue
+            for name, entry in item.entries.items():
+                merged.setdefault(name, entry)
+
+    def _place(self, node: yaml.Node, key: str) -> Place:
+        mark = node.start_mark
+        return Place(self._file, mark.line + 1, mark.column + 1, key)
+
+
+def _key_text(key: yaml.ScalarNode) -> str:
+    """Return a key's text, so that ``on`` stays ``on``, and PDO numbers in decimal."""
+    text = str(key.value)
+    if key.tag == INTEGER_TAG:
+        try:
+            return str(int(text, 0))
+        except ValueError:  # '010' or '1:30', told where the number is used
+            return text
+    return text

@@ -1,0 +1,123 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Splitting an EDS or DCF file into sections and values with their lines (CiA 306-1, 4.2).
+
+Takes what vendors' files hold: any case, blanks around names, CRLF, UTF-8 or Latin-1 text,
+comments with ``;`` or ``#``. Odd lines are told and skipped, never fatal.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+COMMENT_MARKS = (';', '#')
+
+
+@dataclass(frozen=True, slots=True)
+class IniValue:
+    """The text right of an equals sign.
+
+    Attributes:
+        text: The text without blanks around it.
+        line: Its line, from 1.
+    """
+
+    text: str
+    line: int
+
+
+@dataclass(slots=True)
+class IniSection:
+    """A section and its values.
+
+    Attributes:
+        title: Name as the file writes it.
+        line: Line of its head, from 1.
+        values: Values by lower-case key.
+    """
+
+    title: str
+    line: int
+    values: dict[str, IniValue] = field(default_factory=dict)
+
+    def text(self, key: str) -> str:
+        """Return the text of a lower-case key, empty when it is missing or empty."""
+        value = self.values.get(key)
+        return value.text if value is not None else ''
+
+    def line_of(self, key: str) -> int:
+        """Return the line of a key, that of the section when it is missing."""
+        value = self.values.get(key)
+        return value.line if value is not None else self.line
+
+
+@dataclass(slots=True)
+class IniFile:
+    """All sections of a file.
+
+    Attributes:
+        sections: Sections by name in lower case without blanks.
+        oddities: Line and description of everything that had to be skipped or guessed.
+    """
+
+    sections: dict[str, IniSection] = field(default_factory=dict)
+    oddities: list[tuple[int, str]] = field(default_factory=list)
+
+
+def decode_text(data: bytes) -> str:
+    """Read bytes as UTF-8 (with or without byte order mark), else as Latin-1."""
+    try:
+        return data.decode('utf-8-sig')
+    except UnicodeDecodeError:
+        return data.decode('latin-1')
+
+
+def section_name(title: str) -> str:
+    """Return the name by which a section is found: ``1018 Sub1`` is ``1018sub1``."""
+    return ''.join(title.split()).lower()
+
+
+def read_ini(text: str) -> IniFile:
+    """Split a text into sections; nothing in it can make this fail."""
+    result = IniFile()
+    section: IniSection | None = None
+    # only these end a line: str.splitlines() would also split at form feeds inside a name
+    for number, raw in enumerate(text.replace('\r\n', '\n').replace('\r', '\n').split('\n'), 1):
+        line = raw.strip()
+        if not line or line.startswith(COMMENT_MARKS):
+            continue
+        if line.startswith('['):
+            section = _open_section(result, line, number)
+        elif section is None:
+            result.oddities.append((number, f'{line[:40]!r} stands before the first section'))
+        else:
+            _add_value(result, section, line, number)
+    return result
+
+
+def _open_section(result: IniFile, line: str, number: int) -> IniSection:
+    title, bracket, _ = line[1:].partition(']')
+    if not bracket:
+        result.oddities.append((number, f'section {line[:40]!r} has no closing bracket'))
+    name = section_name(title)
+    if name in result.sections:
+        first = result.sections[name]
+        result.oddities.append(
+            (number, f'section [{title}] was already opened in line {first.line}')
+        )
+        return first
+    return result.sections.setdefault(name, IniSection(title.strip(), number))
+
+
+def _add_value(result: IniFile, section: IniSection, line: str, number: int) -> None:
+    key, equals, text = line.partition('=')
+    name = key.strip().lower()
+    if not equals or not name:
+        result.oddities.append((number, f'{line[:40]!r} is neither a section nor a value'))
+        return
+    if name in section.values:
+        earlier = section.values[name].line
+        result.oddities.append(
+            (number, f'{key.strip()} was already given in line {earlier}; this one counts')
+        )
+    section.values[name] = IniValue(text.strip(), number)

@@ -1,0 +1,114 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The two formats of bus.yml, brought to one.
+
+New: ``options``, ``master``, ``defaults`` and ``nodes``. Old (dcfgen's own): ``options``,
+``master``, and every other top-level key a device. A file with ``nodes`` or ``defaults`` is of the new one.
+Top-level keys that begin with a dot are templates for anchors and are ignored in both.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+import difflib
+
+from .bus_keys import TOP_LEVEL
+from .document import Item, Listing, Mapping
+from .findings import Findings
+from .merge import merge_device
+from .scalars import describe
+from .section import block
+
+NODES_REMEDY = "write a mapping: 'nodes:', below it 'joint1:', below that 'node_id: 2'"
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """The sections of a bus.yml.
+
+    Attributes:
+        options: The section ``options``, empty when absent.
+        master: The section ``master``, empty when absent.
+        devices: Each device with the ``defaults`` below its own values, in the order of the file.
+    """
+
+    options: Mapping
+    master: Mapping
+    devices: dict[str, Mapping] = field(default_factory=dict)
+
+
+def lay_out(root: Mapping, findings: Findings) -> Layout:
+    """Find the sections of either format."""
+    new = 'nodes' in root.entries or 'defaults' in root.entries
+    devices = _new_devices(root, findings) if new else _old_devices(root, findings)
+    if 'master' not in root.entries:
+        findings.error(root.place, "no section 'master'", "write 'master:' and its node_id below")
+    empty = Mapping(root.place)
+    return Layout(
+        block(root, 'options', findings) or empty,
+        block(root, 'master', findings) or empty,
+        devices,
+    )
+
+
+def _new_devices(root: Mapping, findings: Findings) -> dict[str, Mapping]:
+    for name, item in root.entries.items():
+        if name not in TOP_LEVEL and not name.startswith('.'):
+            findings.error(item.place, f'unknown section {name!r}', _section_remedy(name, item))
+    defaults = block(root, 'defaults', findings) or Mapping(root.place)
+    nodes = root.entries.get('nodes')
+    if nodes is None:
+        findings.error(root.place, "there are 'defaults' but no 'nodes'", NODES_REMEDY)
+    elif isinstance(nodes, Listing):
+        findings.error(nodes.place, "'nodes' is a list", NODES_REMEDY)
+    elif not isinstance(nodes, Mapping) or not nodes.entries:
+        findings.error(nodes.place, 'there are no devices', NODES_REMEDY)
+    else:
+        return _devices(nodes, defaults, findings)
+    return {}
+
+
+def _old_devices(root: Mapping, findings: Findings) -> dict[str, Mapping]:
+    sections: dict[str, Item] = {}
+    for name, item in root.entries.items():
+        if _is_misspelt(name, item):
+            findings.error(item.place, f'unknown section {name!r}', _section_remedy(name, item))
+        elif name not in TOP_LEVEL:
+            sections[name] = item
+    if not any(not name.startswith('.') for name in sections):
+        findings.error(root.place, 'there are no devices', NODES_REMEDY)
+    return _devices(Mapping(root.place, sections), Mapping(root.place), findings)
+
+
+def _is_misspelt(name: str, item: Item) -> bool:
+    """Tell a section with a typing error from a device, which has a node id."""
+    is_device = isinstance(item, Mapping) and ('node_id' in item.entries or 'dcf' in item.entries)
+    return name not in TOP_LEVEL and not is_device and bool(_close_section(name))
+
+
+def _close_section(name: str) -> list[str]:
+    return difflib.get_close_matches(name, TOP_LEVEL, n=1, cutoff=0.75)
+
+
+def _devices(nodes: Mapping, defaults: Mapping, findings: Findings) -> dict[str, Mapping]:
+    result: dict[str, Mapping] = {}
+    for name, item in nodes.entries.items():
+        if name.startswith('.'):
+            continue
+        if isinstance(item, Mapping):
+            result[name] = merge_device(defaults, item)
+        else:
+            findings.error(
+                item.place,
+                f'expected a device with its keys, got {describe(item)}',
+                _section_remedy(name, item),
+            )
+    return result
+
+
+def _section_remedy(name: str, item: Item) -> str:
+    if close := _close_section(name):
+        return f'did you mean {close[0]!r}?'
+    if isinstance(item, Mapping) and 'node_id' in item.entries:
+        return "move the device below 'nodes:'"
+    return "a device needs at least 'node_id:' below its name; begin a template's name with a dot"

@@ -1,0 +1,92 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Reading a whole bus from its bus.yml."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+import os
+from pathlib import Path
+
+from .cob_ids import assign_cob_ids
+from .device_reader import DeviceDraft, read_device
+from .device_timing import finish_device, Surroundings
+from .document import Mapping, read_document
+from .eds_files import EdsFiles
+from .findings import Findings, Place
+from .layout import lay_out
+from .master import build_master
+from .model import BusConfig
+from .settings import read_master_settings, read_options
+
+
+def load_bus(
+    path: str | os.PathLike[str], *, bus_config_path: str | os.PathLike[str] | None = None
+) -> BusConfig:
+    """Read a bus.yml of either format and the EDS files that it names.
+
+    Args:
+        path: The bus.yml.
+        bus_config_path: What ``@BUS_CONFIG_PATH@`` stands for; its own folder when None.
+
+    Returns:
+        The bus, checked; oddities are among its warnings.
+
+    Raises:
+        ConfigError: Something is wrong; the error lists every problem with file, line, key and
+            remedy.
+    """
+    file = Path(path)
+    findings = Findings()
+    layout = lay_out(read_document(file, findings), findings)
+    options = read_options(layout.options, findings)
+    settings = read_master_settings(layout.master, findings)
+    beside = file.parent.absolute()
+    folder = beside if bus_config_path is None else Path(bus_config_path)
+    eds_files = EdsFiles(folder, beside)
+    drafts = [
+        read_device(name, section, options, eds_files, findings)
+        for name, section in layout.devices.items()
+    ]
+    periods = [draft.settings.period for draft in drafts]
+    master = build_master(layout.master, settings, options, periods, findings)
+    unique = _check_node_ids(layout.master, settings.node_id, drafts, findings)
+    around = Surroundings(options, settings, master)
+    nodes = tuple(
+        finish_device(draft, draft.config, around, findings)
+        for draft in _with_cob_ids(unique, findings)
+        if draft.config is not None
+    )
+    findings.raise_errors()
+    return BusConfig(file, master, nodes, findings.warnings)
+
+
+def _check_node_ids(
+    master: Mapping, master_id: int | None, drafts: Sequence[DeviceDraft], findings: Findings
+) -> list[DeviceDraft]:
+    """Refuse doubled node ids; returns the devices that have one of their own."""
+    owners: dict[int, tuple[str, Place]] = {}
+    if master_id is not None:
+        owners[master_id] = ('the master', master.entries['node_id'].place)
+    unique = []
+    for draft in drafts:
+        if draft.config is None:
+            continue
+        node_id = draft.config.node_id
+        name, place = owners.setdefault(node_id, (draft.config.name, draft.place_of('node_id')))
+        if name == draft.config.name:
+            unique.append(draft)
+            continue
+        findings.error(
+            draft.place_of('node_id'),
+            f'node id {node_id} of {draft.config.name} is also that of {name} (line {place.line})',
+            'give each device an id of its own',
+        )
+    return unique
+
+
+def _with_cob_ids(drafts: Sequence[DeviceDraft], findings: Findings) -> list[DeviceDraft]:
+    """Give the PDOs of all devices their final COB-IDs."""
+    assigned = iter(assign_cob_ids([pdo for draft in drafts for pdo in draft.pdos], findings))
+    return [replace(draft, pdos=[next(assigned) for _ in draft.pdos]) for draft in drafts]

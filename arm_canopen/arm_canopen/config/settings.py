@@ -1,0 +1,152 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Sections of bus.yml as records, before the EDS files are consulted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import re
+
+from .bus_keys import DEVICE_KEYS, DRIVE_KEYS, MASTER_KEYS, OPTION_KEYS
+from .document import Mapping
+from .drivers import check_driver
+from .findings import Findings, Place
+from .model import DriveConfig
+from .section import read_section, texts
+
+ROS_NAME = re.compile(r'[A-Za-z_][A-Za-z0-9_]*')
+NAMESPACE = re.compile(r'/?([A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*)?')
+SCALE_TOLERANCE = 0.01
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """Section ``options``.
+
+    Attributes:
+        dcf_path: Folder of the EDS files, empty for none.
+        heartbeat_multiplier: Heartbeat periods until a heartbeat counts as lost.
+    """
+
+    dcf_path: str = ''
+    heartbeat_multiplier: float = 3.0
+
+
+@dataclass(frozen=True, slots=True)
+class MasterSettings:
+    """Section ``master``; attributes as in :class:`.model.MasterConfig`.
+
+    Attributes:
+        watch_devices: The master supervises the devices' heartbeats.
+        heartbeat_multiplier: Periods that devices wait for the master's heartbeat, None for the
+            options' value.
+    """
+
+    node_id: int | None = None
+    driver: str = ''
+    namespace: str = ''
+    bitrate: int = 1_000_000
+    watch_devices: bool = True
+    heartbeat_producer: float = 0.0
+    heartbeat_multiplier: float | None = None
+    sync_period: float = 0.0
+    sync_overflow: int = 0
+    start_nodes: bool = True
+    boot_timeout: float = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceSettings:
+    """Section of a device; attributes as in :class:`.model.NodeConfig`, None when not given.
+
+    Attributes:
+        dcf: EDS or DCF file, empty when not given.
+        dcf_path: Its folder, None for that of the options.
+        period: Cycle in [s] when there is no SYNC.
+    """
+
+    node_id: int | None = None
+    driver: str = ''
+    namespace: str = ''
+    dcf: str = ''
+    dcf_path: str | None = None
+    period: float = 0.01
+    sdo_timeout: float = 0.2
+    boot_timeout: float = 1.0
+    revision_number: int = 0
+    serial_number: int = 0
+    heartbeat_producer: float | None = None
+    heartbeat_consumer: bool | None = None
+    heartbeat_multiplier: float | None = None
+    mandatory: bool = False
+    reset_communication: bool = True
+
+
+def read_options(section: Mapping, findings: Findings) -> Options:
+    """Read the section ``options``."""
+    return Options(**read_section(section, OPTION_KEYS, findings))
+
+
+def read_master_settings(section: Mapping, findings: Findings) -> MasterSettings:
+    """Read the section ``master``."""
+    settings = MasterSettings(**read_section(section, MASTER_KEYS, findings))
+    _check_names(section, settings.namespace, findings)
+    check_driver(section, settings.driver, findings, for_master=True)
+    if 'node_id' not in section.entries:
+        findings.error(section.place, "no 'node_id'", "write 'node_id: 1'")
+    return settings
+
+
+def read_device_settings(
+    name: str, section: Mapping, findings: Findings
+) -> tuple[DeviceSettings, DriveConfig]:
+    """Read the section of a device, apart from its PDOs and objects."""
+    values = read_section(section, DEVICE_KEYS + DRIVE_KEYS, findings)
+    drive_fields = {key.field for key in DRIVE_KEYS}
+    drive = DriveConfig(**{name: values.pop(name) for name in drive_fields & values.keys()})
+    settings = DeviceSettings(**values)
+    if not ROS_NAME.fullmatch(name):
+        findings.error(
+            section.place,
+            f'{name!r} is no name for a ROS node',
+            'take letters, digits and underscores, and begin with a letter',
+        )
+    _check_names(section, settings.namespace, findings)
+    check_driver(section, settings.driver, findings, for_master=False)
+    _check_scales(section, drive, findings)
+    return settings, drive
+
+
+def remappings(section: Mapping, findings: Findings) -> dict[str, str]:
+    """Read the ROS remappings of the master or a device."""
+    return texts(section, 'remappings', findings)
+
+
+def _check_names(section: Mapping, namespace: str, findings: Findings) -> None:
+    if not NAMESPACE.fullmatch(namespace):
+        findings.error(
+            section.entries['namespace'].place,
+            f'{namespace!r} is no ROS namespace',
+            "write it like '/left/arm'",
+        )
+
+
+def _check_scales(section: Mapping, drive: DriveConfig, findings: Findings) -> None:
+    """Warn when targets and feedback have different units."""
+    scales = {
+        'pos': drive.scale_pos_to_dev * drive.scale_pos_from_dev,
+        'vel': drive.scale_vel_to_dev * drive.scale_vel_from_dev,
+    }
+    for axis, product in scales.items():
+        if abs(product - 1) > SCALE_TOLERANCE:
+            findings.warning(
+                _first_place(section, f'scale_{axis}_to_dev', f'scale_{axis}_from_dev'),
+                f'scale_{axis}_to_dev times scale_{axis}_from_dev is {product:g}, not 1: targets '
+                'and feedback have different units',
+                'make one the inverse of the other',
+            )
+
+
+def _first_place(section: Mapping, *names: str) -> Place:
+    given = (section.entries[name].place for name in names if name in section.entries)
+    return next(given, section.place)
