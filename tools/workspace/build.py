@@ -68,11 +68,15 @@ class Builder:
         return [name for name, value in hashes.items() if not whole or self._built(name) != value]
 
     def _built(self, name: str) -> str:
-        stamp = self.layout.build / name / STAMP
         installed = self.layout.install / name / 'share' / name / 'package.xml'
-        if not (stamp.is_file() and installed.is_file()):
-            return ''
-        return stamp.read_text(encoding='utf-8')
+        return self._stamp(name)[1] if installed.is_file() else ''
+
+    def _stamp(self, name: str) -> tuple[str, str]:
+        path = self.layout.build / name / STAMP
+        if not path.is_file():
+            return '', ''
+        base, _, value = path.read_text(encoding='utf-8').partition('\n')
+        return base, value
 
     def remove(self, names: Iterable[str]) -> None:
         """Remove what was built of packages."""
@@ -81,10 +85,18 @@ class Builder:
             for folder in (self.layout.build / name, self.layout.install / name):
                 shutil.rmtree(folder, ignore_errors=True)
 
-    def leftovers(self, packages: Iterable[str]) -> list[str]:
-        """Name what is installed and no longer a package of the workspace."""
+    def leftovers(self, wanted: Iterable[str]) -> list[str]:
+        """Name what is installed and of no use any more.
+
+        Args:
+            wanted: The packages of the workspace that are not the underlay's.
+        """
+        keep = set(wanted)
         marks = self.layout.install.glob('*/share/colcon-core/packages/*')
-        return sorted({mark.name for mark in marks} - set(packages))
+        names = {mark.name for mark in marks}
+        return sorted(
+            name for name in names if name not in keep or self._stamp(name)[0] != self.base
+        )
 
     def build(self, runner: Runner, packages: Mapping[str, Package], stale: list[str]) -> None:
         """Build packages from nothing.
@@ -104,7 +116,8 @@ class Builder:
         finally:
             for name in stale:
                 if self._succeeded(name):
-                    write_atomically(self.layout.build / name / STAMP, hashes[name])
+                    stamp = self.layout.build / name / STAMP
+                    write_atomically(stamp, f'{self.base}\n{hashes[name]}')
         failed = [name for name in stale if self._built(name) != hashes[name]]
         if failed:
             raise StepFailedError(f'Building {", ".join(failed)}', 1, 'see the folder log/')

@@ -14,7 +14,7 @@ from .errors import ForeignFolderError
 from .interpreter import Interpreter, probe
 from .layout import Layout
 from .process import Argument, Runner
-from .state import EnvironmentState, fingerprint, fingerprint_files, write_state
+from .state import EnvironmentState, fingerprint, fingerprint_files, read_state, write_state
 from .system import check
 from .underlay import Underlay, UnderlayKind
 
@@ -98,18 +98,20 @@ class Environment:
             Step('Fitting the packages to this machine', self._finish),
         ]
 
-    def _check(self, _runner: Runner) -> None:
+    def _check(self, runner: Runner) -> None:
         check(self.underlay, probe(self.python), self.layout.root)
         if self.layout.venv.exists() and not self.layout.venv_owner.exists():
             raise ForeignFolderError(
                 f'{self.layout.venv} was not made by this set-up.',
                 'Move it away (or remove it) and run again.',
             )
+        if read_state(self.layout.state) is not None:
+            # the old environment is not given up before the new one is within reach
+            self._pip(runner, 'download', '--dest', self.layout.venv / '.download')
+            self._uv_install(runner, self.requirements, '--dry-run')
 
     def _make(self, runner: Runner) -> None:
         self.layout.state.unlink(missing_ok=True)
-        for folder in (self.layout.build, self.layout.install):
-            shutil.rmtree(folder, ignore_errors=True)
         remove_environment(self.layout)
         self.layout.venv.mkdir()
         self.layout.venv_owner.touch()
@@ -117,15 +119,16 @@ class Environment:
         runner.run('Making .venv', [self.python, '-m', 'venv', *options, self.layout.venv])
 
     def _install(self, runner: Runner) -> None:
-        python = self.layout.venv_python
-        uv = self.layout.requirements / 'uv.txt'
-        pip: list[Argument] = [python, '-m', 'pip', 'install', '--quiet', '--retries', '1']
-        runner.run(
-            'The installer uv', [*pip, '--require-hashes', '--only-binary', ':all:', '-r', uv]
-        )
+        self._pip(runner, 'install')
         self._uv_install(runner, self.requirements)
 
-    def _uv_install(self, runner: Runner, requirements: Path) -> None:
+    def _pip(self, runner: Runner, *command: Argument) -> None:
+        pip: list[Argument] = [self.layout.venv_python, '-m', 'pip', *command]
+        options: list[Argument] = ['--quiet', '--retries', '1', '--require-hashes']
+        requirements: list[Argument] = ['-r', self.layout.requirements / 'uv.txt']
+        runner.run('The installer uv', [*pip, *options, '--only-binary', ':all:', *requirements])
+
+    def _uv_install(self, runner: Runner, requirements: Path, *options: str) -> None:
         python = self.layout.venv_python
         command: list[Argument] = [
             python,
@@ -141,7 +144,7 @@ class Environment:
         constraints: list[Argument] = ['--build-constraints', self.requirements]
         runner.run(
             'The Python packages',
-            [*command, *constraints, '-r', requirements],
+            [*command, *constraints, *options, '-r', requirements],
             show=lambda line: line.lstrip().startswith(_NEWS),
         )
 

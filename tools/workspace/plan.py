@@ -44,15 +44,13 @@ def plan(environment: Environment, wish: Wish) -> list[Step]:
     packages = needed_packages(found, wish.packages, environment.underlay)
     builder = Builder(layout, environment.base, environment.underlay.kind)
     stale = builder.stale(builder.fingerprints(packages))
-    gone = builder.leftovers(needed_packages(found, (), environment.underlay))
-
-    def build(runner: Runner) -> None:
-        builder.remove(gone)
-        builder.build(runner, packages, stale)
-
-    if stale or gone:
-        title = f'Building {", ".join(stale)}' if stale else f'Removing {", ".join(gone)}'
-        steps.append(Step(title, build))
+    wanted = needed_packages(found, (), environment.underlay)
+    gone = [name for name in builder.leftovers(wanted) if name not in stale]
+    if gone:
+        steps.append(Step(f'Removing {", ".join(gone)}', lambda _runner: builder.remove(gone)))
+    if stale:
+        title = f'Building {", ".join(stale)}'
+        steps.append(Step(title, lambda runner: builder.build(runner, packages, stale)))
     return steps
 
 
