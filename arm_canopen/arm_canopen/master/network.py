@@ -25,8 +25,6 @@ from .sdo_client import SdoClient
 
 CycleHook: TypeAlias = Callable[[float, float], None]
 
-HEARTBEAT_MULTIPLIER = 3.0  # a device may miss two heartbeats of the master
-
 
 class Network:
     """Master of one bus: boots its devices, keeps watch over them and runs the SYNC cycle.
@@ -166,7 +164,7 @@ class Network:
             sdo_timeout=master.boot_timeout,
             start=master.start_nodes,
             master_id=master.node_id,
-            master_heartbeat_timeout=master.heartbeat_producer * HEARTBEAT_MULTIPLIER,
+            master_heartbeat_timeout=master.heartbeat_timeout,
         )
 
     def _connect(self, node: RemoteNode) -> None:

@@ -21,7 +21,6 @@ from .statistics import CycleFigures, CycleStatistics
 
 T = TypeVar('T')
 
-IDLE_PERIOD = 0.01  # [s] cycle of a bus without SYNC
 REOPEN_PAUSE = 0.1  # [s] between two looks at a bus that went away
 
 logger = logging.getLogger(__name__)
@@ -45,7 +44,7 @@ class NetworkThread:
             network: The network whose frames go over it.
         """
         self.network = network
-        self.period = network.config.master.sync_period or IDLE_PERIOD
+        self.period = network.config.master.cycle_period
         self._bus = bus
         self._statistics = CycleStatistics(self.period)
         self._work: deque[Callable[[], None]] = deque()
