@@ -3,15 +3,16 @@
 """Texts of EDS and bus.yml files that the tests of the configuration start from."""
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
 
 from arm_canopen.config import BusConfig, load_bus
 
 ARTICLE_BUS = Path(__file__).parent / 'data' / 'panda' / 'bus.yml'
 
 
-class Row(NamedTuple):
+@dataclass(frozen=True)
+class Row:
     """One sub-index of a sample EDS."""
 
     index: int

@@ -9,13 +9,13 @@ from dataclasses import dataclass, replace
 
 from ..standard.dictionary import ObjectDictionary
 from ..standard.objects import Index
-from .bus_keys import MILLISECONDS
 from .device_reader import DeviceDraft
 from .findings import Findings
 from .model import MasterConfig, NodeConfig
 from .pdo_direction import Direction, RPDO, TPDO
 from .pdo_resolution import PdoDraft, SYNCHRONOUS_MAX
 from .settings import MasterSettings, Options
+from .shared_keys import MILLISECONDS
 
 CYCLIC_OBJECTS = ((RPDO, Index.CONTROLWORD, 'enabled'), (TPDO, Index.STATUSWORD, 'watched'))
 """What a drive cannot do without in its PDOs, as no SDO runs inside the cycle."""

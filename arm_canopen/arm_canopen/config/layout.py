@@ -3,8 +3,8 @@
 """The two formats of bus.yml, brought to one.
 
 New: ``options``, ``master``, ``defaults`` and ``nodes``. Old (dcfgen's own): ``options``,
-``master``, and every other top-level key a device. A file with ``nodes`` or ``defaults`` is of the new one.
-Top-level keys that begin with a dot are templates for anchors and are ignored in both.
+``master``, and every other top-level key a device. A file with ``nodes`` or ``defaults`` is of
+the new one. Top-level keys that begin with a dot are templates for anchors and are ignored in both.
 """
 
 from __future__ import annotations
@@ -12,12 +12,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 import difflib
 
-from .bus_keys import TOP_LEVEL
 from .document import Item, Listing, Mapping
 from .findings import Findings
 from .merge import merge_device
 from .scalars import describe
-from .section import block
+from .section import block, TOP_LEVEL
 
 NODES_REMEDY = "write a mapping: 'nodes:', below it 'joint1:', below that 'node_id: 2'"
 

@@ -4,11 +4,11 @@
 
 from __future__ import annotations
 
-from .bus_keys import MILLISECONDS, U16_MAX
 from .document import Mapping
 from .findings import Findings
 from .model import MasterConfig
 from .settings import MasterSettings, Options, remappings
+from .shared_keys import MILLISECONDS, U16_MAX
 
 HEARTBEAT_TIME_MAX = U16_MAX / MILLISECONDS  # [s] 0x1016 holds 16 bits
 

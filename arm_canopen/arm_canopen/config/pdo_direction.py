@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from ..standard.cob_id import rpdo_default, tpdo_default
 from ..standard.dictionary import ObjectDictionary, ObjectEntry
 from ..standard.objects import Index, PDO_COUNT_MAX
-from .bus_keys import RPDO_KEYS, TPDO_KEYS
+from .device_keys import RPDO_KEYS, TPDO_KEYS
 from .schema import Key
 
 

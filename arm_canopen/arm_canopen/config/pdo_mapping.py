@@ -10,7 +10,7 @@ from ..standard.datatypes import bit_length, DataType
 from ..standard.dictionary import ObjectDictionary, ObjectEntry
 from ..standard.objects import PDO_BITS_MAX
 from ..standard.pdo import MappedObject
-from .bus_keys import MAPPING_KEYS
+from .device_keys import MAPPING_KEYS
 from .document import Listing
 from .eds import DUMMY_TYPES, Eds
 from .findings import Findings, Place, RefusedError

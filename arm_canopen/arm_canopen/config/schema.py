@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""How a key of bus.yml is described; the keys themselves are the tables of ``bus_keys``."""
+"""How a key of bus.yml is described; the keys stand in ``master_keys`` and ``device_keys``."""
 
 from __future__ import annotations
 

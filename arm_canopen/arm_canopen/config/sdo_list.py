@@ -19,12 +19,13 @@ from ..standard.datatypes import (
 from ..standard.dictionary import ObjectDictionary, ObjectEntry
 from ..standard.objects import Index, PDO_COUNT_MAX
 from . import scalars
-from .bus_keys import SDO_KEYS, U8_MAX
+from .device_keys import SDO_KEYS
 from .document import Item, Mapping, Scalar, ScalarKind
 from .findings import Findings, Place, RefusedError
 from .model import SdoWrite
 from .schema import Key
 from .section import block, listing, read_section
+from .shared_keys import U8_MAX
 
 PDO_OBJECTS = (
     (Index.RPDO_COMMUNICATION, 'rpdo'),

@@ -8,11 +8,23 @@ from collections.abc import Iterable, Sequence
 import difflib
 from typing import Any
 
-from .bus_keys import SECTIONS, TOP_LEVEL
+from .device_keys import DEVICE_KEYS, DRIVE_KEYS, RPDO_KEYS, SDO_KEYS, TPDO_KEYS
 from .document import Item, Listing, Mapping, Scalar, ScalarKind
 from .findings import Findings, RefusedError
+from .master_keys import MASTER_KEYS, OPTION_KEYS
 from .scalars import describe
 from .schema import Key, Kind, Use
+
+TOP_LEVEL = ('options', 'master', 'defaults', 'nodes')
+
+SECTIONS: dict[str, tuple[Key, ...]] = {
+    'options': OPTION_KEYS,
+    'master': MASTER_KEYS,
+    'a device or defaults': DEVICE_KEYS + DRIVE_KEYS,
+    'a PDO number': TPDO_KEYS + RPDO_KEYS,
+    'an entry of sdo': SDO_KEYS,
+}
+"""Where each key belongs, for remedies."""
 
 
 def read_section(mapping: Mapping, keys: Sequence[Key], findings: Findings) -> dict[str, Any]:

@@ -7,10 +7,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 import re
 
-from .bus_keys import DEVICE_KEYS, DRIVE_KEYS, MASTER_KEYS, OPTION_KEYS
+from .device_keys import DEVICE_KEYS, DRIVE_KEYS
 from .document import Mapping
 from .drivers import check_driver
 from .findings import Findings, Place
+from .master_keys import MASTER_KEYS, OPTION_KEYS
 from .model import DriveConfig
 from .section import read_section, texts
 

@@ -67,6 +67,11 @@ UNSIGNED_BITS: dict[DataType, int] = {
 TIME_BITS: dict[DataType, int] = {DataType.TIME_OF_DAY: 48, DataType.TIME_DIFFERENCE: 48}
 REAL_FORMATS: dict[DataType, str] = {DataType.REAL32: '<f', DataType.REAL64: '<d'}
 REAL_BITS: dict[DataType, int] = {DataType.REAL32: 32, DataType.REAL64: 64}
+TEXT_ENCODINGS: dict[DataType, str] = {
+    DataType.VISIBLE_STRING: 'latin-1',
+    DataType.OCTET_STRING: 'latin-1',
+    DataType.UNICODE_STRING: 'utf-16-le',
+}
 FIXED_BITS: dict[DataType, int] = {
     DataType.BOOLEAN: 1,
     **SIGNED_BITS,
@@ -116,16 +121,21 @@ def encode(data_type: DataType, value: Value) -> bytes:
         return _encode_real(data_type, value)
     if (limits := integer_range(data_type)) is not None:
         return _encode_integer(data_type, value, *limits)
-    if isinstance(value, str) and data_type in (DataType.VISIBLE_STRING, DataType.OCTET_STRING):
-        return value.encode('latin-1')
-    if isinstance(value, str) and data_type is DataType.UNICODE_STRING:
-        return value.encode('utf-16-le')
+    if isinstance(value, str) and data_type in TEXT_ENCODINGS:
+        return _encode_text(data_type, value)
     if isinstance(value, bytes):
         expected = byte_length(data_type)
         if expected in (None, len(value)):
             return value
         raise CodecError(f'{data_type.name} takes {expected} bytes, got {len(value)}')
     raise CodecError(f'{data_type.name} cannot hold {value!r} ({type(value).__name__})')
+
+
+def _encode_text(data_type: DataType, value: str) -> bytes:
+    try:
+        return value.encode(TEXT_ENCODINGS[data_type])
+    except UnicodeEncodeError as error:
+        raise CodecError(f'{data_type.name} cannot hold {value!r}: {error.reason}') from error
 
 
 def _encode_real(data_type: DataType, value: Value) -> bytes:

@@ -69,9 +69,12 @@ class PdoCodec:
         """Compile the mapping.
 
         Raises:
-            CodecError: The objects are longer than 64 bits together.
+            CodecError: The objects are longer than 64 bits together, or one has no fixed length.
         """
         self.objects = tuple(objects)
+        for entry in self.objects:
+            if entry.data_type not in FIXED_BITS:
+                raise CodecError(f'{entry.data_type.name} has no fixed length, no PDO carries it')
         bits = sum(entry.bits for entry in self.objects)
         if bits > PDO_BITS_MAX:
             raise CodecError(f'a PDO carries at most {PDO_BITS_MAX} bits, this mapping has {bits}')
@@ -133,7 +136,7 @@ def _to_bits(data_type: DataType, value: Number) -> int:
     if data_type in REAL_FORMATS:
         try:
             return int.from_bytes(struct.pack(REAL_FORMATS[data_type], value), 'little')
-        except OverflowError as error:
+        except (OverflowError, struct.error) as error:
             raise CodecError(f'{value} does not fit {data_type.name}') from error
     limits = integer_range(data_type) or (0, (1 << FIXED_BITS[data_type]) - 1)
     if not isinstance(value, int) or not limits[0] <= value <= limits[1]:

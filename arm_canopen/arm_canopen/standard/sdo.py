@@ -117,7 +117,11 @@ class DownloadRequest:
     size: int | None = None
 
     def encode(self) -> bytes:
-        """Return the 8 bytes of the frame."""
+        """Return the 8 bytes of the frame.
+
+        Raises:
+            CodecError: Expedited data have not 1 to 4 bytes.
+        """
         return _encode_initiate(0x20, self.index, self.subindex, self.data, self.size)
 
 
@@ -138,7 +142,11 @@ class UploadResponse:
     size: int | None = None
 
     def encode(self) -> bytes:
-        """Return the 8 bytes of the frame."""
+        """Return the 8 bytes of the frame.
+
+        Raises:
+            CodecError: Expedited data have not 1 to 4 bytes.
+        """
         return _encode_initiate(0x40, self.index, self.subindex, self.data, self.size)
 
 
@@ -175,8 +183,14 @@ class Segment:
     last: bool
 
     def encode(self) -> bytes:
-        """Return the 8 bytes of the frame."""
+        """Return the 8 bytes of the frame.
+
+        Raises:
+            CodecError: The data are longer than 7 bytes.
+        """
         unused = SEGMENT_MAX - len(self.data)
+        if unused < 0:
+            raise CodecError(f'an SDO segment carries 7 bytes at most, got {len(self.data)}')
         command = self.toggle << 4 | unused << 1 | self.last
         return bytes((command,)) + self.data + bytes(unused)
 
@@ -227,6 +241,8 @@ def _encode_initiate(
     if data is None:
         return struct.pack('<BHBI', specifier | indicated, index, subindex, size or 0)
     unused = EXPEDITED_MAX - len(data)
+    if not 0 <= unused < EXPEDITED_MAX:
+        raise CodecError(f'an expedited transfer carries 1 to 4 bytes, got {len(data)}')
     told = unused << 2 | 0x01 if indicated else 0
     return struct.pack('<BHB', specifier | 0x02 | told, index, subindex) + data + bytes(unused)
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""All keys of bus.yml that ros2_canopen and Lely's dcfgen know, and what is made of each.
+"""The keys of a device that ros2_canopen and Lely's dcfgen know.
 
 Names, units and defaults are theirs, so that their files can be read unchanged. Where a default
 differs, ``why`` says the reason.
@@ -8,21 +8,23 @@ differs, ``why`` says the reason.
 
 from __future__ import annotations
 
-from ..standard.cob_id import NODE_ID_MAX, NODE_ID_MIN
 from ..standard.drive import DriveState, OperationMode
 from .schema import Key, Kind, Use
-
-MILLISECONDS = 1e3  # per second
-MICROSECONDS = 1e6
-HUNDRED_MICROSECONDS = 1e4
-KILOBIT = 1e-3  # kbit/s per bit/s
-
-U8_MAX = 0xFF
-U16_MAX = 0xFFFF
-U32_MAX = 0xFFFF_FFFF
-
-BITRATES = dict.fromkeys((10, 20, 50, 100, 125, 250, 500, 800, 1000), 'kbit/s')
-"""Bit rates of CiA 301, table 1."""
+from .shared_keys import (
+    DRIVER,
+    HUNDRED_MICROSECONDS,
+    MILLISECONDS,
+    MULTIPLIER,
+    NAMESPACE,
+    NODE_ID,
+    PACKAGE,
+    REMAPPINGS,
+    RETRY_FACTOR,
+    TIME_COB_ID,
+    U8_MAX,
+    U16_MAX,
+    U32_MAX,
+)
 
 SWITCHING_STATES = {state.value: state.title for state in DriveState if 2 <= state <= 5}
 POSITION_MODES = {
@@ -42,129 +44,12 @@ VELOCITY_MODES = {
     )
 }
 
-NODE_ID_WHY = 'CANopen node ids are 1 to 127'
-MULTIPLIER_WHY = 'below 1 every heartbeat would count as lost'
-
-
-def _identity(name: str, use: Use, field: str = '', why: str = '') -> Key:
-    return Key(
-        name,
-        Kind.INTEGER,
-        field,
-        low=0,
-        high=U32_MAX,
-        default=None if field else 0,
-        use=use,
-        why=why,
-    )
-
-
-_MULTIPLIER = Key(
-    'heartbeat_multiplier',
-    Kind.NUMBER,
-    'heartbeat_multiplier',
-    low=1,
-    high=1000,
-    why=MULTIPLIER_WHY,
-)
-_RETRY_FACTOR = Key(
-    'retry_factor', Kind.INTEGER, default=3, use=Use.LATER, why='there is no node guarding'
-)
-_TIME_COB_ID = Key(
-    'time_cob_id', Kind.INTEGER, default=0x100, use=Use.LATER, why='no TIME is sent or read'
-)
-_NAMESPACE = Key('namespace', Kind.TEXT, 'namespace')
-_REMAPPINGS = Key('remappings', Kind.BLOCK)
-_PACKAGE = Key('package', Kind.TEXT, use=Use.NEEDLESS)
-
-OPTION_KEYS: tuple[Key, ...] = (
-    Key('dcf_path', Kind.TEXT, 'dcf_path'),
-    _MULTIPLIER,
-    _RETRY_FACTOR,
-)
-
-MASTER_KEYS: tuple[Key, ...] = (
-    Key('node_id', Kind.INTEGER, 'node_id', low=NODE_ID_MIN, high=NODE_ID_MAX, why=NODE_ID_WHY),
-    Key('driver', Kind.TEXT, 'driver'),
-    _PACKAGE,
-    _NAMESPACE,
-    _REMAPPINGS,
-    Key('baudrate', Kind.INTEGER, 'bitrate', per_unit=KILOBIT, choices=BITRATES),
-    _identity('vendor_id', Use.LATER, why='the master has no object dictionary of its own'),
-    _identity('product_code', Use.LATER, why='the master has no object dictionary of its own'),
-    _identity('revision_number', Use.LATER, why='the master has no object dictionary of its own'),
-    _identity('serial_number', Use.LATER, why='the master has no object dictionary of its own'),
-    Key('heartbeat_consumer', Kind.BOOLEAN, 'watch_devices', default=True),
-    Key(
-        'heartbeat_producer',
-        Kind.NUMBER,
-        'heartbeat_producer',
-        per_unit=MILLISECONDS,
-        low=0,
-        high=U16_MAX,
-        default=200,
-        why='not 0, as only this lets drives stop when the master dies; write 0 to have none',
-    ),
-    _MULTIPLIER,
-    Key(
-        'sync_period',
-        Kind.NUMBER,
-        'sync_period',
-        per_unit=MICROSECONDS,
-        low=500,
-        high=60_000_000,
-        zero=True,
-        why='the unit is microseconds, 10 ms is 10000',
-    ),
-    Key('sync_window', Kind.INTEGER, default=0, use=Use.LATER, why='its length is not supervised'),
-    Key('sync_overflow', Kind.INTEGER, 'sync_overflow', low=2, high=240, zero=True),
-    _TIME_COB_ID,
-    Key(
-        'emcy_inhibit_time', Kind.INTEGER, default=0, use=Use.LATER, why='the master sends no EMCY'
-    ),
-    Key('nmt_inhibit_time', Kind.INTEGER, default=0, use=Use.LATER, why='NMT is sent at once'),
-    Key('error_behavior', Kind.BLOCK, use=Use.LATER, why='the master has no NMT state'),
-    Key(
-        'start',
-        Kind.BOOLEAN,
-        default=True,
-        use=Use.REFUSED,
-        why='the master always runs its cycle; set start_nodes: false to keep devices stopped',
-    ),
-    Key('start_nodes', Kind.BOOLEAN, 'start_nodes'),
-    Key(
-        'start_all_nodes',
-        Kind.BOOLEAN,
-        default=False,
-        use=Use.LATER,
-        why='each device is started when it is ready',
-    ),
-    Key(
-        'reset_all_nodes',
-        Kind.BOOLEAN,
-        default=False,
-        use=Use.REFUSED,
-        why='an error of a mandatory device does not reset the others in this version',
-    ),
-    Key(
-        'stop_all_nodes',
-        Kind.BOOLEAN,
-        default=False,
-        use=Use.REFUSED,
-        why='an error of a mandatory device does not stop the others in this version',
-    ),
-    Key(
-        'boot_time', Kind.INTEGER, default=0, use=Use.LATER, why='devices are waited for for ever'
-    ),
-    Key('boot_timeout', Kind.NUMBER, 'boot_timeout', per_unit=MILLISECONDS, low=1, high=60_000),
-)
-
 DEVICE_KEYS: tuple[Key, ...] = (
-    Key('node_id', Kind.INTEGER, 'node_id', low=NODE_ID_MIN, high=NODE_ID_MAX, why=NODE_ID_WHY),
-    Key('driver', Kind.TEXT, 'driver'),
-    _PACKAGE,
-    _NAMESPACE,
-    _REMAPPINGS,
+    NODE_ID,
+    DRIVER,
+    PACKAGE,
+    NAMESPACE,
+    REMAPPINGS,
     Key('dcf', Kind.TEXT, 'dcf'),
     Key('dcf_path', Kind.TEXT, 'dcf_path'),
     Key('polling', Kind.BOOLEAN, use=Use.NEEDLESS),
@@ -207,8 +92,8 @@ DEVICE_KEYS: tuple[Key, ...] = (
         use=Use.LATER,
         why='torque modes are not offered in this version',
     ),
-    _identity('revision_number', Use.READ, 'revision_number'),
-    _identity('serial_number', Use.READ, 'serial_number'),
+    Key('revision_number', Kind.INTEGER, 'revision_number', low=0, high=U32_MAX),
+    Key('serial_number', Kind.INTEGER, 'serial_number', low=0, high=U32_MAX),
     Key(
         'heartbeat_producer',
         Kind.NUMBER,
@@ -218,7 +103,7 @@ DEVICE_KEYS: tuple[Key, ...] = (
         high=U16_MAX,
     ),
     Key('heartbeat_consumer', Kind.BOOLEAN, 'heartbeat_consumer'),
-    _MULTIPLIER,
+    MULTIPLIER,
     Key(
         'guard_time',
         Kind.INTEGER,
@@ -229,8 +114,8 @@ DEVICE_KEYS: tuple[Key, ...] = (
     Key(
         'life_time_factor', Kind.INTEGER, default=0, use=Use.LATER, why='there is no node guarding'
     ),
-    _RETRY_FACTOR,
-    _TIME_COB_ID,
+    RETRY_FACTOR,
+    TIME_COB_ID,
     Key('error_behavior', Kind.BLOCK),
     Key(
         'boot',
@@ -322,14 +207,3 @@ RPDO_KEYS: tuple[Key, ...] = (
     *PDO_KEYS,
     Key('event_deadline', Kind.INTEGER, 'event_time', per_unit=MILLISECONDS, low=0, high=U16_MAX),
 )
-
-SECTIONS: dict[str, tuple[Key, ...]] = {
-    'options': OPTION_KEYS,
-    'master': MASTER_KEYS,
-    'a device or defaults': DEVICE_KEYS + DRIVE_KEYS,
-    'a PDO number': TPDO_KEYS + RPDO_KEYS,
-    'an entry of sdo': SDO_KEYS,
-}
-"""Where each key belongs, for remedies."""
-
-TOP_LEVEL = ('options', 'master', 'defaults', 'nodes')

@@ -1,0 +1,112 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The keys of ``options`` and ``master`` that ros2_canopen and Lely's dcfgen know.
+
+Names, units and defaults are theirs, so that their files can be read unchanged. Where a default
+differs, ``why`` says the reason.
+"""
+
+from __future__ import annotations
+
+from .schema import Key, Kind, Use
+from .shared_keys import (
+    DRIVER,
+    KILOBIT,
+    MICROSECONDS,
+    MILLISECONDS,
+    MULTIPLIER,
+    NAMESPACE,
+    NODE_ID,
+    PACKAGE,
+    REMAPPINGS,
+    RETRY_FACTOR,
+    TIME_COB_ID,
+    U16_MAX,
+)
+
+NO_DICTIONARY = 'the master has no object dictionary of its own'
+
+BITRATES = dict.fromkeys((10, 20, 50, 100, 125, 250, 500, 800, 1000), 'kbit/s')
+"""Bit rates of CiA 301, table 1."""
+
+OPTION_KEYS: tuple[Key, ...] = (
+    Key('dcf_path', Kind.TEXT, 'dcf_path'),
+    MULTIPLIER,
+    RETRY_FACTOR,
+)
+
+MASTER_KEYS: tuple[Key, ...] = (
+    NODE_ID,
+    DRIVER,
+    PACKAGE,
+    NAMESPACE,
+    REMAPPINGS,
+    Key('baudrate', Kind.INTEGER, 'bitrate', per_unit=KILOBIT, choices=BITRATES),
+    Key('vendor_id', Kind.INTEGER, default=0, use=Use.LATER, why=NO_DICTIONARY),
+    Key('product_code', Kind.INTEGER, default=0, use=Use.LATER, why=NO_DICTIONARY),
+    Key('revision_number', Kind.INTEGER, default=0, use=Use.LATER, why=NO_DICTIONARY),
+    Key('serial_number', Kind.INTEGER, default=0, use=Use.LATER, why=NO_DICTIONARY),
+    Key('heartbeat_consumer', Kind.BOOLEAN, 'watch_devices', default=True),
+    Key(
+        'heartbeat_producer',
+        Kind.NUMBER,
+        'heartbeat_producer',
+        per_unit=MILLISECONDS,
+        low=0,
+        high=U16_MAX,
+        default=200,
+        why='not 0, as only this lets drives stop when the master dies; write 0 to have none',
+    ),
+    MULTIPLIER,
+    Key(
+        'sync_period',
+        Kind.NUMBER,
+        'sync_period',
+        per_unit=MICROSECONDS,
+        low=500,
+        high=60_000_000,
+        zero=True,
+        why='the unit is microseconds, 10 ms is 10000',
+    ),
+    Key('sync_window', Kind.INTEGER, default=0, use=Use.LATER, why='its length is not supervised'),
+    Key('sync_overflow', Kind.INTEGER, 'sync_overflow', low=2, high=240, zero=True),
+    TIME_COB_ID,
+    Key(
+        'emcy_inhibit_time', Kind.INTEGER, default=0, use=Use.LATER, why='the master sends no EMCY'
+    ),
+    Key('nmt_inhibit_time', Kind.INTEGER, default=0, use=Use.LATER, why='NMT is sent at once'),
+    Key('error_behavior', Kind.BLOCK, use=Use.LATER, why='the master has no NMT state'),
+    Key(
+        'start',
+        Kind.BOOLEAN,
+        default=True,
+        use=Use.REFUSED,
+        why='the master always runs its cycle; set start_nodes: false to keep devices stopped',
+    ),
+    Key('start_nodes', Kind.BOOLEAN, 'start_nodes'),
+    Key(
+        'start_all_nodes',
+        Kind.BOOLEAN,
+        default=False,
+        use=Use.LATER,
+        why='each device is started when it is ready',
+    ),
+    Key(
+        'reset_all_nodes',
+        Kind.BOOLEAN,
+        default=False,
+        use=Use.REFUSED,
+        why='an error of a mandatory device does not reset the others in this version',
+    ),
+    Key(
+        'stop_all_nodes',
+        Kind.BOOLEAN,
+        default=False,
+        use=Use.REFUSED,
+        why='an error of a mandatory device does not stop the others in this version',
+    ),
+    Key(
+        'boot_time', Kind.INTEGER, default=0, use=Use.LATER, why='devices are waited for for ever'
+    ),
+    Key('boot_timeout', Kind.NUMBER, 'boot_timeout', per_unit=MILLISECONDS, low=1, high=60_000),
+)

@@ -1,0 +1,44 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Units of bus.yml, and keys that stand in more than one section."""
+
+from __future__ import annotations
+
+from ..standard.cob_id import NODE_ID_MAX, NODE_ID_MIN
+from .schema import Key, Kind, Use
+
+MILLISECONDS = 1e3  # per second
+MICROSECONDS = 1e6
+HUNDRED_MICROSECONDS = 1e4
+KILOBIT = 1e-3  # kbit/s per bit/s
+
+U8_MAX = 0xFF
+U16_MAX = 0xFFFF
+U32_MAX = 0xFFFF_FFFF
+
+NODE_ID = Key(
+    'node_id',
+    Kind.INTEGER,
+    'node_id',
+    low=NODE_ID_MIN,
+    high=NODE_ID_MAX,
+    why='CANopen node ids are 1 to 127',
+)
+DRIVER = Key('driver', Kind.TEXT, 'driver')
+PACKAGE = Key('package', Kind.TEXT, use=Use.NEEDLESS)
+NAMESPACE = Key('namespace', Kind.TEXT, 'namespace')
+REMAPPINGS = Key('remappings', Kind.BLOCK)
+MULTIPLIER = Key(
+    'heartbeat_multiplier',
+    Kind.NUMBER,
+    'heartbeat_multiplier',
+    low=1,
+    high=1000,
+    why='below 1 every heartbeat would count as lost',
+)
+RETRY_FACTOR = Key(
+    'retry_factor', Kind.INTEGER, default=3, use=Use.LATER, why='there is no node guarding'
+)
+TIME_COB_ID = Key(
+    'time_cob_id', Kind.INTEGER, default=0x100, use=Use.LATER, why='no TIME is sent or read'
+)
