@@ -109,7 +109,7 @@ ANSWERS: tuple[tuple[Response, str], ...] = (
 )
 
 
-@pytest.mark.parametrize(('message', 'frame'), TRANSCRIPTS, ids=lambda value: str(value))
+@pytest.mark.parametrize(('message', 'frame'), TRANSCRIPTS)
 def test_requests_are_those_of_the_standard(message: Request, frame: str) -> None:
     """The bytes of well-known requests, as bus analysers show them."""
     assert message.encode() == bytes.fromhex(frame)
