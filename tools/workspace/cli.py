@@ -59,7 +59,10 @@ def _run(options: argparse.Namespace) -> int:
         return 0
     with exclusive(layout.lock) as lock:
         runner = Runner(os.environ, layout.root, lock)
-        carry_out(plan(environment, _wish(options)), runner)
+        steps = plan(environment, _wish(options))
+        carry_out(steps, runner)
+        if not steps and options.command in {'setup', 'build'}:
+            print('All is up to date.')
         if options.command == 'pins':
             renew(layout, runner)
     return lint(layout, os.environ) if options.command == 'lint' else 0

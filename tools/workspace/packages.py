@@ -88,11 +88,13 @@ def needed_packages(
         UnknownPackageError: A target is not in the workspace.
     """
     ordered: dict[str, Package] = {}
+    visited: set[str] = set()
 
     def visit(name: str) -> None:
         package = packages.get(name)
-        if package is None or name in ordered:
+        if package is None or name in visited:
             return
+        visited.add(name)
         if package.is_copy and underlay.has_package(name):
             return
         for dependency in sorted(package.dependencies):

@@ -1,0 +1,201 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""From any state that a run can leave behind, the next run leads to the whole."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+import shutil
+
+import pytest
+
+from conftest import FakeRunner
+from workspace.environment import choose_python, Environment
+from workspace.errors import ForeignFolderError, StepFailedError
+from workspace.interpreter import Interpreter, probe
+from workspace.layout import Layout
+from workspace.plan import carry_out, plan, Wish
+from workspace.state import EnvironmentState, read_state
+from workspace.underlay import Underlay, UnderlayKind
+
+Add = Callable[..., Path]
+Fake = Callable[..., FakeRunner]
+ALL = Wish(dev=True)
+
+
+@pytest.fixture(autouse=True)
+def complete_system(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A system that lacks nothing."""
+    monkeypatch.setattr('workspace.environment.check', lambda *_: None)
+
+
+@pytest.fixture
+def packages(add_package: Add) -> None:
+    """An arm on its interfaces, and a quadruped on its own."""
+    add_package('arm_msgs', build_type='ament_cmake')
+    add_package('arm', 'arm_msgs')
+    add_package('quad_msgs', 'arm_msgs', build_type='ament_cmake')
+
+
+def titles(environment: Environment, wish: Wish = ALL) -> list[str]:
+    """What would be done, in words."""
+    return [step.title for step in plan(environment, wish)]
+
+
+@pytest.mark.usefixtures('packages')
+def test_second_run_does_nothing(environment: Environment, fake: Fake) -> None:
+    """After a whole run no step is left."""
+    carry_out(plan(environment, ALL), fake())
+    assert titles(environment) == []
+
+
+@pytest.mark.usefixtures('packages')
+@pytest.mark.parametrize('fail_at', range(1, 8))
+def test_interruption_anywhere_is_repaired(
+    environment: Environment, fake: Fake, fail_at: int
+) -> None:
+    """Wherever a run ends, the next one starts again with what is not finished."""
+    broken = fake(fail_at)
+    try:
+        carry_out(plan(environment, ALL), broken)
+    except KeyboardInterrupt:
+        assert titles(environment) != []
+    else:
+        assert len(broken.seen) < fail_at
+    carry_out(plan(environment, ALL), fake())
+    assert titles(environment) == []
+
+
+@pytest.mark.usefixtures('packages')
+def test_interrupted_change_makes_the_environment_new(
+    environment: Environment, fake: Fake
+) -> None:
+    """Half-installed test tools may have left anything, so nothing of it is kept."""
+    carry_out(plan(environment, Wish()), fake())
+    with pytest.raises(KeyboardInterrupt):
+        carry_out(plan(environment, ALL), fake(1))
+    assert read_state(environment.layout.state) is None
+    assert titles(environment, Wish(build=False))[1].startswith('Making .venv')
+
+
+@pytest.mark.usefixtures('packages')
+def test_a_target_builds_only_what_it_needs(environment: Environment, fake: Fake) -> None:
+    """The demo does not wait for the quadruped's messages, nor for the test tools."""
+    wish = Wish(packages=('arm',))
+    assert titles(environment, wish)[-1] == 'Building arm_msgs, arm'
+    carry_out(plan(environment, wish), fake())
+    assert titles(environment, ALL)[-1] == 'Building quad_msgs'
+
+
+@pytest.mark.usefixtures('packages')
+def test_changed_interface_rebuilds_what_stands_on_it(
+    environment: Environment, layout: Layout, fake: Fake
+) -> None:
+    """Interfaces on interfaces are compiled again, Python on interfaces is not."""
+    carry_out(plan(environment, ALL), fake())
+    (layout.root / 'arm_msgs' / 'New.msg').touch()
+    assert titles(environment) == ['Building arm_msgs, quad_msgs']
+
+
+@pytest.mark.usefixtures('packages')
+@pytest.mark.parametrize('lost', ['build/arm_msgs', 'install/arm_msgs'])
+def test_what_was_deleted_is_built_again(
+    environment: Environment, layout: Layout, fake: Fake, lost: str
+) -> None:
+    """With symbolic links both folders are needed."""
+    carry_out(plan(environment, ALL), fake())
+    shutil.rmtree(layout.root / lost)
+    assert titles(environment) == ['Building arm_msgs']
+
+
+@pytest.mark.usefixtures('packages')
+def test_removed_package_is_removed(environment: Environment, layout: Layout, fake: Fake) -> None:
+    """A package that left the workspace does not linger among the installed."""
+    carry_out(plan(environment, ALL), fake())
+    shutil.rmtree(layout.root / 'arm')
+    carry_out(plan(environment, ALL), fake())
+    assert not (layout.install / 'arm').exists()
+    assert titles(environment) == []
+
+
+@pytest.mark.usefixtures('packages')
+def test_other_ros_replaces_environment_and_packages(
+    environment: Environment, layout: Layout, fake: Fake, tmp_path: Path
+) -> None:
+    """When /opt/ros/jazzy appears, nothing that was built on wheels stays."""
+    carry_out(plan(environment, ALL), fake())
+    system = replace(environment, underlay=Underlay(UnderlayKind.SYSTEM, tmp_path / 'ros'))
+    runner = fake()
+    carry_out(plan(system, Wish(packages=('arm',))), runner)
+    assert not (layout.install / 'quad_msgs').exists()
+    assert titles(system, Wish(packages=('arm',))) == []
+
+
+@pytest.mark.parametrize('name', ['uv.txt', 'ros-wheels.txt', 'dev.txt'])
+def test_new_pins_are_installed(
+    environment: Environment, layout: Layout, fake: Fake, name: str
+) -> None:
+    """A changed requirement leads to work, and of dev.txt only to its own."""
+    wish = Wish(dev=True, build=False)
+    carry_out(plan(environment, wish), fake())
+    (layout.requirements / name).write_text('new==2\n')
+    assert len(titles(environment, wish)) == (1 if name == 'dev.txt' else 5)
+
+
+def test_old_environment_stays_while_the_new_is_out_of_reach(
+    environment: Environment, layout: Layout, fake: Fake
+) -> None:
+    """Without a network new pins do not cost the environment that works."""
+    wish = Wish(build=False)
+    carry_out(plan(environment, wish), fake())
+    before = read_state(layout.state)
+    (layout.requirements / 'ros-wheels.txt').write_text('new==2\n')
+    with pytest.raises(KeyboardInterrupt):
+        carry_out(plan(environment, wish), fake(1))
+    assert read_state(layout.state) == before is not None
+
+
+def test_foreign_venv_is_not_touched(environment: Environment, layout: Layout, fake: Fake) -> None:
+    """A .venv that somebody else made is refused, and nothing in it is lost."""
+    theirs = layout.venv / 'their' / 'work'
+    theirs.mkdir(parents=True)
+    with pytest.raises(ForeignFolderError, match='not made by this set-up'):
+        carry_out(plan(environment, Wish(build=False)), fake())
+    assert theirs.exists()
+
+
+@pytest.mark.usefixtures('packages')
+def test_one_failed_package_does_not_cost_the_others(
+    environment: Environment, layout: Layout, fake: Fake
+) -> None:
+    """What colcon built before an error is kept; the failed one is tried again."""
+    carry_out(plan(environment, Wish(build=False)), fake())
+    runner = fake()
+
+    def effect(arguments: list[str]) -> None:
+        runner.effect(arguments)
+        (layout.build / 'quad_msgs' / 'colcon_build.rc').write_text('1\n')
+
+    with pytest.raises(StepFailedError, match='quad_msgs'):
+        carry_out(plan(environment, Wish()), replace(runner, effect=effect))
+    assert titles(environment, Wish()) == ['Building quad_msgs']
+
+
+def test_interpreter_is_kept(environment: Environment, tmp_path: Path) -> None:
+    """`make PYTHON=...` once is enough; a vanished interpreter is replaced by the running one."""
+    wheels = environment.underlay
+    other = tmp_path / 'python3.12'
+    other.touch()
+    state = EnvironmentState('base', '', str(other))
+    assert choose_python('', wheels, state, environment.python) == str(other)
+    other.unlink()
+    assert choose_python('', wheels, state, environment.python) == probe(environment.python)
+
+
+def test_system_ros_decides_on_the_python(tmp_path: Path) -> None:
+    """The venv beside a system's ROS is made by the Python that this ROS is built for."""
+    name = f'python3.{probe("python3").version[1]}'
+    (tmp_path / 'lib' / name / 'site-packages' / 'rclpy').mkdir(parents=True)
+    chosen = choose_python('', Underlay(UnderlayKind.SYSTEM, tmp_path), None, '/bin/false')
+    assert isinstance(chosen, Interpreter)
+    assert chosen.name == name

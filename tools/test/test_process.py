@@ -1,0 +1,58 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+import sys
+
+import pytest
+
+from workspace.errors import NetworkError, StepFailedError
+from workspace.process import clean_environment, Runner
+
+
+def test_foreign_settings_do_not_leak() -> None:
+    """Another ROS, another environment and an outer make are left behind; the rest stays."""
+    foreign = {
+        'AMENT_PREFIX_PATH': '/opt/ros/humble',
+        'PYTHONPATH': '/opt/ros/humble/lib',
+        'LD_LIBRARY_PATH': '/opt/ros/humble/lib',
+        '_ROS_WHEELS_BOOTSTRAP_COMPLETE': '1',
+        'MAKEFLAGS': '--jobserver-auth=3,4',
+        'VIRTUAL_ENV': '/other',
+    }
+    cleaned = clean_environment({**foreign, 'HOME': '/home', 'HTTPS_PROXY': 'proxy'})
+    assert not foreign.keys() & cleaned.keys()
+    assert (cleaned['HOME'], cleaned['HTTPS_PROXY']) == ('/home', 'proxy')
+
+
+def test_chosen_lines_are_shown(runner: Runner, capsys: pytest.CaptureFixture[str]) -> None:
+    """Of a program's output a person sees what the filter picks."""
+    code = 'print("news"); print("noise")'
+    runner.run('it', [sys.executable, '-c', code], show=lambda line: 'news' in line)
+    assert capsys.readouterr().out.split() == ['news']
+
+
+def test_failure_shows_the_last_lines(runner: Runner) -> None:
+    """The message has the program's exit code and what it said last, stderr too."""
+    code = 'import sys; print("out"); sys.exit("cause")'
+    with pytest.raises(StepFailedError, match=r'(?s)it failed \(exit code 1\).*out.*cause'):
+        runner.run('it', [sys.executable, '-c', code])
+
+
+@pytest.mark.parametrize(
+    'said',
+    [
+        'dns error: failed to lookup address information: Name or service not known',
+        "NewConnectionError('Failed to establish a new connection: [Errno 101]')",
+        'tcp connect error: Connection refused (os error 111)',
+        'Temporary failure in name resolution',
+    ],
+)
+def test_missing_network_is_told_apart(runner: Runner, said: str) -> None:
+    """What pip and uv say without a network becomes one clear sentence."""
+    with pytest.raises(NetworkError, match='No network: it could not be downloaded'):
+        runner.run('it', [sys.executable, '-c', f'import sys; sys.exit({said!r})'])
+
+
+def test_a_hash_mismatch_is_no_network_problem(runner: Runner) -> None:
+    """A wrong file must not be taken for a missing connection."""
+    with pytest.raises(StepFailedError, match='Hash mismatch'):
+        runner.run('it', [sys.executable, '-c', 'import sys; sys.exit("Hash mismatch for numpy")'])

@@ -1,0 +1,94 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+import ast
+import importlib
+import os
+from pathlib import Path
+import subprocess
+import sys
+
+import pytest
+
+from workspace.layout import this_checkout
+from workspace.system import PYTHON_NEWEST, PYTHON_OLDEST
+
+TOOLS = this_checkout().root / 'tools'
+
+
+def workspace(*arguments: str, **environ: str) -> 'subprocess.CompletedProcess[str]':
+    """Run the set-up's program."""
+    return subprocess.run(
+        [sys.executable, '-m', 'workspace', *arguments],
+        cwd=TOOLS,
+        env={**os.environ, **environ},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def test_old_pythons_can_read_the_start() -> None:
+    """Python 3.6 parses __main__.py, and so can say that it is too old."""
+    source = (TOOLS / 'workspace' / '__main__.py').read_text()
+    ast.parse(source, feature_version=(3, 6))
+
+
+def test_start_and_checks_agree_on_the_supported_pythons() -> None:
+    """The numbers stand twice, because the start imports nothing."""
+    start = importlib.import_module('workspace.__main__')
+    assert (start.OLDEST, start.NEWEST) == (PYTHON_OLDEST, PYTHON_NEWEST)
+
+
+def test_another_interpreter_is_found_by_its_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A shim that does not work is passed over for the next version."""
+    start = importlib.import_module('workspace.__main__')
+    shim, works = tmp_path / 'python3.14', tmp_path / 'python3.13'
+    shim.write_text('#!/bin/sh\nexit 127\n')
+    works.write_text(f'#!/bin/sh\nexec {sys.executable} "$@"\n')
+    for path in (shim, works):
+        path.chmod(0o755)
+    monkeypatch.setenv('PATH', str(tmp_path))
+    assert start._another() == str(works)
+
+
+def test_wrong_python_is_an_error_without_traceback() -> None:
+    """`make PYTHON=nothing` ends with words and exit code 1."""
+    done = workspace('--python', '/nonexistent/python', 'missing')
+    assert done.returncode == 1
+    assert done.stderr.startswith('error: /nonexistent/python does not start.')
+    assert 'Traceback' not in done.stderr
+
+
+def test_wrong_package_is_an_error_without_traceback() -> None:
+    """A package that is not there is named before anything is done."""
+    done = workspace('build', 'no_such_package')
+    assert done.returncode == 1
+    assert 'no package no_such_package' in done.stderr
+    assert 'Traceback' not in done.stderr
+
+
+@pytest.mark.parametrize('arguments', [[], ['unknown'], ['build', '--unknown']])
+def test_usage_errors(arguments: list[str]) -> None:
+    """Wrong arguments end with code 2 and the usage."""
+    done = workspace(*arguments)
+    assert done.returncode == 2
+    assert 'usage: workspace' in done.stderr
+
+
+@pytest.mark.parametrize('target', ['demo', 'test', 'build', 'lint', 'bench', 'clean', 'setup'])
+def test_makefile_has_the_target_and_explains_it(target: str) -> None:
+    """`make` alone names every target."""
+    makefile = ['make', '--no-print-directory', '-C', str(TOOLS.parent)]
+    shown = subprocess.run([*makefile, 'help'], check=True, capture_output=True, text=True).stdout
+    assert f'make {target} ' in shown
+    subprocess.run([*makefile, '--dry-run', target], check=True, capture_output=True)
+
+
+def test_demo_passes_the_duration_on() -> None:
+    """DURATION=20 becomes --duration 20, and without it there is no such option."""
+    makefile = ['make', '--no-print-directory', '-C', str(TOOLS.parent), '--dry-run', 'demo']
+    for variables, expected in (([], False), (['DURATION=20'], True)):
+        shown = subprocess.run([*makefile, *variables], check=True, capture_output=True, text=True)
+        assert ('demo panda --duration 20' in shown.stdout) == expected

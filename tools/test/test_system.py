@@ -1,0 +1,105 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+from dataclasses import replace
+from pathlib import Path
+import sys
+
+import pytest
+
+from workspace.errors import MissingPackagesError, UnsupportedSystemError
+from workspace.interpreter import Interpreter, probe
+from workspace.system import check_supported, missing_packages, SYSTEM_ROS_PACKAGES
+from workspace.underlay import Underlay, UnderlayKind
+
+PYTHON = Interpreter('/usr/bin/python3.11', (3, 11), 'x86_64', has_headers=True, has_venv=True)
+WHEELS = Underlay(UnderlayKind.WHEELS, Path('/checkout/.venv'))
+ROOT = Path('/checkout')
+
+
+def everything(name: str) -> str:
+    """Find every program."""
+    return f'/usr/bin/{name}'
+
+
+def nothing(_name: str) -> None:
+    """Find no program."""
+
+
+def test_complete_system_lacks_nothing() -> None:
+    """No package is named where all is there."""
+    assert missing_packages(WHEELS, PYTHON, everything) == ()
+
+
+def test_all_that_is_missing_is_named_at_once() -> None:
+    """Compiler, git and the parts of the right Python stand in one apt-get line."""
+    bare = replace(PYTHON, has_headers=False, has_venv=False)
+    missing = missing_packages(WHEELS, bare, nothing)
+    assert missing == ('g++', 'git', 'python3.11-venv', 'python3.11-dev')
+    line = 'sudo apt-get install g++ git python3.11-venv python3.11-dev'
+    assert line in str(MissingPackagesError(missing))
+
+
+def test_packages_of_an_incomplete_system_ros_are_named(tmp_path: Path) -> None:
+    """Beside /opt/ros/jazzy the ROS packages that it lacks are named as apt knows them."""
+    index = tmp_path / 'share/ament_index/resource_index/packages'
+    index.mkdir(parents=True)
+    for name in set(SYSTEM_ROS_PACKAGES) - {'rosidl_default_generators'}:
+        (index / name).touch()
+    missing = missing_packages(Underlay(UnderlayKind.SYSTEM, tmp_path), PYTHON, everything)
+    assert missing == ('ros-jazzy-rosidl-default-generators',)
+
+
+def test_another_compiler_will_do() -> None:
+    """Clang alone is no reason to ask for g++."""
+    found = missing_packages(WHEELS, PYTHON, lambda name: None if 'g++' in name else name)
+    assert found == ()
+
+
+def test_incomplete_python_that_apt_does_not_know() -> None:
+    """No apt-get line can complete an interpreter that was built by hand."""
+    with pytest.raises(UnsupportedSystemError, match='without venv'):
+        missing_packages(
+            WHEELS, replace(PYTHON, path='/opt/bin/python3', has_venv=False), everything
+        )
+
+
+@pytest.mark.parametrize(
+    ('python', 'root', 'words'),
+    [
+        (replace(PYTHON, version=(3, 9)), ROOT, r'3\.9.*not supported'),
+        (replace(PYTHON, version=(3, 15)), ROOT, r'3\.15.*not supported'),
+        (replace(PYTHON, machine='aarch64'), ROOT, 'no ROS wheels for aarch64'),
+        (PYTHON, Path('/my checkout'), 'has a space'),
+    ],
+)
+def test_unsupported_systems_are_refused(python: Interpreter, root: Path, words: str) -> None:
+    """Each refusal names the cause, and says what to do in a second line."""
+    with pytest.raises(UnsupportedSystemError, match=words) as caught:
+        check_supported(WHEELS, python, root)
+    assert caught.value.remedy
+
+
+@pytest.mark.parametrize('minor', range(10, 15))
+def test_supported_versions(minor: int) -> None:
+    """Python 3.10 to 3.14 are accepted."""
+    check_supported(WHEELS, replace(PYTHON, version=(3, minor)), ROOT)
+
+
+def test_any_machine_will_do_with_the_systems_ros(tmp_path: Path) -> None:
+    """A Raspberry Pi with /opt/ros/jazzy needs no wheels."""
+    system = Underlay(UnderlayKind.SYSTEM, tmp_path)
+    check_supported(system, replace(PYTHON, machine='aarch64'), ROOT)
+
+
+def test_probe_looks_through_a_virtual_environment() -> None:
+    """The interpreter below is found, so that .venv is never made from itself."""
+    found = probe(sys.executable)
+    assert found.version == sys.version_info[:2]
+    assert Path(found.path).resolve() == Path(sys.executable).resolve()
+    assert not Path(found.path).is_relative_to(sys.prefix) or sys.prefix == sys.base_prefix
+
+
+def test_probe_refuses_what_is_no_python() -> None:
+    """A wrong PYTHON=... is answered with words."""
+    with pytest.raises(UnsupportedSystemError, match='does not start'):
+        probe('/bin/false')

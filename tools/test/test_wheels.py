@@ -1,0 +1,92 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+from pathlib import Path
+import subprocess
+import sys
+
+from hypothesis import given
+from hypothesis import strategies as st
+import pytest
+
+from workspace.wheels import (
+    BOOTSTRAP_FILE,
+    BOOTSTRAP_LINE,
+    library_folders,
+    mend_bootstrapper,
+    mend_cmake_files,
+    mend_cmake_text,
+)
+
+BUILDER = '/opt/python/cp311-cp311'
+EXPORTED = (
+    f'INTERFACE_INCLUDE_DIRECTORIES "{BUILDER}/include/python3.11;'
+    f'{BUILDER}/lib/python3.11/site-packages/numpy/_core/include;/usr/include"'
+)
+
+
+def test_builder_paths_become_ours() -> None:
+    """Both folders are replaced, and what else stands in the line stays."""
+    mended = mend_cmake_text(EXPORTED, '/inc', '/np')
+    assert mended == 'INTERFACE_INCLUDE_DIRECTORIES "/inc;/np;/usr/include"'
+
+
+@given(st.text(alphabet='/abpython3.1;"\n ', max_size=60))
+def test_mending_twice_is_mending_once(text: str) -> None:
+    """The fix-up is idempotent, also for text with a path or two in it."""
+    once = mend_cmake_text(EXPORTED + text, '/inc', '/np')
+    assert mend_cmake_text(once, '/inc', '/np') == once
+
+
+def test_only_files_that_need_it_are_written(tmp_path: Path) -> None:
+    """A second run changes nothing, and a hard link into a cache keeps its contents."""
+    share = tmp_path / 'share' / 'rclpy' / 'cmake'
+    share.mkdir(parents=True)
+    (share / 'clean.cmake').write_text('nothing')
+    cached = tmp_path / 'cached'
+    cached.write_text(EXPORTED)
+    (share / 'export.cmake').hardlink_to(cached)
+    assert [mend_cmake_files(tmp_path, '/inc', '/np') for _ in range(2)] == [1, 0]
+    assert cached.read_text() == EXPORTED
+    assert BUILDER not in (share / 'export.cmake').read_text()
+
+
+def test_libraries_are_those_beside_the_ros_packages(tmp_path: Path) -> None:
+    """The library path has the prefix first, then the bundled libraries."""
+    site = tmp_path / 'site-packages'
+    for name in ('ros_rclpy.libs', 'numpy.libs'):
+        (site / name).mkdir(parents=True)
+    assert library_folders(tmp_path, site) == [tmp_path / 'lib', site / 'ros_rclpy.libs']
+
+
+@pytest.fixture
+def bootstrapped(tmp_path: Path) -> list[str]:
+    """A command that starts an interpreter as site does with our line and a fake bootstrapper."""
+    (tmp_path / 'ros_wheels_bootstrapper.py').write_text('print("bootstrapped")\n')
+    (tmp_path / BOOTSTRAP_FILE).write_text('import ros_wheels_bootstrapper\n')
+    mend_bootstrapper(tmp_path)
+    assert (tmp_path / BOOTSTRAP_FILE).read_text() == BOOTSTRAP_LINE
+    folder = repr(str(tmp_path))
+    code = f'import site, sys; sys.path.insert(0, {folder}); site.addsitedir({folder})'
+    return [sys.executable, '-S', '-c', code]
+
+
+@pytest.mark.parametrize(
+    ('library_path', 'starts'),
+    [('{prefix}/lib', 0), ('/other:{prefix}/lib', 0), ('', 1), ('{prefix}/library', 1)],
+)
+def test_interpreter_restarts_only_without_the_library_path(
+    bootstrapped: list[str], library_path: str, starts: int
+) -> None:
+    """The library path decides; the guard that another environment left does not."""
+    prefix = subprocess.run(
+        [*bootstrapped[:-2], '-c', 'import sys; print(sys.prefix)'],
+        check=True,
+        capture_output=True,
+        text=True,
+    ).stdout.strip()
+    environ = {
+        'LD_LIBRARY_PATH': library_path.format(prefix=prefix),
+        '_ROS_WHEELS_BOOTSTRAP_COMPLETE': '1',
+    }
+    result = subprocess.run(bootstrapped, check=True, capture_output=True, text=True, env=environ)
+    assert result.stdout.count('bootstrapped') == starts
