@@ -2,11 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Texts of EDS and bus.yml files that the tests of the configuration start from."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from arm_canopen.config import BusConfig, load_bus
+from arm_canopen.config import BusConfig, load_bus, Problem
+from arm_canopen.exceptions import ConfigError
 
 ARTICLE_BUS = Path(__file__).parent / 'data' / 'panda' / 'bus.yml'
 
@@ -170,3 +171,11 @@ def write_bus(folder: Path, text: str = BUS, *, eds: str | None = None) -> Path:
 def load_text(folder: Path, text: str = BUS, *, eds: str | None = None) -> BusConfig:
     """Write and load a bus."""
     return load_bus(write_bus(folder, text, eds=eds))
+
+
+def outcome(load: Callable[[], tuple[Problem, ...]]) -> tuple[Problem, ...]:
+    """Return the warnings of what could be loaded, the errors of what could not."""
+    try:
+        return load()
+    except ConfigError as error:
+        return error.problems

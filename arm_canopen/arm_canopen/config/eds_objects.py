@@ -133,6 +133,9 @@ class ObjectReader:
     def _data_type(self, section: IniSection, code: ObjectCode) -> DataType:
         missing = DataType.DOMAIN
         number = self._number(section, 'datatype', missing if code is ObjectCode.DOMAIN else 0)
+        # CANFestival's editor defines limited types of its own whose sub-index 1 is the real one
+        if derived := self._parts.get(number, {}).get(1):
+            number = self._number(derived, 'defaultvalue', number)
         try:
             return DataType(number)
         except ValueError:
