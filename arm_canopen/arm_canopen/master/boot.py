@@ -114,12 +114,12 @@ class BootProcess:
             await self._configure(pdo, Index.TPDO_COMMUNICATION, Index.TPDO_MAPPING)
         for write in node.config.sdo_writes:
             await self._write(write)
-        await self._await_heartbeat()
         self._enter(BootPhase.STARTING)
         if self._start:
             self._send_nmt(NmtCommand.START, node.config.node_id)
         node.online = True
-        node.supervise()
+        # not waiting for the first heartbeat saves its period; its absence is noticed all the same
+        node.supervise(self._scheduler.now)
         self._told = ''
         self._enter(BootPhase.OPERATIONAL)
         node.report(EventKind.BOOT, Severity.INFO, 'operational')
@@ -166,21 +166,6 @@ class BootProcess:
     async def _write(self, write: SdoWrite) -> None:
         self._enter(BootPhase.CONFIGURING, f'0x{write.index:04X}:{write.subindex:02X}')
         await self._node.sdo.write(write.index, write.subindex, write.data, self._sdo_timeout)
-
-    async def _await_heartbeat(self) -> None:
-        node = self._node
-        timeout = node.config.heartbeat_timeout
-        if timeout <= 0:
-            return
-        self._enter(BootPhase.ERROR_CONTROL)
-        since = self._scheduler.now
-        try:
-            await self._scheduler.until(lambda: node.last_heartbeat >= since, timeout)
-        except TimeoutError:
-            raise BootError(
-                f'{node.name} (node {node.config.node_id}) sent no heartbeat within {timeout:g} s '
-                'although 0x1017 was written; does another node use its COB-ID?'
-            ) from None
 
     def _read(self, index: int, subindex: int) -> Promise[bytes]:
         return self._node.sdo.read(index, subindex, self._sdo_timeout)

@@ -177,16 +177,20 @@ class Network:
         node.on_boot_up = lambda: self._booted(node)
 
     def _booted(self, node: RemoteNode) -> None:
+        self._end_boot(node)
         if node.online:
             node.lost('restarted: a boot-up message came while it was operational')
         else:
             node.offline('the device restarted')
         self._start_boot(node, announced=True)
 
-    def _start_boot(self, node: RemoteNode, *, announced: bool) -> None:
+    def _end_boot(self, node: RemoteNode) -> None:
         running = self._boot_tasks.get(node.name)
         if running is not None:
             running.cancel(SdoError('the boot starts again'))
+
+    def _start_boot(self, node: RemoteNode, *, announced: bool) -> None:
+        self._end_boot(node)
         task = self.scheduler.spawn(self._boots[node.name].run(announced=announced))
         self._boot_tasks[node.name] = task
 

@@ -28,7 +28,6 @@ class BootPhase(Enum):
     WAITING = 'waiting for the device'
     IDENTITY = 'checking its identity'
     CONFIGURING = 'configuring'
-    ERROR_CONTROL = 'waiting for its heartbeat'
     STARTING = 'starting'
     OPERATIONAL = 'operational'
     FAILED = 'failed'
@@ -176,9 +175,14 @@ class RemoteNode:
             self.last_emergency = emergency
             self.report(EventKind.EMERGENCY, Severity.ERROR, f'EMCY: {emergency}')
 
-    def supervise(self) -> None:
-        """Watch the heartbeat from now on, when it is configured."""
+    def supervise(self, now: float) -> None:
+        """Watch the heartbeat from now on, when it is configured.
+
+        Args:
+            now: Steady time in [s], from which the first heartbeat is awaited.
+        """
         self._supervised = self.config.heartbeat_timeout > 0
+        self.last_heartbeat = now
 
     def heartbeat_overdue(self, now: float) -> bool:
         """Tell whether a supervised heartbeat did not come within its consumer time."""
