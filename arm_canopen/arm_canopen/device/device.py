@@ -1,0 +1,256 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""A simulated CANopen device, driven by calls: it owns no bus, no thread and no clock."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from ..can.frame import Frame
+from ..standard.cob_id import CobId, NODE_ID_MAX, NODE_ID_MIN
+from ..standard.dictionary import ObjectDictionary
+from ..standard.nmt import NmtCommand, NmtState
+from ..standard.objects import Index
+from .drive import Drive
+from .emcy_producer import EmcyProducer
+from .heartbeat import HeartbeatConsumer, HeartbeatProducer
+from .nmt_slave import boot_up_frame, NmtSlave
+from .object_store import ObjectStore
+from .rpdo import RpdoEngine
+from .sdo_server import SdoServer
+from .servo import ServoModel
+from .sync_consumer import SyncConsumer
+from .timed import Timed
+from .tpdo import TpdoEngine
+
+Handler = Callable[[Frame, float], None]
+
+HEARTBEAT_ERROR = 0x8130
+SYNC_LENGTH_ERROR = 0x8240
+COMMUNICATION_OBJECTS = (0x1000, 0x1FFF)
+ALL_OBJECTS = (0x0000, 0xFFFF)
+ERROR_STATES: dict[int, NmtState] = {0: NmtState.PRE_OPERATIONAL, 2: NmtState.STOPPED}
+"""Where a communication error leads from Operational (CiA 301, 7.5.2.33); 1 leads nowhere."""
+
+
+class Device:
+    """A CANopen device made from its object dictionary; with 0x6040 in it, it is a drive.
+
+    Call :meth:`advance` once to switch it on, then whenever :attr:`deadline` is due, and
+    :meth:`receive` for each frame. All times are on the steady clock in [s].
+
+    Attributes:
+        node_id: CANopen node id.
+        store: Present values of all objects.
+        drive: The axis, None when the device is no drive.
+        handlers: What it does with the frames of each identifier, in its present NMT state;
+            another mapping takes its place when that changes.
+    """
+
+    def __init__(
+        self,
+        node_id: int,
+        dictionary: ObjectDictionary,
+        send: Callable[[Frame], None],
+        *,
+        boot_time: float = 0.0,
+        servo: ServoModel | None = None,
+        handlers_changed: Callable[[], None] | None = None,
+    ) -> None:
+        """Build a device that is switched off.
+
+        Args:
+            node_id: CANopen node id, 1 to 127.
+            dictionary: Its objects, as load_eds reads them.
+            send: Takes the frames that it sends.
+            boot_time: How long its start takes in [s].
+            servo: Time constants of the motor.
+            handlers_changed: Called when :attr:`handlers` is another mapping.
+
+        Raises:
+            ValueError: The node id is out of range.
+        """
+        if not NODE_ID_MIN <= node_id <= NODE_ID_MAX:
+            raise ValueError(f'node id {node_id} is not {NODE_ID_MIN} to {NODE_ID_MAX}')
+        self.node_id = node_id
+        self.handlers: Mapping[int, Handler] = {}
+        self.store = ObjectStore(dictionary.for_node(node_id))
+        self._send = send
+        self._handlers_changed = handlers_changed
+        store = self.store
+        self._nmt = NmtSlave(node_id, self, boot_time)
+        self._errors = EmcyProducer(store, send)
+        self._sync = SyncConsumer(store, self._on_sync, self._on_sync_length, self._subscribe)
+        is_drive = (Index.CONTROLWORD, 0) in store
+        self.drive: Drive | None = (
+            Drive(store, self._errors, self._sync, servo or ServoModel()) if is_drive else None
+        )
+        self._sdo = SdoServer(node_id, store, send)
+        self._producer = HeartbeatProducer(node_id, store, lambda: self._nmt.state, send)
+        self._consumer = HeartbeatConsumer(
+            store, self._on_heartbeat_lost, self._on_heartbeat_back, self._subscribe
+        )
+        self._error_behaviour = store.integer(Index.ERROR_BEHAVIOUR, 1)
+        self._rpdos = RpdoEngine(store, self._on_pdo_changed, self._on_error)
+        self._tpdos = TpdoEngine(store, self._on_pdo_changed, send)
+        parts: list[Timed] = [
+            self._nmt,
+            self._sdo,
+            self._errors,
+            self._consumer,
+            self._producer,
+            self._rpdos,
+            self._tpdos,
+        ]
+        self._parts: list[Timed] = parts if self.drive is None else [*parts, self.drive]
+
+    @property
+    def nmt_state(self) -> NmtState:
+        """NMT state; BOOT_UP stands for Initialisation."""
+        return self._nmt.state
+
+    @property
+    def deadline(self) -> float:
+        """Steady time in [s] at which :meth:`advance` has something to do."""
+        return min(part.deadline for part in self._parts)
+
+    def next_deadline(self) -> float | None:
+        """Return :attr:`deadline`, or None when the device waits for frames only."""
+        deadline = self.deadline
+        return None if deadline == float('inf') else deadline
+
+    def receive(self, frame: Frame, now: float) -> None:
+        """Take a frame from the bus; what is not for this device is ignored."""
+        if frame.is_extended or frame.is_error:
+            return
+        if frame.is_remote:
+            self._tpdos.request(frame.can_id, now)
+            return
+        handler = self.handlers.get(frame.can_id)
+        if handler is not None:
+            handler(frame, now)
+
+    def advance(self, now: float) -> None:
+        """Do what is due at steady time ``now`` in [s]."""
+        self._refresh(now)
+        for part in self._parts:
+            if part.deadline <= now:
+                part.advance(now)
+        self._tpdos.poll(now)
+
+    def reset(self, command: NmtCommand, now: float) -> None:
+        """Return to the defaults of the whole device or of its communication (from NMT)."""
+        whole = command is NmtCommand.RESET_NODE
+        self._producer.stop()
+        self._rpdos.stop(now)
+        self._tpdos.stop()
+        self.store.restore(*(ALL_OBJECTS if whole else COMMUNICATION_OBJECTS))
+        self._errors.reset()
+        self._errors.allow(False, now)
+        self._sdo.reset()
+        self._sync.reset()
+        self._rpdos.configure()
+        self._tpdos.configure()
+        if self.drive is not None:
+            if whole:
+                self.drive.reset(now)
+            else:
+                self.drive.connection_lost(now)
+                for code in sorted(self.drive.faults):
+                    self._errors.report(code, now)
+        self._consumer.reset()
+        self._subscribe()
+
+    def nmt_changed(self, previous: NmtState, now: float) -> None:
+        """Start and stop services as the NMT state asks (from NMT; CiA 301, table 46)."""
+        state = self._nmt.state
+        if previous is NmtState.BOOT_UP:
+            self._send(boot_up_frame(self.node_id))
+            self._producer.start(now)
+            if self.drive is not None:
+                self.drive.start(now)
+        if state is NmtState.STOPPED:
+            self._sdo.reset()
+            if self.drive is not None:
+                self.drive.connection_lost(now)
+        self._errors.allow(state is not NmtState.STOPPED, now)
+        if state is NmtState.OPERATIONAL:
+            self._rpdos.start()
+            self._tpdos.start(now)
+        else:
+            self._rpdos.stop(now)
+            self._tpdos.stop()
+        self._subscribe()
+
+    def _subscribe(self) -> None:
+        """Offer the services of the present NMT state (CiA 301, table 46)."""
+        state = self._nmt.state
+        handlers: dict[int, Handler] = {CobId.NMT: self._nmt.receive}
+        if state is not NmtState.BOOT_UP:
+            handlers.update(dict.fromkeys(self._consumer.can_ids, self._consumer.receive))
+        if state in (NmtState.PRE_OPERATIONAL, NmtState.OPERATIONAL):
+            handlers[self._sdo.can_id] = self._on_sdo
+            handlers[self._sync.can_id] = self._sync.receive
+        if state is NmtState.OPERATIONAL:
+            handlers.update(self._pdo_handlers())
+        self.handlers = handlers
+        if self._handlers_changed is not None:
+            self._handlers_changed()
+
+    def _pdo_handlers(self) -> dict[int, Handler]:
+        receivers: dict[int, list[Handler]] = {}
+        for rpdo in self._rpdos.active:
+            receivers.setdefault(rpdo.can_id, []).append(rpdo.receive)
+        return {can_id: self._rpdo_handler(*chain) for can_id, chain in receivers.items()}
+
+    def _rpdo_handler(self, *receivers: Handler) -> Handler:
+        def handle(frame: Frame, now: float) -> None:
+            for receive in receivers:
+                receive(frame, now)
+            self._tpdos.poll(now)
+
+        return handle
+
+    def _refresh(self, now: float) -> None:
+        """Let the objects hold the values of this time."""
+        if self.drive is not None:
+            self.drive.advance(now)
+
+    def _on_sdo(self, frame: Frame, now: float) -> None:
+        self._refresh(now)
+        self._sdo.receive(frame, now)
+        self._tpdos.poll(now)
+
+    def _on_sync(self, counter: int, now: float) -> None:
+        # inputs are sampled before outputs act, as at the SYNC of a real device
+        self._refresh(now)
+        self._tpdos.sync(counter, now)
+        self._rpdos.sync(now)
+        if self.drive is not None:
+            self.drive.sync(now)
+        self._tpdos.poll(now)
+
+    def _on_sync_length(self, wrong: bool, now: float) -> None:
+        self._on_error(SYNC_LENGTH_ERROR, wrong, now)
+
+    def _on_error(self, code: int, present: bool, now: float) -> None:
+        if present:
+            self._errors.report(code, now)
+        else:
+            self._errors.clear(code, now)
+
+    def _on_pdo_changed(self, _now: float) -> None:
+        self._subscribe()
+
+    def _on_heartbeat_lost(self, node_id: int, now: float) -> None:
+        self._errors.report(HEARTBEAT_ERROR, now, bytes((node_id, 0, 0, 0, 0)))
+        if self.drive is not None:
+            self.drive.connection_lost(now)
+        target = ERROR_STATES.get(self._error_behaviour.value)
+        if target is not None and self._nmt.state is NmtState.OPERATIONAL:
+            self._nmt.enter(target, now)
+
+    def _on_heartbeat_back(self, _node_id: int, now: float) -> None:
+        latched = self.drive is not None and HEARTBEAT_ERROR in self.drive.faults
+        if not latched and not self._consumer.missing:
+            self._errors.clear(HEARTBEAT_ERROR, now)

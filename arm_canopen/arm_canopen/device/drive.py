@@ -1,0 +1,290 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""A simulated drive: state machine, modes of operation, faults and a motor (CiA 402-2).
+
+The drive looks at its axis when SYNC comes, and otherwise every few milliseconds while anything
+moves or has to be waited for. How often it looks has no influence on the motion, which is known
+in closed form.
+"""
+
+from __future__ import annotations
+
+from ..standard.drive import Controlword, STATE_WORDS, Statusword
+from ..standard.drive import DriveState as State
+from .axis import Axis
+from .drive_objects import DriveObjects, MILLISECOND, NO_WINDOW
+from .drive_state import AbortConnectionOption, FAULT_RESET_BIT, StopOption
+from .emcy_producer import EmcyProducer
+from .modes.mode import Dwell, Mode, SyncClock, TARGET_REACHED
+from .modes.selection import ModeSelection
+from .object_store import ObjectStore
+from .servo import ServoModel
+from .state_machine import chosen, POWERED_STATES, StateMachine, VOLTAGE_STATES
+from .timed import NEVER
+
+FOLLOWING_ERROR_CODE = 0x8611
+UNDER_VOLTAGE_CODE = 0x3220
+CONNECTION_CODE = 0x8130
+
+CONTROL_PERIOD = 0.005  # [s] how often the drive looks at its axis without SYNC
+SYNC_PERIOD_MAX = 0.02  # [s] a slower SYNC is not what the drive waits for
+SYNC_PATIENCE = 1.5  # periods that it waits for a SYNC
+
+HALT = int(Controlword.HALT)
+VOLTAGE_ENABLED = int(Statusword.VOLTAGE_ENABLED)
+REMOTE = int(Statusword.REMOTE)
+INTERNAL_LIMIT = int(Statusword.INTERNAL_LIMIT)
+FOLLOWING_ERROR = int(Statusword.FOLLOWING_ERROR)
+
+
+class Drive:
+    """One axis of a device.
+
+    Attributes:
+        deadline: Steady time in [s] at which it wants to look at its axis.
+        faults: Codes of the faults since the last fault reset.
+    """
+
+    def __init__(
+        self, store: ObjectStore, errors: EmcyProducer, clock: SyncClock, model: ServoModel
+    ) -> None:
+        """Work on the objects of a device.
+
+        Args:
+            store: Objects of the device.
+            errors: Told of faults.
+            clock: What is known of SYNC.
+            model: Time constants of the motor.
+        """
+        self.deadline = NEVER
+        self.faults: set[int] = set()
+        self._objects = objects = DriveObjects(store)
+        self._errors = errors
+        self._clock = clock
+        self._axis = Axis(model)
+        self._machine = StateMachine(objects, self._axis, self._begin_mode)
+        self._modes = ModeSelection(objects, self._axis, clock)
+        self._following = Dwell()
+        self._word = 0
+        self._idle = True
+        objects.mode.listener = self._on_mode
+        objects.controlword.listener = self._on_controlword
+        objects.max_velocity.listener = self._on_max_velocity
+        for target in (
+            objects.target_position,
+            objects.target_velocity,
+            objects.interpolation_target,
+        ):
+            target.listener = self._on_setpoint
+
+    @property
+    def state(self) -> State:
+        """State of the power drive system."""
+        return self._machine.state
+
+    @property
+    def _mode(self) -> Mode:
+        return self._modes.current
+
+    @property
+    def position(self) -> float:
+        """Where the motor is in [inc]."""
+        return self._axis.position
+
+    @property
+    def velocity(self) -> float:
+        """How fast the motor turns in [inc/s]."""
+        return self._axis.velocity
+
+    def reset(self, now: float) -> None:
+        """Start anew with the objects as they are; the motor stays where it is."""
+        self._axis.advance(now)
+        self._machine.reset()
+        self._word = 0
+        self.faults.clear()
+        self._following.clear()
+        self._modes.reset()
+        self._axis.speed = self._objects.speed
+        self._publish(now)
+
+    def start(self, now: float) -> None:
+        """Become ready for commands; the device has started."""
+        self._machine.start()
+        self._publish(now)
+
+    def advance(self, now: float) -> None:
+        """Go on to a time; nothing is to be done while the axis rests."""
+        if not self._idle:
+            self._move(now)
+            self._publish(now)
+
+    def sync(self, now: float) -> None:
+        """Take a set-point with SYNC; :meth:`advance` was called for this time before."""
+        if self._machine.operating and self._mode.sync(now):
+            self._schedule(now)
+
+    def raise_fault(self, code: int, now: float | None = None) -> None:
+        """Let a fault happen.
+
+        Args:
+            code: Error code for 0x603F and EMCY.
+            now: Steady time in [s]; by default when the drive last looked at its axis.
+        """
+        now = self._axis.time if now is None else now
+        self._move(now)
+        self._fail(code, now)
+        self._publish(now)
+
+    def set_voltage(self, present: bool, now: float | None = None) -> None:
+        """Supply the power stage, or cut its supply: a fault if the drive is switched on.
+
+        Args:
+            present: There is voltage.
+            now: Steady time in [s]; by default when the drive last looked at its axis.
+        """
+        now = self._axis.time if now is None else now
+        self._move(now)
+        self._machine.set_voltage(present, now)
+        if not present and self._machine.state in VOLTAGE_STATES:
+            self._fail(UNDER_VOLTAGE_CODE, now)
+        self._publish(now)
+
+    def connection_lost(self, now: float) -> None:
+        """React as 0x6007 says to the loss of the master, if the motor has torque."""
+        if self._machine.state not in POWERED_STATES:
+            return
+        self._move(now)
+        match chosen(self._objects.abort_connection, AbortConnectionOption.FAULT):
+            case AbortConnectionOption.FAULT:
+                self._fail(CONNECTION_CODE, now)
+            case AbortConnectionOption.DISABLE_VOLTAGE:
+                self._machine.disable()
+            case AbortConnectionOption.QUICK_STOP if self._machine.operating:
+                self._machine.quick_stop()
+        self._publish(now)
+
+    def _move(self, now: float) -> None:
+        """Advance the axis to a time, and what depends on where it is."""
+        while self._machine.operating and self._mode.next_event <= now:
+            event = self._mode.next_event
+            self._axis.advance(event)
+            self._mode.event(event)
+        self._axis.advance(now)
+        if self._machine.operating:
+            self._mode.update(now)
+        self._watch_following_error(now)
+        self._machine.advance(now)
+
+    def _watch_following_error(self, now: float) -> None:
+        if self._machine.state not in POWERED_STATES:
+            return
+        window = self._objects.following_window.value
+        beyond = 0 < window < NO_WINDOW and abs(self._axis.following_error) > window
+        timeout = self._objects.following_timeout.value * MILLISECOND
+        self._following.update(beyond, timeout, now)
+        if self._following.reached:
+            self._fail(FOLLOWING_ERROR_CODE, now)
+
+    def _fail(self, code: int, now: float) -> None:
+        self.faults.add(code)
+        self._objects.error_code.put(code)
+        self._machine.fault()
+        self._errors.report(code, now)
+
+    def _reset_fault(self, now: float) -> None:
+        for code in sorted(self.faults):
+            self._errors.clear(code, now)
+        self.faults.clear()
+        self._following.clear()
+        self._objects.error_code.put(0)
+        self._machine.reset_fault()
+
+    def _on_controlword(self, now: float) -> None:
+        word, previous = self._objects.controlword.value, self._word
+        if word == previous:
+            return
+        self._move(now)
+        self._word = word
+        if word & ~previous & FAULT_RESET_BIT and self._machine.state is State.FAULT:
+            self._reset_fault(now)
+        self._machine.command(word, now)
+        if self._machine.operating:
+            self._obey_halt(now)
+            self._mode.command(word, previous, now)
+            self._mode.update(now)
+        self._publish(now)
+
+    def _obey_halt(self, now: float) -> None:
+        halted = bool(self._word & HALT)
+        if halted is self._mode.halted:
+            return
+        self._mode.halted = halted
+        if halted:
+            option = chosen(self._objects.halt_option, StopOption.SLOW_DOWN)
+            self._axis.stop(self._machine.deceleration(option))
+            self._mode.halt(now)
+        else:
+            self._mode.resume(now)
+
+    def _on_setpoint(self, now: float) -> None:
+        if self._machine.operating and self._mode.setpoint(now):
+            self._schedule(now)
+
+    def _on_max_velocity(self, now: float) -> None:
+        self._move(now)
+        self._axis.speed = self._objects.speed
+
+    def _on_mode(self, now: float) -> None:
+        self._move(now)
+        if not self._modes.select():
+            return
+        if self._machine.operating:
+            self._begin_mode(now)
+        self._publish(now)
+
+    def _begin_mode(self, now: float) -> None:
+        self._mode.halted = bool(self._word & HALT)
+        self._mode.start(self._word, now)
+        self._mode.update(now)
+
+    def _publish(self, now: float) -> None:
+        """Write what can be seen from outside, and decide when to look again."""
+        objects, axis = self._objects, self._axis
+        objects.statusword.value = self._statusword()
+        objects.position_actual.put(axis.position)
+        objects.velocity_actual.put(axis.velocity)
+        objects.position_demand.put(axis.demand.position)
+        objects.velocity_demand.put(axis.demand.velocity)
+        objects.following_error.put(axis.following_error)
+        self._schedule(now)
+
+    def _statusword(self) -> int:
+        state = self._machine.state
+        word = STATE_WORDS[state] | REMOTE
+        if self._machine.voltage:
+            word |= VOLTAGE_ENABLED
+        if self._axis.speed_limited or (self._machine.operating and self._mode.limited):
+            word |= INTERNAL_LIMIT
+        if FOLLOWING_ERROR_CODE in self.faults:
+            word |= FOLLOWING_ERROR
+        if state is State.OPERATION_ENABLED:
+            word |= self._mode.status()
+            if self._mode.halted:
+                # during halt "target reached" says that the axis stands (CiA 402-2, table 30)
+                word = word & ~TARGET_REACHED | (TARGET_REACHED if self._axis.settled else 0)
+        elif state is State.QUICK_STOP_ACTIVE and self._axis.settled:
+            word |= TARGET_REACHED
+        return word
+
+    def _schedule(self, now: float) -> None:
+        operating = self._machine.operating
+        self._idle = self._axis.settled and not (operating and self._mode.waiting)
+        if self._idle:
+            self.deadline = NEVER
+            return
+        period = CONTROL_PERIOD
+        if self._clock.period <= SYNC_PERIOD_MAX and self._clock.alive(now):
+            period = SYNC_PATIENCE * self._clock.period
+        self.deadline = now + period
+        if now < self._axis.motion.end < self.deadline:
+            self.deadline = self._axis.motion.end

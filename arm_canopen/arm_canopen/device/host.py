@@ -1,0 +1,118 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Several simulated devices on one bus."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+
+from ..can.frame import Frame
+from ..standard.dictionary import ObjectDictionary
+from .device import Device, Handler
+from .servo import ServoModel
+from .timed import NEVER
+
+
+class DeviceHost:
+    """Devices that share a connection to a bus; they hear each other too.
+
+    A bus object never receives what it sent itself, so the frames of one device are handed to
+    the others here. Each frame goes straight to those who want its identifier.
+
+    Attributes:
+        devices: In the order in which they were added.
+    """
+
+    def __init__(self, send: Callable[[Frame], None]) -> None:
+        """Begin without devices.
+
+        Args:
+            send: Takes the frames for the bus.
+        """
+        self.devices: list[Device] = []
+        self._send = send
+        self._table: dict[int, list[tuple[Device, Handler]]] = {}
+        self._outdated = False
+        self._echoes: deque[tuple[Device, Frame]] = deque()
+
+    def add(
+        self,
+        node_id: int,
+        dictionary: ObjectDictionary,
+        *,
+        boot_time: float = 0.0,
+        servo: ServoModel | None = None,
+    ) -> Device:
+        """Add a device, switched off; the next :meth:`advance` starts it.
+
+        Args:
+            node_id: CANopen node id.
+            dictionary: Its objects.
+            boot_time: How long its start takes in [s].
+            servo: Time constants of the motor.
+
+        Raises:
+            ValueError: The node id is out of range, or another device has it.
+        """
+        if any(other.node_id == node_id for other in self.devices):
+            raise ValueError(f'two devices with node id {node_id}')
+
+        def send(frame: Frame) -> None:
+            self._send(frame)
+            if frame.can_id in self._table:
+                self._echoes.append((device, frame))
+
+        device = Device(
+            node_id,
+            dictionary,
+            send,
+            boot_time=boot_time,
+            servo=servo,
+            handlers_changed=self._outdate,
+        )
+        self.devices.append(device)
+        self._outdate()
+        return device
+
+    @property
+    def deadline(self) -> float:
+        """Steady time in [s] at which :meth:`advance` has something to do."""
+        return min((device.deadline for device in self.devices), default=NEVER)
+
+    def receive(self, frame: Frame, now: float) -> None:
+        """Hand a frame from the bus to all devices that want it."""
+        self._dispatch(frame, None, now)
+        while self._echoes:
+            origin, echo = self._echoes.popleft()
+            self._dispatch(echo, origin, now)
+
+    def advance(self, now: float) -> None:
+        """Do what is due at steady time ``now`` in [s]."""
+        for device in self.devices:
+            if device.deadline <= now:
+                device.advance(now)
+        while self._echoes:
+            origin, echo = self._echoes.popleft()
+            self._dispatch(echo, origin, now)
+
+    def _outdate(self) -> None:
+        self._outdated = True
+
+    def _dispatch(self, frame: Frame, origin: Device | None, now: float) -> None:
+        if frame.is_remote or frame.is_extended or frame.is_error:
+            for device in self.devices:
+                device.receive(frame, now)
+            return
+        if self._outdated:
+            self._rebuild()
+        for device, handler in self._table.get(frame.can_id, ()):
+            if device is not origin:
+                handler(frame, now)
+
+    def _rebuild(self) -> None:
+        self._outdated = False
+        self._table = {}
+        for device in self.devices:
+            for can_id, handler in device.handlers.items():
+                self._table.setdefault(can_id, []).append((device, handler))

@@ -1,0 +1,94 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Profile velocity mode (CiA 402-2, clause 12)."""
+
+from __future__ import annotations
+
+import math
+
+from ...standard.drive import OperationMode, Statusword
+from ..axis import Axis
+from ..drive_objects import DriveObjects, MILLISECOND
+from ..profile import Limits, Motion, plan_move, plan_velocity
+from .mode import Dwell, Mode, SyncClock, TARGET_REACHED
+
+ZERO_SPEED = int(Statusword.ZERO_SPEED)
+
+
+class ProfileVelocity(Mode):
+    """Ramps to the target velocity, and stops at the software position limits."""
+
+    number = OperationMode.PROFILE_VELOCITY
+
+    def __init__(self, objects: DriveObjects, axis: Axis, clock: SyncClock) -> None:
+        """Begin at rest."""
+        super().__init__(objects, axis, clock)
+        self._target = 0.0
+        self._bounded = False  # the motion ends at a software limit
+        self._reached = Dwell()
+        self._standing = Dwell()
+
+    @property
+    def waiting(self) -> bool:
+        """A velocity is in its window, but not yet for long enough."""
+        return self._reached.pending or self._standing.pending
+
+    def start(self, word: int, now: float) -> None:
+        """Ramp to the target velocity as it stands in the dictionary."""
+        self._reached.clear()
+        self._standing.clear()
+        if self.halted:
+            super().start(word, now)
+        else:
+            self.resume(now)
+
+    def resume(self, now: float) -> None:
+        """Ramp to the target velocity."""
+        self._target = float(self.objects.target_velocity.value)
+        self._reached.clear()
+        self.axis.follow(self._plan(now))
+
+    def setpoint(self, now: float) -> bool:
+        """Ramp to another target velocity."""
+        if self.halted or self.objects.target_velocity.value == self._target:
+            return False
+        self.axis.advance(now)
+        self.resume(now)
+        return True
+
+    def _plan(self, now: float) -> Motion:
+        limits = self.objects.profile(abs(self._target))
+        low, high = self.objects.position_limits()
+        limit = high if self._target > 0.0 else low
+        self._bounded = False
+        if self._target == 0.0 or math.isinf(limit):
+            full = Limits(self.objects.speed, limits.acceleration, limits.deceleration)
+            return plan_velocity(self.axis.demand, self._target, full, now)
+        # a move to the limit is the same ramp, and brakes in time
+        self._bounded = True
+        stopping = plan_velocity(self.axis.demand, 0.0, limits, now)
+        stop = stopping.at(stopping.end).position
+        if (limit - stop) * self._target <= 0.0:
+            return stopping
+        return plan_move(self.axis.demand, limit, limits, now)
+
+    def update(self, now: float) -> None:
+        """See whether the velocity is reached, and whether it is zero."""
+        objects, velocity = self.objects, self.axis.velocity
+        self.limited = self._bounded and self.axis.arrived
+        wanted = math.copysign(min(abs(self._target), objects.speed), self._target)
+        self._reached.update(
+            abs(velocity - wanted) <= objects.velocity_window.value,
+            objects.velocity_window_time.value * MILLISECOND,
+            now,
+        )
+        self._standing.update(
+            abs(velocity) <= objects.velocity_threshold.value,
+            objects.velocity_threshold_time.value * MILLISECOND,
+            now,
+        )
+
+    def status(self) -> int:
+        """Return "target reached" and "zero speed"."""
+        zero = ZERO_SPEED if self._standing.reached else 0
+        return zero | (TARGET_REACHED if self._reached.reached else 0)

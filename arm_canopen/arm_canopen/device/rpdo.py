@@ -1,0 +1,220 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Receive PDOs of a device (CiA 301, 7.2.2 and 7.5.2.35)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from ..can.frame import Frame
+from ..standard.datatypes import DataType
+from ..standard.dictionary import AccessType, ObjectEntry
+from ..standard.objects import Index, PDO_COUNT_MAX
+from .object_store import make_variable, ObjectStore, Variable
+from .pdo_channel import channel_numbers, PdoChannel, TRANSMISSION_EVENT, TRANSMISSION_SYNC_MAX
+from .timed import NEVER
+
+LENGTH_ERROR = 0x8210  # EMCY: PDO not processed due to length error
+TIMEOUT_ERROR = 0x8250  # EMCY: RPDO timeout
+ErrorReport = Callable[[int, bool, float], None]
+ChannelReport = Callable[[PdoChannel, int, bool, float], None]
+
+
+class Rpdo(PdoChannel):
+    """One receive PDO: writes what it carries into the object dictionary.
+
+    Attributes:
+        deadline: Steady time in [s] at which the next one is overdue.
+    """
+
+    transmission_types = frozenset((*range(TRANSMISSION_SYNC_MAX + 1), *TRANSMISSION_EVENT))
+
+    def __init__(
+        self,
+        store: ObjectStore,
+        number: int,
+        changed: Callable[[PdoChannel, float], None],
+        report: ChannelReport,
+    ) -> None:
+        """Bind the records of an RPDO.
+
+        Args:
+            store: Objects of the device.
+            number: Offset of its records from 0x1400 and 0x1600.
+            changed: Told the PDO and the time when a client changed it.
+            report: Told the PDO, a code, whether that error is there, and the time.
+        """
+        self.deadline = NEVER
+        self._short = self._late = False
+        self._report = report
+        self._held: bytes | None = None
+        self._listeners: tuple[Callable[[float], None], ...] = ()
+        super().__init__(
+            store, Index.RPDO_COMMUNICATION + number, Index.RPDO_MAPPING + number, changed
+        )
+
+    def configure(self) -> None:
+        """Read the parameter objects."""
+        super().configure()
+        self.reset()
+        listeners = [v.listener for v in self.variables if v.listener is not None]
+        self._listeners = tuple(dict.fromkeys(listeners))  # each once
+
+    def reset(self) -> None:
+        """Forget what was received and waits for SYNC."""
+        self.deadline = NEVER
+        self._held = None
+        self._short = self._late = False
+
+    def receive(self, frame: Frame, now: float) -> None:
+        """Take a PDO: into the dictionary at once, or at the next SYNC."""
+        short = len(frame.data) < self.codec.size
+        if short is not self._short:
+            self._short = short
+            self._report(self, LENGTH_ERROR, short, now)
+        if short:
+            return
+        if self.event_time:
+            self.deadline = now + self.event_time
+            if self._late:
+                self._late = False
+                self._report(self, TIMEOUT_ERROR, False, now)
+        if self.transmission <= TRANSMISSION_SYNC_MAX:
+            self._held = frame.data
+        else:
+            self._apply(frame.data, now)
+
+    def sync(self, now: float) -> None:
+        """Put what came since the last SYNC into the dictionary."""
+        if self._held is not None:
+            data, self._held = self._held, None
+            self._apply(data, now)
+
+    def advance(self, now: float) -> None:
+        """Report that the PDO stayed away."""
+        if now >= self.deadline:
+            self.deadline = NEVER
+            self._late = True
+            self._report(self, TIMEOUT_ERROR, True, now)
+
+    def _apply(self, data: bytes, now: float) -> None:
+        # every value is stored before anyone is told: what came in one PDO belongs together
+        for variable, value in zip(self.variables, self.codec.unpack(data), strict=True):
+            variable.value = value
+        for listener in self._listeners:
+            listener(now)
+
+    @staticmethod
+    def _is_mappable(entry: ObjectEntry) -> bool:
+        return entry.rpdo_mappable
+
+    def _find(self, index: int, subindex: int) -> Variable:
+        dummy = DUMMIES.get(index)
+        if dummy is not None and subindex == 0:
+            return make_variable(dummy)
+        return super()._find(index, subindex)
+
+
+DUMMIES: dict[int, ObjectEntry] = {
+    data_type: ObjectEntry(
+        data_type,
+        0,
+        f'Dummy {data_type.name}',
+        data_type,
+        access=AccessType.WRITE_ONLY,
+        pdo_mappable=True,
+    )
+    for data_type in (
+        DataType.BOOLEAN,
+        DataType.INTEGER8,
+        DataType.INTEGER16,
+        DataType.INTEGER32,
+        DataType.UNSIGNED8,
+        DataType.UNSIGNED16,
+        DataType.UNSIGNED32,
+    )
+}
+"""Data types that may stand in the mapping of an RPDO for bytes to be skipped (CiA 301, 7.4.7)."""
+
+
+class RpdoEngine:
+    """All receive PDOs of a device.
+
+    Attributes:
+        active: Those that exist, while the device is Operational.
+    """
+
+    def __init__(
+        self, store: ObjectStore, changed: Callable[[float], None], report: ErrorReport
+    ) -> None:
+        """Bind every RPDO of a dictionary.
+
+        Args:
+            store: Objects of the device.
+            changed: Told the time when a client changed one of them.
+            report: Told a code, whether that error is there, and the time.
+        """
+        first = int(Index.RPDO_COMMUNICATION)
+        self.active: list[Rpdo] = []
+        self._running = False
+        self._changed = changed
+        self._report = report
+        self._wrong: dict[int, set[PdoChannel]] = {LENGTH_ERROR: set(), TIMEOUT_ERROR: set()}
+        self.channels = [
+            Rpdo(store, number, self._channel_changed, self._channel_error)
+            for number in channel_numbers(store, first, first + PDO_COUNT_MAX - 1)
+        ]
+
+    @property
+    def deadline(self) -> float:
+        """Steady time in [s] at which the first of them is overdue."""
+        return min((rpdo.deadline for rpdo in self.active), default=NEVER)
+
+    def configure(self) -> None:
+        """Read the parameter objects again, after a reset."""
+        for rpdo in self.channels:
+            rpdo.configure()
+
+    def start(self) -> None:
+        """Receive from now on."""
+        self._running = True
+        self._select()
+
+    def stop(self, now: float) -> None:
+        """Receive no more; errors of reception are over."""
+        for rpdo in self.active:
+            rpdo.reset()
+        for code, channels in self._wrong.items():
+            if channels:
+                channels.clear()
+                self._report(code, False, now)
+        self._running = False
+        self._select()
+
+    def sync(self, now: float) -> None:
+        """Put the synchronous ones into the dictionary."""
+        for rpdo in self.active:
+            rpdo.sync(now)
+
+    def advance(self, now: float) -> None:
+        """Report those that are overdue."""
+        for rpdo in self.active:
+            rpdo.advance(now)
+
+    def _select(self) -> None:
+        self.active = [rpdo for rpdo in self.channels if self._running and rpdo.enabled]
+
+    def _channel_changed(self, _channel: PdoChannel, now: float) -> None:
+        self._select()
+        self._changed(now)
+
+    def _channel_error(self, channel: PdoChannel, code: int, present: bool, now: float) -> None:
+        # an error is there until the last of the PDOs that had it is well again
+        channels = self._wrong[code]
+        before = bool(channels)
+        if present:
+            channels.add(channel)
+        else:
+            channels.discard(channel)
+        if bool(channels) is not before:
+            self._report(code, bool(channels), now)

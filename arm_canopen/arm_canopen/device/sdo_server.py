@@ -1,0 +1,195 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""SDO server, expedited and segmented (CiA 301, 7.2.4.3).
+
+One transfer at a time, as the standard has it for one SDO channel: a client that initiates
+another one gives the first up. Block transfers are refused with their abort code.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+import struct
+
+from ..can.frame import Frame
+from ..exceptions import CodecError, SdoAbortError
+from ..standard.cob_id import CobId
+from ..standard.sdo import (
+    Abort,
+    AbortCode,
+    decode_request,
+    DownloadRequest,
+    DownloadResponse,
+    DownloadSegmentResponse,
+    EXPEDITED_MAX,
+    Segment,
+    SEGMENT_MAX,
+    UploadRequest,
+    UploadResponse,
+    UploadSegmentRequest,
+)
+from .object_store import ObjectStore, refusal, STRING_BYTES_MAX
+from .timed import NEVER
+
+FRAME_BYTES = 8  # [byte] shorter frames are no SDO
+SILENCE_MAX = 1.0  # [s] how long a client may pause within a transfer
+
+Answer = Abort | DownloadResponse | DownloadSegmentResponse | Segment | UploadResponse
+
+
+@dataclass(slots=True)
+class Transfer:
+    """A segmented transfer under way.
+
+    Attributes:
+        index: Object index.
+        subindex: Sub-index.
+        is_download: The client writes.
+        data: What is sent, or was received so far.
+        size: Announced length of a download in [byte], None when it was not told.
+        position: Number of bytes of an upload that were sent.
+        toggle: Toggle bit of the next segment.
+    """
+
+    index: int
+    subindex: int
+    is_download: bool
+    data: bytearray = field(default_factory=bytearray)
+    size: int | None = None
+    position: int = 0
+    toggle: bool = False
+
+
+class SdoServer:
+    """Serves the default SDO channel of a device.
+
+    Attributes:
+        can_id: Identifier of the requests.
+        deadline: Steady time in [s] at which a silent client's transfer is aborted.
+    """
+
+    def __init__(self, node_id: int, store: ObjectStore, send: Callable[[Frame], None]) -> None:
+        """Serve the objects of a store under a node id."""
+        self.can_id = CobId.SDO_REQUEST + node_id
+        self.deadline = NEVER
+        self._response_id = CobId.SDO_RESPONSE + node_id
+        self._store = store
+        self._send = send
+        self._transfer: Transfer | None = None
+
+    def reset(self) -> None:
+        """Forget a transfer under way."""
+        self._transfer = None
+        self.deadline = NEVER
+
+    def receive(self, frame: Frame, now: float) -> None:
+        """Answer a request."""
+        if len(frame.data) < FRAME_BYTES:
+            return
+        answer = self._answer(frame.data, now)
+        self.deadline = now + SILENCE_MAX if self._transfer else NEVER
+        if answer is not None:
+            self._send(Frame(self._response_id, answer.encode()))
+
+    def advance(self, now: float) -> None:
+        """Abort the transfer of a client that fell silent."""
+        if now < self.deadline:
+            return
+        transfer = self._transfer
+        self.reset()
+        if transfer is not None:
+            abort = Abort(transfer.index, transfer.subindex, AbortCode.TIMED_OUT)
+            self._send(Frame(self._response_id, abort.encode()))
+
+    def _answer(self, data: bytes, now: float) -> Answer | None:
+        index, subindex = self._subject(data)
+        try:
+            return self._dispatch(data, now)
+        except SdoAbortError as error:
+            self._transfer = None
+            return Abort(index, subindex, error.code)
+
+    def _subject(self, data: bytes) -> tuple[int, int]:
+        """Return the object that an abort names: that of the transfer, else of the request."""
+        is_segment = data[0] >> 5 in (0, 3)
+        if is_segment:
+            transfer = self._transfer
+            return (transfer.index, transfer.subindex) if transfer else (0, 0)
+        index, subindex = struct.unpack_from('<xHB', data)
+        return int(index), int(subindex)
+
+    def _dispatch(self, data: bytes, now: float) -> Answer | None:
+        try:
+            request = decode_request(data)
+        except CodecError as error:
+            raise refusal(AbortCode.COMMAND_SPECIFIER, 'SDO') from error
+        match request:
+            case UploadRequest():
+                return self._start_upload(request)
+            case UploadSegmentRequest():
+                return self._send_segment(request)
+            case DownloadRequest():
+                return self._start_download(request, now)
+            case Segment():
+                return self._take_segment(request, now)
+            case Abort():
+                self._transfer = None
+        return None
+
+    def _start_upload(self, request: UploadRequest) -> UploadResponse:
+        index, subindex = request.index, request.subindex
+        self._transfer = None
+        value = self._store.read(index, subindex)
+        if 0 < len(value) <= EXPEDITED_MAX:
+            return UploadResponse(index, subindex, value, len(value))
+        self._transfer = Transfer(index, subindex, is_download=False, data=bytearray(value))
+        return UploadResponse(index, subindex, None, len(value))
+
+    def _send_segment(self, request: UploadSegmentRequest) -> Segment:
+        transfer = self._expect(request.toggle, is_download=False)
+        part = bytes(transfer.data[transfer.position : transfer.position + SEGMENT_MAX])
+        transfer.position += len(part)
+        last = transfer.position >= len(transfer.data)
+        if last:
+            self._transfer = None
+        return Segment(request.toggle, part, last)
+
+    def _start_download(self, request: DownloadRequest, now: float) -> DownloadResponse:
+        index, subindex = request.index, request.subindex
+        self._transfer = None
+        variable = self._store.writable(index, subindex)
+        if request.data is None:
+            if request.size is not None:
+                variable.check_length(request.size)
+            self._transfer = Transfer(index, subindex, is_download=True, size=request.size)
+        else:
+            data = request.data
+            if request.size is None:  # the client leaves the length to us
+                data = data[: variable.size or EXPEDITED_MAX]
+            self._store.write(index, subindex, data, now)
+        return DownloadResponse(index, subindex)
+
+    def _take_segment(self, request: Segment, now: float) -> DownloadSegmentResponse:
+        transfer = self._expect(request.toggle, is_download=True)
+        transfer.data += request.data
+        received = len(transfer.data)
+        limit = STRING_BYTES_MAX if transfer.size is None else transfer.size
+        if received > limit:
+            raise refusal(AbortCode.LENGTH_HIGH, 'SDO')
+        if request.last:
+            if transfer.size is not None and received < transfer.size:
+                raise refusal(AbortCode.LENGTH_LOW, 'SDO')
+            self._transfer = None
+            self._store.write(transfer.index, transfer.subindex, bytes(transfer.data), now)
+        return DownloadSegmentResponse(request.toggle)
+
+    def _expect(self, toggle: bool, *, is_download: bool) -> Transfer:
+        """Return the transfer that a segment belongs to, and turn its toggle bit."""
+        transfer = self._transfer
+        if transfer is None or transfer.is_download is not is_download:
+            raise refusal(AbortCode.COMMAND_SPECIFIER, 'SDO')
+        if toggle is not transfer.toggle:
+            raise refusal(AbortCode.TOGGLE_BIT, 'SDO')
+        transfer.toggle = not transfer.toggle
+        return transfer

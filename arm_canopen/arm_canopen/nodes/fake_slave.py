@@ -1,0 +1,55 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""``ros2 run arm_canopen fake_slave``: one simulated device, made from an EDS."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+import sys
+
+from ament_index_python.packages import get_package_share_directory
+from rcl_interfaces.msg import IntegerRange, ParameterDescriptor
+from rclpy.node import Node
+
+from ..config import load_eds
+from ..device.host import DeviceHost
+from ..standard.cob_id import NODE_ID_MAX, NODE_ID_MIN
+from .slave_process import run_slaves, text_parameter
+
+DEFAULT_NODE_ID = 2
+
+
+def run_fake_slave(args: Sequence[str] | None = None) -> int:
+    """Simulate one device in this process; return the exit code."""
+    return run_slaves('fake_slave', _populate, default_bus='vcan0', args=args)
+
+
+def main() -> None:
+    """Entry point."""
+    sys.exit(run_fake_slave())
+
+
+def default_eds() -> Path:
+    """Return the EDS of the simulated drive, as installed with this package."""
+    return Path(get_package_share_directory('arm_canopen')) / 'eds' / 'cia402_drive.eds'
+
+
+def _populate(node: Node, host: DeviceHost) -> str:
+    descriptor = ParameterDescriptor(
+        description='CANopen node id of the device',
+        read_only=True,
+        integer_range=[IntegerRange(from_value=NODE_ID_MIN, to_value=NODE_ID_MAX, step=1)],
+    )
+    node_id = int(node.declare_parameter('node_id', DEFAULT_NODE_ID, descriptor).value)
+    path = text_parameter(node, 'slave_config', '', 'EDS of the device; empty for our own drive')
+    eds = load_eds(path or default_eds())
+    for warning in eds.warnings:
+        node.get_logger().warning(str(warning))
+    device = host.add(node_id, eds.dictionary)
+    kind = 'drive' if device.drive is not None else 'device'
+    return f'simulated {kind} {node_id} of {eds.path}'
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,91 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What the nodes of simulated slaves have in common: their parameters, bus and life."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+import logging
+
+from rcl_interfaces.msg import ParameterDescriptor
+import rclpy
+from rclpy.exceptions import ParameterException
+from rclpy.node import Node
+from rclpy.utilities import try_shutdown
+
+from ..can import open_bus
+from ..device.host import DeviceHost
+from ..device.runner import DeviceRunner
+from ..exceptions import CanopenError
+from .spinning import spin
+
+CAN_INTERFACES = (
+    'can0, vcan0, udp_multicast:239.x.y.z[:port], auto, or INTERFACE:CHANNEL[@BITRATE]'
+)
+
+Populate = Callable[[Node, DeviceHost], str]
+
+
+class RosLogHandler(logging.Handler):
+    """Passes what the layers below log on to a node."""
+
+    def __init__(self, node: Node) -> None:
+        """Log as a node."""
+        super().__init__(logging.WARNING)
+        self._logger = node.get_logger()
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Log one record."""
+        if record.levelno >= logging.ERROR:
+            self._logger.error(record.getMessage())
+        else:
+            self._logger.warning(record.getMessage())
+
+
+def text_parameter(node: Node, name: str, default: str, description: str) -> str:
+    """Declare a read-only text parameter and return its value."""
+    descriptor = ParameterDescriptor(description=description, read_only=True)
+    return str(node.declare_parameter(name, default, descriptor).value)
+
+
+def run_slaves(
+    name: str, populate: Populate, *, default_bus: str, args: Sequence[str] | None = None
+) -> int:
+    """Run simulated slaves until Ctrl-C or SIGTERM.
+
+    Args:
+        name: Name of the node.
+        populate: Reads the node's parameters, adds the devices and returns what they are.
+        default_bus: Default of ``can_interface_name``.
+        args: Command line; None for the process's own.
+
+    Returns:
+        Exit code: 0, or 1 when the devices could not be described or the bus not be opened.
+    """
+    rclpy.init(args=None if args is None else list(args))
+    node = Node(name)
+    handler = RosLogHandler(node)
+    logging.getLogger('arm_canopen').addHandler(handler)
+    try:
+        return _run(node, populate, default_bus)
+    except (CanopenError, ParameterException) as error:
+        node.get_logger().fatal(str(error))
+        return 1
+    finally:
+        logging.getLogger('arm_canopen').removeHandler(handler)
+        node.destroy_node()
+        try_shutdown()
+
+
+def _run(node: Node, populate: Populate, default_bus: str) -> int:
+    interface = text_parameter(node, 'can_interface_name', default_bus, CAN_INTERFACES)
+    with open_bus(interface) as bus:
+        runner = DeviceRunner(bus)
+        what = populate(node, runner.host)
+        runner.start()
+        try:
+            node.get_logger().info(f'{what} on {bus.name}')
+            spin([node])
+        finally:
+            runner.stop()
+    return 0
