@@ -81,6 +81,7 @@ class Input:
 
     def receive(self, frame: Frame) -> None:
         """Take a PDO from the bus."""
+        expected = self.values is not None  # the first one after a boot was not counted
         try:
             self.values = self._unpack(frame.data)
         except CodecError:
@@ -93,7 +94,7 @@ class Input:
         sync = self._sync
         if self._round != sync.number:
             self._round = sync.number
-            if self.config.transmission == 1:
+            if expected and self.config.transmission == 1:
                 sync.pending -= 1
                 if sync.pending == 0:
                     sync.complete()

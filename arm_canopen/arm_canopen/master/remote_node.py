@@ -128,8 +128,8 @@ class RemoteNode:
 
     @property
     def expected_answers(self) -> int:
-        """How many TPDOs answer each SYNC."""
-        return len(self._every_sync) if self.online else 0
+        """How many TPDOs answer each SYNC; those count that have come since the device booted."""
+        return sum(entry.values is not None for entry in self._every_sync)
 
     def report(self, kind: EventKind, severity: Severity, text: str) -> None:
         """Tell the owner of the network something about this device."""
@@ -137,9 +137,9 @@ class RemoteNode:
 
     def count_missed(self) -> int:
         """Count the TPDOs that did not answer the last SYNC, and return their number."""
-        if not self.online:
-            return 0
-        missed = sum(not entry.answered for entry in self._every_sync)
+        missed = sum(
+            entry.values is not None and not entry.answered for entry in self._every_sync
+        )
         self.missed_pdos += missed
         return missed
 
