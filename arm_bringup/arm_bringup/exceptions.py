@@ -8,7 +8,9 @@
     ├── RobotError (ValueError)   a robot folder is unknown or incomplete; lists what there is
     ├── DescriptionError (ValueError)   a xacro file cannot be expanded, or its URDF is not usable
     ├── StartError (OSError)      a process of the bring-up cannot be started
-    └── WaveError (ValueError)    the wave cannot be planned within the limits of a joint
+    ├── WaveError (ValueError)    the wave cannot be planned within the limits of a joint
+    ├── CallError                 a service of the arm refused, or did not answer in time
+    └── GivenUpError              what is waited for is no longer wanted
 
 Arguments of the wrong kind from a *programmer* stay ``ValueError``/``TypeError``.
 """
@@ -46,4 +48,18 @@ class WaveError(BringupError, ValueError):
     """The wave cannot be planned within the limits of a joint.
 
     Scenarios: a joint's range is narrower than the margins, its velocity limit is zero.
+    """
+
+
+class CallError(BringupError):
+    """A service of the arm refused, or did not answer in time.
+
+    Scenarios: a drive that does not enable says why, a service that is not there.
+    """
+
+
+class GivenUpError(BringupError):
+    """What is waited for is no longer wanted.
+
+    Scenarios: Ctrl-C, a process of the bring-up has ended.
     """

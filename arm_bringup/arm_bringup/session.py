@@ -32,12 +32,14 @@ class Session:
     Attributes:
         robot: The robot.
         bus: Name of its CAN bus, no longer ``auto``.
+        drives: Names of its drives, in the order of bus.yml.
         urdf: Its description.
         processes: What is to be run.
     """
 
     robot: Robot
     bus: str
+    drives: list[str]
     urdf: str
     processes: list[ProcessSpec]
 
@@ -88,6 +90,29 @@ def locate(wanted: str) -> Robot:
     return find_robot(wanted, folder)
 
 
+def drive_names(robot: Robot) -> list[str]:
+    """Read the bus.yml of a robot, and so find its mistakes before anything is started.
+
+    Args:
+        robot: The robot.
+
+    Returns:
+        Names of its drives, in the order of the file.
+
+    Raises:
+        RobotError: The file, or an EDS that it names, is wrong; the message says where and what.
+    """
+    from arm_canopen import CanopenError, load_bus
+
+    try:
+        drives = [node.name for node in load_bus(robot.bus_config).nodes if node.is_drive]
+    except CanopenError as error:
+        raise RobotError(str(error)) from error
+    if not drives:
+        raise RobotError(f'{robot.bus_config} has no drive (a node with a Cia402 driver)')
+    return drives
+
+
 @contextlib.contextmanager
 def session(
     arguments: argparse.Namespace,
@@ -112,6 +137,7 @@ def session(
     from arm_canopen.can import resolve_name
 
     robot = locate(arguments.robot)
+    drives = drive_names(robot)
     bus = resolve_name(arguments.can or (SIMULATED_BUS if simulate else REAL_BUS))
     domain = os.environ.get('ROS_DOMAIN_ID') or '0'
     locks = Path(tempfile.gettempdir())
@@ -126,4 +152,4 @@ def session(
             robot, bus, simulate, arguments.timeout, master, dict(master_parameters or {})
         )
         processes = arm_processes(wanted, parameters, find_executable)
-        yield Session(robot, bus, urdf, processes)
+        yield Session(robot, bus, drives, urdf, processes)

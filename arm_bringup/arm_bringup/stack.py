@@ -18,7 +18,7 @@ MASTER_READY = r'all \d+ devices operational'
 """What the master logs when every drive of the bus has booted."""
 SLAVES_READY = r'ready'
 """What the simulated slaves log when they are on the bus."""
-PUBLISHER_READY = r'publishing'
+PUBLISHER_READY = r'publishing \d+ joints'
 """What the publisher of /joint_states logs when it has subscribed to the drives."""
 
 MASTER_FIRST, THEN_LISTENERS, SLAVES_LAST = range(3)

@@ -14,8 +14,8 @@ import sys
 import textwrap
 import threading
 
-from processes import PATIENCE, program, wait_for_end
 import pytest
+from small_processes import PATIENCE, program, wait_for_end
 
 from arm_bringup.supervisor import Notice, Outcome, ProcessSpec, Runner
 from arm_bringup.supervisor.runner import LEAVE_SIGNALS
@@ -190,7 +190,7 @@ def test_an_error_in_the_supervisor_stops_its_processes() -> None:
 SUPERVISOR = textwrap.dedent("""
     import sys
     from arm_bringup.supervisor import Runner
-    from processes import program
+    from small_processes import program
     specs = [
         program('deaf', 'slaves', ready='ready', stop_order=2),
         program('good', 'master', ready='ready', stop_order=0),

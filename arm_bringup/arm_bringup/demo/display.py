@@ -1,0 +1,226 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Where the demo shows how it goes: a live table in a terminal, lines elsewhere."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+import threading
+import time
+from typing import Protocol
+
+from rich.console import Console
+from rich.live import Live
+
+from ..description import JointLimits
+from ..supervisor import Notice, Severity
+from ..terminal import LineWriter, Painter, severity_of
+from .figures import Figures
+from .report import progress_line
+from .table import fits, render, Scene
+
+LINE_PERIOD = 3.0
+"""Time between two lines of progress in [s]."""
+MESSAGES = 4
+"""How many messages are kept below the table."""
+MESSAGE_LIFE = {Severity.INFO: 4.0, Severity.WARNING: 20.0, Severity.ERROR: 60.0}
+"""How long a message is shown in [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """What does not change while the demo runs.
+
+    Attributes:
+        title: Robot and bus.
+        limits: The joints.
+        commands: Commands to try in a second terminal.
+        painter: Puts names in front of lines.
+    """
+
+    title: str
+    limits: Mapping[str, JointLimits]
+    commands: Sequence[str]
+    painter: Painter
+
+
+class Display(Protocol):
+    """What the demo needs of its place to show things."""
+
+    def phase(self, text: str) -> None:
+        """Say what is going on now."""
+
+    def show(self, figures: Figures) -> None:
+        """Show the latest figures; called several times a second."""
+
+    def line(self, name: str, text: str) -> None:
+        """Take a line of output of a process, from any thread."""
+
+    def notice(self, notice: Notice) -> None:
+        """Take a notice of the supervisor, from any thread."""
+
+    def close(self) -> None:
+        """Show nothing more; what is written after this is plain text below."""
+
+
+class LineDisplay:
+    """Lines: phases at once, figures every few seconds, warnings and errors of the processes."""
+
+    def __init__(self, setting: Setting, write: LineWriter) -> None:
+        """Begin.
+
+        Args:
+            setting: What does not change.
+            write: Takes the lines.
+        """
+        self._setting = setting
+        self._write = write
+        self._begun = time.monotonic()
+        self._next = 0.0
+        write(setting.title)
+
+    def phase(self, text: str) -> None:
+        """Write it, with the time since the start.
+
+        Args:
+            text: What is going on.
+        """
+        self._next = time.monotonic() + LINE_PERIOD
+        self._stamped(text)
+
+    def show(self, figures: Figures) -> None:
+        """Write a line of progress, when the last one is old enough.
+
+        Args:
+            figures: The latest.
+        """
+        if time.monotonic() >= self._next:
+            self.phase(progress_line(figures, list(self._setting.limits)))
+
+    def line(self, name: str, text: str) -> None:
+        """Write it when it is a warning or an error.
+
+        Args:
+            name: The process.
+            text: What it wrote.
+        """
+        if severity_of(text) is not Severity.INFO:
+            self._write(self._setting.painter.line(name, text))
+
+    def notice(self, notice: Notice) -> None:
+        """Write it.
+
+        Args:
+            notice: What is to be said.
+        """
+        self._write(self._setting.painter.notice(notice))
+
+    def close(self) -> None:
+        """Nothing is left open."""
+
+    def _stamped(self, text: str) -> None:
+        self._write(f'{time.monotonic() - self._begun:6.1f} s  {text}')
+
+
+class TableDisplay:
+    """A live table; what the processes say is kept below it when it is a warning."""
+
+    def __init__(self, setting: Setting, console: Console) -> None:
+        """Begin with an empty table.
+
+        Args:
+            setting: What does not change.
+            console: The terminal.
+        """
+        self._setting = setting
+        self._console = console
+        self._begun = time.monotonic()
+        self._phase = 'starting'
+        self._figures = Figures()
+        self._messages: deque[tuple[float, str]] = deque(maxlen=MESSAGES)
+        self._lock = threading.Lock()
+        self._live = Live(console=console, auto_refresh=False, redirect_stdout=False)
+        self._live.start()
+        self._refresh()
+
+    def phase(self, text: str) -> None:
+        """Show it in the title.
+
+        Args:
+            text: What is going on.
+        """
+        self._phase = text
+        self._refresh()
+
+    def show(self, figures: Figures) -> None:
+        """Draw the table anew.
+
+        Args:
+            figures: The latest.
+        """
+        self._figures = figures
+        self._refresh()
+
+    def line(self, name: str, text: str) -> None:
+        """Keep it when it is a warning or an error.
+
+        Args:
+            name: The process.
+            text: What it wrote.
+        """
+        severity = severity_of(text)
+        if severity is not Severity.INFO:
+            self._keep(severity, f'{name}: {text}')
+
+    def notice(self, notice: Notice) -> None:
+        """Keep it.
+
+        Args:
+            notice: What is to be said.
+        """
+        self._keep(notice.severity, notice.text)
+        self._refresh()
+
+    def close(self) -> None:
+        """Leave the last table where it is."""
+        with self._lock:
+            self._live.stop()
+
+    def _keep(self, severity: Severity, text: str) -> None:
+        self._messages.append((time.monotonic() + MESSAGE_LIFE[severity], text))
+
+    def _refresh(self) -> None:
+        setting = self._setting
+        now = time.monotonic()
+        scene = Scene(
+            setting.title,
+            setting.limits,
+            setting.commands,
+            now - self._begun,
+            self._phase,
+            [text for end, text in list(self._messages) if now < end],
+        )
+        with self._lock:
+            if self._live.is_started:
+                size = self._console.size
+                drawing = render(self._figures, scene, size.width, size.height)
+                self._live.update(drawing, refresh=True)
+
+
+def choose_display(setting: Setting, console: Console, write: LineWriter) -> Display:
+    """Choose the table where there is a terminal that has room for it.
+
+    Args:
+        setting: What does not change.
+        console: Standard output.
+        write: Takes lines when there is no table.
+    """
+    size = console.size
+    if not console.is_terminal or console.is_dumb_terminal:
+        return LineDisplay(setting, write)
+    if not fits(size.width, size.height, len(setting.limits)):
+        write(f'this terminal has {size.width} x {size.height} characters, too few for the table')
+        return LineDisplay(setting, write)
+    return TableDisplay(setting, console)

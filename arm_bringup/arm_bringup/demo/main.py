@@ -1,0 +1,161 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""``ros2 run arm_bringup demo``: a simulated arm boots, enables and waves."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+import math
+import os
+import sys
+import threading
+
+from rich.console import Console
+
+from ..bringup import explain, USAGE_ERROR
+from ..description import joint_limits
+from ..exceptions import BringupError
+from ..session import add_arguments, robots_epilog, Session, session, SIMULATED_BUS
+from ..stack import Executable
+from ..supervisor import Outcome, Runner
+from ..terminal import LineWriter, Painter, wants_colour
+from .display import choose_display, Setting, TableDisplay
+from .play import Play, REFRESH
+
+WAVE_MASTER = Executable('arm_bringup', 'wave_master')
+"""The master of the demo."""
+
+
+def parse(argv: Sequence[str] | None) -> argparse.Namespace:
+    """Parse the command line.
+
+    Args:
+        argv: Arguments without the program's name; None takes those of the process.
+    """
+    parser = argparse.ArgumentParser(
+        prog='ros2 run arm_bringup demo',
+        description='Bring a simulated arm up, enable all its drives and let it wave. In a '
+        'terminal a live table shows what it does; elsewhere a line every few seconds. Ctrl-C '
+        'stops the wave, disables the drives and ends everything.',
+        epilog=robots_epilog(),
+    )
+    add_arguments(parser, default_bus=f'{SIMULATED_BUS}: vcan0 when it is there, else multicast')
+    parser.add_argument(
+        '--duration',
+        metavar='S',
+        type=_duration,
+        help='end after so many seconds of wave, with a summary; the exit code says whether all '
+        'joints were enabled, moved and followed (default: until Ctrl-C)',
+    )
+    return parser.parse_args(argv)
+
+
+def _duration(text: str) -> float:
+    value = float(text)
+    if not 0 < value < math.inf:
+        raise argparse.ArgumentTypeError(f'{text} is no positive number of seconds')
+    return value
+
+
+def commands(joint: str, bus: str, domain: str) -> list[str]:
+    """Return commands to try in a second terminal.
+
+    Args:
+        joint: Name of a drive.
+        bus: Name of the CAN bus.
+        domain: ROS domain, empty for the default one.
+    """
+    call = 'ros2 service call'
+    return [
+        f'source env.sh; export ROS_DOMAIN_ID={domain}' if domain else 'source env.sh',
+        f'{call} /{joint}/position_mode std_srvs/srv/Trigger',
+        f'{call} /{joint}/target canopen_interfaces/srv/COTargetDouble "{{ target: 1.0 }}"',
+        'ros2 topic hz /joint_states',
+        f'ros2 run arm_canopen candump {bus}',
+        # back into the wave
+        f'{call} /{joint}/cyclic_position_mode std_srvs/srv/Trigger',
+        f'{call} /wave/start std_srvs/srv/Trigger',
+    ]
+
+
+def run(arm: Session, duration: float | None) -> int:
+    """Run the demo.
+
+    Args:
+        arm: The arm, prepared.
+        duration: How long the wave runs in [s]; None until Ctrl-C.
+
+    Returns:
+        0, or 1 when something went wrong.
+    """
+    write = LineWriter(sys.stdout)
+    names = [spec.name for spec in arm.processes]
+    setting = Setting(
+        title=f'{arm.robot.name}: {len(arm.drives)} simulated drives on {arm.bus}',
+        limits={
+            name: limits for name, limits in joint_limits(arm.urdf).items() if name in arm.drives
+        },
+        commands=commands(arm.drives[0], arm.bus, os.environ.get('ROS_DOMAIN_ID', '')),
+        painter=Painter('demo', names, wants_colour(sys.stdout, os.environ)),
+    )
+    display = choose_display(setting, Console(), write)
+    play = Play(list(setting.limits), display, duration)
+    try:
+        with Runner(
+            arm.processes, display.line, display.notice, on_interrupt=play.leave
+        ) as runner:
+            thread = threading.Thread(target=play.run, args=[runner], name='play')
+            thread.start()
+            outcome = runner.run()
+            thread.join()
+    finally:
+        display.close()
+    with_summary = duration is not None or not isinstance(display, TableDisplay)
+    return conclude(write, play, outcome, with_summary=with_summary)
+
+
+def conclude(write: LineWriter, play: Play, outcome: Outcome, *, with_summary: bool) -> int:
+    """Say how it went.
+
+    Args:
+        write: Takes the lines.
+        play: The course, ended.
+        outcome: How the supervisor ended.
+        with_summary: Write the summary of the wave.
+
+    Returns:
+        The exit code.
+    """
+    result = play.result
+    for line in result.summary if with_summary else []:
+        write(line)
+    for line in result.warnings:
+        write(f'warning: {line}')
+    failures = [] if play.left else result.problems
+    if outcome.exit_code:
+        failures = [explain(outcome), *failures]
+    for line in failures:
+        write(f'error: {line}')
+    return 1 if failures else 0
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the demo until its end or Ctrl-C.
+
+    Args:
+        argv: Arguments without the program's name; None takes those of the process.
+
+    Returns:
+        0 when all went well, 1 when something did not, 2 when nothing was started.
+    """
+    arguments = parse(argv)
+    parameters = {'diagnostics_period': f'{REFRESH}'}
+    try:
+        with session(
+            arguments, simulate=True, master=WAVE_MASTER, master_parameters=parameters
+        ) as arm:
+            return run(arm, arguments.duration)
+    except BringupError as error:
+        sys.stderr.write(f'{error}\n')
+        return USAGE_ERROR

@@ -1,0 +1,157 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The course of the demo: boot, enable, wave, watch, stop."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+import math
+import threading
+import time
+from typing import TYPE_CHECKING
+
+from ..exceptions import CallError, GivenUpError
+from ..supervisor import Outcome, Phase, Runner
+from .display import Display
+from .figures import Figures
+from .report import problems, summary_lines, warnings
+
+if TYPE_CHECKING:
+    from .client import ArmClient
+
+REFRESH = 0.2
+"""Time between two pictures in [s]."""
+ENABLE_TIMEOUT = 15.0
+"""Longest time in [s] for all drives to be enabled."""
+CALL_TIMEOUT = 10.0
+"""Longest time in [s] for other services."""
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """How a demo went.
+
+    Attributes:
+        summary: The lines of its summary, empty when it did not get as far as the wave.
+        problems: What went wrong.
+        warnings: What is worth a look.
+    """
+
+    summary: list[str]
+    problems: list[str]
+    warnings: list[str]
+
+
+class Play:
+    """Runs the demo in a thread of its own, beside the supervisor.
+
+    Attributes:
+        result: How it went, when the thread has ended.
+    """
+
+    def __init__(self, joints: Sequence[str], display: Display, duration: float | None) -> None:
+        """Prepare; nothing happens yet.
+
+        Args:
+            joints: Names of the joints with a drive.
+            display: Where it is shown.
+            duration: How long the wave runs in [s]; None until :meth:`leave`.
+        """
+        self.result = Result([], [], [])
+        self._joints = list(joints)
+        self._display = display
+        self._duration = math.inf if duration is None else duration
+        self._leaving = threading.Event()
+        self._waving = threading.Event()
+        self._next_picture = 0.0
+
+    @property
+    def left(self) -> bool:
+        """The user asked for the end."""
+        return self._leaving.is_set()
+
+    def leave(self) -> bool:
+        """Ask for the end, from any thread.
+
+        Returns:
+            True when the wave runs: then it is stopped first.
+        """
+        self._leaving.set()
+        return self._waving.is_set()
+
+    def run(self, runner: Runner) -> None:
+        """Run until the end, and stop the supervisor then.
+
+        Args:
+            runner: The supervisor, about to be run in the main thread.
+        """
+        from .client import ArmClient  # rclpy loads while the processes start
+
+        ended = {Phase.STOPPING, Phase.STOPPED}
+        client = ArmClient(lambda: runner.phase in ended)
+        try:
+            self._course(client, lambda: runner.phase is Phase.RUNNING)
+            runner.stop(Outcome(0, 'the demo has ended'))
+        except GivenUpError:
+            pass  # the supervisor knows why
+        except CallError as error:
+            runner.stop(Outcome(1, str(error)))
+        except Exception as error:
+            runner.stop(Outcome(1, f'{type(error).__name__}: {error}'))
+            raise
+        finally:
+            self._follow_stop(client, lambda: runner.phase is Phase.STOPPED)
+            client.close()
+
+    def _course(self, client: ArmClient, ready: Callable[[], bool]) -> None:
+        init, mode, wave = self._services()
+        client.prepare([*init, *mode, *wave])
+        self._display.phase('booting')
+        client.wait_until(lambda: self._booted(client, ready), math.inf, 'the processes')
+        self._display.phase('enabling')
+        client.call(init, ENABLE_TIMEOUT)
+        client.call(mode, CALL_TIMEOUT)
+        client.call(wave[:1], CALL_TIMEOUT)
+        self._display.phase('waving')
+        begun = time.monotonic()
+        self._waving.set()
+        end = begun + self._duration
+        client.wait_until(lambda: self._seen_enough(client, end), math.inf, 'the end')
+        self._conclude(client.figures, time.monotonic() - begun)
+        self._display.phase('stopping')
+        client.call(wave[1:], CALL_TIMEOUT)
+        client.wait_until(lambda: client.figures.wave == 'idle', CALL_TIMEOUT, 'the wave to stop')
+        self._display.show(client.figures)
+
+    def _services(self) -> tuple[list[str], list[str], list[str]]:
+        init = [f'/{joint}/init' for joint in self._joints]
+        mode = [f'/{joint}/cyclic_position_mode' for joint in self._joints]
+        return init, mode, ['/wave/start', '/wave/stop']
+
+    def _booted(self, client: ArmClient, ready: Callable[[], bool]) -> bool:
+        self._show(client)
+        return ready()
+
+    def _seen_enough(self, client: ArmClient, end: float) -> bool:
+        self._show(client)
+        return self._leaving.is_set() or time.monotonic() >= end
+
+    def _show(self, client: ArmClient) -> None:
+        now = time.monotonic()
+        if now >= self._next_picture:
+            self._next_picture = now + REFRESH
+            self._display.show(client.figures)
+
+    def _conclude(self, figures: Figures, duration: float) -> None:
+        self.result = Result(
+            summary_lines(figures, self._joints, duration),
+            problems(figures, self._joints),
+            warnings(figures),
+        )
+
+    def _follow_stop(self, client: ArmClient, stopped: Callable[[], bool]) -> None:
+        """Keep the picture alive until everything has ended: the drives go to disabled in it."""
+        while not stopped():
+            client.listen(REFRESH / 2)
+            self._show(client)

@@ -1,0 +1,203 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The live table of the demo, for a terminal of any size that is large enough."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+import math
+
+from rich import box
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from ..description import JointLimits
+from .figures import AxisFigures, BusFigures, DriveFigures, ENABLED, Figures
+
+NARROWEST = 80
+"""Columns of a terminal below which there is no table."""
+GAUGE_FROM = 102
+"""Columns from which there is room for the gauges."""
+WORDS_FROM = 118
+"""Columns from which modes are written out."""
+GAUGE_WIDTH = 21
+"""Characters of a gauge."""
+LINES_AROUND = 7
+"""Title, head, its rule, a blank line, two lines of the bus, and one that is left free: a full
+terminal would scroll at each refresh."""
+MESSAGE_ROOM = 2
+"""Lines that messages get before the commands do."""
+
+STATE_STYLES = {
+    ENABLED: 'green',
+    'Fault': 'bold red',
+    'Fault reaction active': 'bold red',
+    'Quick stop active': 'yellow',
+}
+"""Colours of CiA 402 states; others are dim."""
+
+SHORT = {
+    'PRE_OPERATIONAL': 'PRE-OP',
+    'BOOT_UP': 'BOOT-UP',
+    'Profile position': 'PP',
+    'Velocity': 'VL',
+    'Profile velocity': 'PV',
+    'Profile torque': 'TQ',
+    'Homing': 'HM',
+    'Interpolated position': 'IP',
+    'Cyclic position': 'CSP',
+    'Cyclic velocity': 'CSV',
+    'Cyclic torque': 'CST',
+    'No mode': '-',
+}
+"""How CiA 301 and CiA 402-2 abbreviate NMT states and modes."""
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """What the table shows beside the figures.
+
+    Attributes:
+        title: Robot and bus.
+        limits: The joints, in the order of the rows.
+        commands: Commands to try in a second terminal.
+        elapsed: Time since the start in [s].
+        phase: What is going on.
+        messages: What was said last.
+    """
+
+    title: str
+    limits: Mapping[str, JointLimits]
+    commands: Sequence[str]
+    elapsed: float
+    phase: str
+    messages: Sequence[str] = ()
+
+
+def fits(width: int, height: int, joints: int) -> bool:
+    """Say whether a terminal has room for the table.
+
+    Args:
+        width: Its columns.
+        height: Its lines.
+        joints: Number of rows.
+    """
+    return width >= NARROWEST and height >= joints + LINES_AROUND
+
+
+def render(figures: Figures, scene: Scene, width: int, height: int) -> RenderableType:
+    """Draw everything; commands and messages that there is no room for are left out.
+
+    Args:
+        figures: The latest.
+        scene: What else is shown.
+        width: Columns of the terminal.
+        height: Lines of the terminal.
+    """
+    drives = _drives(figures, scene, width)
+    parts: list[RenderableType] = [_title(scene, width), drives, Text(''), _bus(figures.bus)]
+    room = height - len(scene.limits) - LINES_AROUND
+    messages = [_message(text) for text in scene.messages[-MESSAGE_ROOM:]]
+    for lines in (messages, _commands(scene.commands)):
+        if lines and room > 1:
+            shown = _cut(lines, width, room - 1)
+            parts += [Text(''), *shown]
+            room -= 1 + _height(shown, width)
+    return Group(*parts)
+
+
+def _title(scene: Scene, width: int) -> RenderableType:
+    line = Table.grid(expand=False)
+    line.width = min(width, WORDS_FROM)
+    line.add_column(no_wrap=True, overflow='ellipsis', ratio=1)
+    line.add_column(justify='right', no_wrap=True)
+    right = Text(f'{scene.phase}  {scene.elapsed:.1f} s', style='cyan')
+    line.add_row(Text(scene.title, style='bold'), right)
+    return line
+
+
+def _drives(figures: Figures, scene: Scene, width: int) -> Table:
+    in_words = width >= WORDS_FROM
+    table = Table(box=box.HORIZONTALS, show_edge=False, padding=0, header_style='bold')
+    left = [('joint', 12), ('NMT', 11), ('CiA 402 state', 21), ('mode', 21 if in_words else 4)]
+    right = [('position', 8), ('velocity', 8), ('error', 8)]
+    for name, least in left:
+        table.add_column(name, no_wrap=True, min_width=least)
+    for name, least in right:
+        table.add_column(name, no_wrap=True, min_width=least, justify='right')
+    if width >= GAUGE_FROM:
+        table.add_column(' between its limits', no_wrap=True, min_width=GAUGE_WIDTH + 1)
+    for name, limits in scene.limits.items():
+        drive = figures.drives.get(name, DriveFigures())
+        cells = _cells(name, drive, figures.axes.get(name), in_words=in_words)
+        table.add_row(*cells, *([_gauge(drive, limits)] if width >= GAUGE_FROM else []))
+    return table
+
+
+def _cells(
+    name: str, drive: DriveFigures, axis: AxisFigures | None, *, in_words: bool
+) -> list[Text]:
+    waving = axis is not None and axis.active
+    mode = drive.mode if in_words else SHORT.get(drive.mode, drive.mode)
+    return [
+        Text(name, style='bold' if waving else ''),
+        Text(SHORT.get(drive.nmt, drive.nmt), style='green' if drive.online else 'red'),
+        Text(drive.state, style=STATE_STYLES.get(drive.state, 'dim')),
+        Text(mode, style='' if waving else 'yellow'),
+        Text(_signed(drive.position)),
+        Text(_signed(drive.velocity)),
+        Text(_signed(drive.following_error)),
+    ]
+
+
+def _signed(value: float) -> str:
+    return f'{value:+.3f}' if math.isfinite(value) else '-'
+
+
+def _gauge(drive: DriveFigures, limits: JointLimits) -> Text:
+    """Show where a joint is between its limits; outside of them the mark is red, at the end."""
+    span = limits.upper - limits.lower
+    if not math.isfinite(span) or not math.isfinite(drive.position):
+        return Text('')
+    share = (drive.position - limits.lower) / span
+    place = round(min(max(share, 0.0), 1.0) * (GAUGE_WIDTH - 1))
+    style = 'bold cyan' if 0.0 <= share <= 1.0 else 'bold red'
+    before, after = '─' * place, '─' * (GAUGE_WIDTH - 1 - place)
+    return Text.assemble(' ', (before, 'dim'), ('●', style), (after, 'dim'))
+
+
+def _bus(bus: BusFigures) -> Text:
+    if not math.isfinite(bus.frames_per_second):
+        return Text('bus    waiting for the master\n', style='dim')
+    return Text.assemble(
+        ('bus    ', 'bold'),
+        f'{bus.frames_per_second:.0f} frames/s   load {bus.load:.0f} %   ',
+        (f'{bus.lost} lost', 'bold red' if bus.lost else ''),
+        f'   {bus.missed_pdos} PDOs missed\n',
+        ('cycle  ', 'bold'),
+        f'jitter p50 {1000 * bus.jitter_p50:.2f} ms   p99 {1000 * bus.jitter_p99:.2f} ms',
+    )
+
+
+def _message(text: str) -> Text:
+    return Text(text, style='yellow', no_wrap=True, overflow='ellipsis')
+
+
+def _commands(commands: Sequence[str]) -> list[Text]:
+    head = Text('try in a second terminal', style='bold')
+    return [head, *(Text(f'  {command}', style='cyan') for command in commands)]
+
+
+def _height(lines: Sequence[Text], width: int) -> int:
+    wrapping = (math.ceil(len(line) / width) for line in lines if not line.no_wrap)
+    return sum(max(1, height) for height in wrapping) + sum(bool(line.no_wrap) for line in lines)
+
+
+def _cut(lines: Sequence[Text], width: int, room: int) -> list[Text]:
+    """Return the first lines that there is room for."""
+    shown = list(lines)
+    while _height(shown, width) > room:
+        shown.pop()
+    return shown

@@ -1,0 +1,163 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The wave: every joint swings about the middle of its range, each a little later than the last.
+
+A joint enters from wherever it stands. With the entry r(t/T), the quintic step of duration T,
+
+    p(t) = start + r(t/T) (centre + A sin(theta + phase) - start)
+
+which begins at ``start`` with velocity and acceleration zero, is twice continuously
+differentiable, and as a convex combination never leaves the hull of the start and the swing.
+With the offset D = |centre - start| and omega = d theta/dt, its derivatives are bounded by
+
+    |v| <= (D + A) r1/T + A omega
+    |a| <= (D + A) r2/T^2 + 2 (r1/T) A omega + A omega^2
+
+where r1 = 15/8 and r2 = 10/sqrt(3) are the greatest slope and curvature of the quintic step.
+A stop slows the time down by the factor g(t) = 1 - r(t/T_stop): the joint stays on its path, and
+adds at most |v| r1/T_stop to its acceleration.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import math
+
+from .description import JointLimits
+from .exceptions import WaveError
+
+STEP_SLOPE = 15 / 8
+"""Greatest first derivative of the quintic step."""
+STEP_CURVATURE = 10 / math.sqrt(3)
+"""Greatest second derivative of the quintic step."""
+
+
+def quintic_step(x: float) -> float:
+    """Go from 0 at x <= 0 to 1 at x >= 1 with two continuous derivatives.
+
+    Args:
+        x: Where, without unit.
+    """
+    x = min(max(x, 0.0), 1.0)
+    return x * x * x * (10.0 + x * (6.0 * x - 15.0))
+
+
+@dataclass(frozen=True, slots=True)
+class WaveStyle:
+    """How the wave looks, and how far it stays from the limits.
+
+    Attributes:
+        amplitude: Greatest amplitude in [rad] or [m].
+        period: Time of one swing in [s].
+        range_share: The swing covers at most this share of a joint's range.
+        velocity_share: A joint is at most at this share of its velocity limit.
+        acceleration: Greatest acceleration in [rad/s^2] or [m/s^2]. URDF knows no such limit;
+            the data sheet of the Panda allows 7.5 for its slowest joint.
+        stop_share: Share of the acceleration that is kept for a stop.
+        shortest_entry: A joint takes at least this long to enter in [s].
+    """
+
+    amplitude: float = 0.45
+    period: float = 5.0
+    range_share: float = 0.5
+    velocity_share: float = 0.6
+    acceleration: float = 4.0
+    stop_share: float = 0.4
+    shortest_entry: float = 2.0
+
+    @property
+    def omega(self) -> float:
+        """Angular velocity of the phase in [rad/s]."""
+        return 2 * math.pi / self.period
+
+
+@dataclass(frozen=True, slots=True)
+class Swing:
+    """The motion of one joint.
+
+    Attributes:
+        name: Name of the joint.
+        centre: Middle of the swing in [rad] or [m].
+        amplitude: Its amplitude in [rad] or [m].
+        phase: How far it is ahead in [rad].
+        velocity: Speed that it never exceeds in [rad/s] or [m/s].
+        acceleration: Acceleration that it never exceeds while it is not being stopped, in
+            [rad/s^2] or [m/s^2].
+    """
+
+    name: str
+    centre: float
+    amplitude: float
+    phase: float
+    velocity: float
+    acceleration: float
+
+    def position(self, start: float, entered: float, theta: float) -> float:
+        """Evaluate the path.
+
+        Args:
+            start: Where the joint stood when it entered, in [rad] or [m].
+            entered: Time since then as a share of the duration of the entry.
+            theta: Phase of the wave in [rad].
+
+        Returns:
+            The position in [rad] or [m].
+        """
+        target = self.centre + self.amplitude * math.sin(theta + self.phase)
+        return start + quintic_step(entered) * (target - start)
+
+    def entry_duration(self, start: float, style: WaveStyle) -> float:
+        """Return how long the entry must take for both bounds of the module to hold, in [s].
+
+        Args:
+            start: Where the joint stands, in [rad] or [m].
+            style: The style of the wave.
+        """
+        way = abs(self.centre - start) + self.amplitude
+        swing_speed = self.amplitude * style.omega
+        by_velocity = way * STEP_SLOPE / (self.velocity - swing_speed)
+        # way r2 + 2 half T = left T^2, where left is what the swing itself leaves
+        half = STEP_SLOPE * swing_speed
+        left = self.acceleration - swing_speed * style.omega
+        by_acceleration = (half + math.sqrt(half * half + way * STEP_CURVATURE * left)) / left
+        return max(style.shortest_entry, by_velocity, by_acceleration)
+
+
+def plan_swing(limits: JointLimits, phase: float, style: WaveStyle) -> Swing:
+    """Choose centre and amplitude within the limits of a joint.
+
+    Args:
+        limits: Limits of the joint; without a range it swings about zero.
+        phase: How far it is ahead in [rad].
+        style: The style of the wave.
+
+    Raises:
+        WaveError: The joint has no range, or may not move.
+    """
+    if not limits.upper > limits.lower or not limits.velocity > 0:
+        raise WaveError(
+            f'joint {limits.name} cannot swing: its range is {limits.lower:g} to '
+            f'{limits.upper:g}, its velocity limit {limits.velocity:g}'
+        )
+    velocity = style.velocity_share * limits.velocity
+    acceleration = (1 - style.stop_share) * style.acceleration
+    half_range = (limits.upper - limits.lower) / 2
+    amplitude = min(
+        style.amplitude,
+        style.range_share * half_range,
+        velocity / 2 / style.omega,
+        acceleration / 2 / style.omega**2,
+    )
+    centre = 0.0 if math.isinf(half_range) else (limits.lower + limits.upper) / 2
+    return Swing(limits.name, centre, amplitude, phase, velocity, acceleration)
+
+
+def stop_duration(swings: list[Swing], style: WaveStyle) -> float:
+    """Return how long a stop must take, in [s].
+
+    Args:
+        swings: The joints that are stopped together.
+        style: The style of the wave.
+    """
+    fastest = max((swing.velocity for swing in swings), default=0.0)
+    return fastest * STEP_SLOPE / (style.stop_share * style.acceleration)

@@ -1,0 +1,127 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The wave as a ROS node inside the master's process."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rcl_interfaces.msg import ParameterDescriptor
+from rclpy.node import Node
+from std_srvs.srv import Trigger
+
+from .description import joint_limits
+from .exceptions import WaveError
+from .wave import plan_swing, Swing, WaveStyle
+from .wave_source import AxisReport, REPORT_PERIOD, WaveReport, WaveSource
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from arm_canopen import MasterProcess
+
+
+def plan(urdf: str, drives: Sequence[str], style: WaveStyle) -> list[Swing]:
+    """Plan the wave for all drives that the description has a joint for.
+
+    Args:
+        urdf: The description of the robot.
+        drives: Names of the drives of the bus.
+        style: The style of the wave.
+
+    Returns:
+        One swing for each, in the order of the drives.
+
+    Raises:
+        DescriptionError: The description is not usable.
+        WaveError: No drive has the name of a joint, or a joint cannot swing.
+    """
+    limits = joint_limits(urdf)
+    joints = [name for name in drives if name in limits]
+    if not joints:
+        raise WaveError(
+            f'no drive has the name of a joint; drives: {", ".join(drives)}; '
+            f'joints: {", ".join(limits)}'
+        )
+    lag = 2 * math.pi / len(joints)
+    return [plan_swing(limits[name], -i * lag, style) for i, name in enumerate(joints)]
+
+
+class WaveNode(Node):
+    """Offers ~/start and ~/stop, and says in /diagnostics how well the drives follow."""
+
+    def __init__(self, master: MasterProcess) -> None:
+        """Plan the wave for the drives of a running master; nothing moves yet.
+
+        Args:
+            master: The process that runs the bus.
+
+        Raises:
+            DescriptionError: Parameter robot_description is not usable.
+            WaveError: The wave cannot be planned.
+        """
+        super().__init__('wave')
+        self._master = master
+        description = ParameterDescriptor(
+            description='URDF of the robot as XML; the wave stays within its joint limits',
+            read_only=True,
+        )
+        urdf = str(self.declare_parameter('robot_description', '', description).value)
+        drives = [node.name for node in master.bus.nodes if node.is_drive]
+        style = WaveStyle()
+        self._source = WaveSource(plan(urdf, drives, style), style)
+        self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
+        self.create_service(Trigger, '~/start', self._start)
+        self.create_service(Trigger, '~/stop', self._stop)
+        self.create_timer(REPORT_PERIOD, self._publish)
+
+    def _start(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        self._master.attach(self._source)
+        self._source.start()
+        response.success = True
+        response.message = (
+            f'the wave takes in each of its {len(self._source.axes)} drives that is enabled, in '
+            'cyclic position mode and moved by nothing else'
+        )
+        return response
+
+    def _stop(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        self._source.stop()
+        response.success = True
+        response.message = f'stands still in {self._source.stop_duration:.1f} s'
+        return response
+
+    def _publish(self) -> None:
+        report = self._source.report
+        message = DiagnosticArray(status=[_motion_status(report), *map(_axis_status, report.axes)])
+        message.header.stamp = self.get_clock().now().to_msg()
+        self._diagnostics.publish(message)
+
+
+def _motion_status(report: WaveReport) -> DiagnosticStatus:
+    active = sum(axis.active for axis in report.axes)
+    return DiagnosticStatus(
+        level=DiagnosticStatus.OK,
+        name='wave: motion',
+        message=f'{report.state.value}, {active} of {len(report.axes)} axes',
+        values=[KeyValue(key='state', value=report.state.value)],
+    )
+
+
+def _axis_status(axis: AxisReport) -> DiagnosticStatus:
+    figures = {
+        'active': str(axis.active),
+        'lowest': f'{axis.lowest:.6f}',
+        'highest': f'{axis.highest:.6f}',
+        'error_max': f'{axis.error_max:.6f}',
+        'error_rms': f'{axis.error_rms:.6f}',
+        'samples': str(axis.samples),
+    }
+    return DiagnosticStatus(
+        level=DiagnosticStatus.OK,
+        name=f'wave: {axis.name}',
+        message='in the wave' if axis.active else 'not in the wave',
+        values=[KeyValue(key=key, value=value) for key, value in figures.items()],
+    )

@@ -1,0 +1,215 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The Panda's description against the numbers of the arm, and what a broken one says."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import numpy as np
+from numpy.typing import NDArray
+import pytest
+
+from arm_bringup.description import expand_xacro, joint_limits
+from arm_bringup.exceptions import DescriptionError
+
+ROBOTS = Path(__file__).parents[1] / 'robots'
+HALF_PI = math.pi / 2
+
+# name, xyz [m], rpy [rad], lower, upper [rad], velocity [rad/s], effort [Nm]: data sheet and
+# modified Denavit-Hartenberg table of the Franka Emika Panda
+Row = tuple[str, tuple[float, float, float], float, float, float, float, float]
+
+JOINTS: list[Row] = [
+    ('panda_joint1', (0, 0, 0.333), 0, -2.8973, 2.8973, 2.175, 87),
+    ('panda_joint2', (0, 0, 0), -HALF_PI, -1.7628, 1.7628, 2.175, 87),
+    ('panda_joint3', (0, -0.316, 0), HALF_PI, -2.8973, 2.8973, 2.175, 87),
+    ('panda_joint4', (0.0825, 0, 0), HALF_PI, -3.0718, -0.0698, 2.175, 87),
+    ('panda_joint5', (-0.0825, 0.384, 0), -HALF_PI, -2.8973, 2.8973, 2.61, 12),
+    ('panda_joint6', (0, 0, 0), HALF_PI, -0.0175, 3.7525, 2.61, 12),
+    ('panda_joint7', (0.088, 0, 0), HALF_PI, -2.8973, 2.8973, 2.61, 12),
+]
+
+Matrix = NDArray[np.float64]
+
+
+def panda(**arguments: str) -> ET.Element:
+    """Expand the Panda's xacro."""
+    urdf = expand_xacro(ROBOTS / 'panda' / 'panda.urdf.xacro', arguments)
+    return ET.fromstring(urdf)  # noqa: S314
+
+
+def numbers(element: ET.Element | None, key: str) -> list[float]:
+    """Read three numbers of an attribute, zero when there are none."""
+    text = element.get(key, '0 0 0') if element is not None else '0 0 0'
+    return [float(word) for word in text.split()]
+
+
+def transform(xyz: list[float], rpy: list[float]) -> Matrix:
+    """Return the homogeneous matrix of a URDF origin (fixed axes, x then y then z)."""
+    (cr, cp, cy), (sr, sp, sy) = np.cos(rpy), np.sin(rpy)
+    matrix = np.eye(4)
+    matrix[:3, 3] = xyz
+    roll = np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
+    pitch = np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])
+    yaw = np.array([[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]])
+    matrix[:3, :3] = yaw @ pitch @ roll
+    return matrix
+
+
+def forward(root: ET.Element, positions: list[float], tip: str) -> Matrix:
+    """Return the pose of a link in the root link, for joints that turn about their z axes."""
+    parents = {joint.find('child').get('link'): joint for joint in root.iter('joint')}  # type: ignore[union-attr]
+    angles = dict(zip([name for name, *_ in JOINTS], positions, strict=True))
+    pose = np.eye(4)
+    while (joint := parents.get(tip)) is not None:
+        origin = joint.find('origin')
+        here = transform(numbers(origin, 'xyz'), numbers(origin, 'rpy'))
+        turn = transform([0, 0, 0], [0, 0, angles.get(joint.get('name', ''), 0.0)])
+        pose = here @ turn @ pose
+        tip = joint.find('parent').get('link')  # type: ignore[union-attr,assignment]
+    return pose
+
+
+@pytest.mark.parametrize('row', JOINTS, ids=[row[0] for row in JOINTS])
+def test_a_joint_is_where_the_arm_has_it(row: Row) -> None:
+    """Origin, axis and limits of each joint are those of the table."""
+    name, xyz, roll, *values = row
+    joint = panda().find(f"joint[@name='{name}']")
+    assert joint is not None
+    assert joint.get('type') == 'revolute'
+    origin = joint.find('origin')
+    assert numbers(origin, 'xyz') == pytest.approx(xyz)
+    assert numbers(origin, 'rpy') == pytest.approx((roll, 0, 0))
+    assert numbers(joint.find('axis'), 'xyz') == [0, 0, 1]
+    limit = joint.find('limit')
+    assert limit is not None
+    keys = ('lower', 'upper', 'velocity', 'effort')
+    assert [float(limit.attrib[key]) for key in keys] == values
+
+
+@pytest.mark.parametrize(
+    ('positions', 'xyz'),
+    [
+        ([0.0] * 7, (0.088, 0.0, 0.926)),
+        ([0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785], (0.3070, 0.0, 0.5903)),
+    ],
+    ids=['zero', 'ready'],
+)
+def test_the_flange_is_where_the_arm_has_it(
+    positions: list[float], xyz: tuple[float, float, float]
+) -> None:
+    """Forward kinematics of the description meets the check poses."""
+    flange = forward(panda(), positions, 'panda_link8')
+    assert flange[:3, 3] == pytest.approx(xyz, abs=1e-4)
+    assert flange[2, 2] == pytest.approx(-1.0, abs=1e-3)  # it points down
+
+
+def test_the_tool_centre_point_is_between_the_finger_tips() -> None:
+    """The hand hangs turned by 45 degrees below the flange."""
+    tcp = forward(panda(), [0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785], 'panda_hand_tcp')
+    assert tcp[2, 3] == pytest.approx(0.4869, abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'there', 'gone'),
+    [
+        ({}, 'panda_hand', 'panda_leftfinger'),
+        ({'hand': 'false'}, 'panda_link8', 'panda_hand'),
+        ({'fingers': 'true'}, 'panda_rightfinger', 'panda_none'),
+    ],
+    ids=['default', 'bare', 'fingers'],
+)
+def test_hand_and_fingers_are_arguments(arguments: dict[str, str], there: str, gone: str) -> None:
+    """The fingers are left out by default: no drive of the bus moves them."""
+    links = {link.get('name') for link in panda(**arguments).iter('link')}
+    assert there in links
+    assert gone not in links
+
+
+def test_fingers_without_a_hand_are_refused() -> None:
+    """With a sentence, not with a URDF of two roots."""
+    with pytest.raises(DescriptionError, match='hand:=true'):
+        panda(hand='false', fingers='true')
+
+
+def test_the_description_is_one_tree_with_plausible_masses() -> None:
+    """One root; every link with mass has a positive inertia that fulfils the triangle rule."""
+    root = panda(fingers='true')
+    children = {joint.find('child').get('link') for joint in root.iter('joint')}  # type: ignore[union-attr]
+    links = [link.get('name') for link in root.iter('link')]
+    assert [name for name in links if name not in children] == ['panda_link0']
+    total = 0.0
+    for inertial in root.iter('inertial'):
+        mass, inertia = inertial.find('mass'), inertial.find('inertia')
+        assert mass is not None
+        assert inertia is not None
+        total += float(mass.attrib['value'])
+        moments = sorted(float(inertia.attrib[key]) for key in ('ixx', 'iyy', 'izz'))
+        assert moments[0] > 0
+        assert moments[0] + moments[1] >= moments[2]
+    assert 15 < total < 20  # the data sheet says about 18 kg
+
+
+def test_a_capsule_is_a_cylinder_between_two_spheres() -> None:
+    """Of each collision capsule, the ends of the cylinder are the centres of the spheres."""
+    for link in panda(fingers='true').iter('link'):
+        parts = link.findall('collision')
+        for cylinder, *spheres in zip(parts[::3], parts[1::3], parts[2::3], strict=True):
+            shape = cylinder.find('geometry/cylinder')
+            origin = cylinder.find('origin')
+            assert shape is not None
+            pose = transform(numbers(origin, 'xyz'), numbers(origin, 'rpy'))
+            half = float(shape.attrib['length']) / 2
+            for sphere, end in zip(spheres, (-half, half), strict=True):
+                centre = numbers(sphere.find('origin'), 'xyz')
+                assert pose @ [0, 0, end, 1] == pytest.approx([*centre, 1], abs=1e-9)
+                ball = sphere.find('geometry/sphere')
+                assert ball is not None
+                assert ball.get('radius') == shape.get('radius')
+
+
+def test_the_limits_are_read_in_the_order_of_the_joints() -> None:
+    """Fixed joints and joints that mimic others are left out."""
+    urdf = ET.tostring(panda(fingers='true'), encoding='unicode')
+    limits = joint_limits(urdf)
+    assert list(limits) == [*(name for name, *_ in JOINTS), 'panda_finger_joint1']
+    assert (limits['panda_joint4'].lower, limits['panda_joint4'].upper) == (-3.0718, -0.0698)
+    assert limits['panda_joint5'].velocity == 2.61
+
+
+def test_a_continuous_joint_has_no_range() -> None:
+    """Its lower and upper limits are infinite."""
+    urdf = '<robot><joint name="a" type="continuous"><limit velocity="1"/></joint></robot>'
+    assert joint_limits(urdf)['a'].lower == -math.inf
+
+
+@pytest.mark.parametrize(
+    ('urdf', 'words'),
+    [
+        ('<robot>', 'no XML'),
+        ('<robot><joint name="a" type="revolute"/></robot>', 'joint a'),
+        ('<robot><joint name="a" type="revolute"><limit/></joint></robot>', 'velocity'),
+        (
+            '<robot><joint name="a" type="revolute"><limit velocity="fast"/></joint></robot>',
+            'fast',
+        ),
+    ],
+    ids=['xml', 'no limit', 'no velocity', 'no number'],
+)
+def test_a_description_that_is_not_usable_says_why(urdf: str, words: str) -> None:
+    """The message names the joint and the value."""
+    with pytest.raises(DescriptionError, match=words):
+        joint_limits(urdf)
+
+
+def test_a_broken_xacro_says_which_file_and_what(tmp_path: Path) -> None:
+    """The message has the file and xacro's own words."""
+    file = tmp_path / 'arm.urdf.xacro'
+    file.write_text(
+        '<robot xmlns:xacro="http://www.ros.org/wiki/xacro"><a b="${nothing}"/></robot>'
+    )
+    with pytest.raises(DescriptionError, match=r'arm\.urdf\.xacro.*nothing'):
+        expand_xacro(file)

@@ -1,0 +1,74 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Robot folders by name and by path, and the bus of the Panda."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from arm_bringup.exceptions import RobotError
+from arm_bringup.robots import find_robot, robot_names
+from arm_canopen import load_bus
+
+ROBOTS = Path(__file__).parents[1] / 'robots'
+
+
+def test_a_robot_is_found_by_name() -> None:
+    """Bus and description are in its folder, by convention."""
+    robot = find_robot('panda', ROBOTS)
+    assert robot.name == 'panda'
+    assert robot.bus_config == ROBOTS / 'panda' / 'bus.yml'
+    assert robot.description == ROBOTS / 'panda' / 'panda.urdf.xacro'
+
+
+def test_an_unknown_robot_lists_those_that_exist() -> None:
+    """And tells how to give a folder of one's own."""
+    with pytest.raises(RobotError, match=r"'pandora'.*robots: .*panda.*\./pandora"):
+        find_robot('pandora', ROBOTS)
+
+
+def test_a_folder_of_ones_own_is_given_by_path(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Relative paths count from where the user is."""
+    folder = tmp_path / 'my_arm'
+    folder.mkdir()
+    (folder / 'bus.yml').touch()
+    (folder / 'my_arm.urdf.xacro').touch()
+    monkeypatch.chdir(tmp_path)
+    robot = find_robot(f'.{os.sep}my_arm', ROBOTS)
+    assert robot.name == 'my_arm'
+    assert robot.bus_config == folder / 'bus.yml'
+    assert robot_names(tmp_path) == ['my_arm']
+
+
+def test_a_folder_that_lacks_files_says_which(tmp_path: Path) -> None:
+    """All at once."""
+    with pytest.raises(RobotError, match=rf'lacks bus.yml and {tmp_path.name}.urdf.xacro'):
+        find_robot(f'{tmp_path}{os.sep}', ROBOTS)
+
+
+def test_a_path_that_is_no_folder_says_so() -> None:
+    """Not that files are missing in it."""
+    with pytest.raises(RobotError, match='does not exist'):
+        find_robot('./nowhere', ROBOTS)
+
+
+def test_the_bus_of_the_panda_has_its_seven_joints() -> None:
+    """The article's bus.yml, with its EDS, has no mistake and a drive for each joint."""
+    bus = load_bus(ROBOTS / 'panda' / 'bus.yml')
+    assert [node.name for node in bus.nodes] == [f'panda_joint{i}' for i in range(1, 8)]
+    assert [node.node_id for node in bus.nodes] == list(range(2, 9))
+    assert all(node.is_drive for node in bus.nodes)
+    assert bus.master.sync_period == pytest.approx(0.01)
+    assert bus.warnings == ()
+
+
+def test_there_is_one_source_of_the_eds() -> None:
+    """The Panda's EDS is that of the simulated drive, under the article's name."""
+    eds = ROBOTS / 'panda' / 'cia402_slave.eds'
+    assert eds.is_symlink()
+    assert eds.resolve() == ROBOTS.parents[1] / 'arm_canopen' / 'eds' / 'cia402_drive.eds'

@@ -1,0 +1,108 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Which processes an arm has, with which arguments."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import yaml
+
+from arm_bringup.exceptions import StartError
+from arm_bringup.robots import Robot
+from arm_bringup.stack import arm_processes, Executable, Stack, write_parameters
+from arm_bringup.supervisor import ProcessSpec
+
+ROBOT = Robot('panda', Path('/robots/panda/bus.yml'), Path('/robots/panda/panda.urdf.xacro'))
+PARAMETERS = Path('/tmp/parameters.yaml')
+
+
+class Underlay:
+    """Executables of packages that are there."""
+
+    def __init__(self, folder: Path, *packages: str) -> None:
+        self.folder = folder
+        self.packages = packages
+
+    def find(self, package: str, name: str) -> Path | None:
+        """Answer as find_executable does."""
+        if package not in self.packages:
+            return None
+        file = self.folder / package / name
+        file.parent.mkdir(exist_ok=True)
+        file.touch(mode=0o755)
+        return file
+
+
+def processes(folder: Path, stack: Stack, *packages: str) -> dict[str, ProcessSpec]:
+    """Plan a stack on an underlay with arm_canopen and more."""
+    find = Underlay(folder, 'arm_canopen', 'arm_bringup', *packages).find
+    return {spec.name: spec for spec in arm_processes(stack, PARAMETERS, find)}
+
+
+def test_hardware_has_no_slaves_and_simulation_has(tmp_path: Path) -> None:
+    """Everything else is the same."""
+    real = processes(tmp_path, Stack(ROBOT, 'can0', simulate=False))
+    simulated = processes(tmp_path, Stack(ROBOT, 'can0', simulate=True))
+    assert set(real) == {'master', 'joint_states'}
+    assert set(simulated) == {'slaves', 'master', 'joint_states'}
+    assert simulated['master'] == real['master']
+
+
+def test_bus_and_description_reach_the_processes(tmp_path: Path) -> None:
+    """The bus as parameters, the description as a parameter file."""
+    found = processes(tmp_path, Stack(ROBOT, 'udp_multicast:239.1.2.3:5000', simulate=True))
+    for name in ('slaves', 'master'):
+        argv = found[name].argv
+        assert 'bus_config:=/robots/panda/bus.yml' in argv
+        assert 'can_interface_name:=udp_multicast:239.1.2.3:5000' in argv
+    for name in ('master', 'joint_states'):
+        argv = found[name].argv
+        assert argv[argv.index('--params-file') + 1] == str(PARAMETERS)
+
+
+def test_another_master_gets_its_parameters(tmp_path: Path) -> None:
+    """The demo runs one with the wave inside."""
+    stack = Stack(
+        ROBOT,
+        'can0',
+        simulate=True,
+        master=Executable('arm_bringup', 'wave_master'),
+        master_parameters={'diagnostics_period': '0.2'},
+    )
+    argv = processes(tmp_path, stack)['master'].argv
+    assert argv[0].endswith('arm_bringup/wave_master')
+    assert 'diagnostics_period:=0.2' in argv
+
+
+def test_the_master_stops_before_the_slaves(tmp_path: Path) -> None:
+    """It disables the drives, so they must still be there; the listeners go between."""
+    found = processes(tmp_path, Stack(ROBOT, 'can0', simulate=True), 'robot_state_publisher')
+    orders = {name: spec.stop_order for name, spec in found.items()}
+    assert orders['master'] < orders['joint_states'] == orders['robot_state'] < orders['slaves']
+
+
+def test_robot_state_publisher_runs_where_it_is_installed(tmp_path: Path) -> None:
+    """It is no reason to end when it dies."""
+    found = processes(tmp_path, Stack(ROBOT, 'can0', simulate=True), 'robot_state_publisher')
+    assert not found['robot_state'].required
+
+
+def test_a_workspace_that_is_not_built_says_so(tmp_path: Path) -> None:
+    """A missing package and a missing executable are told apart."""
+    stack = Stack(ROBOT, 'can0', simulate=True)
+    with pytest.raises(StartError, match=r'arm_canopen is not in AMENT_PREFIX_PATH.*make build'):
+        arm_processes(stack, PARAMETERS, lambda package, name: None)
+    with pytest.raises(StartError, match=r'fake_slaves does not exist.*make build'):
+        arm_processes(stack, PARAMETERS, lambda package, name: tmp_path / name)
+
+
+@pytest.mark.parametrize('urdf', ['<a b="c: d"/>', '# no comment\n\t<x/>', "it's ü \\ \u2028"])
+def test_a_description_survives_the_parameter_file(tmp_path: Path, urdf: str) -> None:
+    """Whatever characters are in it."""
+    file = tmp_path / 'parameters.yaml'
+    write_parameters(file, urdf)
+    assert yaml.safe_load(file.read_text()) == {
+        '/**': {'ros__parameters': {'robot_description': urdf}}
+    }

@@ -1,0 +1,68 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Prefixes and colours."""
+
+from __future__ import annotations
+
+import io
+
+import pytest
+
+from arm_bringup.supervisor import Notice, Severity
+from arm_bringup.terminal import LineWriter, Painter, severity_of, wants_colour
+
+
+class Terminal(io.StringIO):
+    """Says that it is one."""
+
+    def isatty(self) -> bool:
+        """Say so."""
+        return True
+
+
+@pytest.mark.parametrize(
+    ('stream', 'environment', 'colour'),
+    [
+        (Terminal(), {'TERM': 'xterm-256color'}, True),
+        (Terminal(), {'TERM': 'xterm', 'NO_COLOR': '1'}, False),
+        (Terminal(), {'TERM': 'dumb'}, False),
+        (Terminal(), {}, False),
+        (io.StringIO(), {'TERM': 'xterm'}, False),
+    ],
+    ids=['terminal', 'NO_COLOR', 'dumb', 'no TERM', 'pipe'],
+)
+def test_colours_are_for_terminals_that_want_them(
+    stream: io.StringIO, environment: dict[str, str], colour: bool
+) -> None:
+    """A pipe, a dumb terminal and NO_COLOR get plain text."""
+    assert wants_colour(stream, environment) is colour
+
+
+def test_plain_lines_have_aligned_names_and_no_escape_codes() -> None:
+    """All prefixes are as wide as the widest."""
+    painter = Painter('bringup', ['master', 'joint_states'], colour=False)
+    assert painter.line('master', 'hello') == 'master       | hello'
+    assert painter.line('joint_states', 'hello') == 'joint_states | hello'
+    assert painter.notice(Notice(Severity.ERROR, 'no')) == 'bringup      | error: no'
+
+
+def test_warnings_and_errors_have_their_own_colours() -> None:
+    """As the severity at the start of a line of a ROS log says."""
+    painter = Painter('bringup', ['master'], colour=True)
+    lines = [
+        painter.line('master', f'[{word}] [master]: text') for word in ('INFO', 'WARN', 'ERROR')
+    ]
+    assert '\x1b[33m' not in lines[0]
+    assert '\x1b[33m[WARN]' in lines[1]
+    assert '\x1b[31m[ERROR]' in lines[2]
+    assert all(line.count('\x1b[0m') == line.count('\x1b[3') for line in lines)
+    assert severity_of('WARN: not in the format') is Severity.INFO
+
+
+def test_a_closed_output_is_no_error() -> None:
+    """Nobody reads any more, but the drives still have to be stopped."""
+    stream = io.StringIO()
+    write = LineWriter(stream)
+    write('seen')
+    stream.close()
+    write('unseen')
