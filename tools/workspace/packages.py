@@ -135,5 +135,6 @@ def source_fingerprint(package: Package) -> str:
         if package.build_type != 'ament_python' or name in _PYTHON_BUILD_FILES:
             parts += [name, path.read_bytes()]
         elif path.suffix not in {'.py', '.pyc'}:
-            parts.append(name)
+            # a link into another package may have led nowhere when this one was built
+            parts += [name, str(path.exists())]
     return fingerprint(*parts)
