@@ -99,7 +99,7 @@ def test_other_groups_on_the_same_port_are_not_heard(bus: Bus, name: str) -> Non
     assert bus.receive(0.0) == []
 
 
-def test_losses_are_counted(name: str) -> None:
+def test_losses_are_counted_and_told_once(name: str, caplog: pytest.LogCaptureFixture) -> None:
     """When the receive buffer is full the kernel drops, and the bus knows how many."""
     sent = 3000
     with open_bus(name) as sender, open_bus(name) as late:
@@ -112,6 +112,14 @@ def test_losses_are_counted(name: str) -> None:
         sender.send(Frame(2))  # the kernel tells the count with the next frame
         assert unstamped(receive_count(late, 1)) == [Frame(2)]
         assert late.counters.lost == sent - got
+        for _ in range(sent):
+            sender.send(Frame(1))
+        receive_count(late, got)
+        sender.send(Frame(2))
+        receive_count(late, 1)
+        assert late.counters.lost > sent - got
+    (warning,) = [record.message for record in caplog.records if 'lost' in record.message]
+    assert 'sysctl -w net.core.rmem_max' in warning
 
 
 def test_frames_stay_on_the_loopback_interface(bus: Bus) -> None:

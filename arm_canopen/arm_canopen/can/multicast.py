@@ -26,7 +26,7 @@ DEFAULT_PORT = 43113
 
 _LOOPBACK = '127.0.0.1'
 _IP_BLOCK_SOURCE = 38  # linux/in.h; Python's socket module does not name it
-_DATAGRAM_MAX = 1024  # [byte] ours have up to 164; longer ones are CAN FD frames
+_DATAGRAM_MAX = 384  # [byte] classic frames have up to 164, and a channel's name
 _SOURCE_PORT = 4313  # any fixed port: binding it fails when another bus has the address
 _SOURCE_TRIES = 16
 

@@ -51,11 +51,8 @@ def _flags(is_extended: bool, is_remote: bool, is_error: bool) -> bytes:
     )
 
 
-_START = b'\x8b' + _key('timestamp') + b'\xcb'
-_STAMP_SIZE = 8  # [byte]; 0.0, because receivers stamp for themselves
-_ID_KEY = _key('arbitration_id')
-_HEAD = _START + bytes(_STAMP_SIZE) + _ID_KEY
-_ID_KEY_AT = len(_START) + _STAMP_SIZE
+# the time is 0.0, because receivers stamp for themselves
+_HEAD = b'\x8b' + _key('timestamp') + b'\xcb' + bytes(8) + _key('arbitration_id')
 _ID_AT = len(_HEAD)
 _LENGTHS = tuple(
     bytes((size,)) + _key('data') + bytes((0xC4, size)) for size in range(PAYLOAD_MAX + 1)
@@ -76,6 +73,11 @@ _PLAIN_HEADS = tuple(
     _HEAD + _unsigned(can_id) + _PLAIN_FLAGS for can_id in range(STANDARD_ID_MAX + 1)
 )
 """Everything before the length of a data frame, by its 11-bit identifier."""
+_PLAIN_IDS = {head: can_id for can_id, head in enumerate(_PLAIN_HEADS)}
+_HEAD_SIZES = [0] * 0x100
+"""Length of such a head in [byte] by the first byte of its identifier, 0 for none of them."""
+for _head in _PLAIN_HEADS:
+    _HEAD_SIZES[_head[_ID_AT]] = len(_head)
 
 
 def encode(frame: Frame) -> bytes:
@@ -108,28 +110,15 @@ def decode(datagram: bytes, timestamp: float) -> Frame:
 
 def _decode_plain(datagram: bytes, timestamp: float) -> Frame | None:
     """Read a data frame with an 11-bit identifier in the usual layout; None for all others."""
-    if (
-        len(datagram) < len(_PLAIN_HEADS[0]) + _LENGTH_SIZE + _TAIL_SIZE
-        or datagram[_ID_KEY_AT:_ID_AT] != _ID_KEY
-        or not datagram.startswith(_START)
-    ):
+    if len(datagram) <= _ID_AT:
         return None
-    can_id = datagram[_ID_AT]
-    flags_at = _ID_AT + 1
-    if can_id == 0xCD:
-        can_id = datagram[flags_at] << 8 | datagram[flags_at + 1]
-        flags_at += 2
-    elif can_id == 0xCC:
-        can_id = datagram[flags_at]
-        flags_at += 1
-    length_at = flags_at + len(_PLAIN_FLAGS)
-    data_at = length_at + _LENGTH_SIZE
-    data = datagram[data_at:-_TAIL_SIZE]
+    length_at = _HEAD_SIZES[datagram[_ID_AT]]
+    can_id = _PLAIN_IDS.get(datagram[:length_at])
+    data = datagram[length_at + _LENGTH_SIZE : -_TAIL_SIZE]
     if (
-        can_id > STANDARD_ID_MAX
+        can_id is None
         or len(data) > PAYLOAD_MAX
-        or datagram[length_at:data_at] != _LENGTHS[len(data)]
-        or datagram[flags_at:length_at] != _PLAIN_FLAGS
+        or not datagram.startswith(_LENGTHS[len(data)], length_at)
         or not datagram.endswith(_TAIL)
     ):
         return None

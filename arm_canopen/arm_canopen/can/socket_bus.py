@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 import contextlib
+import logging
 import math
 import os
 import select
@@ -29,6 +30,7 @@ _TIMESPEC = struct.Struct('@ll')
 _UINT32 = struct.Struct('=I')
 ANCILLARY_SIZE = socket.CMSG_SPACE(_TIMESPEC.size) + socket.CMSG_SPACE(_UINT32.size)  # [byte]
 _READ_AHEAD = 1e-3  # [s] frames may arrive while a batch is read
+_log = logging.getLogger(__name__)
 
 
 def prepare_receiver(sock: socket.socket) -> None:
@@ -40,6 +42,19 @@ def prepare_receiver(sock: socket.socket) -> None:
     sock.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
     sock.setsockopt(socket.SOL_SOCKET, SO_RXQ_OVFL, 1)
     sock.setblocking(False)
+
+
+def loss_text(name: str, granted: int) -> str:
+    """Say that frames were lost, and what helps.
+
+    Args:
+        name: Name of the bus.
+        granted: Size of the receive buffer in [byte].
+    """
+    text = f'{name}: frames were lost, because they came faster than this process reads them'
+    if granted >= RECEIVE_BUFFER:
+        return text
+    return f'{text}; `sysctl -w net.core.rmem_max={RECEIVE_BUFFER}` allows a larger buffer'
 
 
 class StampReader:
@@ -152,8 +167,15 @@ class SocketBus(Bus):
         except BlockingIOError:
             pass
         self.counters.received += len(frames)
-        self.counters.lost = self._stamps.lost
+        if self._stamps.lost != self.counters.lost:
+            if not self.counters.lost:
+                _log.warning('%s', loss_text(self.name, self._granted_buffer()))
+            self.counters.lost = self._stamps.lost
         return frames
+
+    def _granted_buffer(self) -> int:
+        # the kernel doubles what was asked for, for its own bookkeeping, and tells the double
+        return self._receiver.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF) // 2
 
     def wake(self) -> None:
         """Let a waiting :meth:`receive` return at once."""
