@@ -1,0 +1,205 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The seven-axis arm as real processes, in figures, beside ros2_canopen's on the same scenario.
+
+Run it with ``make bench``, or ``python tests/bench_seven_axes.py [SECONDS]`` in the environment.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+import sys
+import time
+from typing import TYPE_CHECKING
+
+from bus_recorder import BusRecorder
+from canopen_interfaces.srv import COTargetDouble
+from diagnostic_msgs.msg import DiagnosticArray
+import psutil
+from sensor_msgs.msg import JointState
+from simulated_arm import JOINTS, SimulatedArm
+
+from arm_canopen.standard.cob_id import CobId
+from conftest import reserve
+
+if TYPE_CHECKING:
+    from processes import RunningProcess
+
+SECONDS = 15.0
+TARGETS = 40
+SYNC_PERIOD = 0.01  # [s] of the article's bus.yml
+
+REFERENCE: dict[str, str] = {
+    'frames/s on the bus': '2907',
+    'frames lost': '0',
+    'master, CPU of one core': '14.5 %',
+    'slaves, CPU of one core (sum)': '46 %',
+    'last boot-up to all operational': '1.7 s from start',
+    'init of seven joints': '0.7 to 0.8 s (one after another)',
+    'SYNC period deviation p50 / p99': '0.88 / 6.1 ms',
+}
+"""ros2_canopen's C++ classes: seven fake slaves, SYNC 10 ms, multicast bus, a 2-core machine."""
+
+
+def main() -> None:
+    """Run the scenario and print the table."""
+    seconds = float(sys.argv[1]) if len(sys.argv) > 1 else SECONDS
+    with reserve() as isolation:
+        rows = []
+        with BusRecorder(isolation.bus) as recorder, SimulatedArm(isolation) as arm:
+            rows += boot_and_init(arm, recorder)
+            rows += reaction(arm, recorder)
+            rows += joint_state_latency(arm, recorder)
+            recorder.pause()
+            rows += steady_state(arm, seconds)
+    print(f'{"seven axes, SYNC 10 ms":40} {"here":>22}   ros2_canopen (C++)')
+    for name, figure in rows:
+        print(f'{name:40} {figure:>22}   {REFERENCE.get(name, "-")}')
+
+
+def boot_and_init(arm: SimulatedArm, recorder: BusRecorder) -> list[tuple[str, str]]:
+    """Time the boot and the parallel init from the frames on the bus."""
+    nodes = range(2, 9)
+    boot_ups = [f.timestamp for f in recorder.frames if is_boot_up(f.can_id, f.data)]
+    starts = [
+        f.timestamp
+        for f in recorder.frames
+        if f.can_id == CobId.NMT and f.data[0] == 1 and f.data[1] in nodes
+    ]
+    begin = time.monotonic()
+    arm.init_all()
+    init = time.monotonic() - begin
+    return [
+        ('last boot-up to all operational', f'{max(starts) - max(boot_ups):.3f} s'),
+        ('init of seven joints', f'{init:.3f} s (parallel)'),
+    ]
+
+
+def reaction(arm: SimulatedArm, recorder: BusRecorder) -> list[tuple[str, str]]:
+    """Time from the call of ~/target to the RPDO that carries it."""
+    for joint in JOINTS:
+        answer = arm.client.trigger(f'/{joint}/position_mode')
+        if not answer.success:
+            raise SystemExit(answer.message)
+    client = arm.client.node.create_client(COTargetDouble, '/panda_joint1/target')
+    client.wait_for_service(5.0)
+    delays = []
+    for number in range(1, TARGETS + 1):
+        wanted = (number * 7).to_bytes(4, 'little')  # [inc]
+        begin = time.monotonic()
+        future = client.call_async(COTargetDouble.Request(target=number * 0.007))
+        arm.client.spin_until(future.done, 5.0, 'answer of ~/target')
+        arm.client.spin_until(
+            lambda wanted=wanted: recorder.first_after(begin, 0x302, wanted) is not None,
+            5.0,
+            'RPDO with the target',
+        )
+        frame = recorder.first_after(begin, 0x302, wanted)
+        delays.append(frame.timestamp - begin if frame else float('nan'))
+    return [
+        (
+            '~/target call to RPDO p50 / max',
+            f'{milliseconds(delays, 0.5)} / {max(delays) * 1e3:.1f} ms',
+        )
+    ]
+
+
+def joint_state_latency(arm: SimulatedArm, recorder: BusRecorder) -> list[tuple[str, str]]:
+    """Time from the last TPDO of a SYNC to the /joint_states message that carries it."""
+    publisher = arm.start(
+        'canopen_joint_state_publisher', '-p', f'robot_description:={seven_joint_urdf()}'
+    )
+    publisher.wait_for('publishing 7 joints')
+    arrivals: list[tuple[float, int]] = []
+
+    def take(message: JointState) -> None:
+        stamp = message.header.stamp
+        arrivals.append((time.monotonic(), stamp.sec * 10**9 + stamp.nanosec))
+
+    arm.client.node.create_subscription(JointState, '/joint_states', take, 10)
+    arm.client.spin_until(lambda: len(arrivals) >= 300, 20.0, '/joint_states')
+    delays = []
+    for arrived, _ in arrivals[50:]:
+        last = recorder.last_before(arrived, 0x280, 0x2FF)
+        if last is not None:
+            delays.append(arrived - last.timestamp)
+    return [
+        (
+            'TPDO to /joint_states p50 / p99',
+            f'{milliseconds(delays, 0.5)} / {milliseconds(delays, 0.99)} ms',
+        )
+    ]
+
+
+def steady_state(arm: SimulatedArm, seconds: float) -> list[tuple[str, str]]:
+    """CPU, memory, losses and jitter while the drives run, with /joint_states on."""
+    diagnostics = arm.client.listen(DiagnosticArray, '/diagnostics')
+    arm.client.spin_until(lambda: bool(diagnostics), 5.0, '/diagnostics')
+    processes = {'master': arm.master, 'slaves': arm.slaves}
+    before = {name: cpu_time(process) for name, process in processes.items()}
+    first, begin = bus_values(diagnostics[-1]), time.monotonic()
+    arm.client.spin_until(lambda: time.monotonic() - begin > seconds, seconds + 5, 'end')
+    elapsed = time.monotonic() - begin
+    share = {
+        name: (cpu_time(process) - before[name]) / elapsed for name, process in processes.items()
+    }
+    last = bus_values(diagnostics[-1])
+    memory = sum(psutil.Process(p.pid).memory_full_info().pss for p in processes.values())
+
+    def grown(key: str) -> int:
+        return int(last[key]) - int(first[key])
+
+    return [
+        ('frames/s on the bus', f'{float(last["frames_per_second"]):.0f}'),
+        ('frames lost', str(grown('frames_lost'))),
+        ('TPDOs that missed their SYNC', str(grown('missed_pdos'))),
+        ('cycles left out', str(grown('overruns'))),
+        ('master, CPU of one core', f'{share["master"]:.1%}'),
+        ('slaves, CPU of one core (sum)', f'{share["slaves"]:.1%}'),
+        (
+            'SYNC late by p50 / p99',
+            f'{float(last["jitter_p50"]) * 1e3:.2f} / {float(last["jitter_p99"]) * 1e3:.2f} ms',
+        ),
+        ('memory of master and slaves (PSS)', f'{memory / 2**20:.0f} MiB'),
+    ]
+
+
+def bus_values(message: DiagnosticArray) -> dict[str, str]:
+    """Return the values of the bus status."""
+    for status in message.status:
+        if status.name.endswith(': bus'):
+            return {entry.key: entry.value for entry in status.values}
+    raise SystemExit('/diagnostics has no status of the bus')
+
+
+def cpu_time(process: RunningProcess) -> float:
+    """Return the processor time that a process has used in [s]."""
+    times = psutil.Process(process.pid).cpu_times()
+    return times.user + times.system
+
+
+def is_boot_up(can_id: int, data: bytes) -> bool:
+    """Tell whether a frame is a boot-up message."""
+    return 0x701 <= can_id <= 0x77F and data == b'\0'
+
+
+def milliseconds(values: Sequence[float], share: float) -> str:
+    """Return a percentile in [ms]."""
+    ordered = sorted(values)
+    return f'{ordered[int((len(ordered) - 1) * share)] * 1e3:.2f}'
+
+
+def seven_joint_urdf() -> str:
+    """Return a URDF with the names of the seven joints."""
+    joints = ''.join(
+        f'<joint name="{name}" type="continuous"><parent link="{a}"/><child link="{b}"/></joint>'
+        for name, (a, b) in zip(JOINTS, pairwise('abcdefgh'), strict=True)
+    )
+    return (
+        f'<robot name="r">{"".join(f"""<link name="{c}"/>""" for c in "abcdefgh")}{joints}</robot>'
+    )
+
+
+if __name__ == '__main__':
+    main()

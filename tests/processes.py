@@ -1,0 +1,132 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Processes under test: their output as events, and their end as a certainty."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+import os
+import re
+import signal
+import subprocess
+import threading
+import time
+from types import TracebackType
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
+from ament_index_python.packages import get_package_prefix
+
+
+def executable(package: str, name: str) -> str:
+    """Return the path of an installed executable."""
+    return f'{get_package_prefix(package)}/lib/{package}/{name}'
+
+
+class RunningProcess:
+    """A child process in a session of its own.
+
+    Attributes:
+        lines: What it has printed so far, standard output and error together.
+    """
+
+    def __init__(self, arguments: Sequence[str], env: Mapping[str, str]) -> None:
+        """Start it."""
+        self.lines: list[str] = []
+        self._changed = threading.Condition()
+        self._process = subprocess.Popen(
+            arguments,
+            env=env,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            errors='replace',
+            start_new_session=True,
+        )
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    @property
+    def pid(self) -> int:
+        """Its process id."""
+        return self._process.pid
+
+    @property
+    def output(self) -> str:
+        """All lines as one text."""
+        return '\n'.join(self.lines)
+
+    def is_running(self) -> bool:
+        """Tell whether it has not ended yet."""
+        return self._process.poll() is None
+
+    def wait_for(self, pattern: str, timeout: float = 20.0, count: int = 1) -> str:
+        """Wait until lines match a regular expression, and return the last of them.
+
+        Args:
+            pattern: Searched in each line, from the first on.
+            timeout: Longest time in [s].
+            count: How many lines must match.
+        """
+        expression = re.compile(pattern)
+        deadline = time.monotonic() + timeout
+        with self._changed:
+            while True:
+                matches = [line for line in self.lines if expression.search(line)]
+                if len(matches) >= count:
+                    return matches[count - 1]
+                left = deadline - time.monotonic()
+                if left <= 0 or (not self.is_running() and not self._reader.is_alive()):
+                    state = 'running' if self.is_running() else f'ended: {self._process.poll()}'
+                    raise AssertionError(f'no {pattern!r} ({state}) in:\n{self.output}')
+                self._changed.wait(min(left, 0.5))
+
+    def signal(self, number: signal.Signals) -> None:
+        """Send it a signal."""
+        self._process.send_signal(number)
+
+    def wait(self, timeout: float = 15.0) -> int:
+        """Wait for its end and return the exit code."""
+        code = self._process.wait(timeout)
+        self._reader.join(timeout)
+        return code
+
+    def stop(self, timeout: float = 15.0) -> int:
+        """Press Ctrl-C and return the exit code; what does not end then is killed, and a failure."""
+        if self.is_running():
+            self.signal(signal.SIGINT)
+        return self.wait(timeout)
+
+    def __enter__(self) -> Self:
+        """Use it in a with statement."""
+        return self
+
+    def __exit__(
+        self,
+        exc_type: type[BaseException] | None,
+        exc: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """Leave nothing of its session behind."""
+        if self.is_running():
+            try:
+                self.stop()
+            except subprocess.TimeoutExpired:
+                pass
+        try:
+            os.killpg(self.pid, signal.SIGKILL)
+        except ProcessLookupError:
+            pass
+        self._process.wait()
+        self._reader.join()
+
+    def _read(self) -> None:
+        for line in self._process.stdout or ():
+            with self._changed:
+                self.lines.append(line.rstrip('\n'))
+                self._changed.notify_all()
+        with self._changed:
+            self._changed.notify_all()

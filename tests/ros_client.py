@@ -1,0 +1,78 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""A ROS node of the test itself, in a domain of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import time
+from typing import Any, TYPE_CHECKING
+
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from std_srvs.srv import Trigger
+
+if TYPE_CHECKING:
+    from types import TracebackType
+
+    from typing_extensions import Self
+
+
+class RosClient:
+    """Calls services and listens to topics."""
+
+    def __init__(self, domain_id: int) -> None:
+        """Join a domain."""
+        self._context = Context()
+        rclpy.init(context=self._context, domain_id=domain_id)
+        self.node = Node('test_client', context=self._context)
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self.node)
+
+    def call(self, service_type: Any, name: str, request: Any, timeout: float = 20.0) -> Any:
+        """Call a service and return its response."""
+        future = self.call_async(service_type, name, request, timeout)
+        self.spin_until(future.done, timeout, f'an answer of {name}')
+        return future.result()
+
+    def call_async(self, service_type: Any, name: str, request: Any, timeout: float = 20.0) -> Any:
+        """Wait for a service, call it and return the future."""
+        client = self.node.create_client(service_type, name)
+        if not client.wait_for_service(timeout):
+            raise AssertionError(f'there is no service {name}')
+        return client.call_async(request)
+
+    def trigger(self, name: str, timeout: float = 20.0) -> Any:
+        """Call a std_srvs/Trigger."""
+        return self.call(Trigger, name, Trigger.Request(), timeout)
+
+    def listen(self, message_type: Any, topic: str, qos: Any = 10) -> list[Any]:
+        """Subscribe to a topic; the list grows while the client spins."""
+        messages: list[Any] = []
+        self.node.create_subscription(message_type, topic, messages.append, qos)
+        return messages
+
+    def spin_until(self, condition: Callable[[], bool], timeout: float, what: str) -> None:
+        """Serve callbacks until a condition holds."""
+        deadline = time.monotonic() + timeout
+        while not condition():
+            if time.monotonic() > deadline:
+                raise AssertionError(f'no {what} within {timeout} s')
+            self._executor.spin_once(0.05)
+
+    def __enter__(self) -> Self:
+        """Use it in a with statement."""
+        return self
+
+    def __exit__(
+        self,
+        exc_type: type[BaseException] | None,
+        exc: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """Leave the domain."""
+        self._executor.shutdown()
+        self.node.destroy_node()
+        rclpy.shutdown(context=self._context)

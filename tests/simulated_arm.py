@@ -1,0 +1,91 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The Panda's seven drives and their master as real processes on a bus of their own."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ament_index_python.packages import get_package_share_directory
+from processes import executable, RunningProcess
+from ros_client import RosClient
+
+if TYPE_CHECKING:
+    from types import TracebackType
+
+    from typing_extensions import Self
+
+    from conftest import Isolation
+
+JOINTS = [f'panda_joint{number}' for number in range(1, 8)]
+
+
+def panda_bus() -> Path:
+    """Return the bus.yml of the installed robot."""
+    return Path(get_package_share_directory('arm_bringup')) / 'robots' / 'panda' / 'bus.yml'
+
+
+class SimulatedArm:
+    """Slaves, master and a client.
+
+    Attributes:
+        slaves: Process of the simulated drives.
+        master: Process of the master.
+        client: A ROS node of the test.
+    """
+
+    def __init__(self, isolation: Isolation, bus_config: Path | None = None) -> None:
+        """Start the processes and wait until all drives are booted."""
+        self._isolation = isolation
+        self._bus_config = bus_config or panda_bus()
+        self._stack = ExitStack()
+        try:
+            self.client = self._stack.enter_context(RosClient(isolation.domain_id))
+            self.slaves = self.start('fake_slaves')
+            self.master = self.start('master')
+            self.master.wait_for('all 7 devices operational')
+        except BaseException:
+            self._stack.close()
+            raise
+
+    def start(self, name: str, *arguments: str) -> RunningProcess:
+        """Start an executable of arm_canopen on the bus; it ends with the arm."""
+        command = [
+            executable('arm_canopen', name),
+            '--ros-args',
+            *('-p', f'bus_config:={self._bus_config}'),
+            *('-p', f'can_interface_name:={self._isolation.bus}'),
+            *arguments,
+        ]
+        return self._stack.enter_context(RunningProcess(command, self._isolation.env))
+
+    def run(self, *command: str) -> RunningProcess:
+        """Start any command in the environment of the arm, as from a second terminal."""
+        return self._stack.enter_context(RunningProcess(command, self._isolation.env))
+
+    def init_all(self) -> None:
+        """Initialise all joints at the same time."""
+        from std_srvs.srv import Trigger
+
+        futures = [
+            self.client.call_async(Trigger, f'/{joint}/init', Trigger.Request())
+            for joint in JOINTS
+        ]
+        self.client.spin_until(lambda: all(f.done() for f in futures), 20.0, 'init of all joints')
+        for future in futures:
+            assert future.result().success, future.result().message
+
+    def __enter__(self) -> Self:
+        """Use it in a with statement."""
+        return self
+
+    def __exit__(
+        self,
+        exc_type: type[BaseException] | None,
+        exc: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """Stop all processes, the last started first."""
+        self._stack.close()

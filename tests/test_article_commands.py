@@ -1,0 +1,107 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The commands of the CANopen article, as printed, against real processes on a real bus."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import pytest
+from simulated_arm import SimulatedArm
+
+if TYPE_CHECKING:
+    from conftest import Isolation
+
+pytestmark = pytest.mark.scenario
+
+TRIGGER = 'std_srvs/srv/Trigger'
+TARGET = 'canopen_interfaces/srv/COTargetDouble'
+
+
+@pytest.fixture
+def arm(isolation: Isolation) -> Iterator[SimulatedArm]:
+    """Boot the arm."""
+    with SimulatedArm(isolation) as arm:
+        yield arm
+
+
+def call(arm: SimulatedArm, *arguments: str) -> str:
+    """Run ``ros2 service call`` to its end and return what it prints."""
+    process = arm.run('ros2', 'service', 'call', *arguments)
+    assert process.wait(30.0) == 0, process.output
+    return process.output
+
+
+def test_article_moves_a_joint(arm: SimulatedArm) -> None:
+    """init, position_mode and target answer as described, and the joint goes to 10."""
+    publisher = arm.start(
+        'canopen_joint_state_publisher', '-p', f'robot_description:={one_joint_urdf()}'
+    )
+    publisher.wait_for('publishing 1 joints')
+    answer = call(arm, '/panda_joint1/init', TRIGGER)
+    assert 'success=True' in answer
+    assert 'Operation enabled' in answer
+    answer = call(arm, '/panda_joint1/position_mode', TRIGGER)
+    assert 'success=True' in answer
+    assert 'mode Profile position' in answer
+    again = call(arm, '/panda_joint1/position_mode', TRIGGER)
+    assert 'success=True' in again
+    assert 'already in mode' in again
+    assert 'success=True' in call(arm, '/panda_joint1/target', TARGET, '{ target: 10.0 }')
+    from sensor_msgs.msg import JointState
+
+    states = arm.client.listen(JointState, '/joint_states')
+    arm.client.spin_until(
+        lambda: bool(states) and abs(states[-1].position[0] - 10.0) < 1e-3, 30.0, 'arrival at 10'
+    )
+    assert states[-1].name == ['panda_joint1']
+    assert states[-1].header.stamp.sec > 0
+
+
+def test_joint_states_come_at_the_rate_of_sync(arm: SimulatedArm) -> None:
+    """``ros2 topic hz /joint_states`` shows the SYNC rate of 100 Hz."""
+    publisher = arm.start(
+        'canopen_joint_state_publisher', '-p', f'robot_description:={one_joint_urdf()}'
+    )
+    publisher.wait_for('publishing 1 joints')
+    hz = arm.run('ros2', 'topic', 'hz', '/joint_states')
+    line = hz.wait_for('average rate', 20.0, count=3)
+    assert float(line.split()[-1]) == pytest.approx(100.0, rel=0.1)
+
+
+def test_refusals_say_why(arm: SimulatedArm) -> None:
+    """A target before init, and a mode that the drive lacks, are refused in words."""
+    refused = call(arm, '/panda_joint2/target', TARGET, '{ target: 0.1 }')
+    assert 'success=False' in refused
+    arm.master.wait_for('panda_joint2 takes no target.*init.*Switch on disabled')
+    refused = call(arm, '/panda_joint2/torque_mode', TRIGGER)
+    assert 'success=False' in refused
+    assert '0x6502' in refused
+
+
+def test_candump_explains_the_bus(arm: SimulatedArm, isolation: Isolation) -> None:
+    """Candump shows SYNC, PDOs by name, and the SDO that a service causes."""
+    from simulated_arm import panda_bus
+
+    candump = arm.run(
+        *('ros2', 'run', 'arm_canopen', 'candump', isolation.bus),
+        *('--bus-config', str(panda_bus())),
+    )
+    candump.wait_for('SYNC')
+    candump.wait_for('panda_joint1.*Statusword')
+    candump.wait_for('panda_joint7.*Target position')
+    request = '{ index: 0x1000, subindex: 0 }'
+    answer = call(arm, '/panda_joint1/sdo_read', 'canopen_interfaces/srv/CORead', request)
+    assert 'success=True' in answer
+    assert f'data={0x00020192}' in answer
+    candump.wait_for('SDO.*panda_joint1.*0x1000')
+
+
+def one_joint_urdf() -> str:
+    """Return a URDF with the first joint only."""
+    return (
+        '<robot name="one"><link name="a"/><link name="b"/>'
+        '<joint name="panda_joint1" type="revolute"><parent link="a"/><child link="b"/>'
+        '<axis xyz="0 0 1"/><limit lower="-3" upper="3" effort="1" velocity="1"/></joint></robot>'
+    )
