@@ -209,8 +209,8 @@ class CyclicPosition(Mode):
 
     @property
     def goes_to_single_target(self) -> bool:
-        """Whether the profile still moves."""
-        return not self._profile.at_rest
+        """Whether the profile is on the way to a single target."""
+        return self._profile.target is not None and not self._profile.at_rest
 
     def preload(self, position: float, velocity: float) -> None:
         """Hold the actual position."""
