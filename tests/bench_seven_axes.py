@@ -7,7 +7,8 @@ Run it with ``make bench``, or ``python tests/bench_seven_axes.py [SECONDS]`` in
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from itertools import pairwise
 import sys
 import time
@@ -16,12 +17,12 @@ from typing import TYPE_CHECKING
 from bus_recorder import BusRecorder
 from canopen_interfaces.srv import COTargetDouble
 from diagnostic_msgs.msg import DiagnosticArray
+from isolation import reserve
 import psutil
 from sensor_msgs.msg import JointState
 from simulated_arm import JOINTS, SimulatedArm
 
 from arm_canopen.standard.cob_id import CobId
-from conftest import reserve
 
 if TYPE_CHECKING:
     from processes import RunningProcess
@@ -86,23 +87,15 @@ def reaction(arm: SimulatedArm, recorder: BusRecorder) -> list[tuple[str, str]]:
     client.wait_for_service(5.0)
     delays = []
     for number in range(1, TARGETS + 1):
-        wanted = (number * 7).to_bytes(4, 'little')  # [inc]
         begin = time.monotonic()
         future = client.call_async(COTargetDouble.Request(target=number * 0.007))
         arm.client.spin_until(future.done, 5.0, 'answer of ~/target')
-        arm.client.spin_until(
-            lambda wanted=wanted: recorder.first_after(begin, 0x302, wanted) is not None,
-            5.0,
-            'RPDO with the target',
-        )
-        frame = recorder.first_after(begin, 0x302, wanted)
+        carries = partial(recorder.first_after, begin, 0x302, (number * 7).to_bytes(4, 'little'))
+        arm.client.spin_until(partial(is_there, carries), 5.0, 'RPDO of the target')
+        frame = carries()
         delays.append(frame.timestamp - begin if frame else float('nan'))
-    return [
-        (
-            '~/target call to RPDO p50 / max',
-            f'{milliseconds(delays, 0.5)} / {max(delays) * 1e3:.1f} ms',
-        )
-    ]
+    longest = max(delays) * 1e3
+    return [('~/target call to RPDO p50 / max', f'{milliseconds(delays, 0.5)} / {longest:.1f} ms')]
 
 
 def joint_state_latency(arm: SimulatedArm, recorder: BusRecorder) -> list[tuple[str, str]]:
@@ -163,6 +156,11 @@ def steady_state(arm: SimulatedArm, seconds: float) -> list[tuple[str, str]]:
         ),
         ('memory of master and slaves (PSS)', f'{memory / 2**20:.0f} MiB'),
     ]
+
+
+def is_there(look: Callable[[], object]) -> bool:
+    """Tell whether a look finds something."""
+    return look() is not None
 
 
 def bus_values(message: DiagnosticArray) -> dict[str, str]:

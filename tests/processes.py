@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 import os
 import re
 import signal
@@ -95,7 +96,7 @@ class RunningProcess:
         return code
 
     def stop(self, timeout: float = 15.0) -> int:
-        """Press Ctrl-C and return the exit code; what does not end then is killed, and a failure."""
+        """Press Ctrl-C, wait for the end and return the exit code."""
         if self.is_running():
             self.signal(signal.SIGINT)
         return self.wait(timeout)
@@ -112,14 +113,10 @@ class RunningProcess:
     ) -> None:
         """Leave nothing of its session behind."""
         if self.is_running():
-            try:
+            with suppress(subprocess.TimeoutExpired):
                 self.stop()
-            except subprocess.TimeoutExpired:
-                pass
-        try:
+        with suppress(ProcessLookupError):
             os.killpg(self.pid, signal.SIGKILL)
-        except ProcessLookupError:
-            pass
         self._process.wait()
         self._reader.join()
 

@@ -74,5 +74,5 @@ class RosClient:
     ) -> None:
         """Leave the domain."""
         self._executor.shutdown()
-        self.node.destroy_node()
+        self.node.destroy_node()  # type: ignore[no-untyped-call]
         rclpy.shutdown(context=self._context)

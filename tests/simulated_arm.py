@@ -15,9 +15,8 @@ from ros_client import RosClient
 if TYPE_CHECKING:
     from types import TracebackType
 
+    from isolation import Isolation
     from typing_extensions import Self
-
-    from conftest import Isolation
 
 JOINTS = [f'panda_joint{number}' for number in range(1, 8)]
 

@@ -11,7 +11,7 @@ import pytest
 from simulated_arm import SimulatedArm
 
 if TYPE_CHECKING:
-    from conftest import Isolation
+    from isolation import Isolation
 
 pytestmark = pytest.mark.scenario
 

@@ -13,7 +13,7 @@ import pytest
 from simulated_arm import JOINTS, SimulatedArm
 
 if TYPE_CHECKING:
-    from conftest import Isolation
+    from isolation import Isolation
 
 pytestmark = pytest.mark.scenario
 
