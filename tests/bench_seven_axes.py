@@ -68,9 +68,7 @@ def boot_and_init(arm: SimulatedArm, recorder: BusRecorder) -> list[tuple[str, s
         for f in recorder.frames
         if f.can_id == CobId.NMT and f.data[0] == 1 and f.data[1] in nodes
     ]
-    begin = time.monotonic()
-    arm.init_all()
-    init = time.monotonic() - begin
+    init = arm.init_all()
     return [
         ('last boot-up to all operational', f'{max(starts) - max(boot_ups):.3f} s'),
         ('init of seven joints', f'{init:.3f} s (parallel)'),

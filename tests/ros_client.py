@@ -10,7 +10,7 @@ from typing import Any, TYPE_CHECKING
 
 import rclpy
 from rclpy.context import Context
-from rclpy.executors import SingleThreadedExecutor
+from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 
@@ -28,7 +28,7 @@ class RosClient:
         self._context = Context()
         rclpy.init(context=self._context, domain_id=domain_id)
         self.node = Node('test_client', context=self._context)
-        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor = EventsExecutor(context=self._context)
         self._executor.add_node(self.node)
 
     def call(self, service_type: Any, name: str, request: Any, timeout: float = 20.0) -> Any:
@@ -74,5 +74,5 @@ class RosClient:
     ) -> None:
         """Leave the domain."""
         self._executor.shutdown()
-        self.node.destroy_node()  # type: ignore[no-untyped-call]
+        self.node.destroy_node()
         rclpy.shutdown(context=self._context)

@@ -6,11 +6,13 @@ from __future__ import annotations
 
 from contextlib import ExitStack
 from pathlib import Path
+import time
 from typing import TYPE_CHECKING
 
 from ament_index_python.packages import get_package_share_directory
 from processes import executable, RunningProcess
 from ros_client import RosClient
+from std_srvs.srv import Trigger
 
 if TYPE_CHECKING:
     from types import TracebackType
@@ -64,17 +66,19 @@ class SimulatedArm:
         """Start any command in the environment of the arm, as from a second terminal."""
         return self._stack.enter_context(RunningProcess(command, self._isolation.env))
 
-    def init_all(self) -> None:
-        """Initialise all joints at the same time."""
-        from std_srvs.srv import Trigger
-
-        futures = [
-            self.client.call_async(Trigger, f'/{joint}/init', Trigger.Request())
-            for joint in JOINTS
-        ]
+    def init_all(self) -> float:
+        """Initialise all joints at the same time; return how long that took in [s]."""
+        node = self.client.node
+        clients = [node.create_client(Trigger, f'/{joint}/init') for joint in JOINTS]
+        for client in clients:
+            assert client.wait_for_service(20.0), client.srv_name
+        begin = time.monotonic()
+        futures = [client.call_async(Trigger.Request()) for client in clients]
         self.client.spin_until(lambda: all(f.done() for f in futures), 20.0, 'init of all joints')
+        duration = time.monotonic() - begin
         for future in futures:
             assert future.result().success, future.result().message
+        return duration
 
     def __enter__(self) -> Self:
         """Use it in a with statement."""
