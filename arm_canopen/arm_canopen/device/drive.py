@@ -277,8 +277,9 @@ class Drive:
         return word
 
     def _schedule(self, now: float) -> None:
-        operating = self._machine.operating
-        self._idle = self._axis.settled and not (operating and self._mode.waiting)
+        machine = self._machine
+        waiting = machine.transient or (machine.operating and self._mode.waiting)
+        self._idle = self._axis.settled and not waiting
         if self._idle:
             self.deadline = NEVER
             return

@@ -49,7 +49,7 @@ class Servo:
         position: Where the motor is.
         setpoint: Output of the rate limiter.
         powered: The position loop is closed.
-        limited: The demand was faster than the motor.
+        limited: The motor is behind a demand that was faster than it can be.
     """
 
     def __init__(self, model: ServoModel) -> None:
@@ -103,7 +103,6 @@ class Servo:
             end: Time to go to.
             speed: Highest speed of the motor, infinite for none.
         """
-        self.limited = False
         for start, duration in motion.pieces(begin, end):
             self._follow_piece(start, duration, speed)
 
@@ -112,6 +111,7 @@ class Servo:
         last = velocity + acceleration * duration
         caught = abs(position - self.setpoint) <= TOLERANCE
         if caught and abs(velocity) <= speed and abs(last) <= speed:
+            self.limited = False
             self._track(start, duration)
             return
         for _ in range(STRETCHES_MAX):
@@ -130,16 +130,16 @@ class Servo:
             time = _time_within(velocity, acceleration, speed)
             if time > 0.0:
                 time = min(time, duration)
+                self.limited = False
                 self._track(start, time)
                 return time
-        self.limited = True
         sign = math.copysign(1.0, gap or velocity or acceleration)
         closing = velocity - sign * speed
         time = _first_root(0.5 * acceleration, closing, gap)
-        caught = time <= duration
+        self.limited = time > duration
         time = min(time, duration)
         self._track(Point(self.setpoint, sign * speed, 0.0), time)
-        if caught:
+        if not self.limited:
             self.setpoint = advanced(Segment(0.0, *start), time).position
         return time
 

@@ -71,6 +71,13 @@ class StateMachine:
         return self.state is State.OPERATION_ENABLED and self._pending is None
 
     @property
+    def transient(self) -> bool:
+        """The state is left by itself when the motor stands."""
+        if self.state is State.QUICK_STOP_ACTIVE:
+            return not self.quick_stop_option.stays
+        return self._pending is not None or self.state is State.FAULT_REACTION_ACTIVE
+
+    @property
     def quick_stop_option(self) -> QuickStopOption:
         """What a quick stop does (0x605A)."""
         return chosen(self._objects.quick_stop_option, QuickStopOption.QUICK_STOP)
@@ -139,16 +146,14 @@ class StateMachine:
 
     def advance(self, now: float) -> None:
         """Leave a state whose ramp has ended; the axis was advanced before."""
-        if not self._axis.settled:
+        if not self.transient or not self._axis.settled:
             return
         if self._pending is not None:
             self._power_off(self._pending.target)
         elif self.state is State.FAULT_REACTION_ACTIVE:
             self._power_off(State.FAULT)
-        elif self.state is State.QUICK_STOP_ACTIVE and not self.quick_stop_option.stays:
-            self._power_off(State.SWITCH_ON_DISABLED)
         else:
-            return
+            self._power_off(State.SWITCH_ON_DISABLED)
         self.command(self._word, now)
 
     def deceleration(self, option: StopOption) -> float:

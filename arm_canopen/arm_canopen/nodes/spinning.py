@@ -20,7 +20,7 @@ def make_executor() -> Executor:
     while its workers wait for the interpreter lock (rclpy issue 1452).
     """
     try:
-        from rclpy.experimental.events_executor import EventsExecutor  # noqa: PLC0415
+        from rclpy.experimental.events_executor import EventsExecutor
     except ImportError:  # rclpy before 7.1.4
         return SingleThreadedExecutor()
     return EventsExecutor()

@@ -1,0 +1,339 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""SDO server: transcripts byte by byte, and every reason to abort."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from device_rig import drive_dictionary, NODE_ID, RefusedError, Rig
+from hypothesis import given
+from hypothesis import strategies as st
+import pytest
+
+from arm_canopen.standard.datatypes import DataType
+from arm_canopen.standard.dictionary import AccessType, ObjectDictionary, ObjectEntry
+from arm_canopen.standard.sdo import AbortCode
+
+STRING = 0x2000
+BIG = 0x2001
+WRITE_ONLY = 0x2002
+REAL = 0x2003
+EMPTY = 0x2004
+
+
+def dictionary() -> ObjectDictionary:
+    """Return the drive's objects and some of kinds that a drive does not have."""
+    own = [
+        ObjectEntry(STRING, 0, 'text', DataType.VISIBLE_STRING, default='abc'),
+        ObjectEntry(BIG, 0, 'big', DataType.UNSIGNED64, default=1),
+        ObjectEntry(WRITE_ONLY, 0, 'wo', DataType.UNSIGNED8, AccessType.WRITE_ONLY),
+        ObjectEntry(REAL, 0, 'real', DataType.REAL32, default=1.5),
+        ObjectEntry(EMPTY, 0, 'domain', DataType.DOMAIN),
+    ]
+    return ObjectDictionary([*drive_dictionary(), *own])
+
+
+@pytest.fixture
+def rig() -> Rig:
+    """A device in Pre-operational."""
+    rig = Rig(dictionary())
+    rig.take()
+    return rig
+
+
+def check(rig: Rig, transcript: str) -> None:
+    """Play a transcript: lines ``> request`` and ``< answer`` (``-`` for none) in hex."""
+    answer: bytes | None = None
+    for line in transcript.split('\n'):
+        direction, _, text = line.strip().partition(' ')
+        data = None if text.strip() == '-' else bytes.fromhex(text)
+        if direction == '>':
+            assert data is not None
+            answer = rig.raw_sdo(data)
+        elif direction == '<':
+            assert answer == data, f'expected {text}, got {answer and answer.hex(" ")}'
+
+
+TRANSCRIPTS = {
+    'expedited read of 4 bytes': """
+        > 40 00 10 00 00 00 00 00
+        < 43 00 10 00 92 01 02 00""",
+    'expedited read of 1 byte': """
+        > 40 01 10 00 00 00 00 00
+        < 4F 01 10 00 00 00 00 00""",
+    'expedited read of 2 bytes': """
+        > 40 17 10 00 00 00 00 00
+        < 4B 17 10 00 00 00 00 00""",
+    'expedited write with size, read back': """
+        > 2B 17 10 00 E8 03 00 00
+        < 60 17 10 00 00 00 00 00
+        > 40 17 10 00 00 00 00 00
+        < 4B 17 10 00 E8 03 00 00""",
+    'expedited write without size takes the size of the object': """
+        > 22 60 60 00 08 00 00 00
+        < 60 60 60 00 00 00 00 00
+        > 40 60 60 00 00 00 00 00
+        < 4F 60 60 00 08 00 00 00""",
+    'segmented read of a string': """
+        > 40 08 10 00 00 00 00 00
+        < 41 08 10 00 17 00 00 00
+        > 60 00 00 00 00 00 00 00
+        < 00 53 69 6D 75 6C 61 74
+        > 70 00 00 00 00 00 00 00
+        < 10 65 64 20 43 69 41 20
+        > 60 00 00 00 00 00 00 00
+        < 00 34 30 32 20 64 72 69
+        > 70 00 00 00 00 00 00 00
+        < 1B 76 65 00 00 00 00 00""",
+    'segmented write of a string, read back': """
+        > 21 00 20 00 0A 00 00 00
+        < 60 00 20 00 00 00 00 00
+        > 00 30 31 32 33 34 35 36
+        < 20 00 00 00 00 00 00 00
+        > 19 37 38 39 00 00 00 00
+        < 30 00 00 00 00 00 00 00
+        > 40 00 20 00 00 00 00 00
+        < 41 00 20 00 0A 00 00 00
+        > 60 00 00 00 00 00 00 00
+        < 00 30 31 32 33 34 35 36
+        > 70 00 00 00 00 00 00 00
+        < 19 37 38 39 00 00 00 00""",
+    'segmented write of 4 bytes': """
+        > 21 7A 60 00 04 00 00 00
+        < 60 7A 60 00 00 00 00 00
+        > 07 FF FF FF FF 00 00 00
+        < 20 00 00 00 00 00 00 00
+        > 40 7A 60 00 00 00 00 00
+        < 43 7A 60 00 FF FF FF FF""",
+    'segmented write without size': """
+        > 20 7A 60 00 00 00 00 00
+        < 60 7A 60 00 00 00 00 00
+        > 07 01 00 00 00 00 00 00
+        < 20 00 00 00 00 00 00 00""",
+    'expedited write of a string': """
+        > 27 00 20 00 68 69 00 00
+        < 60 00 20 00 00 00 00 00
+        > 40 00 20 00 00 00 00 00
+        < 47 00 20 00 68 69 00 00""",
+    '64 bits do not fit into an expedited transfer': """
+        > 40 01 20 00 00 00 00 00
+        < 41 01 20 00 08 00 00 00
+        > 60 00 00 00 00 00 00 00
+        < 00 01 00 00 00 00 00 00
+        > 70 00 00 00 00 00 00 00
+        < 1D 00 00 00 00 00 00 00""",
+    'read of nothing': """
+        > 40 04 20 00 00 00 00 00
+        < 41 04 20 00 00 00 00 00
+        > 60 00 00 00 00 00 00 00
+        < 0F 00 00 00 00 00 00 00""",
+    'no such object': """
+        > 40 00 50 00 00 00 00 00
+        < 80 00 50 00 00 00 02 06
+        > 2F 00 50 00 01 00 00 00
+        < 80 00 50 00 00 00 02 06""",
+    'no such sub-index': """
+        > 40 18 10 09 00 00 00 00
+        < 80 18 10 09 11 00 09 06
+        > 40 00 10 01 00 00 00 00
+        < 80 00 10 01 11 00 09 06""",
+    'write to a read-only object': """
+        > 23 00 10 00 00 00 00 00
+        < 80 00 10 00 02 00 01 06""",
+    'write to a constant': """
+        > 2F 18 10 00 04 00 00 00
+        < 80 18 10 00 02 00 01 06""",
+    'segmented write to a read-only object is refused at once': """
+        > 21 08 10 00 09 00 00 00
+        < 80 08 10 00 02 00 01 06""",
+    'read of a write-only object': """
+        > 40 02 20 00 00 00 00 00
+        < 80 02 20 00 01 00 01 06""",
+    'too long': """
+        > 23 17 10 00 E8 03 00 00
+        < 80 17 10 00 12 00 07 06""",
+    'too short': """
+        > 2F 17 10 00 E8 00 00 00
+        < 80 17 10 00 13 00 07 06""",
+    'announced size too long': """
+        > 21 7A 60 00 05 00 00 00
+        < 80 7A 60 00 12 00 07 06""",
+    'expedited cannot fill 8 bytes': """
+        > 22 01 20 00 01 02 03 04
+        < 80 01 20 00 13 00 07 06""",
+    'more segments than announced': """
+        > 21 00 20 00 03 00 00 00
+        < 60 00 20 00 00 00 00 00
+        > 00 30 31 32 33 34 35 36
+        < 80 00 20 00 12 00 07 06
+        > 40 00 20 00 00 00 00 00
+        < 47 00 20 00 61 62 63 00""",
+    'fewer segments than announced': """
+        > 21 00 20 00 09 00 00 00
+        < 60 00 20 00 00 00 00 00
+        > 01 30 31 32 33 34 35 36
+        < 80 00 20 00 13 00 07 06""",
+    'toggle bit not alternated in a download': """
+        > 21 00 20 00 0A 00 00 00
+        < 60 00 20 00 00 00 00 00
+        > 10 30 31 32 33 34 35 36
+        < 80 00 20 00 00 00 03 05
+        > 00 30 31 32 33 34 35 36
+        < 80 00 00 00 01 00 04 05""",
+    'toggle bit not alternated in an upload': """
+        > 40 08 10 00 00 00 00 00
+        < 41 08 10 00 17 00 00 00
+        > 70 00 00 00 00 00 00 00
+        < 80 08 10 00 00 00 03 05""",
+    'segments without a transfer': """
+        > 60 00 00 00 00 00 00 00
+        < 80 00 00 00 01 00 04 05
+        > 00 00 00 00 00 00 00 00
+        < 80 00 00 00 01 00 04 05""",
+    'segment of the wrong direction': """
+        > 40 08 10 00 00 00 00 00
+        < 41 08 10 00 17 00 00 00
+        > 00 00 00 00 00 00 00 00
+        < 80 08 10 00 01 00 04 05""",
+    'a new request gives up the transfer under way': """
+        > 40 08 10 00 00 00 00 00
+        < 41 08 10 00 17 00 00 00
+        > 40 00 10 00 00 00 00 00
+        < 43 00 10 00 92 01 02 00
+        > 60 00 00 00 00 00 00 00
+        < 80 00 00 00 01 00 04 05""",
+    'abort by the client is not answered': """
+        > 40 08 10 00 00 00 00 00
+        < 41 08 10 00 17 00 00 00
+        > 80 08 10 00 00 00 00 08
+        < -
+        > 60 00 00 00 00 00 00 00
+        < 80 00 00 00 01 00 04 05""",
+    'block download is refused': """
+        > C6 00 20 00 20 00 00 00
+        < 80 00 20 00 01 00 04 05""",
+    'block upload is refused': """
+        > A4 08 10 00 20 00 00 00
+        < 80 08 10 00 01 00 04 05""",
+    'unknown command specifier': """
+        > E0 34 12 56 00 00 00 00
+        < 80 34 12 56 01 00 04 05""",
+    'a frame that is too short is no SDO': """
+        > 40 00 10 00
+        < -""",
+}
+
+
+@pytest.mark.parametrize('name', TRANSCRIPTS)
+def test_transcript(rig: Rig, name: str) -> None:
+    """The device answers byte by byte what CiA 301, 7.2.4.3 says."""
+    check(rig, TRANSCRIPTS[name])
+
+
+def test_silent_client_is_given_up(rig: Rig) -> None:
+    """A transfer without a request for a second is aborted with a time-out, once."""
+    rig.raw_sdo(bytes.fromhex('40 08 10 00 00 00 00 00'))
+    rig.run(0.9)
+    rig.raw_sdo(bytes.fromhex('60 00 00 00 00 00 00 00'))
+    rig.run(0.9)
+    assert rig.take() == []
+    rig.run(5.0)
+    assert rig.take(0x580 + NODE_ID) == [bytes.fromhex('80 08 10 00 00 00 04 05')]
+
+
+def test_finished_transfer_has_no_time_out(rig: Rig) -> None:
+    """Nothing is aborted after a transfer that came to its end."""
+    rig.read(0x1008)
+    rig.write(STRING, 0, b'0123456789')
+    rig.take()
+    rig.run(5.0)
+    assert rig.take() == []
+
+
+def test_limits_are_kept() -> None:
+    """A value beyond the limits of the EDS is refused by name; the old one stays."""
+    entries = [
+        replace(entry, low_limit=-5, high_limit=9) if entry.index == 0x607C else entry
+        for entry in drive_dictionary()
+    ]
+    rig = Rig(ObjectDictionary(entries))
+    for value, code in ((10, AbortCode.VALUE_HIGH), (-6, AbortCode.VALUE_LOW)):
+        with pytest.raises(RefusedError) as refused:
+            rig.put(0x607C, value)
+        assert refused.value.code == code
+    for value in (9, -5):
+        rig.put(0x607C, value)
+        assert rig.get(0x607C) == value
+
+
+REFUSED_VALUES = [
+    (0x6060, 0, 4, AbortCode.VALUE_RANGE),  # profile torque is not simulated
+    (0x6060, 0, -1, AbortCode.VALUE_RANGE),
+    (0x605A, 0, 3, AbortCode.VALUE_RANGE),
+    (0x605B, 0, 2, AbortCode.VALUE_RANGE),
+    (0x605E, 0, 3, AbortCode.VALUE_RANGE),
+    (0x6083, 0, 0, AbortCode.VALUE_LOW),
+    (0x1019, 0, 241, AbortCode.VALUE_HIGH),
+    (0x1029, 1, 3, AbortCode.VALUE_HIGH),
+    (0x1003, 0, 1, AbortCode.VALUE_RANGE),
+    (0x1005, 0, 0x40000080, AbortCode.VALUE_RANGE),  # it is no SYNC producer
+    (0x1014, 0, 0x86, AbortCode.VALUE_RANGE),  # changed while in use
+]
+
+
+@pytest.mark.parametrize(('index', 'subindex', 'value', 'code'), REFUSED_VALUES)
+def test_value_without_meaning_is_refused(
+    rig: Rig, index: int, subindex: int, value: int, code: AbortCode
+) -> None:
+    """What the device cannot do it does not accept, and keeps what it had."""
+    before = rig.get(index, subindex)
+    with pytest.raises(RefusedError) as refused:
+        rig.put(index, value, subindex)
+    assert refused.value.code == code
+    assert rig.get(index, subindex) == before
+
+
+def test_error_history_without_entries_has_no_data(rig: Rig) -> None:
+    """A sub-index of 0x1003 beyond the number of errors has no data."""
+    with pytest.raises(RefusedError) as refused:
+        rig.read(0x1003, 1)
+    assert refused.value.code == AbortCode.NO_DATA
+
+
+def test_too_much_text_is_refused(rig: Rig) -> None:
+    """A string longer than 64 KiB is refused before it is sent."""
+    answer = rig.raw_sdo(bytes.fromhex('21 00 20 00 01 00 01 00'))
+    assert answer == bytes.fromhex('80 00 20 00 05 00 04 05')
+
+
+@given(text=st.text(st.characters(max_codepoint=0xFF), max_size=200))
+def test_strings_come_back(text: str) -> None:
+    """Whatever text is written is read again, however many segments it takes."""
+    rig = Rig(dictionary())
+    rig.write(STRING, 0, text.encode('latin-1'))
+    assert rig.read(STRING) == text.encode('latin-1')
+
+
+@given(value=st.integers(0, 2**64 - 1))
+def test_long_numbers_come_back(value: int) -> None:
+    """64 bits survive a segmented write and read."""
+    rig = Rig(dictionary())
+    rig.write(BIG, 0, value.to_bytes(8, 'little'))
+    assert rig.read(BIG) == value.to_bytes(8, 'little')
+
+
+def test_every_readable_object_can_be_read(rig: Rig) -> None:
+    """Each object of the EDS answers with a value of its length, or says why it has none."""
+    for entry in drive_dictionary():
+        if entry.index == 0x1003 and entry.subindex:
+            continue
+        size = rig.device.store.find(*entry.address).size
+        value = rig.read(*entry.address)
+        assert size in (None, len(value)), str(entry)
+
+
+def test_nothing_is_answered_for_another_node(rig: Rig) -> None:
+    """Requests to other nodes are none of its business."""
+    rig.send(0x600 + NODE_ID + 1, bytes.fromhex('40 00 10 00 00 00 00 00'))
+    assert rig.take() == []
