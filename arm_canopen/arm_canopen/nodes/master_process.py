@@ -174,7 +174,9 @@ class MasterProcess:
 
     def _tell(self, event: Event) -> None:
         logger = self._node.get_logger()
-        if event.severity is Severity.INFO:
+        if event.severity is Severity.INFO and event.kind is EventKind.NMT_STATE:
+            logger.debug(str(event))  # ~/nmt_state says it
+        elif event.severity is Severity.INFO:
             logger.info(str(event))
         elif event.severity is Severity.WARNING:
             logger.warning(str(event))
