@@ -1,0 +1,86 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The entry point: parse, do, and leave with the exit code of ros2cli.
+
+| code | when |
+|---|---|
+| 0 | done; also for `ros2 topic` without a verb, which shows help |
+| 1 | a `FrontendError`: its message is on stderr |
+| 2 | wrong arguments, or Ctrl-C (ros2cli leaves with the number of SIGINT) |
+| 141 | the reader of our output went away (`| head`), as for every Unix tool |
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+import contextlib
+import os
+import signal
+import sys
+import threading
+
+from .cli.commands import COMMANDS
+from .cli.errors import FrontendError
+from .cli.parser import build
+
+_BROKEN_PIPE = 128 + signal.SIGPIPE
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one `ros2` command line.
+
+    Args:
+        argv: The arguments without the program's name; None takes those of the process.
+
+    Returns:
+        The exit code, see the table above.
+
+    Raises:
+        SystemExit: From argparse, for `--help` (0) and for wrong arguments (2).
+    """
+    words = list(sys.argv[1:] if argv is None else argv)
+    try:
+        with _interrupted_by_sigterm():
+            code = _run(words)
+        sys.stdout.flush()
+    except KeyboardInterrupt:
+        return _leave(int(signal.SIGINT))
+    except BrokenPipeError:
+        return _leave(_BROKEN_PIPE)
+    except FrontendError as error:
+        print(error, file=sys.stderr)
+        return _leave(1)
+    return code
+
+
+def _run(words: list[str]) -> int:
+    line = build(COMMANDS, words)
+    args = line.parser.parse_args(words)
+    if not args.use_python_default_buffering and hasattr(sys.stdout, 'reconfigure'):
+        sys.stdout.reconfigure(line_buffering=True)
+    if line.verb is None:
+        line.help_of.print_help()
+        return 0
+    return line.verb.main(args) or 0
+
+
+@contextlib.contextmanager
+def _interrupted_by_sigterm() -> Iterator[None]:
+    """Let SIGTERM unwind the stack as Ctrl-C does, so that no ghost node stays in the graph."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    previous = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, previous)
+
+
+def _leave(code: int) -> int:
+    """Make sure that a closed stdout does not speak up when Python exits."""
+    try:
+        sys.stdout.flush()
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return code

@@ -1,0 +1,128 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""From a message to plain Python data, abbreviated as the reader asked.
+
+The rules are those that `ros2 topic echo` shows: bytes become text of the same code points, long
+values end in `...`, left-out values say what they are. Nothing here imports rclpy: a message is
+anything with `get_fields_and_field_types()` and `SLOT_TYPES`.
+"""
+
+from __future__ import annotations
+
+from array import array
+from dataclasses import dataclass
+
+from ..aliases import Document, Message, Slot, Value
+
+_ELLIPSIS = '...'
+_SCALARS = (bool, int, float)
+
+
+@dataclass(frozen=True, slots=True)
+class Abbreviation:
+    """What to leave out of a message.
+
+    Attributes:
+        length: Longest array or text that is shown in full; None shows all.
+        no_arrays: Whether arrays are replaced by their type and length.
+        no_texts: Whether texts are replaced by their length.
+    """
+
+    length: int | None = None
+    no_arrays: bool = False
+    no_texts: bool = False
+
+
+FULL = Abbreviation()
+
+
+def to_document(message: Message, abbreviation: Abbreviation = FULL) -> dict[str, Document]:
+    """Turn a message into nested plain data.
+
+    Args:
+        message: Message message, request, response, goal, result or feedback.
+        abbreviation: What to leave out.
+
+    Returns:
+        The fields by name, in the order of their definition.
+    """
+    fields = message.get_fields_and_field_types()
+    return {
+        name: _plain(getattr(message, name), slot, abbreviation)
+        for name, slot in zip(fields, message.SLOT_TYPES, strict=True)
+    }
+
+
+def _plain(value: Value, slot: Slot, cut: Abbreviation) -> Document:
+    if type(value) in _SCALARS:  # numpy's double is a float, too, but not for YAML
+        return value
+    if isinstance(value, str):
+        return describe_text(value) if cut.no_texts else _shorten(value, cut.length)
+    if isinstance(value, bytes):
+        return _shorten(value.decode('latin-1'), cut.length)
+    if is_array(value):
+        if cut.no_arrays:
+            return describe_array(value, slot)
+        return _elements(value, cut)
+    if hasattr(value, 'SLOT_TYPES'):
+        return to_document(value, cut)
+    return value.item()  # a numpy scalar
+
+
+def _elements(values: Value, cut: Abbreviation) -> list[Document]:
+    shown = values if cut.length is None else values[: cut.length]
+    rest = [_ELLIPSIS] if len(shown) < len(values) else []
+    return [*(_plain(value, None, cut) for value in shown), *rest]
+
+
+def _shorten(text: str, length: int | None) -> str:
+    return text if length is None or len(text) <= length else text[:length] + _ELLIPSIS
+
+
+def is_array(value: object) -> bool:
+    """Whether a field's value is an array: a list, `array.array` or numpy array.
+
+    Args:
+        value: The value.
+
+    Returns:
+        False for text, bytes, numbers (numpy's too) and messages.
+    """
+    return isinstance(value, list | tuple | array) or getattr(value, 'ndim', 0) > 0
+
+
+def describe_text(value: str) -> str:
+    """The stand-in for a text that is left out.
+
+    Args:
+        value: The text.
+
+    Returns:
+        Its length in words.
+    """
+    return f'<string length: <{len(value)}>>'
+
+
+def describe_array(value: Value, slot: Slot) -> str:
+    """The stand-in for an array that is left out.
+
+    Args:
+        value: The array.
+        slot: Its type, an entry of the message's `SLOT_TYPES`.
+
+    Returns:
+        Its type and length in words.
+    """
+    element = _type_name(slot.value_type)
+    if hasattr(slot, 'size'):
+        return f'<array type: {element}[{slot.size}]>'
+    bound = f'[{slot.maximum_size}]' if getattr(slot, 'maximum_size', None) is not None else ''
+    return f'<sequence type: {element}{bound}, length: {len(value)}>'
+
+
+def _type_name(value_type: Slot) -> str:
+    if hasattr(value_type, 'typename'):
+        return str(value_type.typename)
+    if hasattr(value_type, 'namespaced_name'):
+        return '/'.join(value_type.namespaced_name())
+    return 'wstring' if 'WString' in type(value_type).__name__ else 'string'

@@ -1,0 +1,99 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Calling services of other nodes."""
+
+from __future__ import annotations
+
+import importlib
+import time
+
+from ..aliases import Handle, InterfaceClass, Message
+from ..cli.errors import FrontendError, NoAnswerError
+from .session import Session
+
+_POLL = 0.01  # [s]
+_APPEAR = 5.0  # [s]; how long a service of a node that exists may take to show up
+
+
+class Client:
+    """A client of one service.
+
+    Attributes:
+        name: The service's name.
+    """
+
+    def __init__(self, session: Session, service_type: InterfaceClass, name: str) -> None:
+        """Look for a service.
+
+        Args:
+            session: The session whose node asks.
+            service_type: The generated class of the service.
+            name: Its name.
+        """
+        self.name = name
+        self._session = session
+        self._client: Handle = session.node.create_client(service_type, name)
+
+    def is_ready(self) -> bool:
+        """Whether the service is there, its endpoints matched."""
+        return bool(self._client.service_is_ready())
+
+    def wait(self, timeout: float | None = None) -> bool:
+        """Wait until the service is there.
+
+        Args:
+            timeout: Longest time [s]; None waits for ever.
+
+        Returns:
+            Whether it is.
+        """
+        deadline = None if timeout is None else time.monotonic() + timeout
+        while not self.is_ready():
+            if deadline is not None and time.monotonic() >= deadline:
+                return False
+            time.sleep(_POLL)
+        return True
+
+    def call(self, request: Message, timeout: float | None = None) -> Message:
+        """Call the service.
+
+        Args:
+            request: The request.
+            timeout: Longest time [s] to wait for the answer; None waits for ever.
+
+        Returns:
+            The response.
+
+        Raises:
+            NoAnswerError: When none came in time.
+            FrontendError: When the answer cannot be read.
+        """
+        future = self._client.call_async(request)
+        if not self._session.spin_until(future.done, timeout):
+            raise NoAnswerError(f"Service '{self.name}' did not answer within {timeout:g} s")
+        if future.exception() is not None:
+            raise FrontendError(f'Exception while calling service: {future.exception()!r}')
+        return future.result()
+
+
+def call(session: Session, type_name: str, name: str, **fields: object) -> Message:
+    """Call a service that a node is known to offer.
+
+    Args:
+        session: The session whose node asks.
+        type_name: The service's type, e.g. `rcl_interfaces/srv/GetParameters`.
+        name: The service's name.
+        fields: The fields of the request.
+
+    Returns:
+        The response.
+
+    Raises:
+        NoAnswerError: When the service did not appear or did not answer.
+    """
+    package, folder, base = type_name.split('/')
+    service_type = getattr(importlib.import_module(f'{package}.{folder}'), base)
+    client = Client(session, service_type, name)
+    if not client.wait(_APPEAR):
+        raise NoAnswerError(f"Wait for service timed out: '{name}' did not appear")
+    return client.call(service_type.Request(**fields), _APPEAR)

@@ -1,0 +1,192 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""`ros2 interface list`, `package`, `packages`, `proto` and `show`."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+import sys
+
+from ..cli.errors import FrontendError
+from ..index.definition import Comments, expand
+from ..index.interfaces import (
+    all_interfaces,
+    class_of,
+    definition_path,
+    interfaces_of,
+    Kind,
+)
+
+_TITLES = {Kind.MESSAGE: 'Messages', Kind.SERVICE: 'Services', Kind.ACTION: 'Actions'}
+_FLAGS = {
+    Kind.MESSAGE: ('-m', 'msgs'),
+    Kind.SERVICE: ('-s', 'srvs'),
+    Kind.ACTION: ('-a', 'actions'),
+}
+
+
+def _add_kind_flags(parser: ArgumentParser, help_: str) -> None:
+    for kind, (short, noun) in _FLAGS.items():
+        parser.add_argument(
+            short,
+            f'--only-{noun}',
+            dest='kinds',
+            action='append_const',
+            const=kind,
+            help=help_.format(kind.name.lower()),
+        )
+
+
+class List:
+    """List all interface types available."""
+
+    def add_arguments(self, parser: ArgumentParser) -> None:
+        """Add the command's own arguments.
+
+        Args:
+            parser: The command's parser.
+        """
+        _add_kind_flags(parser, 'Print out only the {} types')
+
+    def main(self, args: Namespace) -> None:
+        """Print the types, grouped by kind.
+
+        Args:
+            args: The parsed arguments.
+        """
+        for kind, title in _TITLES.items():
+            if args.kinds and kind not in args.kinds:
+                continue
+            print(f'{title}:')
+            for names in all_interfaces([kind]).values():
+                for name in names:
+                    print(f'    {name}')
+
+
+class Packages:
+    """Output a list of packages that provide interfaces."""
+
+    def add_arguments(self, parser: ArgumentParser) -> None:
+        """Add the command's own arguments.
+
+        Args:
+            parser: The command's parser.
+        """
+        _add_kind_flags(parser, 'Only list packages that generate {}s')
+
+    def main(self, args: Namespace) -> None:
+        """Print the packages.
+
+        Args:
+            args: The parsed arguments.
+        """
+        for name in all_interfaces(args.kinds or Kind):
+            print(name)
+
+
+class Package:
+    """Output a list of available interface types within one package."""
+
+    def add_arguments(self, parser: ArgumentParser) -> None:
+        """Add the command's own arguments.
+
+        Args:
+            parser: The command's parser.
+        """
+        parser.add_argument(
+            'package_name', help="Name of the ROS package (e.g. 'example_interfaces')"
+        )
+
+    def main(self, args: Namespace) -> None:
+        """Print the types.
+
+        Args:
+            args: The parsed arguments.
+
+        Raises:
+            UnknownNameError: When the package defines none.
+        """
+        for name in interfaces_of(args.package_name):
+            print(name)
+
+
+class Proto:
+    """Output an interface prototype."""
+
+    def add_arguments(self, parser: ArgumentParser) -> None:
+        """Add the command's own arguments.
+
+        Args:
+            parser: The command's parser.
+        """
+        parser.add_argument(
+            'type', help="Show an interface definition (e.g. 'example_interfaces/msg/String')"
+        )
+        parser.add_argument(
+            '--no-quotes', action='store_true', help='if true output has no outer quotes.'
+        )
+
+    def main(self, args: Namespace) -> None:
+        """Print the defaults of a message, request or goal as YAML.
+
+        Args:
+            args: The parsed arguments.
+
+        Raises:
+            UnknownNameError: When there is no such interface.
+        """
+        from ..messages.document import to_document
+        from ..messages.yaml_text import to_yaml
+
+        kind = Kind(definition_path(args.type).parent.name)
+        found = class_of(args.type, kind, 'The passed interface type is invalid')
+        part = {Kind.SERVICE: 'Request', Kind.ACTION: 'Goal'}.get(kind)
+        message = getattr(found, part)() if part else found()
+        text = to_yaml(to_document(message))
+        print(text if args.no_quotes else f'"{text}"')
+
+
+class Show:
+    """Output the interface definition."""
+
+    def add_arguments(self, parser: ArgumentParser) -> None:
+        """Add the command's own arguments.
+
+        Args:
+            parser: The command's parser.
+        """
+        comments = parser.add_mutually_exclusive_group()
+        comments.add_argument(
+            '--all-comments',
+            action='store_true',
+            help='Show all comments, including for nested interface definitions',
+        )
+        comments.add_argument(
+            '--no-comments', action='store_true', help='Show no comments or whitespace'
+        )
+        parser.add_argument(
+            'type',
+            help="Show an interface definition (e.g. 'example_interfaces/msg/String'). "
+            "Passing '-' reads the argument from stdin (e.g. "
+            "'ros2 topic type /chatter | ros2 interface show -').",
+        )
+
+    def main(self, args: Namespace) -> None:
+        """Print the definition with those of its fields' types.
+
+        Args:
+            args: The parsed arguments.
+
+        Raises:
+            FrontendError: When no type is given on stdin.
+            UnknownNameError: When there is no such interface.
+        """
+        name = sys.stdin.readline().strip() if args.type == '-' else args.type
+        if not name:
+            raise FrontendError('the passed value is empty')
+        for line in expand(name, _read, Comments(not args.no_comments, args.all_comments)):
+            print(line)
+
+
+def _read(name: str) -> str:
+    return definition_path(name).read_text(encoding='utf-8')

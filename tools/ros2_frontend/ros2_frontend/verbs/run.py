@@ -1,0 +1,109 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""`ros2 run`: become an executable of a package.
+
+This process is replaced by the executable. So every signal reaches it, once, whoever sends it and
+however; its exit code is ours; and there is one process less per node. (ros2cli keeps a parent,
+which leaves the node running when only the parent is killed.)
+"""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace, REMAINDER
+import os
+from pathlib import Path
+import shlex
+import signal
+import sys
+from typing import NoReturn
+
+from ..cli.errors import FrontendError, UnknownNameError
+from ..cli.suggest import hint
+from ..index.packages import executables
+
+
+class Run:
+    """Run a package specific executable."""
+
+    def add_arguments(self, parser: ArgumentParser) -> None:
+        """Add the command's own arguments.
+
+        Args:
+            parser: The command's parser.
+        """
+        parser.add_argument(
+            '--prefix',
+            help='Prefix command, which should go before the executable. '
+            'Command must be wrapped in quotes if it contains spaces '
+            "(e.g. --prefix 'gdb -ex run --args').",
+        )
+        parser.add_argument('package_name', help='Name of the ROS package')
+        parser.add_argument('executable_name', help='Name of the executable')
+        parser.add_argument(
+            'argv', nargs=REMAINDER, help='Pass arbitrary arguments to the executable'
+        )
+
+    def main(self, args: Namespace) -> NoReturn:
+        """Replace this process by the executable.
+
+        Args:
+            args: The parsed arguments.
+
+        Raises:
+            UnknownNameError: When there is no such package or executable.
+            FrontendError: When several have the name, or it cannot be started.
+        """
+        path = find_executable(args.package_name, args.executable_name)
+        prefix = shlex.split(args.prefix) if args.prefix else []
+        become([*prefix, str(path), *args.argv])
+
+
+def find_executable(package: str, name: str) -> Path:
+    """Find an executable of a package.
+
+    Args:
+        package: The package's name.
+        name: The executable's file name.
+
+    Returns:
+        Its path.
+
+    Raises:
+        UnknownNameError: When there is no such package or executable.
+        FrontendError: When several have the name.
+    """
+    paths = executables(package)
+    found = [path for path in paths if path.name == name]
+    if not found:
+        raise UnknownNameError('No executable found' + _alternatives(package, name, paths))
+    if len(found) > 1:
+        listed = ''.join(f'\n- {path}' for path in found)
+        raise FrontendError(f'Multiple executables found:{listed}')
+    return found[0]
+
+
+def _alternatives(package: str, name: str, paths: list[Path]) -> str:
+    names = sorted(path.name for path in paths)
+    if not names:
+        return f"\nPackage '{package}' has no executables; is it built?"
+    return hint(name, names) or f'\n{package} has: {", ".join(names)}'
+
+
+def become(command: list[str]) -> NoReturn:
+    """Replace this process.
+
+    Args:
+        command: Program and arguments; the program is looked up in `PATH`.
+
+    Raises:
+        FrontendError: When it cannot be started.
+    """
+    sys.stdout.flush()
+    sys.stderr.flush()
+    # Python ignores SIGPIPE, and what is ignored stays ignored across exec
+    signal.signal(signal.SIGPIPE, signal.SIG_DFL)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    try:
+        os.execvp(command[0], command)  # noqa: S606
+    except OSError as error:
+        raise FrontendError(f'Cannot run {command[0]}: {error.strerror}') from error

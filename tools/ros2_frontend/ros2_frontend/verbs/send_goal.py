@@ -1,0 +1,153 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""`ros2 action send_goal`."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+import sys
+import time
+
+from ..aliases import Handle, Message
+from ..cli.arguments import add_graph_arguments
+from ..cli.errors import FieldValueError, FrontendError
+from ..cli.suggest import hint
+from ..index.interfaces import class_of, Kind
+from ..messages.document import to_document
+from ..messages.fill import Filler
+from ..messages.from_text import parse_mapping
+from ..messages.yaml_text import to_yaml
+from ..ros.actions import action_names
+from ..ros.graph import Graph
+from ..ros.names import absolute
+from ..ros.session import open_session, Session
+
+_POLL = 0.01  # [s]
+_CANCEL_TIMEOUT = 5.0  # [s]
+
+# action_msgs/msg/GoalStatus
+_STATUS = {
+    1: 'ACCEPTED',
+    2: 'EXECUTING',
+    3: 'CANCELING',
+    4: 'SUCCEEDED',
+    5: 'CANCELED',
+    6: 'ABORTED',
+}
+
+
+class SendGoal:
+    """Send an action goal."""
+
+    def add_arguments(self, parser: ArgumentParser) -> None:
+        """Add the command's own arguments.
+
+        Args:
+            parser: The command's parser.
+        """
+        add_graph_arguments(parser)
+        parser.add_argument('action_name', help="Name of the ROS action (e.g. '/fibonacci')")
+        parser.add_argument(
+            'action_type',
+            help="Type of the ROS action (e.g. 'example_interfaces/action/Fibonacci')",
+        )
+        content = parser.add_mutually_exclusive_group()
+        content.add_argument(
+            'goal',
+            nargs='?',
+            default='{}',
+            help="Goal request values in YAML format (e.g. '{order: 10}')",
+        )
+        content.add_argument('--stdin', action='store_true', help='Read goal from standard input')
+        parser.add_argument(
+            '-f', '--feedback', action='store_true', help='Echo feedback messages for the goal'
+        )
+
+    def main(self, args: Namespace) -> None:
+        """Send the goal and wait for its result; Ctrl-C cancels it.
+
+        Args:
+            args: The parsed arguments.
+
+        Raises:
+            BadTypeError: When the type is not installed or no action.
+            FieldValueError: When the values do not fit the goal.
+        """
+        action_type = class_of(args.action_type, Kind.ACTION, 'The passed action type is invalid')
+        goal = action_type.Goal()
+        try:
+            Filler().fill(goal, parse_mapping(sys.stdin.read() if args.stdin else args.goal))
+        except FieldValueError as error:
+            raise FieldValueError(f'Failed to populate message fields: {error}') from None
+        from rclpy.action.client import ActionClient
+
+        with open_session(args) as session:
+            client = ActionClient(session.node, action_type, absolute(args.action_name))
+            try:
+                _await_server(client, session, args)
+                _Goal(session, client).run(goal, args.feedback)
+            finally:
+                client.destroy()
+
+
+class _Goal:
+    """One goal on its way."""
+
+    def __init__(self, session: Session, client: Handle) -> None:
+        self._session = session
+        self._client = client
+        self._handle: Handle = None
+
+    def run(self, goal: Message, feedback: bool) -> None:
+        """Send, wait, print; whatever interrupts the wait cancels the goal."""
+        print(f'Sending goal:\n     {_yaml(goal)}')
+        self._handle = self._result_of(
+            self._client.send_goal_async(goal, _print_feedback if feedback else None)
+        )
+        if not self._handle.accepted:
+            print('Goal was rejected.')
+            return
+        print(f'Goal accepted with ID: {bytes(self._handle.goal_id.uuid).hex()}\n')
+        try:
+            result = self._result_of(self._handle.get_result_async())
+        except BaseException:
+            self._cancel()
+            raise
+        print(f'Result:\n    {_yaml(result.result)}')
+        print(f'Goal finished with status: {_STATUS.get(result.status, "UNKNOWN")}')
+
+    def _cancel(self) -> None:
+        print('Canceling goal...')
+        future = self._handle.cancel_goal_async()
+        if not self._session.spin_until(future.done, _CANCEL_TIMEOUT):
+            raise FrontendError('Failed to cancel goal: no answer')
+        if not future.result().goals_canceling:
+            raise FrontendError('Failed to cancel goal')
+        print('Goal canceled.')
+
+    def _result_of(self, future: Handle) -> Handle:
+        self._session.spin_until(future.done)
+        if future.exception() is not None:
+            raise FrontendError(f'Exception while sending goal: {future.exception()!r}')
+        return future.result()
+
+
+def _await_server(client: Handle, session: Session, args: Namespace) -> None:
+    print('Waiting for an action server to become available...')
+    graph = Graph(session, args.spin_time)
+    if graph.wait_for(lambda: client.server_is_ready() or None):
+        return
+    name = absolute(args.action_name)
+    known = [other for other, _ in action_names(session)]
+    if name not in known:
+        print(f"There is no action '{name}' yet.{hint(name, known)}", file=sys.stderr)
+    while not client.server_is_ready():
+        time.sleep(_POLL)
+
+
+def _print_feedback(message: Message) -> None:
+    print(f'Feedback:\n    {_yaml(message.feedback)}')
+
+
+def _yaml(message: Message) -> str:
+    return to_yaml(to_document(message))
