@@ -12,7 +12,8 @@ FOLDERS = [Path('macros'), *sorted(Path('robots').iterdir())]
 
 def files(folder: Path) -> list[str]:
     """Return the files of a folder, as data_files wants them."""
-    return sorted(str(path) for path in folder.iterdir() if path.is_file())
+    # a link whose target is missing must fail the build, not be passed over
+    return sorted(str(path) for path in folder.iterdir() if not path.is_dir())
 
 
 setup(

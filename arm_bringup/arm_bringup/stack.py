@@ -16,7 +16,7 @@ from .supervisor import ProcessSpec
 
 MASTER_READY = r'all \d+ devices operational'
 """What the master logs when every drive of the bus has booted."""
-SLAVES_READY = r'ready'
+SLAVES_READY = r'\d+ simulated drives.* on '
 """What the simulated slaves log when they are on the bus."""
 PUBLISHER_READY = r'publishing \d+ joints'
 """What the publisher of /joint_states logs when it has subscribed to the drives."""

@@ -136,7 +136,8 @@ def test_a_missing_executable_is_a_failure_with_its_name() -> None:
     outcome = watch.run()
     assert outcome.exit_code == 1
     assert '/no/such/master' in outcome.reason
-    assert wait_for_end(int(text.split()[1]) for text in watch.said('good') if ' ' in text) == []
+    ready = [text for text in watch.said('good') if text.startswith('ready')]
+    assert wait_for_end(int(text.split()[1]) for text in ready) == []
 
 
 def test_stop_works_from_another_thread() -> None:
