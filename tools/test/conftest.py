@@ -5,11 +5,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
 import os
 from pathlib import Path
 import sys
 
+from fake_programs import FakeRunner, imitate_colcon
 import pytest
 
 from workspace.environment import Environment
@@ -25,29 +25,6 @@ MANIFEST = """<package format="3">
   <export><build_type>{build_type}</build_type></export>
 </package>
 """
-
-
-@dataclass(frozen=True)
-class FakeRunner(Runner):
-    """Notes what it is asked to run and, like the real programs, leaves the files behind.
-
-    Attributes:
-        seen: What was run so far.
-        fail_at: Number of the run that ends with an exception, 0 for none.
-        effect: Called with the arguments of each run.
-    """
-
-    seen: list[str] = field(default_factory=list)
-    fail_at: int = 0
-    effect: Callable[[list[str]], None] = lambda _arguments: None
-
-    def run(self, what: str, arguments: object, **_options: object) -> None:
-        """Note it; raise as a kill would end it, or do what the program does."""
-        assert isinstance(arguments, list)
-        self.seen.append(what)
-        if len(self.seen) == self.fail_at:
-            raise KeyboardInterrupt
-        self.effect([str(argument) for argument in arguments])
 
 
 @pytest.fixture
@@ -98,21 +75,6 @@ def add_package(layout: Layout) -> Callable[..., Path]:
         return where
 
     return add
-
-
-def imitate_colcon(layout: Layout, arguments: list[str]) -> None:
-    """Leave behind what colcon does for the packages that it is told to build."""
-    if 'colcon' not in arguments:
-        return
-    begin, end = arguments.index('--packages-select') + 1, arguments.index('--cmake-args')
-    for name in arguments[begin:end]:
-        share = layout.install / name / 'share'
-        for path in (share / name / 'package.xml', share / 'colcon-core' / 'packages' / name):
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.touch()
-        (layout.build / name).mkdir(parents=True, exist_ok=True)
-        (layout.build / name / 'colcon_build.rc').write_text('0\n')
-    (layout.install / 'local_setup.bash').touch()
 
 
 @pytest.fixture

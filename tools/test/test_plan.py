@@ -7,9 +7,9 @@ from dataclasses import replace
 from pathlib import Path
 import shutil
 
+from fake_programs import FakeRunner
 import pytest
 
-from conftest import FakeRunner
 from workspace.environment import choose_python, Environment
 from workspace.errors import ForeignFolderError, StepFailedError
 from workspace.interpreter import Interpreter, probe

@@ -1,0 +1,49 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Imitations of the programs that the set-up runs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from workspace.layout import Layout
+from workspace.process import Runner
+
+
+@dataclass(frozen=True)
+class FakeRunner(Runner):
+    """Notes what it is asked to run and, like the real programs, leaves the files behind.
+
+    Attributes:
+        seen: What was run so far.
+        fail_at: Number of the run that ends with an exception, 0 for none.
+        effect: Called with the arguments of each run.
+    """
+
+    seen: list[str] = field(default_factory=list)
+    fail_at: int = 0
+    effect: Callable[[list[str]], None] = lambda _arguments: None
+
+    def run(self, what: str, arguments: object, **_options: object) -> None:
+        """Note it; raise as a kill would end it, or do what the program does."""
+        assert isinstance(arguments, list)
+        self.seen.append(what)
+        if len(self.seen) == self.fail_at:
+            raise KeyboardInterrupt
+        self.effect([str(argument) for argument in arguments])
+
+
+def imitate_colcon(layout: Layout, arguments: list[str]) -> None:
+    """Leave behind what colcon does for the packages that it is told to build."""
+    if 'colcon' not in arguments:
+        return
+    begin, end = arguments.index('--packages-select') + 1, arguments.index('--cmake-args')
+    for name in arguments[begin:end]:
+        share = layout.install / name / 'share'
+        for path in (share / name / 'package.xml', share / 'colcon-core' / 'packages' / name):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.touch()
+        (layout.build / name).mkdir(parents=True, exist_ok=True)
+        (layout.build / name / 'colcon_build.rc').write_text('0\n')
+    (layout.install / 'local_setup.bash').touch()
