@@ -104,6 +104,18 @@ class Rig:
         assert self.device.drive is not None
         return self.device.drive
 
+    @property
+    def position(self) -> float:
+        """Where the motor is now in [inc]; the drive itself may have looked some time ago."""
+        self.drive.advance(self.now)
+        return self.drive.position
+
+    @property
+    def velocity(self) -> float:
+        """How fast the motor turns now in [inc/s]."""
+        self.drive.advance(self.now)
+        return self.drive.velocity
+
     def send(self, can_id: int, data: bytes = b'') -> None:
         """Let the device receive a frame."""
         self.device.receive(Frame(can_id, data), self.now)

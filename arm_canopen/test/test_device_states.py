@@ -113,12 +113,12 @@ def test_starts_by_itself() -> None:
 def test_reset_of_the_node_starts_anew() -> None:
     """An enabled drive is Switch on disabled after a reset of its node, and stays where it is."""
     rig = rig_in(OE)
-    position = rig.drive.position
+    position = rig.position
     rig.send(0, bytes((0x81, rig.node_id)))
     assert rig.state is SOD
-    assert rig.drive.position == position
+    assert rig.position == position
     rig.run(1.0)
-    assert rig.drive.position == position
+    assert rig.position == position
 
 
 @pytest.mark.parametrize('state', [SOD, READY, ON, OE, QS])
@@ -218,16 +218,16 @@ def moving(**options: int) -> Rig:
 
 def ramp(rig: Rig, duration: float = 1.0) -> tuple[float, float, list[State]]:
     """Return time to standstill, its distance, and the states on the way."""
-    start, origin = rig.now, rig.drive.position
+    start, origin = rig.now, rig.position
     states = [rig.drive.state]
     stopped = rig.now
     while rig.now < start + duration:
         rig.run(0.001)
         if rig.drive.state is not states[-1]:
             states.append(rig.drive.state)
-        if abs(rig.drive.velocity) > 1.0:
+        if abs(rig.velocity) > 1.0:
             stopped = rig.now
-    return stopped - start, rig.drive.position - origin, states
+    return stopped - start, rig.position - origin, states
 
 
 SLOW = 1000.0 / 10_000.0  # [s] by 0x6084
@@ -277,10 +277,10 @@ def test_enable_after_quick_stop_with_stay() -> None:
     rig = moving(o605A=6)
     rig.command(QUICK_STOP)
     rig.run(0.02)
-    before = rig.drive.velocity
+    before = rig.velocity
     rig.command(ENABLE)
     assert rig.drive.state is OE
-    assert rig.drive.velocity == pytest.approx(before)
+    assert rig.velocity == pytest.approx(before)
     rig.run(1.0)
     assert rig.get(0x606C) == 1000
 
@@ -362,15 +362,15 @@ def test_enabling_a_motor_that_runs_out_does_not_jerk() -> None:
     rig.put(0x60FF, 0)
     rig.command(DISABLE_VOLTAGE)
     rig.run(0.01)
-    before = rig.drive.velocity
+    before = rig.velocity
     rig.put(0x6060, 1)
     rig.command(SHUTDOWN, SWITCH_ON, ENABLE)
-    assert rig.drive.velocity == pytest.approx(before)
+    assert rig.velocity == pytest.approx(before)
     last = before
     for _ in range(100):
         rig.run(0.001)
-        assert rig.drive.velocity <= last + 1e-6
-        last = rig.drive.velocity
+        assert rig.velocity <= last + 1e-6
+        last = rig.velocity
     assert last == pytest.approx(0.0, abs=1.0)
 
 

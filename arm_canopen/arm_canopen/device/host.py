@@ -60,8 +60,7 @@ class DeviceHost:
 
         def send(frame: Frame) -> None:
             self._send(frame)
-            if frame.can_id in self._table:
-                self._echoes.append((device, frame))
+            self._echoes.append((device, frame))
 
         device = Device(
             node_id,
@@ -83,21 +82,23 @@ class DeviceHost:
     def receive(self, frame: Frame, now: float) -> None:
         """Hand a frame from the bus to all devices that want it."""
         self._dispatch(frame, None, now)
-        while self._echoes:
-            origin, echo = self._echoes.popleft()
-            self._dispatch(echo, origin, now)
+        self._dispatch_echoes(now)
 
     def advance(self, now: float) -> None:
         """Do what is due at steady time ``now`` in [s]."""
         for device in self.devices:
             if device.deadline <= now:
                 device.advance(now)
-        while self._echoes:
-            origin, echo = self._echoes.popleft()
-            self._dispatch(echo, origin, now)
+        self._dispatch_echoes(now)
 
     def _outdate(self) -> None:
         self._outdated = True
+
+    def _dispatch_echoes(self, now: float) -> None:
+        # after the frame that caused them, which everybody has got by then
+        while self._echoes:
+            origin, echo = self._echoes.popleft()
+            self._dispatch(echo, origin, now)
 
     def _dispatch(self, frame: Frame, origin: Device | None, now: float) -> None:
         if frame.is_remote or frame.is_extended or frame.is_error:

@@ -6,18 +6,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 import logging
+import threading
 
 from rcl_interfaces.msg import ParameterDescriptor
 import rclpy
 from rclpy.exceptions import ParameterException
 from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import try_shutdown
 
 from ..can import open_bus
 from ..device.host import DeviceHost
 from ..device.runner import DeviceRunner
 from ..exceptions import CanopenError
-from .spinning import spin
+from .spinning import spin, stop_on_signals
 
 CAN_INTERFACES = (
     'can0, vcan0, udp_multicast:239.x.y.z[:port], auto, or INTERFACE:CHANNEL[@BITRATE]'
@@ -62,12 +64,15 @@ def run_slaves(
     Returns:
         Exit code: 0, or 1 when the devices could not be described or the bus not be opened.
     """
-    rclpy.init(args=None if args is None else list(args))
+    stop = stop_on_signals()
+    rclpy.init(
+        args=None if args is None else list(args), signal_handler_options=SignalHandlerOptions.NO
+    )
     node = Node(name)
     handler = RosLogHandler(node)
     logging.getLogger('arm_canopen').addHandler(handler)
     try:
-        return _run(node, populate, default_bus)
+        return _run(node, populate, default_bus, stop)
     except (CanopenError, ParameterException) as error:
         node.get_logger().fatal(str(error))
         return 1
@@ -77,7 +82,7 @@ def run_slaves(
         try_shutdown()
 
 
-def _run(node: Node, populate: Populate, default_bus: str) -> int:
+def _run(node: Node, populate: Populate, default_bus: str, stop: threading.Event) -> int:
     interface = text_parameter(node, 'can_interface_name', default_bus, CAN_INTERFACES)
     with open_bus(interface) as bus:
         runner = DeviceRunner(bus)
@@ -85,7 +90,7 @@ def _run(node: Node, populate: Populate, default_bus: str) -> int:
         runner.start()
         try:
             node.get_logger().info(f'{what} on {bus.name}')
-            spin([node])
+            spin([node], stop=stop)
         finally:
             runner.stop()
     return 0

@@ -5,6 +5,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+import signal
+import threading
 
 from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
@@ -26,7 +28,31 @@ def make_executor() -> Executor:
     return EventsExecutor()
 
 
-def spin(nodes: Iterable[Node], executor: Executor | None = None) -> None:
+def stop_on_signals() -> threading.Event:
+    """Set an event at the first SIGINT or SIGTERM; the second one ends the process at once.
+
+    For programs that must not be interrupted anywhere: initialise rclpy with
+    ``SignalHandlerOptions.NO``, call this, and hand the event to :func:`spin`.
+    """
+    stop = threading.Event()
+
+    def handle(number: int, _frame: object) -> None:
+        if stop.is_set():
+            signal.signal(number, signal.SIG_DFL)
+            signal.raise_signal(number)
+        stop.set()
+
+    signal.signal(signal.SIGINT, handle)
+    signal.signal(signal.SIGTERM, handle)
+    return stop
+
+
+def spin(
+    nodes: Iterable[Node],
+    executor: Executor | None = None,
+    *,
+    stop: threading.Event | None = None,
+) -> None:
     """Serve nodes until Ctrl-C, SIGTERM or ``rclpy.shutdown``.
 
     The nodes are still there afterwards; destroying them is up to the caller.
@@ -34,13 +60,15 @@ def spin(nodes: Iterable[Node], executor: Executor | None = None) -> None:
     Args:
         nodes: The nodes to serve.
         executor: What serves them; :func:`make_executor` chooses when it is None.
+        stop: Ends it too when it is set, within :data:`WAKE_PERIOD`.
     """
+    stop = stop or threading.Event()
     executor = executor or make_executor()
     for node in nodes:
         executor.add_node(node)
     try:
         # the unbounded spin() of some EventsExecutors burns a core and runs nothing
-        while ok():
+        while ok() and not stop.is_set():
             executor.spin_once(timeout_sec=WAKE_PERIOD)
     except (KeyboardInterrupt, ExternalShutdownException):
         pass

@@ -1,0 +1,299 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Cyclic synchronous and interpolated position modes of the simulated drive."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+import math
+import random
+
+from device_rig import ENABLE, Rig
+import pytest
+
+from arm_canopen.standard.drive import DriveState
+from arm_canopen.standard.nmt import NmtCommand
+
+REACHED = 0x400
+LIMIT = 0x800
+BIT12 = 0x1000
+HALT = 0x100
+PERIOD = 0.01  # [s]
+
+MODES = {8: (0x607A, 0, ENABLE), 7: (0x60C1, 1, ENABLE | 0x10)}
+"""Target object and controlword of the two modes."""
+
+
+AMPLITUDE = 4000.0  # [inc]
+OMEGA = 2.0 * math.pi * 0.2  # [rad/s]
+
+
+def sine(time: float) -> float:
+    """Return a position that begins at rest at 0."""
+    return AMPLITUDE * (1.0 - math.cos(OMEGA * time))
+
+
+def streaming(mode: int, *, sync: bool = True, rpdo_type: int = 255) -> Rig:
+    """Return a drive that is enabled in a mode and gets its targets by RPDO 3."""
+    index, subindex, word = MODES[mode]
+    rig = Rig()
+    rig.put(0x1402, 0x80000000, 1)
+    rig.put(0x1402, rpdo_type, 2)
+    rig.put(0x1602, 0)
+    rig.put(0x1602, index << 16 | subindex << 8 | 32, 1)
+    rig.put(0x1602, 1)
+    rig.put(0x1402, 0x400 + rig.node_id, 1)
+    rig.put(0x6065, 0)
+    rig.nmt(NmtCommand.START)
+    if sync:
+        rig.cycles(5, PERIOD)
+    rig.enable(mode)
+    rig.command(word)
+    return rig
+
+
+def target(rig: Rig, position: float) -> None:
+    """Send a set-point."""
+    rig.send(0x400 + rig.node_id, round(position).to_bytes(4, 'little', signed=True))
+
+
+@pytest.mark.parametrize('mode', MODES)
+@pytest.mark.parametrize('rpdo_type', [0, 1, 255])
+def test_sine_is_followed(mode: int, rpdo_type: int) -> None:
+    """A sine of set-points is followed with a small lag and without jumps in velocity."""
+    rig = streaming(mode, rpdo_type=rpdo_type)
+    velocities = []
+    for step in range(600):
+        wanted = sine(step * PERIOD)
+        target(rig, wanted)
+        rig.sync()
+        rig.run(PERIOD / 2)
+        velocities.append(rig.velocity)
+        rig.run(PERIOD / 2)
+        if step > 5:
+            # a set-point is reached when the next one is due, but for the lag of the servo
+            assert rig.position == pytest.approx(wanted, abs=15.0)
+    jumps = [abs(later - earlier) for earlier, later in pairwise(velocities[5:])]
+    # set-points are whole increments: half a one, twice at both ends, is 200 inc/s in a period
+    assert max(jumps) < AMPLITUDE * OMEGA**2 * PERIOD + 200.0
+
+
+@pytest.mark.parametrize('mode', MODES)
+def test_what_the_target_held_before_is_no_set_point(mode: int) -> None:
+    """Enabling moves nothing until a set-point is written."""
+    index, subindex, word = MODES[mode]
+    rig = Rig()
+    rig.put(index, 4000, subindex)
+    rig.enable(mode)
+    rig.command(word)
+    rig.cycles(50)
+    assert rig.get(0x6064) == 0
+
+
+@pytest.mark.parametrize('mode', MODES)
+def test_without_sync_a_set_point_acts_at_once(mode: int) -> None:
+    """Without SYNC the way to a set-point takes the interpolation time period 0x60C2."""
+    rig = streaming(mode, sync=False)
+    rig.put(0x60C2, 100, 1)
+    target(rig, 200)
+    rig.run(0.05)
+    assert rig.position == pytest.approx(100.0, abs=5.0)
+    assert not rig.statusword & REACHED
+    rig.run(0.1)
+    assert rig.get(0x6064) == 200
+
+
+def test_slower_set_points_than_sync() -> None:
+    """Set-points at every fifth SYNC are interpolated over 0x60C2, not over one SYNC."""
+    rig = streaming(8)
+    rig.put(0x60C2, 50, 1)
+    speeds = []
+    for step in range(40):
+        if step % 5 == 0:
+            target(rig, 10 * (step + 5))
+        rig.sync()
+        rig.run(PERIOD)
+        if step > 5:
+            speeds.append(rig.velocity)
+    assert min(speeds) > 900.0
+    assert max(speeds) < 1100.0
+
+
+def test_set_points_at_each_sync_take_its_period() -> None:
+    """With a set-point for each SYNC the measured period counts, whatever 0x60C2 says."""
+    rig = streaming(8)
+    rig.put(0x60C2, 50, 1)
+    for step in range(1, 50):
+        target(rig, 10 * step)
+        rig.sync()
+        rig.run(PERIOD)
+    assert rig.position == pytest.approx(490.0, abs=5.0)
+
+
+def test_period_of_the_dictionary_counts() -> None:
+    """0x1006 says what the period of SYNC is, instead of measuring it."""
+    rig = streaming(8)
+    rig.put(0x1006, 20_000)
+    for step in range(1, 20):
+        target(rig, 10 * step)
+        rig.sync()
+        rig.run(PERIOD)
+    # each line is half done when the next one takes its place: it runs one set-point behind
+    assert rig.position == pytest.approx(180.0, abs=6.0)
+
+
+def test_late_syncs_do_not_shake_the_axis() -> None:
+    """SYNCs that jitter by a fifth of their period change the speed by about as much."""
+    jitter = random.Random(1)
+    rig = streaming(8)
+    speeds, now = [], rig.now
+    for step in range(1, 200):
+        now += PERIOD
+        rig.run(max(0.0, now + jitter.uniform(-0.001, 0.001) - rig.now))
+        target(rig, 10 * step)
+        rig.sync()
+        if step > 10:
+            speeds.append(rig.velocity)
+    # a late SYNC finds the axis waiting at its set-point for a fifth of the period
+    assert min(speeds) > 300.0
+    assert max(speeds) < 1300.0
+    assert rig.position == pytest.approx(1980.0, abs=15.0)
+
+
+def test_loss_of_sync_in_motion_ends_at_the_last_set_point() -> None:
+    """When master and SYNC are gone, the axis stands at the last set-point that it took."""
+    rig = streaming(8)
+    for step in range(1, 50):
+        target(rig, 10 * step)
+        rig.sync()
+        rig.run(PERIOD)
+    rig.run(1.0)
+    assert (rig.get(0x6064), rig.get(0x606C)) == (490, 0)
+
+
+@pytest.mark.parametrize('mode', MODES)
+def test_software_limits(mode: int) -> None:
+    """A set-point beyond 0x607D leads to the limit and sets bit 11."""
+    rig = streaming(mode)
+    rig.put(0x607D, -50, 1)
+    rig.put(0x607D, 100, 2)
+    for step in range(30):
+        target(rig, 10 * step)
+        rig.sync()
+        rig.run(PERIOD)
+    assert rig.get(0x6064) == 100
+    assert rig.statusword & LIMIT
+    assert mode != 8 or not rig.statusword & BIT12
+    target(rig, 50)
+    rig.sync()
+    rig.run(1.0)
+    assert rig.get(0x6064) == 50
+    assert not rig.statusword & LIMIT
+
+
+@pytest.mark.parametrize('mode', MODES)
+def test_halt(mode: int) -> None:
+    """Halt ramps down; set-points in it are ignored, and the next one after it is obeyed."""
+    word = MODES[mode][2]
+    rig = streaming(mode)
+    for step in range(50):
+        target(rig, 10 * step)
+        rig.sync()
+        rig.run(PERIOD)
+    assert rig.statusword & BIT12
+    rig.command(word | HALT)
+    assert not rig.statusword & BIT12
+    target(rig, 5000)
+    rig.cycles(30)
+    stopped = rig.get(0x6064)
+    assert rig.get(0x606C) == 0
+    assert stopped < 600
+    rig.command(word)
+    rig.cycles(10)
+    assert rig.get(0x6064) == stopped
+    target(rig, stopped + 10)
+    rig.sync()
+    rig.run(1.0)
+    assert rig.get(0x6064) == stopped + 10
+
+
+def test_interpolation_needs_its_bit() -> None:
+    """In mode 7 set-points count only while bit 4 is set; taking it back stops the axis."""
+    rig = streaming(7)
+    rig.command(ENABLE)
+    assert not rig.statusword & BIT12
+    target(rig, 100)
+    rig.cycles(20)
+    assert rig.get(0x6064) == 0
+    rig.command(ENABLE | 0x10)
+    assert rig.statusword & BIT12
+    for step in range(50):
+        target(rig, 10 * step)
+        rig.sync()
+        rig.run(PERIOD)
+    rig.command(ENABLE)
+    rig.run(0.5)
+    assert rig.get(0x606C) == 0
+    assert 480 <= rig.get(0x6064) < 600
+
+
+def test_jump_is_a_following_error() -> None:
+    """A set-point that the motor cannot follow is a fault 0x8611; the motor does not teleport."""
+    rig = streaming(8)
+    rig.put(0x6065, 1000)
+    rig.put(0x6066, 50)
+    target(rig, 20_000)
+    start, before = rig.now, rig.position
+    rig.sync()
+    while rig.drive.state is DriveState.OPERATION_ENABLED:
+        rig.run(0.001)
+        assert abs(rig.position - before) <= 10_000 * 0.001 + 1e-6
+        before = rig.position
+        assert rig.now - start < 0.2
+    assert rig.statusword & LIMIT
+    assert rig.now - start == pytest.approx(0.05, abs=0.02)
+    assert rig.get(0x603F) == 0x8611
+    assert rig.statusword & 0x2000
+    rig.run(2.0)
+    assert rig.drive.state is DriveState.FAULT
+    assert rig.get(0x606C) == 0
+    rig.command(0x80)
+    assert not rig.statusword & 0x2000
+
+
+def test_jump_within_the_window_is_caught_up() -> None:
+    """A jump that the motor makes good in time is no fault; bit 11 tells of the limit."""
+    rig = streaming(8)
+    rig.put(0x6065, 1000)
+    rig.put(0x6066, 50)
+    target(rig, 1200)
+    rig.sync()
+    rig.run(0.02)
+    assert rig.statusword & LIMIT
+    rig.run(1.0)
+    assert rig.state is DriveState.OPERATION_ENABLED
+    assert rig.get(0x6064) == 1200
+    assert not rig.statusword & LIMIT
+
+
+@pytest.mark.parametrize('window', [0, 0xFFFF_FFFF])
+def test_following_error_can_be_switched_off(window: int) -> None:
+    """Window 0 and 0xFFFFFFFF switch the monitoring off: the motor goes as fast as it can."""
+    rig = streaming(8)
+    rig.put(0x6065, window)
+    target(rig, 20_000)
+    rig.sync()
+    rig.run(1.0)
+    assert rig.get(0x606C) == 10_000
+    rig.run(2.0)
+    assert rig.get(0x6064) == 20_000
+
+
+def test_following_error_is_shown() -> None:
+    """0x60F4 is demand minus actual position, here velocity times the lag of the servo."""
+    rig = streaming(8)
+    for step in range(100):
+        target(rig, 50 * step)
+        rig.sync()
+        rig.run(PERIOD)
+    assert rig.get(0x60F4) == pytest.approx(5000 * 0.002, abs=2)
