@@ -185,3 +185,27 @@ def test_bus_that_goes_away_is_waited_for(caplog: pytest.LogCaptureFixture) -> N
         assert bus.served.wait(ARRIVAL)
         runner.stop()
     assert [record.getMessage() for record in caplog.records] == ['flaky is down']
+
+
+def test_defect_in_one_device_leaves_the_others_alive(
+    caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An exception in a device is logged with its traceback, and the next frame is served."""
+    name = free_virtual()
+    with open_bus(name) as bus, open_bus(name) as master:
+        runner = DeviceRunner(bus)
+        broken, _ = (runner.host.add(node_id, drive_dictionary()) for node_id in (5, 6))
+
+        def fail(frame: Frame, now: float) -> None:
+            raise ZeroDivisionError
+
+        runner.start()
+        expect(master, Frame(0x706, b'\x00'))
+        monkeypatch.setattr(broken._sdo, 'receive', fail)
+        read = b'\x40\x00\x10\x00\x00\x00\x00\x00'
+        with caplog.at_level(logging.ERROR):
+            master.send(Frame(0x605, read))
+            master.send(Frame(0x606, read))
+            expect(master, Frame(0x586, b'\x43\x00\x10\x00\x92\x01\x02\x00'))
+        runner.stop()
+    assert 'ZeroDivisionError' in caplog.text

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 import logging
 import threading
 import time
@@ -26,7 +28,7 @@ class DeviceRunner:
     ones do.
 
     Attributes:
-        host: The devices; add them before :meth:`start`.
+        host: The devices; add them before :meth:`start`, and leave them to the thread then.
     """
 
     def __init__(self, bus: Bus) -> None:
@@ -56,10 +58,20 @@ class DeviceRunner:
         """Run the devices in this thread, until :meth:`stop` is called from another one."""
         host = self.host
         while not self._stopping:
-            host.advance(time.monotonic())
+            if not self._guarded(partial(host.advance, time.monotonic())):
+                time.sleep(RETRY_PAUSE)  # what is due stays due
             wait = min(host.deadline - time.monotonic(), IDLE_WAIT)
             for frame in self._receive(max(0.0, wait)):
-                host.receive(frame, frame.timestamp or time.monotonic())
+                self._guarded(partial(host.receive, frame, frame.timestamp or time.monotonic()))
+
+    def _guarded(self, work: Callable[[], None]) -> bool:
+        """Let the devices not die of a defect in one; return whether there was none."""
+        try:
+            work()
+        except Exception:
+            logger.exception('a defect in a simulated device')
+            return False
+        return True
 
     def _receive(self, timeout: float) -> list[Frame]:
         try:

@@ -39,9 +39,9 @@ class RosLogHandler(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
         """Log one record."""
         if record.levelno >= logging.ERROR:
-            self._logger.error(record.getMessage())
+            self._logger.error(self.format(record))
         else:
-            self._logger.warning(record.getMessage())
+            self._logger.warning(self.format(record))
 
 
 def text_parameter(node: Node, name: str, default: str, description: str) -> str:
