@@ -11,12 +11,17 @@ from collections.abc import Iterator
 import importlib
 from pathlib import Path
 
+from hypothesis import settings
 from isolation import Isolation, reserve
 import pytest
 
 for _marker in Path(__file__).parent.glob('*/resource/*'):
     if (_marker.parents[1] / _marker.name / '__init__.py').is_file():
         importlib.import_module(_marker.name)
+
+# how long an example takes says more about the machine than about the code
+settings.register_profile('workspace', deadline=None)
+settings.load_profile('workspace')
 
 
 @pytest.fixture

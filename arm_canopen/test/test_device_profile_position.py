@@ -324,7 +324,7 @@ def test_selecting_the_mode_in_motion_stops(rig: Rig) -> None:
     assert rig.statusword & REACHED
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     targets=st.lists(st.integers(-3000, 3000), min_size=1, max_size=4),
     pauses=st.lists(st.floats(0.0, 1.5), min_size=4, max_size=4),
