@@ -84,6 +84,9 @@ def fake(layout: Layout, lock: int) -> Callable[..., FakeRunner]:
     def make(fail_at: int = 0) -> FakeRunner:
         def effect(arguments: list[str]) -> None:
             imitate_colcon(layout, arguments)
+            if 'venv' in arguments:
+                layout.venv_python.parent.mkdir()
+                layout.venv_python.touch()
             if arguments[-1].endswith('.paths.json'):
                 Path(arguments[-1]).write_text(f'["{layout.venv}/lib", "/include", "/numpy"]')
 

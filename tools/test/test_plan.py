@@ -11,7 +11,7 @@ from fake_programs import FakeRunner
 import pytest
 
 from workspace.environment import choose_python, Environment
-from workspace.errors import ForeignFolderError, StepFailedError
+from workspace.errors import ForeignFolderError, NetworkError, StepFailedError
 from workspace.interpreter import Interpreter, probe
 from workspace.layout import Layout
 from workspace.plan import carry_out, plan, Wish
@@ -155,6 +155,39 @@ def test_old_environment_stays_while_the_new_is_out_of_reach(
     assert read_state(layout.state) == before is not None
 
 
+def test_missing_network_costs_no_environment(
+    environment: Environment, layout: Layout, fake: Fake
+) -> None:
+    """Test tools that cannot be downloaded leave the environment as it was."""
+    carry_out(plan(environment, Wish(build=False)), fake())
+    before = read_state(layout.state)
+
+    def unreachable(_arguments: list[str]) -> None:
+        raise NetworkError('it')
+
+    with pytest.raises(NetworkError):
+        carry_out(plan(environment, ALL), replace(fake(), effect=unreachable))
+    assert read_state(layout.state) == before is not None
+
+
+def test_old_tools_that_fail_do_not_keep_the_old_environment(
+    environment: Environment, layout: Layout, fake: Fake
+) -> None:
+    """An environment whose own pip or uv is damaged is replaced."""
+    wish = Wish(build=False)
+    carry_out(plan(environment, wish), fake())
+    (layout.requirements / 'ros-wheels.txt').write_text('new==2\n')
+    runner = fake()
+
+    def damaged(arguments: list[str]) -> None:
+        if 'download' in arguments:
+            raise StepFailedError('pip', 1, '')
+        runner.effect(arguments)
+
+    carry_out(plan(environment, wish), replace(runner, effect=damaged))
+    assert titles(environment, wish) == []
+
+
 def test_foreign_venv_is_not_touched(environment: Environment, layout: Layout, fake: Fake) -> None:
     """A .venv that somebody else made is refused, and nothing in it is lost."""
     theirs = layout.venv / 'their' / 'work'
@@ -192,10 +225,26 @@ def test_interpreter_is_kept(environment: Environment, tmp_path: Path) -> None:
     assert choose_python('', wheels, state, environment.python) == probe(environment.python)
 
 
+def test_an_upgraded_interpreter_makes_the_environment_new(
+    environment: Environment, tmp_path: Path
+) -> None:
+    """A python3 that leads to another version than before does not count as the same."""
+    name, old, new = (tmp_path / part for part in ('python3', 'python3.11', 'python3.12'))
+    name.symlink_to(old)
+    mine = replace(environment, python=str(name))
+    before = mine.base
+    name.unlink()
+    name.symlink_to(new)
+    assert mine.base != before
+
+
 def test_system_ros_decides_on_the_python(tmp_path: Path) -> None:
     """The venv beside a system's ROS is made by the Python that this ROS is built for."""
     name = f'python3.{probe("python3").version[1]}'
     (tmp_path / 'lib' / name / 'site-packages' / 'rclpy').mkdir(parents=True)
-    chosen = choose_python('', Underlay(UnderlayKind.SYSTEM, tmp_path), None, '/bin/false')
-    assert isinstance(chosen, Interpreter)
-    assert chosen.name == name
+    (tmp_path / 'python3.1').touch()
+    of_wheels = EnvironmentState('base', '', str(tmp_path / 'python3.1'))
+    for state in (None, of_wheels):
+        chosen = choose_python('', Underlay(UnderlayKind.SYSTEM, tmp_path), state, '/bin/false')
+        assert isinstance(chosen, Interpreter)
+        assert chosen.name == name

@@ -103,3 +103,12 @@ def test_probe_refuses_what_is_no_python() -> None:
     """A wrong PYTHON=... is answered with words."""
     with pytest.raises(UnsupportedSystemError, match='does not start'):
         probe('/bin/false')
+
+
+def test_a_python_that_the_systems_ros_is_not_built_for(tmp_path: Path) -> None:
+    """Another Python could not load its extensions."""
+    (tmp_path / 'lib/python3.12/site-packages/rclpy').mkdir(parents=True)
+    with pytest.raises(
+        UnsupportedSystemError, match=r'built for python3\.12, not for python3\.11'
+    ):
+        check_supported(Underlay(UnderlayKind.SYSTEM, tmp_path), PYTHON, ROOT)

@@ -79,7 +79,7 @@ def main(arguments: Sequence[str]) -> int:
     """
     try:
         return _run(_parser().parse_args(arguments))
-    except WorkspaceError as error:
+    except (WorkspaceError, OSError) as error:  # the latter: disk full, read-only, ...
         print(f'error: {error}', file=sys.stderr)
         return 1
     except KeyboardInterrupt:

@@ -5,12 +5,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import contextlib
 from dataclasses import dataclass
 from pathlib import Path
 import shutil
 
 from . import shell, wheels
-from .errors import ForeignFolderError
+from .errors import ForeignFolderError, NetworkError, StepFailedError
 from .interpreter import Interpreter, probe
 from .layout import Layout
 from .process import Argument, Runner
@@ -67,7 +68,9 @@ class Environment:
             *(Path(module.__file__ or '') for module in (wheels, shell)),
         )
         ros = (self.underlay.kind.value, str(self.underlay.prefix))
-        return fingerprint(*ros, self.python, str(self.layout.venv), fingerprint_files(files))
+        # its versioned name: /usr/bin/python3 may lead to another one tomorrow
+        python = str(Path(self.python).resolve())
+        return fingerprint(*ros, python, str(self.layout.venv), fingerprint_files(files))
 
     @property
     def dev(self) -> str:
@@ -105,8 +108,13 @@ class Environment:
                 f'{self.layout.venv} was not made by this set-up.',
                 'Move it away (or remove it) and run again.',
             )
-        if read_state(self.layout.state) is not None:
-            # the old environment is not given up before the new one is within reach
+        if read_state(self.layout.state) is not None and self.layout.venv_python.exists():
+            self._reach_for_packages(runner)
+
+    def _reach_for_packages(self, runner: Runner) -> None:
+        """Give an environment that works not up while the packages of the new one are far."""
+        # only a missing network counts: that the old tools fail is no reason to keep them
+        with contextlib.suppress(StepFailedError):
             self._pip(runner, 'download', '--dest', self.layout.venv / '.download')
             self._uv_install(runner, self.requirements, '--dry-run')
 
@@ -130,23 +138,11 @@ class Environment:
 
     def _uv_install(self, runner: Runner, requirements: Path, *options: str) -> None:
         python = self.layout.venv_python
-        command: list[Argument] = [
-            python,
-            '-m',
-            'uv',
-            'pip',
-            'install',
-            '--python',
-            python,
-            '--require-hashes',
-        ]
+        uv: list[Argument] = [python, '-m', 'uv', 'pip', 'install', '--require-hashes']
+        uv += ['--python', python]
         # what must be built from source is built with pinned tools too
-        constraints: list[Argument] = ['--build-constraints', self.requirements]
-        runner.run(
-            'The Python packages',
-            [*command, *constraints, *options, '-r', requirements],
-            show=lambda line: line.lstrip().startswith(_NEWS),
-        )
+        uv += ['--build-constraints', self.requirements, *options, '-r', requirements]
+        runner.run('The Python packages', uv, show=lambda line: line.lstrip().startswith(_NEWS))
 
     def _finish(self, runner: Runner) -> None:
         libraries = []
@@ -158,8 +154,15 @@ class Environment:
         write_state(self.layout.state, EnvironmentState(self.base, '', self.python))
 
     def _install_dev(self, runner: Runner) -> None:
+        before = read_state(self.layout.state)
         self.layout.state.unlink(missing_ok=True)
-        self._uv_install(runner, self.layout.requirements / 'dev.txt')
+        try:
+            self._uv_install(runner, self.layout.requirements / 'dev.txt')
+        except NetworkError:
+            # uv changes nothing before all is downloaded: what was there is whole
+            if before is not None:
+                write_state(self.layout.state, before)
+            raise
         write_state(self.layout.state, EnvironmentState(self.base, self.dev, self.python))
 
 
@@ -194,6 +197,8 @@ def choose_python(
     """
     if asked:
         return probe(asked)
-    if state is not None and Path(state.python).exists():
-        return state.python
-    return probe(underlay.python_name or running)
+    wanted = underlay.python_name
+    kept = Path(state.python) if state is not None else None
+    if kept is not None and kept.exists() and wanted in {None, kept.resolve().name}:
+        return str(kept)
+    return probe(wanted or running)

@@ -53,6 +53,11 @@ def check_supported(underlay: Underlay, python: Interpreter, root: Path) -> None
             f'Name one of Python 3.{PYTHON_OLDEST[1]} to 3.{PYTHON_NEWEST[1]}, '
             'as in: make PYTHON=python3.12',
         )
+    if underlay.python_name not in {None, python.name}:
+        raise UnsupportedSystemError(
+            f'{underlay.prefix} is built for {underlay.python_name}, not for {python.name}.',
+            f'Run again without PYTHON=..., or with an empty {PREFIX_VARIABLE} to use the wheels.',
+        )
     if underlay.kind is UnderlayKind.WHEELS and python.machine != WHEEL_MACHINE:
         raise UnsupportedSystemError(
             f'There are no ROS wheels for {python.machine}, and no {SYSTEM_PREFIX}.',
