@@ -31,15 +31,6 @@ class Command(IntEnum):
     FAULT_RESET = Controlword.FAULT_RESET
 
 
-COMMAND_MASK = (
-    Controlword.SWITCH_ON
-    | Controlword.ENABLE_VOLTAGE
-    | Controlword.QUICK_STOP
-    | Controlword.ENABLE_OPERATION
-    | Controlword.FAULT_RESET
-)
-"""Bits of the controlword that make the command; the others belong to the mode or are HALT."""
-
 TARGETS: tuple[DriveState, ...] = (
     _S.SWITCH_ON_DISABLED,
     _S.READY_TO_SWITCH_ON,
