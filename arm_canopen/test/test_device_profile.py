@@ -52,6 +52,7 @@ def scale(*values: float) -> float:
 
 def check_continuity(motion: Motion, acceleration: float) -> None:
     """Position and velocity have no jumps; where segments meet they agree."""
+    reach = max(abs(segment.position) for segment in motion.segments)
     for before, after in pairwise(motion.segments):
         elapsed = after.start - before.start
         position = before.position + elapsed * (
@@ -59,7 +60,7 @@ def check_continuity(motion: Motion, acceleration: float) -> None:
         )
         velocity = before.velocity + before.acceleration * elapsed
         # time itself is rounded, by so much at the size of a steady clock
-        slack = 1e-6 * (1.0 + abs(before.velocity) + abs(velocity)) + scale(position)
+        slack = 1e-6 * (1.0 + abs(before.velocity) + abs(velocity)) + scale(reach)
         assert after.position == pytest.approx(position, abs=slack)
         assert after.velocity == pytest.approx(velocity, abs=1e-6 * (1.0 + acceleration))
 

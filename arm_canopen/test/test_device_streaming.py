@@ -160,6 +160,39 @@ def test_late_syncs_do_not_shake_the_axis() -> None:
     assert rig.position == pytest.approx(1980.0, abs=15.0)
 
 
+@pytest.mark.parametrize('pause', [0.0, 0.05, 0.5, 5.0])
+def test_pause_of_sync_is_survived(pause: float) -> None:
+    """After SYNCs in a burst or a pause, the set-points are followed as before."""
+    rig = streaming(8)
+
+    def stream(first: int, count: int) -> None:
+        for step in range(first, first + count):
+            target(rig, 10 * step)
+            rig.sync()
+            rig.run(PERIOD)
+
+    stream(1, 50)
+    rig.run(pause)
+    for _ in range(5):  # five SYNCs that were late arrive in one instant
+        target(rig, 500)
+        rig.sync()
+    stream(51, 50)
+    assert rig.position == pytest.approx(1000.0, abs=5.0)
+    assert rig.velocity == pytest.approx(1000.0, abs=20.0)
+
+
+def test_another_period_of_sync_is_noticed() -> None:
+    """A master that goes on with a SYNC five times slower is followed at that period."""
+    rig = streaming(8)
+    rig.cycles(20)
+    for step in range(1, 20):
+        target(rig, 50 * step)
+        rig.sync()
+        rig.run(5 * PERIOD)
+    assert rig.velocity == pytest.approx(1000.0, abs=50.0)
+    assert rig.position == pytest.approx(950.0, abs=10.0)
+
+
 def test_loss_of_sync_in_motion_ends_at_the_last_set_point() -> None:
     """When master and SYNC are gone, the axis stands at the last set-point that it took."""
     rig = streaming(8)

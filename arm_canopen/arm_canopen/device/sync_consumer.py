@@ -45,6 +45,7 @@ class SyncConsumer:
         """
         self.period = 0.0
         self.last_time = float('-inf')
+        self._paused = False
         self._handle = handle
         self._length_error = length_error
         self._changed = changed
@@ -68,6 +69,7 @@ class SyncConsumer:
         """Forget what was measured."""
         self.period = self._cycle.value * MICROSECOND
         self.last_time = float('-inf')
+        self._paused = False
 
     def receive(self, frame: Frame, now: float) -> None:
         """Take a SYNC; one of the wrong length is reported, and obeyed all the same."""
@@ -81,10 +83,12 @@ class SyncConsumer:
         interval = now - self.last_time
         if self.alive(now):
             self.period += PERIOD_WEIGHT * (interval - self.period)
-        elif self.period == 0.0 and interval < PERIOD_MAX:
-            self.period = interval
-        else:  # the interval is a pause; the next one is the first estimate
-            self.period = 0.0
+            self._paused = False
+        elif self.period and not self._paused:
+            self._paused = True  # one long interval is a pause, two are another period
+        else:
+            self.period = interval if interval < PERIOD_MAX else 0.0
+            self._paused = False
 
     def _check_cob_id(self, value: Value) -> None:
         if isinstance(value, int) and value & SYNC_PRODUCER:

@@ -14,7 +14,7 @@ from abc import abstractmethod
 
 from ...standard.drive import Controlword, OperationMode, Statusword
 from ..axis import Axis
-from ..drive_objects import DriveObjects, NO_WINDOW
+from ..drive_objects import DriveObjects, NO_WINDOW, PERIOD_MIN
 from ..object_store import Integer
 from ..profile import plan_line
 from .mode import Mode, SyncClock, TARGET_REACHED
@@ -71,8 +71,8 @@ class StreamedPosition(Mode):
         steady, self._streaming = self._streaming and fresh, fresh
         if not fresh:
             return False
-        period = self.clock.period if steady else self.objects.setpoint_period
-        return self._take(period, now)
+        period = self.clock.period if steady else 0.0
+        return self._take(period or self.objects.setpoint_period, now)
 
     def _take(self, period: float, now: float) -> bool:
         wanted = self.target.value
@@ -82,7 +82,7 @@ class StreamedPosition(Mode):
         axis.advance(now)
         if axis.arrived and axis.demand.position == target:
             return False
-        axis.follow(plan_line(axis.demand.position, target, period, now))
+        axis.follow(plan_line(axis.demand.position, target, max(period, PERIOD_MIN), now))
         return True
 
 
