@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-import signal
 import sys
 import threading
 
@@ -19,7 +18,7 @@ from ..can import open_bus
 from ..config import load_bus
 from ..exceptions import CanopenError
 from .master_process import MasterProcess
-from .spinning import make_executor, WAKE_PERIOD
+from .spinning import make_executor, stop_on_signals, WAKE_PERIOD
 
 SWITCH_INTERVAL = 0.0005  # [s] how long a busy callback may keep the interpreter from the cycle
 
@@ -41,7 +40,7 @@ def run_master(args: Sequence[str] | None = None, *, extend: Extend | None = Non
     rclpy.init(
         args=None if args is None else list(args), signal_handler_options=SignalHandlerOptions.NO
     )
-    stop = _stop_on_signals()
+    stop = stop_on_signals()
     node = Node('master')
     try:
         return _run(node, stop, extend)
@@ -110,21 +109,6 @@ def _parameters(node: Node) -> tuple[str, str, float]:
             'no bus_config: give the path of a bus.yml with --ros-args -p bus_config:=FILE'
         )
     return bus_config, can_name, float(period)
-
-
-def _stop_on_signals() -> threading.Event:
-    """Set an event at the first SIGINT or SIGTERM; at the second leave at once."""
-    stop = threading.Event()
-
-    def handle(number: int, _frame: object) -> None:
-        if stop.is_set():
-            signal.signal(number, signal.SIG_DFL)
-            signal.raise_signal(number)
-        stop.set()
-
-    signal.signal(signal.SIGINT, handle)
-    signal.signal(signal.SIGTERM, handle)
-    return stop
 
 
 if __name__ == '__main__':
