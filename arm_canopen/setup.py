@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Build description of arm_canopen."""
 
-from glob import glob
+from pathlib import Path
 
 from setuptools import find_packages, setup
 
@@ -14,7 +14,7 @@ setup(
     data_files=[
         ('share/ament_index/resource_index/packages', ['resource/arm_canopen']),
         ('share/arm_canopen', ['package.xml']),
-        ('share/arm_canopen/eds', glob('eds/*')),
+        ('share/arm_canopen/eds', sorted(str(path) for path in Path('eds').iterdir())),
     ],
     install_requires=['setuptools'],
     zip_safe=True,

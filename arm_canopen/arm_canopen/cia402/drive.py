@@ -282,7 +282,10 @@ class Drive:
         velocity = self.objects.target_writer(Index.TARGET_VELOCITY)
         interpolation = self.objects.target_writer(Index.INTERPOLATION_DATA, 1)
         if position is not None:
-            modes.append(ProfilePosition(self.units, position, self._warn))
+            apart = self.objects.waits_for_sync_apart(Index.TARGET_POSITION)
+            modes.append(
+                ProfilePosition(self.units, position, self._warn, target_waits_for_sync=apart)
+            )
             modes.append(CyclicPosition(self.units, position, lambda: self.parameters.profile))
         if velocity is not None:
             modes.append(ProfileVelocity(self.units, velocity))

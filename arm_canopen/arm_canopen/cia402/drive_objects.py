@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from ..master.process_image import Reader, Writer
+from ..master.process_image import Reader, SYNCHRONOUS_MAX, Writer
 from ..master.remote_node import RemoteNode
 from ..standard.drive import drive_state, DriveState
 from ..standard.objects import Index
@@ -63,6 +63,13 @@ class DriveObjects:
     def target_writer(self, index: int, subindex: int = 0) -> Writer | None:
         """Return a writer for a target object that a PDO carries, else None."""
         return self._node.image.writer(index, subindex)
+
+    def waits_for_sync_apart(self, index: int) -> bool:
+        """Whether an object is in a synchronous RPDO that does not carry the controlword."""
+        output = self._node.image.output_of(index)
+        if output is None or output is self._node.image.output_of(Index.CONTROLWORD):
+            return False
+        return output.config.transmission <= SYNCHRONOUS_MAX
 
     def _optional_reader(self, index: int) -> Reader | None:
         mapped = self._node.image.reader(index)

@@ -86,6 +86,7 @@ class Handshake(Enum):
     """Where the exchange of a set-point stands (CiA 402-2, 10.3)."""
 
     IDLE = 'the drive takes a set-point'
+    WRITTEN = 'the value is on its way, bit 4 follows in the next cycle'
     OFFERED = 'bit 4 is set, the drive has not acknowledged yet'
     RELEASED = 'acknowledged, bit 4 is cleared, the drive still shows bit 12'
 
@@ -99,14 +100,24 @@ class ProfilePosition(Mode):
 
     number = OperationMode.PROFILE_POSITION
 
-    def __init__(self, units: Units, target: Writer, warn: Callable[[str], None]) -> None:
+    def __init__(
+        self,
+        units: Units,
+        target: Writer,
+        warn: Callable[[str], None],
+        *,
+        target_waits_for_sync: bool,
+    ) -> None:
         """Take the way to 0x607A.
 
         Args:
             units: Units of the drive.
             target: Writer of 0x607A.
             warn: Takes a warning in words.
+            target_waits_for_sync: 0x607A is in a synchronous RPDO without the controlword. Which
+                of the two a drive looks at first is its own affair, so the value goes ahead.
         """
+        self._target_waits_for_sync = target_waits_for_sync
         self._units = units
         self._target = target
         self._warn = warn
@@ -137,16 +148,28 @@ class ProfilePosition(Mode):
         acknowledged = bool(statusword & Statusword.SET_POINT_ACKNOWLEDGE)
         if self.handshake is Handshake.OFFERED:
             self._watch_acknowledge(now, acknowledged=acknowledged)
+        elif self.handshake is Handshake.WRITTEN:
+            self._offer(now)
         elif not acknowledged:
-            self.handshake = Handshake.IDLE
-            if self._waiting is not None:
-                self._target.write(self._waiting)
-                self._waiting = None
-                self._offered_at = now
-                self.handshake = Handshake.OFFERED
+            self._take_waiting(now)
         if self.handshake is Handshake.OFFERED:
             return Controlword.NEW_SET_POINT | Controlword.CHANGE_IMMEDIATELY
         return Controlword.CHANGE_IMMEDIATELY
+
+    def _take_waiting(self, now: float) -> None:
+        self.handshake = Handshake.IDLE
+        if self._waiting is None:
+            return
+        self._target.write(self._waiting)
+        self._waiting = None
+        if self._target_waits_for_sync:
+            self.handshake = Handshake.WRITTEN
+        else:
+            self._offer(now)
+
+    def _offer(self, now: float) -> None:
+        self._offered_at = now
+        self.handshake = Handshake.OFFERED
 
     def _watch_acknowledge(self, now: float, *, acknowledged: bool) -> None:
         if acknowledged:

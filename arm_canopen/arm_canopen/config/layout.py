@@ -4,7 +4,7 @@
 
 New: ``options``, ``master``, ``defaults`` and ``nodes``. Old (dcfgen's own): ``options``,
 ``master``, and every other top-level key a device. A file with ``nodes`` or ``defaults`` is of
-the new one. Top-level keys that begin with a dot are templates for anchors and are ignored in both.
+the new one. Top-level keys that begin with a dot are templates for anchors, ignored in both.
 """
 
 from __future__ import annotations

@@ -82,13 +82,21 @@ class Rpdo(PdoChannel):
         if self.transmission <= TRANSMISSION_SYNC_MAX:
             self._held = frame.data
         else:
-            self._apply(frame.data, now)
+            self._write_objects(frame.data)
+            self.tell(now)
 
-    def sync(self, now: float) -> None:
-        """Put what came since the last SYNC into the dictionary."""
-        if self._held is not None:
-            data, self._held = self._held, None
-            self._apply(data, now)
+    def store_held(self) -> bool:
+        """Put what came since the last SYNC into the dictionary; tells whether there was any."""
+        if self._held is None:
+            return False
+        data, self._held = self._held, None
+        self._write_objects(data)
+        return True
+
+    def tell(self, now: float) -> None:
+        """Tell those who use the objects of this PDO that they were written."""
+        for listener in self._listeners:
+            listener(now)
 
     def advance(self, now: float) -> None:
         """Report that the PDO stayed away."""
@@ -97,12 +105,9 @@ class Rpdo(PdoChannel):
             self._late = True
             self._report(self, TIMEOUT_ERROR, True, now)
 
-    def _apply(self, data: bytes, now: float) -> None:
-        # every value is stored before anyone is told: what came in one PDO belongs together
+    def _write_objects(self, data: bytes) -> None:
         for variable, value in zip(self.variables, self.codec.unpack(data), strict=True):
             variable.value = value
-        for listener in self._listeners:
-            listener(now)
 
     @staticmethod
     def _is_mappable(entry: ObjectEntry) -> bool:
@@ -192,9 +197,13 @@ class RpdoEngine:
         self._select()
 
     def sync(self, now: float) -> None:
-        """Put the synchronous ones into the dictionary."""
-        for rpdo in self.active:
-            rpdo.sync(now)
+        """Put the synchronous ones into the dictionary.
+
+        Every value is stored before anyone is told: what one SYNC makes valid belongs together,
+        such as a controlword in one PDO and its target in another.
+        """
+        for rpdo in [rpdo for rpdo in self.active if rpdo.store_held()]:
+            rpdo.tell(now)
 
     def advance(self, now: float) -> None:
         """Report those that are overdue."""

@@ -40,8 +40,8 @@ class JointAggregator:
     """Collects samples into rounds; a round is over when all that were in the last one are there.
 
     Drives on one bus share the stamp of their SYNC, so a round is one SYNC. A sample of a later
-    stamp, or a second one of the same joint, ends a round that is still incomplete. Joints that are
-    silent are left out after a while instead of being invented.
+    stamp, or a second one of the same joint, ends a round that is still incomplete. Joints that
+    are silent are left out after a while instead of being invented.
     """
 
     def __init__(self, joints: Sequence[RobotJoint]) -> None:

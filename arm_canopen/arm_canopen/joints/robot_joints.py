@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from xml.etree import ElementTree
+from xml.etree import ElementTree as ET
 
 from ..exceptions import CanopenError
 
@@ -46,8 +46,8 @@ def movable_joints(robot_description: str) -> list[RobotJoint]:
     """
     try:
         # a robot description is the user's own file, and expat resolves no external entities
-        robot = ElementTree.fromstring(robot_description)  # noqa: S314
-    except ElementTree.ParseError as error:
+        robot = ET.fromstring(robot_description)  # noqa: S314
+    except ET.ParseError as error:
         raise CanopenError(f'robot_description is not XML: {error}') from error
     if robot.tag != 'robot':
         raise CanopenError(f'robot_description is no URDF: its root is <{robot.tag}>, not <robot>')
@@ -61,7 +61,7 @@ def movable_joints(robot_description: str) -> list[RobotJoint]:
     return joints
 
 
-def _mimic(element: ElementTree.Element | None) -> Mimic | None:
+def _mimic(element: ET.Element | None) -> Mimic | None:
     if element is None:
         return None
     try:

@@ -137,9 +137,7 @@ class RemoteNode:
 
     def count_missed(self) -> int:
         """Count the TPDOs that did not answer the last SYNC, and return their number."""
-        missed = sum(
-            entry.values is not None and not entry.answered for entry in self._every_sync
-        )
+        missed = sum(entry.values is not None and not entry.answered for entry in self._every_sync)
         self.missed_pdos += missed
         return missed
 

@@ -24,7 +24,7 @@ WATCH_PERIOD = 2.0  # [s] between two looks for joints that are silent
 
 
 class JointStatePublisher(Node):
-    """Subscribes ``/<joint>/joint_states`` of each movable joint and publishes ``/joint_states``."""
+    """Subscribes ``/<joint>/joint_states`` of all joints and publishes ``/joint_states``."""
 
     def __init__(self) -> None:
         """Read the robot description and subscribe.
