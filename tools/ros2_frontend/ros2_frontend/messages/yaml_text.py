@@ -10,14 +10,13 @@ of a message is simple, so that most of it is written here; PyYAML decides how a
 from __future__ import annotations
 
 from functools import lru_cache
+import math
 import re
 import sys
 
 from ..aliases import Document, Value
 
 _INDENT = '  '
-_FIELD = re.compile(r'[a-z][a-z0-9_]*')
-
 # texts that are the same in YAML: they start like a name, hold nothing that YAML knows as syntax,
 # and are not the words of the YAML 1.1 types bool and null
 _PLAIN = re.compile(r'[A-Za-z/][A-Za-z0-9_/.\-]*')
@@ -102,10 +101,13 @@ def _scalar(value: Document) -> str:
 
 
 def _float(value: float) -> str:
+    """A float as PyYAML writes it: YAML 1.1 wants a point before an exponent."""
+    if math.isinf(value):
+        return '.inf' if value > 0.0 else '-.inf'
+    if math.isnan(value):
+        return '.nan'
     text = repr(value)
-    if 'e' in text or 'n' in text:  # exponents, inf and nan have a YAML spelling of their own
-        return _other(value)
-    return text
+    return text.replace('e', '.0e') if 'e' in text and '.' not in text else text
 
 
 def _other(value: Value) -> str:

@@ -94,6 +94,17 @@ class Patience:
         """
         return cls(_LIMIT, _QUIET_FOR_NAMES) if spin_time is None else cls(spin_time, spin_time)
 
+    def at_most(self, limit: float) -> Patience:
+        """The same with an upper bound.
+
+        Args:
+            limit: Longest time of all [s].
+
+        Returns:
+            The patience.
+        """
+        return Patience(min(limit, self.limit), self.quiet)
+
 
 @dataclass(frozen=True, slots=True)
 class Census:

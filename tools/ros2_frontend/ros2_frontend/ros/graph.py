@@ -5,6 +5,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable
+import contextlib
+import math
+import time
 from typing import TypeVar
 
 from ..aliases import Endpoint, NamesAndTypes
@@ -67,6 +70,21 @@ class Graph:
         """
         return _visible(self._node.get_service_names_and_types(), hidden)
 
+    def offered_services(self) -> dict[str, list[str]]:
+        """The services that some node offers; `services` names those that are only called, too.
+
+        Returns:
+            The types by name.
+        """
+        from rclpy.node import NodeNameNonExistentError
+
+        found: dict[str, list[str]] = {}
+        for node in self.nodes(hidden=True):
+            with contextlib.suppress(NodeNameNonExistentError):  # it left meanwhile
+                query = self._node.get_service_names_and_types_by_node
+                found.update(query(node.name, node.namespace))
+        return found
+
     def publishers(self, topic: str) -> list[Endpoint]:
         """The publishers of a topic.
 
@@ -101,16 +119,33 @@ class Graph:
         """Wait until the view is complete."""
         wait(lambda: None, self, Patience.for_lists(self._spin_time))
 
-    def wait_for(self, look: Callable[[], T | None]) -> T | None:
+    def wait_for(self, look: Callable[[], T | None], limit: float = math.inf) -> T | None:
         """Wait until something is there.
 
         Args:
             look: Answers what was looked for, or None as long as it is not there.
+            limit: Longest time [s], besides what the graph decides.
 
         Returns:
             What `look` found; None when the view is complete without it.
         """
-        return wait(look, self, Patience.for_names(self._spin_time))
+        return wait(look, self, Patience.for_names(self._spin_time).at_most(limit))
+
+    def wait_until(self, look: Callable[[], T | None], timeout: float | None = None) -> T | None:
+        """Wait until something is there, however long it takes.
+
+        Args:
+            look: Answers what was looked for, or None as long as it is not there.
+            timeout: Longest time [s]; None waits for ever.
+
+        Returns:
+            What `look` found; None only after `timeout`.
+        """
+        deadline = time.monotonic() + (math.inf if timeout is None else timeout)
+        found = look()
+        while found is None and (left := deadline - time.monotonic()) > 0.0:
+            found = self.wait_for(look, left)
+        return found
 
 
 def _visible(pairs: NamesAndTypes, hidden: bool) -> NamesAndTypes:

@@ -143,7 +143,7 @@ def matching_profile(
 
 
 def _policy_name(policy: Handle) -> str:
-    return f'{type(policy).__name__}.{policy.name}'.replace('Policy.', 'Policy.')
+    return f'QoS{type(policy).__name__}.{policy.name}'
 
 
 def _copy_of(profile: QosProfile) -> QosProfile:

@@ -17,6 +17,7 @@ import os
 import time
 
 from ..aliases import Handle, Node
+from ..cli.errors import FrontendError
 
 NODE_PREFIX = '_ros2cli'  # a leading underscore hides a node from `ros2 node list`
 
@@ -77,13 +78,18 @@ def open_session(args: Namespace, node_name: str | None = None) -> Iterator[Sess
 
     Yields:
         The session; the node is gone from the graph afterwards.
+
+    Raises:
+        FrontendError: When the node's name, or another that the session uses, is malformed.
     """
     import rclpy
     from rclpy.context import Context
+    from rclpy.exceptions import NameValidationException
     from rclpy.executors import SingleThreadedExecutor
     from rclpy.node import Node as RclpyNode
     from rclpy.parameter import Parameter
     from rclpy.signals import SignalHandlerOptions
+    from rclpy.validate_node_name import validate_node_name
 
     context = Context()
     # no log file per command
@@ -94,8 +100,10 @@ def open_session(args: Namespace, node_name: str | None = None) -> Iterator[Sess
     )
     try:
         sim_time = getattr(args, 'use_sim_time', False)
+        name = node_name or f'{NODE_PREFIX}_{os.getpid()}'
+        validate_node_name(name)  # Node() would clean up after itself, with a warning
         node = RclpyNode(
-            node_name or f'{NODE_PREFIX}_{os.getpid()}',
+            name,
             context=context,
             start_parameter_services=False,
             parameter_overrides=[Parameter('use_sim_time', value=True)] if sim_time else None,
@@ -107,5 +115,7 @@ def open_session(args: Namespace, node_name: str | None = None) -> Iterator[Sess
         finally:
             executor.shutdown(timeout_sec=0.0)
             node.destroy_node()
+    except NameValidationException as error:
+        raise FrontendError(str(error)) from None
     finally:
         context.try_shutdown()

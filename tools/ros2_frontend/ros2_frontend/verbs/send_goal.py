@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 import sys
-import time
 
 from ..aliases import Handle, Message
 from ..cli.arguments import add_graph_arguments
@@ -22,7 +21,6 @@ from ..ros.graph import Graph
 from ..ros.names import absolute
 from ..ros.session import open_session, Session
 
-_POLL = 0.01  # [s]
 _CANCEL_TIMEOUT = 5.0  # [s]
 
 # action_msgs/msg/GoalStatus
@@ -75,8 +73,9 @@ class SendGoal:
         """
         action_type = class_of(args.action_type, Kind.ACTION, 'The passed action type is invalid')
         goal = action_type.Goal()
+        values = parse_mapping(sys.stdin.read() if args.stdin else args.goal)
         try:
-            Filler().fill(goal, parse_mapping(sys.stdin.read() if args.stdin else args.goal))
+            Filler().fill(goal, values)
         except FieldValueError as error:
             raise FieldValueError(f'Failed to populate message fields: {error}') from None
         from rclpy.action.client import ActionClient
@@ -141,8 +140,7 @@ def _await_server(client: Handle, session: Session, args: Namespace) -> None:
     known = [other for other, _ in action_names(session)]
     if name not in known:
         print(f"There is no action '{name}' yet.{hint(name, known)}", file=sys.stderr)
-    while not client.server_is_ready():
-        time.sleep(_POLL)
+    graph.wait_until(lambda: client.server_is_ready() or None)
 
 
 def _print_feedback(message: Message) -> None:

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
+import math
 import sys
 import time
 
@@ -94,9 +95,9 @@ class Call:
 
 
 def _request(service_type: InterfaceClass, text: str) -> Message:
-    request = service_type.Request()
+    request, values = service_type.Request(), parse_mapping(text)
     try:
-        Filler().fill(request, parse_mapping(text))
+        Filler().fill(request, values)
     except FieldValueError as error:
         raise FieldValueError(f'Failed to populate field: {error}') from None
     return request
@@ -108,14 +109,13 @@ def _await(client: Client, session: Session, args: Namespace) -> None:
         return
     print('waiting for service to become available...')
     start = time.monotonic()
-    graph = Graph(session, args.timeout or args.spin_time)
-    if graph.wait_for(lambda: client.is_ready() or None):
+    graph = Graph(session, args.spin_time)
+    if graph.wait_for(lambda: client.is_ready() or None, args.timeout or math.inf):
         return
     name = client.name
-    services = dict(graph.services(hidden=is_hidden(name)))
-    _explain(name, args.service_type, services)
+    _explain(name, args.service_type, graph.offered_services())
     left = None if args.timeout is None else start + args.timeout - time.monotonic()
-    if not client.wait(left):
+    if not graph.wait_until(lambda: client.is_ready() or None, left):
         raise NoAnswerError(f"Service '{name}' did not appear within {args.timeout:g} s")
 
 
@@ -123,8 +123,7 @@ def _explain(name: str, wanted: str, services: dict[str, list[str]]) -> None:
     """Tell on stderr why the wait may be in vain."""
     if name in services:
         offered = ', '.join(services[name])
-        if wanted not in services[name]:
-            print(f"Service '{name}' has the type {offered}, not {wanted}", file=sys.stderr)
+        print(f"Service '{name}' has the type {offered}, not {wanted}", file=sys.stderr)
         return
-    text = f"There is no service '{name}' yet.{hint(name, services)}"
-    print(text, file=sys.stderr)
+    known = [other for other in services if is_hidden(name) or not is_hidden(other)]
+    print(f"There is no service '{name}' yet.{hint(name, known)}", file=sys.stderr)

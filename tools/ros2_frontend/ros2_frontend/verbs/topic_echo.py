@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
+from collections.abc import Mapping
 
 from ..aliases import Handle, Message
 from ..cli.arguments import add_graph_arguments, positive_float, unsigned_int
@@ -168,7 +169,7 @@ class Printer:
         length = None if args.full_length else args.truncate_length
         self._cut = Abbreviation(length, args.no_arr, args.no_str)
 
-    def take(self, message: Message, info: dict[str, object]) -> None:
+    def take(self, message: Message, info: Mapping[str, object]) -> None:
         """Print one message, unless the filter refuses it.
 
         Args:
@@ -190,14 +191,14 @@ class Printer:
         else:
             self._print_yaml(value, info)
 
-    def _print_plain(self, value: object, info: dict[str, object]) -> None:
+    def _print_plain(self, value: object, info: Mapping[str, object]) -> None:
         if self._args.include_message_info:
             print('---Got new message, message info:---')
             print(info)
             print('---Message data:---')
         print(value, end='\n---\n')
 
-    def _print_yaml(self, message: Message, info: dict[str, object]) -> None:
+    def _print_yaml(self, message: Message, info: Mapping[str, object]) -> None:
         if self._args.include_message_info:
             print(to_yaml(dict(sorted(info.items()))), end='---\n')
         print(to_yaml(to_document(message, self._cut), self._args.flow_style), end='---\n')

@@ -7,6 +7,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator
 import itertools
+import math
 import sys
 import time
 
@@ -15,6 +16,7 @@ from ..cli.arguments import add_graph_arguments, positive_float, unsigned_int
 from ..cli.errors import FieldValueError, NoAnswerError
 from ..messages.fill import Filler
 from ..messages.from_text import parse_mapping
+from ..ros.graph import Graph
 from ..ros.names import absolute
 from ..ros.qos import add_qos_arguments, profile_of
 from ..ros.session import open_session, Session
@@ -65,9 +67,9 @@ class Pub:
         """
         message_type = message_class(args.message_type)
         message, filler = message_type(), Filler(expand_now=True)
-        text = sys.stdin.read() if args.stdin else args.values
+        values = parse_mapping(sys.stdin.read() if args.stdin else args.values)
         try:
-            filler.fill(message, parse_mapping(text))
+            filler.fill(message, values)
         except FieldValueError as error:
             raise FieldValueError(f'Failed to populate field: {error}') from None
         times = 1 if args.once else args.times
@@ -75,7 +77,8 @@ class Pub:
             topic = absolute(args.topic_name)
             publisher = session.node.create_publisher(message_type, topic, profile_of(args))
             wanted = (1 if times else 0) if args.wait is None else args.wait
-            _await_subscriptions(session, publisher, wanted, args.max_wait_time_secs)
+            graph = Graph(session, args.spin_time)
+            _await_subscriptions(graph, publisher, wanted, args.max_wait_time_secs)
             print('publisher: beginning loop')
             for count in _paced(session, times, 1.0 / args.rate):
                 _stamp(filler, session)
@@ -145,27 +148,23 @@ def _add_repetition(parser: ArgumentParser) -> None:
 
 
 def _await_subscriptions(
-    session: Session,
-    publisher: Handle,
-    wanted: int,
-    longest: float | None,
+    graph: Graph, publisher: Handle, wanted: int, longest: float | None
 ) -> None:
     """Wait for subscriptions, with a line each second that says so."""
-    start = time.monotonic()
+    deadline = time.monotonic() + (math.inf if longest is None else longest)
 
-    def enough() -> bool:
-        return bool(publisher.get_subscription_count() >= wanted)
+    def enough() -> bool | None:
+        return publisher.get_subscription_count() >= wanted or None
 
     while not enough():
-        print(f'Waiting for at least {wanted} matching subscription(s)...')
-        left = _REMINDER if longest is None else start + longest - time.monotonic()
-        if not session.spin_until(enough, min(_REMINDER, left)) and left <= _REMINDER:
-            if longest is None:
-                continue
+        left = deadline - time.monotonic()
+        if left <= 0.0:
             raise NoAnswerError(
                 f'Timed out waiting for subscribers: Expected {wanted} subcribers but only got '
                 f'{publisher.get_subscription_count()} subscribers'
             )
+        print(f'Waiting for at least {wanted} matching subscription(s)...')
+        graph.wait_until(enough, min(_REMINDER, left))
 
 
 def _paced(session: Session, times: int, period: float) -> Iterator[int]:

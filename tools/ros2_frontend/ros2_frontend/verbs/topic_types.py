@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import sys
-import time
 
 from ..aliases import InterfaceClass
 from ..cli.errors import FrontendError, UnknownNameError
@@ -14,7 +13,6 @@ from ..index.interfaces import class_of, Kind
 from ..ros.graph import Graph
 from ..ros.names import absolute, is_hidden
 
-_POLL = 0.05  # [s]
 _BAD_TYPE = 'The passed message type is invalid'
 
 
@@ -75,10 +73,8 @@ def await_class_of_topic(topic: str, graph: Graph) -> InterfaceClass:
         near = _near(topic, graph).strip()
         if near:
             print(near, file=sys.stderr)
-    while types is None:
-        time.sleep(_POLL)
-        types = _types(topic, graph)
-    return _only_class(topic, types)
+        types = graph.wait_until(lambda: _types(topic, graph))
+    return _only_class(topic, types or [])
 
 
 def _types(topic: str, graph: Graph) -> list[str] | None:

@@ -1,0 +1,39 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Fixtures: the `ros2` command, and a ROS domain with nodes in it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+import sys
+
+from frontend_cli import Ros2, runner, with_frontend
+from isolation import reserve
+from processes import RunningProcess
+import pytest
+
+
+@pytest.fixture
+def ros2(capsys: pytest.CaptureFixture[str]) -> Ros2:
+    """Run a command line in this process."""
+    return runner(capsys)
+
+
+@pytest.fixture(scope='session')
+def zoo_env() -> Iterator[Mapping[str, str]]:
+    """Give the environment of a domain in which the zoo lives."""
+    with reserve() as isolation:
+        env = with_frontend(isolation.env)
+        zoo_program = str(Path(__file__).with_name('frontend_zoo.py'))
+        with RunningProcess([sys.executable, zoo_program], env) as zoo:
+            zoo.wait_for('^ready$')
+            yield env
+
+
+@pytest.fixture
+def zoo(zoo_env: Mapping[str, str], monkeypatch: pytest.MonkeyPatch) -> Mapping[str, str]:
+    """Put this process into the domain of the zoo."""
+    for name in ('ROS_DOMAIN_ID', 'ROS_AUTOMATIC_DISCOVERY_RANGE'):
+        monkeypatch.setenv(name, zoo_env[name])
+    return zoo_env

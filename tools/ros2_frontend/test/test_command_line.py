@@ -1,0 +1,153 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The tree of commands: help, wrong arguments, exit codes, Ctrl-C and closed pipes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+import os
+import signal
+import subprocess
+import sys
+
+from frontend_cli import PROGRAM, Ros2, with_frontend
+from processes import RunningProcess
+import pytest
+
+from ros2_frontend.cli.arguments import positive_float, positive_int, unsigned_int
+from ros2_frontend.cli.commands import Command, COMMANDS, Group
+
+EVERY_COMMAND = [
+    (name, *verb)
+    for name, command in COMMANDS.items()
+    for verb in ([(verb,) for verb in command.verbs] if isinstance(command, Group) else [()])
+]
+
+
+def test_help_lists_every_command(ros2: Ros2) -> None:
+    """With the words of ros2cli; without a command, too."""
+    outcome = ros2('--help')
+    assert outcome.code == 0
+    assert 'ros2 is an extensible command-line tool for ROS 2.' in outcome.out
+    assert '  topic      Various topic related sub-commands\n' in outcome.out
+    assert '  Call `ros2 <command> -h` for more detailed usage.\n' in outcome.out
+    assert ros2() == outcome
+
+
+def test_a_group_without_a_verb_shows_its_help(ros2: Ros2) -> None:
+    """Exit code 0, as ros2cli."""
+    outcome = ros2('topic')
+    assert outcome.code == 0
+    assert '  hz     Print the average receiving rate to screen\n' in outcome.out
+    assert ros2('topic', '-h') == outcome
+
+
+@pytest.mark.parametrize('words', EVERY_COMMAND, ids=' '.join)
+def test_every_command_has_help(ros2: Ros2, words: tuple[str, ...]) -> None:
+    """Its module can be imported, its arguments can be added, its summary is shown."""
+    outcome = ros2(*words, '--help')
+    assert outcome.code == 0
+    assert outcome.out.startswith(f'usage: ros2 {" ".join(words)} ')
+    command = COMMANDS[words[0]]
+    summary = command.verbs[words[1]].summary if isinstance(command, Group) else command.summary
+    assert ' '.join(summary.split()) in ' '.join(outcome.out.split())
+
+
+@pytest.mark.parametrize(
+    ('words', 'problem'),
+    [
+        (('nothing',), "invalid choice: 'nothing'"),
+        (('topic', 'nothing'), "invalid choice: 'nothing'"),
+        (('topic', 'info'), 'the following arguments are required: topic_name'),
+        (('param', 'load', 'n'), 'the following arguments are required: parameter_file'),
+        (('topic', 'echo', '/a', '-l', '-1'), 'value must be non-negative integer'),
+        (('topic', 'hz', '/a', '-w', '0'), 'value must be a positive integer'),
+        (('topic', 'pub', '/a', 'b', '-1', '-t', '2'), 'not allowed with argument'),
+        (('topic', 'pub', '/a', 'b', '-r', '0'), 'value must be a positive float'),
+        (('interface', 'show', 'a', '--no-comments', '--all-comments'), 'not allowed with'),
+    ],
+)
+def test_wrong_arguments(ros2: Ros2, words: tuple[str, ...], problem: str) -> None:
+    """Exit code 2, usage and reason on stderr."""
+    outcome = ros2(*words)
+    assert (outcome.code, outcome.out) == (2, '')
+    assert outcome.err.startswith('usage: ros2')
+    assert problem in outcome.err
+
+
+def test_commands_import_only_what_they_need() -> None:
+    """Help and package commands start without rclpy, numpy and YAML."""
+    for words in ('[]', "['topic', '-h']", "['pkg', 'list']"):
+        code = (
+            'import sys; from ros2_frontend.main import main\n'
+            f'try: main({words})\nexcept SystemExit: pass\n'
+            "sys.exit(bool({'rclpy', 'numpy', 'yaml'} & set(sys.modules)))"
+        )
+        done = subprocess.run(
+            [sys.executable, '-c', code],
+            env=with_frontend(os.environ),
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert (done.returncode, done.stderr) == (0, ''), words
+
+
+def test_the_tree_is_sorted_and_loads() -> None:
+    """The order of the help page is that of the tree."""
+    assert list(COMMANDS) == sorted(COMMANDS)
+    for command in COMMANDS.values():
+        verbs = command.verbs if isinstance(command, Group) else {}
+        assert list(verbs) == sorted(verbs)
+        assert all(isinstance(verb, Command) for verb in verbs.values())
+
+
+@pytest.mark.parametrize('text', ['', '-1', '1.5', 'x'])
+def test_numbers_of_arguments(text: str) -> None:
+    """What is refused, and that the least value is taken."""
+    for type_ in (positive_int, unsigned_int):
+        with pytest.raises(Exception, match='value must be'):
+            type_(text)
+    assert (positive_int('1'), unsigned_int('0'), positive_float('0.5')) == (1, 0, 0.5)
+
+
+@pytest.mark.parametrize('text', ['0', '-1', 'nan', 'inf', 'x'])
+def test_a_duration_is_finite_and_positive(text: str) -> None:
+    """A timeout that cannot be waited for is refused."""
+    with pytest.raises(Exception, match='positive float'):
+        positive_float(text)
+
+
+@pytest.mark.scenario
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_interrupts_are_quiet(zoo_env: Mapping[str, str], number: signal.Signals) -> None:
+    """Ctrl-C, and SIGTERM, end a command at once with ros2cli's exit code and no traceback."""
+    with RunningProcess([*PROGRAM, 'topic', 'echo', '/chatter'], zoo_env) as process:
+        process.wait_for('^data: ')
+        process.signal(number)
+        assert process.wait() == 2
+        assert 'Traceback' not in process.output
+
+
+@pytest.mark.scenario
+def test_an_interrupt_during_discovery_is_quiet(zoo_env: Mapping[str, str]) -> None:
+    """Also while waiting for a topic that never comes."""
+    with RunningProcess([*PROGRAM, 'topic', 'hz', '/never'], zoo_env) as process:
+        process.wait_for('WARNING: topic .* does not appear to be published yet')
+        assert process.stop() == 2
+        assert 'Traceback' not in process.output
+
+
+@pytest.mark.scenario
+def test_a_closed_pipe_is_quiet(zoo_env: Mapping[str, str]) -> None:
+    """`| head -1` gets its line, and the command leaves like any Unix tool."""
+    words = [*PROGRAM, 'topic', 'echo', '/chatter']
+    with subprocess.Popen(
+        words, env=zoo_env, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline().startswith('data: ')
+        process.stdout.close()
+        assert process.wait(timeout=20) == 128 + signal.SIGPIPE
+        assert process.stderr is not None
+        assert process.stderr.read() == ''

@@ -1,0 +1,76 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Interface definitions: nested types folded in, comments shown or not."""
+
+from __future__ import annotations
+
+import pytest
+
+from ros2_frontend.index.definition import Comments, expand, nested_type, strip_comment
+
+FILES = {
+    'demo/msg/Outer': '# Top\nInner inner # the inner\n\nother/Leaf[] leaves\nuint8 A=1 # one\n',
+    'demo/msg/Inner': '# Nested\nother/msg/Leaf[<=3] leaf  # a leaf\n\nbool flag\n',
+    'other/msg/Leaf': '# Leaf\nint32 value\n',
+}
+
+
+def shown(comments: Comments) -> list[str]:
+    """Expand the outer definition."""
+    return list(expand('demo/msg/Outer', FILES.__getitem__, comments))
+
+
+def test_default_hides_comments_of_nested_types() -> None:
+    """The interface's own comments and blank lines stay; nested ones go."""
+    assert shown(Comments()) == [
+        '# Top',
+        'Inner inner # the inner',
+        '\tother/msg/Leaf[<=3] leaf',
+        '\t\tint32 value',
+        '\tbool flag',
+        '',
+        'other/Leaf[] leaves',
+        '\tint32 value',
+        'uint8 A=1 # one',
+    ]
+
+
+def test_all_comments() -> None:
+    """Every line of every level, indented by tabs."""
+    assert shown(Comments(top=True, nested=True))[2:5] == [
+        '\t# Nested',
+        '\tother/msg/Leaf[<=3] leaf  # a leaf',
+        '\t\t# Leaf',
+    ]
+
+
+def test_no_comments() -> None:
+    """Neither comments nor blank lines."""
+    lines = shown(Comments(top=False, nested=False))
+    assert lines[0] == 'Inner inner'
+    assert not any('#' in line or not line for line in lines)
+
+
+@pytest.mark.parametrize(
+    ('line', 'expected'),
+    [
+        ('Point[3] points', 'demo/msg/Point'),
+        ('geometry_msgs/Point point', 'geometry_msgs/msg/Point'),
+        ('builtin_interfaces/Time[<=5] stamps # many', 'builtin_interfaces/msg/Time'),
+        ('float64 x', None),
+        ('string<=10 name', None),
+        ('uint8 KIND=1', None),
+        ('# Point p', None),
+        ('---', None),
+        ('', None),
+    ],
+)
+def test_nested_type(line: str, expected: str | None) -> None:
+    """Only fields of message types have definitions of their own."""
+    assert nested_type(line, 'demo') == expected
+
+
+def test_strip_comment() -> None:
+    """What stands before the first #."""
+    assert strip_comment('  bool a # b # c') == 'bool a'
+    assert strip_comment('# all') == ''

@@ -1,0 +1,179 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""YAML values into messages: round trips, and every refusal by name."""
+
+from __future__ import annotations
+
+from builtin_interfaces.msg import Time
+from geometry_msgs.msg import Polygon, PoseWithCovariance, Twist
+from hypothesis import given
+from hypothesis import strategies as st
+import pytest
+from rcl_interfaces.msg import ParameterValue
+from sensor_msgs.msg import JointState
+from shape_msgs.msg import SolidPrimitive
+from std_msgs.msg import Byte, ByteMultiArray, Float32, Header, Int8, String, UInt8, UInt64
+from std_srvs.srv import SetBool, Trigger
+
+from ros2_frontend.aliases import Document, Message
+from ros2_frontend.cli.errors import FieldValueError
+from ros2_frontend.messages.document import to_document
+from ros2_frontend.messages.fill import Filler
+from ros2_frontend.messages.from_text import parse_mapping, parse_yaml
+from ros2_frontend.messages.yaml_text import to_yaml
+
+NUMBERS = st.floats(allow_nan=False)
+TEXTS = st.text(st.characters(codec='utf-8', exclude_characters='\x85\u2028\u2029'), max_size=8)
+
+
+def filled(message: Message, values: Document) -> Message:
+    """Fill a message and return it."""
+    Filler().fill(message, values)
+    return message
+
+
+@given(
+    st.lists(TEXTS, max_size=3),
+    st.lists(NUMBERS, max_size=4),
+    st.integers(-(2**31), 2**31 - 1),
+    st.integers(0, 2**32 - 1),
+)
+def test_what_echo_prints_pub_takes(
+    names: list[str], positions: list[float], sec: int, nanosec: int
+) -> None:
+    """Message to YAML and back is the same message."""
+    message = JointState(name=names, position=positions)
+    message.header.stamp = Time(sec=sec, nanosec=nanosec)
+    text = to_yaml(to_document(message))
+    assert filled(JointState(), parse_mapping(text)) == message
+
+
+@given(st.lists(st.booleans(), max_size=3), st.lists(st.integers(0, 255), max_size=3))
+def test_arrays_of_bools_and_bytes_come_back(bools: list[bool], octets: list[int]) -> None:
+    """The element types that Python keeps in lists."""
+    values = {'bool_array_value': bools, 'byte_array_value': octets}
+    message = filled(ParameterValue(), values)
+    assert list(message.bool_array_value) == bools
+    assert list(message.byte_array_value) == [bytes([octet]) for octet in octets]
+
+
+def test_fixed_arrays_and_arrays_of_messages() -> None:
+    """36 numbers; two points given as mappings, one of them in part."""
+    numbers = [float(index) for index in range(36)]
+    assert list(filled(PoseWithCovariance(), {'covariance': numbers}).covariance) == numbers
+    polygon = filled(Polygon(), {'points': [{'x': 1}, {'x': 2, 'z': 3}]})
+    assert [(p.x, p.y, p.z) for p in polygon.points] == [(1.0, 0.0, 0.0), (2.0, 0.0, 3.0)]
+
+
+def test_fields_that_are_not_named_keep_their_value() -> None:
+    """Filling twice adds up."""
+    message = filled(Twist(), {'linear': {'x': 1}})
+    assert filled(message, {'angular': {'z': 2}}).linear.x == 1.0
+
+
+@pytest.mark.parametrize('text', ['', '{}', 'null'])
+def test_no_values_at_all(text: str) -> None:
+    """A request without fields needs no YAML."""
+    assert filled(Trigger.Request(), parse_mapping(text)) == Trigger.Request()
+
+
+@pytest.mark.parametrize(
+    ('message', 'text', 'value'),
+    [
+        (String(), 'data: 10', '10'),
+        (String(), 'data: true', 'True'),
+        (String(), 'data: ', ''),
+        (Float32(), 'data: 3', 3.0),
+        (Float32(), 'data: 1e3', 1000.0),
+        (Float32(), 'data: .inf', float('inf')),
+        (Int8(), 'data: 3.0', 3),
+        (Int8(), "data: '-7'", -7),
+        (UInt64(), 'data: 0xffffffffffffffff', 2**64 - 1),
+        (SetBool.Request(), 'data: 1', True),
+        (SetBool.Request(), '{ data: off }', False),
+        (Byte(), 'data: 65', b'A'),
+        (Byte(), 'data: !!binary QQ==', b'A'),
+    ],
+)
+def test_values_that_fit(message: Message, text: str, value: object) -> None:
+    """What people write and what it becomes."""
+    assert filled(message, parse_mapping(text)).data == value
+
+
+@pytest.mark.parametrize(
+    ('message', 'text', 'problem'),
+    [
+        (Int8(), 'data: 128', r'data: 128 is outside of int8 \[-128, 127\]'),
+        (UInt8(), 'data: -1', r'data: -1 is outside of uint8 \[0, 255\]'),
+        (Int8(), 'data: 1.5', r'data: 1.5 is no integer \(int8\)'),
+        (Int8(), 'data: .nan', r'data: nan is no integer'),
+        (Int8(), 'data: .inf', r'data: inf is no integer'),
+        (Int8(), 'data: true', r'data: True is no integer'),
+        (Float32(), 'data: x', r"data: 'x' is no number \(float\)"),
+        (Float32(), 'data: 1.0e+39', r'data: 1e\+39 is outside of float32'),
+        (SetBool.Request(), "data: 'false'", r"data: 'false' is no bool; write true or false"),
+        (String(), 'data: [a]', r"data: \['a'\] is no text"),
+        (Byte(), 'data: 256', r'data: 256 is no byte'),
+        (ByteMultiArray(), 'data: 5', r"data: '5' is no sequence; write \[ ... \]"),
+        (Twist(), 'linear: 1', r"linear: Value '1' is expected to be a dictionary but is a int"),
+        (Twist(), 'linear: {w: 1}', r"linear: 'Vector3' object has no attribute 'w'"),
+        (Polygon(), 'points: [{x: 1}, {x: a}]', r"points\[1\].x: 'a' is no number"),
+        (PoseWithCovariance(), 'covariance: [1.0]', r'needs exactly 36 elements, not 1'),
+        (SolidPrimitive(), 'dimensions: [1, 2, 3, 4]', r'takes at most 3 elements, not 4'),
+    ],
+)
+def test_values_that_do_not_fit(message: Message, text: str, problem: str) -> None:
+    """The error names the field, the value and what is taken instead."""
+    with pytest.raises(FieldValueError, match=problem):
+        filled(message, parse_mapping(text))
+
+
+def test_an_unknown_field_is_answered_with_those_that_exist() -> None:
+    """Their names and types, and the nearest."""
+    with pytest.raises(FieldValueError) as caught:
+        filled(JointState(), {'postion': [1.0]})
+    first, second, third = str(caught.value).splitlines()
+    assert first == "'JointState' object has no attribute 'postion'"
+    assert second.startswith('JointState has the fields: header (std_msgs/Header), name (seq')
+    assert third == "Did you mean 'position'?"
+
+
+def test_a_request_without_fields_says_so() -> None:
+    """There is nothing to suggest."""
+    with pytest.raises(FieldValueError, match='Trigger_Request has no fields'):
+        filled(Trigger.Request(), {'data': 1})
+
+
+def test_stamps_can_be_left_to_the_moment_of_sending() -> None:
+    """`auto` and `now` become setters, when asked for."""
+    message, filler = JointState(), Filler(expand_now=True)
+    filler.fill(message, {'header': 'auto', 'name': ['a']})
+    (set_stamp,) = filler.stamps
+    set_stamp(Time(sec=7))
+    assert (message.header.stamp.sec, message.name) == (7, ['a'])
+    header, filler = Header(), Filler(expand_now=True)
+    filler.fill(header, {'stamp': 'now', 'frame_id': 'map'})
+    filler.stamps[0](Time(sec=8))
+    assert (header.stamp.sec, header.frame_id) == (8, 'map')
+    with pytest.raises(FieldValueError, match='header: Value'):
+        filled(JointState(), {'header': 'auto'})
+
+
+@pytest.mark.parametrize(
+    ('text', 'problem'),
+    [
+        ('data:1', 'needs to be a dictionary in YAML format .YAML wants a space'),
+        ('[1]', 'needs to be a dictionary'),
+        ('{a: ', 'is not valid YAML'),
+    ],
+)
+def test_text_that_is_no_mapping(text: str, problem: str) -> None:
+    """The usual slips are named."""
+    with pytest.raises(FieldValueError, match=problem):
+        parse_mapping(text)
+
+
+def test_yaml_is_read_safely() -> None:
+    """No Python objects come out of a command line."""
+    with pytest.raises(FieldValueError, match='not valid YAML'):
+        parse_yaml('!!python/object/apply:os.getcwd []')

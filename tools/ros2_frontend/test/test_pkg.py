@@ -1,0 +1,81 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""`ros2 pkg` over a made-up prefix."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from fake_prefix import add_package
+from frontend_cli import Ros2
+import pytest
+
+
+@pytest.fixture
+def prefix(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Install two packages into two prefixes; the first hides what the second has again."""
+    over, under = tmp_path / 'over', tmp_path / 'under'
+    add_package(over, 'tools_pkg', {'work': '#!/bin/sh\n', 'sub/deep': '#!/bin/sh\n'})
+    add_package(under, 'tools_pkg', {'old': '#!/bin/sh\n'})
+    add_package(under, 'plain_pkg')
+    (over / 'lib/tools_pkg/readme.txt').write_text('no program')
+    monkeypatch.setenv('AMENT_PREFIX_PATH', f'{over}:{under}')
+    return over
+
+
+@pytest.mark.usefixtures('prefix')
+def test_list_is_sorted_and_without_repetition(ros2: Ros2) -> None:
+    """Each package once."""
+    assert ros2('pkg', 'list').lines == ['plain_pkg', 'tools_pkg']
+
+
+def test_executables(ros2: Ros2, prefix: Path) -> None:
+    """Executable files of the package's lib folder, in depth, of the first prefix only."""
+    assert ros2('pkg', 'executables', 'tools_pkg').lines == ['tools_pkg deep', 'tools_pkg work']
+    assert ros2('pkg', 'executables').lines == ['tools_pkg deep', 'tools_pkg work']
+    full = ros2('pkg', 'executables', 'tools_pkg', '--full-path').lines
+    assert full == [str(prefix / 'lib/tools_pkg/sub/deep'), str(prefix / 'lib/tools_pkg/work')]
+
+
+def test_prefix(ros2: Ros2, prefix: Path) -> None:
+    """The prefix, or the package's share folder."""
+    assert ros2('pkg', 'prefix', 'tools_pkg').out == f'{prefix}\n'
+    share = ros2('pkg', 'prefix', 'tools_pkg', '--share')
+    assert share.out == f'{prefix}/share/tools_pkg\n'
+
+
+@pytest.mark.usefixtures('prefix')
+def test_xml(ros2: Ros2) -> None:
+    """The manifest, or the texts of one of its tags."""
+    assert ros2('pkg', 'xml', 'plain_pkg').out.startswith('<package format="3">\n  <name>plain')
+    assert ros2('pkg', 'xml', 'plain_pkg', '--tag', 'version').out == '1.2.3\n'
+    assert ros2('pkg', 'xml', 'plain_pkg', '-t', 'depend').lines == ['one', 'two']
+
+
+@pytest.mark.usefixtures('prefix')
+@pytest.mark.parametrize(
+    ('words', 'message'),
+    [
+        (('prefix', 'tool_pkg'), "Package not found\nDid you mean 'tools_pkg'?\n"),
+        (('xml', 'tool_pkg'), "Package not found\nDid you mean 'tools_pkg'?\n"),
+        (
+            ('executables', 'tool_pkg'),
+            "Package 'tool_pkg' not found\nDid you mean 'tools_pkg'?\n",
+        ),
+        (('xml', 'plain_pkg', '-t', 'nothing'), 'XML tag not found\n'),
+    ],
+)
+def test_what_is_not_there(ros2: Ros2, words: tuple[str, ...], message: str) -> None:
+    """ros2cli's sentence and the nearest name, exit code 1."""
+    outcome = ros2('pkg', *words)
+    assert (outcome.code, outcome.out, outcome.err) == (1, '', message)
+
+
+def test_without_an_environment_the_remedy_is_named(
+    ros2: Ros2, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """No traceback when env.sh was not sourced."""
+    monkeypatch.delenv('AMENT_PREFIX_PATH')
+    outcome = ros2('pkg', 'list')
+    assert outcome.code == 1
+    assert 'Source env.sh' in outcome.err

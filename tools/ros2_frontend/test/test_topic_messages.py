@@ -1,0 +1,155 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""`ros2 topic echo` and `pub` over DDS."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+import re
+
+from frontend_cli import PROGRAM, Ros2
+from processes import RunningProcess
+import pytest
+
+pytestmark = [pytest.mark.scenario, pytest.mark.usefixtures('zoo')]
+
+JOINTS = """\
+header:
+  stamp:
+    sec: \\d+
+    nanosec: \\d+
+  frame_id: base
+name:
+- one
+- two
+position:
+- 0.5
+- -1.0
+velocity: \\[\\]
+effort: \\[\\]
+---
+"""
+
+
+def test_echo_prints_yaml(ros2: Ros2) -> None:
+    """One message, as ros2cli prints it."""
+    outcome = ros2('topic', 'echo', '/joint_states', '--once')
+    assert (outcome.code, outcome.err) == (0, '')
+    assert re.fullmatch(JOINTS, outcome.out), outcome.out
+
+
+def test_echo_gets_what_was_published_before(ros2: Ros2) -> None:
+    """A latched topic: durability is chosen by its publisher."""
+    assert ros2('topic', 'echo', '/latched', '--once').out == 'data: kept\n---\n'
+
+
+def test_echo_of_publishers_that_differ(ros2: Ros2) -> None:
+    """It says so, and takes what connects to all."""
+    lines = ros2('topic', 'echo', '/mixed', '--once').lines
+    assert lines[0] == (
+        'Some, but not all, publishers are offering QoSReliabilityPolicy.RELIABLE. Falling back '
+        'to QoSReliabilityPolicy.BEST_EFFORT as it will connect to all publishers'
+    )
+    assert lines[1].startswith('data: ')
+
+
+def test_echo_filter(ros2: Ros2) -> None:
+    """Only what the expression accepts is printed."""
+    out = ros2('topic', 'echo', '/chatter', '--once', '--filter', "m.data.endswith('7')").out
+    assert re.fullmatch(r"data: 'Hello World: \d*7'\n---\n", out)
+
+
+def test_echo_timeout_without_a_message(ros2: Ros2) -> None:
+    """The end of the wait is no error, as in ros2cli."""
+    outcome = ros2('topic', 'echo', '/listener/input', 'std_msgs/msg/String', '--timeout', '0.1')
+    assert (outcome.code, outcome.out, outcome.err) == (0, '', '')
+
+
+@pytest.mark.parametrize(
+    ('words', 'out', 'problem'),
+    [
+        (
+            ('/chater',),
+            'WARNING: topic [/chater] does not appear to be published yet\n',
+            "Could not determine the type for the passed topic\nDid you mean '/chatter'",
+        ),
+        (('/chatter', 'std_msgs/msg/Strin'), '', 'The passed message type is invalid\nDid you'),
+        (('/chatter', 'std_srvs/srv/Trigger'), '', 'The passed message type is invalid'),
+        (('/chatter', '--field', '.'), '', "Invalid field value '.'"),
+        (('/chatter', '--field', 'dat'), '', "Invalid field 'dat': 'String' object has no"),
+        (('/chatter', '--filter', 'm..'), '', "Invalid filter 'm..'"),
+    ],
+    ids=['topic', 'type', 'kind', 'no field', 'field', 'filter'],
+)
+def test_echo_of_what_is_not_there(
+    ros2: Ros2, words: tuple[str, ...], out: str, problem: str
+) -> None:
+    """The sentence of ros2cli and the nearest name."""
+    outcome = ros2('topic', 'echo', *words)
+    assert (outcome.code, outcome.out) == (1, out)
+    assert outcome.err.startswith(problem), outcome.err
+
+
+def test_pub_once_reaches_the_subscription(ros2: Ros2) -> None:
+    """It waits for the subscription to match, so that the one message is not lost."""
+    words = ('topic', 'pub', '--once', '/listener/input', 'std_msgs/msg/String', '{data: foo}')
+    lines = ros2(*words).lines
+    while lines[0].startswith('Waiting for at least 1 matching subscription(s)...'):
+        del lines[0]
+    assert lines == [
+        'publisher: beginning loop',
+        "publishing #1: std_msgs.msg.String(data='foo')",
+        '',
+    ]
+    assert "message='foo;'" in ros2('service', 'call', '/last_heard', 'std_srvs/srv/Trigger').out
+
+
+def test_pub_counts_and_prints_every_nth(ros2: Ros2) -> None:
+    """Four messages, every second is printed."""
+    words = ('-t', '4', '-p', '2', '-r', '100', '/listener/input', 'std_msgs/String', 'data: a')
+    printed = [line for line in ros2('topic', 'pub', *words).lines if '#' in line]
+    assert [line.split()[1] for line in printed] == ['#2:', '#4:']
+    assert "message='a;a;a;a;'" in ros2('service', 'call', '/last_heard', 'std_srvs/Trigger').out
+
+
+def test_pub_stamps_at_the_moment_of_sending(ros2: Ros2) -> None:
+    """`header: auto` arrives with a time."""
+    words = ('--once', '/listener/stamped', 'sensor_msgs/msg/JointState', '{header: auto}')
+    assert re.search(r'Time\(sec=[1-9]\d+', ros2('topic', 'pub', *words).out)
+    answer = ros2('service', 'call', '/last_heard', 'std_srvs/srv/Trigger').out
+    assert re.search(r"message='stamp [1-9]\d+'", answer)
+
+
+def test_pub_until_interrupted(zoo: Mapping[str, str]) -> None:
+    """Without a count it goes on at its rate; Ctrl-C ends it."""
+    words = [*PROGRAM, 'topic', 'pub', '-r', '50', '/nobody', 'std_msgs/msg/String', 'data: x']
+    with RunningProcess(words, zoo) as process:
+        process.wait_for(r"^publishing #5: std_msgs.msg.String\(data='x'\)$")
+        assert process.stop() == 2
+
+
+@pytest.mark.parametrize(
+    ('words', 'problem'),
+    [
+        (('std_msgs/msg/Strin',), 'The passed message type is invalid\n'),
+        (('std_msgs/msg/String', 'data'), 'The passed value needs to be a dictionary in YAML'),
+        (
+            ('std_msgs/msg/String', '{dat: a}'),
+            "Failed to populate field: 'String' object has no attribute 'dat'\nString has the",
+        ),
+        (
+            ('--once', '--max-wait-time-secs', '0.1', 'std_msgs/msg/String'),
+            'Timed out waiting for subscribers: Expected 1 subcribers but only got 0',
+        ),
+        (
+            ('std_msgs/msg/String', '-n', 'not valid'),
+            'Invalid node name: node name must not',
+        ),
+    ],
+    ids=['type', 'no mapping', 'field', 'nobody', 'node name'],
+)
+def test_pub_of_what_cannot_be(ros2: Ros2, words: tuple[str, ...], problem: str) -> None:
+    """Exit code 1 and the reason."""
+    outcome = ros2('topic', 'pub', '/nobody', *words)
+    assert outcome.code == 1
+    assert outcome.err.startswith(problem), outcome.err
