@@ -92,3 +92,14 @@ def test_demo_passes_the_duration_on() -> None:
     for variables, expected in (([], False), (['DURATION=20'], True)):
         shown = subprocess.run([*makefile, *variables], check=True, capture_output=True, text=True)
         assert ('demo panda --duration 20' in shown.stdout) == expected
+
+
+def test_the_start_leaves_a_virtual_environment() -> None:
+    """A set-up that ran inside .venv would remove what it runs on."""
+    start = importlib.import_module('workspace.__main__')
+    better = start._better_interpreter()
+    if sys.prefix == sys.base_prefix:
+        assert better == ''
+    else:
+        assert not Path(better).is_relative_to(sys.prefix)
+        assert Path(better).resolve() == Path(sys.executable).resolve()

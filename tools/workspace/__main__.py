@@ -35,9 +35,12 @@ def _another() -> str:
 
 def _better_interpreter() -> str:
     """Name the interpreter that should run the set-up instead of this one; empty for none."""
-    base = getattr(sys, '_base_executable', '') if sys.prefix != sys.base_prefix else ''
-    if base and base != sys.executable and os.path.exists(base):  # noqa: PTH110
-        return base
+    if sys.prefix != sys.base_prefix:
+        base = getattr(sys, '_base_executable', sys.executable)
+        if base == sys.executable:  # before Python 3.11
+            base = os.path.realpath(sys.executable)
+        if base != sys.executable and os.path.exists(base):  # noqa: PTH110
+            return base
     return '' if OLDEST <= sys.version_info[:2] <= NEWEST else _another()
 
 

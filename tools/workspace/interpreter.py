@@ -13,8 +13,11 @@ from .errors import UnsupportedSystemError
 
 _QUESTIONS = """
 import importlib.util, json, os, platform, sys, sysconfig
+path = getattr(sys, '_base_executable', None) or sys.executable
+if sys.prefix != sys.base_prefix and path == sys.executable:  # before Python 3.11
+    path = os.path.realpath(path)
 print(json.dumps({
-    'path': getattr(sys, '_base_executable', None) or sys.executable,
+    'path': path,
     'version': sys.version_info[:2],
     'machine': platform.machine(),
     'has_headers': os.path.exists(os.path.join(sysconfig.get_path('include'), 'Python.h')),
