@@ -1,0 +1,93 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The same on a real vcan0: of this kernel where it has one, else of a kernel in user mode."""
+
+from __future__ import annotations
+
+from pathlib import Path
+import re
+import shutil
+import sys
+from typing import TYPE_CHECKING
+
+import pytest
+from simulated_arm import panda_bus
+from test_article_commands import TARGET, TRIGGER
+from user_mode_linux import run_in_guest, what_is_missing
+
+from arm_canopen.can.interfaces import can_interfaces
+
+if TYPE_CHECKING:
+    from isolation import Isolation
+
+pytestmark = [pytest.mark.scenario, pytest.mark.vcan]
+
+VCAN = can_interfaces().get('vcan0')
+HAS_VCAN = VCAN is not None and VCAN.is_up
+ROOT = Path(__file__).parents[1]
+LOG_LINE = re.compile(r'\(\d+\.\d{6}\) vcan0 [0-9A-F]{3}#[0-9A-F]*')
+
+
+@pytest.mark.skipif(HAS_VCAN, reason='the tests run on this kernel itself')
+@pytest.mark.skipif(bool(what_is_missing()), reason=what_is_missing())
+@pytest.mark.timeout(400)
+@pytest.mark.parametrize(
+    'tests',
+    [
+        ['arm_canopen/test/test_can_bus_contract.py', 'arm_canopen/test/test_can_socketcan.py'],
+        ['tests/test_real_vcan.py'],
+    ],
+    ids=['buses', 'bring-up'],
+)
+def test_in_user_mode_linux(tests: list[str], tmp_path: Path) -> None:
+    """The tests that need a vcan0 pass in a guest that has one, and none is skipped for it."""
+    options = ['-q', '-p', 'no:cacheprovider', '--timeout', '240', '--rootdir', str(ROOT)]
+    command = [sys.executable, '-m', 'pytest', *options, *(str(ROOT / test) for test in tests)]
+    code, output = run_in_guest(command, tmp_path, timeout=300.0)
+    assert code == 0, output
+    assert 'no vcan0' not in output
+    assert re.search(r'\d+ passed', output), output
+
+
+@pytest.mark.skipif(not HAS_VCAN, reason='this kernel has no vcan0; see test_in_user_mode_linux')
+@pytest.mark.timeout(240)
+def test_bring_up_on_vcan0_seen_by_candump(isolation: Isolation, tmp_path: Path) -> None:
+    """All seven drives boot, one moves, and can-utils' candump sees the same frames as ours."""
+    from processes import RunningProcess
+
+    robot = tmp_path / 'panda'
+    shutil.copytree(panda_bus().parent, robot)
+    bus = robot / 'bus.yml'
+    # a guest carries about 1,000 frames of Python in a second
+    slow = bus.read_text().replace('sync_period: 10000', 'sync_period: 50000')
+    bus.write_text(slow.replace('period: 10 ', 'period: 50 '))
+    log = tmp_path / 'real.log'
+
+    def start(*command: str) -> RunningProcess:
+        return RunningProcess(command, isolation.env)
+
+    with start('bash', '-c', f'exec candump -L vcan0 > {log}') as candump:
+        bringup = ['bringup', f'{robot}/', '--simulate', '--can', 'vcan0', '--timeout', '60']
+        with start('ros2', 'run', 'arm_bringup', *bringup) as arm:
+            arm.wait_for('all is ready', 90.0)
+            for service, service_type, request in (
+                ('init', TRIGGER, '{}'),
+                ('position_mode', TRIGGER, '{}'),
+                ('target', TARGET, '{ target: 0.2 }'),
+            ):
+                call = [f'/panda_joint1/{service}', service_type, request]
+                with start('ros2', 'service', 'call', *call) as process:
+                    assert process.wait(60.0) == 0, process.output
+                    assert 'success=True' in process.output
+            with start('ros2', 'run', 'arm_canopen', 'candump', 'vcan0', '-n', '40') as ours:
+                assert ours.wait(60.0) == 0, ours.output
+            assert arm.stop(30.0) == 0, arm.output
+        candump.stop()
+    lines = log.read_text().splitlines()
+    assert all(LOG_LINE.fullmatch(line) for line in lines)
+    assert any(line.endswith(' 302#C800000000000000') for line in lines), 'target 200 increments'
+    assert {f'{identifier:03X}' for identifier in range(0x182, 0x189)} <= {
+        line.split()[2].split('#')[0] for line in lines
+    }
+    last = [line for line in lines if ' 182#' in line][-1]
+    assert last.split('#')[1].startswith('50'), f'not disabled at the end: {last}'
