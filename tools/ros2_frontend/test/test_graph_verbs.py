@@ -165,7 +165,7 @@ def test_topic_type_of_an_unknown_topic(ros2: Ros2) -> None:
 
 def test_topic_type_of_a_hidden_topic_needs_the_switch(ros2: Ros2) -> None:
     """Hidden topics are unknown unless asked for."""
-    assert ros2('topic', 'type', '/_hidden_chatter').code == 1
+    assert ros2('topic', 'type', '/_hidden_chatter', '--spin-time', '0.2').code == 1
     assert ros2('topic', '--include-hidden-topics', 'type', '/_hidden_chatter').code == 0
 
 
@@ -208,9 +208,9 @@ def test_an_empty_list_of_actions(ros2: Ros2) -> None:
     """Nothing and exit code 0; `info` counts nobody, `type` has exit code 1."""
     assert ros2('action', 'list').out == ''
     assert ros2('action', 'list', '-c').out == '0\n'
-    info = ros2('action', 'info', '/nothing')
+    info = ros2('action', 'info', '/nothing', '--spin-time', '0.2')
     assert (info.code, info.out) == (
         0,
         'Action: /nothing\nAction clients: 0\nAction servers: 0\n',
     )
-    assert ros2('action', 'type', '/nothing').code == 1
+    assert ros2('action', 'type', '/nothing', '--spin-time', '0.2').code == 1

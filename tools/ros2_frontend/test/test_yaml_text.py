@@ -53,6 +53,7 @@ def by_pyyaml(document: Document, flow_style: bool) -> str:
 @given(DOCUMENTS, st.booleans())
 @example({'a': [[[], {}], [{'b': [1.0]}]]}, False)
 @example({'a': 'two\nlines'}, False)
+@example({'a': {'b': '\x85'}}, False)
 @example({'on': 1e22, 'b': -1e-07, 'c': float('-inf')}, False)
 def test_text_is_pyyamls(document: Document, flow_style: bool) -> None:
     """Every document is written as PyYAML writes it."""

@@ -20,6 +20,7 @@ _INDENT = '  '
 # texts that are the same in YAML: they start like a name, hold nothing that YAML knows as syntax,
 # and are not the words of the YAML 1.1 types bool and null
 _PLAIN = re.compile(r'[A-Za-z/][A-Za-z0-9_/.\-]*')
+_LINE_BREAKS = frozenset('\n\x85\u2028\u2029')
 _WORDS = frozenset({'yes', 'no', 'true', 'false', 'on', 'off', 'null'})
 
 
@@ -124,7 +125,6 @@ def _text(value: str) -> str:
 
 @lru_cache(maxsize=1024)
 def _quoted(value: str) -> str:
-    text = _by_pyyaml({'k': value}, False)[len('k: ') : -1]
-    if '\n' in text:
+    if not _LINE_BREAKS.isdisjoint(value):
         raise _NeedsSeveralLinesError
-    return text
+    return _by_pyyaml({'k': value}, False)[len('k: ') : -1]

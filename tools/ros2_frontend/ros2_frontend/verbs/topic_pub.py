@@ -78,7 +78,10 @@ class Pub:
             publisher = session.node.create_publisher(message_type, topic, profile_of(args))
             wanted = (1 if times else 0) if args.wait is None else args.wait
             graph = Graph(session, args.spin_time)
-            _await_subscriptions(graph, publisher, wanted, args.max_wait_time_secs)
+            if wanted:
+                _await_subscriptions(graph, publisher, wanted, args.max_wait_time_secs)
+            else:
+                graph.settle()  # who is there already hears the first message, too
             print('publisher: beginning loop')
             for count in _paced(session, times, 1.0 / args.rate):
                 _stamp(filler, session)
