@@ -357,6 +357,23 @@ def test_a_single_target_takes_the_axis_from_its_source(net: VirtualNetwork) -> 
     assert net.drives[JOINT].position == pytest.approx(0.0, abs=2 / SCALE)
 
 
+def test_a_source_attached_again_goes_on(net: VirtualNetwork) -> None:
+    """What it still has is not taken from it; what it had lost it gets back."""
+    enabled(net, OperationMode.CYCLIC_POSITION)
+    source = Ramp(0.4)
+    net.group.attach(source)
+    net.run(0.5)
+    begin = net.now
+    net.group.attach(source)
+    net.run(0.5)
+    assert source.losses == []
+    targets = [target / SCALE for target in net.targets(JOINT, since=begin)]
+    assert all(b - a == pytest.approx(0.4 * PERIOD, abs=2 / SCALE) for a, b in pairwise(targets))
+    net.group.attach(Ramp(0.0))
+    net.run(0.1)
+    assert source.losses == ['another motion source took over']
+
+
 class Broken(Ramp):
     """A source with a defect."""
 

@@ -53,7 +53,9 @@ class MotionGroup:
             drive.released = partial(self._release, drive)
 
     def attach(self, source: MotionSource) -> None:
-        """Let a source command its axes from the next cycle on; again to give it back all axes.
+        """Let a source command its axes from the next cycle on.
+
+        Attached again, it gets back what it had lost; the axes that it still has go on.
 
         Raises:
             KeyError: An axis is no drive of this bus.
@@ -62,10 +64,14 @@ class MotionGroup:
         if unknown:
             raise KeyError(f'no drives {unknown} on this bus; it has {list(self.drives)}')
         drives = [self.drives[name] for name in source.axes]
+        before = [entry for entry in self._attachments if entry.source is source]
+        kept = [drive for entry in before for drive in entry.owned]
         for drive in drives:
-            self._release(drive, 'another motion source took over')
+            if drive not in kept:
+                self._release(drive, 'another motion source took over')
         self.detach(source)
-        self._attachments.append(Attachment(source, drives, owned=list(drives)))
+        streaming = {name for entry in before for name in entry.streaming}
+        self._attachments.append(Attachment(source, drives, list(drives), streaming))
 
     def detach(self, source: MotionSource) -> None:
         """End a source; drives that it moved are braked."""
