@@ -23,8 +23,17 @@ NAME_COLOURS = ('\x1b[36m', '\x1b[32m', '\x1b[35m', '\x1b[34m', '\x1b[96m', '\x1
 SEVERITY_COLOURS = {Severity.WARNING: YELLOW, Severity.ERROR: RED}
 """Colours of notices."""
 
-ROS_SEVERITY = re.compile(r'^\[(WARN|ERROR|FATAL)\]')
+ROS_SEVERITY = re.compile(r'^\[(DEBUG|INFO|WARN|ERROR|FATAL)\]')
 """Severity at the start of a line of rcutils logging, in the format that the bring-up asks for."""
+
+SEVERITIES = {
+    'DEBUG': Severity.INFO,
+    'INFO': Severity.INFO,
+    'WARN': Severity.WARNING,
+    'ERROR': Severity.ERROR,
+    'FATAL': Severity.ERROR,
+}
+"""How loud the severities of rcutils are here."""
 
 
 def wants_colour(stream: TextIO, environment: Mapping[str, str]) -> bool:
@@ -47,15 +56,14 @@ def is_smart(environment: Mapping[str, str]) -> bool:
 
 
 def severity_of(line: str) -> Severity:
-    """Say how loud a line of a ROS node's log is.
+    """Say how loud a line of a ROS node's output is.
 
     Args:
-        line: A line of its output.
+        line: A line of its output; one that is no log line, such as that of a traceback, is a
+            warning: nothing of the kind is expected.
     """
     match = ROS_SEVERITY.match(line)
-    if match is None:
-        return Severity.INFO
-    return Severity.WARNING if match[1] == 'WARN' else Severity.ERROR
+    return SEVERITIES[match[1]] if match else Severity.WARNING
 
 
 @dataclass(frozen=True, slots=True)

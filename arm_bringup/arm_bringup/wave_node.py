@@ -72,6 +72,7 @@ class WaveNode(Node):
         drives = [node.name for node in master.bus.nodes if node.is_drive]
         style = WaveStyle()
         self._source = WaveSource(plan(urdf, drives, style), style)
+        self._left: dict[str, str] = {}
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self.create_service(Trigger, '~/start', self._start)
         self.create_service(Trigger, '~/stop', self._stop)
@@ -95,9 +96,16 @@ class WaveNode(Node):
 
     def _publish(self) -> None:
         report = self._source.report
+        self._tell_who_left(report)
         message = DiagnosticArray(status=[_motion_status(report), *map(_axis_status, report.axes)])
         message.header.stamp = self.get_clock().now().to_msg()
         self._diagnostics.publish(message)
+
+    def _tell_who_left(self, report: WaveReport) -> None:
+        before, self._left = self._left, {axis.name: axis.left for axis in report.axes}
+        for name, reason in self._left.items():
+            if reason and not before.get(name):
+                self.get_logger().warning(f'{name} left the wave: {reason}')
 
 
 def _motion_status(report: WaveReport) -> DiagnosticStatus:
@@ -122,6 +130,6 @@ def _axis_status(axis: AxisReport) -> DiagnosticStatus:
     return DiagnosticStatus(
         level=DiagnosticStatus.OK,
         name=f'wave: {axis.name}',
-        message='in the wave' if axis.active else 'not in the wave',
+        message='in the wave' if axis.active else f'not in the wave: {axis.left or "idle"}',
         values=[KeyValue(key=key, value=value) for key, value in figures.items()],
     )

@@ -43,6 +43,7 @@ class AxisReport:
         name: Name of the drive.
         followable: The master would obey a set-point.
         active: It takes part.
+        left: Why it takes no part any more; empty when it does, or never did.
         lowest: Least measured position in [rad].
         highest: Greatest measured position in [rad].
         error_max: Greatest distance in [rad] between a measured position and the last set-point
@@ -54,6 +55,7 @@ class AxisReport:
     name: str
     followable: bool
     active: bool
+    left: str
     lowest: float
     highest: float
     error_max: float
@@ -74,6 +76,12 @@ class WaveReport:
     axes: tuple[AxisReport, ...]
 
 
+@dataclass(frozen=True, slots=True)
+class _Release:
+    axis: str
+    reason: str
+
+
 class _Axis:
     """One drive: where it entered, and how well it follows."""
 
@@ -84,6 +92,7 @@ class _Axis:
         'error_max',
         'followable',
         'highest',
+        'left',
         'lowest',
         'samples',
         'sent',
@@ -95,6 +104,7 @@ class _Axis:
     def __init__(self, swing: Swing) -> None:
         self.swing = swing
         self.active = False
+        self.left = ''
         self.followable = False
         self.start = 0.0
         self.entered = 0.0
@@ -111,11 +121,14 @@ class _Axis:
 
     def enter(self, setpoint: float, style: WaveStyle) -> None:
         self.active = True
+        self.left = ''
         self.start = setpoint
         self.entered = 0.0
         self.duration = self.swing.entry_duration(setpoint, style)
 
-    def leave(self) -> None:
+    def leave(self, reason: str) -> None:
+        if self.active:
+            self.left = reason
         self.active = False
         self.sent = None
 
@@ -140,6 +153,7 @@ class _Axis:
             self.swing.name,
             self.followable,
             self.active,
+            self.left,
             self.lowest,
             self.highest,
             self.error_max,
@@ -166,7 +180,7 @@ class WaveSource:
         self._style = style
         self._stop_duration = stop_duration(list(swings), style)
         self._axes = [_Axis(swing) for swing in swings]
-        self._commands: deque[Command | str] = deque()
+        self._commands: deque[Command | _Release] = deque()
         self._state = WaveState.IDLE
         self._start_again = False
         self._theta = 0.0
@@ -202,10 +216,9 @@ class WaveSource:
 
         Args:
             axis: Name of the drive.
-            reason: Why it was taken away; the master has logged it.
+            reason: Why it was taken away.
         """
-        del reason
-        self._commands.append(axis)
+        self._commands.append(_Release(axis, reason))
 
     def update(
         self, now: float, period: float, feedback: Sequence[AxisFeedback]
@@ -228,7 +241,7 @@ class WaveSource:
             axis.measure(state.position)
             axis.followable = state.followable
             if axis.active and not state.followable:
-                axis.leave()
+                axis.leave('the drive can no longer follow')
         while self._commands:
             self._obey(self._commands.popleft(), feedback)
         setpoints = self._advance(period)
@@ -238,7 +251,7 @@ class WaveSource:
             self._report = self._make_report()
         return setpoints
 
-    def _obey(self, command: Command | str, feedback: Sequence[AxisFeedback]) -> None:
+    def _obey(self, command: Command | _Release, feedback: Sequence[AxisFeedback]) -> None:
         if command is Command.START:
             self._enter(feedback)
         elif command is Command.STOP:
@@ -246,10 +259,10 @@ class WaveSource:
             if self._state is WaveState.RUNNING:
                 self._state = WaveState.STOPPING
                 self._stopping = 0.0
-        else:
+        elif isinstance(command, _Release):
             for axis in self._axes:
-                if axis.swing.name == command:
-                    axis.leave()
+                if axis.swing.name == command.axis:
+                    axis.leave(command.reason)
 
     def _enter(self, feedback: Sequence[AxisFeedback]) -> None:
         if self._state is WaveState.STOPPING:
@@ -285,7 +298,7 @@ class WaveSource:
     def _stand_still(self) -> None:
         self._state = WaveState.IDLE
         for axis in self._axes:
-            axis.leave()
+            axis.leave('')
         if self._start_again:
             self._start_again = False
             self._commands.append(Command.START)

@@ -56,7 +56,20 @@ def test_warnings_and_errors_have_their_own_colours() -> None:
     assert '\x1b[33m[WARN]' in lines[1]
     assert '\x1b[31m[ERROR]' in lines[2]
     assert all(line.count('\x1b[0m') == line.count('\x1b[3') for line in lines)
-    assert severity_of('WARN: not in the format') is Severity.INFO
+
+
+@pytest.mark.parametrize(
+    ('line', 'severity'),
+    [
+        ('[DEBUG] [master]: text', Severity.INFO),
+        ('[INFO] [master]: [ERROR]', Severity.INFO),
+        ('[FATAL] [master]: text', Severity.ERROR),
+        ('Traceback (most recent call last):', Severity.WARNING),
+    ],
+)
+def test_what_is_no_log_line_is_a_warning(line: str, severity: Severity) -> None:
+    """So a traceback is seen where only warnings are shown."""
+    assert severity_of(line) is severity
 
 
 def test_a_closed_output_is_no_error() -> None:
