@@ -11,7 +11,7 @@ import pytest
 
 from arm_canopen.standard.drive import DriveState
 from arm_canopen.standard.nmt import NmtCommand, NmtState
-from arm_canopen.standard.sdo import AbortCode
+from arm_canopen.standard.sdo_abort import AbortCode
 
 OWN = 0x700 + NODE_ID
 EMCY = 0x080 + NODE_ID

@@ -9,7 +9,7 @@ import pytest
 
 from arm_canopen.standard.drive import OperationMode
 from arm_canopen.standard.nmt import NmtCommand
-from arm_canopen.standard.sdo import AbortCode
+from arm_canopen.standard.sdo_abort import AbortCode
 
 REACHED = 0x400
 LIMIT = 0x800

@@ -9,7 +9,7 @@ import pytest
 
 from arm_canopen.can.frame import Frame
 from arm_canopen.standard.nmt import NmtCommand
-from arm_canopen.standard.sdo import AbortCode
+from arm_canopen.standard.sdo_abort import AbortCode
 
 DISABLED = 0x8000_0000
 NO_RTR = 0x4000_0000

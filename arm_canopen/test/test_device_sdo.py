@@ -13,7 +13,7 @@ import pytest
 
 from arm_canopen.standard.datatypes import DataType
 from arm_canopen.standard.dictionary import AccessType, ObjectDictionary, ObjectEntry
-from arm_canopen.standard.sdo import AbortCode
+from arm_canopen.standard.sdo_abort import AbortCode
 
 STRING = 0x2000
 BIG = 0x2001

@@ -9,9 +9,6 @@ import pytest
 from arm_canopen.exceptions import CodecError
 from arm_canopen.standard.sdo import (
     Abort,
-    abort_text,
-    ABORT_TEXTS,
-    AbortCode,
     decode_request,
     decode_response,
     DownloadRequest,
@@ -24,6 +21,7 @@ from arm_canopen.standard.sdo import (
     UploadResponse,
     UploadSegmentRequest,
 )
+from arm_canopen.standard.sdo_abort import abort_text, ABORT_TEXTS, AbortCode
 
 INDEX = st.integers(0, 0xFFFF)
 SUBINDEX = st.integers(0, 0xFF)

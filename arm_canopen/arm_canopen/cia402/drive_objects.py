@@ -4,10 +4,11 @@
 
 from __future__ import annotations
 
-from ..master.process_image import Reader, SYNCHRONOUS_MAX, Writer
+from ..master.process_image import Reader, Writer
 from ..master.remote_node import RemoteNode
 from ..standard.drive import drive_state, DriveState
 from ..standard.objects import Index
+from ..standard.pdo import SYNCHRONOUS_MAX
 
 
 class DriveObjects:

@@ -9,11 +9,12 @@ from dataclasses import dataclass, replace
 
 from ..standard.dictionary import ObjectDictionary
 from ..standard.objects import Index
+from ..standard.pdo import SYNCHRONOUS_MAX
 from .device_reader import DeviceDraft
 from .findings import Findings
 from .model import MasterConfig, NodeConfig
 from .pdo_direction import Direction, RPDO, TPDO
-from .pdo_resolution import PdoDraft, SYNCHRONOUS_MAX
+from .pdo_resolution import PdoDraft
 from .settings import MasterSettings, Options
 from .shared_keys import MILLISECONDS
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 from ..standard.cob_id import CAN_ID_MASK, COB_ID_EXTENDED, COB_ID_INVALID
 from ..standard.objects import PDO_COUNT_MAX
+from ..standard.pdo import SYNCHRONOUS_MAX
 from .document import Item, Listing, Mapping, Scalar
 from .eds import Eds
 from .findings import Findings, Place, RefusedError
@@ -21,7 +22,6 @@ from .section import block, listing, read_section
 AUTO = 'auto'
 PREDEFINED_MAX = 4  # PDOs with a pre-defined COB-ID (CiA 301, 7.3.3)
 TRANSMISSION_DEFAULT = 255
-SYNCHRONOUS_MAX = 240
 EVENT_TYPES = (254, 255)
 SUBINDICES = {'inhibit_time': 3, 'event_time': 5, 'sync_start': 6}
 """Sub-indices of the communication parameter that not every device has (CiA 301, 7.5.2.37)."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 from ..standard.cob_id import CAN_ID_MASK, COB_ID_EXTENDED, COB_ID_INVALID
 from ..standard.datatypes import Value
 from ..standard.dictionary import ObjectEntry
-from ..standard.sdo import AbortCode
+from ..standard.sdo_abort import AbortCode
 from .object_store import Integer, refusal
 
 RESTRICTED_CAN_IDS: tuple[tuple[int, int], ...] = (

@@ -12,7 +12,7 @@ from ..standard.cob_id import CAN_ID_MASK, COB_ID_INVALID
 from ..standard.datatypes import Value
 from ..standard.emcy import Emergency
 from ..standard.objects import Index
-from ..standard.sdo import AbortCode
+from ..standard.sdo_abort import AbortCode
 from .cob_id_rules import check_cob_id
 from .object_store import Integer, ObjectStore, refusal
 from .timed import NEVER

@@ -12,7 +12,7 @@ from ..standard.cob_id import CobId, NODE_ID_MAX, NODE_ID_MIN
 from ..standard.datatypes import Value
 from ..standard.nmt import NmtState, parse_heartbeat
 from ..standard.objects import Index
-from ..standard.sdo import AbortCode
+from ..standard.sdo_abort import AbortCode
 from .object_store import Integer, ObjectStore, refusal
 from .timed import NEVER
 

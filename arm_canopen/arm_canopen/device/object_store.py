@@ -23,7 +23,7 @@ from ..standard.datatypes import (
 )
 from ..standard.dictionary import ObjectDictionary, ObjectEntry
 from ..standard.pdo import Number
-from ..standard.sdo import abort_text, AbortCode
+from ..standard.sdo_abort import abort_text, AbortCode
 
 STRING_BYTES_MAX = 65_536  # [byte] longest string or domain that a client may write
 

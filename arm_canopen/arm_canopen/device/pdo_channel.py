@@ -17,13 +17,12 @@ from ..standard.cob_id import CAN_ID_MASK, COB_ID_INVALID
 from ..standard.datatypes import bit_length, Value
 from ..standard.dictionary import ObjectEntry
 from ..standard.objects import PDO_BITS_MAX
-from ..standard.pdo import MappedObject, PdoCodec
-from ..standard.sdo import AbortCode
+from ..standard.pdo import MappedObject, PdoCodec, SYNCHRONOUS_MAX
+from ..standard.sdo_abort import AbortCode
 from .cob_id_rules import check_cob_id
 from .object_store import ObjectStore, refusal, Scalar, Variable
 
 RTR_FORBIDDEN = 0x4000_0000  # bit 30 of a TPDO's COB-ID
-TRANSMISSION_SYNC_MAX = 240  # transmission types up to here go with SYNC
 TRANSMISSION_EVENT = (254, 255)
 INHIBIT_UNIT = 0.0001  # [s]
 MILLISECOND = 0.001  # [s]
@@ -90,7 +89,7 @@ class PdoChannel(ABC):
     @property
     def is_synchronous(self) -> bool:
         """It goes with SYNC."""
-        return self.transmission <= TRANSMISSION_SYNC_MAX
+        return self.transmission <= SYNCHRONOUS_MAX
 
     @property
     def is_event_driven(self) -> bool:

@@ -10,8 +10,9 @@ from ..can.frame import Frame
 from ..standard.datatypes import DataType
 from ..standard.dictionary import AccessType, ObjectEntry
 from ..standard.objects import Index, PDO_COUNT_MAX
+from ..standard.pdo import SYNCHRONOUS_MAX
 from .object_store import make_variable, ObjectStore, Variable
-from .pdo_channel import channel_numbers, PdoChannel, TRANSMISSION_EVENT, TRANSMISSION_SYNC_MAX
+from .pdo_channel import channel_numbers, PdoChannel, TRANSMISSION_EVENT
 from .timed import NEVER
 
 LENGTH_ERROR = 0x8210  # EMCY: PDO not processed due to length error
@@ -27,7 +28,7 @@ class Rpdo(PdoChannel):
         deadline: Steady time in [s] at which the next one is overdue.
     """
 
-    transmission_types = frozenset((*range(TRANSMISSION_SYNC_MAX + 1), *TRANSMISSION_EVENT))
+    transmission_types = frozenset((*range(SYNCHRONOUS_MAX + 1), *TRANSMISSION_EVENT))
 
     def __init__(
         self,
@@ -79,7 +80,7 @@ class Rpdo(PdoChannel):
             if self._late:
                 self._late = False
                 self._report(self, TIMEOUT_ERROR, False, now)
-        if self.transmission <= TRANSMISSION_SYNC_MAX:
+        if self.transmission <= SYNCHRONOUS_MAX:
             self._held = frame.data
         else:
             self._write_objects(frame.data)

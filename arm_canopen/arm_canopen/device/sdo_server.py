@@ -17,7 +17,6 @@ from ..exceptions import CodecError, SdoAbortError
 from ..standard.cob_id import CobId
 from ..standard.sdo import (
     Abort,
-    AbortCode,
     decode_request,
     DownloadRequest,
     DownloadResponse,
@@ -29,6 +28,7 @@ from ..standard.sdo import (
     UploadResponse,
     UploadSegmentRequest,
 )
+from ..standard.sdo_abort import AbortCode
 from .object_store import ObjectStore, refusal, STRING_BYTES_MAX
 from .timed import NEVER
 

@@ -11,7 +11,7 @@ from typing import TypeVar
 
 from ..standard.datatypes import Value
 from ..standard.drive import DriveState as State
-from ..standard.sdo import AbortCode
+from ..standard.sdo_abort import AbortCode
 from .axis import Axis
 from .drive_objects import DriveObjects
 from .drive_state import (

@@ -10,7 +10,7 @@ from ..can.frame import Frame
 from ..standard.cob_id import CAN_ID_MASK, CobId, SYNC_PRODUCER
 from ..standard.datatypes import Value
 from ..standard.objects import Index
-from ..standard.sdo import AbortCode
+from ..standard.sdo_abort import AbortCode
 from .cob_id_rules import check_can_id
 from .object_store import ObjectStore, refusal
 

@@ -9,8 +9,9 @@ from collections.abc import Callable
 from ..can.frame import Frame
 from ..standard.dictionary import ObjectEntry
 from ..standard.objects import Index, PDO_COUNT_MAX
+from ..standard.pdo import SYNCHRONOUS_MAX
 from .object_store import ObjectStore
-from .pdo_channel import channel_numbers, PdoChannel, TRANSMISSION_EVENT, TRANSMISSION_SYNC_MAX
+from .pdo_channel import channel_numbers, PdoChannel, TRANSMISSION_EVENT
 from .timed import NEVER
 
 ACYCLIC = 0  # sent at a SYNC when something changed
@@ -27,7 +28,7 @@ class Tpdo(PdoChannel):
 
     transmission_types = frozenset(
         (
-            *range(TRANSMISSION_SYNC_MAX + 1),
+            *range(SYNCHRONOUS_MAX + 1),
             RTR_SYNC,
             RTR_EVENT,
             *TRANSMISSION_EVENT,

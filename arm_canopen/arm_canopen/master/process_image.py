@@ -16,8 +16,6 @@ from ..config.model import PdoConfig
 from ..exceptions import CodecError
 from ..standard.pdo import Number, PdoCodec
 
-SYNCHRONOUS_MAX = 240  # transmission types up to this one follow SYNC (CiA 301, table 71)
-
 
 class SyncRound:
     """Counts the TPDOs that answer one SYNC, over all devices.

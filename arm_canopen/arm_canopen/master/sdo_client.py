@@ -14,8 +14,6 @@ from ..exceptions import CodecError, SdoAbortError, SdoError, SdoTimeoutError
 from ..standard.cob_id import CobId
 from ..standard.sdo import (
     Abort,
-    abort_text,
-    AbortCode,
     decode_response,
     DownloadRequest,
     DownloadResponse,
@@ -29,6 +27,7 @@ from ..standard.sdo import (
     UploadResponse,
     UploadSegmentRequest,
 )
+from ..standard.sdo_abort import abort_text, AbortCode
 from .scheduler import Promise, Scheduler
 
 T = TypeVar('T')

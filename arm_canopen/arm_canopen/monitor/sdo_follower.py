@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from ..exceptions import CodecError
 from ..standard.sdo import (
     Abort,
-    abort_text,
     decode_request,
     decode_response,
     DownloadRequest,
@@ -23,6 +22,7 @@ from ..standard.sdo import (
     UploadResponse,
     UploadSegmentRequest,
 )
+from ..standard.sdo_abort import abort_text
 from .object_names import ObjectNames
 from .sdo_block import BlockFollower
 from .value_text import data_text

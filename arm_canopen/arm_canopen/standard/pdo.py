@@ -18,6 +18,8 @@ from .objects import PDO_BITS_MAX
 
 Number = int | float
 
+SYNCHRONOUS_MAX = 240  # transmission types up to this one follow SYNC (CiA 301, tables 69 and 71)
+
 STRUCT_CODES: dict[DataType, str] = {
     DataType.INTEGER8: 'b',
     DataType.INTEGER16: 'h',

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from ...standard.datatypes import Value
-from ...standard.sdo import AbortCode
+from ...standard.sdo_abort import AbortCode
 from ..axis import Axis
 from ..drive_objects import DriveObjects
 from ..object_store import refusal
