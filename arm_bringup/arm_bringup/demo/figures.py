@@ -16,16 +16,29 @@ ENABLED = 'Operation enabled'
 class KeyValue(Protocol):
     """As diagnostic_msgs/KeyValue."""
 
-    key: str
-    value: str
+    @property
+    def key(self) -> str:
+        """Name of the figure."""
+
+    @property
+    def value(self) -> str:
+        """The figure as text."""
 
 
 class Status(Protocol):
     """As diagnostic_msgs/DiagnosticStatus, as far as it is looked at."""
 
-    name: str
-    message: str
-    values: Iterable[KeyValue]
+    @property
+    def name(self) -> str:
+        """What it is about."""
+
+    @property
+    def message(self) -> str:
+        """A summary in words."""
+
+    @property
+    def values(self) -> Iterable[KeyValue]:
+        """The figures."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -100,11 +100,11 @@ def render(figures: Figures, scene: Scene, width: int, height: int) -> Renderabl
     parts: list[RenderableType] = [_title(scene, width), drives, Text(''), _bus(figures.bus)]
     room = height - len(scene.limits) - LINES_AROUND
     messages = [_message(text) for text in scene.messages[-MESSAGE_ROOM:]]
-    for lines in (messages, _commands(scene.commands)):
+    for lines in (messages, _commands(scene.commands, width)):
         if lines and room > 1:
-            shown = _cut(lines, width, room - 1)
+            shown = lines[: room - 1]
             parts += [Text(''), *shown]
-            room -= 1 + _height(shown, width)
+            room -= 1 + len(shown)
     return Group(*parts)
 
 
@@ -185,19 +185,9 @@ def _message(text: str) -> Text:
     return Text(text, style='yellow', no_wrap=True, overflow='ellipsis')
 
 
-def _commands(commands: Sequence[str]) -> list[Text]:
+def _commands(commands: Sequence[str], width: int) -> list[Text]:
+    """Fold long commands by character, as a terminal does, so that they can be copied."""
+    indented = (f'  {command}' for command in commands)
+    folded = (line[i : i + width] for line in indented for i in range(0, len(line), width))
     head = Text('try in a second terminal', style='bold')
-    return [head, *(Text(f'  {command}', style='cyan') for command in commands)]
-
-
-def _height(lines: Sequence[Text], width: int) -> int:
-    wrapping = (math.ceil(len(line) / width) for line in lines if not line.no_wrap)
-    return sum(max(1, height) for height in wrapping) + sum(bool(line.no_wrap) for line in lines)
-
-
-def _cut(lines: Sequence[Text], width: int, room: int) -> list[Text]:
-    """Return the first lines that there is room for."""
-    shown = list(lines)
-    while _height(shown, width) > room:
-        shown.pop()
-    return shown
+    return [head, *(Text(line, style='cyan', no_wrap=True) for line in folded)]

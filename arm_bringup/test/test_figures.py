@@ -1,0 +1,165 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""From /diagnostics to figures, and from figures to lines and verdicts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+import math
+
+from hypothesis import given
+from hypothesis import strategies as st
+import pytest
+
+from arm_bringup.demo.figures import AxisFigures, BusFigures, DriveFigures, Figures
+from arm_bringup.demo.report import problems, progress_line, summary_lines, warnings
+
+JOINTS = ['joint1', 'joint2']
+
+
+@dataclass
+class KeyValue:
+    """As diagnostic_msgs/KeyValue."""
+
+    key: str
+    value: str
+
+
+@dataclass
+class Status:
+    """As diagnostic_msgs/DiagnosticStatus."""
+
+    name: str
+    message: str = ''
+    values: list[KeyValue] = field(default_factory=list)
+
+
+def status(name: str, message: str = '', **values: str) -> Status:
+    """Build a status."""
+    return Status(name, message, [KeyValue(*pair) for pair in values.items()])
+
+
+MESSAGE = [
+    status(
+        'master: bus',
+        frames_per_second='2912.4',
+        bus_load='26.91',
+        frames_lost='0',
+        jitter_p50='0.000140',
+        jitter_p99='0.001220',
+        missed_pdos='3',
+    ),
+    *(
+        status(
+            f'{joint}: drive',
+            'all well',
+            online='True',
+            nmt_state='OPERATIONAL',
+            state='Operation enabled',
+            mode='Cyclic position',
+            position='1.5',
+            velocity='-0.25',
+            following_error='0.005',
+        )
+        for joint in JOINTS
+    ),
+    status('wave: motion', state='running'),
+    *(
+        status(
+            f'wave: {joint}',
+            active='True',
+            lowest='-0.45',
+            highest='0.45',
+            error_max='0.012',
+            error_rms='0.004',
+        )
+        for joint in JOINTS
+    ),
+]
+GOOD = Figures().updated(MESSAGE)
+
+
+def test_figures_are_read_from_the_statuses() -> None:
+    """Of bus, drives and wave, with their units."""
+    assert GOOD.bus == BusFigures(2912.4, 26.91, 0, 0.00014, 0.00122, 3)
+    assert list(GOOD.drives) == JOINTS
+    assert GOOD.drives['joint1'] == DriveFigures(
+        online=True,
+        nmt='OPERATIONAL',
+        state='Operation enabled',
+        mode='Cyclic position',
+        position=1.5,
+        velocity=-0.25,
+        following_error=0.005,
+        message='all well',
+    )
+    assert GOOD.axes['joint2'] == AxisFigures(True, -0.45, 0.45, 0.012, 0.004)
+    assert GOOD.wave == 'running'
+    assert GOOD.enabled == 2
+
+
+def test_other_statuses_are_passed_over() -> None:
+    """Other nodes publish diagnostics, too."""
+    others = [status('battery', level='low'), status('joint1: encoder', position='7')]
+    assert GOOD.updated(others) == GOOD
+
+
+texts = st.dictionaries(
+    st.sampled_from(['online', 'state', 'position', 'frames_lost', 'jitter_p50', 'error_max']),
+    st.sampled_from(['', 'nan', 'inf', '-1', '1e400', 'words of any kind', '0x12 text', '3 rad']),
+)
+
+
+@given(st.sampled_from(['master: bus', 'joint1: drive', 'wave: joint1', 'wave: motion']), texts)
+def test_no_text_in_a_status_is_an_error(name: str, values: dict[str, str]) -> None:
+    """What is missing or is no number is shown as unknown."""
+    figures = Figures().updated([status(name, **values)])
+    assert progress_line(figures, JOINTS)
+    assert summary_lines(figures, JOINTS, 1.0)
+    assert problems(figures, JOINTS)
+
+
+def test_a_good_demo_has_no_problems_and_a_summary_of_each_joint() -> None:
+    """The summary names frames, losses, jitter, and range and path error of each joint."""
+    assert problems(GOOD, JOINTS) == []
+    assert warnings(GOOD) == []
+    text = '\n'.join(summary_lines(GOOD, JOINTS, 12.0))
+    for words in ('2/2 joints enabled', '2912 frames/s', 'lost 0', '0.14/1.22 ms', '12.0 s'):
+        assert words in text
+    row = next(line for line in text.splitlines() if line.startswith('joint2')).split()
+    assert row == ['joint2', '-0.450', '0.450', '0.900', '12.00', '4.00']
+
+
+@pytest.mark.parametrize(
+    ('drive', 'axis', 'words'),
+    [
+        (DriveFigures(message='offline: no answer'), AxisFigures(), 'not enabled: offline'),
+        (DriveFigures(online=True, state='Fault'), AxisFigures(), 'not enabled: Fault'),
+        (None, replace(GOOD.axes['joint2'], lowest=0.4), 'did not move'),
+        (None, AxisFigures(), 'did not move'),
+        (None, AxisFigures(True, -math.inf, math.inf), 'did not move'),
+        (None, replace(GOOD.axes['joint2'], error_max=0.5), '0.500 rad away'),
+    ],
+    ids=['offline', 'fault', 'lazy', 'silent', 'infinite', 'astray'],
+)
+def test_a_joint_that_did_not_do_it_is_named(
+    drive: DriveFigures | None, axis: AxisFigures, words: str
+) -> None:
+    """Only that one, with the reason."""
+    drives = GOOD.drives if drive is None else {**GOOD.drives, 'joint2': drive}
+    figures = replace(GOOD, drives=drives, axes={**GOOD.axes, 'joint2': axis})
+    (problem,) = problems(figures, JOINTS)
+    assert problem.startswith('joint2')
+    assert words in problem
+
+
+def test_a_joint_never_heard_of_is_a_problem() -> None:
+    """An empty /diagnostics is no success."""
+    assert [text.split()[0] for text in problems(Figures(), JOINTS)] == JOINTS
+
+
+def test_lost_frames_are_a_warning() -> None:
+    """They are a matter of the host, not of the arm."""
+    lost = replace(GOOD, bus=replace(GOOD.bus, lost=12))
+    assert '12 frames were lost' in warnings(lost)[0]
+    assert problems(lost, JOINTS) == []
