@@ -25,6 +25,21 @@ def action_names(session: Session) -> NamesAndTypes:
     return sorted(get_action_names_and_types(session.node))
 
 
+def offered_actions(session: Session, graph: Graph) -> set[str]:
+    """The actions that some node offers; `action_names` names those that are only used, too.
+
+    Args:
+        session: The session whose node looks.
+        graph: The graph with the nodes.
+
+    Returns:
+        Their names.
+    """
+    return {
+        name for name, _ in action_names(session) if clients_and_servers(session, graph, name)[1]
+    }
+
+
 def clients_and_servers(
     session: Session, graph: Graph, action: str
 ) -> tuple[NamesAndTypes, NamesAndTypes]:

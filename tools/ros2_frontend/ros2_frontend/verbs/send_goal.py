@@ -16,7 +16,7 @@ from ..messages.document import to_document
 from ..messages.fill import Filler
 from ..messages.from_text import parse_mapping
 from ..messages.yaml_text import to_yaml
-from ..ros.actions import action_names
+from ..ros.actions import offered_actions
 from ..ros.graph import Graph
 from ..ros.names import absolute
 from ..ros.session import open_session, Session
@@ -137,7 +137,7 @@ def _await_server(client: Handle, session: Session, args: Namespace) -> None:
     if graph.wait_for(lambda: client.server_is_ready() or None):
         return
     name = absolute(args.action_name)
-    known = [other for other, _ in action_names(session)]
+    known = offered_actions(session, graph)
     if name not in known:
         print(f"There is no action '{name}' yet.{hint(name, known)}", file=sys.stderr)
     graph.wait_until(lambda: client.server_is_ready() or None)
