@@ -237,13 +237,13 @@ class WaveSource:
             A position in [rad] for each axis that takes part, None for the others.
         """
         del now
+        while self._commands:  # first: a release says why an axis can no longer follow
+            self._obey(self._commands.popleft(), feedback)
         for axis, state in zip(self._axes, feedback, strict=True):
             axis.measure(state.position)
             axis.followable = state.followable
             if axis.active and not state.followable:
                 axis.leave('the drive can no longer follow')
-        while self._commands:
-            self._obey(self._commands.popleft(), feedback)
         setpoints = self._advance(period)
         self._since_report += period
         if self._since_report >= REPORT_PERIOD:

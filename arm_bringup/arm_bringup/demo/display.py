@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import threading
 import time
 from typing import Protocol
@@ -184,7 +184,9 @@ class TableDisplay:
         self._refresh()
 
     def close(self) -> None:
-        """Leave the last table where it is."""
+        """Leave the last table where it is, without what can no longer be tried."""
+        self._setting = replace(self._setting, commands=())
+        self.phase('ended')
         with self._lock:
             self._live.stop()
 

@@ -121,8 +121,7 @@ class Play:
         self._conclude(client.figures, time.monotonic() - begun)
         self._display.phase('stopping')
         client.call(wave[1:], CALL_TIMEOUT)
-        client.wait_until(lambda: client.figures.wave == 'idle', CALL_TIMEOUT, 'the wave to stop')
-        self._display.show(client.figures)
+        client.wait_until(lambda: self._stands_still(client), CALL_TIMEOUT, 'the wave to stop')
 
     def _services(self) -> tuple[list[str], list[str], list[str]]:
         init = [f'/{joint}/init' for joint in self._joints]
@@ -136,6 +135,10 @@ class Play:
     def _seen_enough(self, client: ArmClient, end: float) -> bool:
         self._show(client)
         return self._leaving.is_set() or time.monotonic() >= end
+
+    def _stands_still(self, client: ArmClient) -> bool:
+        self._show(client)
+        return client.figures.wave == 'idle'
 
     def _show(self, client: ArmClient) -> None:
         now = time.monotonic()
@@ -153,5 +156,6 @@ class Play:
     def _follow_stop(self, client: ArmClient, stopped: Callable[[], bool]) -> None:
         """Keep the picture alive until everything has ended: the drives go to disabled in it."""
         while not stopped():
-            client.listen(REFRESH / 2)
+            client.listen(REFRESH / 4)
             self._show(client)
+        self._display.show(client.figures)

@@ -187,6 +187,8 @@ def _message(text: str) -> Text:
 
 def _commands(commands: Sequence[str], width: int) -> list[Text]:
     """Fold long commands by character, as a terminal does, so that they can be copied."""
+    if not commands:
+        return []
     indented = (f'  {command}' for command in commands)
     folded = (line[i : i + width] for line in indented for i in range(0, len(line), width))
     head = Text('try in a second terminal', style='bold')
