@@ -14,6 +14,7 @@ import time
 from typing import Any, TypeVar
 
 from ..can.bus import Bus
+from ..can.frame import Frame
 from ..exceptions import BusError
 from .network import Network
 from .scheduler import Promise
@@ -49,6 +50,7 @@ class NetworkThread:
         self._statistics = CycleStatistics(self.period)
         self._work: deque[Callable[[], None]] = deque()
         self._stopping = False
+        self._bus_failed = False
         self._thread = threading.Thread(target=self._run, name='canopen', daemon=True)
 
     def start(self) -> None:
@@ -122,25 +124,39 @@ class NetworkThread:
             deadline += (skipped + 1) * self.period
 
     def _serve_until(self, deadline: float) -> None:
-        """Take frames, hand-overs and timers until the deadline of the next cycle."""
-        network = self.network
+        """Take frames, hand-overs and timers until the deadline of the next cycle.
+
+        The bus is looked at once even when the deadline has passed: what waits there after a
+        pause of this process is older than the time-outs that would otherwise be missed.
+        """
         while not self._stopping:
+            timer = self.network.scheduler.next_deadline()
+            wake = deadline if timer is None else min(deadline, timer)
+            frames = self._receive(max(0.0, wake - time.monotonic()))
+            self._guarded(partial(self._take, frames))
             now = time.monotonic()
             if now >= deadline:
                 return
-            timer = network.scheduler.next_deadline()
-            wake = deadline if timer is None else min(deadline, timer)
-            try:
-                frames = self._bus.receive(max(0.0, wake - now))
-            except BusError as error:
+            self._guarded(partial(self.network.advance, now))
+
+    def _receive(self, timeout: float) -> list[Frame]:
+        try:
+            frames = self._bus.receive(timeout)
+        except BusError as error:
+            if not self._bus_failed:
+                self._bus_failed = True
                 logger.error('%s', error)
-                time.sleep(min(REOPEN_PAUSE, max(0.0, deadline - now)))
-                return
-            for frame in frames:
-                network.receive(frame)
-            while self._work:
-                self._guarded(self._work.popleft())
-            network.advance(time.monotonic())
+            time.sleep(min(REOPEN_PAUSE, timeout))
+            return []
+        self._bus_failed = False
+        return frames
+
+    def _take(self, frames: list[Frame]) -> None:
+        receive = self.network.receive
+        for frame in frames:
+            receive(frame)
+        while self._work:
+            self._work.popleft()()
 
     def _guarded(self, work: Callable[[], object]) -> None:
         """Let no defect in one cycle end the cycles that keep the drives under control."""

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from concurrent.futures import Future, wait
+from concurrent.futures import TimeoutError as FutureTimeoutError
 from functools import partial
 import time
 
@@ -31,6 +33,7 @@ from .master_node import MasterServices
 from .output_thread import OutputThread
 
 LISTENER_PERIOD = 0.1  # [s] how soon a new subscriber hears something
+LAST_WORD_TIMEOUT = 0.5  # [s] for the last /diagnostics
 STOP_TIMEOUT = 8.0  # [s] for all drives to stop; each has its own shorter limits
 
 JointSample = tuple[DriveNode, float, float, float]
@@ -101,8 +104,9 @@ class MasterProcess:
 
         try:
             self._thread.run_coroutine(leave).result(STOP_TIMEOUT)
-        except TimeoutError:
+        except FutureTimeoutError:
             self._node.get_logger().error('the drives did not all stop in time')
+        wait([self._ask_diagnostics()], LAST_WORD_TIMEOUT)  # in which states the drives are left
         self._thread.stop()
         self._output.stop()
 
@@ -196,11 +200,12 @@ class MasterProcess:
                 count = len(self.bus.nodes)
                 self._node.get_logger().info(f'all {count} devices operational')
 
-    def _ask_diagnostics(self) -> None:
+    def _ask_diagnostics(self) -> Future[list[DiagnosticStatus]]:
         future = self._thread.call(self._collect)
         future.add_done_callback(
             lambda done: self._output.post(partial(self._publish_diagnostics, done.result()))
         )
+        return future
 
     def _publish_diagnostics(self, statuses: list[DiagnosticStatus]) -> None:
         message = DiagnosticArray(status=statuses)
