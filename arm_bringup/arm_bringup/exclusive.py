@@ -29,7 +29,8 @@ def exclusive(thing: str, folder: Path) -> Iterator[None]:
     """
     file = folder / f'arm_bringup-{os.getuid()}-{re.sub("[^A-Za-z0-9.]+", "-", thing)}.lock'
     # append: the pid in it must stay readable while another process holds the lock
-    with file.open('a+', encoding='ascii') as lock:
+    descriptor = os.open(file, os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_NOFOLLOW, 0o600)
+    with os.fdopen(descriptor, 'r+', encoding='ascii') as lock:
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as error:

@@ -64,10 +64,17 @@ def add_arguments(parser: argparse.ArgumentParser, *, default_bus: str) -> None:
     parser.add_argument(
         '--timeout',
         metavar='S',
-        type=float,
+        type=_seconds,
         default=30.0,
         help='longest time until all is ready in [s]; inf waits for ever (default: %(default)s)',
     )
+
+
+def _seconds(text: str) -> float:
+    value = float(text)
+    if not value > 0:
+        raise argparse.ArgumentTypeError(f'{text} is no positive number of seconds')
+    return value
 
 
 def robots_epilog() -> str:

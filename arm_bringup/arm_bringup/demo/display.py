@@ -220,7 +220,8 @@ def choose_display(setting: Setting, console: Console, write: LineWriter) -> Dis
         write: Takes lines when there is no table.
     """
     size = console.size
-    if not console.is_terminal or console.is_dumb_terminal:
+    plain = console.is_dumb_terminal or not console.encoding.startswith('utf')
+    if plain or not console.is_terminal:
         return LineDisplay(setting, write)
     if not fits(size.width, size.height, len(setting.limits)):
         write(f'this terminal has {size.width} x {size.height} characters, too few for the table')

@@ -46,7 +46,8 @@ def parse(argv: Sequence[str] | None) -> argparse.Namespace:
         metavar='S',
         type=_duration,
         help='end after so many seconds of wave, with a summary; the exit code says whether all '
-        'joints were enabled, moved and followed (default: until Ctrl-C)',
+        'joints were enabled, moved (it takes them 5 s to get going) and followed (default: until '
+        'Ctrl-C)',
     )
     return parser.parse_args(argv)
 

@@ -65,6 +65,7 @@ class Play:
         self._leaving = threading.Event()
         self._waving = threading.Event()
         self._next_picture = 0.0
+        self._phase = ''
 
     @property
     def left(self) -> bool:
@@ -107,21 +108,26 @@ class Play:
     def _course(self, client: ArmClient, ready: Callable[[], bool]) -> None:
         init, mode, wave = self._services()
         client.prepare([*init, *mode, *wave])
-        self._display.phase('booting')
+        self._enter('booting')
         client.wait_until(lambda: self._booted(client, ready), math.inf, 'the processes')
-        self._display.phase('enabling')
+        self._enter('enabling')
         client.call(init, ENABLE_TIMEOUT)
         client.call(mode, CALL_TIMEOUT)
         client.call(wave[:1], CALL_TIMEOUT)
-        self._display.phase('waving')
+        self._enter('waving')
         begun = time.monotonic()
         self._waving.set()
         end = begun + self._duration
         client.wait_until(lambda: self._seen_enough(client, end), math.inf, 'the end')
         self._conclude(client.figures, time.monotonic() - begun)
-        self._display.phase('stopping')
+        self._enter('stopping')
         client.call(wave[1:], CALL_TIMEOUT)
         client.wait_until(lambda: self._stands_still(client), CALL_TIMEOUT, 'the wave to stop')
+
+    def _enter(self, phase: str) -> None:
+        if phase != self._phase:
+            self._phase = phase
+            self._display.phase(phase)
 
     def _services(self) -> tuple[list[str], list[str], list[str]]:
         init = [f'/{joint}/init' for joint in self._joints]
@@ -155,6 +161,7 @@ class Play:
 
     def _follow_stop(self, client: ArmClient, stopped: Callable[[], bool]) -> None:
         """Keep the picture alive until everything has ended: the drives go to disabled in it."""
+        self._enter('stopping')
         while not stopped():
             client.listen(REFRESH / 4)
             self._show(client)

@@ -49,16 +49,19 @@ def summary_lines(figures: Figures, joints: Sequence[str], duration: float) -> l
         duration: How long the wave ran in [s].
     """
     width = max(len('joint'), *map(len, joints))
-    head = f'{"joint":<{width}}  {"from":>8} {"to":>8} {"moved":>8}  {"error max":>10} {"rms":>8}'
+    head = (
+        f'{"joint":<{width}}  {"from":>7} {"to":>7} {"moved":>7} rad   '
+        f'{"path error max":>14} {"rms":>6} mrad'
+    )
     rows = [
-        f'{name:<{width}}  {axis.lowest:8.3f} {axis.highest:8.3f} {axis.moved:8.3f}  '
-        f'{1000 * axis.error_max:10.2f} {1000 * axis.error_rms:8.2f}'
+        f'{name:<{width}}  {axis.lowest:7.3f} {axis.highest:7.3f} {axis.moved:7.3f}       '
+        f'{1000 * axis.error_max:14.2f} {1000 * axis.error_rms:6.2f}'
         for name in joints
         for axis in [figures.axes.get(name, AxisFigures())]
     ]
     return [
         f'{duration:.1f} s of wave, {figures.enabled}/{len(joints)} joints enabled',
-        f'{head}   (positions in rad, path error in mrad)',
+        head,
         *rows,
         bus_line(figures.bus),
     ]
