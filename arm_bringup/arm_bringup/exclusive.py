@@ -28,7 +28,7 @@ def exclusive(thing: str, folder: Path) -> Iterator[None]:
         StartError: Another process holds it; the message says which.
     """
     file = folder / f'arm_bringup-{os.getuid()}-{re.sub("[^A-Za-z0-9.]+", "-", thing)}.lock'
-    # append: the pid in it must stay readable while another process holds the lock
+    # not truncated yet: it has the pid of the process that holds the lock
     descriptor = os.open(file, os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_NOFOLLOW, 0o600)
     with os.fdopen(descriptor, 'r+', encoding='ascii') as lock:
         try:

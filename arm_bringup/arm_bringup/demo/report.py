@@ -50,12 +50,12 @@ def summary_lines(figures: Figures, joints: Sequence[str], duration: float) -> l
     """
     width = max(len('joint'), *map(len, joints))
     head = (
-        f'{"joint":<{width}}  {"from":>7} {"to":>7} {"moved":>7} rad   '
-        f'{"path error max":>14} {"rms":>6} mrad'
+        f'{"joint":<{width}}  {"from [rad]":>10}  {"to [rad]":>8}  {"moved":>6}  '
+        f'{"path error max [mrad]":>21}  {"rms":>6}'
     )
     rows = [
-        f'{name:<{width}}  {axis.lowest:7.3f} {axis.highest:7.3f} {axis.moved:7.3f}       '
-        f'{1000 * axis.error_max:14.2f} {1000 * axis.error_rms:6.2f}'
+        f'{name:<{width}}  {axis.lowest:10.3f}  {axis.highest:8.3f}  {axis.moved:6.3f}  '
+        f'{1000 * axis.error_max:21.2f}  {1000 * axis.error_rms:6.2f}'
         for name in joints
         for axis in [figures.axes.get(name, AxisFigures())]
     ]
