@@ -179,3 +179,12 @@ def outcome(load: Callable[[], tuple[Problem, ...]]) -> tuple[Problem, ...]:
         return load()
     except ConfigError as error:
         return error.problems
+
+
+def errors_of(path: Path) -> tuple[Problem, ...]:
+    """Return what is wrong with a bus.yml, nothing when it can be loaded."""
+    try:
+        load_bus(path)
+    except ConfigError as error:
+        return error.problems
+    return ()

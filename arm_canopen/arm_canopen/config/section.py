@@ -21,7 +21,8 @@ SECTIONS: dict[str, tuple[Key, ...]] = {
     'options': OPTION_KEYS,
     'master': MASTER_KEYS,
     'a device or defaults': DEVICE_KEYS + DRIVE_KEYS,
-    'a PDO number': TPDO_KEYS + RPDO_KEYS,
+    'a number below tpdo': TPDO_KEYS,
+    'a number below rpdo': RPDO_KEYS,
     'an entry of sdo': SDO_KEYS,
 }
 """Where each key belongs, for remedies."""
@@ -84,7 +85,9 @@ def remedy_for(name: str, names: Sequence[str]) -> str:
     for section, keys in SECTIONS.items():
         if any(key.name == name for key in keys):
             return f'{name!r} belongs to {section}; check the indentation'
-    close = difflib.get_close_matches(name, names, n=1)
+    close = difflib.get_close_matches(name, names, n=1) or [
+        known for known in names if known.startswith(name)
+    ]
     if close:
         return f'did you mean {close[0]!r}?'
     return f'remove it; known here: {", ".join(names)}'
