@@ -39,7 +39,7 @@ def quintic_step(x: float) -> float:
         x: Where, without unit.
     """
     x = min(max(x, 0.0), 1.0)
-    return x * x * x * (10.0 + x * (6.0 * x - 15.0))
+    return min(x * x * x * (10.0 + x * (6.0 * x - 15.0)), 1.0)  # rounding may pass 1
 
 
 @dataclass(frozen=True, slots=True)

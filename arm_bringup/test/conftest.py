@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -12,14 +11,18 @@ import pytest
 PACKAGE = Path(__file__).parents[1]
 
 
-@pytest.fixture(scope='session', autouse=True)
-def prefix(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """Make a ROS prefix in which arm_bringup is this source folder, found before any other."""
+@pytest.fixture(scope='session')
+def prefix(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Make a ROS prefix in which arm_bringup is this source folder."""
     prefix = tmp_path_factory.mktemp('prefix')
     marker = prefix / 'share' / 'ament_index' / 'resource_index' / 'packages' / 'arm_bringup'
     marker.parent.mkdir(parents=True)
     marker.touch()
     (prefix / 'share' / 'arm_bringup').symlink_to(PACKAGE)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv('AMENT_PREFIX_PATH', str(prefix), prepend=':')
-        yield prefix
+    return prefix
+
+
+@pytest.fixture(autouse=True)
+def find_own_package(prefix: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Find it there before any other, for one test: others need the built packages."""
+    monkeypatch.setenv('AMENT_PREFIX_PATH', str(prefix), prepend=':')

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 import math
 
-from hypothesis import assume, given
+from hypothesis import assume, example, given
 from hypothesis import strategies as st
 import pytest
 
@@ -90,10 +90,12 @@ plans = st.lists(st.tuples(limits, st.floats(-1, 1)), min_size=1, max_size=3)
 
 
 @given(st.floats(0, 1), st.floats(1e-4, 0.1))
+@example(0.9999999999999999, 0.0625)
 def test_the_step_has_two_continuous_derivatives_within_its_constants(x: float, d: float) -> None:
     """Differences never exceed the greatest slope and curvature, also across its ends."""
     before, here, after = (quintic_step(x + offset) for offset in (-d, 0.0, d))
-    assert 0.0 <= after - here <= STEP_SLOPE * d * (1 + 1e-9) + 1e-15
+    assert here <= 1.0
+    assert -1e-15 <= after - here <= STEP_SLOPE * d * (1 + 1e-9) + 1e-15
     assert abs(after - 2 * here + before) <= STEP_CURVATURE * d * d * (1 + 1e-6) + 1e-14
 
 
