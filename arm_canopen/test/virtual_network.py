@@ -239,7 +239,7 @@ class VirtualNetwork:
         self._servo = servo
         self._cycle_at = NEVER
         self.network = Network(
-            config, lambda frame: self.wire.put(self.now, 'master', frame), self.events.append
+            config, lambda frame: self.wire.put(self.now, 'master', frame), self._note
         )
         scheduler = self.network.scheduler
         drives = [
@@ -247,7 +247,7 @@ class VirtualNetwork:
         ]
         self.drives = {drive.name: drive for drive in drives}
         self.commands = {drive.name: DriveCommands(drive, scheduler) for drive in drives}
-        self.group = MotionGroup(drives, self.events.append)
+        self.group = MotionGroup(drives, self._note)
         self.network.on_cycle = self.group.cycle
         self.network.on_feedback = lambda sync: self.feedback_times.append((self.now, sync))
         for node in config.nodes:
@@ -358,6 +358,10 @@ class VirtualNetwork:
     def story(self) -> str:
         """Say what was reported so far, for messages of failed tests."""
         return '; '.join(self.told()) or 'nothing was reported'
+
+    def _note(self, event: Event) -> None:
+        self.events.append(event)
+        assert 'a defect in the CANopen master' not in event.text, event.text
 
     def _step(self, end: float) -> bool:
         """Go on to the next event; returns False when there is none until ``end``."""

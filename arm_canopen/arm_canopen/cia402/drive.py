@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from ..exceptions import DriveError, SdoError
+from ..exceptions import CodecError, DriveError, SdoError
 from ..master.events import EventKind, Severity
 from ..master.remote_node import RemoteNode
 from ..master.scheduler import Scheduler
@@ -170,7 +170,7 @@ class Drive:
         """Take the state from the process image."""
         if self.node.online and not self._asked:
             self._asked = True
-            self._scheduler.spawn(self._ask())
+            self._scheduler.background(self._ask())
         if not self.node.online or not self.objects.known:
             self.state = DriveState.UNKNOWN
             return
@@ -221,7 +221,7 @@ class Drive:
             )
 
     async def _ask(self) -> None:
-        self._scheduler.spawn(self.node.poll(self.node.config.poll_period))
+        self._scheduler.background(self.node.poll(self.node.config.poll_period))
         self.parameters = await read_parameters(self.node, self.units)
         self._answered = True
 
@@ -231,7 +231,7 @@ class Drive:
             return
         try:
             code = await self.node.read_object(Index.ERROR_CODE)
-        except SdoError:
+        except (SdoError, CodecError):
             return  # the statusword says that there is a fault, only its code stays unknown
         self.error = error_code_text(int(code)) if isinstance(code, int) else ''
 
@@ -247,7 +247,7 @@ class Drive:
         if self.state in FAULTY and before not in FAULTY:
             self.goal = DriveState.SWITCH_ON_DISABLED
             self.released('fault')
-            self._scheduler.spawn(self._report_fault())
+            self._scheduler.background(self._report_fault())
         elif left and self.goal is DriveState.OPERATION_ENABLED:
             # a drive that lost its enable must not start again when the cause goes away
             self.goal = DriveState.SWITCH_ON_DISABLED

@@ -51,6 +51,7 @@ class Network:
         """
         self.config = config
         self.scheduler = Scheduler()
+        self.scheduler.on_defect = self._report_defect
         self.on_cycle: CycleHook = lambda now, period: None
         self.on_feedback: Callable[[float], None] = lambda sync_time: None
         self.on_frame: Callable[[Frame], None] = lambda frame: None
@@ -155,6 +156,10 @@ class Network:
             self._handlers[CobId.SDO_RESPONSE + node_id] = client.receive
         return client
 
+    def _report_defect(self, error: BaseException) -> None:
+        text = f'a defect in the CANopen master: {type(error).__name__}: {error}'
+        self._report(Event(EventKind.BUS, Severity.ERROR, '', text))
+
     def _boot_process(self, node: RemoteNode) -> BootProcess:
         master = self.config.master
         return BootProcess(
@@ -191,7 +196,7 @@ class Network:
 
     def _start_boot(self, node: RemoteNode, *, announced: bool) -> None:
         self._end_boot(node)
-        task = self.scheduler.spawn(self._boots[node.name].run(announced=announced))
+        task = self.scheduler.background(self._boots[node.name].run(announced=announced))
         self._boot_tasks[node.name] = task
 
     def _send_heartbeat(self, now: float) -> None:

@@ -36,7 +36,13 @@ class Promise(Generic[T]):
         self._finish(None, error)
 
     def result(self) -> T:
-        """Return the result or raise the error; only once done."""
+        """Return the result or raise the error.
+
+        Raises:
+            RuntimeError: There is none yet.
+        """
+        if not self.done:
+            raise RuntimeError('the promise is not done, it has no result yet')
         if self._error is not None:
             raise self._error
         return self._value  # type: ignore[return-value]  # None only where T allows it
@@ -69,23 +75,36 @@ class Promise(Generic[T]):
 
 
 class Task(Promise[T]):
-    """A running coroutine; its result is what the coroutine returns."""
+    """A running coroutine; its result is what the coroutine returns.
+
+    Attributes:
+        cancelled: It was ended from outside.
+    """
 
     def __init__(self, coroutine: Coroutine[Promise[Any], None, T]) -> None:
         """Run up to the first wait."""
         super().__init__()
+        self.cancelled = False
         self._coroutine = coroutine
+        self._stepping = False
         self._step(None)
 
     def cancel(self, reason: BaseException) -> None:
-        """End the coroutine where it waits; awaiting the task raises the reason."""
-        if not self.done:
-            self.reject(reason)
+        """End the coroutine where it waits; awaiting the task raises the reason.
+
+        One that is just running, and ends itself over some corner, ends at its next wait.
+        """
+        if self.done:
+            return
+        self.cancelled = True
+        self.reject(reason)
+        if not self._stepping:
             self._coroutine.close()
 
     def _step(self, _: Promise[Any] | None) -> None:
         if self.done:
             return
+        self._stepping = True
         try:
             awaited = self._coroutine.send(None)
         except StopIteration as stop:
@@ -93,7 +112,12 @@ class Task(Promise[T]):
         except Exception as error:  # noqa: BLE001  # handed to whoever awaits the task
             self.reject(error)
         else:
-            awaited.when_done(self._step)
+            if self.cancelled:
+                self._coroutine.close()
+            else:
+                awaited.when_done(self._step)
+        finally:
+            self._stepping = False
 
 
 class Scheduler:
@@ -101,11 +125,13 @@ class Scheduler:
 
     Attributes:
         now: Steady time of the last ``advance`` in [s].
+        on_defect: Told the error of a coroutine that nobody awaits.
     """
 
     def __init__(self, now: float = 0.0) -> None:
         """Start at a time, with nothing to do."""
         self.now = now
+        self.on_defect: Callable[[BaseException], None] = lambda error: None
         self._timers: list[tuple[float, int, Promise[None]]] = []
         self._order = count()
         self._conditions: list[tuple[Callable[[], bool], Promise[None]]] = []
@@ -125,8 +151,14 @@ class Scheduler:
         return self._timers[0][0] if self._timers else None
 
     def spawn(self, coroutine: Coroutine[Promise[Any], None, T]) -> Task[T]:
-        """Start a coroutine now."""
+        """Start a coroutine now, for somebody who awaits it or looks at its result."""
         return Task(coroutine)
+
+    def background(self, coroutine: Coroutine[Promise[Any], None, None]) -> Task[None]:
+        """Start a coroutine that nobody awaits; an error in it is a defect and is told."""
+        task = Task(coroutine)
+        task.when_done(self._check_background)
+        return task
 
     def timer(self, delay: float) -> Promise[None]:
         """Return a promise that is resolved after a delay in [s]."""
@@ -144,8 +176,10 @@ class Scheduler:
         timer = self.timer(timeout)
         promise.when_done(lambda _: first.resolve(None))
         timer.when_done(lambda _: first.resolve(None))
-        await first
-        timer.resolve(None)
+        try:
+            await first
+        finally:
+            timer.resolve(None)  # no deadline is left, also when the task is cancelled
         if not promise.done:
             raise TimeoutError(f'nothing within {timeout:g} s')
         return promise.result()
@@ -180,8 +214,18 @@ class Scheduler:
         task.when_done(lambda _: end.resolve(None))
         return end
 
+    def _check_background(self, task: Promise[None]) -> None:
+        cancelled = isinstance(task, Task) and task.cancelled
+        if task.error is not None and not cancelled:
+            self.on_defect(task.error)
+
     def _check_conditions(self) -> None:
-        ready = [entry for entry in self._conditions if entry[0]()]
-        self._conditions = [entry for entry in self._conditions if entry not in ready]
-        for _, promise in ready:
-            promise.resolve(None)
+        for entry in list(self._conditions):
+            condition, promise = entry
+            try:
+                ready = condition()
+            except Exception as error:  # noqa: BLE001  # belongs to whoever waits for it
+                promise.reject(error)
+                continue
+            if ready:
+                promise.resolve(None)

@@ -124,7 +124,7 @@ class SdoClient:
         promise: Promise[T] = Promise()
         self._queue.append((transfer, promise))
         if not self._busy:
-            self._scheduler.spawn(self._work())
+            self._scheduler.background(self._work())
         return promise
 
     async def _work(self) -> None:
