@@ -20,6 +20,7 @@ adds at most |v| r1/T_stop to its acceleration.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 import math
 
@@ -152,7 +153,33 @@ def plan_swing(limits: JointLimits, phase: float, style: WaveStyle) -> Swing:
     return Swing(limits.name, centre, amplitude, phase, velocity, acceleration)
 
 
-def stop_duration(swings: list[Swing], style: WaveStyle) -> float:
+def plan_wave(
+    limits: Mapping[str, JointLimits], drives: Sequence[str], style: WaveStyle
+) -> list[Swing]:
+    """Plan the wave for all drives that there is a joint for.
+
+    Args:
+        limits: The joints of the robot by name.
+        drives: Names of the drives of the bus.
+        style: The style of the wave.
+
+    Returns:
+        One swing for each, in the order of the drives; together they are one wave long.
+
+    Raises:
+        WaveError: No drive has the name of a joint, or a joint cannot swing.
+    """
+    joints = [name for name in drives if name in limits]
+    if not joints:
+        raise WaveError(
+            f'no drive has the name of a joint; drives: {", ".join(drives)}; '
+            f'joints: {", ".join(limits)}'
+        )
+    lag = 2 * math.pi / len(joints)
+    return [plan_swing(limits[name], -i * lag, style) for i, name in enumerate(joints)]
+
+
+def stop_duration(swings: Sequence[Swing], style: WaveStyle) -> float:
     """Return how long a stop must take, in [s].
 
     Args:

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -13,40 +12,11 @@ from rclpy.node import Node
 from std_srvs.srv import Trigger
 
 from .description import joint_limits
-from .exceptions import WaveError
-from .wave import plan_swing, Swing, WaveStyle
+from .wave import plan_wave, WaveStyle
 from .wave_source import AxisReport, REPORT_PERIOD, WaveReport, WaveSource
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from arm_canopen import MasterProcess
-
-
-def plan(urdf: str, drives: Sequence[str], style: WaveStyle) -> list[Swing]:
-    """Plan the wave for all drives that the description has a joint for.
-
-    Args:
-        urdf: The description of the robot.
-        drives: Names of the drives of the bus.
-        style: The style of the wave.
-
-    Returns:
-        One swing for each, in the order of the drives.
-
-    Raises:
-        DescriptionError: The description is not usable.
-        WaveError: No drive has the name of a joint, or a joint cannot swing.
-    """
-    limits = joint_limits(urdf)
-    joints = [name for name in drives if name in limits]
-    if not joints:
-        raise WaveError(
-            f'no drive has the name of a joint; drives: {", ".join(drives)}; '
-            f'joints: {", ".join(limits)}'
-        )
-    lag = 2 * math.pi / len(joints)
-    return [plan_swing(limits[name], -i * lag, style) for i, name in enumerate(joints)]
 
 
 class WaveNode(Node):
@@ -71,7 +41,7 @@ class WaveNode(Node):
         urdf = str(self.declare_parameter('robot_description', '', description).value)
         drives = [node.name for node in master.bus.nodes if node.is_drive]
         style = WaveStyle()
-        self._source = WaveSource(plan(urdf, drives, style), style)
+        self._source = WaveSource(plan_wave(joint_limits(urdf), drives, style), style)
         self._left: dict[str, str] = {}
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self.create_service(Trigger, '~/start', self._start)

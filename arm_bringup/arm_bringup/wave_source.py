@@ -178,7 +178,7 @@ class WaveSource:
             style: The style of the wave.
         """
         self._style = style
-        self._stop_duration = stop_duration(list(swings), style)
+        self._stop_duration = stop_duration(swings, style)
         self._axes = [_Axis(swing) for swing in swings]
         self._commands: deque[Command | _Release] = deque()
         self._state = WaveState.IDLE

@@ -188,6 +188,18 @@ def test_an_error_in_the_supervisor_stops_its_processes() -> None:
     assert wait_for_end(pids) == []
 
 
+def test_a_killed_guardian_is_no_reason_to_end() -> None:
+    """The supervisor goes on without it."""
+
+    def kill(runner: Runner) -> None:
+        assert runner._guardian is not None
+        os.kill(runner._guardian.pid, signal.SIGKILL)
+        ctrl_c(runner)
+
+    watch = Watch(program('good', ready='ready'), when_ready=kill)
+    assert watch.run().exit_code == 0
+
+
 SUPERVISOR = textwrap.dedent("""
     import sys
     from arm_bringup.supervisor import Runner

@@ -14,7 +14,15 @@ import pytest
 
 from arm_bringup.description import JointLimits
 from arm_bringup.exceptions import WaveError
-from arm_bringup.wave import plan_swing, quintic_step, STEP_CURVATURE, STEP_SLOPE, Swing, WaveStyle
+from arm_bringup.wave import (
+    plan_swing,
+    plan_wave,
+    quintic_step,
+    STEP_CURVATURE,
+    STEP_SLOPE,
+    Swing,
+    WaveStyle,
+)
 from arm_bringup.wave_source import WaveSource, WaveState
 
 CYCLE = 0.01  # [s]
@@ -272,3 +280,18 @@ def test_a_joint_without_a_range_swings_about_zero() -> None:
     swing = plan_swing(JointLimits('wheel', -math.inf, math.inf, 1.0), 0.0, STYLE)
     assert swing.centre == 0.0
     assert 0 < swing.amplitude <= STYLE.amplitude
+
+
+def test_the_wave_has_a_swing_for_each_drive_with_a_joint() -> None:
+    """In the order of the drives, spread over one wave; other drives and joints are left out."""
+    limits = {name: JointLimits(name, -1.0, 1.0, 1.0) for name in ('a', 'finger', 'b')}
+    swings = plan_wave(limits, ['b', 'gripper', 'a'], STYLE)
+    assert [swing.name for swing in swings] == ['b', 'a']
+    assert swings[0].phase - swings[1].phase == pytest.approx(math.pi)
+
+
+def test_a_bus_without_a_joint_of_the_robot_is_refused() -> None:
+    """The names on both sides are told: they differ by a prefix, usually."""
+    limits = {'panda_joint1': JointLimits('panda_joint1', -1.0, 1.0, 1.0)}
+    with pytest.raises(WaveError, match='drives: joint1; joints: panda_joint1'):
+        plan_wave(limits, ['joint1'], STYLE)

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 import math
 import os
 import sys
@@ -21,7 +21,7 @@ from ..stack import Executable
 from ..supervisor import Outcome, Runner
 from ..terminal import LineWriter, Painter, wants_colour
 from .display import choose_display, Setting, TableDisplay
-from .play import Play, REFRESH
+from .play import Client, Play, REFRESH
 
 WAVE_MASTER = Executable('arm_bringup', 'wave_master')
 """The master of the demo."""
@@ -57,6 +57,17 @@ def _duration(text: str) -> float:
     if not 0 < value < math.inf:
         raise argparse.ArgumentTypeError(f'{text} is no positive number of seconds')
     return value
+
+
+def join_ros(given_up: Callable[[], bool]) -> Client:
+    """Make the ROS client of the demo; rclpy loads while the processes start.
+
+    Args:
+        given_up: True when nothing shall be waited for any more.
+    """
+    from .client import ArmClient
+
+    return ArmClient(given_up)
 
 
 def commands(joint: str, bus: str, domain: str) -> list[str]:
@@ -106,7 +117,7 @@ def run(arm: Session, duration: float | None) -> int:
         with Runner(
             arm.processes, display.line, display.notice, on_interrupt=play.leave
         ) as runner:
-            thread = threading.Thread(target=play.run, args=[runner], name='play')
+            thread = threading.Thread(target=play.run, args=[runner, join_ros], name='play')
             thread.start()
             outcome = runner.run()
             thread.join()

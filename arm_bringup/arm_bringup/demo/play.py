@@ -4,21 +4,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 import math
 import threading
 import time
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from ..exceptions import CallError, GivenUpError
-from ..supervisor import Outcome, Phase, Runner
+from ..supervisor import Outcome, Phase
 from .display import Display
 from .figures import Figures
 from .report import problems, summary_lines, warnings
-
-if TYPE_CHECKING:
-    from .client import ArmClient
 
 REFRESH = 0.2
 """Time between two pictures in [s]."""
@@ -41,6 +38,42 @@ class Result:
     summary: list[str]
     problems: list[str]
     warnings: list[str]
+
+
+class Client(Protocol):
+    """What the demo needs of ROS; :class:`.client.ArmClient` is the real one."""
+
+    figures: Figures
+
+    def prepare(self, services: Iterable[str]) -> None:
+        """Look for services that will be called."""
+
+    def call(self, services: list[str], timeout: float) -> dict[str, str]:
+        """Call services side by side."""
+
+    def wait_until(self, condition: Callable[[], bool], timeout: float, what: str) -> None:
+        """Wait for something."""
+
+    def listen(self, duration: float) -> None:
+        """Hear what comes in."""
+
+    def close(self) -> None:
+        """Leave the ROS graph."""
+
+
+MakeClient = Callable[[Callable[[], bool]], Client]
+"""Joins the ROS graph; the client asks the argument whether its waiting shall be given up."""
+
+
+class Supervisor(Protocol):
+    """What the demo needs of the supervisor of its processes."""
+
+    @property
+    def phase(self) -> Phase:
+        """What it is doing."""
+
+    def stop(self, outcome: Outcome) -> None:
+        """Ask for an orderly end."""
 
 
 class Play:
@@ -81,31 +114,30 @@ class Play:
         self._leaving.set()
         return self._waving.is_set()
 
-    def run(self, runner: Runner) -> None:
+    def run(self, supervisor: Supervisor, make_client: MakeClient) -> None:
         """Run until the end, and stop the supervisor then.
 
         Args:
-            runner: The supervisor, about to be run in the main thread.
+            supervisor: About to be run in the main thread.
+            make_client: Makes the demo's ROS client, here in this thread.
         """
-        from .client import ArmClient  # rclpy loads while the processes start
-
         ended = {Phase.STOPPING, Phase.STOPPED}
-        client = ArmClient(lambda: runner.phase in ended)
+        client = make_client(lambda: supervisor.phase in ended)
         try:
-            self._course(client, lambda: runner.phase is Phase.RUNNING)
-            runner.stop(Outcome(0, 'the demo has ended'))
+            self._course(client, lambda: supervisor.phase is Phase.RUNNING)
+            supervisor.stop(Outcome(0, 'the demo has ended'))
         except GivenUpError:
             pass  # the supervisor knows why
         except CallError as error:
-            runner.stop(Outcome(1, str(error)))
+            supervisor.stop(Outcome(1, str(error)))
         except Exception as error:
-            runner.stop(Outcome(1, f'{type(error).__name__}: {error}'))
+            supervisor.stop(Outcome(1, f'{type(error).__name__}: {error}'))
             raise
         finally:
-            self._follow_stop(client, lambda: runner.phase is Phase.STOPPED)
+            self._follow_stop(client, lambda: supervisor.phase is Phase.STOPPED)
             client.close()
 
-    def _course(self, client: ArmClient, ready: Callable[[], bool]) -> None:
+    def _course(self, client: Client, ready: Callable[[], bool]) -> None:
         init, mode, wave = self._services()
         client.prepare([*init, *mode, *wave])
         self._enter('booting')
@@ -134,19 +166,19 @@ class Play:
         mode = [f'/{joint}/cyclic_position_mode' for joint in self._joints]
         return init, mode, ['/wave/start', '/wave/stop']
 
-    def _booted(self, client: ArmClient, ready: Callable[[], bool]) -> bool:
+    def _booted(self, client: Client, ready: Callable[[], bool]) -> bool:
         self._show(client)
         return ready()
 
-    def _seen_enough(self, client: ArmClient, end: float) -> bool:
+    def _seen_enough(self, client: Client, end: float) -> bool:
         self._show(client)
         return self._leaving.is_set() or time.monotonic() >= end
 
-    def _stands_still(self, client: ArmClient) -> bool:
+    def _stands_still(self, client: Client) -> bool:
         self._show(client)
         return client.figures.wave == 'idle'
 
-    def _show(self, client: ArmClient) -> None:
+    def _show(self, client: Client) -> None:
         now = time.monotonic()
         if now >= self._next_picture:
             self._next_picture = now + REFRESH
@@ -159,7 +191,7 @@ class Play:
             warnings(figures),
         )
 
-    def _follow_stop(self, client: ArmClient, stopped: Callable[[], bool]) -> None:
+    def _follow_stop(self, client: Client, stopped: Callable[[], bool]) -> None:
         """Keep the picture alive until everything has ended: the drives go to disabled in it."""
         self._enter('stopping')
         while not stopped():

@@ -114,9 +114,9 @@ class Runner:
         for end in (self._wake_read, self._wake_write):
             end.setblocking(False)
         self._selector.register(self._wake_read, selectors.EVENT_READ, self._wake)
+        self._guardian = GuardianLink()
         if threading.current_thread() is threading.main_thread():
             self._listen_to_signals()
-        self._guardian = GuardianLink()
         return self
 
     def __exit__(

@@ -1,0 +1,105 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Where the demo shows itself: table or lines."""
+
+from __future__ import annotations
+
+import io
+
+import pytest
+from rich.console import Console
+
+from arm_bringup.demo.display import choose_display, LineDisplay, Setting, TableDisplay
+from arm_bringup.demo.figures import DriveFigures, Figures
+from arm_bringup.description import JointLimits
+from arm_bringup.supervisor import Notice, Severity
+from arm_bringup.terminal import LineWriter, Painter
+
+JOINTS = [f'joint{i}' for i in range(7)]
+SETTING = Setting(
+    'panda on vcan0',
+    {name: JointLimits(name, -1.0, 1.0, 1.0) for name in JOINTS},
+    ['ros2 topic hz /joint_states'],
+    Painter('demo', ['master'], colour=False),
+)
+FIGURES = Figures(dict.fromkeys(JOINTS, DriveFigures(online=True, state='Operation enabled')))
+
+
+class Utf8(io.StringIO):
+    """A file of a terminal, or of a printer from the last century."""
+
+    encoding = 'utf-8'
+
+
+class Latin1(io.StringIO):
+    """A file that knows no dots and lines."""
+
+    encoding = 'iso8859-1'
+
+
+@pytest.mark.parametrize(
+    'case',
+    [
+        (Utf8(), True, 'xterm', (80, 24), True),
+        (Utf8(), False, 'xterm', (80, 24), False),
+        (Utf8(), True, 'dumb', (80, 24), False),
+        (Latin1(), True, 'xterm', (80, 24), False),
+        (Utf8(), True, 'xterm', (60, 24), False),
+        (Utf8(), True, 'xterm', (80, 10), False),
+    ],
+    ids=['terminal', 'pipe', 'dumb', 'no unicode', 'narrow', 'low'],
+)
+def test_the_table_is_for_terminals_that_have_room_for_it(
+    monkeypatch: pytest.MonkeyPatch,
+    case: tuple[io.StringIO, bool, str, tuple[int, int], bool],
+) -> None:
+    """Everything else gets lines; a terminal that is too small is told so."""
+    file, terminal, term, size, table = case
+    monkeypatch.setenv('TERM', term)
+    width, height = size
+    console = Console(file=file, force_terminal=terminal, width=width, height=height)
+    lines = io.StringIO()
+    display = choose_display(SETTING, console, LineWriter(lines))
+    display.close()
+    assert isinstance(display, TableDisplay if table else LineDisplay)
+    assert ('too few' in lines.getvalue()) == (size != (80, 24))
+
+
+def test_lines_tell_phases_warnings_and_notices() -> None:
+    """Information of the processes is left out: it would bury the rest."""
+    lines = io.StringIO()
+    display = LineDisplay(SETTING, LineWriter(lines))
+    display.phase('booting')
+    display.line('master', '[INFO] [master]: joint1 operational')
+    display.line('master', '[WARN] [master]: joint2 silent')
+    display.line('master', 'Traceback (most recent call last):')
+    display.notice(Notice(Severity.INFO, 'all is ready'))
+    display.show(FIGURES)  # too soon after a phase
+    text = lines.getvalue()
+    for words in ('panda on vcan0', 'booting', 'joint2 silent', 'Traceback', 'all is ready'):
+        assert words in text
+    for words in ('joint1 operational', 'frames/s'):
+        assert words not in text
+
+
+def test_the_table_shows_what_was_said_last_and_stays_when_it_is_closed() -> None:
+    """After the end it has no commands to be tried any more."""
+    file = Utf8()
+    console = Console(file=file, force_terminal=True, width=80, height=40, color_system=None)
+    display = TableDisplay(SETTING, console)
+    display.phase('waving')
+    display.line('master', '[INFO] [master]: joint1 operational')
+    display.line('master', '[ERROR] [master]: heartbeat lost')
+    display.notice(Notice(Severity.INFO, 'stopping'))
+    display.show(FIGURES)
+    display.close()
+    pictures = file.getvalue().split('panda on vcan0')
+    waving = [picture for picture in pictures if 'waving' in picture][-1]
+    for words in ('waving', 'heartbeat lost', 'stopping', 'ros2 topic hz', 'Operation enabled'):
+        assert words in waving
+    assert 'joint1 operational' not in file.getvalue()
+    assert 'ended' in pictures[-1]
+    assert 'ros2 topic hz' not in pictures[-1]
+    length = len(file.getvalue())
+    display.show(FIGURES)
+    assert len(file.getvalue()) == length

@@ -1,0 +1,183 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The course of the demo, with a ROS client and a supervisor of the test's own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+
+import pytest
+
+from arm_bringup.demo.figures import AxisFigures, DriveFigures, Figures
+from arm_bringup.demo.play import Play
+from arm_bringup.exceptions import CallError, GivenUpError
+from arm_bringup.supervisor import Notice, Outcome, Phase
+
+JOINTS = ['joint1', 'joint2']
+DRIVE = DriveFigures(online=True, state='Operation enabled')
+MOVED = AxisFigures(True, -0.4, 0.4, 0.01, 0.005)
+GOOD = Figures(dict.fromkeys(JOINTS, DRIVE), axes=dict.fromkeys(JOINTS, MOVED), wave='running')
+
+
+class Show:
+    """A display that keeps the phases."""
+
+    def __init__(self) -> None:
+        self.phases: list[str] = []
+
+    def phase(self, text: str) -> None:
+        """Keep it."""
+        self.phases.append(text)
+
+    def show(self, figures: Figures) -> None:
+        """Nobody looks."""
+
+    def line(self, name: str, text: str) -> None:
+        """Nobody reads."""
+
+    def notice(self, notice: Notice) -> None:
+        """Nobody reads."""
+
+    def close(self) -> None:
+        """Nothing is open."""
+
+
+class Supervisor:
+    """A supervisor that runs until it is asked to stop."""
+
+    def __init__(self, phase: Phase = Phase.RUNNING) -> None:
+        self.phase = phase
+        self.outcome: Outcome | None = None
+
+    def stop(self, outcome: Outcome) -> None:
+        """Stop at once."""
+        self.outcome = outcome
+        self.phase = Phase.STOPPED
+
+
+class Client:
+    """A client whose services answer as they are told to, and whose wave stops at once."""
+
+    def __init__(self, refuses: str = '', when: Callable[[str], None] = lambda what: None) -> None:
+        self.figures = GOOD
+        self.prepared: list[str] = []
+        self.called: list[str] = []
+        self.closed = False
+        self.given_up: Callable[[], bool] = lambda: False
+        self._refuses = refuses
+        self._when = when
+
+    def prepare(self, services: Iterable[str]) -> None:
+        """Keep the names."""
+        self.prepared += services
+
+    def call(self, services: list[str], timeout: float) -> dict[str, str]:
+        """Answer, or refuse one."""
+        self.called += services
+        if self._refuses in services:
+            raise CallError(f'{self._refuses}: fault')
+        if services == ['/wave/stop']:
+            self.figures = replace(self.figures, wave='idle')
+        return dict.fromkeys(services, '')
+
+    def wait_until(self, condition: Callable[[], bool], timeout: float, what: str) -> None:
+        """Wait as the real one does."""
+        self._when(what)
+        while not condition():
+            if self.given_up():
+                raise GivenUpError(what)
+
+    def listen(self, duration: float) -> None:
+        """Nothing comes in."""
+
+    def close(self) -> None:
+        """Leave."""
+        self.closed = True
+
+
+def run(play: Play, supervisor: Supervisor, client: Client) -> None:
+    """Run the demo in this thread."""
+
+    def make_client(given_up: Callable[[], bool]) -> Client:
+        client.given_up = given_up
+        return client
+
+    play.run(supervisor, make_client)
+
+
+def test_all_joints_are_enabled_before_the_wave_and_the_wave_stops_before_the_processes() -> None:
+    """Services of all joints are called side by side; at the end the supervisor stops."""
+    show, supervisor, client = Show(), Supervisor(), Client()
+    play = Play(JOINTS, show, duration=0.01)
+    run(play, supervisor, client)
+    assert client.called == [
+        '/joint1/init',
+        '/joint2/init',
+        '/joint1/cyclic_position_mode',
+        '/joint2/cyclic_position_mode',
+        '/wave/start',
+        '/wave/stop',
+    ]
+    assert set(client.called) == set(client.prepared)
+    assert show.phases == ['booting', 'enabling', 'waving', 'stopping']
+    assert supervisor.outcome is not None
+    assert supervisor.outcome.exit_code == 0
+    assert play.result.problems == []
+    assert len(play.result.summary) == 5
+    assert not play.left
+    assert client.closed
+
+
+def test_a_drive_that_refuses_ends_the_demo_with_its_reason() -> None:
+    """No wave is started, and there is no summary of one."""
+    supervisor, client = Supervisor(), Client(refuses='/joint2/init')
+    play = Play(JOINTS, Show(), duration=1.0)
+    run(play, supervisor, client)
+    assert supervisor.outcome == Outcome(1, '/joint2/init: fault')
+    assert '/wave/start' not in client.called
+    assert play.result.summary == []
+    assert client.closed
+
+
+def test_ctrl_c_stops_the_wave_first() -> None:
+    """Before the wave it is left to the supervisor, which stops at once."""
+    answers: list[bool] = []
+
+    def when(what: str) -> None:
+        if what in {'the processes', 'the end'}:
+            answers.append(play.leave())
+
+    supervisor, client = Supervisor(), Client(when=when)
+    play = Play(JOINTS, Show(), duration=None)
+    run(play, supervisor, client)
+    assert answers == [False, True]
+    assert client.called[-1] == '/wave/stop'
+    assert play.left
+
+
+@pytest.mark.parametrize('what', ['the processes', 'the end'])
+def test_a_supervisor_that_stops_ends_the_demo(what: str) -> None:
+    """A process has died: nothing is waited for any more, and the outcome is the supervisor's."""
+
+    def when(waited_for: str) -> None:
+        if waited_for == what:
+            supervisor.phase = Phase.STOPPED
+
+    supervisor, client = Supervisor(Phase.RUNNING), Client(when=when)
+    run(Play(JOINTS, Show(), duration=None), supervisor, client)
+    assert supervisor.outcome is None
+    assert client.closed
+
+
+def test_a_defect_in_the_demo_stops_the_processes() -> None:
+    """Whatever it is: drives must not stay enabled because a picture could not be drawn."""
+
+    def when(what: str) -> None:
+        raise ZeroDivisionError('in the picture')
+
+    supervisor, client = Supervisor(), Client(when=when)
+    with pytest.raises(ZeroDivisionError):
+        run(Play(JOINTS, Show(), duration=1.0), supervisor, client)
+    assert supervisor.outcome == Outcome(1, 'ZeroDivisionError: in the picture')
+    assert client.closed
