@@ -46,9 +46,21 @@ def added(section: str, piece: str) -> str:
     start = next(i for i, line in enumerate(lines) if line.strip() == f'{section}:')
     end = next((i for i in range(start + 1, len(lines)) if lines[i][:depth].strip()), len(lines))
     names = re.findall(r'^([\w]+):', piece, flags=re.MULTILINE)
-    body = [line for line in lines[start + 1 : end] if line.strip().split(':')[0] not in names]
+    body = _without(lines[start + 1 : end], {' ' * depth + name for name in names})
     addition = textwrap.indent(piece, ' ' * depth).splitlines()
     return '\n'.join([*lines[: start + 1], *body, *addition, *lines[end:]]) + '\n'
+
+
+def _without(lines: list[str], names: set[str]) -> list[str]:
+    """Leave out keys and what is indented below them."""
+    kept: list[str] = []
+    dropping = False
+    for line in lines:
+        is_key = line.partition(':')[0] in names
+        dropping = is_key or (dropping and line.startswith(' ' * 4))
+        if not dropping:
+            kept.append(line)
+    return kept
 
 
 def check(folder: Path, case: Case, eds: str | None = None) -> None:

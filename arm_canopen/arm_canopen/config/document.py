@@ -22,6 +22,7 @@ from .findings import Findings, Place
 TAG_PREFIX = 'tag:yaml.org,2002:'
 MERGE_TAG = TAG_PREFIX + 'merge'
 INTEGER_TAG = TAG_PREFIX + 'int'
+TEXT_TAGS = (TAG_PREFIX + 'timestamp', TAG_PREFIX + 'value', MERGE_TAG)  # dates, '=' and '<<'
 SIZE_MAX = 4 * 1024 * 1024  # [byte]
 
 
@@ -175,11 +176,10 @@ class _Converter:
         return Listing(place, tuple(items))
 
     def _scalar(self, node: yaml.ScalarNode, place: Place) -> Scalar:
-        name = node.tag.removeprefix(TAG_PREFIX)
-        known = {kind.value: kind for kind in ScalarKind}
-        if node.tag.startswith('!'):
+        known = {TAG_PREFIX + kind.value: kind for kind in ScalarKind}
+        if node.tag not in known and node.tag not in TEXT_TAGS:
             self._findings.error(place, f'the tag {node.tag!r} has no meaning here', 'remove it')
-        kind = known.get(name, ScalarKind.TEXT)
+        kind = known.get(node.tag, ScalarKind.TEXT)
         return Scalar(place, str(node.value), kind, quoted=node.style is not None)
 
     def _mapping(self, node: yaml.MappingNode, place: Place) -> Mapping:

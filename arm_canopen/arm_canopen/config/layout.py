@@ -80,8 +80,8 @@ def _old_devices(root: Mapping, findings: Findings) -> dict[str, Mapping]:
 
 
 def _is_misspelt(name: str, item: Item) -> bool:
-    """Tell a section with a typing error from a device, which has a node id."""
-    is_device = isinstance(item, Mapping) and ('node_id' in item.entries or 'dcf' in item.entries)
+    """Tell a section with a typing error from a device, which has an EDS in this format."""
+    is_device = isinstance(item, Mapping) and 'dcf' in item.entries
     return name not in TOP_LEVEL and not is_device and bool(_close_section(name))
 
 

@@ -1,0 +1,122 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What is taken, but told: unused keys, units that do not fit, PDOs without SYNC."""
+
+from __future__ import annotations
+
+from pathlib import Path
+import re
+
+from config_cases import added
+from config_samples import BUS, eds_text, load_text
+import pytest
+
+
+@pytest.mark.parametrize(
+    ('section', 'piece', 'key', 'message'),
+    [
+        ('joint1', 'effort_mode: 4', 'effort_mode', 'known, not used yet: torque'),
+        ('joint1', 'life_time_factor: 3', 'life_time_factor', 'no node guarding'),
+        ('joint1', 'retry_factor: 5', 'retry_factor', 'no node guarding'),
+        ('joint1', 'time_cob_id: 0x200', 'time_cob_id', 'no TIME'),
+        ('joint1', 'period: 20', 'period', 'every 10 ms, not every 20 ms'),
+        ('joint1', 'package: wrong', 'package', "is in the package 'canopen_402_driver'"),
+        (
+            'joint1',
+            'driver: "ros2_canopen::LifecycleCia402Driver"',
+            'driver',
+            'without lifecycle transitions',
+        ),
+        ('joint1', 'scale_pos_to_dev: 57.3', 'scale_pos_to_dev', 'is 0.0573, not 1'),
+        ('joint1', 'scale_vel_from_dev: 2', 'scale_vel_from_dev', 'is 2000, not 1'),
+        ('master', 'sync_window: 5000', 'sync_window', 'known, not used yet'),
+        ('master', 'vendor_id: 0x360', 'vendor_id', 'known, not used yet'),
+        ('master', 'error_behavior: {1: 1}', 'error_behavior', 'known, not used yet'),
+        ('master', 'boot_time: 100', 'boot_time', 'waited for for ever'),
+        ('master', 'start_all_nodes: true', 'start_all_nodes', 'when it is ready'),
+    ],
+)
+def test_told_with_line_and_key(
+    tmp_path: Path, section: str, piece: str, key: str, message: str
+) -> None:
+    """One warning at the key, which says what happens instead, and a remedy."""
+    text = added(section, piece)
+    (warning,) = load_text(tmp_path, text).warnings
+    prefix = 'nodes.joint1' if section == 'joint1' else section
+    assert warning.key == f'{prefix}.{key}'
+    assert text.splitlines()[warning.line - 1].strip() == piece
+    assert message in warning.message
+    assert warning.remedy
+
+
+@pytest.mark.parametrize(
+    ('section', 'piece'),
+    [
+        ('joint1', 'polling: true'),
+        ('joint1', 'period: 10'),
+        ('joint1', 'non_transmit_timeout: 100'),
+        ('joint1', 'diagnostics: {enable: true, period: 1000}'),
+        ('joint1', 'enable_lazy_load: false'),
+        ('joint1', 'num_channels: 1'),
+        ('joint1', 'guard_time: 0'),
+        ('joint1', 'boot: true'),
+        ('joint1', 'software_file: ""'),
+        ('joint1', 'restore_configuration: 0'),
+        ('joint1', 'retry_factor: 3'),
+        ('joint1', 'revision_number: 0'),
+        ('master', 'vendor_id: 0'),
+        ('master', 'start: true'),
+        ('master', 'boot_time: 0'),
+    ],
+)
+def test_what_asks_for_nothing_is_no_warning(tmp_path: Path, section: str, piece: str) -> None:
+    """Keys whose wish is granted anyway, or that say the default, are taken silently."""
+    assert load_text(tmp_path, added(section, piece)).warnings == ()
+
+
+def test_a_pdo_that_waits_for_sync(tmp_path: Path) -> None:
+    """Synchronous PDOs on a bus without SYNC would never be sent."""
+    text = added('joint1', 'tpdo: {1: {transmission: 1}}')
+    (warning,) = load_text(tmp_path, text.replace('  sync_period: 10000\n', '')).warnings
+    assert 'TPDO 1 of joint1 waits for SYNC' in warning.message
+
+
+def test_a_drive_without_control_word(tmp_path: Path) -> None:
+    """A drive whose controlword or statusword no PDO carries cannot be run in the cycle."""
+    text = added('joint1', 'rpdo: {1: {enabled: false}}\ntpdo: {1: {enabled: false}}')
+    messages = [warning.message for warning in load_text(tmp_path, text).warnings]
+    assert [re.findall('0x60..', message) for message in messages] == [['0x6040'], ['0x6041']]
+
+
+def test_identifiers_of_an_eds_without_node_id(tmp_path: Path) -> None:
+    """EDS defaults that collide are warnings as long as bus.yml does not configure the PDOs."""
+    eds = eds_text().replace('$NODEID+0x280', '0x280').replace('$NODEID+0x380', '0x380')
+    text = f'{BUS}  joint2: {{node_id: 3}}\n'
+    (warning,) = load_text(tmp_path, text, eds=eds).warnings
+    assert 'COB-ID 0x280 of TPDO 2 of joint2 is also that of TPDO 2 of joint1' in warning.message
+    assert 'node id' in warning.remedy
+
+
+def test_mappings_that_the_eds_does_not_know(tmp_path: Path) -> None:
+    """An enabled PDO whose default mapping names unknown objects is told at its EDS line."""
+    lines = eds_text().splitlines()
+    start = lines.index('[1A01sub0]')
+    for offset, value in ((0, '1'), (1, '0x70000020')):
+        section = lines.index(f'[1A01sub{offset}]', start)
+        place = next(i for i in range(section, len(lines)) if lines[i].startswith('DefaultValue'))
+        lines[place] = f'DefaultValue={value}'
+    bus = load_text(tmp_path, eds='\n'.join(lines))
+    (warning,) = bus.warnings
+    assert warning.file.name == 'drive.eds'
+    assert warning.line == lines.index('[1A01sub1]') + 1
+    assert 'maps 0x7000:00, which is not there; taken as UNSIGNED32' in warning.message
+    assert bus.nodes[0].tpdos[1].mapping[0].word == 0x7000_0020
+
+
+def test_warnings_of_an_eds_are_told_once(tmp_path: Path) -> None:
+    """Devices that share an odd EDS share its warnings."""
+    text = f'{BUS}  joint2: {{node_id: 3}}\n'
+    eds = eds_text().replace('DefaultValue=1.5', 'DefaultValue=one')
+    (warning,) = load_text(tmp_path, text, eds=eds).warnings
+    assert warning.file.name == 'drive.eds'
+    assert "could not convert string to float: 'one'; ignored" in warning.message
