@@ -31,6 +31,7 @@ from ..standard.sdo_abort import abort_text, AbortCode
 from .scheduler import Promise, Scheduler
 
 T = TypeVar('T')
+Answer = TypeVar('Answer', UploadResponse, Segment, DownloadResponse, DownloadSegmentResponse)
 Transfer = Coroutine[Promise[Any], None, Any]
 
 
@@ -71,7 +72,9 @@ class SdoClient:
         self._queue: deque[tuple[Transfer, Promise[Any]]] = deque()
         self._busy = False
         self._expected: Promise[Response] | None = None
+        self._answer: type[Response] = Abort
         self._address = (0, 0)
+        self._strays = 0  # frames since the open request that do not answer it
 
     def read(self, index: int, subindex: int, timeout: float) -> Promise[bytes]:
         """Queue an upload.
@@ -93,32 +96,44 @@ class SdoClient:
     def cancel_all(self, reason: str) -> None:
         """Reject every transfer, because the device restarted or went away."""
         queue, self._queue = self._queue, deque()
-        if self._expected is not None:
-            self._expected.reject(SdoError(f'{self._name}: {reason}'))
+        expected, self._expected = self._expected, None
+        if expected is not None:
+            expected.reject(SdoError(f'{self._name}: {reason}'))
         for coroutine, promise in queue:
             coroutine.close()
             promise.reject(SdoError(f'{self._name}: {reason}'))
 
     def receive(self, frame: Frame) -> None:
-        """Take an answer of the device."""
-        if self._expected is None:
+        """Take an answer of the device.
+
+        What does not answer the open request is passed over: it is the late answer to one that
+        timed out, or meant for another client.
+        """
+        response = self._decode(frame.data)
+        if self._expected is None or response is None or not self._fits(response):
             self.counters.stale += 1
+            self._strays += 1
             return
-        try:
-            response = decode_response(frame.data)
-        except CodecError:
-            self.counters.stale += 1
-            return
-        if not isinstance(response, (Segment, DownloadSegmentResponse)):
-            # python-canopen's peers send aborts with index 0, so an abort counts for any request
-            address = (response.index, response.subindex)
-            if address != self._address and not (
-                isinstance(response, Abort) and address == (0, 0)
-            ):
-                self.counters.stale += 1
-                return
         expected, self._expected = self._expected, None
         expected.resolve(response)
+
+    @staticmethod
+    def _decode(data: bytes) -> Response | None:
+        try:
+            return decode_response(data)
+        except CodecError:
+            return None
+
+    def _fits(self, response: Response) -> bool:
+        """Whether a response answers the open request."""
+        if isinstance(response, Abort):
+            # python-canopen's peers send aborts with index 0, so such an abort counts for any
+            return (response.index, response.subindex) in (self._address, (0, 0))
+        if not isinstance(response, self._answer):
+            return False
+        if isinstance(response, (UploadResponse, DownloadResponse)):
+            return (response.index, response.subindex) == self._address
+        return True
 
     def _enqueue(self, transfer: Coroutine[Promise[Any], None, T]) -> Promise[T]:
         promise: Promise[T] = Promise()
@@ -142,9 +157,8 @@ class SdoClient:
 
     async def _upload(self, index: int, subindex: int, timeout: float) -> bytes:
         self._address = (index, subindex)
-        response = await self._exchange(UploadRequest(index, subindex), timeout)
-        if not isinstance(response, UploadResponse):
-            raise self._abort(AbortCode.COMMAND_SPECIFIER)
+        request = UploadRequest(index, subindex)
+        response = await self._exchange(request, UploadResponse, timeout)
         if response.data is not None:
             return response.data
         return await self._upload_segments(response.size, timeout)
@@ -152,23 +166,20 @@ class SdoClient:
     async def _upload_segments(self, size: int | None, timeout: float) -> bytes:
         data, toggle, last = bytearray(), False, False
         while not last:
-            segment = await self._exchange(UploadSegmentRequest(toggle), timeout)
-            if not isinstance(segment, Segment):
-                raise self._abort(AbortCode.COMMAND_SPECIFIER)
+            segment = await self._exchange(UploadSegmentRequest(toggle), Segment, timeout)
             if segment.toggle != toggle:
                 raise self._abort(AbortCode.TOGGLE_BIT)
             data += segment.data
             toggle, last = not toggle, segment.last
-        if size is not None and len(data) != size:
-            raise self._abort(AbortCode.LENGTH)
+            if size is not None and (len(data) > size or (last and len(data) < size)):
+                raise self._abort(AbortCode.LENGTH)
         return bytes(data)
 
     async def _download(self, index: int, subindex: int, data: bytes, timeout: float) -> None:
         self._address = (index, subindex)
         short = 0 < len(data) <= EXPEDITED_MAX
         request = DownloadRequest(index, subindex, data if short else None, len(data))
-        if not isinstance(await self._exchange(request, timeout), DownloadResponse):
-            raise self._abort(AbortCode.COMMAND_SPECIFIER)
+        await self._exchange(request, DownloadResponse, timeout)
         if not short:
             await self._download_segments(data, timeout)
 
@@ -177,16 +188,15 @@ class SdoClient:
         for start in range(0, max(len(data), 1), SEGMENT_MAX):
             chunk = data[start : start + SEGMENT_MAX]
             last = start + SEGMENT_MAX >= len(data)
-            response = await self._exchange(Segment(toggle, chunk, last), timeout)
-            if not isinstance(response, DownloadSegmentResponse):
-                raise self._abort(AbortCode.COMMAND_SPECIFIER)
+            segment = Segment(toggle, chunk, last)
+            response = await self._exchange(segment, DownloadSegmentResponse, timeout)
             if response.toggle != toggle:
                 raise self._abort(AbortCode.TOGGLE_BIT)
             toggle = not toggle
 
-    async def _exchange(self, request: Request, timeout: float) -> Response:
+    async def _exchange(self, request: Request, answer: type[Answer], timeout: float) -> Answer:
         expected: Promise[Response] = Promise()
-        self._expected = expected
+        self._expected, self._answer, self._strays = expected, answer, 0
         self._send(Frame(CobId.SDO_REQUEST + self.node_id, request.encode()))
         try:
             response = await self._scheduler.wait(expected, timeout)
@@ -194,18 +204,25 @@ class SdoClient:
             self._expected = None
             self.counters.timed_out += 1
             self._send_abort(AbortCode.TIMED_OUT)
-            raise SdoTimeoutError(
-                f'{self._name} (node {self.node_id}) did not answer the SDO for '
-                f'{self._place()} within {timeout * 1000:g} ms'
-            ) from None
-        if isinstance(response, Abort):
-            self.counters.aborted += 1
-            raise SdoAbortError(
-                f'{self._name} (node {self.node_id}) refused {self._place()}: '
-                f'{abort_text(response.code)}',
-                response.code,
-            )
-        return response
+            raise SdoTimeoutError(self._silence(timeout)) from None
+        if isinstance(response, answer):
+            return response
+        self.counters.aborted += 1
+        code = response.code if isinstance(response, Abort) else AbortCode.COMMAND_SPECIFIER
+        raise SdoAbortError(
+            f'{self._name} (node {self.node_id}) refused {self._place()}: {abort_text(code)}', code
+        )
+
+    def _silence(self, timeout: float) -> str:
+        strays = (
+            f'; it sent {self._strays} frames that do not belong to the request'
+            if self._strays
+            else ''
+        )
+        return (
+            f'{self._name} (node {self.node_id}) did not answer the SDO for {self._place()} '
+            f'within {timeout * 1000:g} ms{strays}'
+        )
 
     def _abort(self, code: AbortCode) -> SdoAbortError:
         self.counters.aborted += 1
