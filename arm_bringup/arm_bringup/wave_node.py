@@ -13,7 +13,8 @@ from std_srvs.srv import Trigger
 
 from .description import joint_limits
 from .wave import plan_wave, WaveStyle
-from .wave_source import AxisReport, REPORT_PERIOD, WaveReport, WaveSource
+from .wave_axis import AxisReport
+from .wave_source import REPORT_PERIOD, WaveReport, WaveSource
 
 if TYPE_CHECKING:
     from arm_canopen import MasterProcess

@@ -12,6 +12,7 @@ import math
 from typing import TYPE_CHECKING
 
 from .wave import quintic_step, stop_duration, Swing, WaveStyle
+from .wave_axis import AxisReport, WaveAxis
 
 if TYPE_CHECKING:
     from arm_canopen import AxisFeedback
@@ -36,34 +37,6 @@ class Command(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class AxisReport:
-    """How well an axis followed since the wave was started from standstill.
-
-    Attributes:
-        name: Name of the drive.
-        followable: The master would obey a set-point.
-        active: It takes part.
-        left: Why it takes no part any more; empty when it does, or never did.
-        lowest: Least measured position in [rad].
-        highest: Greatest measured position in [rad].
-        error_max: Greatest distance in [rad] between a measured position and the last set-point
-            that was sent before it was measured.
-        error_rms: Root mean square of that distance in [rad].
-        samples: Number of measurements.
-    """
-
-    name: str
-    followable: bool
-    active: bool
-    left: str
-    lowest: float
-    highest: float
-    error_max: float
-    error_rms: float
-    samples: int
-
-
-@dataclass(frozen=True, slots=True)
 class WaveReport:
     """What the wave says of itself; immutable, so that any thread may read it.
 
@@ -80,86 +53,6 @@ class WaveReport:
 class _Release:
     axis: str
     reason: str
-
-
-class _Axis:
-    """One drive: where it entered, and how well it follows."""
-
-    __slots__ = (
-        'active',
-        'duration',
-        'entered',
-        'error_max',
-        'followable',
-        'highest',
-        'left',
-        'lowest',
-        'samples',
-        'sent',
-        'squares',
-        'start',
-        'swing',
-    )
-
-    def __init__(self, swing: Swing) -> None:
-        self.swing = swing
-        self.active = False
-        self.left = ''
-        self.followable = False
-        self.start = 0.0
-        self.entered = 0.0
-        self.duration = 1.0
-        self.sent: float | None = None
-        self.clear()
-
-    def clear(self) -> None:
-        self.lowest = math.inf
-        self.highest = -math.inf
-        self.error_max = 0.0
-        self.squares = 0.0
-        self.samples = 0
-
-    def enter(self, setpoint: float, style: WaveStyle) -> None:
-        self.active = True
-        self.left = ''
-        self.start = setpoint
-        self.entered = 0.0
-        self.duration = self.swing.entry_duration(setpoint, style)
-
-    def leave(self, reason: str) -> None:
-        if self.active:
-            self.left = reason
-        self.active = False
-        self.sent = None
-
-    def measure(self, position: float) -> None:
-        if self.sent is None:
-            return
-        error = abs(position - self.sent)
-        self.lowest = min(self.lowest, position)
-        self.highest = max(self.highest, position)
-        self.error_max = max(self.error_max, error)
-        self.squares += error * error
-        self.samples += 1
-
-    def advance(self, step: float, theta: float) -> float:
-        self.entered += step
-        self.sent = self.swing.position(self.start, self.entered / self.duration, theta)
-        return self.sent
-
-    def report(self) -> AxisReport:
-        rms = math.sqrt(self.squares / self.samples) if self.samples else 0.0
-        return AxisReport(
-            self.swing.name,
-            self.followable,
-            self.active,
-            self.left,
-            self.lowest,
-            self.highest,
-            self.error_max,
-            rms,
-            self.samples,
-        )
 
 
 class WaveSource:
@@ -179,7 +72,7 @@ class WaveSource:
         """
         self._style = style
         self._stop_duration = stop_duration(swings, style)
-        self._axes = [_Axis(swing) for swing in swings]
+        self._axes = [WaveAxis(swing) for swing in swings]
         self._commands: deque[Command | _Release] = deque()
         self._state = WaveState.IDLE
         self._start_again = False
@@ -241,7 +134,6 @@ class WaveSource:
             self._obey(self._commands.popleft(), feedback)
         for axis, state in zip(self._axes, feedback, strict=True):
             axis.measure(state.position)
-            axis.followable = state.followable
             if axis.active and not state.followable:
                 axis.leave('the drive can no longer follow')
         setpoints = self._advance(period)
