@@ -12,15 +12,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-import contextlib
+from collections.abc import Sequence
 import os
 import signal
 import sys
-import threading
 
 from .cli.commands import COMMANDS
 from .cli.errors import FrontendError
+from .cli.interrupts import sigterm_interrupts
 from .cli.parser import build
 
 _BROKEN_PIPE = 128 + signal.SIGPIPE
@@ -40,7 +39,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     words = list(sys.argv[1:] if argv is None else argv)
     try:
-        with _interrupted_by_sigterm():
+        with sigterm_interrupts():
             code = _run(words)
         sys.stdout.flush()
     except KeyboardInterrupt:
@@ -62,19 +61,6 @@ def _run(words: list[str]) -> int:
         line.help_of.print_help()
         return 0
     return line.verb.main(args) or 0
-
-
-@contextlib.contextmanager
-def _interrupted_by_sigterm() -> Iterator[None]:
-    """Let SIGTERM unwind the stack as Ctrl-C does, so that no ghost node stays in the graph."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    previous = signal.signal(signal.SIGTERM, signal.default_int_handler)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, previous)
 
 
 def _leave(code: int) -> int:

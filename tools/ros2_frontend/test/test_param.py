@@ -46,8 +46,6 @@ def test_list_of_one_node(ros2: Ros2) -> None:
         '  limits.upper (type: integer array)',
         '  loose (type: string)',
     ]
-    prefixed = ros2('param', 'list', NODE, '--param-prefixes', 'limits')
-    assert prefixed.lines == ['  limits.upper']
 
 
 def test_list_of_all_nodes(ros2: Ros2) -> None:

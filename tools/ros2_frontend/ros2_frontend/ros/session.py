@@ -18,6 +18,7 @@ import time
 
 from ..aliases import Handle, Node
 from ..cli.errors import FrontendError
+from ..cli.interrupts import deferred_interrupts
 
 NODE_PREFIX = '_ros2cli'  # a leading underscore hides a node from `ros2 node list`
 
@@ -42,7 +43,8 @@ class Session:
         Args:
             timeout: Longest wait [s].
         """
-        self._executor.spin_once(timeout_sec=min(timeout, _LONGEST_WAIT))
+        with deferred_interrupts():
+            self._executor.spin_once(timeout_sec=min(timeout, _LONGEST_WAIT))
 
     def spin_until(self, done: Callable[[], bool], timeout: float | None = None) -> bool:
         """Serve callbacks until a condition holds.

@@ -95,29 +95,35 @@ class _Goal:
     def __init__(self, session: Session, client: Handle) -> None:
         self._session = session
         self._client = client
-        self._handle: Handle = None
 
     def run(self, goal: Message, feedback: bool) -> None:
         """Send, wait, print; whatever interrupts the wait cancels the goal."""
         print(f'Sending goal:\n     {_yaml(goal)}')
-        self._handle = self._result_of(
-            self._client.send_goal_async(goal, _print_feedback if feedback else None)
-        )
-        if not self._handle.accepted:
+        sent = self._client.send_goal_async(goal, _print_feedback if feedback else None)
+        try:
+            self._follow(sent)
+        except BaseException:
+            self._cancel(sent)
+            raise
+
+    def _follow(self, sent: Handle) -> None:
+        handle = self._result_of(sent)
+        if not handle.accepted:
             print('Goal was rejected.')
             return
-        print(f'Goal accepted with ID: {bytes(self._handle.goal_id.uuid).hex()}\n')
-        try:
-            result = self._result_of(self._handle.get_result_async())
-        except BaseException:
-            self._cancel()
-            raise
+        print(f'Goal accepted with ID: {bytes(handle.goal_id.uuid).hex()}\n')
+        result = self._result_of(handle.get_result_async())
         print(f'Result:\n    {_yaml(result.result)}')
         print(f'Goal finished with status: {_STATUS.get(result.status, "UNKNOWN")}')
 
-    def _cancel(self) -> None:
+    def _cancel(self, sent: Handle) -> None:
+        """Cancel the goal; one that is just being sent may be accepted yet."""
+        if not self._session.spin_until(sent.done, _CANCEL_TIMEOUT):
+            raise FrontendError('Failed to cancel goal: it is not known whether it was accepted')
+        if sent.exception() is not None or not sent.result().accepted:
+            return
         print('Canceling goal...')
-        future = self._handle.cancel_goal_async()
+        future = sent.result().cancel_goal_async()
         if not self._session.spin_until(future.done, _CANCEL_TIMEOUT):
             raise FrontendError('Failed to cancel goal: no answer')
         if not future.result().goals_canceling:

@@ -24,6 +24,8 @@ from .topic_types import message_class
 
 _REMINDER = 1.0  # [s] between two lines that say what is waited for
 _KEEP_ALIVE = 0.1  # [s]
+_ACKNOWLEDGEMENT_TIMEOUT = 4.0  # [s]; heartbeats come every 3 s
+_ACKNOWLEDGEMENT_POLL = 0.1  # [s]; Python sees Ctrl-C between two waits
 
 
 class Pub:
@@ -89,6 +91,7 @@ class Pub:
                     print(f'publishing #{count}: {message!r}\n')
                 publisher.publish(message)
             session.spin_until(lambda: False, args.keep_alive)
+            _await_acknowledgement(publisher)
 
 
 def _add_content(parser: ArgumentParser) -> None:
@@ -168,6 +171,20 @@ def _await_subscriptions(
             )
         print(f'Waiting for at least {wanted} matching subscription(s)...')
         graph.wait_until(enough, min(_REMINDER, left))
+
+
+def _await_acknowledgement(publisher: Handle) -> None:
+    """Wait until reliable subscriptions have all messages.
+
+    A subscription that is just being connected takes no messages yet; what it missed is sent
+    again with the next heartbeat.
+    """
+    from rclpy.duration import Duration
+
+    deadline = time.monotonic() + _ACKNOWLEDGEMENT_TIMEOUT
+    while time.monotonic() < deadline:
+        if publisher.wait_for_all_acked(Duration(seconds=_ACKNOWLEDGEMENT_POLL)):
+            return
 
 
 def _paced(session: Session, times: int, period: float) -> Iterator[int]:

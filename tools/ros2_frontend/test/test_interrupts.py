@@ -1,0 +1,72 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Interrupts: kept while they would do harm, and never lost."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+
+import pytest
+
+from ros2_frontend.cli.interrupts import deferred_interrupts, sigterm_interrupts
+
+
+def interrupt(number: signal.Signals, times: int, done: list[str]) -> None:
+    """Send signals to this process in a block that defers them."""
+    with deferred_interrupts():
+        for _ in range(times):
+            os.kill(os.getpid(), number)
+        done.append('the rest')
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupt_comes_at_the_end_of_the_block(number: signal.Signals) -> None:
+    """What the block does is done first; the handlers are as before."""
+    before = signal.getsignal(number)
+    done: list[str] = []
+    with pytest.raises(KeyboardInterrupt):
+        interrupt(number, 1, done)
+    assert done == ['the rest']
+    assert signal.getsignal(number) is before
+
+
+def test_a_second_interrupt_is_not_kept() -> None:
+    """Who presses Ctrl-C twice does not want to wait."""
+    done: list[str] = []
+    with pytest.raises(KeyboardInterrupt):
+        interrupt(signal.SIGINT, 2, done)
+    assert not done
+
+
+def test_what_was_ignored_stays_ignored() -> None:
+    """A background job of a script is not interrupted by the terminal."""
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        with deferred_interrupts():
+            os.kill(os.getpid(), signal.SIGINT)
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def test_sigterm_is_an_interrupt_while_a_command_runs() -> None:
+    """And what it was before afterwards."""
+    before = signal.getsignal(signal.SIGTERM)
+    with pytest.raises(KeyboardInterrupt), sigterm_interrupts():
+        os.kill(os.getpid(), signal.SIGTERM)
+    assert signal.getsignal(signal.SIGTERM) is before
+
+
+def test_threads_can_use_the_blocks() -> None:
+    """Only the main thread may set handlers; others just run."""
+    done = []
+
+    def work() -> None:
+        with sigterm_interrupts(), deferred_interrupts():
+            done.append('work')
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join()
+    assert done == ['work']
