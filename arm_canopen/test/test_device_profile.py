@@ -70,7 +70,9 @@ def test_move_ends_exactly_at_its_target(start: Point, target: float, limits: Li
     """A move begins where it was started, and stands at its target ever after."""
     motion = plan_move(start, target, limits, START)
     first = motion.at(START)
-    assert first.position == pytest.approx(start.position, abs=1e-9)
+    assert first.position == pytest.approx(
+        start.position, abs=scale(start.position, start.velocity)
+    )
     assert first.velocity == pytest.approx(start.velocity, abs=1e-6 * limits.deceleration)
     for time in (motion.end, motion.end + 1.0, motion.end + 1e6):
         assert motion.at(time) == Point(target, 0.0, 0.0)
