@@ -117,9 +117,8 @@ class BootProcess:
         self._enter(BootPhase.STARTING)
         if self._start:
             self._send_nmt(NmtCommand.START, node.config.node_id)
-        node.online = True
         # not waiting for the first heartbeat saves its period; its absence is noticed all the same
-        node.supervise(self._scheduler.now)
+        node.go_online(self._scheduler.now)
         self._told = ''
         self._enter(BootPhase.OPERATIONAL)
         node.report(EventKind.BOOT, Severity.INFO, 'operational')

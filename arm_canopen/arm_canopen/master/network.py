@@ -212,8 +212,9 @@ class Network:
         if self.config.master.sync_overflow:
             self._sync_counter = self._sync_counter % self.config.master.sync_overflow + 1
             data = bytes((self._sync_counter,))
-        expected = sum(node.expected_answers for node in self.nodes.values())
-        self._sync.start(expected)
+        self._sync.start()
+        for node in self.nodes.values():
+            node.expect_answers()
         self._sync_time = now
         self._feedback_due = True
         self.send(Frame(CobId.SYNC, data))

@@ -7,7 +7,7 @@ from __future__ import annotations
 import struct
 
 from ..exceptions import CodecError
-from ..standard.datatypes import byte_length, DataType, integer_range, SIGNED_BITS
+from ..standard.datatypes import byte_length, DataType, SIGNED_BITS
 from ..standard.pdo import MappedObject, Number, PdoCodec
 
 RAW_BYTES = 4  # [byte] in COData, CORead and COWrite
@@ -36,12 +36,16 @@ def bytes_from_raw(data_type: DataType, raw: int) -> bytes:
     if size is None or size > RAW_BYTES:
         raise CodecError(f'{data_type.name} does not fit into the 32 bits of this message')
     bits = size * 8
-    if data_type in SIGNED_BITS and raw >> (bits - 1) == (1 << (33 - bits)) - 1:
-        raw &= (1 << bits) - 1
-    limits = integer_range(DataType.BOOLEAN) if data_type is DataType.BOOLEAN else None
-    if raw >> bits or (limits is not None and raw > limits[1]):
+    raw = _narrowed(data_type, bits, raw)
+    if raw >> (1 if data_type is DataType.BOOLEAN else bits):
         raise CodecError(f'0x{raw:X} does not fit {data_type.name}')
     return raw.to_bytes(size, 'little')
+
+
+def _narrowed(data_type: DataType, bits: int, raw: int) -> int:
+    """Cut a negative number that was sign-extended to 32 bits down to those of its type."""
+    negative = raw >> (bits - 1) == (1 << (33 - bits)) - 1 if bits <= 32 else False
+    return raw & ((1 << bits) - 1) if negative and data_type in SIGNED_BITS else raw
 
 
 def raw_from_number(mapped: MappedObject, value: Number) -> int:
@@ -52,10 +56,12 @@ def raw_from_number(mapped: MappedObject, value: Number) -> int:
 def number_from_raw(mapped: MappedObject, raw: int) -> Number:
     """Return the value of a mapped object from the 32 bits of a message.
 
+    A negative number may come zero-extended to its type or sign-extended to 32 bits.
+
     Raises:
         CodecError: The value does not fit the object.
     """
-    data = struct.pack('<Q', raw)
+    raw = _narrowed(mapped.data_type, mapped.bits, raw)
     if raw >> min(mapped.bits, 32):
         raise CodecError(f'0x{raw:X} does not fit the {mapped.bits} bits of the object')
-    return PdoCodec([mapped]).unpack(data)[0]
+    return PdoCodec([mapped]).unpack(struct.pack('<Q', raw))[0]

@@ -9,33 +9,38 @@ are list look-ups. Objects that no PDO carries are read and written by SDO in th
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import Protocol
+from typing import Protocol, TypeAlias
 
 from ..can.frame import Frame
 from ..config.model import PdoConfig
 from ..exceptions import CodecError
-from ..standard.pdo import Number, PdoCodec
+from ..standard.pdo import MappedObject, Number, PdoCodec
+
+StartValue: TypeAlias = Callable[[MappedObject], Number]
 
 
 class SyncRound:
     """Counts the TPDOs that answer one SYNC, over all devices.
 
     Attributes:
-        number: Number of SYNCs so far.
         pending: How many expected TPDOs have not yet come.
         complete: Called when the last one has come.
     """
 
     def __init__(self, complete: Callable[[], None]) -> None:
         """Start before the first SYNC."""
-        self.number = 0
         self.pending = 0
         self.complete = complete
 
-    def start(self, expected: int) -> None:
-        """A SYNC is sent; so many TPDOs are expected."""
-        self.number += 1
-        self.pending = expected
+    def start(self) -> None:
+        """A SYNC is about to be sent; each :class:`Input` says whether it is expected."""
+        self.pending = 0
+
+    def answer(self) -> None:
+        """An expected TPDO has come."""
+        self.pending -= 1
+        if self.pending == 0:
+            self.complete()
 
 
 class Input:
@@ -48,6 +53,7 @@ class Input:
         timestamp: Steady time of arrival of the last in [s].
         count: Number of PDOs received.
         length_errors: Number of PDOs that were too short.
+        awaited: It was expected after the last SYNC and has not come.
     """
 
     def __init__(self, config: PdoConfig, sync: SyncRound) -> None:
@@ -59,8 +65,8 @@ class Input:
         self.count = 0
         self.length_errors = 0
         self.listener: Callable[[Input], None] | None = None
+        self.awaited = False
         self._sync = sync
-        self._round = 0
         self._unpack = self.codec.unpack
 
     @property
@@ -68,18 +74,18 @@ class Input:
         """The device sends it after each SYNC."""
         return self.config.transmission == 1
 
-    @property
-    def answered(self) -> bool:
-        """It came since the last SYNC."""
-        return self._round == self._sync.number
-
     def clear(self) -> None:
         """Forget the values, because the device restarted or went away."""
         self.values = None
+        self.awaited = False
+
+    def expect(self) -> None:
+        """A SYNC is about to be sent; what answered before is expected to answer again."""
+        self.awaited = self.values is not None
+        self._sync.pending += self.awaited
 
     def receive(self, frame: Frame) -> None:
         """Take a PDO from the bus."""
-        expected = self.values is not None  # the first one after a boot was not counted
         try:
             self.values = self._unpack(frame.data)
         except CodecError:
@@ -89,13 +95,9 @@ class Input:
         self.count += 1
         if self.listener is not None:
             self.listener(self)
-        sync = self._sync
-        if self._round != sync.number:
-            self._round = sync.number
-            if expected and self.config.transmission == 1:
-                sync.pending -= 1
-                if sync.pending == 0:
-                    sync.complete()
+        if self.awaited:
+            self.awaited = False
+            self._sync.answer()
 
 
 class Output:
@@ -107,11 +109,11 @@ class Output:
         values: Next values in mapping order.
     """
 
-    def __init__(self, config: PdoConfig) -> None:
-        """Start with zeros."""
+    def __init__(self, config: PdoConfig, start: StartValue) -> None:
+        """Start with the values that the device has."""
         self.config = config
         self.codec = PdoCodec(config.mapping)
-        self.values: list[Number] = [0] * len(config.mapping)
+        self.values: list[Number] = [start(mapped) for mapped in config.mapping]
 
     def frame(self) -> Frame:
         """Return the frame that carries the present values."""
@@ -175,6 +177,7 @@ class ProcessImage:
         rpdos: tuple[PdoConfig, ...],
         sync: SyncRound,
         *,
+        start: StartValue = lambda mapped: 0,
         send_last: int | None = None,
     ) -> None:
         """Compile the enabled PDOs.
@@ -183,11 +186,12 @@ class ProcessImage:
             tpdos: What the device sends.
             rpdos: What it receives.
             sync: The round that all TPDOs of the bus belong to.
+            start: Tells what an object in an RPDO carries until it is written.
             send_last: Index of an object whose RPDO leaves after the others, so that a command
                 never overtakes its data.
         """
         self.inputs = [Input(pdo, sync) for pdo in tpdos if pdo.enabled and pdo.mapping]
-        outputs = [Output(pdo) for pdo in rpdos if pdo.enabled and pdo.mapping]
+        outputs = [Output(pdo, start) for pdo in rpdos if pdo.enabled and pdo.mapping]
         self.outputs = sorted(
             outputs, key=lambda output: any(o.index == send_last for o in output.config.mapping)
         )

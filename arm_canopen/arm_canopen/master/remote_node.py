@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from enum import Enum
+from functools import partial
 
 from ..can.frame import Frame
 from ..config.model import NodeConfig
@@ -20,6 +21,7 @@ from .events import Event, EventKind, Report, Severity
 from .process_image import ProcessImage, Reader, SyncRound, Writer
 from .scheduler import Promise, Scheduler
 from .sdo_client import SdoClient
+from .start_values import start_value
 
 
 class BootPhase(Enum):
@@ -102,7 +104,13 @@ class RemoteNode:
             report: Takes events.
         """
         self.config = config
-        self.image = ProcessImage(config.tpdos, config.rpdos, sync, send_last=Index.CONTROLWORD)
+        self.image = ProcessImage(
+            config.tpdos,
+            config.rpdos,
+            sync,
+            start=partial(start_value, config),
+            send_last=Index.CONTROLWORD,
+        )
         self.sdo = SdoClient(config.node_id, config.name, scheduler, send)
         self.nmt_state: NmtState | None = None
         self.phase = BootPhase.WAITING
@@ -126,10 +134,11 @@ class RemoteNode:
         """Name in bus.yml."""
         return self.config.name
 
-    @property
-    def expected_answers(self) -> int:
-        """How many TPDOs answer each SYNC; those count that have come since the device booted."""
-        return sum(entry.values is not None for entry in self._every_sync)
+    def expect_answers(self) -> None:
+        """A SYNC is about to be sent: await the TPDOs that answer each one."""
+        if self.online:
+            for entry in self._every_sync:
+                entry.expect()
 
     def report(self, kind: EventKind, severity: Severity, text: str) -> None:
         """Tell the owner of the network something about this device."""
@@ -137,7 +146,7 @@ class RemoteNode:
 
     def count_missed(self) -> int:
         """Count the TPDOs that did not answer the last SYNC, and return their number."""
-        missed = sum(entry.values is not None and not entry.answered for entry in self._every_sync)
+        missed = sum(entry.awaited for entry in self._every_sync)
         self.missed_pdos += missed
         return missed
 
@@ -173,12 +182,14 @@ class RemoteNode:
             self.last_emergency = emergency
             self.report(EventKind.EMERGENCY, Severity.ERROR, f'EMCY: {emergency}')
 
-    def supervise(self, now: float) -> None:
-        """Watch the heartbeat from now on, when it is configured.
+    def go_online(self, now: float) -> None:
+        """The device is booted: talk to it, and watch its heartbeat when it is configured.
 
         Args:
             now: Steady time in [s], from which the first heartbeat is awaited.
         """
+        self.image.clear()  # what it sent before it was configured says nothing about now
+        self.online = True
         self._supervised = self.config.heartbeat_timeout > 0
         self.last_heartbeat = now
 

@@ -1,0 +1,45 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What an RPDO carries before anybody commanded anything."""
+
+from __future__ import annotations
+
+from ..config.model import NodeConfig
+from ..exceptions import CodecError
+from ..standard.datatypes import decode, Value
+from ..standard.pdo import MappedObject, Number, PdoCodec
+
+
+def start_value(config: NodeConfig, mapped: MappedObject) -> Number:
+    """Return the value that an object has in the device when it is booted.
+
+    RPDOs leave in every cycle, so an object that nobody commands (a torque limit, a profile
+    velocity, digital outputs) must keep what bus.yml wrote or else what its EDS has as default.
+
+    Args:
+        config: The device.
+        mapped: The object in one of its RPDOs.
+
+    Returns:
+        The value; 0 when neither tells one that fits the object.
+    """
+    value = _configured(config, mapped)
+    if isinstance(value, (int, float)):
+        try:
+            PdoCodec([mapped]).pack([value])
+        except CodecError:
+            return 0
+        return value
+    return 0
+
+
+def _configured(config: NodeConfig, mapped: MappedObject) -> Value | None:
+    address = (mapped.index, mapped.subindex)
+    for write in reversed(config.sdo_writes):
+        if (write.index, write.subindex) == address:
+            try:
+                return decode(mapped.data_type, write.data)
+            except CodecError:
+                break
+    entry = config.dictionary.get(*address)
+    return None if entry is None else entry.default
