@@ -35,6 +35,11 @@ class Promise(Generic[T]):
         """Give an error as the result; ignored when there is one already."""
         self._finish(None, error)
 
+    def abandon(self) -> None:
+        """Be done without a result, and without telling those who wait; nobody does any more."""
+        self.done = True
+        self._callbacks.clear()
+
     def result(self) -> T:
         """Return the result or raise the error.
 
@@ -179,7 +184,7 @@ class Scheduler:
         try:
             await first
         finally:
-            timer.resolve(None)  # no deadline is left, also when the task is cancelled
+            timer.abandon()  # no deadline is left, also when the task is cancelled
         if not promise.done:
             raise TimeoutError(f'nothing within {timeout:g} s')
         return promise.result()
