@@ -5,7 +5,7 @@
 from collections.abc import Sequence
 import random
 
-MUTATIONS_MAX = 6
+MUTATIONS_MAX = 3
 
 
 def mutated(text: str, snippets: Sequence[str], generator: random.Random) -> str:
