@@ -97,6 +97,17 @@ def test_the_eds_gives_the_heartbeat_when_bus_yml_does_not(tmp_path: Path) -> No
     assert (node.heartbeat_producer, node.heartbeat_timeout) == (0.25, 0.75)
 
 
+def test_a_fixed_heartbeat_cannot_be_changed(tmp_path: Path) -> None:
+    """A device whose 0x1017 is read-only keeps the period of its EDS, and no other is taken."""
+    head = 'Producer heartbeat time\nDataType=0x0006\nAccessType='
+    eds = eds_text().replace(f'{head}rw\nDefaultValue=0', f'{head}ro\nDefaultValue=250')
+    text = added('joint1', 'heartbeat_producer: 250')
+    assert load_text(tmp_path, text, eds=eds).nodes[0].heartbeat_producer == 0.25
+    (problem,) = errors_of(write_bus(tmp_path, text.replace('250', '100'), eds=eds))
+    assert problem.key == 'nodes.joint1.heartbeat_producer'
+    assert 'fixed at 250 ms' in problem.message
+
+
 def test_devices_watch_the_master_where_they_can(tmp_path: Path) -> None:
     """By default a device with 0x1016 watches, one without does not, none without a heartbeat."""
     assert load_text(tmp_path).nodes[0].heartbeat_consumer

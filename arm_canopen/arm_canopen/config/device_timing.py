@@ -79,9 +79,16 @@ def _heartbeat_producer(
                 'remove the key, or use the EDS that fits the device',
             )
         return 0.0
-    if wanted is not None:
-        return wanted
-    return entry.default / MILLISECONDS if isinstance(entry.default, int) else 0.0
+    given = entry.default / MILLISECONDS if isinstance(entry.default, int) else 0.0
+    if wanted is None or wanted == given:
+        return given
+    if not entry.access.writable:
+        findings.error(
+            draft.place_of('heartbeat_producer'),
+            f'the heartbeat is fixed at {given * 1e3:g} ms: 0x1017 is read-only in the EDS',
+            'remove the key, the period of the EDS counts',
+        )
+    return wanted
 
 
 def _heartbeat_consumer(
