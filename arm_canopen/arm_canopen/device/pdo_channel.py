@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 
 from ..exceptions import CodecError, SdoAbortError
-from ..standard.cob_id import CAN_ID_MASK, COB_ID_INVALID
+from ..standard.cob_id import CAN_ID_MASK, COB_ID_INVALID, RTR_FORBIDDEN
 from ..standard.datatypes import bit_length, Value
 from ..standard.dictionary import ObjectEntry
 from ..standard.objects import PDO_BITS_MAX
@@ -22,7 +22,6 @@ from ..standard.sdo_abort import AbortCode
 from .cob_id_rules import check_cob_id
 from .object_store import ObjectStore, refusal, Scalar, Variable
 
-RTR_FORBIDDEN = 0x4000_0000  # bit 30 of a TPDO's COB-ID
 TRANSMISSION_EVENT = (254, 255)
 INHIBIT_UNIT = 0.0001  # [s]
 MILLISECOND = 0.001  # [s]

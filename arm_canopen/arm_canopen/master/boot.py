@@ -9,7 +9,7 @@ import struct
 
 from ..config.model import Identity, PdoConfig, SdoWrite
 from ..exceptions import BootError, SdoAbortError, SdoError, SdoTimeoutError
-from ..standard.cob_id import COB_ID_INVALID
+from ..standard.cob_id import COB_ID_INVALID, RTR_FORBIDDEN
 from ..standard.nmt import NmtCommand
 from ..standard.objects import Index
 from .events import EventKind, Severity
@@ -106,6 +106,7 @@ class BootProcess:
         await self._check_identity(node.config.identity)
         # PDO parameters may only be written while the device does not process PDOs
         self._send_nmt(NmtCommand.ENTER_PRE_OPERATIONAL, node.config.node_id)
+        configured_at = self._scheduler.now
         for write in self._error_control_writes():
             await self._write(write)
         for pdo in node.config.rpdos:
@@ -114,14 +115,18 @@ class BootProcess:
             await self._configure(pdo, Index.TPDO_COMMUNICATION, Index.TPDO_MAPPING)
         for write in node.config.sdo_writes:
             await self._write(write)
+        # not waiting for the first heartbeat saves its period; its absence is noticed all the
+        # same, and only a device that once was without it has to show it first
+        if node.owes_heartbeat:
+            await self._await_heartbeat(configured_at)
         self._enter(BootPhase.STARTING)
         if self._start:
             self._send_nmt(NmtCommand.START, node.config.node_id)
-        # not waiting for the first heartbeat saves its period; its absence is noticed all the same
         node.go_online(self._scheduler.now)
         self._told = ''
         self._enter(BootPhase.OPERATIONAL)
-        node.report(EventKind.BOOT, Severity.INFO, 'operational')
+        started = 'operational' if self._start else 'configured; start_nodes is false in bus.yml'
+        node.report(EventKind.BOOT, Severity.INFO, started)
 
     async def _check_identity(self, expected: Identity) -> None:
         if expected.device_type:
@@ -143,15 +148,19 @@ class BootProcess:
 
     def _error_control_writes(self) -> Iterator[SdoWrite]:
         node = self._node.config
-        if (Index.PRODUCER_HEARTBEAT, 0) in node.dictionary:
+        if self._is_writable(Index.PRODUCER_HEARTBEAT, 0):
             period = round(node.heartbeat_producer * 1000)  # [ms]
             yield SdoWrite(Index.PRODUCER_HEARTBEAT, 0, struct.pack('<H', period))
-        if (Index.CONSUMER_HEARTBEAT, 1) in node.dictionary:
+        if self._is_writable(Index.CONSUMER_HEARTBEAT, 1):
             watched = (
                 round(self._master_heartbeat_timeout * 1000) if node.heartbeat_consumer else 0
             )
             entry = self._master_id << 16 | watched if watched else 0
             yield SdoWrite(Index.CONSUMER_HEARTBEAT, 1, struct.pack('<I', entry))
+
+    def _is_writable(self, index: int, subindex: int) -> bool:
+        entry = self._node.config.dictionary.get(index, subindex)
+        return entry is not None and entry.access.writable
 
     async def _configure(self, pdo: PdoConfig, communication: int, mapping: int) -> None:
         if not pdo.configured:
@@ -159,8 +168,23 @@ class BootProcess:
         # the identifier may not change while the PDO is valid, so it is disabled as it stands
         present = await self._read_u32(communication + pdo.number - 1, 1)
         await self._write(_u32(communication + pdo.number - 1, 1, present | COB_ID_INVALID))
-        for write in pdo_writes(pdo, communication, mapping):
+        # a device without remote frames refuses a COB-ID that allows them, so the bit is kept
+        rtr = present & RTR_FORBIDDEN if communication == Index.TPDO_COMMUNICATION else 0
+        for write in pdo_writes(pdo, communication, mapping, cob_id_flags=rtr):
             await self._write(write)
+
+    async def _await_heartbeat(self, since: float) -> None:
+        node = self._node
+        timeout = node.config.heartbeat_timeout
+        self._enter(BootPhase.ERROR_CONTROL)
+        try:
+            await self._scheduler.until(lambda: node.last_heartbeat > since, timeout)
+        except TimeoutError:
+            raise BootError(
+                f'{node.name} (node {node.config.node_id}) sent no heartbeat within '
+                f'{timeout * 1000:g} ms although 0x1017 was written; it is not started, because '
+                'its loss would go unnoticed: does it support heartbeat_producer?'
+            ) from None
 
     async def _write(self, write: SdoWrite) -> None:
         self._enter(BootPhase.CONFIGURING, f'0x{write.index:04X}:{write.subindex:02X}')
@@ -188,20 +212,23 @@ class BootProcess:
             self._node.report(EventKind.BOOT_FAILED, Severity.WARNING, text)
 
 
-def pdo_writes(pdo: PdoConfig, communication: int, mapping: int) -> Iterator[SdoWrite]:
+def pdo_writes(
+    pdo: PdoConfig, communication: int, mapping: int, *, cob_id_flags: int = 0
+) -> Iterator[SdoWrite]:
     """List the writes that configure a PDO which is disabled already (CiA 301, 7.5.2.36).
 
-    Parameters, clear the mapping, map, set the count, enable.
+    Parameters, clear the mapping, map, set the count, enable. A mapping that the device has for
+    ever is left alone.
 
     Args:
         pdo: The PDO.
         communication: Index of the first communication parameter (0x1400 or 0x1800).
         mapping: Index of the first mapping parameter (0x1600 or 0x1A00).
+        cob_id_flags: Bits of the COB-ID object beside the identifier.
     """
     if not pdo.enabled:
         return
     communication += pdo.number - 1
-    mapping += pdo.number - 1
     yield _u8(communication, 2, pdo.transmission)
     if pdo.inhibit_time is not None:
         yield _u16(communication, 3, round(pdo.inhibit_time * 10_000))  # [100 us]
@@ -209,11 +236,16 @@ def pdo_writes(pdo: PdoConfig, communication: int, mapping: int) -> Iterator[Sdo
         yield _u16(communication, 5, round(pdo.event_time * 1000))  # [ms]
     if pdo.sync_start is not None:
         yield _u8(communication, 6, pdo.sync_start)
-    yield _u8(mapping, 0, 0)
+    if not pdo.fixed_mapping:
+        yield from _mapping_writes(pdo, mapping + pdo.number - 1)
+    yield _u32(communication, 1, pdo.cob_id | cob_id_flags)
+
+
+def _mapping_writes(pdo: PdoConfig, index: int) -> Iterator[SdoWrite]:
+    yield _u8(index, 0, 0)
     for subindex, mapped in enumerate(pdo.mapping, start=1):
-        yield _u32(mapping, subindex, mapped.word)
-    yield _u8(mapping, 0, len(pdo.mapping))
-    yield _u32(communication, 1, pdo.cob_id)
+        yield _u32(index, subindex, mapped.word)
+    yield _u8(index, 0, len(pdo.mapping))
 
 
 def _u8(index: int, subindex: int, value: int) -> SdoWrite:

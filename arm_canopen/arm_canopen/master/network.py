@@ -103,8 +103,7 @@ class Network:
         self.scheduler.advance(now)
         for node in self.nodes.values():
             if node.heartbeat_overdue(now):
-                timeout = node.config.heartbeat_timeout * 1000  # [ms]
-                node.lost(f'heartbeat lost: none within its consumer time of {timeout:g} ms')
+                node.heartbeat_lost()
                 self._start_boot(node, announced=False)
 
     def cycle(self, now: float, period: float) -> None:

@@ -30,6 +30,7 @@ class BootPhase(Enum):
     WAITING = 'waiting for the device'
     IDENTITY = 'checking its identity'
     CONFIGURING = 'configuring'
+    ERROR_CONTROL = 'waiting for its heartbeat'
     STARTING = 'starting'
     OPERATIONAL = 'operational'
     FAILED = 'failed'
@@ -82,6 +83,8 @@ class RemoteNode:
         online: Booted, and not lost since.
         left_operational: Online, but somebody stopped it or sent it to pre-operational.
         last_heartbeat: Steady time of the last heartbeat in [s].
+        owes_heartbeat: It was started and never sent a heartbeat, though it is supervised; it has
+            to show one before it is started again.
         last_emergency: Last EMCY that was no reset, None when the device reported its end.
         missed_pdos: TPDOs that did not answer a SYNC.
     """
@@ -118,11 +121,13 @@ class RemoteNode:
         self.online = False
         self.left_operational = False
         self.last_heartbeat = 0.0
+        self.owes_heartbeat = False
         self.last_emergency: Emergency | None = None
         self.missed_pdos = 0
         self.on_boot_up: Callable[[], None] = lambda: None
         self.on_lost: Callable[[str], None] = lambda reason: None  # its driver stops
         self._supervised = False
+        self._online_since = 0.0
         self._scheduler = scheduler
         self._report = report
         self._polled: dict[tuple[int, int], BackgroundReader] = {}
@@ -166,6 +171,7 @@ class RemoteNode:
             severity = Severity.WARNING if self.left_operational else Severity.INFO
             self.report(EventKind.NMT_STATE, severity, f'NMT state {state.name}')
         if state is NmtState.BOOT_UP:
+            self.last_emergency = None  # whatever it was, it ended with the restart
             self.on_boot_up()
 
     def receive_emergency(self, frame: Frame) -> None:
@@ -192,10 +198,18 @@ class RemoteNode:
         self.online = True
         self._supervised = self.config.heartbeat_timeout > 0
         self.last_heartbeat = now
+        self.owes_heartbeat = False
+        self._online_since = now
 
     def heartbeat_overdue(self, now: float) -> bool:
         """Tell whether a supervised heartbeat did not come within its consumer time."""
         return self._supervised and now - self.last_heartbeat > self.config.heartbeat_timeout
+
+    def heartbeat_lost(self) -> None:
+        """Its heartbeat is overdue: it counts as gone."""
+        timeout = self.config.heartbeat_timeout * 1000  # [ms]
+        self.owes_heartbeat = self.last_heartbeat <= self._online_since
+        self.lost(f'heartbeat lost: none within its consumer time of {timeout:g} ms')
 
     def lost(self, reason: str) -> None:
         """The device is gone: forget what it said and tell whoever drives it."""

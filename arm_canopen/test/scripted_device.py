@@ -1,0 +1,117 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""A device that boots as a test wants it to: it answers, refuses, lies or keeps silent.
+
+It knows nothing of the package's device; its SDO server is the one made from the byte tables.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from sdo_byte_server import SdoByteServer
+
+from arm_canopen.can.frame import Frame
+from arm_canopen.standard.nmt import NmtState
+
+START, STOP, PRE_OPERATIONAL, RESET_NODE, RESET_COMMUNICATION = 0x01, 0x02, 0x80, 0x81, 0x82
+STATES = {
+    START: NmtState.OPERATIONAL,
+    STOP: NmtState.STOPPED,
+    PRE_OPERATIONAL: NmtState.PRE_OPERATIONAL,
+}
+MILLISECOND = 0.001  # [s]
+
+
+@dataclass
+class ScriptedDevice:
+    """A device; it has every object that is written, and those of ``values``.
+
+    Attributes:
+        node_id: Its node id.
+        send: Takes its frames.
+        values: Its objects.
+        refuses: Abort codes by index and sub-index.
+        announces: It sends a boot-up message after a reset.
+        answers: It answers SDOs.
+        beats: It sends heartbeats when 0x1017 says so.
+        answer_time: How long it thinks about an SDO in [s].
+        state: Its NMT state.
+        commands: NMT commands that it got.
+        writes: What was written by expedited downloads, as index, sub-index and number.
+        on_request: Called with each SDO request before it is answered.
+    """
+
+    node_id: int
+    send: Callable[[Frame], None]
+    values: dict[tuple[int, int], bytes] = field(default_factory=dict)
+    refuses: dict[tuple[int, int], int] = field(default_factory=dict)
+    announces: bool = True
+    answers: bool = True
+    beats: bool = True
+    answer_time: float = 0.0005
+    state: NmtState = NmtState.PRE_OPERATIONAL
+    commands: list[int] = field(default_factory=list)
+    writes: list[tuple[int, int, int]] = field(default_factory=list)
+    on_request: Callable[[bytes], None] = lambda request: None
+    _answers_due: list[tuple[float, bytes]] = field(default_factory=list)
+    _beat_due: float | None = None
+
+    def __post_init__(self) -> None:
+        """Make the server."""
+        self._server = SdoByteServer(values=self.values, refuses=self.refuses)
+
+    def restart(self, now: float) -> None:
+        """Start anew, as after a reset or a power cut."""
+        self.state = NmtState.PRE_OPERATIONAL
+        self._answers_due.clear()
+        self._beat_due = None
+        self.writes.clear()
+        if self.announces:
+            self.send(Frame(0x700 + self.node_id, b'\0'))
+
+    def receive(self, frame: Frame, now: float) -> None:
+        """Obey NMT commands and take SDO requests."""
+        if frame.can_id == 0x000 and frame.data[1] in (0, self.node_id):
+            self.commands.append(frame.data[0])
+            if frame.data[0] in STATES:
+                self.state = STATES[frame.data[0]]
+            else:
+                self.restart(now)
+        elif frame.can_id == 0x600 + self.node_id and self.answers:
+            self.on_request(frame.data)
+            self._note_write(frame.data, now)
+            answer = self._server.answer(frame.data)
+            if answer is not None:
+                self._answers_due.append((now + self.answer_time, answer))
+
+    def advance(self, now: float) -> None:
+        """Answer, and beat."""
+        while self._answers_due and self._answers_due[0][0] <= now:
+            self.send(Frame(0x580 + self.node_id, self._answers_due.pop(0)[1]))
+        if self._beat_due is not None and self._beat_due <= now:
+            self._beat_due = now + self._period
+            self.send(Frame(0x700 + self.node_id, bytes((self.state,))))
+
+    def next_deadline(self) -> float | None:
+        """Return when it wants to send in [s]."""
+        dues = [due for due, _ in self._answers_due[:1]]
+        dues += [self._beat_due] if self._beat_due is not None else []
+        return min(dues, default=None)
+
+    @property
+    def _period(self) -> float:
+        return int.from_bytes(self.values.get((0x1017, 0), b''), 'little') * MILLISECOND
+
+    def _note_write(self, request: bytes, now: float) -> None:
+        if request[0] >> 5 != 1 or not request[0] & 2:
+            return
+        index, subindex = int.from_bytes(request[1:3], 'little'), request[3]
+        if (index, subindex) in self.refuses:
+            return
+        size = 4 - (request[0] >> 2 & 3)
+        value = int.from_bytes(request[4 : 4 + size], 'little')
+        self.writes.append((index, subindex, value))
+        if (index, subindex) == (0x1017, 0):
+            self._beat_due = now + value * MILLISECOND if value and self.beats else None
