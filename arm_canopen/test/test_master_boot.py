@@ -347,8 +347,8 @@ def test_a_restart_in_the_middle_of_a_boot_starts_it_again(after: int) -> None:
     assert restarted
     undisturbed = Scene()
     undisturbed.boot()
-    count = len(undisturbed.device.writes)
-    assert scene.device.writes[-count:] == undisturbed.device.writes
+    expected = [write[:2] for write in undisturbed.device.writes]
+    assert [write[:2] for write in scene.device.writes][-len(expected) :] == expected
     assert scene.device.state is NmtState.OPERATIONAL
     assert scene.told(EventKind.BOOT_FAILED) == []
     assert scene.node.online
