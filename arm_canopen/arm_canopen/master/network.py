@@ -92,6 +92,7 @@ class Network:
     def receive(self, frame: Frame) -> None:
         """Take a frame from the bus."""
         self.on_frame(frame)
+        self.scheduler.set_time(frame.timestamp)
         handler = self._handlers.get(frame.can_id)
         if handler is None or frame.is_extended or frame.is_remote or frame.is_error:
             self.unknown_frames += 1
@@ -202,7 +203,9 @@ class Network:
         """Send the master's heartbeat from the cycle, so that a hung cycle stops it."""
         period = self.config.master.heartbeat_producer
         if period > 0 and now >= self._next_heartbeat:
-            self._next_heartbeat = max(self._next_heartbeat + period, now)
+            # after a pause the series begins anew, so that no heartbeats crowd
+            due = self._next_heartbeat + period
+            self._next_heartbeat = due if due > now else now + period
             node_id = self.config.master.node_id
             self.send(Frame(CobId.HEARTBEAT + node_id, bytes((NmtState.OPERATIONAL,))))
 

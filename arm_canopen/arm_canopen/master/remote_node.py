@@ -10,7 +10,7 @@ from functools import partial
 
 from ..can.frame import Frame
 from ..config.model import NodeConfig
-from ..exceptions import CodecError, SdoError
+from ..exceptions import CodecError, SdoAbortError, SdoError
 from ..standard.datatypes import decode, encode, Value
 from ..standard.dictionary import ObjectEntry
 from ..standard.emcy import Emergency
@@ -52,6 +52,7 @@ class BackgroundWriter:
         self._node = node
         self._address = (index, subindex)
         self._written: Number | None = None
+        self._failing = False
 
     def write(self, value: Number) -> None:
         """Queue the write unless this is the value that was written last."""
@@ -63,10 +64,15 @@ class BackgroundWriter:
     def forget(self) -> None:
         """The device restarted: write again whatever comes."""
         self._written = None
+        self._failing = False
 
     def _check(self, promise: Promise[None]) -> None:
-        if promise.error is not None:
-            self._written = None
+        failing, self._failing = self._failing, promise.error is not None
+        if promise.error is None or not self._node.online:
+            return
+        if not isinstance(promise.error, SdoAbortError):
+            self._written = None  # it did not arrive; a value that was refused is not repeated
+        if not failing:
             self._node.report(EventKind.PDO, Severity.WARNING, str(promise.error))
 
 
@@ -249,10 +255,12 @@ class RemoteNode:
     async def poll(self, period: float) -> None:
         """Keep the objects that no TPDO carries up to date while the device is online."""
         while self._polled and self.online:
-            for address, entry in self._polled.items():
+            for address, entry in list(self._polled.items()):
                 try:
                     value = await self.read_object(*address)
                 except (SdoError, CodecError):
+                    if not self.online:
+                        return
                     continue  # the SDO counters show it; the value stays as old as it is
                 entry.value = value if isinstance(value, (int, float)) else None
             await self._scheduler.timer(period)

@@ -153,6 +153,7 @@ class NetworkThread:
 
     def _take(self, frames: list[Frame]) -> None:
         receive = self.network.receive
+        self.network.scheduler.set_time(time.monotonic())
         for frame in frames:
             receive(frame)
         while self._work:

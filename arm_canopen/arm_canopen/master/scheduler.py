@@ -143,11 +143,15 @@ class Scheduler:
 
     def advance(self, now: float) -> None:
         """Set the time and resume what waited for it, or for a condition that now holds."""
-        self.now = max(self.now, now)
+        self.set_time(now)
         while self._timers and self._timers[0][0] <= self.now:
             heapq.heappop(self._timers)[2].resolve(None)
         if self._conditions:
             self._check_conditions()
+
+    def set_time(self, now: float) -> None:
+        """Set the time without resuming anybody, so that what is begun now is timed from now."""
+        self.now = max(self.now, now)
 
     def next_deadline(self) -> float | None:
         """Return the time of the next timer in [s], None when there is none."""
