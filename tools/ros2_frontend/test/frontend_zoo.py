@@ -21,6 +21,9 @@ from std_srvs.srv import SetBool, Trigger
 LATCHED = QoSProfile(  # type: ignore[no-untyped-call]
     depth=1, durability=QoSDurabilityPolicy.TRANSIENT_LOCAL
 )
+KEPT = QoSProfile(  # type: ignore[no-untyped-call]
+    depth=10, durability=QoSDurabilityPolicy.TRANSIENT_LOCAL
+)
 BEST_EFFORT = QoSProfile(  # type: ignore[no-untyped-call]
     depth=1, reliability=QoSReliabilityPolicy.BEST_EFFORT
 )
@@ -41,8 +44,9 @@ class Talker(Node):
         self._latched = self.create_publisher(String, 'latched', LATCHED)
         self._latched.publish(String(data='kept'))
         self.create_timer(0.02, self._publish)
-        self.create_subscription(String, 'listener/input', self._hear, 10)
-        self.create_subscription(JointState, 'listener/stamped', self._hear_stamped, 10)
+        # keeps what comes while it is being connected, so that the tests need no luck
+        self.create_subscription(String, 'listener/input', self._hear, KEPT)
+        self.create_subscription(JointState, 'listener/stamped', self._hear_stamped, KEPT)
         self.create_service(Trigger, 'trigger', self._trigger)
         self.create_service(Trigger, 'last_heard', self._tell_heard)
         self.create_service(SetBool, 'set_bool', self._set_bool)
@@ -61,7 +65,7 @@ class Talker(Node):
         self._heard += message.data + ';'
 
     def _hear_stamped(self, message: JointState) -> None:
-        self._heard = f'stamp {message.header.stamp.sec}'
+        self._heard += f'stamp {message.header.stamp.sec};'
 
     def _trigger(self, _: Any, response: Any) -> Any:
         response.success, response.message = True, 'done'
@@ -69,7 +73,6 @@ class Talker(Node):
 
     def _tell_heard(self, _: Any, response: Any) -> Any:
         response.success, response.message = True, self._heard
-        self._heard = ''
         return response
 
     def _set_bool(self, request: Any, response: Any) -> Any:

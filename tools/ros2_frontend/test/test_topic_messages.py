@@ -4,8 +4,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 import re
+import time
 
 from frontend_cli import PROGRAM, Ros2
 from processes import RunningProcess
@@ -90,34 +91,74 @@ def test_echo_of_what_is_not_there(
     assert outcome.err.startswith(problem), outcome.err
 
 
-def test_pub_once_reaches_the_subscription(ros2: Ros2) -> None:
-    """It waits for the subscription to match, so that the one message is not lost."""
-    words = ('topic', 'pub', '--once', '/listener/input', 'std_msgs/msg/String', '{data: foo}')
-    lines = ros2(*words).lines
-    while lines[0].startswith('Waiting for at least 1 matching subscription(s)...'):
-        del lines[0]
-    assert lines == [
-        'publisher: beginning loop',
-        "publishing #1: std_msgs.msg.String(data='foo')",
-        '',
-    ]
-    assert "message='foo;'" in ros2('service', 'call', '/last_heard', 'std_srvs/srv/Trigger').out
+@pytest.fixture
+def heard(ros2: Ros2) -> Callable[[str], None]:
+    """Wait until the listener has heard something."""
+
+    def wait(text: str) -> None:
+        deadline = time.monotonic() + 20.0
+        while text not in (
+            answer := ros2('service', 'call', '/last_heard', 'std_srvs/Trigger').out
+        ):
+            assert time.monotonic() < deadline, answer
+
+    return wait
 
 
-def test_pub_counts_and_prints_every_nth(ros2: Ros2) -> None:
+def publish(zoo: Mapping[str, str], *words: str) -> RunningProcess:
+    """Publish with a QoS and a life that give the listener all the time it needs."""
+    qos = ('--qos-durability', 'transient_local', '--keep-alive', '60')
+    return RunningProcess([*PROGRAM, 'topic', 'pub', *qos, *words], zoo)
+
+
+def test_pub_once_waits_for_the_subscription(
+    zoo: Mapping[str, str], heard: Callable[[str], None]
+) -> None:
+    """It begins when the subscription matches, and says what it sends."""
+    words = ('--once', '/listener/input', 'std_msgs/msg/String', '{data: foo}')
+    with publish(zoo, *words) as process:
+        process.wait_for('^publisher: beginning loop$')
+        process.wait_for(r"^publishing #1: std_msgs\.msg\.String\(data='foo'\)$")
+        heard('foo;')
+        assert process.stop() == 2
+        assert not any('#2' in line for line in process.lines)
+
+
+def test_pub_counts_and_prints_every_nth(
+    zoo: Mapping[str, str], heard: Callable[[str], None]
+) -> None:
     """Four messages, every second is printed."""
     words = ('-t', '4', '-p', '2', '-r', '100', '/listener/input', 'std_msgs/String', 'data: a')
-    printed = [line for line in ros2('topic', 'pub', *words).lines if '#' in line]
-    assert [line.split()[1] for line in printed] == ['#2:', '#4:']
-    assert "message='a;a;a;a;'" in ros2('service', 'call', '/last_heard', 'std_srvs/Trigger').out
+    with publish(zoo, *words) as process:
+        heard('a;a;a;a;')
+        printed = [line.split()[1] for line in process.lines if '#' in line]
+        assert printed == ['#2:', '#4:']
 
 
-def test_pub_stamps_at_the_moment_of_sending(ros2: Ros2) -> None:
-    """`header: auto` arrives with a time."""
+def test_pub_stamps_at_the_moment_of_sending(
+    zoo: Mapping[str, str], heard: Callable[[str], None]
+) -> None:
+    """`header: auto` arrives with the time that is printed."""
     words = ('--once', '/listener/stamped', 'sensor_msgs/msg/JointState', '{header: auto}')
-    assert re.search(r'Time\(sec=[1-9]\d+', ros2('topic', 'pub', *words).out)
-    answer = ros2('service', 'call', '/last_heard', 'std_srvs/srv/Trigger').out
-    assert re.search(r"message='stamp [1-9]\d+'", answer)
+    with publish(zoo, *words) as process:
+        line = process.wait_for(r'Time\(sec=[1-9]\d+')
+        heard(f'stamp {line.split("Time(sec=")[1].split(",")[0]};')
+
+
+def test_pub_once_ends_by_itself(ros2: Ros2) -> None:
+    """Exit code 0 after the message."""
+    words = ('/listener/input', 'std_msgs/msg/String', '{data: end}')
+    outcome = ros2('topic', 'pub', '--once', '--qos-durability', 'transient_local', *words)
+    assert (outcome.code, outcome.err) == (0, '')
+    assert outcome.lines[-2:] == ["publishing #1: std_msgs.msg.String(data='end')", '']
+
+
+def test_pub_says_when_qos_does_not_fit(zoo: Mapping[str, str]) -> None:
+    """The listener wants what was sent before it came; a volatile publisher never matches."""
+    words = [*PROGRAM, 'topic', 'pub', '--once', '/listener/input', 'std_msgs/msg/String']
+    with RunningProcess(words, zoo) as process:
+        process.wait_for('requesting incompatible QoS.*DURABILITY')
+        assert process.stop() == 2
 
 
 def test_pub_until_interrupted(zoo: Mapping[str, str]) -> None:

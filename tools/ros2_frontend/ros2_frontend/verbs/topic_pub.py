@@ -24,8 +24,6 @@ from .topic_types import message_class
 
 _REMINDER = 1.0  # [s] between two lines that say what is waited for
 _KEEP_ALIVE = 0.1  # [s]
-_ACKNOWLEDGEMENT_TIMEOUT = 4.0  # [s]; heartbeats come every 3 s
-_ACKNOWLEDGEMENT_POLL = 0.1  # [s]; Python sees Ctrl-C between two waits
 
 
 class Pub:
@@ -81,7 +79,7 @@ class Pub:
             wanted = (1 if times else 0) if args.wait is None else args.wait
             graph = Graph(session, args.spin_time)
             if wanted:
-                _await_subscriptions(graph, publisher, wanted, args.max_wait_time_secs)
+                _await_subscriptions(session, graph, publisher, wanted, args.max_wait_time_secs)
             else:
                 graph.settle()  # who is there already hears the first message, too
             print('publisher: beginning loop')
@@ -91,7 +89,6 @@ class Pub:
                     print(f'publishing #{count}: {message!r}\n')
                 publisher.publish(message)
             session.spin_until(lambda: False, args.keep_alive)
-            _await_acknowledgement(publisher)
 
 
 def _add_content(parser: ArgumentParser) -> None:
@@ -154,12 +151,13 @@ def _add_repetition(parser: ArgumentParser) -> None:
 
 
 def _await_subscriptions(
-    graph: Graph, publisher: Handle, wanted: int, longest: float | None
+    session: Session, graph: Graph, publisher: Handle, wanted: int, longest: float | None
 ) -> None:
     """Wait for subscriptions, with a line each second that says so."""
     deadline = time.monotonic() + (math.inf if longest is None else longest)
 
     def enough() -> bool | None:
+        session.spin_once(0.0)  # rclpy warns of subscriptions whose QoS does not fit
         return publisher.get_subscription_count() >= wanted or None
 
     while not enough():
@@ -171,20 +169,6 @@ def _await_subscriptions(
             )
         print(f'Waiting for at least {wanted} matching subscription(s)...')
         graph.wait_until(enough, min(_REMINDER, left))
-
-
-def _await_acknowledgement(publisher: Handle) -> None:
-    """Wait until reliable subscriptions have all messages.
-
-    A subscription that is just being connected takes no messages yet; what it missed is sent
-    again with the next heartbeat.
-    """
-    from rclpy.duration import Duration
-
-    deadline = time.monotonic() + _ACKNOWLEDGEMENT_TIMEOUT
-    while time.monotonic() < deadline:
-        if publisher.wait_for_all_acked(Duration(seconds=_ACKNOWLEDGEMENT_POLL)):
-            return
 
 
 def _paced(session: Session, times: int, period: float) -> Iterator[int]:
