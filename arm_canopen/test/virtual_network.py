@@ -167,11 +167,13 @@ class VirtualWire:
     Attributes:
         log: Every frame that was sent, also those that got lost.
         loses: Tells of a frame and its sender whether it gets lost.
+        alters: Gives what arrives of a frame of a sender.
         refuses: Why the interface of the master takes no frames, empty while it does.
     """
 
     log: list[Sent] = field(default_factory=list)
     loses: Callable[[str, Frame], bool] = lambda sender, frame: False
+    alters: Callable[[str, Frame], Frame] = lambda sender, frame: frame
     refuses: str = ''
     _way: deque[tuple[float, str, Frame]] = field(default_factory=deque)
     _free_at: float = 0.0
@@ -183,7 +185,7 @@ class VirtualWire:
         self.log.append(Sent(now, sender, checked(frame)))
         self._free_at = max(now, self._free_at) + FRAME_TIME
         if not self.loses(sender, frame):
-            self._way.append((self._free_at, sender, frame))
+            self._way.append((self._free_at, sender, self.alters(sender, frame)))
 
     @property
     def next_arrival(self) -> float:

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from ..exceptions import CodecError, DriveError, SdoError
 from ..master.events import EventKind, Severity
 from ..master.remote_node import RemoteNode
-from ..master.scheduler import Scheduler
+from ..master.scheduler import Scheduler, Task
 from ..standard.drive import (
     DriveState,
     mode_title,
@@ -34,6 +34,7 @@ from .parameters import DriveParameters, read_parameters
 from .state_machine import Command, fault_reset, next_command
 from .units import Units
 
+ASK_AGAIN = 1.0  # [s] after which a drive is asked again for what it did not answer
 FAULTY = (DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE)
 
 
@@ -79,6 +80,7 @@ class Drive:
         self._controlword = 0
         self._asked = False
         self._answered = False
+        self._background: list[Task[None]] = []
         node.on_lost = self._on_lost
 
     @property
@@ -154,10 +156,12 @@ class Drive:
             phase = self.node.phase.value
             detail = f' ({self.node.phase_detail})' if self.node.phase_detail else ''
             return f'offline: {phase}{detail}'
-        parts = [
-            statusword_text(self.objects.statusword),
-            f'mode {mode_title(self.objects.mode_display)}',
-        ]
+        parts = ['no statusword yet']
+        if self.objects.known:
+            parts = [
+                statusword_text(self.objects.statusword),
+                f'mode {mode_title(self.objects.mode_display)}',
+            ]
         if self.error:
             parts.append(f'error {self.error}')
         if self.node.last_emergency is not None:
@@ -168,10 +172,11 @@ class Drive:
 
     def read(self) -> None:
         """Take the state from the process image."""
-        if self.node.online and not self._asked:
+        if self.node.operational and not self._asked:
             self._asked = True
-            self._scheduler.background(self._ask())
-        if not self.node.online or not self.objects.known:
+            poll = self.node.poll(self.node.config.poll_period)
+            self._background = [self._scheduler.background(work) for work in (self._ask(), poll)]
+        if not self.node.operational or not self.objects.known:
             self.state = DriveState.UNKNOWN
             return
         before, self.state = self.state, self.objects.state
@@ -221,9 +226,16 @@ class Drive:
             )
 
     async def _ask(self) -> None:
-        self._scheduler.background(self.node.poll(self.node.config.poll_period))
-        self.parameters = await read_parameters(self.node, self.units)
-        self._answered = True
+        told = False
+        while not self._answered:
+            try:
+                self.parameters = await read_parameters(self.node, self.units)
+                self._answered = True
+            except SdoError as error:
+                if not told:
+                    self._warn(f'its parameters are unknown, so it takes no commands: {error}')
+                told = True
+                await self._scheduler.timer(ASK_AGAIN)
 
     async def know_error(self) -> None:
         """Read 0x603F, so that the answer can say what is wrong."""
@@ -265,9 +277,12 @@ class Drive:
         self.report(Severity.ERROR, f'FAULT: {self.describe()}; call ~/recover')
 
     def _on_lost(self, reason: str) -> None:
+        for task in self._background:
+            task.cancel(SdoError(reason))
         self.goal = None
         self.resetting = False
         self._asked = self._answered = False
+        self.error = ''
         self.state = DriveState.UNKNOWN
         self.mode = self.modes[OperationMode.NO_MODE]
         self.released(reason)

@@ -18,6 +18,7 @@ READY_TIMEOUT = 2.0  # [s] from operational to the first PDOs and parameters
 STATE_TIMEOUT = 5.0  # [s] for all steps to a state, as ros2_canopen has it
 MODE_TIMEOUT = 5.0  # [s] for 0x6061 to follow 0x6060
 STOP_TIMEOUT = 2.0  # [s] to come to rest when leaving
+REST_SHARE = 0.01  # share of the profile velocity below which an axis counts as standing
 HOMING_START = 0.1  # [s] after which a drive has overwritten the homing bits of the last time
 
 
@@ -165,19 +166,30 @@ class DriveCommands:
 
     async def _ready(self) -> None:
         drive = self.drive
-        if not drive.node.online:
-            raise DriveError(f'{drive.name} is {drive.describe()}')
+        self._require_operational()
         try:
             await self._scheduler.until(
-                lambda: drive.ready or not drive.node.online, READY_TIMEOUT
+                lambda: drive.ready or not drive.node.operational, READY_TIMEOUT
             )
         except TimeoutError:
-            raise DriveError(
+            raise DriveError(self._why_not_ready()) from None
+        self._require_operational()
+
+    def _require_operational(self) -> None:
+        if not self.drive.node.operational:
+            raise DriveError(f'{self.drive.name} is not operational: {self.drive.describe()}')
+
+    def _why_not_ready(self) -> str:
+        drive = self.drive
+        if drive.state is DriveState.UNKNOWN:
+            return (
                 f'{drive.name} is operational, but its statusword, mode and position have not '
                 'come; do its TPDOs follow SYNC, and does the bus.yml have a sync_period?'
-            ) from None
-        if not drive.node.online:
-            raise DriveError(f'{drive.name} is {drive.describe()}')
+            )
+        return (
+            f'{drive.name} has not answered the SDOs for its parameters (modes 0x6502, limits '
+            f'0x607D, profile 0x6081): {drive.describe()}'
+        )
 
     async def _reach(self, goal: DriveState) -> None:
         self.drive.goal = goal
@@ -272,7 +284,9 @@ class DriveCommands:
 
     def _moves_in_quick_stop(self) -> bool:
         drive = self.drive
-        return drive.state is DriveState.QUICK_STOP_ACTIVE and drive.objects.velocity != 0
+        # a real encoder is never quite still, so slow enough counts as rest
+        slow = REST_SHARE * drive.parameters.profile.velocity
+        return drive.state is DriveState.QUICK_STOP_ACTIVE and abs(drive.velocity) > slow
 
     def _require_no_fault(self) -> None:
         if self.drive.state in FAULTY:

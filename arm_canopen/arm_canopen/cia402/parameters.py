@@ -6,13 +6,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..exceptions import CodecError, SdoError
+from ..exceptions import CodecError, SdoAbortError
 from ..master.remote_node import RemoteNode
 from ..standard.drive import OperationMode
 from ..standard.objects import Index
 from .setpoint_profile import ProfileLimits
 from .units import Units
 
+READ_TIMEOUT = 0.5  # [s] nothing waits for these answers, so a slow device has its time
 DEFAULT_VELOCITY = 0.5  # [unit/s] for drives without 0x6081: slow, but moving
 DEFAULT_ACCELERATION = 1.0  # [unit/s^2] for drives without 0x6083
 DEFAULT_PROFILE = ProfileLimits(DEFAULT_VELOCITY, DEFAULT_ACCELERATION, DEFAULT_ACCELERATION)
@@ -40,7 +41,12 @@ class DriveParameters:
 
 
 async def read_parameters(node: RemoteNode, units: Units) -> DriveParameters:
-    """Ask the drive for everything that its EDS knows of these objects."""
+    """Ask the drive for everything that its EDS knows of these objects.
+
+    Raises:
+        SdoError: The drive does not answer. Its limits are then unknown, which is not the same as
+            that it has none.
+    """
     modes = await _read(node, Index.SUPPORTED_MODES)
     method = await _read(node, Index.HOMING_METHOD)
     lower = await _read(node, Index.SOFTWARE_POSITION_LIMIT, 1)
@@ -73,7 +79,7 @@ async def _read(node: RemoteNode, index: int, subindex: int = 0) -> int | None:
     if entry is None or not entry.access.readable:
         return None
     try:
-        value = await node.read_object(index, subindex)
-    except (SdoError, CodecError):
+        value = await node.read_object(index, subindex, timeout=READ_TIMEOUT)
+    except (SdoAbortError, CodecError):
         return None  # a drive may lack what its EDS promises; the default stands
     return value if isinstance(value, int) else None

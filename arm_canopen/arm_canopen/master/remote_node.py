@@ -141,6 +141,11 @@ class RemoteNode:
         self._every_sync = [entry for entry in self.image.inputs if entry.every_sync]
 
     @property
+    def operational(self) -> bool:
+        """Online, and nobody stopped it or sent it to pre-operational."""
+        return self.online and not self.left_operational
+
+    @property
     def name(self) -> str:
         """Name in bus.yml."""
         return self.config.name
@@ -168,17 +173,26 @@ class RemoteNode:
             return
         self.last_heartbeat = frame.timestamp
         if state is not self.nmt_state:
-            self.left_operational = (
-                self.online
-                and state is not NmtState.OPERATIONAL
-                and (self.left_operational or self.nmt_state is NmtState.OPERATIONAL)
-            )
-            self.nmt_state = state
-            severity = Severity.WARNING if self.left_operational else Severity.INFO
-            self.report(EventKind.NMT_STATE, severity, f'NMT state {state.name}')
+            self._nmt_state_changed(state)
         if state is NmtState.BOOT_UP:
             self.last_emergency = None  # whatever it was, it ended with the restart
             self.on_boot_up()
+
+    def _nmt_state_changed(self, state: NmtState) -> None:
+        before, self.nmt_state = self.nmt_state, state
+        left_before = self.left_operational
+        self.left_operational = (
+            self.online
+            and state is not NmtState.OPERATIONAL
+            and (left_before or before is NmtState.OPERATIONAL)
+        )
+        severity = Severity.WARNING if self.left_operational else Severity.INFO
+        self.report(EventKind.NMT_STATE, severity, f'NMT state {state.name}')
+        if self.left_operational and not left_before and state is not NmtState.BOOT_UP:
+            # it hears no PDO any more: what it said before is no longer true, and whoever drives
+            # it must not go on as if it followed
+            self.image.clear()
+            self.on_lost(f'somebody sent it to NMT state {state.name}')
 
     def receive_emergency(self, frame: Frame) -> None:
         """Take an EMCY message."""
@@ -221,8 +235,9 @@ class RemoteNode:
         """The device is gone: forget what it said and tell whoever drives it."""
         self.report(EventKind.HEARTBEAT_LOST, Severity.ERROR, reason)
         self.nmt_state = None
+        self.online = False
+        self.on_lost(reason)  # first, so that nobody asks the device again when its SDOs end
         self.offline(reason)
-        self.on_lost(reason)
 
     def offline(self, reason: str) -> None:
         """Stop talking to the device until it is booted again."""
@@ -280,17 +295,23 @@ class RemoteNode:
             )
         return entry
 
-    async def read_object(self, index: int, subindex: int = 0) -> Value:
+    async def read_object(
+        self, index: int, subindex: int = 0, *, timeout: float | None = None
+    ) -> Value:
         """Read an object by SDO and decode it by its type in the EDS.
+
+        Args:
+            index: Object index.
+            subindex: Sub-index.
+            timeout: How long each answer may take in [s]; by default what bus.yml says.
 
         Raises:
             SdoError: The device did not answer or aborted, or the EDS does not know the object.
             CodecError: The answer does not fit the type.
         """
         entry = self.entry(index, subindex)
-        return decode(
-            entry.data_type, await self.sdo.read(index, subindex, self.config.sdo_timeout)
-        )
+        patience = self.config.sdo_timeout if timeout is None else timeout
+        return decode(entry.data_type, await self.sdo.read(index, subindex, patience))
 
     def write_object(self, index: int, subindex: int, value: Value) -> Promise[None]:
         """Write an object by SDO, encoded by its type in the EDS; errors reject the promise."""
