@@ -35,11 +35,14 @@ Goal finished with status: SUCCEEDED
 
 
 @pytest.fixture(scope='module')
-def counter(pytestconfig: pytest.Config) -> Iterator[tuple[RunningProcess, Mapping[str, str]]]:
+def counter(
+    pytestconfig: pytest.Config, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[tuple[RunningProcess, Mapping[str, str]]]:
     """Start the action server in a domain of its own."""
-    cache = pytestconfig.cache
-    assert cache is not None
-    prefix = build(Path(cache.mkdir('frontend_test_msgs')))
+    cache = getattr(pytestconfig, 'cache', None)  # not there with `-p no:cacheprovider`
+    prefix = build(
+        cache.mkdir('frontend_test_msgs') if cache else tmp_path_factory.mktemp('cmake')
+    )
     program = str(Path(__file__).with_name('frontend_counter.py'))
     with reserve() as isolation:
         env = with_package(prefix, with_frontend(isolation.env))
@@ -62,14 +65,11 @@ def run(counter: tuple[RunningProcess, Mapping[str, str]]) -> Ros2:
 
 
 def test_list_info_and_type(run: Ros2) -> None:
-    """The action, who offers it, and its type; a slip is answered with the nearest name."""
+    """The action, who offers it, and its type."""
     assert run('action', 'list', '-t').out == f'/count [{TYPE}]\n'
     info = 'Action: /count\nAction clients: 0\nAction servers: 1\n'
     assert run('action', 'info', '/count', '-t').out == f'{info}    /counter [{TYPE}]\n'
-    assert run('action', 'info', '/count', '-c').out == info
-    slip = run('action', 'type', '/cont')
-    assert (slip.code, slip.out) == (1, '')
-    assert "'/count'" in slip.err
+    assert run('action', 'type', '/count').out == f'{TYPE}\n'
 
 
 def test_node_info_names_actions(run: Ros2) -> None:
@@ -97,7 +97,7 @@ def test_goals_that_do_not_succeed(run: Ros2) -> None:
     """A rejected and an aborted goal are told, with exit code 0, as ros2cli."""
     rejected = run('action', 'send_goal', '/count', TYPE, '{order: -1}')
     assert (rejected.code, rejected.out.splitlines()[-1]) == (0, 'Goal was rejected.')
-    aborted = run('action', 'send_goal', '/count', TYPE)
+    aborted = run('action', 'send_goal', '/count', TYPE)  # without YAML: order 0
     assert (aborted.code, aborted.out.splitlines()[-1]) == (
         0,
         'Goal finished with status: ABORTED',

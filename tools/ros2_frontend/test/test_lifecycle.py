@@ -56,7 +56,7 @@ def test_a_transition_that_is_not_possible(ros2: Ros2) -> None:
     'words', [('get', '/machin'), ('set', '/machin', '1'), ('list', '/machin')]
 )
 def test_a_node_that_is_not_there(ros2: Ros2, words: tuple[str, ...]) -> None:
-    """The sentence of ros2cli and the nearest name."""
-    outcome = ros2('lifecycle', *words)
-    assert outcome.code == 1
-    assert outcome.err == "Node not found\nDid you mean '/machine'?\n"
+    """The sentence of ros2cli."""
+    outcome = ros2('lifecycle', *words, '--spin-time', '0.2')
+    assert (outcome.code, outcome.out) == (1, '')
+    assert outcome.err.startswith('Node not found\n')
