@@ -76,6 +76,7 @@ class Drive:
         self.resetting = False
         self.modes = self._build_modes()
         self.mode: Mode = self.modes[OperationMode.NO_MODE]
+        self._cyclic_modes = [m for m in self.modes.values() if isinstance(m, CyclicPosition)]
         self._scheduler = scheduler
         self._controlword = 0
         self._asked = False
@@ -126,10 +127,20 @@ class Drive:
         )
 
     @property
-    def _holds(self) -> bool:
-        """Whether the drive is still powered in this mode, so that its target must stay."""
+    def _holding_mode(self) -> CyclicPosition | None:
+        """The mode whose set-point holds the drive: it is powered and displays that mode."""
+        if self.state is not DriveState.OPERATION_ENABLED:
+            return None
+        shown = self.objects.mode_display
+        return next((mode for mode in self._cyclic_modes if mode.number == shown), None)
+
+    @property
+    def _keeps_target(self) -> bool:
+        """Whether the drive is powered in a mode in which its target must stay as it is."""
+        if self._holding_mode is not None:
+            return True
         displayed = self.objects.mode_display == self.mode.number
-        return self.state is DriveState.OPERATION_ENABLED and displayed
+        return displayed and self.state is DriveState.OPERATION_ENABLED
 
     @property
     def followable(self) -> bool:
@@ -191,8 +202,8 @@ class Drive:
             command, bits = self._command(), NO_BITS
             if command is Command.ENABLE_OPERATION and self.obeys:
                 bits = self.mode.step(now, period, self.objects.statusword)
-            elif not self._holds:
-                self.mode.preload(self.position, self.velocity)
+            elif not self._keeps_target:
+                self._preload_all()
         self._controlword = int(command) | int(bits)
         self.objects.controlword.write(self._controlword)
         self.objects.mode.write(int(self.mode.number))
@@ -208,9 +219,22 @@ class Drive:
             self.mode.stream(setpoint)
 
     def select(self, mode: Mode) -> None:
-        """Command another mode, preloaded with where the drive is."""
-        mode.preload(self.position, self.velocity)
+        """Command another mode, preloaded with where the drive is, or where it is held."""
+        held = self._holding_mode
+        if held is None:
+            mode.preload(int(self.objects.position), self.velocity)
+        elif held is not mode:
+            # under load the drive is not quite where it is held, and would sag to where it is
+            mode.preload(self.units.position_to_device(held.setpoint), held.velocity)
         self.mode = mode
+
+    def _preload_all(self) -> None:
+        """Let every target be where the drive is, also those of modes that are not selected.
+
+        A drive may stay in the mode that it had, whatever was selected.
+        """
+        for mode in self.modes.values():
+            mode.preload(int(self.objects.position), self.velocity)
 
     def check_limits(self, target: float) -> None:
         """Refuse a position beyond the drive's software limits.

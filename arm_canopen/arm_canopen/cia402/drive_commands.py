@@ -12,7 +12,7 @@ from ..master.events import Severity
 from ..master.scheduler import Promise, Scheduler, Task
 from ..standard.drive import DriveState, OperationMode, Statusword
 from .drive import Drive, FAULTY
-from .modes import Homing, Mode, NoMode
+from .modes import CyclicPosition, Homing, Mode, NoMode
 
 READY_TIMEOUT = 2.0  # [s] from operational to the first PDOs and parameters
 STATE_TIMEOUT = 5.0  # [s] for all steps to a state, as ros2_canopen has it
@@ -81,14 +81,19 @@ class DriveCommands:
         """Reset a fault, enable, home if the drive has a homing method, and select no mode."""
         drive = self.drive
         await self._ready()
+        drive.released('the drive is initialised')
         await self._reset_fault()
         await self._reach(DriveState.OPERATION_ENABLED)
+        await self._come_to_rest()
         method = drive.parameters.homing_method
         homed = ''
-        if method and drive.parameters.supports(OperationMode.HOMING):
-            await self._home()
-            homed = f', homed by method {method}'
-        drive.select(drive.modes[OperationMode.NO_MODE])
+        try:
+            if method and drive.parameters.supports(OperationMode.HOMING):
+                await self._home()
+                homed = f', homed by method {method}'
+        finally:
+            if drive.node.online:
+                drive.select(drive.modes[OperationMode.NO_MODE])
         return f'{drive.state.title}{homed}; select a mode before the first target'
 
     async def enable(self) -> str:
@@ -121,9 +126,10 @@ class DriveCommands:
         drive = self.drive
         await self._ready()
         self._require_no_fault()
-        if drive.state is not DriveState.OPERATION_ENABLED:
-            return f'nothing to halt: {drive.describe()}'
         drive.released('halted')
+        if drive.state is not DriveState.OPERATION_ENABLED:
+            drive.goal = DriveState.SWITCH_ON_DISABLED  # nor shall it be enabled any more
+            return f'nothing to halt: {drive.describe()}'
         drive.goal = DriveState.QUICK_STOP_ACTIVE
         await self._until(
             lambda: drive.state is not DriveState.OPERATION_ENABLED,
@@ -158,8 +164,8 @@ class DriveCommands:
         if drive.state is DriveState.OPERATION_ENABLED:
             drive.goal = DriveState.QUICK_STOP_ACTIVE
             await self._settled(lambda: drive.state is not DriveState.OPERATION_ENABLED)
-            # option codes 5 to 8 hold in Quick Stop Active: wait for rest, then let go
-            await self._settled(lambda: not self._moves_in_quick_stop())
+        # option codes 5 to 8 hold in Quick Stop Active: wait for rest, then let go
+        await self._settled(lambda: not self._moves_in_quick_stop())
         drive.goal = DriveState.SWITCH_ON_DISABLED
         await self._settled(lambda: drive.state is DriveState.SWITCH_ON_DISABLED)
         return drive.describe()
@@ -195,9 +201,19 @@ class DriveCommands:
         self.drive.goal = goal
         try:
             await self._until(lambda: self.drive.state is goal, STATE_TIMEOUT, goal.title)
-        except DriveError:
+        except BaseException:  # also when it is cancelled: nobody waits for the rest of the way
             self.drive.goal = DriveState.SWITCH_ON_DISABLED
             raise
+
+    async def _come_to_rest(self) -> None:
+        """Let the profile of a cyclic mode brake, which another mode would end with a jerk."""
+        drive = self.drive
+        mode = drive.mode
+        if not drive.obeys or not isinstance(mode, CyclicPosition):
+            return
+        mode.brake()
+        ramp = abs(mode.velocity) / drive.parameters.profile.deceleration  # [s]
+        await self._until(lambda: mode.velocity == 0.0, STOP_TIMEOUT + ramp, 'standstill')
 
     async def _reset_fault(self) -> None:
         drive = self.drive
@@ -220,6 +236,7 @@ class DriveCommands:
         switching_state = drive.node.config.drive.switching_state
         leave = enabled and switching_state is not DriveState.OPERATION_ENABLED
         drive.released(f'mode {mode.number.title} was selected')
+        await self._come_to_rest()
         if leave:
             await self._reach(switching_state)
         drive.select(mode)
@@ -230,7 +247,8 @@ class DriveCommands:
                 f'mode {mode.number.title} in 0x6061',
             )
         except DriveError:
-            drive.select(before)
+            if drive.node.online:
+                drive.select(before)
             raise
         if leave:
             await self._reach(DriveState.OPERATION_ENABLED)

@@ -12,6 +12,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from enum import Enum
+import math
 
 from ..exceptions import DriveError
 from ..master.process_image import Writer
@@ -33,12 +34,13 @@ class Mode(ABC):
     number: OperationMode
 
     @abstractmethod
-    def preload(self, position: float, velocity: float) -> None:
+    def preload(self, position_inc: int, velocity: float) -> None:
         """Forget any target and make the present position the one that is commanded.
 
         Args:
-            position: Actual position in user units.
-            velocity: Actual velocity in user units per second; a moving drive is braked from it.
+            position_inc: Where the drive is, or is held, in [inc]: as it says itself, so that no
+                factor in bus.yml can make the target another one.
+            velocity: Its velocity in user units per second; a moving drive is braked from it.
         """
 
     @abstractmethod
@@ -70,7 +72,7 @@ class NoMode(Mode):
 
     number = OperationMode.NO_MODE
 
-    def preload(self, position: float, velocity: float) -> None:
+    def preload(self, position_inc: int, velocity: float) -> None:
         """Have nothing to preload."""
 
     def set_target(self, target: float) -> None:
@@ -123,6 +125,7 @@ class ProfilePosition(Mode):
         self._warn = warn
         self._waiting: int | None = None
         self._offered_at = 0.0
+        self._blocked_since: float | None = None
         self._setpoint: float | None = None
         self.handshake = Handshake.IDLE
 
@@ -131,12 +134,12 @@ class ProfilePosition(Mode):
         """Target of the move, in user units."""
         return self._setpoint
 
-    def preload(self, position: float, velocity: float) -> None:
+    def preload(self, position_inc: int, velocity: float) -> None:
         """Write the actual position as the target, without announcing it."""
         self._waiting = None
         self.handshake = Handshake.IDLE
-        self._setpoint = position
-        self._target.write(self._units.position_to_device(position))
+        self._setpoint = self._units.position_commanded(position_inc)
+        self._target.write(position_inc)
 
     def set_target(self, target: float) -> None:
         """Queue the target for the handshake."""
@@ -150,7 +153,9 @@ class ProfilePosition(Mode):
             self._watch_acknowledge(now, acknowledged=acknowledged)
         elif self.handshake is Handshake.WRITTEN:
             self._offer(now)
-        elif not acknowledged:
+        elif acknowledged:
+            self._watch_release(now)
+        else:
             self._take_waiting(now)
         if self.handshake is Handshake.OFFERED:
             return Controlword.NEW_SET_POINT | Controlword.CHANGE_IMMEDIATELY
@@ -158,6 +163,7 @@ class ProfilePosition(Mode):
 
     def _take_waiting(self, now: float) -> None:
         self.handshake = Handshake.IDLE
+        self._blocked_since = None
         if self._waiting is None:
             return
         self._target.write(self._waiting)
@@ -170,6 +176,18 @@ class ProfilePosition(Mode):
     def _offer(self, now: float) -> None:
         self._offered_at = now
         self.handshake = Handshake.OFFERED
+
+    def _watch_release(self, now: float) -> None:
+        if self._waiting is None:
+            self._blocked_since = None
+        elif self._blocked_since is None:
+            self._blocked_since = now
+        elif now - self._blocked_since > ACKNOWLEDGE_TIMEOUT:
+            self._blocked_since = math.inf  # said once
+            self._warn(
+                f'bit 12 has been set for {ACKNOWLEDGE_TIMEOUT:g} s, so a new set-point cannot be '
+                'handed over; it will be when the drive takes the bit back'
+            )
 
     def _watch_acknowledge(self, now: float, *, acknowledged: bool) -> None:
         if acknowledged:
@@ -192,7 +210,7 @@ class ProfileVelocity(Mode):
         self._units = units
         self._target = target
 
-    def preload(self, position: float, velocity: float) -> None:
+    def preload(self, position_inc: int, velocity: float) -> None:
         """Command standstill."""
         self._target.write(0)
 
@@ -235,16 +253,26 @@ class CyclicPosition(Mode):
         """Whether the profile is on the way to a single target."""
         return self._profile.target is not None and not self._profile.at_rest
 
-    def preload(self, position: float, velocity: float) -> None:
+    def preload(self, position_inc: int, velocity: float) -> None:
         """Hold the actual position."""
         self._streamed = None
-        self._profile = SetpointProfile(position, velocity)
-        self._target.write(self._units.position_to_device(position))
+        self._profile = SetpointProfile(self._units.position_commanded(position_inc), velocity)
+        self._target.write(position_inc)
 
     def set_target(self, target: float) -> None:
         """Go to a single target by a profile."""
         self._units.position_to_device(target)  # refuse now what could not be sent on arrival
         self._profile.target = target
+
+    @property
+    def velocity(self) -> float:
+        """Rate of the set-point in user units per second."""
+        return self._profile.velocity
+
+    def brake(self) -> None:
+        """Come to a stop within the limits, wherever that is."""
+        self._streamed = None
+        self._profile.target = None
 
     def stream(self, setpoint: float) -> None:
         """Take the set-point of a motion source for this cycle.
@@ -286,7 +314,7 @@ class Homing(Mode):
         """Wait for the start."""
         self.started = False
 
-    def preload(self, position: float, velocity: float) -> None:
+    def preload(self, position_inc: int, velocity: float) -> None:
         """Have nothing to preload: without bit 4 nothing moves."""
         self.started = False
 

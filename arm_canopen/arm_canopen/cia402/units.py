@@ -33,6 +33,14 @@ class Units:
         config = self._config
         return _to_int32(position, position * config.scale_pos_to_dev + config.offset_pos_to_dev)
 
+    def position_commanded(self, position_inc: float) -> float:
+        """Return the target that :meth:`position_to_device` turns into these [inc].
+
+        It differs from :meth:`position_from_device` where bus.yml scales the two ways differently.
+        """
+        config = self._config
+        return (position_inc - config.offset_pos_to_dev) / config.scale_pos_to_dev
+
     def velocity_to_device(self, velocity: float) -> int:
         """Convert a velocity to the nearest device unit; errors as for positions."""
         return _to_int32(velocity, velocity * self._config.scale_vel_to_dev)
