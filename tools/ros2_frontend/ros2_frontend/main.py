@@ -5,7 +5,7 @@
 | code | when |
 |---|---|
 | 0 | done; also for `ros2 topic` without a verb, which shows help |
-| 1 | a `FrontendError`: its message is on stderr |
+| 1 | a `FrontendError`, or an error of rclpy: its message is on stderr |
 | 2 | wrong arguments, or Ctrl-C (ros2cli leaves with the number of SIGINT) |
 | 141 | the reader of our output went away (`| head`), as for every Unix tool |
 """
@@ -18,7 +18,6 @@ import signal
 import sys
 
 from .cli.commands import COMMANDS
-from .cli.errors import FrontendError
 from .cli.interrupts import sigterm_interrupts
 from .cli.parser import build
 
@@ -46,7 +45,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _leave(int(signal.SIGINT))
     except BrokenPipeError:
         return _leave(_BROKEN_PIPE)
-    except FrontendError as error:
+    except RuntimeError as error:  # a FrontendError, or what rcl says of a bad ROS_DOMAIN_ID
         print(error, file=sys.stderr)
         return _leave(1)
     return code

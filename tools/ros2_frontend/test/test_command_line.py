@@ -138,6 +138,14 @@ def test_an_interrupt_during_discovery_is_quiet(zoo_env: Mapping[str, str]) -> N
         assert 'Traceback' not in process.output
 
 
+def test_what_rcl_refuses_is_no_traceback(ros2: Ros2, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The message of rcl names the variable; exit code 1."""
+    monkeypatch.setenv('ROS_DOMAIN_ID', 'x')
+    outcome = ros2('node', 'list')
+    assert (outcome.code, outcome.out) == (1, '')
+    assert 'ROS_DOMAIN_ID is not an integral number' in outcome.err
+
+
 @pytest.mark.scenario
 def test_a_closed_pipe_is_quiet(zoo_env: Mapping[str, str]) -> None:
     """`| head -1` gets its line, and the command leaves like any Unix tool."""

@@ -27,7 +27,7 @@ _POLL = 0.01  # [s]; one look costs below 1 ms with 30 topics
 _LIMIT = 4.0  # [s]; without an inquiry, a participant announces itself every 3 s
 _QUIET_FOR_LISTS = 0.06  # [s]; the endpoints of a participant come in one burst
 _QUIET_FOR_NAMES = 0.3  # [s]; a node that is just starting gets its chance
-_QUIET_FOR_NETWORK = 0.5  # [s]; participants of other hosts cannot be counted
+_QUIET_FOR_NETWORK = 0.5  # [s]; participants that the kernel does not tell cannot be counted
 _INQUIRY_PERIOD = 0.3  # [s]; an answer with all endpoints takes 0.1 s
 
 _PREFIX = 12  # [byte] of an endpoint's GUID that name its participant
@@ -166,8 +166,9 @@ def wait(look: Callable[[], T | None], graph: Endpoints, patience: Patience) -> 
             if census.missing and now - asked >= _INQUIRY_PERIOD:
                 inquiry.ask(ports)
                 asked = now
+            quiet = patience.quiet if ports.own else max(patience.quiet, _QUIET_FOR_NETWORK)
             if census.missing or census.unnamed or view != before:
                 before, changed = view, now
-            elif now - changed >= patience.quiet:
+            elif now - changed >= quiet:
                 return None
             time.sleep(_POLL)
