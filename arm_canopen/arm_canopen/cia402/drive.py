@@ -250,16 +250,21 @@ class Drive:
             )
 
     async def _ask(self) -> None:
-        told = False
-        while not self._answered:
-            try:
-                self.parameters = await read_parameters(self.node, self.units)
-                self._answered = True
-            except SdoError as error:
-                if not told:
-                    self._warn(f'its parameters are unknown, so it takes no commands: {error}')
-                told = True
-                await self._scheduler.timer(ASK_AGAIN)
+        reason = await self._parameters_unread()
+        if reason:
+            self._warn(f'its parameters are unknown, so it takes no commands: {reason}')
+        while reason:
+            await self._scheduler.timer(ASK_AGAIN)
+            reason = await self._parameters_unread()
+
+    async def _parameters_unread(self) -> str:
+        """Read the parameters; return why that could not be done, or nothing."""
+        try:
+            self.parameters = await read_parameters(self.node, self.units)
+        except SdoError as error:
+            return str(error)
+        self._answered = True
+        return ''
 
     async def know_error(self) -> None:
         """Read 0x603F, so that the answer can say what is wrong."""
