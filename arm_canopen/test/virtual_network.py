@@ -123,7 +123,8 @@ def drive_config(name: str, node_id: int, **changes: Any) -> NodeConfig:
             pdo(3, rpdo_default(3, node_id), (0x60C1, 1)),
         ),
     )
-    return replace(config, **{'drive': replace(config.drive, **scales)} | changes)
+    axis = replace(config.drive, name=name, **scales)
+    return replace(config, **{'axes': (axis,)} | changes)
 
 
 def bus_config(*nodes: NodeConfig, **master: Any) -> BusConfig:

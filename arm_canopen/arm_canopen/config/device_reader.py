@@ -78,7 +78,7 @@ def read_device(
         sdo_timeout=settings.sdo_timeout,
         boot_timeout=settings.boot_timeout,
         sdo_writes=SdoReader(eds.dictionary, findings).read(section),
-        drive=drive,
+        axes=(replace(drive, name=name),),
         line=section.place.line,
     )
     _check_profile(config, section, findings)

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from enum import Enum
 from pathlib import Path
 
 from ..standard.dictionary import ObjectDictionary
@@ -67,15 +68,30 @@ class Identity:
     serial_number: int = 0
 
 
+class RecoveryPolicy(Enum):
+    """What becomes of a drive that was enabled when its device was lost and booted again."""
+
+    MANUAL = 'manual'
+    """It stays disabled until somebody calls ~/recover or ~/enable."""
+    AUTO = 'auto'
+    """It is enabled again in the mode that it had, holding where it is; it moves nowhere."""
+
+
 @dataclass(frozen=True, slots=True)
 class DriveConfig:
-    """Units and sequences of a CiA 402 drive.
+    """Units and sequences of one axis of a CiA 402 drive.
 
     Attributes:
+        name: Name of the axis: that of the device, of its channel for one with several axes.
+        channel: Number of the axis from 0; its objects lie 0x800 * channel above those of the
+            first (CiA 402-2, 7.2).
+        units_from_device: bus.yml has no scale, so units are those of the drive's factor group
+            (0x608F, 0x6091, 0x6092, 0x6096), one revolution being 2 pi rad.
         scale_pos_to_dev: Device increments per user unit (usually rad).
         scale_vel_to_dev: Device velocity units per user unit per second.
         scale_pos_from_dev: User units per device increment.
         scale_vel_from_dev: User units per second per device velocity unit.
+        scale_eff_to_dev: Device units of torque per user unit of effort.
         scale_eff_from_dev: User units of effort per device unit of torque.
         offset_pos_to_dev: Added to a target after scaling, in [inc].
         offset_pos_from_dev: Added to a position after scaling, in user units.
@@ -83,12 +99,21 @@ class DriveConfig:
         homing_timeout: Longest time for homing in [s].
         position_mode: Mode number for position commands, None when bus.yml names none.
         velocity_mode: Mode number for velocity commands, None when bus.yml names none.
+        effort_mode: Mode number for effort commands, None when bus.yml names none.
+        target_timeout: How long a stream of targets on ~/target may pause before it counts as
+            ended in [s].
+        recovery: What becomes of the axis when its device comes back.
+        quirks: Name of the drive's entry in the table of quirks, empty for none.
     """
 
+    name: str = ''
+    channel: int = 0
+    units_from_device: bool = False
     scale_pos_to_dev: float = 1000.0
     scale_vel_to_dev: float = 1000.0
     scale_pos_from_dev: float = 0.001
     scale_vel_from_dev: float = 0.001
+    scale_eff_to_dev: float = 1.0
     scale_eff_from_dev: float = 0.001
     offset_pos_to_dev: float = 0.0
     offset_pos_from_dev: float = 0.0
@@ -96,6 +121,10 @@ class DriveConfig:
     homing_timeout: float = 10.0
     position_mode: int | None = None
     velocity_mode: int | None = None
+    effort_mode: int | None = None
+    target_timeout: float = 0.2
+    recovery: RecoveryPolicy = RecoveryPolicy.MANUAL
+    quirks: str = ''
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,15 +145,25 @@ class NodeConfig:
         heartbeat_timeout: How long the master waits for a heartbeat in [s]; 0 for no supervision.
         heartbeat_consumer: The device shall watch the master's heartbeat; it then has 0x1016 and
             the master sends one.
+        guard_time: Period of node guarding in [s]; 0 for none.
+        life_time_factor: Guard times after which either side takes the other for lost.
+        retry_factor: Missing answers after which a guarded device counts as lost.
+        boot: The master checks and configures the device; false leaves it alone, and it is taken
+            as it is.
         mandatory: The network is not operational without it.
         reset_communication: The device may be reset at boot; false keeps a running one alive.
+        restore_configuration: Sub-index of 0x1011 by which defaults are restored at boot, 0 for
+            none.
+        software_file: Program that is loaded when the device has another version, None for none.
+        software_version: Version in 0x1F56:1 that the device shall have, 0 for any.
         sdo_timeout: How long an SDO answer may take in [s].
         boot_timeout: How long one boot attempt waits for the device in [s].
         poll_period: How often objects that no PDO carries are read in [s] (``period`` of bus.yml).
         tpdos: All TPDOs of the device, by ascending number.
         rpdos: All RPDOs of the device, by ascending number.
-        sdo_writes: ``error_behavior`` and the ``sdo`` list of bus.yml, in the order of writing.
-        drive: Settings of the CiA 402 drive.
+        sdo_writes: ``error_behavior``, ``time_cob_id``, the objects of a concise DCF and the
+            ``sdo`` list of bus.yml, in the order of writing.
+        axes: The axes of a CiA 402 drive, by ascending channel.
         line: Line of bus.yml at which the node begins.
     """
 
@@ -139,16 +178,28 @@ class NodeConfig:
     heartbeat_producer: float = 0.0
     heartbeat_timeout: float = 0.0
     heartbeat_consumer: bool = False
+    guard_time: float = 0.0
+    life_time_factor: int = 0
+    retry_factor: int = 3
+    boot: bool = True
     mandatory: bool = False
     reset_communication: bool = True
+    restore_configuration: int = 0
+    software_file: Path | None = None
+    software_version: int = 0
     sdo_timeout: float = 0.02
     boot_timeout: float = 1.0
     poll_period: float = 0.01
     tpdos: tuple[PdoConfig, ...] = ()
     rpdos: tuple[PdoConfig, ...] = ()
     sdo_writes: tuple[SdoWrite, ...] = ()
-    drive: DriveConfig = DriveConfig()
+    axes: tuple[DriveConfig, ...] = (DriveConfig(),)
     line: int = 0
+
+    @property
+    def drive(self) -> DriveConfig:
+        """The first axis, which is the only one of most drives."""
+        return self.axes[0]
 
     @property
     def is_drive(self) -> bool:
@@ -168,13 +219,25 @@ class MasterConfig:
         remappings: ROS remappings, from name to name.
         bitrate: Bit rate in [bit/s], for the bus load.
         sync_period: SYNC period in [s]; 0 sends none.
+        sync_window: Time after SYNC within which synchronous PDOs are sent in [s]; 0 for no limit.
         sync_overflow: Highest SYNC counter value, 0 for a SYNC without counter.
+        time_cob_id: CAN identifier of TIME.
+        time_period: Period of TIME in [s]; 0 sends none.
         cycle_period: Period of the control cycle in [s]: that of SYNC, without one the shortest
             ``period`` of a device.
         heartbeat_producer: Period of the master's own heartbeat in [s]; 0 for none.
         heartbeat_timeout: How long a device that watches the master waits for its heartbeat in
             [s], for 0x1016; 0 when there is none.
+        start: The master runs its cycle; false keeps SYNC, RPDOs and devices stopped until NMT start.
         start_nodes: The master starts devices when they are booted.
+        start_all_nodes: Devices are started by one broadcast, when all mandatory ones are booted.
+        reset_all_nodes: The loss of a mandatory device resets all devices.
+        stop_all_nodes: The loss of a mandatory device stops all devices.
+        nmt_inhibit_time: Shortest time between two NMT commands in [s].
+        emcy_inhibit_time: Shortest time between two EMCY frames of the master in [s].
+        error_behavior: 0x1029 of the master by sub-index: what it does when it loses a device.
+        identity: 0x1018 of the master, for the files of other tools.
+        boot_time: How long mandatory devices may take to boot in [s]; 0 for ever.
         boot_timeout: SDO timeout during boot in [s].
     """
 
@@ -185,12 +248,29 @@ class MasterConfig:
     remappings: dict[str, str] = field(default_factory=dict)
     bitrate: int = 1_000_000
     sync_period: float = 0.0
+    sync_window: float = 0.0
     sync_overflow: int = 0
+    time_cob_id: int = 0x100
+    time_period: float = 0.0
     cycle_period: float = 0.01
     heartbeat_producer: float = 0.0
     heartbeat_timeout: float = 0.0
+    start: bool = True
     start_nodes: bool = True
+    start_all_nodes: bool = False
+    reset_all_nodes: bool = False
+    stop_all_nodes: bool = False
+    nmt_inhibit_time: float = 0.0
+    emcy_inhibit_time: float = 0.0
+    error_behavior: dict[int, int] = field(default_factory=dict)
+    identity: Identity = Identity()
+    boot_time: float = 0.0
     boot_timeout: float = 2.0
+
+    @property
+    def is_lifecycle(self) -> bool:
+        """The master and its devices are lifecycle nodes."""
+        return 'Lifecycle' in self.driver
 
 
 @dataclass(frozen=True, slots=True)
