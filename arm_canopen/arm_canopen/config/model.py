@@ -228,7 +228,8 @@ class MasterConfig:
         heartbeat_producer: Period of the master's own heartbeat in [s]; 0 for none.
         heartbeat_timeout: How long a device that watches the master waits for its heartbeat in
             [s], for 0x1016; 0 when there is none.
-        start: The master runs its cycle; false keeps SYNC, RPDOs and devices stopped until NMT start.
+        start: The master runs its cycle from the start; false waits for NMT start with SYNC and
+            RPDOs.
         start_nodes: The master starts devices when they are booted.
         start_all_nodes: Devices are started by one broadcast, when all mandatory ones are booted.
         reset_all_nodes: The loss of a mandatory device resets all devices.
