@@ -80,6 +80,22 @@ def test_what_is_written_leaves_with_the_next_frame(
     }
 
 
+def test_an_object_in_several_rpdos_is_written_to_all_of_them() -> None:
+    """An EDS often maps the controlword four times; a zero in one would disable the drive."""
+    also = pdo(3, 0x402, (CONTROLWORD, 0), (TARGET, 0))
+    entries = image(rpdos=(*RPDOS[:2], also))
+    for index, value in ((CONTROLWORD, 0x0F), (TARGET, -5)):
+        writer = entries.writer(index)
+        assert writer is not None
+        writer.write(value)
+    frames = {output.frame().can_id: output.frame().data for output in entries.outputs}
+    assert frames == {
+        0x202: struct.pack('<Hb', 0x0F, 0),
+        0x302: struct.pack('<ii', -5, 0),
+        0x402: struct.pack('<Hi', 0x0F, -5),
+    }
+
+
 def test_the_controlword_leaves_last() -> None:
     """A command never overtakes its data; the others keep their order."""
     assert [output.config.cob_id for output in image().outputs] == [0x302, 0x402, 0x202]

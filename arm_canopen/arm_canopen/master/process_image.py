@@ -8,7 +8,7 @@ are list look-ups. Objects that no PDO carries are read and written by SDO in th
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Protocol, TypeAlias
 
 from ..can.frame import Frame
@@ -151,16 +151,16 @@ class InputReader:
 
 
 class OutputWriter:
-    """Writes an object into an RPDO."""
+    """Writes an object into every RPDO that carries it, so that none brings an old value."""
 
-    def __init__(self, target: Output, position: int) -> None:
-        """Point to one object of the PDO."""
-        self._values = target.values
-        self._position = position
+    def __init__(self, places: Iterable[tuple[Output, int]]) -> None:
+        """Point to the object: RPDOs, and its position in each."""
+        self._places = [(output.values, position) for output, position in places]
 
     def write(self, value: Number) -> None:
-        """Set the value for the next PDO."""
-        self._values[self._position] = value
+        """Set the value for the next PDOs."""
+        for values, position in self._places:
+            values[position] = value
 
 
 class ProcessImage:
@@ -211,9 +211,8 @@ class ProcessImage:
 
     def writer(self, index: int, subindex: int = 0) -> OutputWriter | None:
         """Return a writer for an object, None when no RPDO carries it."""
-        for entry, position in self._mapped_outputs(index, subindex):
-            return OutputWriter(entry, position)
-        return None
+        places = list(self._mapped_outputs(index, subindex))
+        return OutputWriter(places) if places else None
 
     def output_of(self, index: int, subindex: int = 0) -> Output | None:
         """Return the RPDO that carries an object, None when there is none."""
