@@ -7,6 +7,8 @@
 PYTHON ?=
 # seconds; without it the demo runs until Ctrl-C
 DURATION ?=
+# a robot of arm_bringup, or the path of a robot folder
+ROBOT ?= panda
 # what pytest gets besides: make test ARGS='-k sync -x'
 ARGS ?=
 
@@ -17,7 +19,7 @@ IN_ENVIRONMENT = bash -c '. "$(CURDIR)/env.sh" && exec "$$@"' environment
 .DEFAULT_GOAL := help
 
 help:
-	@echo 'make demo       watch a simulated arm move (DURATION=20 ends it after 20 s)'
+	@echo 'make demo       watch a simulated arm move (DURATION=20 ends it, ROBOT=prbt is another arm)'
 	@echo 'make test       build everything and run all tests'
 	@echo 'make build      build every package; then: source env.sh'
 	@echo 'make lint       ruff, its formatter, mypy'
@@ -29,7 +31,7 @@ help:
 
 demo: system
 	@$(WORKSPACE) build arm_bringup
-	@$(IN_ENVIRONMENT) ros2 run arm_bringup demo panda $(if $(DURATION),--duration $(DURATION))
+	@$(IN_ENVIRONMENT) ros2 run arm_bringup demo $(ROBOT) $(if $(DURATION),--duration $(DURATION))
 
 test: system
 	@$(WORKSPACE) build --dev

@@ -5,12 +5,13 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 import contextlib
 from dataclasses import dataclass
 import os
 from pathlib import Path
 import tempfile
+from typing import TYPE_CHECKING
 
 from .description import expand_xacro
 from .exceptions import RobotError
@@ -19,10 +20,15 @@ from .robots import find_robot, installed_robots_folder, Robot, robot_names
 from .stack import arm_processes, Executable, find_executable, Stack, write_parameters
 from .supervisor import ProcessSpec
 
+if TYPE_CHECKING:
+    from arm_canopen import NodeConfig
+
 REAL_BUS = 'can0'
 """Bus without --can on hardware: never one on which only simulated drives could be."""
 SIMULATED_BUS = 'auto'
 """Bus without --can in simulation: vcan0 when it exists, else multicast on the loopback."""
+INTERPOLATED_POSITION = 7
+"""Mode of operation (CiA 402-2, 0x6060)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +39,7 @@ class Session:
         robot: The robot.
         bus: Name of its CAN bus, no longer ``auto``.
         drives: Names of its drives, in the order of bus.yml.
+        mode_service: Service that selects the mode in which all of them follow a stream.
         urdf: Its description.
         processes: What is to be run.
     """
@@ -40,6 +47,7 @@ class Session:
     robot: Robot
     bus: str
     drives: list[str]
+    mode_service: str
     urdf: str
     processes: list[ProcessSpec]
 
@@ -97,14 +105,14 @@ def locate(wanted: str) -> Robot:
     return find_robot(wanted, folder)
 
 
-def drive_names(robot: Robot) -> list[str]:
+def read_drives(robot: Robot) -> list[NodeConfig]:
     """Read the bus.yml of a robot, and so find its mistakes before anything is started.
 
     Args:
         robot: The robot.
 
     Returns:
-        Names of its drives, in the order of the file.
+        Its drives, in the order of the file.
 
     Raises:
         RobotError: The file, or an EDS that it names, is wrong; the message says where and what.
@@ -112,12 +120,23 @@ def drive_names(robot: Robot) -> list[str]:
     from arm_canopen import CanopenError, load_bus
 
     try:
-        drives = [node.name for node in load_bus(robot.bus_config).nodes if node.is_drive]
+        drives = [node for node in load_bus(robot.bus_config).nodes if node.is_drive]
     except CanopenError as error:
         raise RobotError(str(error)) from error
     if not drives:
         raise RobotError(f'{robot.bus_config} has no drive (a node with a Cia402 driver)')
     return drives
+
+
+def stream_mode_service(drives: Sequence[NodeConfig]) -> str:
+    """Name the service for the mode of streams: what bus.yml asks for, else cyclic position.
+
+    Args:
+        drives: The drives of the robot.
+    """
+    if all(drive.drive.position_mode == INTERPOLATED_POSITION for drive in drives):
+        return 'interpolated_position_mode'
+    return 'cyclic_position_mode'
 
 
 @contextlib.contextmanager
@@ -144,7 +163,7 @@ def session(
     from arm_canopen.can import resolve_name
 
     robot = locate(arguments.robot)
-    drives = drive_names(robot)
+    drives = read_drives(robot)
     bus = resolve_name(arguments.can or (SIMULATED_BUS if simulate else REAL_BUS))
     domain = os.environ.get('ROS_DOMAIN_ID') or '0'
     locks = Path(tempfile.gettempdir())
@@ -159,4 +178,5 @@ def session(
             robot, bus, simulate, arguments.timeout, master, dict(master_parameters or {})
         )
         processes = arm_processes(wanted, parameters, find_executable)
-        yield Session(robot, bus, drives, urdf, processes)
+        names = [drive.name for drive in drives]
+        yield Session(robot, bus, names, stream_mode_service(drives), urdf, processes)

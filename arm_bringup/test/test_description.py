@@ -8,9 +8,8 @@ import math
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
-import numpy as np
-from numpy.typing import NDArray
 import pytest
+from urdf_kinematics import forward, numbers, transform
 
 from arm_bringup.description import expand_xacro, joint_limits
 from arm_bringup.exceptions import DescriptionError
@@ -32,45 +31,19 @@ JOINTS: list[Row] = [
     ('panda_joint7', (0.088, 0, 0), HALF_PI, -2.8973, 2.8973, 2.61, 12),
 ]
 
-Matrix = NDArray[np.float64]
+
+READY = [0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785]  # [rad]
+
+
+def at(positions: list[float]) -> dict[str, float]:
+    """Name the positions of the joints."""
+    return dict(zip([name for name, *_ in JOINTS], positions, strict=True))
 
 
 def panda(**arguments: str) -> ET.Element:
     """Expand the Panda's xacro."""
     urdf = expand_xacro(ROBOTS / 'panda' / 'panda.urdf.xacro', arguments)
     return ET.fromstring(urdf)  # noqa: S314
-
-
-def numbers(element: ET.Element | None, key: str) -> list[float]:
-    """Read three numbers of an attribute, zero when there are none."""
-    text = element.get(key, '0 0 0') if element is not None else '0 0 0'
-    return [float(word) for word in text.split()]
-
-
-def transform(xyz: list[float], rpy: list[float]) -> Matrix:
-    """Return the homogeneous matrix of a URDF origin (fixed axes, x then y then z)."""
-    (cr, cp, cy), (sr, sp, sy) = np.cos(rpy), np.sin(rpy)
-    matrix = np.eye(4)
-    matrix[:3, 3] = xyz
-    roll = np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
-    pitch = np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])
-    yaw = np.array([[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]])
-    matrix[:3, :3] = yaw @ pitch @ roll
-    return matrix
-
-
-def forward(root: ET.Element, positions: list[float], tip: str) -> Matrix:
-    """Return the pose of a link in the root link, for joints that turn about their z axes."""
-    parents = {joint.find('child').get('link'): joint for joint in root.iter('joint')}  # type: ignore[union-attr]
-    angles = dict(zip([name for name, *_ in JOINTS], positions, strict=True))
-    pose = np.eye(4)
-    while (joint := parents.get(tip)) is not None:
-        origin = joint.find('origin')
-        here = transform(numbers(origin, 'xyz'), numbers(origin, 'rpy'))
-        turn = transform([0, 0, 0], [0, 0, angles.get(joint.get('name', ''), 0.0)])
-        pose = here @ turn @ pose
-        tip = joint.find('parent').get('link')  # type: ignore[union-attr,assignment]
-    return pose
 
 
 @pytest.mark.parametrize('row', JOINTS, ids=[row[0] for row in JOINTS])
@@ -94,7 +67,7 @@ def test_a_joint_is_where_the_arm_has_it(row: Row) -> None:
     ('positions', 'xyz'),
     [
         ([0.0] * 7, (0.088, 0.0, 0.926)),
-        ([0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785], (0.3070, 0.0, 0.5903)),
+        (READY, (0.3070, 0.0, 0.5903)),
     ],
     ids=['zero', 'ready'],
 )
@@ -102,14 +75,14 @@ def test_the_flange_is_where_the_arm_has_it(
     positions: list[float], xyz: tuple[float, float, float]
 ) -> None:
     """Forward kinematics of the description meets the check poses."""
-    flange = forward(panda(), positions, 'panda_link8')
+    flange = forward(panda(), at(positions), 'panda_link8')
     assert flange[:3, 3] == pytest.approx(xyz, abs=1e-4)
     assert flange[2, 2] == pytest.approx(-1.0, abs=1e-3)  # it points down
 
 
 def test_the_tool_centre_point_is_between_the_finger_tips() -> None:
     """The hand hangs turned by 45 degrees below the flange."""
-    tcp = forward(panda(), [0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785], 'panda_hand_tcp')
+    tcp = forward(panda(), at(READY), 'panda_hand_tcp')
     assert tcp[2, 3] == pytest.approx(0.4869, abs=1e-4)
 
 

@@ -109,7 +109,7 @@ def run(play: Play, supervisor: Supervisor, client: Client) -> None:
 def test_all_joints_are_enabled_before_the_wave_and_the_wave_stops_before_the_processes() -> None:
     """Services of all joints are called side by side; at the end the supervisor stops."""
     show, supervisor, client = Show(), Supervisor(), Client()
-    play = Play(JOINTS, show, duration=0.01)
+    play = Play(JOINTS, 'cyclic_position_mode', show, duration=0.01)
     run(play, supervisor, client)
     assert client.called == [
         '/joint1/init',
@@ -132,7 +132,7 @@ def test_all_joints_are_enabled_before_the_wave_and_the_wave_stops_before_the_pr
 def test_a_drive_that_refuses_ends_the_demo_with_its_reason() -> None:
     """No wave is started, and there is no summary of one."""
     supervisor, client = Supervisor(), Client(refuses='/joint2/init')
-    play = Play(JOINTS, Show(), duration=1.0)
+    play = Play(JOINTS, 'cyclic_position_mode', Show(), duration=1.0)
     run(play, supervisor, client)
     assert supervisor.outcome == Outcome(1, '/joint2/init: fault')
     assert '/wave/start' not in client.called
@@ -149,7 +149,7 @@ def test_ctrl_c_stops_the_wave_first() -> None:
             answers.append(play.leave())
 
     supervisor, client = Supervisor(), Client(when=when)
-    play = Play(JOINTS, Show(), duration=None)
+    play = Play(JOINTS, 'cyclic_position_mode', Show(), duration=None)
     run(play, supervisor, client)
     assert answers == [False, True]
     assert client.called[-1] == '/wave/stop'
@@ -165,7 +165,7 @@ def test_a_supervisor_that_stops_ends_the_demo(what: str) -> None:
             supervisor.phase = Phase.STOPPED
 
     supervisor, client = Supervisor(Phase.RUNNING), Client(when=when)
-    run(Play(JOINTS, Show(), duration=None), supervisor, client)
+    run(Play(JOINTS, 'cyclic_position_mode', Show(), duration=None), supervisor, client)
     assert supervisor.outcome is None
     assert client.closed
 
@@ -178,6 +178,6 @@ def test_a_defect_in_the_demo_stops_the_processes() -> None:
 
     supervisor, client = Supervisor(), Client(when=when)
     with pytest.raises(ZeroDivisionError):
-        run(Play(JOINTS, Show(), duration=1.0), supervisor, client)
+        run(Play(JOINTS, 'cyclic_position_mode', Show(), duration=1.0), supervisor, client)
     assert supervisor.outcome == Outcome(1, 'ZeroDivisionError: in the picture')
     assert client.closed

@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Robot folders by name and by path, and the bus of the Panda."""
+"""Robot folders by name and by path, and the buses of the Panda and the PRBT."""
 
 from __future__ import annotations
 
+import math
 import os
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import pytest
 
 from arm_bringup.exceptions import RobotError
 from arm_bringup.robots import find_robot, robot_names
+from arm_bringup.session import read_drives, stream_mode_service
 from arm_canopen import load_bus
 
 ROBOTS = Path(__file__).parents[1] / 'robots'
@@ -67,8 +69,30 @@ def test_the_bus_of_the_panda_has_its_seven_joints() -> None:
     assert bus.warnings == ()
 
 
-def test_there_is_one_source_of_the_eds() -> None:
-    """The Panda's EDS is that of the simulated drive, under the article's name."""
-    eds = ROBOTS / 'panda' / 'cia402_slave.eds'
+@pytest.mark.parametrize('name', ['panda/cia402_slave.eds', 'prbt/prbt_0_1.dcf'])
+def test_there_is_one_source_of_the_eds(name: str) -> None:
+    """A robot's EDS is that of the simulated drive, under its article's name."""
+    eds = ROBOTS / name
     assert eds.is_symlink()
     assert eds.resolve() == ROBOTS.parents[1] / 'arm_canopen' / 'eds' / 'cia402_drive.eds'
+
+
+def test_the_bus_of_the_prbt_has_its_six_joints() -> None:
+    """Node ids 3 to 8 in mode 7, positions in thousandths of a degree; nothing odd in the file."""
+    bus = load_bus(ROBOTS / 'prbt' / 'bus.yml')
+    assert [node.name for node in bus.nodes] == [f'prbt_joint_{i}' for i in range(1, 7)]
+    assert [node.node_id for node in bus.nodes] == list(range(3, 9))
+    for node in bus.nodes:
+        assert node.drive.position_mode == 7
+        assert node.drive.scale_pos_to_dev == pytest.approx(math.degrees(1000.0), rel=1e-8)
+        assert node.drive.scale_vel_to_dev == node.drive.scale_pos_to_dev
+    assert bus.warnings == ()
+
+
+def test_the_mode_of_streams_is_the_one_that_bus_yml_asks_for() -> None:
+    """Interpolated position on the PRBT; the Panda asks for profile position, so cyclic."""
+    services = {
+        name: stream_mode_service(read_drives(find_robot(name, ROBOTS)))
+        for name in ('panda', 'prbt')
+    }
+    assert services == {'panda': 'cyclic_position_mode', 'prbt': 'interpolated_position_mode'}

@@ -13,7 +13,7 @@ from typing import Any, TYPE_CHECKING
 from .can import open_bus
 from .cia402.motion import AxisFeedback, MotionSource
 from .config import load_bus
-from .config.model import BusConfig
+from .config.model import BusConfig, NodeConfig
 from .exceptions import CanopenError
 
 if TYPE_CHECKING:
@@ -26,6 +26,7 @@ __all__ = [
     'CanopenError',
     'MasterProcess',
     'MotionSource',
+    'NodeConfig',
     'load_bus',
     'open_bus',
     'run_master',

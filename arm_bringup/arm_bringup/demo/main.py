@@ -70,11 +70,12 @@ def join_ros(given_up: Callable[[], bool]) -> Client:
     return ArmClient(given_up)
 
 
-def commands(joint: str, bus: str, domain: str) -> list[str]:
+def commands(joint: str, mode_service: str, bus: str, domain: str) -> list[str]:
     """Return commands to try in a second terminal.
 
     Args:
         joint: Name of a drive.
+        mode_service: Service that selects the mode of the wave.
         bus: Name of the CAN bus.
         domain: ROS domain, empty for the default one.
     """
@@ -86,7 +87,7 @@ def commands(joint: str, bus: str, domain: str) -> list[str]:
         'ros2 topic hz /joint_states',
         f'ros2 run arm_canopen candump {bus}',
         # back into the wave
-        f'{call} /{joint}/cyclic_position_mode std_srvs/srv/Trigger',
+        f'{call} /{joint}/{mode_service} std_srvs/srv/Trigger',
         f'{call} /wave/start std_srvs/srv/Trigger',
     ]
 
@@ -108,11 +109,13 @@ def run(arm: Session, duration: float | None) -> int:
         limits={
             name: limits for name, limits in joint_limits(arm.urdf).items() if name in arm.drives
         },
-        commands=commands(arm.drives[0], arm.bus, os.environ.get('ROS_DOMAIN_ID', '')),
+        commands=commands(
+            arm.drives[0], arm.mode_service, arm.bus, os.environ.get('ROS_DOMAIN_ID', '')
+        ),
         painter=Painter('demo', names, wants_colour(sys.stdout, os.environ)),
     )
     display = choose_display(setting, Console(), write)
-    play = Play(list(setting.limits), display, duration)
+    play = Play(list(setting.limits), arm.mode_service, display, duration)
     try:
         with Runner(
             arm.processes, display.line, display.notice, on_interrupt=play.leave

@@ -83,16 +83,20 @@ class Play:
         result: How it went, when the thread has ended.
     """
 
-    def __init__(self, joints: Sequence[str], display: Display, duration: float | None) -> None:
+    def __init__(
+        self, joints: Sequence[str], mode_service: str, display: Display, duration: float | None
+    ) -> None:
         """Prepare; nothing happens yet.
 
         Args:
             joints: Names of the joints with a drive.
+            mode_service: Service of a drive that selects the mode of the wave.
             display: Where it is shown.
             duration: How long the wave runs in [s]; None until :meth:`leave`.
         """
         self.result = Result([], [], [])
         self._joints = list(joints)
+        self._mode_service = mode_service
         self._display = display
         self._duration = math.inf if duration is None else duration
         self._leaving = threading.Event()
@@ -163,7 +167,7 @@ class Play:
 
     def _services(self) -> tuple[list[str], list[str], list[str]]:
         init = [f'/{joint}/init' for joint in self._joints]
-        mode = [f'/{joint}/cyclic_position_mode' for joint in self._joints]
+        mode = [f'/{joint}/{self._mode_service}' for joint in self._joints]
         return init, mode, ['/wave/start', '/wave/stop']
 
     def _booted(self, client: Client, ready: Callable[[], bool]) -> bool:
