@@ -1,0 +1,141 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Joint states of single drives become one set for each moment."""
+
+from __future__ import annotations
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from arm_canopen.joints.aggregator import JointAggregator, JointSample, JointSet, STALE_AFTER
+from arm_canopen.joints.robot_joints import Mimic, RobotJoint
+
+PERIOD_NS = 10_000_000
+NAMES = ['elbow', 'wrist', 'base']  # URDF order, which is no alphabetical one
+
+
+def sample(value: float) -> JointSample:
+    """Return a state that can be told from others."""
+    return JointSample(value, -value, 2 * value)
+
+
+class Publisher:
+    """Feeds an aggregator and keeps what it publishes."""
+
+    def __init__(self, *joints: RobotJoint) -> None:
+        """Begin at time 0."""
+        self.aggregator = JointAggregator(joints or [RobotJoint(name) for name in NAMES])
+        self.sets: list[JointSet] = []
+
+    def hear(self, name: str, cycle: int, value: float = 0.0) -> None:
+        """Take the state of a joint at a cycle of 10 ms."""
+        stamp, now = cycle * PERIOD_NS, cycle * PERIOD_NS * 1e-9
+        self.sets += self.aggregator.update(name, stamp, sample(value), now)
+
+    def settle(self) -> None:
+        """Let it learn who takes part, in two cycles."""
+        for cycle in (1, 2):
+            for name in NAMES:
+                self.hear(name, cycle)
+        self.sets.clear()
+
+
+@given(st.lists(st.permutations(NAMES), min_size=1, max_size=20))
+def test_one_set_for_each_cycle_in_urdf_order(orders: list[list[str]]) -> None:
+    """Whatever the order in which drives answer, each cycle gives one set, with its own values."""
+    publisher = Publisher()
+    publisher.settle()
+    for cycle, order in enumerate(orders, start=3):
+        for name in order:
+            publisher.hear(name, cycle, cycle + NAMES.index(name) / 10)
+    assert [state.stamp for state in publisher.sets] == [
+        cycle * PERIOD_NS for cycle in range(3, 3 + len(orders))
+    ]
+    for cycle, state in enumerate(publisher.sets, start=3):
+        assert state.names == NAMES
+        assert state.samples == [sample(cycle + place / 10) for place in range(3)]
+
+
+def test_the_set_leaves_with_the_last_joint() -> None:
+    """Not before, and not at the next cycle."""
+    publisher = Publisher()
+    publisher.settle()
+    publisher.hear('base', 3)
+    publisher.hear('elbow', 3)
+    assert publisher.sets == []
+    publisher.hear('wrist', 3)
+    assert len(publisher.sets) == 1
+
+
+def test_a_joint_that_is_lost_delays_one_cycle_only() -> None:
+    """The next cycle ends the incomplete round; after that nobody waits for the lost one."""
+    publisher = Publisher()
+    publisher.settle()
+    for cycle in (3, 4, 5):
+        publisher.hear('elbow', cycle)
+        publisher.hear('base', cycle)
+    assert [state.stamp // PERIOD_NS for state in publisher.sets] == [3, 4, 5]
+
+
+def test_a_lost_joint_is_left_out_after_a_while_and_named() -> None:
+    """Its last state is repeated for a moment, never for longer; then it counts as silent."""
+    publisher = Publisher()
+    publisher.settle()
+    last = 2 + round(STALE_AFTER * 1e9 / PERIOD_NS)
+    for cycle in range(3, last + 3):
+        publisher.hear('elbow', cycle)
+        publisher.hear('base', cycle)
+    with_wrist = [state.stamp // PERIOD_NS for state in publisher.sets if 'wrist' in state.names]
+    assert max(with_wrist) in (last - 1, last)
+    assert publisher.sets[-1].names == ['elbow', 'base']
+    now = (last + 2) * PERIOD_NS * 1e-9
+    assert publisher.aggregator.silent(now) == ['wrist']
+
+
+def test_a_joint_that_comes_back_takes_part_again() -> None:
+    """From its second cycle on it is waited for."""
+    publisher = Publisher()
+    publisher.settle()
+    for cycle in range(3, 90):
+        publisher.hear('elbow', cycle)
+    for cycle in (90, 91, 92):
+        for name in NAMES:
+            publisher.hear(name, cycle)
+    assert [len(state.names) for state in publisher.sets[-2:]] == [3, 3]
+    assert publisher.aggregator.silent(0.93) == []
+
+
+def test_joints_never_heard_of_are_silent_from_the_start() -> None:
+    """In URDF order, without those that follow others."""
+    publisher = Publisher(RobotJoint('a'), RobotJoint('b', Mimic('a')), RobotJoint('c'))
+    assert publisher.aggregator.silent(0.0) == ['a', 'c']
+    publisher.hear('c', 1)
+    assert publisher.sets[-1].names == ['c']
+    assert publisher.aggregator.silent(0.01) == ['a']
+
+
+def test_a_mimic_joint_follows_by_its_law_unless_it_is_heard_itself() -> None:
+    """It is multiplier * leader + offset; a drive of its own beats the law."""
+    publisher = Publisher(RobotJoint('a'), RobotJoint('b', Mimic('a', -2.0, 0.5)))
+    publisher.hear('a', 1, 3.0)
+    state = publisher.sets[-1]
+    assert state.names == ['a', 'b']
+    assert state.samples[1] == JointSample(-5.5, 6.0, 0.0)
+    publisher.hear('a', 2, 3.0)
+    publisher.hear('b', 2, 1.0)
+    for name, value in (('a', 3.0), ('b', 1.0)):
+        publisher.hear(name, 3, value)
+    assert publisher.sets[-1].samples == [sample(3.0), sample(1.0)]
+
+
+def test_a_clock_that_is_set_back_does_not_stop_the_sets() -> None:
+    """Joints that report again begin a new round, whatever their stamp."""
+    publisher = Publisher()
+    for cycle in (1000, 1001):
+        for name in NAMES:
+            publisher.hear(name, cycle)
+    publisher.sets.clear()
+    for cycle in (10, 11, 12):
+        for name in NAMES:
+            publisher.hear(name, cycle)
+    assert [state.stamp // PERIOD_NS for state in publisher.sets] == [10, 11, 12]
