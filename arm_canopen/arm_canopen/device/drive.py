@@ -107,6 +107,12 @@ class Drive:
         self._axis.speed = self._objects.speed
         self._publish(now)
 
+    def lose_position(self, now: float) -> None:
+        """Count from 0 where the motor is, as an incremental encoder does after power-on."""
+        self._axis.advance(now)
+        self._axis.shift(-self._axis.position)
+        self._publish(now)
+
     def start(self, now: float) -> None:
         """Become ready for commands; the device has started."""
         self._machine.start()
