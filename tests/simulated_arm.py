@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The Panda's seven drives and their master as real processes on a bus of their own."""
+"""An arm's drives and their master as real processes on a bus of their own."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from ros_client import RosClient
 from std_srvs.srv import Trigger
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from types import TracebackType
 
     from isolation import Isolation
@@ -29,16 +30,23 @@ def panda_bus() -> Path:
 
 
 class SimulatedArm:
-    """Slaves, master and a client.
+    """Slaves, master and a client; by default the Panda's.
 
     Attributes:
+        joints: Names of the drives.
         slaves: Process of the simulated drives.
         master: Process of the master.
         client: A ROS node of the test.
     """
 
-    def __init__(self, isolation: Isolation, bus_config: Path | None = None) -> None:
+    def __init__(
+        self,
+        isolation: Isolation,
+        bus_config: Path | None = None,
+        joints: Sequence[str] = JOINTS,
+    ) -> None:
         """Start the processes and wait until all drives are booted."""
+        self.joints = list(joints)
         self._isolation = isolation
         self._bus_config = bus_config or panda_bus()
         self._stack = ExitStack()
@@ -46,7 +54,7 @@ class SimulatedArm:
             self.client = self._stack.enter_context(RosClient(isolation.domain_id))
             self.slaves = self.start('fake_slaves')
             self.master = self.start('master')
-            self.master.wait_for('all 7 devices operational')
+            self.master.wait_for(f'all {len(self.joints)} devices operational')
         except BaseException:
             self._stack.close()
             raise
@@ -69,7 +77,7 @@ class SimulatedArm:
     def init_all(self) -> float:
         """Initialise all joints at the same time; return how long that took in [s]."""
         node = self.client.node
-        clients = [node.create_client(Trigger, f'/{joint}/init') for joint in JOINTS]
+        clients = [node.create_client(Trigger, f'/{joint}/init') for joint in self.joints]
         for client in clients:
             assert client.wait_for_service(20.0), client.srv_name
         begin = time.monotonic()

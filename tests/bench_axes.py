@@ -1,16 +1,18 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The seven-axis arm as real processes, in figures, beside ros2_canopen's on the same scenario.
+"""Arms as real processes, in figures; the first beside ros2_canopen's on the same scenario.
 
-Run it with ``make bench``, or ``python tests/bench_seven_axes.py [SECONDS]`` in the environment.
+Run it with ``make bench``, or ``python tests/bench_axes.py [SECONDS]`` in the environment.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import partial
-from itertools import pairwise
+from pathlib import Path
 import sys
+from tempfile import TemporaryDirectory
 import time
 from typing import TYPE_CHECKING
 
@@ -20,7 +22,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from isolation import reserve
 import psutil
 from sensor_msgs.msg import JointState
-from simulated_arm import JOINTS, SimulatedArm
+from simulated_arm import panda_bus, SimulatedArm
 
 from arm_canopen.standard.cob_id import CobId
 
@@ -29,7 +31,31 @@ if TYPE_CHECKING:
 
 SECONDS = 15.0
 TARGETS = 40
-SYNC_PERIOD = 0.01  # [s] of the article's bus.yml
+FIRST_NODE_ID = 2
+
+Rows = dict[str, str]
+
+
+@dataclass(frozen=True, slots=True)
+class Scenario:
+    """An arm and its cycle: number of axes, SYNC period in [ms]."""
+
+    axes: int
+    period: int
+
+    @property
+    def title(self) -> str:
+        """Name of the column."""
+        return f'{self.axes} axes, {self.period} ms'
+
+    @property
+    def joints(self) -> list[str]:
+        """Names of the drives."""
+        return [f'panda_joint{number}' for number in range(1, self.axes + 1)]
+
+
+SCENARIOS = (Scenario(7, 10), Scenario(7, 5), Scenario(7, 4), Scenario(12, 5))
+"""At 1 Mbit/s the third fills two thirds of the bus, the fourth nine tenths."""
 
 REFERENCE: dict[str, str] = {
     'frames/s on the bus': '2907',
@@ -37,31 +63,55 @@ REFERENCE: dict[str, str] = {
     'master, CPU of one core': '14.5 %',
     'slaves, CPU of one core (sum)': '46 %',
     'last boot-up to all operational': '1.7 s from start',
-    'init of seven joints': '0.7 to 0.8 s (one after another)',
+    'init of all joints': '0.7 to 0.8 s (in turn)',
     'SYNC period deviation p50 / p99': '0.88 / 6.1 ms',
 }
 """ros2_canopen's C++ classes: seven fake slaves, SYNC 10 ms, multicast bus, a 2-core machine."""
 
 
 def main() -> None:
-    """Run the scenario and print the table."""
+    """Run the scenarios and print the table."""
     seconds = float(sys.argv[1]) if len(sys.argv) > 1 else SECONDS
-    with reserve() as isolation:
-        rows = []
-        with BusRecorder(isolation.bus) as recorder, SimulatedArm(isolation) as arm:
-            rows += boot_and_init(arm, recorder)
-            rows += reaction(arm, recorder)
-            rows += joint_state_latency(arm, recorder)
+    columns = {scenario.title: measure(scenario, seconds) for scenario in SCENARIOS}
+    heads = [*columns, 'C++, 7 axes, 10 ms']
+    print(f'{"":34}' + ''.join(f'{head:>22}' for head in heads))
+    for name in next(iter(columns.values())):
+        figures = [rows[name] for rows in columns.values()]
+        print(f'{name:34}' + ''.join(f'{x:>22}' for x in [*figures, REFERENCE.get(name, '-')]))
+
+
+def measure(scenario: Scenario, seconds: float) -> Rows:
+    """Run one scenario."""
+    with reserve() as isolation, TemporaryDirectory() as folder:
+        bus = write_bus(Path(folder), scenario)
+        with (
+            BusRecorder(isolation.bus) as recorder,
+            SimulatedArm(isolation, bus, scenario.joints) as arm,
+        ):
+            rows = boot_and_init(arm, recorder)
+            rows |= reaction(arm, recorder)
+            rows |= joint_state_latency(arm, recorder)
             recorder.pause()
-            rows += steady_state(arm, seconds)
-    print(f'{"seven axes, SYNC 10 ms":40} {"here":>22}   ros2_canopen (C++)')
-    for name, figure in rows:
-        print(f'{name:40} {figure:>22}   {REFERENCE.get(name, "-")}')
+            return rows | steady_state(arm, seconds)
 
 
-def boot_and_init(arm: SimulatedArm, recorder: BusRecorder) -> list[tuple[str, str]]:
+def write_bus(folder: Path, scenario: Scenario) -> Path:
+    """Write the Panda's bus.yml with another number of axes and another period."""
+    text = panda_bus().read_text().partition('nodes:')[0]
+    text = text.replace('sync_period: 10000', f'sync_period: {scenario.period * 1000}')
+    text = text.replace('"@BUS_CONFIG_PATH@"', f'"{panda_bus().parent}"')
+    nodes = ''.join(
+        f'  {joint}:\n    node_id: {node_id}\n'
+        for node_id, joint in enumerate(scenario.joints, start=FIRST_NODE_ID)
+    )
+    path = folder / 'bus.yml'
+    path.write_text(f'{text}nodes:\n{nodes}')
+    return path
+
+
+def boot_and_init(arm: SimulatedArm, recorder: BusRecorder) -> Rows:
     """Time the boot and the parallel init from the frames on the bus."""
-    nodes = range(2, 9)
+    nodes = range(FIRST_NODE_ID, FIRST_NODE_ID + len(arm.joints))
     boot_ups = [f.timestamp for f in recorder.frames if is_boot_up(f.can_id, f.data)]
     starts = [
         f.timestamp
@@ -69,15 +119,15 @@ def boot_and_init(arm: SimulatedArm, recorder: BusRecorder) -> list[tuple[str, s
         if f.can_id == CobId.NMT and f.data[0] == 1 and f.data[1] in nodes
     ]
     init = arm.init_all()
-    return [
-        ('last boot-up to all operational', f'{max(starts) - max(boot_ups):.3f} s'),
-        ('init of seven joints', f'{init:.3f} s (parallel)'),
-    ]
+    return {
+        'last boot-up to all operational': f'{max(starts) - max(boot_ups):.3f} s',
+        'init of all joints': f'{init:.3f} s (at once)',
+    }
 
 
-def reaction(arm: SimulatedArm, recorder: BusRecorder) -> list[tuple[str, str]]:
+def reaction(arm: SimulatedArm, recorder: BusRecorder) -> Rows:
     """Time from the call of ~/target to the RPDO that carries it."""
-    for joint in JOINTS:
+    for joint in arm.joints:
         answer = arm.client.trigger(f'/{joint}/position_mode')
         if not answer.success:
             raise SystemExit(answer.message)
@@ -93,15 +143,15 @@ def reaction(arm: SimulatedArm, recorder: BusRecorder) -> list[tuple[str, str]]:
         frame = carries()
         delays.append(frame.timestamp - begin if frame else float('nan'))
     longest = max(delays) * 1e3
-    return [('~/target call to RPDO p50 / max', f'{milliseconds(delays, 0.5)} / {longest:.1f} ms')]
+    return {'~/target call to RPDO p50 / max': f'{milliseconds(delays, 0.5)} / {longest:.1f} ms'}
 
 
-def joint_state_latency(arm: SimulatedArm, recorder: BusRecorder) -> list[tuple[str, str]]:
+def joint_state_latency(arm: SimulatedArm, recorder: BusRecorder) -> Rows:
     """Time from the last TPDO of a SYNC to the /joint_states message that carries it."""
     publisher = arm.start(
-        'canopen_joint_state_publisher', '-p', f'robot_description:={seven_joint_urdf()}'
+        'canopen_joint_state_publisher', '-p', f'robot_description:={urdf(arm.joints)}'
     )
-    publisher.wait_for('publishing 7 joints')
+    publisher.wait_for(f'publishing {len(arm.joints)} joints')
     arrivals: list[tuple[float, int]] = []
 
     def take(message: JointState) -> None:
@@ -115,15 +165,11 @@ def joint_state_latency(arm: SimulatedArm, recorder: BusRecorder) -> list[tuple[
         last = recorder.last_before(arrived, 0x280, 0x2FF)
         if last is not None:
             delays.append(arrived - last.timestamp)
-    return [
-        (
-            'TPDO to /joint_states p50 / p99',
-            f'{milliseconds(delays, 0.5)} / {milliseconds(delays, 0.99)} ms',
-        )
-    ]
+    share = f'{milliseconds(delays, 0.5)} / {milliseconds(delays, 0.99)} ms'
+    return {'TPDO to /joint_states p50 / p99': share}
 
 
-def steady_state(arm: SimulatedArm, seconds: float) -> list[tuple[str, str]]:
+def steady_state(arm: SimulatedArm, seconds: float) -> Rows:
     """CPU, memory, losses and jitter while the drives run, with /joint_states on."""
     diagnostics = arm.client.listen(DiagnosticArray, '/diagnostics')
     arm.client.spin_until(lambda: bool(diagnostics), 5.0, '/diagnostics')
@@ -141,19 +187,18 @@ def steady_state(arm: SimulatedArm, seconds: float) -> list[tuple[str, str]]:
     def grown(key: str) -> int:
         return int(last[key]) - int(first[key])
 
-    return [
-        ('frames/s on the bus', f'{float(last["frames_per_second"]):.0f}'),
-        ('frames lost', str(grown('frames_lost'))),
-        ('TPDOs that missed their SYNC', str(grown('missed_pdos'))),
-        ('cycles left out', str(grown('overruns'))),
-        ('master, CPU of one core', f'{share["master"]:.1%}'),
-        ('slaves, CPU of one core (sum)', f'{share["slaves"]:.1%}'),
-        (
-            'SYNC late by p50 / p99',
-            f'{float(last["jitter_p50"]) * 1e3:.2f} / {float(last["jitter_p99"]) * 1e3:.2f} ms',
-        ),
-        ('memory of master and slaves (PSS)', f'{memory / 2**20:.0f} MiB'),
-    ]
+    late = [float(last[key]) * 1e3 for key in ('jitter_p50', 'jitter_p99')]
+    return {
+        'frames/s on the bus': f'{float(last["frames_per_second"]):.0f}',
+        'bus load at 1 Mbit/s': f'{float(last["bus_load"]):.0f} %',
+        'frames lost': str(grown('frames_lost')),
+        'TPDOs that missed their SYNC': str(grown('missed_pdos')),
+        'cycles left out': str(grown('overruns')),
+        'master, CPU of one core': f'{share["master"]:.1%}',
+        'slaves, CPU of one core (sum)': f'{share["slaves"]:.1%}',
+        'SYNC late by p50 / p99': f'{late[0]:.2f} / {late[1]:.2f} ms',
+        'memory of master and slaves (PSS)': f'{memory / 2**20:.0f} MiB',
+    }
 
 
 def is_there(look: Callable[[], object]) -> bool:
@@ -186,15 +231,15 @@ def milliseconds(values: Sequence[float], share: float) -> str:
     return f'{ordered[int((len(ordered) - 1) * share)] * 1e3:.2f}'
 
 
-def seven_joint_urdf() -> str:
-    """Return a URDF with the names of the seven joints."""
+def urdf(names: Sequence[str]) -> str:
+    """Return the URDF of a chain of joints."""
+    links = ''.join(f'<link name="link{number}"/>' for number in range(len(names) + 1))
     joints = ''.join(
-        f'<joint name="{name}" type="continuous"><parent link="{a}"/><child link="{b}"/></joint>'
-        for name, (a, b) in zip(JOINTS, pairwise('abcdefgh'), strict=True)
+        f'<joint name="{name}" type="continuous"><parent link="link{number}"/>'
+        f'<child link="link{number + 1}"/></joint>'
+        for number, name in enumerate(names)
     )
-    return (
-        f'<robot name="r">{"".join(f"""<link name="{c}"/>""" for c in "abcdefgh")}{joints}</robot>'
-    )
+    return f'<robot name="r">{links}{joints}</robot>'
 
 
 if __name__ == '__main__':
