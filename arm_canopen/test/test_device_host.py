@@ -209,3 +209,42 @@ def test_defect_in_one_device_leaves_the_others_alive(
             expect(master, Frame(0x586, b'\x43\x00\x10\x00\x92\x01\x02\x00'))
         runner.stop()
     assert 'ZeroDivisionError' in caplog.text
+
+
+def test_calls_run_in_the_thread_of_the_devices() -> None:
+    """A call gets at the devices and gives its result, or its exception."""
+    with open_bus(free_virtual()) as bus:
+        runner = DeviceRunner(bus)
+        runner.host.add(5, drive_dictionary())
+        early = runner.call(threading.get_ident)
+        runner.start()
+        states = runner.call(lambda: [device.nmt_state for device in runner.host.devices])
+        assert states.result(ARRIVAL) == [NmtState.PRE_OPERATIONAL]
+        assert early.result(ARRIVAL) == runner.call(threading.get_ident).result(ARRIVAL)
+        assert early.result() != threading.get_ident()
+        with pytest.raises(KeyError):
+            runner.call(lambda: runner.host.device(6)).result(ARRIVAL)
+        runner.stop()
+        assert runner.call(threading.get_ident).cancelled()
+
+
+def test_defect_that_stays_due_does_not_stop_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A device that fails whenever it is advanced rests; the deadlines of others are kept."""
+    defects: list[int] = []
+    sent: list[Frame] = []
+    host = DeviceHost(sent.append, lambda device, _error: defects.append(device.node_id))
+    broken, _ = (host.add(node_id, drive_dictionary()) for node_id in (5, 6))
+
+    def fail(now: float) -> None:
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(broken, 'advance', fail)
+    host.advance(1.0)
+    assert sent == [Frame(0x706, b'\x00')]
+    assert defects == [5]
+    write(host, 6, 0x1017, 0, b'\x32\x00')
+    sent.clear()
+    while host.deadline < 2.0:
+        host.advance(host.deadline)
+    assert len(sent) in (19, 20, 21)
+    assert 5 < len(defects) < 15

@@ -11,8 +11,11 @@ from ..standard.cob_id import CobId, NODE_ID_MAX, NODE_ID_MIN
 from ..standard.dictionary import ObjectDictionary
 from ..standard.nmt import NmtCommand, NmtState
 from ..standard.objects import Index
+from ..standard.sdo import Abort
 from .drive import Drive
 from .emcy_producer import EmcyProducer
+from .fault_injector import FaultInjector
+from .fault_line import FaultLine, Service, Traffic
 from .heartbeat import HeartbeatConsumer, HeartbeatProducer
 from .nmt_slave import boot_up_frame, NmtSlave
 from .object_store import ObjectStore
@@ -43,6 +46,7 @@ class Device:
         node_id: CANopen node id.
         store: Present values of all objects.
         drive: The axis, None when the device is no drive.
+        faults: What it does wrong on purpose.
         handlers: What it does with the frames of each identifier, in its present NMT state;
             another mapping takes its place when that changes.
     """
@@ -75,7 +79,8 @@ class Device:
         self.node_id = node_id
         self.handlers: Mapping[int, Handler] = {}
         self.store = ObjectStore(dictionary.for_node(node_id))
-        self._send = send
+        self._line = FaultLine(send, self._send_abort, self._identify)
+        self._send = send = self._line.send
         self._handlers_changed = handlers_changed
         store = self.store
         self._nmt = NmtSlave(node_id, self, boot_time)
@@ -93,7 +98,9 @@ class Device:
         self._error_behaviour = store.integer(Index.ERROR_BEHAVIOUR, 1)
         self._rpdos = RpdoEngine(store, self._on_pdo_changed, self._on_error)
         self._tpdos = TpdoEngine(store, self._on_pdo_changed, send)
+        self.faults = FaultInjector(self, self._line)
         parts: list[Timed] = [
+            self.faults,
             self._nmt,
             self._sdo,
             self._errors,
@@ -102,12 +109,18 @@ class Device:
             self._rpdos,
             self._tpdos,
         ]
-        self._parts: list[Timed] = parts if self.drive is None else [*parts, self.drive]
+        self._powered_parts = parts if self.drive is None else [*parts, self.drive]
+        self._parts: list[Timed] = self._powered_parts
 
     @property
     def nmt_state(self) -> NmtState:
         """NMT state; BOOT_UP stands for Initialisation."""
         return self._nmt.state
+
+    @property
+    def powered(self) -> bool:
+        """It has power."""
+        return self._parts is self._powered_parts
 
     @property
     def deadline(self) -> float:
@@ -124,7 +137,8 @@ class Device:
         if frame.is_extended or frame.is_error:
             return
         if frame.is_remote:
-            self._tpdos.request(frame.can_id, now)
+            if self.powered:
+                self._line.receive(frame, now, self._on_remote)
             return
         handler = self.handlers.get(frame.can_id)
         if handler is not None:
@@ -132,11 +146,48 @@ class Device:
 
     def advance(self, now: float) -> None:
         """Do what is due at steady time ``now`` in [s]."""
-        self._refresh(now)
+        self._line.now = now
+        if self.powered:
+            self._refresh(now)
         for part in self._parts:
             if part.deadline <= now:
                 part.advance(now)
         self._tpdos.poll(now)
+
+    def switch_off(self, now: float) -> None:
+        """Cut the power: the device falls silent, and the motor runs out."""
+        if not self.powered:
+            return
+        self._line.clear()
+        self._errors.reset()
+        self._errors.allow(False, now)
+        self._producer.stop()
+        self._rpdos.stop(now)
+        self._tpdos.stop()
+        if self.drive is not None:
+            self.drive.reset(now)
+        self._nmt.switch_off()
+        self._parts = [self.faults]
+        self._subscribe()
+
+    def switch_on(self, now: float, *, position_kept: bool = True) -> None:
+        """Give power again: the device starts, its objects with their defaults.
+
+        Args:
+            now: Steady time in [s].
+            position_kept: The encoder knows where the motor is; otherwise it counts from 0.
+        """
+        if self.powered:
+            return
+        if self.drive is not None and not position_kept:
+            self.drive.lose_position(now)
+        self._parts = self._powered_parts
+        self._subscribe()
+        self.advance(now)
+
+    def faults_changed(self) -> None:
+        """Let frames pass through the faults of the line (from the injector)."""
+        self._subscribe()
 
     def reset(self, command: NmtCommand, now: float) -> None:
         """Return to the defaults of the whole device or of its communication (from NMT)."""
@@ -185,7 +236,9 @@ class Device:
     def _subscribe(self) -> None:
         """Offer the services of the present NMT state (CiA 301, table 46)."""
         state = self._nmt.state
-        handlers: dict[int, Handler] = {CobId.NMT: self._nmt.receive}
+        handlers: dict[int, Handler] = {}
+        if self.powered:
+            handlers[CobId.NMT] = self._nmt.receive
         if state is not NmtState.BOOT_UP:
             handlers.update(dict.fromkeys(self._consumer.can_ids, self._consumer.receive))
         if state in (NmtState.PRE_OPERATIONAL, NmtState.OPERATIONAL):
@@ -193,6 +246,9 @@ class Device:
             handlers[self._sync.can_id] = self._sync.receive
         if state is NmtState.OPERATIONAL:
             handlers.update(self._pdo_handlers())
+        if self._line.faults:
+            guarded = self._line.guarded
+            handlers = {can_id: guarded(handler) for can_id, handler in handlers.items()}
         self.handlers = handlers
         if self._handlers_changed is not None:
             self._handlers_changed()
@@ -215,6 +271,23 @@ class Device:
         """Let the objects hold the values of this time."""
         if self.drive is not None:
             self.drive.advance(now)
+
+    def _on_remote(self, frame: Frame, now: float) -> None:
+        self._tpdos.request(frame.can_id, now)
+
+    def _identify(self, frame: Frame, outgoing: bool) -> Traffic:
+        """Say what a frame is, for the faults of the line."""
+        can_id = frame.can_id
+        if can_id == (self._sdo.response_id if outgoing else self._sdo.can_id):
+            return Traffic(Service.SDO, outgoing)
+        if can_id == CobId.HEARTBEAT + self.node_id and any(frame.data):  # 0 says boot-up
+            return Traffic(Service.HEARTBEAT, outgoing)
+        engine = self._tpdos if outgoing else self._rpdos
+        number = 0 if frame.is_remote else engine.number_of(can_id)
+        return Traffic(Service.PDO if number else Service.OTHER, outgoing, number)
+
+    def _send_abort(self, abort: Abort) -> None:
+        self._send(Frame(self._sdo.response_id, abort.encode()))
 
     def _on_sdo(self, frame: Frame, now: float) -> None:
         self._refresh(now)

@@ -13,6 +13,8 @@ from .device import Device, Handler
 from .servo import ServoModel
 from .timed import NEVER
 
+DEFECT_PAUSE = 0.1  # [s] after a defect in a device, before it is looked at again
+
 
 class DeviceHost:
     """Devices that share a connection to a bus; they hear each other too.
@@ -24,14 +26,22 @@ class DeviceHost:
         devices: In the order in which they were added.
     """
 
-    def __init__(self, send: Callable[[Frame], None]) -> None:
+    def __init__(
+        self,
+        send: Callable[[Frame], None],
+        on_defect: Callable[[Device, Exception], None] | None = None,
+    ) -> None:
         """Begin without devices.
 
         Args:
             send: Takes the frames for the bus.
+            on_defect: Told of an exception in a device, while the others go on; without it
+                the exception leaves the host.
         """
         self.devices: list[Device] = []
         self._send = send
+        self._on_defect = on_defect
+        self._resting: dict[Device, float] = {}  # until when, after a defect
         self._table: dict[int, list[tuple[Device, Handler]]] = {}
         self._outdated = False
         self._echoes: deque[tuple[Device, Frame]] = deque()
@@ -77,7 +87,7 @@ class DeviceHost:
     @property
     def deadline(self) -> float:
         """Steady time in [s] at which :meth:`advance` has something to do."""
-        return min((device.deadline for device in self.devices), default=NEVER)
+        return min((self._due(device) for device in self.devices), default=NEVER)
 
     def receive(self, frame: Frame, now: float) -> None:
         """Hand a frame from the bus to all devices that want it."""
@@ -87,9 +97,34 @@ class DeviceHost:
     def advance(self, now: float) -> None:
         """Do what is due at steady time ``now`` in [s]."""
         for device in self.devices:
-            if device.deadline <= now:
-                device.advance(now)
+            if self._due(device) <= now:
+                self._resting.pop(device, None)
+                try:
+                    device.advance(now)
+                except Exception as error:  # noqa: BLE001  # the other devices go on
+                    self._defect(device, error, now)
         self._dispatch_echoes(now)
+
+    def device(self, node_id: int) -> Device:
+        """Return the device with a node id.
+
+        Raises:
+            KeyError: There is none.
+        """
+        for device in self.devices:
+            if device.node_id == node_id:
+                return device
+        raise KeyError(node_id)
+
+    def _due(self, device: Device) -> float:
+        deadline = device.deadline
+        return max(deadline, self._resting[device]) if device in self._resting else deadline
+
+    def _defect(self, device: Device, error: Exception, now: float) -> None:
+        if self._on_defect is None:
+            raise error
+        self._on_defect(device, error)
+        self._resting[device] = now + DEFECT_PAUSE  # what is due stays due
 
     def _outdate(self) -> None:
         self._outdated = True
@@ -102,14 +137,22 @@ class DeviceHost:
 
     def _dispatch(self, frame: Frame, origin: Device | None, now: float) -> None:
         if frame.is_remote or frame.is_extended or frame.is_error:
-            for device in self.devices:
-                device.receive(frame, now)
-            return
-        if self._outdated:
-            self._rebuild()
-        for device, handler in self._table.get(frame.can_id, ()):
-            if device is not origin:
+            wanted: list[tuple[Device, Handler]] = [
+                (device, device.receive) for device in self.devices if device is not origin
+            ]
+        else:
+            if self._outdated:
+                self._rebuild()
+            wanted = [
+                (device, handler)
+                for device, handler in self._table.get(frame.can_id, ())
+                if device is not origin
+            ]
+        for device, handler in wanted:
+            try:
                 handler(frame, now)
+            except Exception as error:  # noqa: BLE001, PERF203  # the other devices go on
+                self._defect(device, error, now)
 
     def _rebuild(self) -> None:
         self._outdated = False

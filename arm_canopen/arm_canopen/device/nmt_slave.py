@@ -84,6 +84,12 @@ class NmtSlave:
             self.deadline = NEVER
             self.enter(NmtState.PRE_OPERATIONAL, now)
 
+    def switch_off(self) -> None:
+        """Lose the power; the next :meth:`advance` starts Initialisation again."""
+        self.state = NmtState.BOOT_UP
+        self.deadline = 0.0
+        self._powered = False
+
     def _initialise(self, command: NmtCommand, now: float) -> None:
         self.state = NmtState.BOOT_UP
         self._observer.reset(command, now)

@@ -161,11 +161,13 @@ class ObjectStore:
 
     Attributes:
         dictionary: What it was made from.
+        overlay: What clients read of some objects instead of their values.
     """
 
     def __init__(self, dictionary: ObjectDictionary) -> None:
         """Give every object its default."""
         self.dictionary = dictionary
+        self.overlay: dict[tuple[int, int], bytes] = {}
         self._variables = {entry.address: make_variable(entry) for entry in dictionary}
 
     def __iter__(self) -> Iterator[Variable]:
@@ -223,7 +225,8 @@ class ObjectStore:
             raise refusal(AbortCode.WRITE_ONLY, variable.entry)
         if variable.before_read is not None:
             variable.before_read()
-        return encode(variable.entry.data_type, variable.value)
+        shown = self.overlay.get((index, subindex))
+        return shown if shown is not None else encode(variable.entry.data_type, variable.value)
 
     def writable(self, index: int, subindex: int = 0) -> Variable:
         """Return a variable that an SDO may write.

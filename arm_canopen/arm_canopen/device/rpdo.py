@@ -25,6 +25,7 @@ class Rpdo(PdoChannel):
     """One receive PDO: writes what it carries into the object dictionary.
 
     Attributes:
+        number: From 1.
         deadline: Steady time in [s] at which the next one is overdue.
     """
 
@@ -50,6 +51,7 @@ class Rpdo(PdoChannel):
         self._report = report
         self._held: bytes | None = None
         self._listeners: tuple[Callable[[float], None], ...] = ()
+        self.number = number + 1
         super().__init__(
             store, Index.RPDO_COMMUNICATION + number, Index.RPDO_MAPPING + number, changed
         )
@@ -210,6 +212,10 @@ class RpdoEngine:
         """Report those that are overdue."""
         for rpdo in self.active:
             rpdo.advance(now)
+
+    def number_of(self, can_id: int) -> int:
+        """Return the number of the active PDO with an identifier, 0 when there is none."""
+        return next((rpdo.number for rpdo in self.active if rpdo.can_id == can_id), 0)
 
     def _select(self) -> None:
         self.active = [rpdo for rpdo in self.channels if self._running and rpdo.enabled]

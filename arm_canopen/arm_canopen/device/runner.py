@@ -5,15 +5,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
+from concurrent.futures import Future
 import logging
+from queue import SimpleQueue
 import threading
 import time
+from typing import Any, TypeVar
 
 from ..can.bus import Bus
 from ..can.frame import Frame
 from ..exceptions import BusError
+from .device import Device
 from .host import DeviceHost
+
+Result = TypeVar('Result')
 
 IDLE_WAIT = 1.0  # [s] longest wait when no device has a deadline
 RETRY_PAUSE = 0.1  # [s] between two looks at a bus that went away
@@ -25,10 +30,11 @@ class DeviceRunner:
     """Waits for frames and deadlines, and gives them to the devices of a host.
 
     A bus that goes away (interface down) is waited for; the devices go on meanwhile, as real
-    ones do.
+    ones do. A defect in one device is logged, and the others go on.
 
     Attributes:
-        host: The devices; add them before :meth:`start`, and leave them to the thread then.
+        host: The devices; add them before :meth:`start`, and leave them to the thread then:
+            :meth:`call` gets at them.
     """
 
     def __init__(self, bus: Bus) -> None:
@@ -37,8 +43,11 @@ class DeviceRunner:
         Args:
             bus: An open bus; it stays the caller's to close.
         """
-        self.host = DeviceHost(self._send)
+        self.host = DeviceHost(self._send, _tell_defect)
         self._bus = bus
+        self._lock = threading.Lock()
+        self._ended = False
+        self._calls: SimpleQueue[tuple[Callable[[], None], Future[Any]]] = SimpleQueue()
         self._stopping = False
         self._bus_failed = False
         self._thread = threading.Thread(target=self.run, name='devices', daemon=True)
@@ -54,24 +63,52 @@ class DeviceRunner:
         if self._thread.is_alive():
             self._thread.join()
 
+    def call(self, function: Callable[[], Result]) -> Future[Result]:
+        """Have a function run in the thread of the devices, between two of their steps.
+
+        Args:
+            function: May use :attr:`host` and its devices; it must not wait for anything.
+
+        Returns:
+            Its result or its exception; cancelled when the thread has ended or ends before.
+        """
+        future: Future[Result] = Future()
+
+        def work() -> None:
+            if not future.set_running_or_notify_cancel():
+                return
+            try:
+                future.set_result(function())
+            except Exception as error:  # noqa: BLE001  # it belongs to the caller
+                future.set_exception(error)
+
+        with self._lock:
+            if self._ended:
+                future.cancel()
+                return future
+            self._calls.put((work, future))
+        self._bus.wake()
+        return future
+
     def run(self) -> None:
         """Run the devices in this thread, until :meth:`stop` is called from another one."""
-        host = self.host
-        while not self._stopping:
-            if not self._guarded(partial(host.advance, time.monotonic())):
-                time.sleep(RETRY_PAUSE)  # what is due stays due
-            wait = min(host.deadline - time.monotonic(), IDLE_WAIT)
-            for frame in self._receive(max(0.0, wait)):
-                self._guarded(partial(host.receive, frame, frame.timestamp or time.monotonic()))
-
-    def _guarded(self, work: Callable[[], None]) -> bool:
-        """Let the devices not die of a defect in one; return whether there was none."""
         try:
-            work()
-        except Exception:
-            logger.exception('a defect in a simulated device')
-            return False
-        return True
+            while not self._stopping:
+                self._step()
+        finally:
+            with self._lock:
+                self._ended = True
+            while not self._calls.empty():
+                self._calls.get()[1].cancel()
+
+    def _step(self) -> None:
+        host = self.host
+        host.advance(time.monotonic())
+        while not self._calls.empty():
+            self._calls.get()[0]()
+        wait = min(host.deadline - time.monotonic(), IDLE_WAIT)
+        for frame in self._receive(max(0.0, wait)):
+            host.receive(frame, frame.timestamp or time.monotonic())
 
     def _receive(self, timeout: float) -> list[Frame]:
         try:
@@ -95,3 +132,7 @@ class DeviceRunner:
         if not self._bus_failed:
             self._bus_failed = True
             logger.error('%s', error)
+
+
+def _tell_defect(device: Device, error: Exception) -> None:
+    logger.error('a defect in the simulated device %d', device.node_id, exc_info=error)

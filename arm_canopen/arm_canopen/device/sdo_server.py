@@ -66,6 +66,7 @@ class SdoServer:
 
     Attributes:
         can_id: Identifier of the requests.
+        response_id: Identifier of the answers.
         deadline: Steady time in [s] at which a silent client's transfer is aborted.
     """
 
@@ -73,7 +74,7 @@ class SdoServer:
         """Serve the objects of a store under a node id."""
         self.can_id = CobId.SDO_REQUEST + node_id
         self.deadline = NEVER
-        self._response_id = CobId.SDO_RESPONSE + node_id
+        self.response_id = CobId.SDO_RESPONSE + node_id
         self._store = store
         self._send = send
         self._transfer: Transfer | None = None
@@ -90,7 +91,7 @@ class SdoServer:
         answer = self._answer(frame.data, now)
         self.deadline = now + SILENCE_MAX if self._transfer else NEVER
         if answer is not None:
-            self._send(Frame(self._response_id, answer.encode()))
+            self._send(Frame(self.response_id, answer.encode()))
 
     def advance(self, now: float) -> None:
         """Abort the transfer of a client that fell silent."""
@@ -100,7 +101,7 @@ class SdoServer:
         self.reset()
         if transfer is not None:
             abort = Abort(transfer.index, transfer.subindex, AbortCode.TIMED_OUT)
-            self._send(Frame(self._response_id, abort.encode()))
+            self._send(Frame(self.response_id, abort.encode()))
 
     def _answer(self, data: bytes, now: float) -> Answer | None:
         index, subindex = self._subject(data)

@@ -23,6 +23,7 @@ class Tpdo(PdoChannel):
     """One transmit PDO.
 
     Attributes:
+        number: From 1.
         deadline: Steady time in [s] at which it is to be sent.
     """
 
@@ -56,6 +57,7 @@ class Tpdo(PdoChannel):
         self._sampled: bytes | None = None
         self._free_time = 0.0  # end of the inhibit time
         self._countdown = 0
+        self.number = number + 1
         super().__init__(
             store, Index.TPDO_COMMUNICATION + number, Index.TPDO_MAPPING + number, changed
         )
@@ -183,6 +185,10 @@ class TpdoEngine:
         self._running = False
         self._select()
         self.deadline = NEVER
+
+    def number_of(self, can_id: int) -> int:
+        """Return the number of the active PDO with an identifier, 0 when there is none."""
+        return next((tpdo.number for tpdo in self.active if tpdo.can_id == can_id), 0)
 
     def _select(self) -> None:
         self.active = [
