@@ -77,40 +77,65 @@ class Mapping:
 Item: TypeAlias = Scalar | Listing | Mapping
 
 
-def read_document(path: str | os.PathLike[str], findings: Findings) -> Mapping:
+@dataclass(frozen=True, slots=True)
+class DocumentKind:
+    """What a kind of file is told when it is wrong as a whole.
+
+    Attributes:
+        name: What it is called.
+        parameter: Where its path is given.
+        beginning: What its top level is to look like.
+    """
+
+    name: str
+    parameter: str
+    beginning: str
+
+
+BUS_YML = DocumentKind(
+    'bus.yml',
+    'parameter bus_config',
+    "begin with the sections 'options:', 'master:', 'defaults:' and 'nodes:'",
+)
+
+
+def read_document(
+    path: str | os.PathLike[str], findings: Findings, kind: DocumentKind = BUS_YML
+) -> Mapping:
     """Read a YAML file whose top level is a mapping.
 
     Args:
         path: The file.
         findings: Gets duplicate keys and the like.
+        kind: What the file is meant to be.
 
     Raises:
         ConfigError: The file is missing or unreadable, is not YAML, or is no mapping.
     """
     file = Path(path)
-    item = _read(file, findings)
+    item = _read(file, findings, kind)
     if isinstance(item, Mapping):
         return item
     findings.error(
         Place(file),
         'the file is empty' if item is None else 'the top level is not a mapping',
-        "begin with the sections 'options:', 'master:', 'defaults:' and 'nodes:'",
+        kind.beginning,
     )
     findings.raise_errors()
     return Mapping(Place(file))
 
 
-def _read(file: Path, findings: Findings) -> Item | None:
+def _read(file: Path, findings: Findings, kind: DocumentKind) -> Item | None:
     item: Item | None = None
     try:
         root = yaml.compose(_read_text(file), Loader=yaml.SafeLoader)
         if root is not None:
             item = _Converter(file, findings).convert(root, Place(file))
     except OSError as error:
-        remedy = 'correct the path of the bus.yml (parameter bus_config)'
+        remedy = f'correct the path of the {kind.name} ({kind.parameter})'
         findings.error(Place(file), f'cannot be read: {error.strerror or error}', remedy)
     except RecursionError:
-        findings.error(Place(file), 'nested too deeply', 'a bus.yml needs five levels')
+        findings.error(Place(file), 'nested too deeply', f'a {kind.name} needs five levels')
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         place = Place(file, mark.line + 1, mark.column + 1) if mark else Place(file)
