@@ -1,0 +1,365 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The fault matrix: each fault in each mode, in motion, and what comes of it.
+
+What the master says, what the drives do, how it recovers; and that nothing moves unasked before,
+in between and after. Two drives move: the fault meets the first, and the second is the witness.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+import random
+import re
+
+import pytest
+from virtual_network import (
+    bus_config,
+    drive_config,
+    drive_dictionary,
+    SCALE,
+    VirtualNetwork,
+    with_defaults,
+)
+
+from arm_canopen.can.frame import Frame
+from arm_canopen.config.model import Identity
+from arm_canopen.device.drive import Drive as SimulatedDrive
+from arm_canopen.exceptions import DriveError, SdoError
+from arm_canopen.master.events import Severity
+from arm_canopen.standard.drive import DriveState, OperationMode
+
+FAULTY, WITNESS = 'joint1', 'joint2'
+NODE_ID = 2  # of the faulty one
+SPEED = 0.5  # [rad/s]
+FAR = 0.9  # [rad]
+SETTLING = 2.0  # [s] for a fault to be noticed and every ramp to end
+CREEP = 0.002  # [rad] that a motor without torque may still roll
+MODES = [
+    OperationMode.PROFILE_POSITION,
+    OperationMode.PROFILE_VELOCITY,
+    OperationMode.INTERPOLATED_POSITION,
+    OperationMode.CYCLIC_POSITION,
+]
+
+
+class Way(Enum):
+    """What brings the faulty drive back."""
+
+    NONE = 'it never stopped'
+    INIT = 'init'
+    RECOVER = 'recover'
+    ENABLE = 'enable'
+
+
+class Arm:
+    """Two drives and their master."""
+
+    def __init__(self) -> None:
+        """Boot them; the devices watch the master's heartbeat."""
+        watching = {'heartbeat_consumer': True}
+        self.net = VirtualNetwork(
+            bus_config(
+                drive_config(FAULTY, 2, **watching),
+                drive_config(WITNESS, 3, **watching),
+                heartbeat_producer=0.1,
+                heartbeat_timeout=0.3,
+            )
+        )
+        self.net.boot()
+
+    def simulated(self, name: str = FAULTY) -> SimulatedDrive:
+        """Return the drive of a simulated device."""
+        drive = self.net.devices[name].drive
+        assert drive is not None
+        return drive
+
+    def motor(self, name: str) -> float:
+        """Return where a motor really is in [rad]."""
+        return self.simulated(name).position / SCALE
+
+    def state(self, name: str = FAULTY) -> DriveState:
+        """Return the state in which a simulated drive really is."""
+        return self.simulated(name).state
+
+    def move(self, mode: OperationMode) -> None:
+        """Set both drives in motion in a mode."""
+        for name in (FAULTY, WITNESS):
+            self.net.do(name, 'init')
+            self.net.select(name, mode)
+        velocity = mode is OperationMode.PROFILE_VELOCITY
+        for name in (FAULTY, WITNESS):
+            self.net.commands[name].set_target(SPEED if velocity else FAR)
+        self.net.run(0.4)
+        assert self.motor(FAULTY) > 0.05
+        assert self.motor(WITNESS) > 0.05
+
+    def stop(self, name: str, mode: OperationMode) -> None:
+        """Have a drive stand that is enabled."""
+        if mode is OperationMode.PROFILE_VELOCITY:
+            self.net.commands[name].set_target(0.0)
+        self.net.run(SETTLING)
+
+    def stands(self, *names: str, duration: float = 2.0) -> None:
+        """Check that motors rest for a while, whatever their drives do."""
+        before = {name: self.motor(name) for name in names}
+        self.net.run(duration)
+        for name in names:
+            assert self.motor(name) == pytest.approx(before[name], abs=CREEP), self.net.story()
+
+    def lose(self, *cob_ids: int) -> None:
+        """Lose all frames of some identifiers."""
+        self.net.wire.loses = lambda sender, frame: frame.can_id in cob_ids
+
+
+def kill(arm: Arm) -> None:
+    """Cut the supply of the whole device."""
+    arm.net.power_off(FAULTY)
+
+
+def revive(arm: Arm) -> None:
+    """Switch it on again, and let it boot."""
+    arm.net.power_on(FAULTY)
+
+
+def reboot(arm: Arm) -> None:
+    """Restart it faster than its heartbeat could be missed."""
+    arm.net.power_off(FAULTY)
+    arm.net.run(0.05)
+    arm.net.power_on(FAULTY)
+
+
+def silence_master(arm: Arm) -> None:
+    """Nothing of the master reaches the bus any more."""
+    arm.net.wire.loses = lambda sender, frame: sender == 'master'
+
+
+def cut_bus(arm: Arm) -> None:
+    """Nothing reaches anybody, and the master's interface is down."""
+    arm.net.wire.loses = lambda sender, frame: True
+    arm.net.wire.refuses = 'the interface is down'
+
+
+def mend_bus(arm: Arm) -> None:
+    """Everything reaches everybody."""
+    arm.net.wire.loses = lambda sender, frame: False
+    arm.net.wire.refuses = ''
+
+
+def over_current(arm: Arm) -> None:
+    """Raise a fault with EMCY 0x2310."""
+    arm.simulated().raise_fault(0x2310, arm.net.now)
+
+
+def open_safety_circuit(arm: Arm) -> None:
+    """Take the voltage away."""
+    arm.simulated().set_voltage(False, arm.net.now)
+
+
+def close_safety_circuit(arm: Arm) -> None:
+    """Give it back."""
+    arm.simulated().set_voltage(True, arm.net.now)
+
+
+def following_error(arm: Arm) -> None:
+    """Raise the fault of a motor that does not follow."""
+    arm.simulated().raise_fault(0x8611, arm.net.now)
+
+
+def stop_heartbeat(arm: Arm) -> None:
+    """Lose the heartbeats of the device, and nothing else."""
+    arm.lose(0x700 + NODE_ID)
+
+
+def stop_sdo(arm: Arm) -> None:
+    """Lose the SDO answers of the device, and nothing else."""
+    arm.lose(0x580 + NODE_ID)
+
+
+def nothing(arm: Arm) -> None:
+    """Leave it as it is."""
+    del arm
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A row of the matrix.
+
+    Attributes:
+        name: What happens.
+        happen: Makes it happen.
+        says: What the master says, as a regular expression; empty when it is none the wiser.
+        state: States in one of which the drive ends; None when it is gone.
+        refuses: What answers a target meanwhile.
+        witness_stops: The other drive is met, too.
+        cure: Removes the cause.
+        way: What brings the drive back.
+    """
+
+    name: str
+    happen: Callable[[Arm], None]
+    says: str
+    state: DriveState | None
+    refuses: str
+    cure: Callable[[Arm], None]
+    way: Way
+    witness_stops: bool = False
+
+
+SWITCHED_OFF, FAULT = DriveState.SWITCH_ON_DISABLED, DriveState.FAULT
+FAULTS = (
+    Fault('slave killed', kill, 'heartbeat lost', None, 'offline', revive, Way.INIT),
+    Fault('slave rebooted', reboot, 'boot-up', SWITCHED_OFF, 'takes no target', nothing, Way.INIT),
+    Fault(
+        'master unheard', silence_master, '', FAULT, '', mend_bus, Way.RECOVER, witness_stops=True
+    ),
+    Fault(
+        'bus down',
+        cut_bus,
+        'interface is down',
+        FAULT,
+        '',
+        mend_bus,
+        Way.RECOVER,
+        witness_stops=True,
+    ),
+    Fault('EMCY', over_current, 'FAULT.*0x2310', FAULT, 'recover', nothing, Way.RECOVER),
+    Fault(
+        'STO low',
+        open_safety_circuit,
+        'FAULT|left Operation enabled',
+        FAULT,
+        'recover',
+        close_safety_circuit,
+        Way.RECOVER,
+    ),
+    Fault('following error', following_error, '0x8611', FAULT, 'recover', nothing, Way.RECOVER),
+    Fault(
+        'heartbeat stopped',
+        stop_heartbeat,
+        'heartbeat lost',
+        SWITCHED_OFF,
+        'offline',
+        mend_bus,
+        Way.ENABLE,
+    ),
+)
+
+
+ROWS = [
+    pytest.param(
+        fault,
+        marks=pytest.mark.xfail(
+            fault.name == 'master unheard', reason='nobody starts the devices again', strict=True
+        ),
+    )
+    for fault in FAULTS
+]
+
+
+@pytest.mark.parametrize('mode', MODES, ids=lambda mode: mode.name)
+@pytest.mark.parametrize('fault', ROWS, ids=[fault.name for fault in FAULTS])
+def test_fault_in_motion(fault: Fault, mode: OperationMode) -> None:
+    """It is said, the drive stops, targets are refused, and only a command brings it back."""
+    arm = Arm()
+    arm.move(mode)
+    fault.happen(arm)
+    if not fault.witness_stops:
+        arm.stop(WITNESS, mode)
+    arm.net.run(SETTLING)
+    said = [text for text in arm.net.told(Severity.INFO) if re.search(fault.says, text)]
+    assert said, arm.net.story()
+    if fault.state is not None:
+        assert arm.state() is fault.state, arm.net.story()
+        arm.stands(FAULTY)
+    if fault.refuses:
+        with pytest.raises(DriveError, match=fault.refuses):
+            arm.net.commands[FAULTY].set_target(0.1)
+    met = [FAULTY, WITNESS] if fault.witness_stops else [FAULTY]
+    assert (arm.state(WITNESS) is not DriveState.OPERATION_ENABLED) is fault.witness_stops
+
+    fault.cure(arm)
+    arm.net.run_until(arm.net.all_ready)
+    arm.stands(FAULTY, WITNESS)
+    for name in met:
+        assert arm.state(name) is not DriveState.OPERATION_ENABLED, 'enabled by itself'
+    for name in met:
+        arm.net.do(name, fault.way.value)
+        arm.net.select(name, mode)
+    arm.stands(FAULTY, WITNESS)
+    assert_obeys(arm, mode)
+
+
+def assert_obeys(arm: Arm, mode: OperationMode) -> None:
+    """Check that the drive goes where it is sent now."""
+    if mode is OperationMode.PROFILE_VELOCITY:
+        arm.net.commands[FAULTY].set_target(-SPEED)
+        arm.net.run(1.0)
+        assert arm.net.drives[FAULTY].velocity == pytest.approx(-SPEED, rel=0.05)
+        return
+    arm.net.commands[FAULTY].set_target(-0.2)
+    arm.net.run(3.0)
+    assert arm.motor(FAULTY) == pytest.approx(-0.2, abs=0.01)
+
+
+@pytest.mark.parametrize('mode', MODES, ids=lambda mode: mode.name)
+def test_sdo_time_outs_do_not_disturb_motion(mode: OperationMode) -> None:
+    """The cycle needs no SDO: only who asks for one hears of it, with object and device."""
+    arm = Arm()
+    arm.move(mode)
+    stop_sdo(arm)
+    with pytest.raises(SdoError, match=r'joint1.*0x1008|0x1008.*joint1'):
+        arm.net.result(arm.net.network.nodes[FAULTY].sdo.read(0x1008, 0, 0.2))
+    arm.stop(FAULTY, mode)
+    assert arm.state() is DriveState.OPERATION_ENABLED
+    mend_bus(arm)
+    arm.net.run(1.0)
+    assert_obeys(arm, mode)
+
+
+@pytest.mark.parametrize('mode', MODES, ids=lambda mode: mode.name)
+@pytest.mark.parametrize('seed', range(3))
+def test_a_twentieth_of_all_frames_lost(mode: OperationMode, seed: int) -> None:
+    """Boot, enabling and motion succeed all the same, and what was lost is counted."""
+    chance = random.Random(seed)
+    arm = Arm()
+
+    def loses(sender: str, frame: Frame) -> bool:
+        del sender, frame
+        return chance.random() < 0.05
+
+    arm.net.wire.loses = loses
+    arm.move(mode)
+    arm.stop(FAULTY, mode)
+    arm.stop(WITNESS, mode)
+    assert arm.state() is DriveState.OPERATION_ENABLED
+    arm.stands(FAULTY, WITNESS)
+    assert_obeys(arm, mode)
+    assert arm.net.network.missed_pdos > 0
+    assert arm.net.network.nodes[FAULTY].online
+
+
+def test_another_device_than_expected_is_not_driven() -> None:
+    """Its identity is said, it stays disabled, the others run, and the right one boots later."""
+    other = with_defaults(drive_dictionary().for_node(NODE_ID), {(0x1018, 1): 0x1234})
+    config = bus_config(
+        drive_config(FAULTY, NODE_ID, identity=Identity(vendor_id=0xFFFF)),
+        drive_config(WITNESS, 3),
+    )
+    net = VirtualNetwork(config, dictionaries={FAULTY: other})
+    net.start()
+    net.run_until(lambda: net.drives[WITNESS].ready)
+    net.run(2.0)
+    assert any('another device: vendor id 0x00001234' in text for text in net.told())
+    with pytest.raises(DriveError, match='vendor id'):
+        net.do(FAULTY, 'init')
+    net.do(WITNESS, 'init')
+    assert (stranger := net.devices[FAULTY].drive) is not None
+    assert stranger.state is DriveState.SWITCH_ON_DISABLED
+    net.power_off(FAULTY)
+    net._dictionaries.clear()
+    net.power_on(FAULTY)
+    net.run_until(net.all_ready)
+    net.do(FAULTY, 'init')
