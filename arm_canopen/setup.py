@@ -15,6 +15,10 @@ setup(
         ('share/ament_index/resource_index/packages', ['resource/arm_canopen']),
         ('share/arm_canopen', ['package.xml']),
         ('share/arm_canopen/eds', sorted(str(path) for path in Path('eds').iterdir())),
+        (
+            'share/arm_canopen/scenarios',
+            sorted(str(path) for path in Path('scenarios').iterdir()),
+        ),
     ],
     install_requires=['setuptools'],
     zip_safe=True,

@@ -113,6 +113,7 @@ BAD: dict[str, tuple[str, dict[str, str | int], str]] = {
     'no bus.yml given': ('fake_slaves', {}, 'no bus_config'),
     'no such bus.yml': ('fake_slaves', {'bus_config': '/nowhere/bus.yml'}, '/nowhere/bus.yml'),
     'no such EDS': ('fake_slave', {'slave_config': '/nowhere/a.eds'}, '/nowhere/a.eds'),
+    'no such scenario': ('fake_slave', {'scenario': '/nowhere/s.yaml'}, '/nowhere/s.yaml'),
     'no such bus': ('fake_slave', {'can_interface_name': 'nothing99'}, 'nothing99'),
     'node id out of range': ('fake_slave', {'node_id': 128}, 'node_id'),
     'node id of another type': ('fake_slave', {'node_id': 'seven'}, 'node_id'),

@@ -11,7 +11,7 @@ from ..can.frame import Frame
 from ..standard.dictionary import ObjectDictionary
 from .device import Device, Handler
 from .servo import ServoModel
-from .timed import NEVER
+from .timed import NEVER, Timed
 
 DEFECT_PAUSE = 0.1  # [s] after a defect in a device, before it is looked at again
 
@@ -24,6 +24,7 @@ class DeviceHost:
 
     Attributes:
         devices: In the order in which they were added.
+        observers: Advanced after each step, and when they are due.
     """
 
     def __init__(
@@ -39,6 +40,7 @@ class DeviceHost:
                 the exception leaves the host.
         """
         self.devices: list[Device] = []
+        self.observers: list[Timed] = []
         self._send = send
         self._on_defect = on_defect
         self._resting: dict[Device, float] = {}  # until when, after a defect
@@ -87,12 +89,17 @@ class DeviceHost:
     @property
     def deadline(self) -> float:
         """Steady time in [s] at which :meth:`advance` has something to do."""
-        return min((self._due(device) for device in self.devices), default=NEVER)
+        due = min((self._due(device) for device in self.devices), default=NEVER)
+        return (
+            min(due, *(observer.deadline for observer in self.observers))
+            if self.observers
+            else due
+        )
 
     def receive(self, frame: Frame, now: float) -> None:
         """Hand a frame from the bus to all devices that want it."""
         self._dispatch(frame, None, now)
-        self._dispatch_echoes(now)
+        self._finish(now)
 
     def advance(self, now: float) -> None:
         """Do what is due at steady time ``now`` in [s]."""
@@ -103,7 +110,7 @@ class DeviceHost:
                     device.advance(now)
                 except Exception as error:  # noqa: BLE001  # the other devices go on
                     self._defect(device, error, now)
-        self._dispatch_echoes(now)
+        self._finish(now)
 
     def device(self, node_id: int) -> Device:
         """Return the device with a node id.
@@ -128,6 +135,13 @@ class DeviceHost:
 
     def _outdate(self) -> None:
         self._outdated = True
+
+    def _finish(self, now: float) -> None:
+        self._dispatch_echoes(now)
+        if self.observers:
+            for observer in self.observers:
+                observer.advance(now)
+            self._dispatch_echoes(now)
 
     def _dispatch_echoes(self, now: float) -> None:
         # after the frame that caused them, which everybody has got by then

@@ -15,7 +15,7 @@ from rclpy.node import Node
 from ..config import load_eds
 from ..device.host import DeviceHost
 from ..standard.cob_id import NODE_ID_MAX, NODE_ID_MIN
-from .slave_process import run_slaves, text_parameter
+from .slave_process import Population, run_slaves, text_parameter
 
 DEFAULT_NODE_ID = 2
 
@@ -35,7 +35,7 @@ def default_eds() -> Path:
     return Path(get_package_share_directory('arm_canopen')) / 'eds' / 'cia402_drive.eds'
 
 
-def _populate(node: Node, host: DeviceHost) -> str:
+def _populate(node: Node, host: DeviceHost) -> Population:
     descriptor = ParameterDescriptor(
         description='CANopen node id of the device',
         read_only=True,
@@ -48,7 +48,7 @@ def _populate(node: Node, host: DeviceHost) -> str:
         node.get_logger().warning(str(warning))
     device = host.add(node_id, eds.dictionary)
     kind = 'drive' if device.drive is not None else 'device'
-    return f'simulated {kind} {node_id} of {eds.path}'
+    return Population(f'simulated {kind} {node_id} of {eds.path}', {'slave': node_id})
 
 
 if __name__ == '__main__':

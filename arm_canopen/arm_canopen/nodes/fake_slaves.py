@@ -12,7 +12,7 @@ from rclpy.node import Node
 from ..config import load_bus
 from ..device.host import DeviceHost
 from ..exceptions import CanopenError
-from .slave_process import run_slaves, text_parameter
+from .slave_process import Population, run_slaves, text_parameter
 
 
 def run_fake_slaves(args: Sequence[str] | None = None) -> int:
@@ -25,7 +25,7 @@ def main() -> None:
     sys.exit(run_fake_slaves())
 
 
-def _populate(node: Node, host: DeviceHost) -> str:
+def _populate(node: Node, host: DeviceHost) -> Population:
     path = text_parameter(node, 'bus_config', '', 'bus.yml whose devices are simulated')
     if not path:
         raise CanopenError(
@@ -38,7 +38,8 @@ def _populate(node: Node, host: DeviceHost) -> str:
         host.add(config.node_id, config.dictionary)
     drives = sum(device.drive is not None for device in host.devices)
     others = len(host.devices) - drives
-    return f'{drives} simulated drives' + (f' and {others} other devices' if others else '')
+    what = f'{drives} simulated drives' + (f' and {others} other devices' if others else '')
+    return Population(what, {config.name: config.node_id for config in bus.nodes})
 
 
 if __name__ == '__main__':

@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 import logging
 import threading
 
@@ -18,14 +19,33 @@ from rclpy.utilities import try_shutdown
 from ..can import open_bus
 from ..device.host import DeviceHost
 from ..device.runner import DeviceRunner
+from ..device.scenario import ScenarioPlayer
+from ..device.scenario_file import load_scenario
 from ..exceptions import CanopenError
+from .fault_services import FaultServices
 from .spinning import spin, stop_on_signals
 
 CAN_INTERFACES = (
     'can0, vcan0, udp_multicast:239.x.y.z[:port], auto, or INTERFACE:CHANNEL[@BITRATE]'
 )
 
-Populate = Callable[[Node, DeviceHost], str]
+SCENARIO = 'YAML file with faults and their times; empty for none'
+
+
+@dataclass(frozen=True, slots=True)
+class Population:
+    """The devices of a process.
+
+    Attributes:
+        what: What they are, for the log.
+        names: Their node ids by name.
+    """
+
+    what: str
+    names: Mapping[str, int]
+
+
+Populate = Callable[[Node, DeviceHost], Population]
 
 
 class RosLogHandler(logging.Handler):
@@ -86,11 +106,23 @@ def _run(node: Node, populate: Populate, default_bus: str, stop: threading.Event
     interface = text_parameter(node, 'can_interface_name', default_bus, CAN_INTERFACES)
     with open_bus(interface) as bus:
         runner = DeviceRunner(bus)
-        what = populate(node, runner.host)
+        population = populate(node, runner.host)
+        _play_scenario(node, runner.host, population)
+        FaultServices(node, runner, population.names)
         runner.start()
         try:
-            node.get_logger().info(f'{what} on {bus.name}')
+            node.get_logger().info(f'{population.what} on {bus.name}')
             spin([node], stop=stop)
         finally:
             runner.stop()
     return 0
+
+
+def _play_scenario(node: Node, host: DeviceHost, population: Population) -> None:
+    path = text_parameter(node, 'scenario', '', SCENARIO)
+    if not path:
+        return
+    drives = frozenset(device.node_id for device in host.devices if device.drive is not None)
+    steps = load_scenario(path, population.names, drives)
+    host.observers.append(ScenarioPlayer(host, steps, node.get_logger().info))
+    node.get_logger().info(f'{len(steps)} steps of {path} will be played')
