@@ -7,6 +7,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 import re
 
+from ..standard.drive import DriveState
 from .device_keys import DEVICE_KEYS, DRIVE_KEYS
 from .document import Mapping
 from .drivers import check_driver
@@ -104,6 +105,8 @@ def read_device_settings(
     """Read the section of a device, apart from its PDOs and objects."""
     values = read_section(section, DEVICE_KEYS + DRIVE_KEYS, findings)
     drive_fields = {key.field for key in DRIVE_KEYS}
+    if 'switching_state' in values:
+        values['switching_state'] = DriveState(values['switching_state'])
     drive = DriveConfig(**{name: values.pop(name) for name in drive_fields & values.keys()})
     settings = DeviceSettings(**values)
     if not ROS_NAME.fullmatch(name):
