@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 import re
 import shutil
@@ -37,7 +38,7 @@ LOG_LINE = re.compile(r'\(\d+\.\d{6}\) vcan0 [0-9A-F]{3}#[0-9A-F]*')
         ['arm_canopen/test/test_can_bus_contract.py', 'arm_canopen/test/test_can_socketcan.py'],
         ['tests/test_real_vcan.py'],
     ],
-    ids=['buses', 'bring-up'],
+    ids=['buses', 'bring-ups'],
 )
 def test_in_user_mode_linux(tests: list[str], tmp_path: Path) -> None:
     """The tests that need a vcan0 pass in a guest that has one, and none is skipped for it."""
@@ -49,45 +50,80 @@ def test_in_user_mode_linux(tests: list[str], tmp_path: Path) -> None:
     assert re.search(r'\d+ passed', output), output
 
 
-@pytest.mark.skipif(not HAS_VCAN, reason='this kernel has no vcan0; see test_in_user_mode_linux')
-@pytest.mark.timeout(240)
-def test_bring_up_on_vcan0_seen_by_candump(isolation: Isolation, tmp_path: Path) -> None:
-    """All seven drives boot, one moves, and can-utils' candump sees the same frames as ours."""
-    from processes import RunningProcess
+@dataclass(frozen=True)
+class Arm:
+    """A robot, and what one of its joints is told.
 
-    robot = tmp_path / 'panda'
-    shutil.copytree(panda_bus().parent, robot)
+    Attributes:
+        robot: Name of its folder.
+        joint: The joint.
+        node_ids: Node ids of all its drives.
+        mode: Service that selects the mode.
+        target: Target in [rad].
+        command: Frame that carries the target, as candump writes it.
+    """
+
+    robot: str
+    joint: str
+    node_ids: range
+    mode: str
+    target: float
+    command: str
+
+
+PANDA = Arm(
+    'panda', 'panda_joint1', range(2, 9), 'position_mode', 0.2, '302#C800000000000000'
+)  # 200 increments, velocity 0
+PRBT = Arm(
+    'prbt', 'prbt_joint_1', range(3, 9), 'interpolated_position_mode', 0.001, '203#1F000739000000'
+)  # controlword with the interpolation enabled, mode 7, 57 thousandths of a degree
+
+
+def copy_robot(arm: Arm, folder: Path) -> Path:
+    """Copy a robot with a slower SYNC: a guest carries about 1,000 frames of Python a second."""
+    robot = folder / arm.robot
+    shutil.copytree(panda_bus().parents[1] / arm.robot, robot)
     bus = robot / 'bus.yml'
-    # a guest carries about 1,000 frames of Python in a second
     slow = bus.read_text().replace('sync_period: 10000', 'sync_period: 50000')
     bus.write_text(slow.replace('period: 10 ', 'period: 50 '))
+    return robot
+
+
+@pytest.mark.skipif(not HAS_VCAN, reason='this kernel has no vcan0; see test_in_user_mode_linux')
+@pytest.mark.timeout(240)
+@pytest.mark.parametrize('arm', [PANDA, PRBT], ids=['panda', 'prbt'])
+def test_bring_up_on_vcan0_seen_by_candump(arm: Arm, isolation: Isolation, tmp_path: Path) -> None:
+    """All drives boot, one moves, and can-utils' candump sees the same frames as ours."""
+    from processes import RunningProcess
+
     log = tmp_path / 'real.log'
 
     def start(*command: str) -> RunningProcess:
         return RunningProcess(command, isolation.env)
 
     with start('bash', '-c', f'exec candump -L vcan0 > {log}') as candump:
-        bringup = ['bringup', f'{robot}/', '--simulate', '--can', 'vcan0', '--timeout', '60']
-        with start('ros2', 'run', 'arm_bringup', *bringup) as arm:
-            arm.wait_for('all is ready', 90.0)
+        robot = f'{copy_robot(arm, tmp_path)}/'
+        options = ['--simulate', '--can', 'vcan0', '--timeout', '60']
+        with start('ros2', 'run', 'arm_bringup', 'bringup', robot, *options) as bringup:
+            bringup.wait_for('all is ready', 90.0)
             for service, service_type, request in (
                 ('init', TRIGGER, '{}'),
-                ('position_mode', TRIGGER, '{}'),
-                ('target', TARGET, '{ target: 0.2 }'),
+                (arm.mode, TRIGGER, '{}'),
+                ('target', TARGET, f'{{ target: {arm.target} }}'),
             ):
-                call = [f'/panda_joint1/{service}', service_type, request]
+                call = [f'/{arm.joint}/{service}', service_type, request]
                 with start('ros2', 'service', 'call', *call) as process:
                     assert process.wait(60.0) == 0, process.output
                     assert 'success=True' in process.output
             with start('ros2', 'run', 'arm_canopen', 'candump', 'vcan0', '-n', '40') as ours:
                 assert ours.wait(60.0) == 0, ours.output
-            assert arm.stop(30.0) == 0, arm.output
+            assert bringup.stop(30.0) == 0, bringup.output
         candump.stop()
     lines = log.read_text().splitlines()
     assert all(LOG_LINE.fullmatch(line) for line in lines)
-    assert any(line.endswith(' 302#C800000000000000') for line in lines), 'target 200 increments'
-    assert {f'{identifier:03X}' for identifier in range(0x182, 0x189)} <= {
-        line.split()[2].split('#')[0] for line in lines
-    }
-    last = [line for line in lines if ' 182#' in line][-1]
+    assert any(line.endswith(f' {arm.command}') for line in lines), 'the target was not sent'
+    seen = {line.split()[2].split('#')[0] for line in lines}
+    assert {f'{0x180 + node_id:03X}' for node_id in arm.node_ids} <= seen
+    state = f' {0x180 + arm.node_ids[0]:03X}#'
+    last = [line for line in lines if state in line][-1]
     assert last.split('#')[1].startswith('50'), f'not disabled at the end: {last}'
