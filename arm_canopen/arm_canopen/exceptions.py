@@ -8,6 +8,7 @@
     ├── ConfigError (ValueError)     a bus.yml or EDS is wrong; lists every problem
     ├── BusError (OSError)           a CAN interface cannot be opened, or refuses a frame
     ├── CodecError (ValueError)      a value does not fit its type, or bytes are no message
+    ├── ObjectError (LookupError)    a device has no object of that name or number
     ├── SdoError                     a device did not do what an SDO asked
     │   ├── SdoAbortError            the device (or we) aborted the transfer with a code
     │   └── SdoTimeoutError (TimeoutError)   the device did not answer
@@ -54,6 +55,10 @@ class BusError(CanopenError, OSError):
 
 class CodecError(CanopenError, ValueError):
     """A value does not fit its data type, or received bytes are no valid message."""
+
+
+class ObjectError(CanopenError, LookupError):
+    """A device has no object of that name or number; the message names similar ones."""
 
 
 class SdoError(CanopenError):

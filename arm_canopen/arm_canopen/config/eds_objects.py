@@ -116,6 +116,7 @@ class ObjectReader:
         data_type = self._data_type(section, code)
         initial = self._initial(section, data_type)
         low, high = self._limits(section, data_type)
+        whole = self._objects.get(index, section)
         return ObjectEntry(
             index,
             subindex,
@@ -128,6 +129,7 @@ class ObjectReader:
             high_limit=high,
             pdo_mappable=bool(self._number(section, 'pdomapping', 0)),
             line=section.line,
+            record=whole.text('parametername') if whole.title != section.title else '',
         )
 
     def _data_type(self, section: IniSection, code: ObjectCode) -> DataType:

@@ -17,13 +17,18 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
+from arm_msgs.srv import ReadObject, WriteObject
+
 from ..exceptions import CanopenError, CodecError, SdoError
 from ..master.object_access import bytes_from_raw, number_from_raw, raw_from_bytes, raw_from_number
+from ..master.object_text import bytes_from_text, text_from_bytes
 from ..master.process_image import Input
 from ..master.remote_node import RemoteNode
 from ..master.runner import NetworkThread
 from ..master.scheduler import Promise
+from ..standard.dictionary import ObjectEntry
 from ..standard.nmt import NmtCommand, NmtState
+from ..standard.object_path import find_object, object_path
 from .deferred_service import DeferredServices
 from .output_thread import OutputThread
 
@@ -34,6 +39,15 @@ NMT_STATE_WORDS: dict[NmtState, str] = {
     NmtState.STOPPED: 'STOP',
 }
 """What ~/nmt_state says, in ros2_canopen's words; ERROR stands for a device that was lost."""
+
+NMT_SERVICES: dict[str, NmtCommand] = {
+    'nmt_start_node': NmtCommand.START,
+    'nmt_stop_node': NmtCommand.STOP,
+    'nmt_enter_pre_operational': NmtCommand.ENTER_PRE_OPERATIONAL,
+    'nmt_reset_node': NmtCommand.RESET_NODE,
+    'nmt_reset_communication': NmtCommand.RESET_COMMUNICATION,
+}
+"""Services and the NMT commands that they send; ros2_canopen has the first and the fourth."""
 
 LATCHED = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
@@ -66,10 +80,16 @@ class DeviceNode(Node):
         self._nmt_state = self.create_publisher(String, '~/nmt_state', LATCHED)
         self._rpdo = self.create_publisher(COData, '~/rpdo', 10)
         self.create_subscription(COData, '~/tpdo', self._write_pdo, 10)
-        self._offer_nmt('nmt_reset_node', NmtCommand.RESET_NODE)
-        self._offer_nmt('nmt_start_node', NmtCommand.START)
+        for name, command in NMT_SERVICES.items():
+            self._offer_nmt(name, command)
         self._deferred.create(self, CORead, '~/sdo_read', self._read, self._answer_read)
         self._deferred.create(self, COWrite, '~/sdo_write', self._write, self._answer_write)
+        self._deferred.create(
+            self, ReadObject, '~/read_object', self._read_object, self._answer_read_object
+        )
+        self._deferred.create(
+            self, WriteObject, '~/write_object', self._write_object, self._answer_write_object
+        )
 
     def offer_trigger(self, name: str, handler: Callable[[], Future[str]]) -> None:
         """Offer a std_srvs/Trigger whose message is what the future returns, or why it failed."""
@@ -161,6 +181,55 @@ class DeviceNode(Node):
 
     def _answer_write(self, response: COWrite.Response, future: Future[None]) -> None:
         answer_write(self, response, future)
+
+    def _read_object(self, request: ReadObject.Request) -> Future[tuple[ObjectEntry, bytes]]:
+        device, path = self.device, request.object
+
+        async def read() -> tuple[ObjectEntry, bytes]:
+            entry = find_object(device.config.dictionary, path)
+            return entry, await device.sdo.read(*entry.address, device.config.sdo_timeout)
+
+        return self._thread.run_coroutine(read)
+
+    def _answer_read_object(
+        self, response: ReadObject.Response, future: Future[tuple[ObjectEntry, bytes]]
+    ) -> None:
+        try:
+            entry, data = future.result()
+            response.index, response.subindex = entry.address
+            response.type, response.data = entry.data_type.name, data
+            response.value = text_from_bytes(entry.data_type, data)
+        except CanopenError as error:
+            response.message = str(error)
+        else:
+            response.success = True
+
+    def _write_object(self, request: WriteObject.Request) -> Future[tuple[ObjectEntry, bytes]]:
+        device, path = self.device, request.object
+
+        async def write() -> tuple[ObjectEntry, bytes]:
+            entry = find_object(device.config.dictionary, path)
+            if self.owns_object(entry.index):
+                raise CanopenError(f'{entry} is written by the drive itself; use its services')
+            data = bytes(request.data) or bytes_from_text(entry.data_type, request.value)
+            await device.sdo.write(*entry.address, data, device.config.sdo_timeout)
+            return entry, data
+
+        return self._thread.run_coroutine(write)
+
+    def _answer_write_object(
+        self, response: WriteObject.Response, future: Future[tuple[ObjectEntry, bytes]]
+    ) -> None:
+        try:
+            entry, data = future.result()
+        except CanopenError as error:
+            response.message = str(error)
+            return
+        response.index, response.subindex = entry.address
+        written = text_from_bytes(entry.data_type, data)
+        address = f'0x{entry.index:04X}:{entry.subindex:02X}'
+        response.success = True
+        response.message = f'{address} {object_path(entry)} = {written}'
 
 
 def answer_read(node: Node, response: Any, future: Future[int]) -> None:  # noqa: ANN401

@@ -1,13 +1,13 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The ROS node of the master: SDO access to any node id, and /diagnostics of the bus."""
+"""The ROS node of the master: SDO and NMT to any node id."""
 
 from __future__ import annotations
 
 from concurrent.futures import Future
 from typing import Any
 
-from canopen_interfaces.srv import COReadID, COWriteID
+from canopen_interfaces.srv import CONmtID, COReadID, COWriteID
 from rclpy.node import Node
 
 from ..exceptions import CanopenError
@@ -16,6 +16,7 @@ from ..master.runner import NetworkThread
 from ..master.scheduler import Promise
 from ..standard.cob_id import NODE_ID_MAX, NODE_ID_MIN
 from ..standard.datatypes import byte_length, DataType
+from ..standard.nmt import ALL_NODES, NmtCommand
 from .deferred_service import DeferredServices
 from .device_node import answer_read, answer_write
 from .output_thread import OutputThread
@@ -49,6 +50,7 @@ class MasterServices:
         services = DeferredServices(output)
         services.create(node, COReadID, '~/sdo_read', self._read, self._answer_read)
         services.create(node, COWriteID, '~/sdo_write', self._write, self._answer_write)
+        services.create(node, CONmtID, '~/set_nmt', self._set_nmt, self._answer_write)
 
     def _read(self, request: COReadID.Request) -> Future[int]:
         async def read() -> int:
@@ -72,6 +74,13 @@ class MasterServices:
 
         return self._thread.run(write)
 
+    def _set_nmt(self, request: CONmtID.Request) -> Future[None]:
+        def send() -> None:
+            node_id = request.nodeid if request.nodeid == ALL_NODES else _node_id(request.nodeid)
+            self._thread.network.send_nmt(_nmt_command(request.nmtcommand), node_id)
+
+        return self._thread.call(send)
+
     def _answer_read(self, response: Any, future: Future[int]) -> None:  # noqa: ANN401
         answer_read(self._node, response, future)
 
@@ -85,6 +94,14 @@ def _data_type(number: int) -> DataType:
             return data_type
     names = ', '.join(f'{data_type.name} {data_type:#04x}' for data_type in SERVICE_TYPES)
     raise CanopenError(f'canopen_datatype {number:#04x} is none of {names}')
+
+
+def _nmt_command(number: int) -> NmtCommand:
+    try:
+        return NmtCommand(number)
+    except ValueError:
+        names = ', '.join(f'{command.value} {command.name}' for command in NmtCommand)
+        raise CanopenError(f'nmtcommand {number} is none of {names}') from None
 
 
 def _node_id(number: int) -> int:

@@ -52,6 +52,7 @@ class ObjectEntry:
         index: Object index.
         subindex: Sub-index, 0 for a VAR.
         name: ParameterName of the EDS.
+        record: ParameterName of the array or record that it belongs to, empty for a VAR.
         data_type: Type of the value.
         access: Who may read or write.
         default: Value after a reset, None when the EDS gives none.
@@ -73,6 +74,7 @@ class ObjectEntry:
     high_limit: int | float | None = None
     pdo_mappable: bool = False
     line: int = 0
+    record: str = ''
 
     @property
     def address(self) -> tuple[int, int]:
