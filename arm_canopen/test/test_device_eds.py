@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import configparser
+import importlib.util
 from pathlib import Path
 import shutil
 from typing import Any
@@ -18,6 +19,9 @@ from arm_canopen.device.drive_objects import DriveObjects
 from arm_canopen.device.object_store import Integer, ObjectStore
 from arm_canopen.standard.nmt import NmtCommand
 
+TWO_AXES = EDS.with_name('cia402_two_axes.eds')
+TOOL = EDS.parents[1] / 'tools' / 'make_two_axes.py'
+FILES = pytest.mark.parametrize('path', [EDS, TWO_AXES], ids=lambda path: path.stem)
 ARTICLE = Path(__file__).parent / 'data' / 'panda' / 'bus.yml'
 DEVICE_INFO = [
     'VendorName',
@@ -46,24 +50,26 @@ DEVICE_INFO = [
 """Entries that CiA 306-1, 4.5.2 asks for."""
 
 
-def ini() -> configparser.ConfigParser:
+def ini(path: Path) -> configparser.ConfigParser:
     """Read the file as an INI file; a section or key that stands twice is an error."""
     parser = configparser.ConfigParser(strict=True, interpolation=None)
     parser.optionxform = str  # type: ignore[assignment,method-assign]
-    with EDS.open(encoding='ascii') as file:
+    with path.open(encoding='ascii') as file:
         parser.read_file(file)
     return parser
 
 
-def test_reads_without_a_warning() -> None:
+@FILES
+def test_reads_without_a_warning(path: Path) -> None:
     """Our own reader finds nothing odd in it."""
-    assert load_eds(EDS).warnings == ()
+    assert load_eds(path).warnings == ()
 
 
-def test_others_read_the_same() -> None:
+@FILES
+def test_others_read_the_same(path: Path) -> None:
     """python-canopen understands every object as our reader does."""
-    dictionary = load_eds(EDS).dictionary.for_node(NODE_ID)
-    other: Any = canopen.import_od(str(EDS), node_id=NODE_ID)
+    dictionary = load_eds(path).dictionary.for_node(NODE_ID)
+    other: Any = canopen.import_od(str(path), node_id=NODE_ID)
     assert len(list(dictionary)) == sum(
         1 if isinstance(entry, canopen.objectdictionary.ODVariable) else len(entry)
         for entry in other.values()
@@ -80,9 +86,10 @@ def test_others_read_the_same() -> None:
         assert (variable.min, variable.max) == (entry.low_limit, entry.high_limit), str(entry)
 
 
-def test_lists_and_sections_agree() -> None:
+@FILES
+def test_lists_and_sections_agree(path: Path) -> None:
     """Each listed object has its section, each section is listed once, counts are right."""
-    file = ini()
+    file = ini(path)
     listed: list[int] = []
     for name in ('MandatoryObjects', 'OptionalObjects', 'ManufacturerObjects'):
         count = int(file[name]['SupportedObjects'])
@@ -98,9 +105,10 @@ def test_lists_and_sections_agree() -> None:
         assert int(file[f'{index:04X}'].get('SubNumber', '0')) == len(subs)
 
 
-def test_device_info_is_complete_and_true() -> None:
+@FILES
+def test_device_info_is_complete_and_true(path: Path) -> None:
     """The device information has what the standard asks for, and agrees with the objects."""
-    file = ini()
+    file = ini(path)
     info = file['DeviceInfo']
     assert [key for key in DEVICE_INFO if key not in info] == []
     assert int(info['VendorNumber'], 0) == int(file['1018sub1']['DefaultValue'], 0)
@@ -109,13 +117,39 @@ def test_device_info_is_complete_and_true() -> None:
     assert info['ProductName'] == file['1008']['DefaultValue']
     assert int(info['NrOfRXPDO']) == sum(name.startswith('140') for name in file if len(name) == 4)
     assert int(info['NrOfTXPDO']) == sum(name.startswith('180') for name in file if len(name) == 4)
-    assert file['FileInfo']['FileName'] == EDS.name
+    assert file['FileInfo']['FileName'] == path.name
 
 
-def test_file_is_ascii_with_short_lines() -> None:
+@FILES
+def test_file_is_ascii_with_short_lines(path: Path) -> None:
     """CiA 306-1 allows ASCII and 255 characters to a line."""
-    text = EDS.read_bytes().decode('ascii')
+    text = path.read_bytes().decode('ascii')
     assert max(map(len, text.splitlines())) <= 255
+
+
+def test_two_axes_are_made_from_the_single_drive() -> None:
+    """The file of two axes is what its tool makes of the present file of one."""
+    spec = importlib.util.spec_from_file_location('make_two_axes', TOOL)
+    assert spec is not None
+    assert spec.loader is not None
+    tool = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(tool)
+    assert tool.two_axes(EDS.read_text('ascii')) == TWO_AXES.read_text('ascii')
+
+
+def test_second_axis_mirrors_the_first() -> None:
+    """Each object of the drive profile is there again 0x800 further on, the same in all else."""
+    dictionary = load_eds(TWO_AXES).dictionary
+    one, two = (
+        {
+            (entry.index - base, entry.subindex): (entry.data_type, entry.access, entry.default)
+            for entry in dictionary
+            if base <= entry.index < base + 0x800
+        }
+        for base in (0x6000, 0x6800)
+    )
+    assert one == two
+    assert (0x40, 0) in two
 
 
 def test_drive_finds_every_object_that_it_works_with() -> None:
