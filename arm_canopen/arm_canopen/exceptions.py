@@ -13,7 +13,8 @@
     │   ├── SdoAbortError            the device (or we) aborted the transfer with a code
     │   └── SdoTimeoutError (TimeoutError)   the device did not answer
     ├── BootError                    a device did not come up; names the phase
-    └── DriveError                   a drive refused a command or did not reach a state in time
+    ├── DriveError                   a drive refused a command or did not reach a state in time
+    └── LifecycleError               a managed node cannot make this transition now
 
 Arguments of the wrong kind from a *programmer* stay ``ValueError``/``TypeError``.
 """
@@ -91,3 +92,7 @@ class BootError(CanopenError):
 
 class DriveError(CanopenError):
     """A drive refused a command or did not reach the wanted state in time."""
+
+
+class LifecycleError(CanopenError):
+    """A managed node cannot make this transition now; the message says which it can."""

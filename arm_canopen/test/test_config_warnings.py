@@ -21,12 +21,6 @@ import pytest
         ('joint1', 'time_cob_id: 0x200', 'time_cob_id', 'no TIME'),
         ('joint1', 'period: 20', 'period', 'every 10 ms, not every 20 ms'),
         ('joint1', 'package: wrong', 'package', "is in the package 'canopen_402_driver'"),
-        (
-            'joint1',
-            'driver: "ros2_canopen::LifecycleCia402Driver"',
-            'driver',
-            'without lifecycle transitions',
-        ),
         ('joint1', 'scale_pos_to_dev: 57.3', 'scale_pos_to_dev', 'is 0.0573, not 1'),
         ('joint1', 'scale_vel_from_dev: 2', 'scale_vel_from_dev', 'is 2000, not 1'),
         ('master', 'sync_window: 5000', 'sync_window', 'known, not used yet'),

@@ -81,9 +81,3 @@ def _check_variant(section: Mapping, driver: DriverClass, findings: Findings) ->
             f'{driver.name} is in the package {driver.package!r}, not in {text!r}',
             'correct it; the class alone counts here',
         )
-    if driver.lifecycle:
-        findings.warning(
-            section.entries['driver'].place,
-            f'{driver.name} is run without lifecycle transitions: its node is active at once',
-            f'take {driver.name.replace("Lifecycle", "")!r} to say so',
-        )

@@ -17,19 +17,15 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from arm_msgs.srv import ReadObject, WriteObject
-
 from ..exceptions import CanopenError, CodecError, SdoError
 from ..master.object_access import bytes_from_raw, number_from_raw, raw_from_bytes, raw_from_number
-from ..master.object_text import bytes_from_text, text_from_bytes
 from ..master.process_image import Input
 from ..master.remote_node import RemoteNode
 from ..master.runner import NetworkThread
 from ..master.scheduler import Promise
-from ..standard.dictionary import ObjectEntry
 from ..standard.nmt import NmtCommand, NmtState
-from ..standard.object_path import find_object, object_path
 from .deferred_service import DeferredServices
+from .object_services import ObjectServices
 from .output_thread import OutputThread
 
 NMT_STATE_WORDS: dict[NmtState, str] = {
@@ -53,7 +49,12 @@ LATCHED = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 class DeviceNode(Node):
-    """Services and topics of one device."""
+    """Services and topics of one device.
+
+    Attributes:
+        device: The device.
+        admit: Called before every request; raises CanopenError when none is taken at the moment.
+    """
 
     def __init__(self, device: RemoteNode, thread: NetworkThread, output: OutputThread) -> None:
         """Offer the services.
@@ -74,6 +75,7 @@ class DeviceNode(Node):
         self.device = device
         self.output = output
         self._thread = thread
+        self.admit: Callable[[], None] = lambda: None
         self._deferred = DeferredServices(output)
         fixed = ParameterDescriptor(description='CANopen node id', read_only=True)
         self.declare_parameter('node_id', config.node_id, fixed)
@@ -82,14 +84,36 @@ class DeviceNode(Node):
         self.create_subscription(COData, '~/tpdo', self._write_pdo, 10)
         for name, command in NMT_SERVICES.items():
             self._offer_nmt(name, command)
-        self._deferred.create(self, CORead, '~/sdo_read', self._read, self._answer_read)
-        self._deferred.create(self, COWrite, '~/sdo_write', self._write, self._answer_write)
-        self._deferred.create(
-            self, ReadObject, '~/read_object', self._read_object, self._answer_read_object
-        )
-        self._deferred.create(
-            self, WriteObject, '~/write_object', self._write_object, self._answer_write_object
-        )
+        self.offer(CORead, 'sdo_read', self._read, self._answer_read)
+        self.offer(COWrite, 'sdo_write', self._write, self._answer_write)
+        ObjectServices(self, thread)
+
+    def offer(
+        self,
+        service_type: Any,  # noqa: ANN401  # service classes have no type
+        name: str,
+        handler: Callable[[Any], Future[Any]],
+        respond: Callable[[Any, Future[Any]], None],
+    ) -> None:
+        """Offer a service of this node whose outcome is a future.
+
+        Args:
+            service_type: Its type.
+            name: Its name below that of the node.
+            handler: Called with each request that is admitted.
+            respond: Fills the response in.
+        """
+
+        def guarded(request: Any) -> Future[Any]:  # noqa: ANN401
+            try:
+                self.admit()
+            except CanopenError as error:
+                refused: Future[Any] = Future()
+                refused.set_exception(error)
+                return refused
+            return handler(request)
+
+        self._deferred.create(self, service_type, f'~/{name}', guarded, respond)
 
     def offer_trigger(self, name: str, handler: Callable[[], Future[str]]) -> None:
         """Offer a std_srvs/Trigger whose message is what the future returns, or why it failed."""
@@ -101,7 +125,7 @@ class DeviceNode(Node):
             if error is not None:
                 self.get_logger().warning(f'{name}: {error}')
 
-        self._deferred.create(self, Trigger, f'~/{name}', lambda request: handler(), respond)
+        self.offer(Trigger, name, lambda request: handler(), respond)
 
     def publish_nmt_state(self) -> None:
         """Publish the NMT state; called when it changes."""
@@ -129,6 +153,11 @@ class DeviceNode(Node):
             self._rpdo.publish(COData(index=mapped.index, subindex=mapped.subindex, data=data))
 
     def _write_pdo(self, message: COData) -> None:
+        try:
+            self.admit()
+        except CanopenError as error:
+            self.get_logger().warning(f'~/tpdo: {error}')
+            return
         place = f'0x{message.index:04X}:{message.subindex:02X}'
         output = self.device.image.output_of(message.index, message.subindex)
         if output is None:
@@ -181,55 +210,6 @@ class DeviceNode(Node):
 
     def _answer_write(self, response: COWrite.Response, future: Future[None]) -> None:
         answer_write(self, response, future)
-
-    def _read_object(self, request: ReadObject.Request) -> Future[tuple[ObjectEntry, bytes]]:
-        device, path = self.device, request.object
-
-        async def read() -> tuple[ObjectEntry, bytes]:
-            entry = find_object(device.config.dictionary, path)
-            return entry, await device.sdo.read(*entry.address, device.config.sdo_timeout)
-
-        return self._thread.run_coroutine(read)
-
-    def _answer_read_object(
-        self, response: ReadObject.Response, future: Future[tuple[ObjectEntry, bytes]]
-    ) -> None:
-        try:
-            entry, data = future.result()
-            response.index, response.subindex = entry.address
-            response.type, response.data = entry.data_type.name, data
-            response.value = text_from_bytes(entry.data_type, data)
-        except CanopenError as error:
-            response.message = str(error)
-        else:
-            response.success = True
-
-    def _write_object(self, request: WriteObject.Request) -> Future[tuple[ObjectEntry, bytes]]:
-        device, path = self.device, request.object
-
-        async def write() -> tuple[ObjectEntry, bytes]:
-            entry = find_object(device.config.dictionary, path)
-            if self.owns_object(entry.index):
-                raise CanopenError(f'{entry} is written by the drive itself; use its services')
-            data = bytes(request.data) or bytes_from_text(entry.data_type, request.value)
-            await device.sdo.write(*entry.address, data, device.config.sdo_timeout)
-            return entry, data
-
-        return self._thread.run_coroutine(write)
-
-    def _answer_write_object(
-        self, response: WriteObject.Response, future: Future[tuple[ObjectEntry, bytes]]
-    ) -> None:
-        try:
-            entry, data = future.result()
-        except CanopenError as error:
-            response.message = str(error)
-            return
-        response.index, response.subindex = entry.address
-        written = text_from_bytes(entry.data_type, data)
-        address = f'0x{entry.index:04X}:{entry.subindex:02X}'
-        response.success = True
-        response.message = f'{address} {object_path(entry)} = {written}'
 
 
 def answer_read(node: Node, response: Any, future: Future[int]) -> None:  # noqa: ANN401

@@ -77,9 +77,7 @@ class DriveNode(DeviceNode):
         self._offer('halt', commands.halt, preempt=True)
         for name, mode in MODE_SERVICES.items():
             self._offer_mode(name, mode)
-        self._deferred.create(
-            self, COTargetDouble, '~/target', self._set_target, self._answer_target
-        )
+        self.offer(COTargetDouble, 'target', self._set_target, self._answer_target)
 
     def update_listeners(self) -> None:
         """Look who listens, so that only what is heard is published."""
@@ -102,17 +100,21 @@ class DriveNode(DeviceNode):
         self._joint_states.publish(message)
 
     def _offer(self, name: str, sequence: Sequence, *, preempt: bool = False) -> None:
-        commands = self._commands
-        self.offer_trigger(
-            name,
-            lambda: self._thread.run(lambda: commands.run(name, sequence(), preempt=preempt)),
-        )
+        def run() -> Promise[str]:
+            self.admit()  # again, in the thread in which the node may have been deactivated
+            return self._commands.run(name, sequence(), preempt=preempt)
+
+        self.offer_trigger(name, lambda: self._thread.run(run))
 
     def _offer_mode(self, name: str, mode: OperationMode) -> None:
         self._offer(name, lambda: self._commands.select_mode(mode))
 
     def _set_target(self, request: COTargetDouble.Request) -> Future[str]:
-        return self._thread.call(lambda: self._commands.set_target(request.target))
+        def set_target() -> str:
+            self.admit()
+            return self._commands.set_target(request.target)
+
+        return self._thread.call(set_target)
 
     def _answer_target(self, response: COTargetDouble.Response, future: Future[str]) -> None:
         error = future.exception()

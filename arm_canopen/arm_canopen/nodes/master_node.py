@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Any
 
@@ -35,7 +36,11 @@ SDO_TIMEOUT = 0.5  # [s] a stranger's bus.yml entry, which would say, does not e
 
 
 class MasterServices:
-    """Services of the master node."""
+    """Services of the master node.
+
+    Attributes:
+        admit: Called for every request; raises CanopenError when none is taken at the moment.
+    """
 
     def __init__(self, node: Node, thread: NetworkThread, output: OutputThread) -> None:
         """Offer them.
@@ -45,6 +50,7 @@ class MasterServices:
             thread: The thread of the network.
             output: The thread that answers.
         """
+        self.admit: Callable[[], None] = lambda: None
         self._node = node
         self._thread = thread
         services = DeferredServices(output)
@@ -54,6 +60,7 @@ class MasterServices:
 
     def _read(self, request: COReadID.Request) -> Future[int]:
         async def read() -> int:
+            self.admit()
             data_type = _data_type(request.canopen_datatype)
             client = self._thread.network.sdo_client(_node_id(request.nodeid))
             data = await client.read(request.index, request.subindex, SDO_TIMEOUT)
@@ -68,6 +75,7 @@ class MasterServices:
 
     def _write(self, request: COWriteID.Request) -> Future[None]:
         def write() -> Promise[None]:
+            self.admit()
             data = bytes_from_raw(_data_type(request.canopen_datatype), request.data)
             client = self._thread.network.sdo_client(_node_id(request.nodeid))
             return client.write(request.index, request.subindex, data, SDO_TIMEOUT)
@@ -76,6 +84,7 @@ class MasterServices:
 
     def _set_nmt(self, request: CONmtID.Request) -> Future[None]:
         def send() -> None:
+            self.admit()
             node_id = request.nodeid if request.nodeid == ALL_NODES else _node_id(request.nodeid)
             self._thread.network.send_nmt(_nmt_command(request.nmtcommand), node_id)
 

@@ -29,6 +29,7 @@ from ..master.status import node_status
 from .device_node import DeviceNode
 from .diagnostics import bus_diagnostic, BusStatus, device_diagnostic, drive_diagnostic
 from .drive_node import DriveNode
+from .managed_bus import ManagedBus
 from .master_node import MasterServices
 from .output_thread import OutputThread
 
@@ -80,11 +81,16 @@ class MasterProcess:
             name: DriveNode(drive, self._commands[name], self._thread, self._output)
             for name, drive in self._group.drives.items()
         }
-        MasterServices(node, self._thread, self._output)
+        services = MasterServices(node, self._thread, self._output)
         self._diagnostics = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
         node.create_timer(diagnostics_period, self._ask_diagnostics)
         node.create_timer(LISTENER_PERIOD, self._update_listeners)
-        self.nodes: list[Node] = [node, *self._devices.values(), *self._drives.values()]
+        devices = {**self._devices, **self._drives}
+        self.nodes: list[Node] = [node, *devices.values()]
+        if config.master.is_lifecycle:
+            managed = ManagedBus(node, devices, self._commands, self._thread, self._output)
+            services.admit = managed.admit
+            self.nodes.append(managed.manager)
 
     def start(self) -> None:
         """Boot the devices and start the cycle."""

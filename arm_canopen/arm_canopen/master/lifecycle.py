@@ -1,0 +1,206 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""States of managed nodes, whose transitions may take seconds and many SYNC cycles.
+
+States, transitions and their numbers are those of lifecycle_msgs (ROS 2 design, "Managed nodes").
+rclpy's own lifecycle node runs a transition inside a service callback, which would have to wait
+for a drive to brake; here a transition is a coroutine of the network.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Coroutine, Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any, TypeAlias
+
+from ..exceptions import CanopenError, LifecycleError
+from .scheduler import Promise, Scheduler
+
+
+class LifecycleState(IntEnum):
+    """States of lifecycle_msgs/State."""
+
+    UNKNOWN = 0
+    UNCONFIGURED = 1
+    INACTIVE = 2
+    ACTIVE = 3
+    FINALIZED = 4
+    CONFIGURING = 10
+    CLEANING_UP = 11
+    SHUTTING_DOWN = 12
+    ACTIVATING = 13
+    DEACTIVATING = 14
+
+    @property
+    def label(self) -> str:
+        """Label in lifecycle_msgs/State."""
+        return self.name.lower().replace('_', '')
+
+
+class Verb(IntEnum):
+    """What a transition does; the number of its success is ten times that, of its failure + 1."""
+
+    CONFIGURE = 1
+    CLEANUP = 2
+    ACTIVATE = 3
+    DEACTIVATE = 4
+    SHUTDOWN = 5
+
+    @property
+    def label(self) -> str:
+        """Label in lifecycle_msgs/Transition."""
+        return self.name.lower()
+
+
+@dataclass(frozen=True, slots=True)
+class Transition:
+    """A transition that somebody may ask for.
+
+    Attributes:
+        number: Its id in lifecycle_msgs/Transition.
+        verb: What it does.
+        start: The state in which it is possible.
+        through: The state while it runs.
+        success: The state after it.
+        failure: The state when it fails.
+    """
+
+    number: int
+    verb: Verb
+    start: LifecycleState
+    through: LifecycleState
+    success: LifecycleState
+    failure: LifecycleState
+
+
+_S = LifecycleState
+TRANSITIONS: tuple[Transition, ...] = (
+    Transition(1, Verb.CONFIGURE, _S.UNCONFIGURED, _S.CONFIGURING, _S.INACTIVE, _S.UNCONFIGURED),
+    Transition(2, Verb.CLEANUP, _S.INACTIVE, _S.CLEANING_UP, _S.UNCONFIGURED, _S.INACTIVE),
+    Transition(3, Verb.ACTIVATE, _S.INACTIVE, _S.ACTIVATING, _S.ACTIVE, _S.INACTIVE),
+    Transition(4, Verb.DEACTIVATE, _S.ACTIVE, _S.DEACTIVATING, _S.INACTIVE, _S.ACTIVE),
+    Transition(5, Verb.SHUTDOWN, _S.UNCONFIGURED, _S.SHUTTING_DOWN, _S.FINALIZED, _S.FINALIZED),
+    Transition(6, Verb.SHUTDOWN, _S.INACTIVE, _S.SHUTTING_DOWN, _S.FINALIZED, _S.FINALIZED),
+    Transition(7, Verb.SHUTDOWN, _S.ACTIVE, _S.SHUTTING_DOWN, _S.FINALIZED, _S.FINALIZED),
+)
+
+Work: TypeAlias = Callable[[Verb], Coroutine[Promise[Any], None, None]]
+
+
+class Managed:
+    """One managed entity: its state, and the work of its transitions.
+
+    Attributes:
+        name: Its name, for messages.
+        state: Its state.
+        on_change: Called before and after a transition, with it, the state that was left, the one
+            that was entered, and whether the transition has ended.
+    """
+
+    def __init__(self, name: str, work: Work) -> None:
+        """Begin unconfigured.
+
+        Args:
+            name: Its name.
+            work: The coroutine of each transition; a CanopenError that it raises is its failure.
+        """
+        self.name = name
+        self.state = LifecycleState.UNCONFIGURED
+        self.on_change: Callable[[Transition, LifecycleState, LifecycleState, bool], None] = (
+            lambda transition, before, after, ended: None
+        )
+        self._work = work
+
+    @property
+    def possible(self) -> tuple[Transition, ...]:
+        """Transitions that can be asked for now."""
+        return tuple(entry for entry in TRANSITIONS if entry.start is self.state)
+
+    def find(self, number: int, label: str = '') -> Transition:
+        """Return a transition by label, or by number when there is no label.
+
+        Raises:
+            LifecycleError: It does not exist, or is not possible now; the message says what is.
+        """
+        for entry in self.possible:
+            if (entry.verb.label == label) if label else (entry.number == number):
+                return entry
+        offered = ', '.join(f'{entry.verb.label} ({entry.number})' for entry in self.possible)
+        wanted = repr(label) if label else str(number)
+        raise LifecycleError(
+            f'{self.name} is {self.state.label}: transition {wanted} is not possible; '
+            f'possible: {offered or "none"}'
+        )
+
+    async def change(self, transition: Transition) -> None:
+        """Run a transition to its end.
+
+        Raises:
+            LifecycleError: It is not possible now.
+            CanopenError: It failed; the state is what the transition has for that.
+        """
+        if transition.start is not self.state:
+            self.find(transition.number)
+        self._enter(transition, transition.through, ended=False)
+        try:
+            await self._work(transition.verb)
+        except BaseException:
+            self._enter(transition, transition.failure, ended=True)
+            raise
+        self._enter(transition, transition.success, ended=True)
+
+    async def go(self, *verbs: Verb) -> None:
+        """Run transitions one after another, leaving out those whose end is reached already."""
+        for verb in verbs:
+            if not any(e.verb is verb and e.success is self.state for e in TRANSITIONS):
+                await self.change(self.find(0, verb.label))
+
+    def _enter(self, transition: Transition, state: LifecycleState, *, ended: bool) -> None:
+        before, self.state = self.state, state
+        self.on_change(transition, before, state, ended)
+
+
+class Supervisor:
+    """Brings a master and its devices up and down in order, as ros2_canopen's manager does.
+
+    The devices change side by side. When one of them cannot be activated, the others are brought
+    down again, so that there is no half of a robot that obeys.
+    """
+
+    def __init__(self, master: Managed, devices: Sequence[Managed], scheduler: Scheduler) -> None:
+        """Take what is brought up."""
+        self._master = master
+        self._devices = devices
+        self._scheduler = scheduler
+
+    async def work(self, verb: Verb) -> None:
+        """Do the work of a transition of the manager."""
+        if verb is Verb.ACTIVATE:
+            await self._up()
+        elif verb in (Verb.DEACTIVATE, Verb.SHUTDOWN):
+            await self._down()
+
+    async def _up(self) -> None:
+        await self._master.go(Verb.CONFIGURE, Verb.ACTIVATE)
+        try:
+            await self._all(Verb.CONFIGURE, Verb.ACTIVATE)
+        except CanopenError:
+            await self._down()
+            raise
+
+    async def _down(self) -> None:
+        active = [d for d in self._devices if d.state is LifecycleState.ACTIVE]
+        await self._scheduler.gather([self._spawn(d, Verb.DEACTIVATE) for d in active])
+        inactive = [d for d in self._devices if d.state is LifecycleState.INACTIVE]
+        await self._scheduler.gather([self._spawn(d, Verb.CLEANUP) for d in inactive])
+        if self._master.state is LifecycleState.ACTIVE:
+            await self._master.go(Verb.DEACTIVATE)
+        if self._master.state is LifecycleState.INACTIVE:
+            await self._master.go(Verb.CLEANUP)
+
+    async def _all(self, *verbs: Verb) -> None:
+        await self._scheduler.gather([self._spawn(d, *verbs) for d in self._devices])
+
+    def _spawn(self, device: Managed, *verbs: Verb) -> Promise[None]:
+        return self._scheduler.spawn(device.go(*verbs))

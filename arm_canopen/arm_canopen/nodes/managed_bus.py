@@ -1,0 +1,108 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Lifecycle nodes of a bus whose bus.yml names lifecycle drivers, and their manager."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from rcl_interfaces.msg import ParameterDescriptor
+from rclpy.node import Node
+
+from ..cia402.drive_commands import DriveCommands
+from ..exceptions import BootError, LifecycleError
+from ..master.lifecycle import LifecycleState, Managed, Supervisor, Verb, Work
+from ..master.remote_node import RemoteNode
+from ..master.runner import NetworkThread
+from .device_node import DeviceNode
+from .lifecycle_services import LifecycleServices
+from .output_thread import OutputThread
+
+MANAGER = 'lifecycle_manager'
+BOOT_ATTEMPTS = 3  # boot time-outs that an activation waits, as ros2_canopen does
+
+
+class ManagedBus:
+    """The lifecycle of a master and its devices.
+
+    A device that is not active obeys nothing. Deactivating a drive stops and disables it.
+
+    Attributes:
+        manager: The node ``/lifecycle_manager``.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        devices: Mapping[str, DeviceNode],
+        commands: Mapping[str, DriveCommands],
+        thread: NetworkThread,
+        output: OutputThread,
+    ) -> None:
+        """Make the nodes managed ones.
+
+        Args:
+            node: The master's node.
+            devices: The nodes of the devices by name.
+            commands: Commands of those that are drives.
+            thread: The thread of the network.
+            output: The thread that publishes and answers.
+        """
+        self._scheduler = thread.network.scheduler
+        self._master = Managed(node.get_name(), _nothing)
+        LifecycleServices(node, self._master, thread, output)
+        managed = []
+        for name, device in devices.items():
+            entry = Managed(name, self._work(device.device, commands.get(name)))
+            device.admit = _gate(entry)
+            LifecycleServices(device, entry, thread, output)
+            managed.append(entry)
+        supervisor = Supervisor(self._master, managed, self._scheduler)
+        self.manager = Node(MANAGER)
+        text = ParameterDescriptor(
+            description='accepted for ros2_canopen; not needed', read_only=True
+        )
+        self.manager.declare_parameter('container_name', '', text)
+        LifecycleServices(self.manager, Managed(MANAGER, supervisor.work), thread, output)
+
+    def admit(self) -> None:
+        """Let a request to the master pass.
+
+        Raises:
+            LifecycleError: It is not active.
+        """
+        _gate(self._master)()
+
+    def _work(self, device: RemoteNode, commands: DriveCommands | None) -> Work:
+        async def work(verb: Verb) -> None:
+            if verb is Verb.ACTIVATE:
+                await self._booted(device)
+            elif verb in (Verb.DEACTIVATE, Verb.SHUTDOWN) and commands is not None:
+                await commands.run('shutdown', commands.shutdown(), preempt=True)
+
+        return work
+
+    async def _booted(self, device: RemoteNode) -> None:
+        timeout = BOOT_ATTEMPTS * device.config.boot_timeout
+        try:
+            await self._scheduler.until(lambda: device.online, timeout)
+        except TimeoutError:
+            raise BootError(
+                f'{device.name} is not activated: not booted within {timeout:g} s '
+                f'({device.phase.value} {device.phase_detail})'.rstrip()
+            ) from None
+
+
+async def _nothing(verb: Verb) -> None:
+    """Do no work: the master boots and watches its devices in every state."""
+
+
+def _gate(managed: Managed) -> Callable[[], None]:
+    def admit() -> None:
+        if managed.state is not LifecycleState.ACTIVE:
+            raise LifecycleError(
+                f'{managed.name} is {managed.state.label}, not active; activate it, or all with: '
+                f'ros2 lifecycle set /{MANAGER} configure, then activate'
+            )
+
+    return admit

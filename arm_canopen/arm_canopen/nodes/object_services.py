@@ -1,0 +1,83 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Services that read and write objects of any type by name or number."""
+
+from __future__ import annotations
+
+from concurrent.futures import Future
+from typing import TYPE_CHECKING
+
+from arm_msgs.srv import ReadObject, WriteObject
+
+from ..exceptions import CanopenError
+from ..master.object_text import bytes_from_text, text_from_bytes
+from ..master.runner import NetworkThread
+from ..standard.dictionary import ObjectEntry
+from ..standard.object_path import find_object, object_path
+
+if TYPE_CHECKING:
+    from .device_node import DeviceNode
+
+Transfer = tuple[ObjectEntry, bytes]
+
+
+class ObjectServices:
+    """``~/read_object`` and ``~/write_object`` of one device."""
+
+    def __init__(self, node: DeviceNode, thread: NetworkThread) -> None:
+        """Offer them.
+
+        Args:
+            node: The node of the device.
+            thread: The thread of its network.
+        """
+        self._node = node
+        self._device = node.device
+        self._thread = thread
+        node.offer(ReadObject, 'read_object', self._read, self._answer_read)
+        node.offer(WriteObject, 'write_object', self._write, self._answer_write)
+
+    def _read(self, request: ReadObject.Request) -> Future[Transfer]:
+        device, path = self._device, request.object
+
+        async def read() -> Transfer:
+            entry = find_object(device.config.dictionary, path)
+            return entry, await device.sdo.read(*entry.address, device.config.sdo_timeout)
+
+        return self._thread.run_coroutine(read)
+
+    def _answer_read(self, response: ReadObject.Response, future: Future[Transfer]) -> None:
+        try:
+            entry, data = future.result()
+            response.index, response.subindex = entry.address
+            response.type, response.data = entry.data_type.name, data
+            response.value = text_from_bytes(entry.data_type, data)
+        except CanopenError as error:
+            response.message = str(error)
+        else:
+            response.success = True
+
+    def _write(self, request: WriteObject.Request) -> Future[Transfer]:
+        device, path = self._device, request.object
+
+        async def write() -> Transfer:
+            entry = find_object(device.config.dictionary, path)
+            if self._node.owns_object(entry.index):
+                raise CanopenError(f'{entry} is written by the drive itself; use its services')
+            data = bytes(request.data) or bytes_from_text(entry.data_type, request.value)
+            await device.sdo.write(*entry.address, data, device.config.sdo_timeout)
+            return entry, data
+
+        return self._thread.run_coroutine(write)
+
+    def _answer_write(self, response: WriteObject.Response, future: Future[Transfer]) -> None:
+        try:
+            entry, data = future.result()
+        except CanopenError as error:
+            response.message = str(error)
+            return
+        response.index, response.subindex = entry.address
+        written = text_from_bytes(entry.data_type, data)
+        address = f'0x{entry.index:04X}:{entry.subindex:02X}'
+        response.success = True
+        response.message = f'{address} {object_path(entry)} = {written}'

@@ -1,0 +1,94 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Lifecycle drivers in bus.yml: managed nodes and their manager, over DDS and a real bus."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from bus_recorder import BusRecorder
+from canopen_interfaces.srv import COTargetDouble
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState, GetState
+import pytest
+from simulated_arm import JOINTS, panda_bus, SimulatedArm
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from isolation import Isolation
+
+pytestmark = pytest.mark.scenario
+NODES = ['master', *JOINTS]
+
+
+@pytest.fixture
+def lifecycle_bus(tmp_path: Path) -> Path:
+    """The Panda's bus with lifecycle drivers."""
+    text = panda_bus().read_text().replace('"@BUS_CONFIG_PATH@"', f'"{panda_bus().parent}"')
+    for name in ('MasterDriver', 'Cia402Driver'):
+        text = text.replace(f'::{name}', f'::Lifecycle{name}')
+    path = tmp_path / 'bus.yml'
+    path.write_text(text)
+    return path
+
+
+def change(arm: SimulatedArm, node: str, label: str) -> bool:
+    """Ask for a transition by its label, as ``ros2 lifecycle set`` does."""
+    request = ChangeState.Request(transition=Transition(label=label))
+    return bool(arm.client.call(ChangeState, f'/{node}/change_state', request).success)
+
+
+def states(arm: SimulatedArm) -> set[str]:
+    """Return the states that occur among master and joints."""
+    return {
+        arm.client.call(GetState, f'/{node}/get_state', GetState.Request()).current_state.label
+        for node in NODES
+    }
+
+
+def test_the_manager_brings_up_and_deactivation_disables(
+    isolation: Isolation, lifecycle_bus: Path
+) -> None:
+    """Inactive nodes refuse in words; deactivated in motion, every drive stops and is off."""
+    with BusRecorder(isolation.bus) as recorder, SimulatedArm(isolation, lifecycle_bus) as arm:
+        assert states(arm) == {'unconfigured'}
+        refused = arm.client.trigger('/panda_joint1/init')
+        assert not refused.success
+        assert 'panda_joint1 is unconfigured, not active' in refused.message
+        assert not change(arm, 'lifecycle_manager', 'activate')  # not before configure
+
+        assert change(arm, 'lifecycle_manager', 'configure')
+        assert change(arm, 'lifecycle_manager', 'activate')
+        assert states(arm) == {'active'}
+        arm.init_all()
+        for joint in JOINTS:
+            assert arm.client.trigger(f'/{joint}/position_mode').success
+            request = COTargetDouble.Request(target=5.0)
+            assert arm.client.call(COTargetDouble, f'/{joint}/target', request).success
+
+        assert change(arm, 'panda_joint2', 'deactivate')
+        assert recorder.last_states()[3] == 'Switch on disabled'
+        assert recorder.last_states()[2] == 'Operation enabled'
+        assert not arm.client.trigger('/panda_joint2/enable').success
+        assert change(arm, 'lifecycle_manager', 'deactivate')
+        assert states(arm) == {'unconfigured'}
+        assert recorder.last_states() == dict.fromkeys(range(2, 9), 'Switch on disabled')
+
+        assert change(arm, 'lifecycle_manager', 'activate')
+        arm.init_all()
+
+
+def test_the_command_line_knows_the_nodes(isolation: Isolation, lifecycle_bus: Path) -> None:
+    """Ros2 lifecycle lists them and sets their states."""
+    with SimulatedArm(isolation, lifecycle_bus) as arm:
+        listed = arm.run('ros2', 'lifecycle', 'nodes')
+        assert listed.wait() == 0, listed.output
+        assert set(listed.lines) == {f'/{node}' for node in ['lifecycle_manager', *NODES]}
+        done = arm.run('ros2', 'lifecycle', 'set', '/panda_joint1', 'configure')
+        assert done.wait() == 0, done.output
+        state = arm.run('ros2', 'lifecycle', 'get', '/panda_joint1')
+        assert state.wait() == 0, state.output
+        assert state.lines == ['inactive [2]']
+        assert change(arm, 'panda_joint1', 'activate')
+        assert arm.client.trigger('/panda_joint1/init').success
