@@ -324,7 +324,7 @@ def test_remote_frames(rig: Rig) -> None:
     assert ask(0x180 + NODE_ID) == [b'\x31\x02']
     assert ask(0x380 + NODE_ID) == []
     assert ask(0x480 + NODE_ID) == []
-    assert ask(0x700 + NODE_ID) == []
+    assert ask(0x701) == []
 
 
 def test_full_frame_of_eight_objects(rig: Rig) -> None:

@@ -16,6 +16,7 @@ from .drive import Drive
 from .emcy_producer import EmcyProducer
 from .fault_injector import FaultInjector
 from .fault_line import FaultLine, Service, Traffic
+from .guarding import GuardedNode
 from .heartbeat import HeartbeatConsumer, HeartbeatProducer
 from .nmt_slave import boot_up_frame, NmtSlave
 from .object_store import ObjectStore
@@ -95,6 +96,9 @@ class Device:
         self._consumer = HeartbeatConsumer(
             store, self._on_heartbeat_lost, self._on_heartbeat_back, self._subscribe
         )
+        self._guarding = GuardedNode(
+            node_id, store, lambda: self._nmt.state, send, self._on_guarding
+        )
         self._error_behaviour = store.integer(Index.ERROR_BEHAVIOUR, 1)
         self._rpdos = RpdoEngine(store, self._on_pdo_changed, self._on_error)
         self._tpdos = TpdoEngine(store, self._on_pdo_changed, send)
@@ -106,6 +110,7 @@ class Device:
             self._errors,
             self._consumer,
             self._producer,
+            self._guarding,
             self._rpdos,
             self._tpdos,
         ]
@@ -166,6 +171,7 @@ class Device:
         self._tpdos.stop()
         if self.drive is not None:
             self.drive.reset(now)
+        self._guarding.reset()
         self._nmt.switch_off()
         self._parts = [self.faults]
         self._subscribe()
@@ -210,6 +216,7 @@ class Device:
                 for code in sorted(self.drive.faults):
                     self._errors.report(code, now)
         self._consumer.reset()
+        self._guarding.reset()
         self._subscribe()
 
     def nmt_changed(self, previous: NmtState, now: float) -> None:
@@ -273,6 +280,9 @@ class Device:
             self.drive.advance(now)
 
     def _on_remote(self, frame: Frame, now: float) -> None:
+        if frame.can_id == CobId.HEARTBEAT + self.node_id:
+            self._guarding.request(now)
+            return
         self._tpdos.request(frame.can_id, now)
 
     def _identify(self, frame: Frame, outgoing: bool) -> Traffic:
@@ -316,6 +326,16 @@ class Device:
         self._subscribe()
 
     def _on_heartbeat_lost(self, node_id: int, now: float) -> None:
+        self._lose_contact(now, node_id)
+
+    def _on_guarding(self, lost: bool, now: float) -> None:
+        if lost:
+            self._lose_contact(now)
+        else:
+            self._regain_contact(now)
+
+    def _lose_contact(self, now: float, node_id: int = 0) -> None:
+        """React to a communication error as 0x1029:01 and the drive's 0x6007 say."""
         self._errors.report(HEARTBEAT_ERROR, now, bytes((node_id, 0, 0, 0, 0)))
         if self.drive is not None:
             self.drive.connection_lost(now)
@@ -324,6 +344,9 @@ class Device:
             self._nmt.enter(target, now)
 
     def _on_heartbeat_back(self, _node_id: int, now: float) -> None:
+        self._regain_contact(now)
+
+    def _regain_contact(self, now: float) -> None:
         latched = self.drive is not None and HEARTBEAT_ERROR in self.drive.faults
-        if not latched and not self._consumer.missing:
+        if not (latched or self._consumer.missing or self._guarding.lost):
             self._errors.clear(HEARTBEAT_ERROR, now)
