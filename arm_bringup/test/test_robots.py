@@ -7,6 +7,7 @@ from __future__ import annotations
 import math
 import os
 from pathlib import Path
+import runpy
 
 import pytest
 
@@ -69,10 +70,9 @@ def test_the_bus_of_the_panda_has_its_seven_joints() -> None:
     assert bus.warnings == ()
 
 
-@pytest.mark.parametrize('name', ['panda/cia402_slave.eds', 'prbt/prbt_0_1.dcf'])
-def test_there_is_one_source_of_the_eds(name: str) -> None:
-    """A robot's EDS is that of the simulated drive, under its article's name."""
-    eds = ROBOTS / name
+def test_there_is_one_source_of_the_eds() -> None:
+    """The Panda's EDS is that of the simulated drive, under the article's name."""
+    eds = ROBOTS / 'panda' / 'cia402_slave.eds'
     assert eds.is_symlink()
     assert eds.resolve() == ROBOTS.parents[1] / 'arm_canopen' / 'eds' / 'cia402_drive.eds'
 
@@ -96,3 +96,10 @@ def test_the_mode_of_streams_is_the_one_that_bus_yml_asks_for() -> None:
         for name in ('panda', 'prbt')
     }
     assert services == {'panda': 'cyclic_position_mode', 'prbt': 'interpolated_position_mode'}
+
+
+def test_the_dcf_of_the_prbt_is_made_of_the_same_eds() -> None:
+    """Nobody edits it by hand: arm_bringup/tools/make_prbt_dcf.py writes it."""
+    tool = runpy.run_path(str(ROBOTS.parent / 'tools' / 'make_prbt_dcf.py'))
+    eds = ROBOTS.parents[1] / 'arm_canopen' / 'eds' / 'cia402_drive.eds'
+    assert (ROBOTS / 'prbt' / 'prbt_0_1.dcf').read_text() == tool['derive'](eds.read_text())
