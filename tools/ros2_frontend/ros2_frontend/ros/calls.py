@@ -12,6 +12,8 @@ from ..cli.errors import FrontendError, NoAnswerError
 from .session import Session
 
 _POLL = 0.01  # [s]
+_POLL_LONGEST = 0.25  # [s]
+_POLL_SHARE = 0.02  # of the time waited so far: who waits for minutes shall not burn a core
 _APPEAR = 5.0  # [s]; how long a service of a node that exists may take to show up
 
 
@@ -47,11 +49,12 @@ class Client:
         Returns:
             Whether it is.
         """
-        deadline = None if timeout is None else time.monotonic() + timeout
+        begin = time.monotonic()
         while not self.is_ready():
-            if deadline is not None and time.monotonic() >= deadline:
+            waited = time.monotonic() - begin
+            if timeout is not None and waited >= timeout:
                 return False
-            time.sleep(_POLL)
+            time.sleep(min(max(_POLL, _POLL_SHARE * waited), _POLL_LONGEST))
         return True
 
     def call(self, request: Message, timeout: float | None = None) -> Message:
