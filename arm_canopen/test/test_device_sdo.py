@@ -210,12 +210,6 @@ TRANSCRIPTS = {
         < -
         > 60 00 00 00 00 00 00 00
         < 80 00 00 00 01 00 04 05""",
-    'block download is refused': """
-        > C6 00 20 00 20 00 00 00
-        < 80 00 20 00 01 00 04 05""",
-    'block upload is refused': """
-        > A4 08 10 00 20 00 00 00
-        < 80 08 10 00 01 00 04 05""",
     'unknown command specifier': """
         > E0 34 12 56 00 00 00 00
         < 80 34 12 56 01 00 04 05""",
@@ -326,7 +320,7 @@ def test_long_numbers_come_back(value: int) -> None:
 def test_every_readable_object_can_be_read(rig: Rig) -> None:
     """Each object of the EDS answers with a value of its length, or says why it has none."""
     for entry in drive_dictionary():
-        if entry.index == 0x1003 and entry.subindex:
+        if (entry.index == 0x1003 and entry.subindex) or not entry.access.readable:
             continue
         size = rig.device.store.find(*entry.address).size
         value = rig.read(*entry.address)

@@ -21,7 +21,7 @@ from .heartbeat import HeartbeatConsumer, HeartbeatProducer
 from .nmt_slave import boot_up_frame, NmtSlave
 from .object_store import ObjectStore
 from .rpdo import RpdoEngine
-from .sdo_server import SdoServer
+from .sdo_servers import SdoServers
 from .servo import ServoModel
 from .sync_consumer import SyncConsumer
 from .timed import Timed
@@ -91,7 +91,7 @@ class Device:
         self.drive: Drive | None = (
             Drive(store, self._errors, self._sync, servo or ServoModel()) if is_drive else None
         )
-        self._sdo = SdoServer(node_id, store, send)
+        self._sdo = SdoServers(node_id, store, send, self._subscribe)
         self._producer = HeartbeatProducer(node_id, store, lambda: self._nmt.state, send)
         self._consumer = HeartbeatConsumer(
             store, self._on_heartbeat_lost, self._on_heartbeat_back, self._subscribe
@@ -205,6 +205,7 @@ class Device:
         self._errors.reset()
         self._errors.allow(False, now)
         self._sdo.reset()
+        self._sdo.configure()
         self._sync.reset()
         self._rpdos.configure()
         self._tpdos.configure()
@@ -249,7 +250,7 @@ class Device:
         if state is not NmtState.BOOT_UP:
             handlers.update(dict.fromkeys(self._consumer.can_ids, self._consumer.receive))
         if state in (NmtState.PRE_OPERATIONAL, NmtState.OPERATIONAL):
-            handlers[self._sdo.can_id] = self._on_sdo
+            handlers.update((can_id, self._on_sdo) for can_id in self._sdo.can_ids)
             handlers[self._sync.can_id] = self._sync.receive
         if state is NmtState.OPERATIONAL:
             handlers.update(self._pdo_handlers())
@@ -288,7 +289,7 @@ class Device:
     def _identify(self, frame: Frame, outgoing: bool) -> Traffic:
         """Say what a frame is, for the faults of the line."""
         can_id = frame.can_id
-        if can_id == (self._sdo.response_id if outgoing else self._sdo.can_id):
+        if can_id in (self._sdo.response_ids if outgoing else self._sdo.can_ids):
             return Traffic(Service.SDO, outgoing)
         if can_id == CobId.HEARTBEAT + self.node_id and any(frame.data):  # 0 says boot-up
             return Traffic(Service.HEARTBEAT, outgoing)
@@ -297,7 +298,7 @@ class Device:
         return Traffic(Service.PDO if number else Service.OTHER, outgoing, number)
 
     def _send_abort(self, abort: Abort) -> None:
-        self._send(Frame(self._sdo.response_id, abort.encode()))
+        self._send(Frame(self._sdo.default.response_id, abort.encode()))
 
     def _on_sdo(self, frame: Frame, now: float) -> None:
         self._refresh(now)

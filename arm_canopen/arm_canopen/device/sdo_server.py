@@ -3,7 +3,7 @@
 """SDO server, expedited and segmented (CiA 301, 7.2.4.3).
 
 One transfer at a time, as the standard has it for one SDO channel: a client that initiates
-another one gives the first up. Block transfers are refused with their abort code.
+another one gives the first up.
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ import struct
 
 from ..can.frame import Frame
 from ..exceptions import CodecError, SdoAbortError
-from ..standard.cob_id import CobId
 from ..standard.sdo import (
     Abort,
     decode_request,
@@ -30,9 +29,11 @@ from ..standard.sdo import (
 )
 from ..standard.sdo_abort import AbortCode
 from .object_store import ObjectStore, refusal, STRING_BYTES_MAX
+from .sdo_block import BlockDownload, BlockUpload, CLIENT_DOWNLOAD, CLIENT_UPLOAD
 from .timed import NEVER
 
 FRAME_BYTES = 8  # [byte] shorter frames are no SDO
+ABORT = 0x80  # command byte of an abort
 SILENCE_MAX = 1.0  # [s] how long a client may pause within a transfer
 
 Answer = Abort | DownloadResponse | DownloadSegmentResponse | Segment | UploadResponse
@@ -62,7 +63,7 @@ class Transfer:
 
 
 class SdoServer:
-    """Serves the default SDO channel of a device.
+    """Serves one SDO channel of a device.
 
     Attributes:
         can_id: Identifier of the requests.
@@ -70,14 +71,16 @@ class SdoServer:
         deadline: Steady time in [s] at which a silent client's transfer is aborted.
     """
 
-    def __init__(self, node_id: int, store: ObjectStore, send: Callable[[Frame], None]) -> None:
-        """Serve the objects of a store under a node id."""
-        self.can_id = CobId.SDO_REQUEST + node_id
+    def __init__(
+        self, can_id: int, response_id: int, store: ObjectStore, send: Callable[[Frame], None]
+    ) -> None:
+        """Serve the objects of a store under two identifiers."""
+        self.can_id = can_id
+        self.response_id = response_id
         self.deadline = NEVER
-        self.response_id = CobId.SDO_RESPONSE + node_id
         self._store = store
         self._send = send
-        self._transfer: Transfer | None = None
+        self._transfer: Transfer | BlockDownload | BlockUpload | None = None
 
     def reset(self) -> None:
         """Forget a transfer under way."""
@@ -88,10 +91,10 @@ class SdoServer:
         """Answer a request."""
         if len(frame.data) < FRAME_BYTES:
             return
-        answer = self._answer(frame.data, now)
+        answers = self._answer(frame.data, now)
         self.deadline = now + SILENCE_MAX if self._transfer else NEVER
-        if answer is not None:
-            self._send(Frame(self.response_id, answer.encode()))
+        for answer in answers:
+            self._send(Frame(self.response_id, answer))
 
     def advance(self, now: float) -> None:
         """Abort the transfer of a client that fell silent."""
@@ -103,22 +106,77 @@ class SdoServer:
             abort = Abort(transfer.index, transfer.subindex, AbortCode.TIMED_OUT)
             self._send(Frame(self.response_id, abort.encode()))
 
-    def _answer(self, data: bytes, now: float) -> Answer | None:
+    def _answer(self, data: bytes, now: float) -> list[bytes]:
         index, subindex = self._subject(data)
         try:
-            return self._dispatch(data, now)
+            if self._is_block(data):
+                return self._block(data, now)
+            answer = self._dispatch(data, now)
         except SdoAbortError as error:
             self._transfer = None
-            return Abort(index, subindex, error.code)
+            return [Abort(index, subindex, error.code).encode()]
+        return [answer.encode()] if answer is not None else []
 
     def _subject(self, data: bytes) -> tuple[int, int]:
         """Return the object that an abort names: that of the transfer, else of the request."""
-        is_segment = data[0] >> 5 in (0, 3)
-        if is_segment:
-            transfer = self._transfer
+        transfer = self._transfer
+        streaming = isinstance(transfer, BlockDownload) and transfer.streaming
+        names_none = data[0] >> 5 in (0, 3) or (self._is_block(data) and data[0] & 0x03)
+        if streaming or names_none:
             return (transfer.index, transfer.subindex) if transfer else (0, 0)
         index, subindex = struct.unpack_from('<xHB', data)
         return int(index), int(subindex)
+
+    def _is_block(self, data: bytes) -> bool:
+        """Tell whether a frame is of a block transfer; an abort is of any transfer."""
+        transfer = self._transfer
+        if isinstance(transfer, BlockDownload) and transfer.streaming:
+            return data[0] != ABORT
+        return data[0] >> 5 in (CLIENT_UPLOAD, CLIENT_DOWNLOAD)
+
+    def _block(self, data: bytes, now: float) -> list[bytes]:
+        transfer = self._transfer
+        if isinstance(transfer, BlockDownload) and transfer.streaming:
+            answer = transfer.segment(data)
+            return [answer] if answer is not None else []
+        if data[0] >> 5 == CLIENT_DOWNLOAD:
+            return [self._block_download(data, now)]
+        if not data[0] & 0x03:
+            return [self._start_block_upload(data)]
+        if not isinstance(transfer, BlockUpload):
+            raise refusal(AbortCode.COMMAND_SPECIFIER, 'SDO')
+        answers = transfer.proceed(data)
+        if transfer.finished:
+            self._transfer = None
+        return answers
+
+    def _block_download(self, data: bytes, now: float) -> bytes:
+        """Begin a block download, or end the one whose segments have all come."""
+        transfer = self._transfer
+        if not data[0] & 0x01:
+            transfer = BlockDownload(data)
+            self._transfer = None
+            variable = self._store.writable(transfer.index, transfer.subindex)
+            if transfer.size is not None:
+                variable.check_length(transfer.size)
+            self._transfer = transfer
+            return transfer.initiated()
+        if not isinstance(transfer, BlockDownload):
+            raise refusal(AbortCode.COMMAND_SPECIFIER, 'SDO')
+        answer = transfer.end(data)
+        self._transfer = None
+        self._store.write(transfer.index, transfer.subindex, bytes(transfer.data), now)
+        return answer
+
+    def _start_block_upload(self, data: bytes) -> bytes:
+        index, subindex, threshold = struct.unpack_from('<xHBxB', data)
+        self._transfer = None
+        value = self._store.read(index, subindex)
+        upload = BlockUpload(data, value)
+        if 0 < len(value) <= threshold:  # the client prefers the other protocol for so little
+            return self._start_upload(UploadRequest(index, subindex)).encode()
+        self._transfer = upload
+        return upload.initiated()
 
     def _dispatch(self, data: bytes, now: float) -> Answer | None:
         try:
@@ -188,7 +246,7 @@ class SdoServer:
     def _expect(self, toggle: bool, *, is_download: bool) -> Transfer:
         """Return the transfer that a segment belongs to, and turn its toggle bit."""
         transfer = self._transfer
-        if transfer is None or transfer.is_download is not is_download:
+        if not isinstance(transfer, Transfer) or transfer.is_download is not is_download:
             raise refusal(AbortCode.COMMAND_SPECIFIER, 'SDO')
         if toggle is not transfer.toggle:
             raise refusal(AbortCode.TOGGLE_BIT, 'SDO')

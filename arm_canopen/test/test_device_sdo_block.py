@@ -1,0 +1,253 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""SDO block transfers with a simulated device, and its further SDO channels."""
+
+from __future__ import annotations
+
+from binascii import crc_hqx
+import struct
+
+from device_rig import drive_dictionary, NODE_ID, Rig
+from hypothesis import given, settings
+from hypothesis import strategies as st
+import pytest
+
+from arm_canopen.can.frame import Frame
+from arm_canopen.standard.cob_id import COB_ID_INVALID
+from arm_canopen.standard.datatypes import DataType
+from arm_canopen.standard.dictionary import ObjectDictionary, ObjectEntry
+from arm_canopen.standard.sdo import decode_response, UploadRequest, UploadResponse
+from arm_canopen.standard.sdo_abort import AbortCode
+
+FILE = 0x2100
+FILE_NAME = struct.pack('<HB', FILE, 0)
+RESPONSE = 0x580 + NODE_ID
+ENTRIES = [
+    ObjectEntry(FILE, 0, 'File', DataType.DOMAIN),
+    *(
+        ObjectEntry(index, sub, 'Channel', DataType.UNSIGNED32, default=COB_ID_INVALID)
+        for index in (0x1201, 0x1202)
+        for sub in (1, 2)
+    ),
+]
+
+
+def make_rig() -> Rig:
+    """Return a drive with a file and two more SDO channels, which do not exist yet."""
+    rig = Rig(ObjectDictionary([*drive_dictionary(), *ENTRIES]))
+    rig.take()
+    return rig
+
+
+def ask(rig: Rig, data: bytes) -> list[bytes]:
+    """Send a frame on the default channel and return all answers."""
+    rig.take()
+    rig.send(0x600 + NODE_ID, data)
+    return rig.take(RESPONSE)
+
+
+def segments(data: bytes) -> list[bytes]:
+    """Cut data into segments, all of one block."""
+    parts = [data[start : start + 7] for start in range(0, max(1, len(data)), 7)]
+    return [
+        bytes((number | (0x80 if number == len(parts) else 0),)) + part.ljust(7, b'\0')
+        for number, part in enumerate(parts, start=1)
+    ]
+
+
+def begin_download(rig: Rig, size: int) -> None:
+    """Initiate a block download of the file, with its length and a checksum."""
+    begin = struct.pack('<B3sI', 0xC6, FILE_NAME, size)
+    assert ask(rig, begin) == [struct.pack('<B3sB3x', 0xA4, FILE_NAME, 127)]
+
+
+def end_of(data: bytes, crc: int | None = None) -> bytes:
+    """Return the end of a block download."""
+    unused = -len(data) % 7 if data else 7
+    value = crc_hqx(data, 0) if crc is None else crc
+    return struct.pack('<BH5x', 0xC1 | unused << 2, value)
+
+
+def download(rig: Rig, data: bytes) -> None:
+    """Write the file, block after block."""
+    begin_download(rig, len(data))
+    frames = segments_of_blocks(data)
+    for block in frames:
+        answers = [answer for frame in block for answer in ask(rig, frame)]
+        assert answers == [bytes((0xA2, len(block), 127, 0, 0, 0, 0, 0))]
+    assert ask(rig, end_of(data)) == [b'\xa1' + bytes(7)]
+
+
+def segments_of_blocks(data: bytes) -> list[list[bytes]]:
+    """Cut data into blocks of 127 segments."""
+    size = 127 * 7
+    blocks = []
+    for start in range(0, max(1, len(data)), size):
+        block = segments(data[start : start + size])
+        if start + size < len(data):
+            block[-1] = bytes((block[-1][0] & 0x7F,)) + block[-1][1:]
+        blocks.append(block)
+    return blocks
+
+
+def upload(rig: Rig, block_size: int = 127, *, damage: int | None = None) -> bytes:
+    """Read the file by blocks; of the first block the segments after ``damage`` get lost."""
+    (answer,) = ask(rig, struct.pack('<B3sBB2x', 0xA4, FILE_NAME, block_size, 0))
+    command, name, size = struct.unpack('<B3sI', answer)
+    assert (command, name) == (0xC6, FILE_NAME)
+    data = b''
+    frames = ask(rig, b'\xa3' + bytes(7))
+    while frames[0][0] & 0xE3 != 0xC1 or len(frames) > 1:
+        assert [frame[0] & 0x7F for frame in frames] == list(range(1, len(frames) + 1))
+        assert len(frames) <= block_size
+        taken = len(frames) if damage is None else min(damage, len(frames))
+        damage = None
+        data += b''.join(frame[1:] for frame in frames[:taken])
+        frames = ask(rig, bytes((0xA2, taken, block_size)) + bytes(5))
+        if len(data) >= size and len(frames) == 1 and frames[0][0] & 0xE3 == 0xC1:
+            break
+    unused, crc = frames[0][0] >> 2 & 0x07, struct.unpack_from('<xH', frames[0])[0]
+    data = data[: len(data) - unused]
+    assert crc == crc_hqx(data, 0)
+    assert len(data) == size
+    assert ask(rig, b'\xa1' + bytes(7)) == []
+    return data
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.binary(max_size=2000), st.integers(1, 127))
+def test_what_is_written_is_read(data: bytes, block_size: int) -> None:
+    """Any data make the way there and back, in blocks of any size, several blocks included."""
+    rig = make_rig()
+    download(rig, data)
+    assert rig.read(FILE) == data
+    assert upload(rig, block_size) == data
+
+
+@pytest.mark.parametrize('size', [0, 1, 6, 7, 8, 13, 14, 127 * 7, 127 * 7 + 1, 60_000])
+def test_sizes_at_the_edges(size: int) -> None:
+    """Empty data, whole segments and whole blocks, and many of them."""
+    rig = make_rig()
+    data = bytes(number % 251 for number in range(size))
+    download(rig, data)
+    assert upload(rig) == data
+
+
+def test_lost_segment_of_a_download_is_sent_again() -> None:
+    """The device says how far segments came in order, and takes the rest in the next block."""
+    rig = make_rig()
+    data = bytes(range(70))
+    begin_download(rig, len(data))
+    frames = segments(data)
+    answers = [answer for frame in frames[:3] + frames[4:] for answer in ask(rig, frame)]
+    assert answers == [bytes((0xA2, 3, 127, 0, 0, 0, 0, 0))]
+    again = segments(data[21:])
+    answers = [answer for frame in again for answer in ask(rig, frame)]
+    assert answers == [bytes((0xA2, 7, 127, 0, 0, 0, 0, 0))]
+    assert ask(rig, end_of(data)) == [b'\xa1' + bytes(7)]
+    assert rig.read(FILE) == data
+
+
+def test_lost_segment_of_an_upload_is_sent_again() -> None:
+    """A client that took part of a block gets the rest in the next one."""
+    rig = make_rig()
+    data = bytes(range(200))
+    download(rig, data)
+    assert upload(rig, damage=5) == data
+    assert upload(rig, 20, damage=0) == data
+
+
+def abort_code(answers: list[bytes]) -> int:
+    """Return the code of the one answer, which is an abort of the file's transfer."""
+    (answer,) = answers
+    assert answer[:4] == b'\x80' + FILE_NAME
+    return int(struct.unpack_from('<I', answer, 4)[0])
+
+
+def test_wrong_checksum() -> None:
+    """Damaged data are refused, and the object keeps its value."""
+    rig = make_rig()
+    download(rig, b'before')
+    begin_download(rig, 6)
+    ask(rig, segments(b'after!')[0])
+    assert abort_code(ask(rig, end_of(b'after!', crc=0x1234))) == AbortCode.CRC
+    assert rig.read(FILE) == b'before'
+
+
+def test_wrong_lengths() -> None:
+    """Less or more than was announced is refused."""
+    rig = make_rig()
+    begin_download(rig, 20)
+    ask(rig, segments(b'short')[0])
+    assert abort_code(ask(rig, end_of(b'short'))) == AbortCode.LENGTH_LOW
+    begin_download(rig, 3)
+    ask(rig, b'\x01' + bytes(7))
+    assert abort_code(ask(rig, b'\x82' + bytes(7))) == AbortCode.LENGTH_HIGH
+
+
+def test_nonsense_in_a_transfer() -> None:
+    """Sequence number 0, blocks without length and commands out of turn are aborted."""
+    rig = make_rig()
+    begin_download(rig, 20)
+    assert abort_code(ask(rig, bytes(8))) == AbortCode.SEQUENCE_NUMBER
+    begin = struct.pack('<B3sBB2x', 0xA4, FILE_NAME, 0, 0)
+    assert abort_code(ask(rig, begin)) == AbortCode.BLOCK_SIZE
+    download(rig, b'0123456789')
+    ask(rig, struct.pack('<B3sBB2x', 0xA4, FILE_NAME, 10, 0))
+    ask(rig, b'\xa3' + bytes(7))
+    assert abort_code(ask(rig, b'\xa2\x7f\x0a' + bytes(5))) == AbortCode.SEQUENCE_NUMBER
+    ask(rig, struct.pack('<B3sBB2x', 0xA4, FILE_NAME, 10, 0))
+    assert abort_code(ask(rig, b'\xa1' + bytes(7))) == AbortCode.COMMAND_SPECIFIER
+    for orphan in (b'\xa3', b'\xa2', b'\xa1', b'\xc1'):
+        (answer,) = ask(rig, orphan + bytes(7))
+        assert struct.unpack_from('<I', answer, 4)[0] == AbortCode.COMMAND_SPECIFIER
+
+
+def test_abort_by_the_client_in_the_stream() -> None:
+    """An abort between segments ends the transfer, although segments have no command byte."""
+    rig = make_rig()
+    begin_download(rig, 20)
+    ask(rig, b'\x01' + bytes(7))
+    assert ask(rig, b'\x80' + FILE_NAME + bytes(4)) == []
+    rig.run(5.0)
+    assert rig.take() == []
+    assert rig.read(FILE) == b''
+
+
+def test_silence_in_the_stream() -> None:
+    """A client that falls silent gets one time-out."""
+    rig = make_rig()
+    begin_download(rig, 20)
+    rig.run(5.0)
+    assert abort_code(rig.take(RESPONSE)) == AbortCode.TIMED_OUT
+
+
+def test_little_data_by_the_other_protocol() -> None:
+    """Below the client's threshold the device answers as to a normal upload."""
+    rig = make_rig()
+    begin = struct.pack('<BHBBB2x', 0xA4, 0x1000, 0, 127, 4)
+    (answer,) = ask(rig, begin)
+    assert decode_response(answer) == UploadResponse(0x1000, 0, b'\x92\x01\x02\x00', 4)
+
+
+def test_more_channels_are_independent() -> None:
+    """A transfer on each channel at the same time; a channel exists as 0x1201 says."""
+    rig = make_rig()
+    read = UploadRequest(0x1008, 0).encode()
+    rig.send(0x6C0, read)
+    assert rig.take() == []
+    for index, request, response in ((0x1201, 0x6C0, 0x6D0), (0x1202, 0x6C1, 0x6D1)):
+        rig.put(index, request, 1)
+        rig.put(index, response, 2)
+    rig.take()
+    for can_id in (0x600 + NODE_ID, 0x6C0, 0x6C1):
+        rig.send(can_id, read)
+    assert [frame.can_id for _, frame in rig.sent] == [RESPONSE, 0x6D0, 0x6D1]
+    rig.take()
+    for can_id in (0x6C0, 0x6C1, 0x600 + NODE_ID):
+        rig.device.receive(Frame(can_id, b'\x60' + bytes(7)), rig.now)
+    assert rig.take(0x6D0)[0] == b'\x00' + b'Simulat'
+    rig.put(0x1201, COB_ID_INVALID | 0x6C0, 1)
+    rig.take()
+    rig.send(0x6C0, read)
+    assert rig.take() == []
