@@ -16,7 +16,7 @@ LIMIT = 0x800
 BIT12 = 0x1000
 BIT13 = 0x2000
 HALT = 0x100
-SIMULATED = (1, 3, 6, 7, 8)
+SIMULATED = (1, 2, 3, 4, 6, 7, 8, 9, 10)
 
 
 def test_supported_modes_are_those_simulated() -> None:
@@ -39,13 +39,13 @@ def test_mode_by_rpdo_that_is_not_simulated_is_ignored() -> None:
     rig = Rig()
     rig.put(0x6060, 8)
     rig.nmt(NmtCommand.START)
-    rig.send(0x300 + rig.node_id, b'\x00\x00\x04')
-    assert (rig.get(0x6060), rig.get(0x6061)) == (4, 8)
+    rig.send(0x300 + rig.node_id, b'\x00\x00\x05')
+    assert (rig.get(0x6060), rig.get(0x6061)) == (5, 8)
 
 
 def test_dictionary_may_leave_modes_out() -> None:
     """A mode that 0x6502 of the dictionary does not name is refused, though it is simulated."""
-    rig = Rig(with_defaults(drive_dictionary(), {(0x6502, 0): 0x80 | 0x08}))
+    rig = Rig(with_defaults(drive_dictionary(), {(0x6502, 0): 0x80 | 0x10}))
     assert rig.get(0x6502) == 0x80
     rig.put(0x6060, 8)
     with pytest.raises(RefusedError):

@@ -123,7 +123,7 @@ def test_long_names_arrive_in_segments(node: Any) -> None:
         (0x1018, 7, None, 0x06090011),
         (0x1000, 0, bytes(4), 0x06010002),
         (0x1017, 0, bytes(4), 0x06070012),
-        (0x6060, 0, b'\x04', 0x06090030),
+        (0x6060, 0, b'\x05', 0x06090030),
     ],
 )
 def test_aborts_are_understood(

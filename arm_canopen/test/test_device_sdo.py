@@ -262,11 +262,11 @@ def test_limits_are_kept() -> None:
 
 
 REFUSED_VALUES = [
-    (0x6060, 0, 4, AbortCode.VALUE_RANGE),  # profile torque is not simulated
+    (0x6060, 0, 5, AbortCode.VALUE_RANGE),  # reserved
     (0x6060, 0, -1, AbortCode.VALUE_RANGE),
-    (0x605A, 0, 3, AbortCode.VALUE_RANGE),
+    (0x605A, 0, 9, AbortCode.VALUE_RANGE),
     (0x605B, 0, 2, AbortCode.VALUE_RANGE),
-    (0x605E, 0, 3, AbortCode.VALUE_RANGE),
+    (0x605E, 0, 5, AbortCode.VALUE_RANGE),
     (0x6083, 0, 0, AbortCode.VALUE_LOW),
     (0x1019, 0, 241, AbortCode.VALUE_HIGH),
     (0x1029, 1, 3, AbortCode.VALUE_HIGH),

@@ -376,7 +376,7 @@ def test_enabling_a_motor_that_runs_out_does_not_jerk() -> None:
 
 def test_dictionary_with_an_unknown_option() -> None:
     """An option code of the dictionary that is not simulated acts like the usual one."""
-    rig = Rig(with_defaults(drive_dictionary(), {(0x605A, 0): 7}))
+    rig = Rig(with_defaults(drive_dictionary(), {(0x605A, 0): 9}))
     rig.command(*TO_STATE[OE], QUICK_STOP)
     rig.run(0.1)
     assert rig.state is SOD

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from .motor import MotorModel
 from .profile import hold, Limits, Motion, plan_velocity, Point
 from .servo import Servo, ServoModel, SETTLED
 
@@ -16,12 +17,18 @@ class Axis:
         motion: The demand, now and in future.
         demand: Position, velocity and acceleration demanded now.
         speed: Highest speed of the motor in [inc/s].
+        motor: What it makes of a torque.
+        load: Torque that it takes to hold the axis, in [0.1 % of the rated torque].
+        origin: Where the mechanical zero is in [inc]; homing moves it.
     """
 
     def __init__(self, model: ServoModel) -> None:
         """Begin at rest at position 0, without power."""
         self.time = 0.0
         self.speed = float('inf')
+        self.motor = MotorModel()
+        self.load = 0.0
+        self.origin = 0.0
         self.motion = hold(0.0, 0.0)
         self.demand = Point(0.0, 0.0, 0.0)
         self._servo = Servo(model)
@@ -40,6 +47,23 @@ class Axis:
     def following_error(self) -> float:
         """Demand minus actual position in [inc]."""
         return self.demand.position - self._servo.position
+
+    @property
+    def blocked(self) -> bool:
+        """The motor pushes against a mechanical stop."""
+        return self._servo.blocked
+
+    @property
+    def torque(self) -> float:
+        """Torque that the demanded motion takes, in [0.1 % of the rated torque]."""
+        if not self.powered:
+            return 0.0
+        acceleration = 0.0 if self.arrived else self.demand.acceleration
+        return self.motor.torque(self.velocity, acceleration, self.load)
+
+    def set_stops(self, low: float, high: float) -> None:
+        """Put mechanical stops at positions in [inc], infinite for none."""
+        self._servo.stops = (low, high)
 
     @property
     def powered(self) -> bool:
@@ -62,7 +86,7 @@ class Axis:
         if not self._servo.powered:
             return self._servo.velocity == 0.0
         at_rest = self.arrived and self.demand.velocity == 0.0
-        return at_rest and abs(self.following_error) < SETTLED
+        return at_rest and (self.blocked or abs(self.following_error) < SETTLED)
 
     def power_on(self, deceleration: float) -> None:
         """Close the position loop where the motor is; one that still runs out is ramped down."""
@@ -90,6 +114,7 @@ class Axis:
     def shift(self, offset: float) -> None:
         """Move the zero of the position by an offset in [inc]; the motor does not turn."""
         self._servo.shift(offset)
+        self.origin += offset
         segments = self.motion.segments
         self.motion = Motion([s._replace(position=s.position + offset) for s in segments])
         self.demand = self.demand._replace(position=self.demand.position + offset)

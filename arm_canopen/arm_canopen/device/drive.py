@@ -9,12 +9,14 @@ in closed form.
 
 from __future__ import annotations
 
+import math
+
 from ..standard.drive import Controlword, STATE_WORDS, Statusword
 from ..standard.drive import DriveState as State
 from .axis import Axis
+from .drive_fault import DriveFault, SharedErrors
 from .drive_objects import DriveObjects, MILLISECOND, NO_WINDOW
 from .drive_state import AbortConnectionOption, FAULT_RESET_BIT, StopOption
-from .emcy_producer import EmcyProducer
 from .modes.mode import Dwell, Mode, SyncClock, TARGET_REACHED
 from .modes.selection import ModeSelection
 from .object_store import ObjectStore
@@ -26,6 +28,7 @@ FOLLOWING_ERROR_CODE = 0x8611
 UNDER_VOLTAGE_CODE = 0x3220
 CONNECTION_CODE = 0x8130
 
+DC_VOLTAGE = 48_000  # [mV]
 CONTROL_PERIOD = 0.005  # [s] how often the drive looks at its axis without SYNC
 SYNC_PERIOD_MAX = 0.02  # [s] a slower SYNC is not what the drive waits for
 SYNC_PATIENCE = 1.5  # periods that it waits for a SYNC
@@ -43,10 +46,17 @@ class Drive:
     Attributes:
         deadline: Steady time in [s] at which it wants to look at its axis.
         faults: Codes of the faults since the last fault reset.
+        causes: Faults whose cause is still there; no fault reset helps against them.
     """
 
     def __init__(
-        self, store: ObjectStore, errors: EmcyProducer, clock: SyncClock, model: ServoModel
+        self,
+        store: ObjectStore,
+        errors: SharedErrors,
+        clock: SyncClock,
+        model: ServoModel,
+        *,
+        number: int = 0,
     ) -> None:
         """Work on the objects of a device.
 
@@ -55,10 +65,13 @@ class Drive:
             errors: Told of faults.
             clock: What is known of SYNC.
             model: Time constants of the motor.
+            number: Of the axis in its device, from 0.
         """
         self.deadline = NEVER
         self.faults: set[int] = set()
-        self._objects = objects = DriveObjects(store)
+        self.causes: set[DriveFault] = set()
+        self._number = number
+        self._objects = objects = DriveObjects(store, number)
         self._errors = errors
         self._clock = clock
         self._axis = Axis(model)
@@ -70,10 +83,13 @@ class Drive:
         objects.mode.listener = self._on_mode
         objects.controlword.listener = self._on_controlword
         objects.max_velocity.listener = self._on_max_velocity
+        objects.max_motor_speed.listener = self._on_max_velocity
         for target in (
             objects.target_position,
             objects.target_velocity,
             objects.interpolation_target,
+            objects.vl_target,
+            objects.target_torque,
         ):
             target.listener = self._on_setpoint
 
@@ -101,6 +117,7 @@ class Drive:
         self._axis.advance(now)
         self._machine.reset()
         self._word = 0
+        self._errors.forget(self._number)
         self.faults.clear()
         self._following.clear()
         self._modes.reset()
@@ -116,6 +133,9 @@ class Drive:
     def start(self, now: float) -> None:
         """Become ready for commands; the device has started."""
         self._machine.start()
+        for fault in sorted(self.causes, key=lambda fault: fault.code):
+            if fault.code:
+                self._fail(fault.code, now, at_once=fault.at_once)
         self._publish(now)
 
     def advance(self, now: float) -> None:
@@ -129,30 +149,104 @@ class Drive:
         if self._machine.operating and self._mode.sync(now):
             self._schedule(now)
 
-    def raise_fault(self, code: int, now: float | None = None) -> None:
+    def raise_fault(self, code: int, now: float | None = None, *, at_once: bool = False) -> None:
         """Let a fault happen.
 
         Args:
             code: Error code for 0x603F and EMCY.
             now: Steady time in [s]; by default when the drive last looked at its axis.
+            at_once: It leaves no torque to brake with, whatever 0x605E says.
         """
         now = self._axis.time if now is None else now
         self._move(now)
-        self._fail(code, now)
+        self._fail(code, now, at_once=at_once)
         self._publish(now)
 
-    def set_voltage(self, present: bool, now: float | None = None) -> None:
-        """Supply the power stage, or cut its supply: a fault if the drive is switched on.
+    def inject(self, fault: DriveFault, now: float | None = None, *, lasting: bool = True) -> None:
+        """Let something go wrong.
+
+        Args:
+            fault: What.
+            now: Steady time in [s]; by default when the drive last looked at its axis.
+            lasting: Its cause stays until :meth:`clear`; otherwise a fault reset ends it.
+        """
+        now = self._axis.time if now is None else now
+        if lasting:
+            self.causes.add(fault)
+        if fault is DriveFault.BLOCKED_MOTOR:
+            self.block(now=now)
+        if fault is DriveFault.STO:
+            self.set_voltage(False, now, fault=False)
+        else:
+            self.raise_fault(fault.code, now, at_once=fault.at_once)
+
+    def clear(self, fault: DriveFault, now: float | None = None) -> None:
+        """Take the cause of a fault away; the drive then still waits for a fault reset."""
+        now = self._axis.time if now is None else now
+        self.causes.discard(fault)
+        if fault is DriveFault.BLOCKED_MOTOR:
+            self.release(now)
+        if fault is DriveFault.STO:
+            self.set_voltage(True, now)
+
+    def block(self, at: float | None = None, now: float | None = None) -> None:
+        """Put a mechanical stop in the way.
+
+        Args:
+            at: Position in [inc]; beyond it, as seen from the motor, there is no way. By
+                default the motor is stuck where it is.
+            now: Steady time in [s]; by default when the drive last looked at its axis.
+        """
+        now = self._axis.time if now is None else now
+        self._move(now)
+        here = self._axis.position
+        if at is None:
+            self._axis.set_stops(here, here)
+        elif at >= here:
+            self._axis.set_stops(-math.inf, at)
+        else:
+            self._axis.set_stops(at, math.inf)
+        self._publish(now)
+
+    def release(self, now: float | None = None) -> None:
+        """Take mechanical stops away."""
+        now = self._axis.time if now is None else now
+        self._move(now)
+        self._axis.set_stops(-math.inf, math.inf)
+        self._publish(now)
+
+    def set_load(self, torque: float, now: float | None = None) -> None:
+        """Load the axis, as gravity does.
+
+        Args:
+            torque: What it takes to hold it, in [0.1 % of the rated torque]; a positive load
+                pulls towards negative positions.
+            now: Steady time in [s]; by default when the drive last looked at its axis.
+        """
+        now = self._axis.time if now is None else now
+        self._move(now)
+        self._axis.load = torque
+        if self._machine.operating:
+            self._mode.load_changed(now)
+        self._publish(now)
+
+    def set_voltage(self, present: bool, now: float | None = None, *, fault: bool = True) -> None:
+        """Supply the power stage, or cut its supply.
 
         Args:
             present: There is voltage.
             now: Steady time in [s]; by default when the drive last looked at its axis.
+            fault: Without it a drive that is switched on faults; otherwise it goes to Switch on
+                disabled, as with safe torque off.
         """
         now = self._axis.time if now is None else now
         self._move(now)
         self._machine.set_voltage(present, now)
         if not present and self._machine.state in VOLTAGE_STATES:
-            self._fail(UNDER_VOLTAGE_CODE, now)
+            if fault:
+                self._fail(UNDER_VOLTAGE_CODE, now)
+            else:
+                self._machine.disable()
         self._publish(now)
 
     def connection_lost(self, now: float) -> None:
@@ -191,15 +285,17 @@ class Drive:
         if self._following.reached:
             self._fail(FOLLOWING_ERROR_CODE, now)
 
-    def _fail(self, code: int, now: float) -> None:
+    def _fail(self, code: int, now: float, *, at_once: bool = False) -> None:
         self.faults.add(code)
         self._objects.error_code.put(code)
-        self._machine.fault()
-        self._errors.report(code, now)
+        self._machine.fault(at_once=at_once)
+        self._errors.report(self._number, code, now)
 
     def _reset_fault(self, now: float) -> None:
+        if any(fault.code for fault in self.causes):
+            return
         for code in sorted(self.faults):
-            self._errors.clear(code, now)
+            self._errors.clear(self._number, code, now)
         self.faults.clear()
         self._following.clear()
         self._objects.error_code.put(0)
@@ -262,7 +358,21 @@ class Drive:
         objects.position_demand.put(axis.demand.position)
         objects.velocity_demand.put(axis.demand.velocity)
         objects.following_error.put(axis.following_error)
+        objects.vl_demand.put(axis.demand.velocity)
+        objects.vl_actual.put(axis.velocity)
+        self._publish_torque()
         self._schedule(now)
+
+    def _publish_torque(self) -> None:
+        objects, axis = self._objects, self._axis
+        applied = self._mode.torque if self._machine.operating else None
+        torque = axis.torque if applied is None else applied
+        if applied is None and axis.blocked:  # the position loop pushes as hard as it may
+            torque = objects.held_torque(math.copysign(math.inf, axis.following_error))
+        objects.torque_demand.put(torque)
+        objects.torque_actual.put(torque)
+        objects.current_actual.put(torque)
+        objects.dc_voltage.put(DC_VOLTAGE if self._machine.voltage else 0)
 
     def _statusword(self) -> int:
         state = self._machine.state

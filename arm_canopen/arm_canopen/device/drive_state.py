@@ -86,32 +86,44 @@ Those of themselves are 0 and 1 (start), 12 (quick stop done), 13 (fault) and 14
 """
 
 
+class StopOption(Enum):
+    """Values of 0x605B to 0x605E that the drive can do; not every object has each (CiA 402-2).
+
+    "Current limit" and "voltage limit" brake as hard as the motor can: ramps of twice the quick
+    stop deceleration. The vendor's value -1 of the fault reaction brakes half as hard as "slow
+    down".
+    """
+
+    VENDOR_SLOW = -1
+    DISABLE = 0
+    SLOW_DOWN = 1
+    QUICK_STOP = 2
+    CURRENT_LIMIT = 3
+    VOLTAGE_LIMIT = 4
+
+
 class QuickStopOption(Enum):
     """Values of 0x605A that the drive can do (CiA 402-2, 0x605A)."""
 
     DISABLE = 0
     SLOW_DOWN = 1
     QUICK_STOP = 2
+    CURRENT_LIMIT = 3
+    VOLTAGE_LIMIT = 4
     SLOW_DOWN_AND_STAY = 5
     QUICK_STOP_AND_STAY = 6
+    CURRENT_LIMIT_AND_STAY = 7
+    VOLTAGE_LIMIT_AND_STAY = 8
 
     @property
     def stays(self) -> bool:
         """The drive stays in Quick stop active when it stands still."""
-        return self in (QuickStopOption.SLOW_DOWN_AND_STAY, QuickStopOption.QUICK_STOP_AND_STAY)
+        return self.value > StopOption.VOLTAGE_LIMIT.value
 
     @property
-    def is_slow(self) -> bool:
-        """It uses the profile deceleration rather than that of the quick stop."""
-        return self in (QuickStopOption.SLOW_DOWN, QuickStopOption.SLOW_DOWN_AND_STAY)
-
-
-class StopOption(Enum):
-    """Values of 0x605B to 0x605E that the drive can do; not every object has each (CiA 402-2)."""
-
-    DISABLE = 0
-    SLOW_DOWN = 1
-    QUICK_STOP = 2
+    def ramp(self) -> StopOption:
+        """How it brakes."""
+        return StopOption(self.value - 4 if self.stays else self.value)
 
 
 class AbortConnectionOption(Enum):

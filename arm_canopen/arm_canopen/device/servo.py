@@ -50,6 +50,7 @@ class Servo:
         setpoint: Output of the rate limiter.
         powered: The position loop is closed.
         limited: The motor is behind a demand that was faster than it can be.
+        stops: Lowest and highest position that mechanical stops let it reach.
     """
 
     def __init__(self, model: ServoModel) -> None:
@@ -58,6 +59,7 @@ class Servo:
         self.setpoint = 0.0
         self.powered = False
         self.limited = False
+        self.stops = (-math.inf, math.inf)
         self._model = model
         self._free_velocity = 0.0
 
@@ -66,7 +68,18 @@ class Servo:
         """How fast the motor turns."""
         if not self.powered:
             return self._free_velocity
+        if self.blocked:
+            return 0.0
         return (self.setpoint - self.position) / self._model.lag
+
+    @property
+    def blocked(self) -> bool:
+        """The position loop pushes the motor against a stop."""
+        if not self.powered:
+            return False
+        low, high = self.stops
+        gap = self.setpoint - self.position
+        return (self.position >= high and gap > 0.0) or (self.position <= low and gap < 0.0)
 
     def power_on(self) -> Point:
         """Close the position loop and return where the demand has to begin."""
@@ -83,6 +96,7 @@ class Servo:
         """Move the zero of the position, not the motor."""
         self.position += offset
         self.setpoint += offset
+        self.stops = (self.stops[0] + offset, self.stops[1] + offset)
 
     def coast(self, duration: float) -> None:
         """Run out for a time."""
@@ -92,6 +106,8 @@ class Servo:
         self.position += self._free_velocity * self._model.coasting * (1.0 - decay)
         self._free_velocity *= decay
         if abs(self._free_velocity) * self._model.coasting < SETTLED:
+            self._free_velocity = 0.0
+        if self._halt_at_stops():
             self._free_velocity = 0.0
 
     def follow(self, motion: Motion, begin: float, end: float, speed: float) -> None:
@@ -156,6 +172,14 @@ class Servo:
             + lag * lag * acceleration
             + offset * math.exp(-duration / lag)
         )
+        self._halt_at_stops()
+
+    def _halt_at_stops(self) -> bool:
+        low, high = self.stops
+        if low <= self.position <= high:
+            return False
+        self.position = min(max(self.position, low), high)
+        return True
 
 
 def _time_within(velocity: float, acceleration: float, speed: float) -> float:

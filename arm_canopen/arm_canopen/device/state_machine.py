@@ -27,6 +27,14 @@ from .object_store import Integer, refusal
 Option = TypeVar('Option', bound=Enum)
 
 POWERED_STATES = frozenset({State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE})
+LIMIT_FACTOR = 2.0  # of the quick stop ramp, where the motor brakes at its limit
+HALT_OPTIONS = (
+    StopOption.SLOW_DOWN,
+    StopOption.QUICK_STOP,
+    StopOption.CURRENT_LIMIT,
+    StopOption.VOLTAGE_LIMIT,
+)
+
 VOLTAGE_STATES = POWERED_STATES | {State.SWITCHED_ON}
 """States that need the voltage of the power stage."""
 
@@ -64,6 +72,7 @@ class StateMachine:
         _restrict(objects.shutdown_option, stops)
         _restrict(objects.disable_option, stops)
         _restrict(objects.fault_option, StopOption)
+        _restrict(objects.halt_option, HALT_OPTIONS)
 
     @property
     def operating(self) -> bool:
@@ -112,12 +121,19 @@ class StateMachine:
         elif self.state is State.FAULT_REACTION_ACTIVE:
             self._power_off(State.FAULT)
 
-    def fault(self) -> None:
-        """Pass transition 13, and 14 when there is nothing to be stopped."""
+    def fault(self, *, at_once: bool = False) -> None:
+        """Pass transition 13, and 14 when there is nothing to be stopped.
+
+        Args:
+            at_once: The fault leaves no torque to brake with, whatever 0x605E says.
+        """
+        if self.state is State.FAULT_REACTION_ACTIVE and at_once:
+            self._power_off(State.FAULT)
         if self.state in (State.FAULT_REACTION_ACTIVE, State.FAULT):
             return
         reaction = chosen(self._objects.fault_option, StopOption.QUICK_STOP)
-        if self._axis.powered and self.voltage and reaction is not StopOption.DISABLE:
+        can_brake = self._axis.powered and self.voltage and not at_once
+        if can_brake and reaction is not StopOption.DISABLE:
             self._pending = None
             self.state = State.FAULT_REACTION_ACTIVE
             self._axis.stop(self.deceleration(reaction))
@@ -137,8 +153,7 @@ class StateMachine:
             return
         self._pending = None
         self.state = State.QUICK_STOP_ACTIVE
-        slow = option.is_slow
-        self._axis.stop(self._objects.slow_down if slow else self._objects.quick_stop)
+        self._axis.stop(self.deceleration(option.ramp))
 
     def disable(self) -> None:
         """Take the torque away at once, as "disable voltage" does."""
@@ -158,8 +173,15 @@ class StateMachine:
 
     def deceleration(self, option: StopOption) -> float:
         """Return the deceleration of a stop option in [inc/s^2]."""
-        slow = option is StopOption.SLOW_DOWN
-        return self._objects.slow_down if slow else self._objects.quick_stop
+        objects = self._objects
+        match option:
+            case StopOption.SLOW_DOWN:
+                return objects.slow_down
+            case StopOption.VENDOR_SLOW:
+                return 0.5 * objects.slow_down
+            case StopOption.CURRENT_LIMIT | StopOption.VOLTAGE_LIMIT:
+                return LIMIT_FACTOR * objects.quick_stop
+        return objects.quick_stop
 
     def _go(self, transition: Transition, now: float) -> bool:
         """Pass a transition; return whether the state has changed."""

@@ -77,6 +77,14 @@ class Mode:
     def resume(self, now: float) -> None:
         """Halt is over."""
 
+    @property
+    def torque(self) -> float | None:
+        """Torque that it applies in [0.1 % of the rated torque]; None when a position is held."""
+        return None
+
+    def load_changed(self, now: float) -> None:
+        """See another load torque."""
+
     def setpoint(self, now: float) -> bool:
         """See a target object written; the axis may be at an earlier time.
 

@@ -9,10 +9,12 @@ import math
 from ...standard.drive import OperationMode, Statusword
 from ..axis import Axis
 from ..drive_objects import DriveObjects, MILLISECOND
-from ..profile import Limits, Motion, plan_move, plan_velocity
+from ..profile import Motion
 from .mode import Dwell, Mode, SyncClock, TARGET_REACHED
+from .velocity_plan import plan_bounded
 
 ZERO_SPEED = int(Statusword.ZERO_SPEED)
+SLIPPAGE_ERROR = 0x2000  # bit 13 of the statusword
 
 
 class ProfileVelocity(Mode):
@@ -57,20 +59,10 @@ class ProfileVelocity(Mode):
         return True
 
     def _plan(self, now: float) -> Motion:
-        limits = self.objects.profile(abs(self._target))
-        low, high = self.objects.position_limits()
-        limit = high if self._target > 0.0 else low
-        self._bounded = False
-        if self._target == 0.0 or math.isinf(limit):
-            full = Limits(self.objects.speed, limits.acceleration, limits.deceleration)
-            return plan_velocity(self.axis.demand, self._target, full, now)
-        # a move to the limit is the same ramp, and brakes in time
-        self._bounded = True
-        stopping = plan_velocity(self.axis.demand, 0.0, limits, now)
-        stop = stopping.at(stopping.end).position
-        if (limit - stop) * self._target <= 0.0:
-            return stopping
-        return plan_move(self.axis.demand, limit, limits, now)
+        limits = self.objects.profile(self.objects.speed)
+        bounds = self.objects.position_limits()
+        motion, self._bounded = plan_bounded(self.axis.demand, self._target, limits, bounds, now)
+        return motion
 
     def update(self, now: float) -> None:
         """See whether the velocity is reached, and whether it is zero."""
@@ -89,6 +81,9 @@ class ProfileVelocity(Mode):
         )
 
     def status(self) -> int:
-        """Return "target reached" and "zero speed"."""
+        """Return "target reached", "zero speed" and "max slippage error"."""
         zero = ZERO_SPEED if self._standing.reached else 0
+        slip = self.objects.max_slippage.value
+        if 0 < slip < abs(self.axis.demand.velocity - self.axis.velocity):
+            zero |= SLIPPAGE_ERROR
         return zero | (TARGET_REACHED if self._reached.reached else 0)

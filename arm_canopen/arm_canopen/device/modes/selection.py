@@ -9,19 +9,26 @@ from ...standard.sdo_abort import AbortCode
 from ..axis import Axis
 from ..drive_objects import DriveObjects
 from ..object_store import refusal
+from .cyclic_velocity import CyclicVelocity
 from .homing import Homing
 from .mode import Mode, NoMode, SyncClock
 from .profile_position import ProfilePosition
 from .profile_velocity import ProfileVelocity
 from .streamed_position import CyclicPosition, InterpolatedPosition
+from .torque import CyclicTorque, ProfileTorque
+from .velocity import Velocity
 
 MODES: tuple[type[Mode], ...] = (
     NoMode,
     ProfilePosition,
+    Velocity,
     ProfileVelocity,
+    ProfileTorque,
     Homing,
     InterpolatedPosition,
     CyclicPosition,
+    CyclicVelocity,
+    CyclicTorque,
 )
 
 

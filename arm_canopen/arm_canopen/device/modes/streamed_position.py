@@ -2,80 +2,39 @@
 # SPDX-License-Identifier: Apache-2.0
 """Modes in which the master streams positions: cyclic synchronous and interpolated position.
 
-Both go from set-point to set-point at constant velocity (CiA 402-2, clauses 13 and 14). While
-SYNC comes regularly, a set-point that was written is taken at the next SYNC; otherwise at once.
-It shall be reached when the next one is due: after the period of SYNC when there was one for
-each SYNC, else after the interpolation time period 0x60C2.
+Both go from set-point to set-point at constant velocity (CiA 402-2, clauses 13 and 14).
 """
 
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections import deque
 
 from ...standard.drive import Controlword, OperationMode, Statusword
 from ..axis import Axis
 from ..drive_objects import DriveObjects, NO_WINDOW, PERIOD_MIN
-from ..object_store import Integer
 from ..profile import plan_line
-from .mode import Mode, SyncClock, TARGET_REACHED
+from .mode import SyncClock, TARGET_REACHED
+from .streamed import Streamed
 
 ENABLE_INTERPOLATION = int(Controlword.ENABLE_INTERPOLATION)
-FOLLOWS_COMMAND = int(Statusword.FOLLOWS_COMMAND)
 INTERPOLATION_ACTIVE = int(Statusword.INTERPOLATION_ACTIVE)
 
 
-class StreamedPosition(Mode):
-    """Follows positions that come at regular times.
-
-    A drive that is enabled stands still until the first set-point is written; what the target
-    object held before is no set-point.
-    """
-
-    def __init__(self, objects: DriveObjects, axis: Axis, clock: SyncClock) -> None:
-        """Begin without a set-point."""
-        super().__init__(objects, axis, clock)
-        self._fresh = False  # written since the last SYNC
-        self._streaming = False  # there was one for the SYNC before
+class StreamedPosition(Streamed):
+    """Follows positions that come at regular times."""
 
     @property
     @abstractmethod
-    def target(self) -> Integer:
-        """The object that the set-points are written to."""
+    def wanted(self) -> int:
+        """The latest set-point in [inc]."""
 
-    @property
-    def following(self) -> bool:
-        """Set-points are obeyed."""
-        return not self.halted
+    def take(self, period: float, now: float) -> bool:
+        """Go to the set-point within a period."""
+        return self.go(self.wanted, period, now)
 
-    def start(self, word: int, now: float) -> None:
-        """Stand still and wait for a set-point."""
-        super().start(word, now)
-        self._fresh = self._streaming = False
-
-    def halt(self, now: float) -> None:
-        """Forget a set-point that was not taken."""
-        self._fresh = self._streaming = False
-
-    def setpoint(self, now: float) -> bool:
-        """Keep the set-point for the next SYNC, or take it."""
-        if not self.following:
-            return False
-        if self.clock.alive(now):
-            self._fresh = True
-            return False
-        return self._take(self.objects.setpoint_period, now)
-
-    def sync(self, now: float) -> bool:
-        """Take the set-point that came since the last SYNC."""
-        fresh, self._fresh = self._fresh, False
-        steady, self._streaming = self._streaming and fresh, fresh
-        if not fresh:
-            return False
-        period = self.clock.period if steady else 0.0
-        return self._take(period or self.objects.setpoint_period, now)
-
-    def _take(self, period: float, now: float) -> bool:
-        wanted = self.target.value
+    def go(self, wanted: int, period: float, now: float) -> bool:
+        """Go to a position within a period; return whether the motion has changed."""
         target = self.objects.within_limits(wanted)
         self.limited = target != wanted
         axis = self.axis
@@ -92,17 +51,17 @@ class CyclicPosition(StreamedPosition):
     number = OperationMode.CYCLIC_POSITION
 
     @property
-    def target(self) -> Integer:
-        """Target position 0x607A."""
-        return self.objects.target_position
-
-    def status(self) -> int:
-        """Return "drive follows the command value"."""
-        return FOLLOWS_COMMAND if self.following and not self.limited else 0
+    def wanted(self) -> int:
+        """Target position 0x607A plus the position offset 0x60B0."""
+        return self.objects.target_position.value + self.objects.position_offset.value
 
 
 class InterpolatedPosition(StreamedPosition):
-    """Interpolated position mode, linear; bit 4 of the controlword enables it."""
+    """Interpolated position mode, linear; bit 4 of the controlword enables it.
+
+    With a buffer of more than one record (0x60C4:02) the set-points wait in it, and each SYNC
+    takes one. Writing 0 to 0x60C4:06 empties it and keeps it shut until 1 is written.
+    """
 
     number = OperationMode.INTERPOLATED_POSITION
 
@@ -110,11 +69,13 @@ class InterpolatedPosition(StreamedPosition):
         """Begin disabled."""
         super().__init__(objects, axis, clock)
         self._enabled = False
+        self._buffer: deque[int] = deque()
+        objects.buffer_clear.listener = self._on_clear
 
     @property
-    def target(self) -> Integer:
+    def wanted(self) -> int:
         """Interpolation data record 0x60C1:01."""
-        return self.objects.interpolation_target
+        return self.objects.interpolation_target.value
 
     @property
     def following(self) -> bool:
@@ -124,7 +85,37 @@ class InterpolatedPosition(StreamedPosition):
     def start(self, word: int, now: float) -> None:
         """Stand still; bit 4 may be set already."""
         super().start(word, now)
+        self._buffer.clear()
         self._enabled = bool(word & ENABLE_INTERPOLATION)
+
+    def setpoint(self, now: float) -> bool:
+        """Keep the set-point for its SYNC, or take it."""
+        size = min(self.objects.buffer_size.value, self.objects.buffer_maximum.value)
+        if not self.objects.buffer_clear.value:
+            return False
+        if size > 1 and self.clock.alive(now):
+            if self.following and len(self._buffer) < size:
+                self._buffer.append(self.wanted)
+            return False
+        return super().setpoint(now)
+
+    def sync(self, now: float) -> bool:
+        """Take the oldest set-point of the buffer, or the one since the last SYNC."""
+        if not self._buffer:
+            return super().sync(now)
+        if not self.following:
+            return False
+        return self.go(self._buffer.popleft(), self.clock.period, now)
+
+    def _on_clear(self, _now: float) -> None:
+        if not self.objects.buffer_clear.value:
+            self._buffer.clear()
+            self._fresh = False
+
+    def halt(self, now: float) -> None:
+        """Forget what was not taken."""
+        super().halt(now)
+        self._buffer.clear()
 
     def command(self, word: int, previous: int, now: float) -> None:
         """Enable or disable interpolation."""
