@@ -13,15 +13,16 @@ from ..standard.nmt import NmtCommand, NmtState
 from ..standard.objects import Index
 from ..standard.sdo import Abort
 from .drive import Drive
-from .drive_fault import SharedErrors
-from .drive_objects import AXIS_OFFSET
 from .emcy_producer import EmcyProducer
 from .fault_injector import FaultInjector
 from .fault_line import FaultLine, Service, Traffic
 from .guarding import GuardedNode
 from .heartbeat import HeartbeatConsumer, HeartbeatProducer
+from .lss_slave import LSS_REQUEST, LssSlave, UNCONFIGURED
 from .nmt_slave import boot_up_frame, NmtSlave
 from .object_store import ObjectStore
+from .parameter_memory import ParameterMemory
+from .parameter_storage import ParameterStorage
 from .rpdo import RpdoEngine
 from .sdo_servers import SdoServers
 from .servo import ServoModel
@@ -34,7 +35,6 @@ Handler = Callable[[Frame, float], None]
 HEARTBEAT_ERROR = 0x8130
 SYNC_LENGTH_ERROR = 0x8240
 COMMUNICATION_OBJECTS = (0x1000, 0x1FFF)
-AXES_MAX = 8  # in a device (CiA 402-1)
 ALL_OBJECTS = (0x0000, 0xFFFF)
 ERROR_STATES: dict[int, NmtState] = {0: NmtState.PRE_OPERATIONAL, 2: NmtState.STOPPED}
 """Where a communication error leads from Operational (CiA 301, 7.5.2.33); 1 leads nowhere."""
@@ -47,9 +47,10 @@ class Device:
     :meth:`receive` for each frame. All times are on the steady clock in [s].
 
     Attributes:
-        node_id: CANopen node id.
+        node_id: CANopen node id; 255 while it has none.
+        first_id: The one that it was made with; LSS may have changed it.
         store: Present values of all objects.
-        drives: Its axes; none when the device is no drive.
+        drive: The axis, None when the device is no drive.
         faults: What it does wrong on purpose.
         handlers: What it does with the frames of each identifier, in its present NMT state;
             another mapping takes its place when that changes.
@@ -64,22 +65,29 @@ class Device:
         boot_time: float = 0.0,
         servo: ServoModel | None = None,
         handlers_changed: Callable[[], None] | None = None,
+        memory: ParameterMemory | None = None,
     ) -> None:
         """Build a device that is switched off.
 
         Args:
-            node_id: CANopen node id, 1 to 127.
+            node_id: CANopen node id, 1 to 127; 255 for one that LSS has to give an id first. An
+                id that LSS has stored in the memory is stronger.
             dictionary: Its objects, as load_eds reads them.
             send: Takes the frames that it sends.
             boot_time: How long its start takes in [s].
             servo: Time constants of the motor.
             handlers_changed: Called when :attr:`handlers` is another mapping.
+            memory: What it keeps without power; by default what lasts as long as the object.
 
         Raises:
             ValueError: The node id is out of range.
         """
-        if not NODE_ID_MIN <= node_id <= NODE_ID_MAX:
+        if not NODE_ID_MIN <= node_id <= NODE_ID_MAX and node_id != UNCONFIGURED:
             raise ValueError(f'node id {node_id} is not {NODE_ID_MIN} to {NODE_ID_MAX}')
+        self._memory = memory or ParameterMemory()
+        self._dictionary = dictionary
+        self.first_id = node_id
+        node_id = self._memory.node_id or node_id
         self.node_id = node_id
         self.handlers: Mapping[int, Handler] = {}
         self.store = ObjectStore(dictionary.for_node(node_id))
@@ -90,11 +98,9 @@ class Device:
         self._nmt = NmtSlave(node_id, self, boot_time)
         self._errors = EmcyProducer(store, send)
         self._sync = SyncConsumer(store, self._on_sync, self._on_sync_length, self._subscribe)
-        shared = SharedErrors(self._errors)
-        self.drives: tuple[Drive, ...] = tuple(
-            Drive(store, shared, self._sync, servo or ServoModel(), number=axis)
-            for axis in range(AXES_MAX)
-            if (Index.CONTROLWORD + axis * AXIS_OFFSET, 0) in store
+        is_drive = (Index.CONTROLWORD, 0) in store
+        self.drive: Drive | None = (
+            Drive(store, self._errors, self._sync, servo or ServoModel()) if is_drive else None
         )
         self._sdo = SdoServers(node_id, store, send, self._subscribe)
         self._producer = HeartbeatProducer(node_id, store, lambda: self._nmt.state, send)
@@ -104,6 +110,9 @@ class Device:
         self._guarding = GuardedNode(
             node_id, store, lambda: self._nmt.state, send, self._on_guarding
         )
+        self._storage = ParameterStorage(store, self._memory)
+        self._storage.load()
+        self._lss = LssSlave(node_id, store, self._memory, send, self._nmt.initialise)
         self._error_behaviour = store.integer(Index.ERROR_BEHAVIOUR, 1)
         self._rpdos = RpdoEngine(store, self._on_pdo_changed, self._on_error)
         self._tpdos = TpdoEngine(store, self._on_pdo_changed, send)
@@ -119,13 +128,8 @@ class Device:
             self._rpdos,
             self._tpdos,
         ]
-        self._powered_parts = [*parts, *self.drives]
+        self._powered_parts = parts if self.drive is None else [*parts, self.drive]
         self._parts: list[Timed] = self._powered_parts
-
-    @property
-    def drive(self) -> Drive | None:
-        """The first axis, None when the device is no drive."""
-        return self.drives[0] if self.drives else None
 
     @property
     def nmt_state(self) -> NmtState:
@@ -179,9 +183,10 @@ class Device:
         self._producer.stop()
         self._rpdos.stop(now)
         self._tpdos.stop()
-        for drive in self.drives:
-            drive.reset(now)
+        if self.drive is not None:
+            self.drive.reset(now)
         self._guarding.reset()
+        self._lss.pending_id = self._memory.node_id or self.first_id
         self._nmt.switch_off()
         self._parts = [self.faults]
         self._subscribe()
@@ -195,9 +200,8 @@ class Device:
         """
         if self.powered:
             return
-        if not position_kept:
-            for drive in self.drives:
-                drive.lose_position(now)
+        if self.drive is not None and not position_kept:
+            self.drive.lose_position(now)
         self._parts = self._powered_parts
         self._subscribe()
         self.advance(now)
@@ -212,6 +216,9 @@ class Device:
         self._producer.stop()
         self._rpdos.stop(now)
         self._tpdos.stop()
+        if self._lss.pending_id != self.node_id:
+            self._renumber(self._lss.pending_id)
+        self._lss.reset()
         self.store.restore(*(ALL_OBJECTS if whole else COMMUNICATION_OBJECTS))
         self._errors.reset()
         self._errors.allow(False, now)
@@ -220,12 +227,12 @@ class Device:
         self._sync.reset()
         self._rpdos.configure()
         self._tpdos.configure()
-        for drive in self.drives:
+        if self.drive is not None:
             if whole:
-                drive.reset(now)
+                self.drive.reset(now)
             else:
-                drive.connection_lost(now)
-                for code in sorted(drive.faults):
+                self.drive.connection_lost(now)
+                for code in sorted(self.drive.faults):
                     self._errors.report(code, now)
         self._consumer.reset()
         self._guarding.reset()
@@ -237,12 +244,12 @@ class Device:
         if previous is NmtState.BOOT_UP:
             self._send(boot_up_frame(self.node_id))
             self._producer.start(now)
-            for drive in self.drives:
-                drive.start(now)
+            if self.drive is not None:
+                self.drive.start(now)
         if state is NmtState.STOPPED:
             self._sdo.reset()
-            for drive in self.drives:
-                drive.connection_lost(now)
+            if self.drive is not None:
+                self.drive.connection_lost(now)
         self._errors.allow(state is not NmtState.STOPPED, now)
         if state is NmtState.OPERATIONAL:
             self._rpdos.start()
@@ -257,7 +264,7 @@ class Device:
         state = self._nmt.state
         handlers: dict[int, Handler] = {}
         if self.powered:
-            handlers[CobId.NMT] = self._nmt.receive
+            handlers = {CobId.NMT: self._nmt.receive, LSS_REQUEST: self._lss.receive}
         if state is not NmtState.BOOT_UP:
             handlers.update(dict.fromkeys(self._consumer.can_ids, self._consumer.receive))
         if state in (NmtState.PRE_OPERATIONAL, NmtState.OPERATIONAL):
@@ -271,6 +278,13 @@ class Device:
         self.handlers = handlers
         if self._handlers_changed is not None:
             self._handlers_changed()
+
+    def _renumber(self, node_id: int) -> None:
+        """Take another node id; all that follows from it is read again by the reset."""
+        self.node_id = node_id
+        self.store.renumber(self._dictionary.for_node(node_id))
+        for part in (self._nmt, self._sdo, self._producer, self._guarding, self._lss):
+            part.node_id = node_id
 
     def _pdo_handlers(self) -> dict[int, Handler]:
         receivers: dict[int, list[Handler]] = {}
@@ -288,8 +302,8 @@ class Device:
 
     def _refresh(self, now: float) -> None:
         """Let the objects hold the values of this time."""
-        for drive in self.drives:
-            drive.advance(now)
+        if self.drive is not None:
+            self.drive.advance(now)
 
     def _on_remote(self, frame: Frame, now: float) -> None:
         if frame.can_id == CobId.HEARTBEAT + self.node_id:
@@ -321,8 +335,8 @@ class Device:
         self._refresh(now)
         self._tpdos.sync(counter, now)
         self._rpdos.sync(now)
-        for drive in self.drives:
-            drive.sync(now)
+        if self.drive is not None:
+            self.drive.sync(now)
         self._tpdos.poll(now)
 
     def _on_sync_length(self, wrong: bool, now: float) -> None:
@@ -349,8 +363,8 @@ class Device:
     def _lose_contact(self, now: float, node_id: int = 0) -> None:
         """React to a communication error as 0x1029:01 and the drive's 0x6007 say."""
         self._errors.report(HEARTBEAT_ERROR, now, bytes((node_id, 0, 0, 0, 0)))
-        for drive in self.drives:
-            drive.connection_lost(now)
+        if self.drive is not None:
+            self.drive.connection_lost(now)
         target = ERROR_STATES.get(self._error_behaviour.value)
         if target is not None and self._nmt.state is NmtState.OPERATIONAL:
             self._nmt.enter(target, now)
@@ -359,6 +373,6 @@ class Device:
         self._regain_contact(now)
 
     def _regain_contact(self, now: float) -> None:
-        latched = any(HEARTBEAT_ERROR in drive.faults for drive in self.drives)
+        latched = self.drive is not None and HEARTBEAT_ERROR in self.drive.faults
         if not (latched or self._consumer.missing or self._guarding.lost):
             self._errors.clear(HEARTBEAT_ERROR, now)

@@ -28,6 +28,7 @@ class HeartbeatProducer:
     the node id; all others keep the period.
 
     Attributes:
+        node_id: Id of the device.
         deadline: Steady time in [s] of the next heartbeat.
     """
 
@@ -49,15 +50,15 @@ class HeartbeatProducer:
         self.deadline = NEVER
         self._period = store.integer(Index.PRODUCER_HEARTBEAT)  # [ms]
         self._period.listener = self.start
-        self._phase = node_id * GOLDEN_RATIO % 1.0
-        self._can_id = CobId.HEARTBEAT + node_id
+        self.node_id = node_id
         self._state = state
         self._send = send
 
     def start(self, now: float) -> None:
         """Begin a new series of heartbeats, or none when the period is 0."""
         period = self._period.value * MILLISECOND
-        self.deadline = now + period * (1.0 - self._phase) if period else NEVER
+        phase = self.node_id * GOLDEN_RATIO % 1.0
+        self.deadline = now + period * (1.0 - phase) if period else NEVER
 
     def stop(self) -> None:
         """Fall silent until :meth:`start`."""
@@ -67,7 +68,7 @@ class HeartbeatProducer:
         """Send a heartbeat when it is due."""
         if now < self.deadline:
             return
-        self._send(Frame(self._can_id, bytes((self._state(),))))
+        self._send(Frame(CobId.HEARTBEAT + self.node_id, bytes((self._state(),))))
         period = self._period.value * MILLISECOND
         self.deadline += period
         if self.deadline <= now:  # a process that stood still does not catch up in a burst

@@ -10,6 +10,8 @@ from collections.abc import Callable
 from ..can.frame import Frame
 from ..standard.dictionary import ObjectDictionary
 from .device import Device, Handler
+from .lss_slave import UNCONFIGURED
+from .parameter_memory import ParameterMemory
 from .servo import ServoModel
 from .timed import NEVER, Timed
 
@@ -55,6 +57,7 @@ class DeviceHost:
         *,
         boot_time: float = 0.0,
         servo: ServoModel | None = None,
+        memory: ParameterMemory | None = None,
     ) -> Device:
         """Add a device, switched off; the next :meth:`advance` starts it.
 
@@ -63,11 +66,12 @@ class DeviceHost:
             dictionary: Its objects.
             boot_time: How long its start takes in [s].
             servo: Time constants of the motor.
+            memory: What it keeps without power.
 
         Raises:
             ValueError: The node id is out of range, or another device has it.
         """
-        if any(other.node_id == node_id for other in self.devices):
+        if node_id != UNCONFIGURED and any(d.node_id == node_id for d in self.devices):
             raise ValueError(f'two devices with node id {node_id}')
 
         def send(frame: Frame) -> None:
@@ -80,6 +84,7 @@ class DeviceHost:
             send,
             boot_time=boot_time,
             servo=servo,
+            memory=memory,
             handlers_changed=self._outdate,
         )
         self.devices.append(device)
@@ -113,13 +118,13 @@ class DeviceHost:
         self._finish(now)
 
     def device(self, node_id: int) -> Device:
-        """Return the device with a node id.
+        """Return the device with a node id, also if LSS has given it another one since.
 
         Raises:
             KeyError: There is none.
         """
         for device in self.devices:
-            if device.node_id == node_id:
+            if device.first_id == node_id:
                 return device
         raise KeyError(node_id)
 

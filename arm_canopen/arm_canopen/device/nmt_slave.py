@@ -7,7 +7,7 @@ from __future__ import annotations
 from typing import Protocol
 
 from ..can.frame import Frame
-from ..standard.cob_id import CobId
+from ..standard.cob_id import CobId, NODE_ID_MAX
 from ..standard.nmt import ALL_NODES, NmtCommand, NmtState
 from .timed import NEVER
 
@@ -36,6 +36,7 @@ class NmtSlave:
     """NMT state of one device; it obeys commands to its id and to all.
 
     Attributes:
+        node_id: Id of the device, 255 while it has none and stays in Initialisation.
         state: BOOT_UP stands for Initialisation.
         deadline: When Initialisation ends, as steady time in [s].
     """
@@ -50,14 +51,14 @@ class NmtSlave:
         """
         self.state = NmtState.BOOT_UP
         self.deadline = 0.0
-        self._addressees = (ALL_NODES, node_id)
+        self.node_id = node_id
         self._observer = observer
         self._boot_time = boot_time
         self._powered = False
 
     def receive(self, frame: Frame, now: float) -> None:
         """Obey a command; anything that is none is ignored."""
-        if len(frame.data) != NMT_BYTES or frame.data[1] not in self._addressees:
+        if len(frame.data) != NMT_BYTES or frame.data[1] not in (ALL_NODES, self.node_id):
             return
         try:
             command = NmtCommand(frame.data[0])
@@ -90,9 +91,16 @@ class NmtSlave:
         self.deadline = 0.0
         self._powered = False
 
+    def initialise(self, now: float) -> None:
+        """Reset the communication from within."""
+        self._initialise(NmtCommand.RESET_COMMUNICATION, now)
+
     def _initialise(self, command: NmtCommand, now: float) -> None:
         self.state = NmtState.BOOT_UP
         self._observer.reset(command, now)
+        if self.node_id > NODE_ID_MAX:  # LSS has to give it one first
+            self.deadline = NEVER
+            return
         self.deadline = now + self._boot_time
         if self._boot_time <= 0.0:
             self.advance(now)

@@ -68,11 +68,11 @@ class Variable:
         """Take the default again, without telling the listener."""
         self.value = default_value(self.entry)
 
-    def accept(self, data: bytes) -> Value:
-        """Return the value of bytes that an SDO wants to write.
+    def decoded(self, data: bytes) -> Value:
+        """Return the value of bytes, within the limits of the object.
 
         Raises:
-            SdoAbortError: The length, the range or the object's own check refuses it.
+            SdoAbortError: The length or the range refuses it.
         """
         self.check_length(len(data))
         try:
@@ -80,6 +80,15 @@ class Variable:
         except CodecError as error:
             raise refusal(AbortCode.LENGTH, self.entry) from error
         self._check_limits(value)
+        return value
+
+    def accept(self, data: bytes) -> Value:
+        """Return the value of bytes that an SDO wants to write.
+
+        Raises:
+            SdoAbortError: The length, the range or the object's own check refuses it.
+        """
+        value = self.decoded(data)
         if self.check is not None:
             self.check(value)
         return value
@@ -162,12 +171,14 @@ class ObjectStore:
     Attributes:
         dictionary: What it was made from.
         overlay: What clients read of some objects instead of their values.
+        saved: What some objects hold after a reset instead of their defaults.
     """
 
     def __init__(self, dictionary: ObjectDictionary) -> None:
         """Give every object its default."""
         self.dictionary = dictionary
         self.overlay: dict[tuple[int, int], bytes] = {}
+        self.saved: dict[tuple[int, int], Value] = {}
         self._variables = {entry.address: make_variable(entry) for entry in dictionary}
 
     def __iter__(self) -> Iterator[Variable]:
@@ -209,10 +220,18 @@ class ObjectStore:
         )
 
     def restore(self, first: int, last: int) -> None:
-        """Give the objects from one index to another (included) their defaults."""
-        for (index, _), variable in self._variables.items():
-            if first <= index <= last:
+        """Give the objects from one index to another (included) their saved or default values."""
+        for address, variable in self._variables.items():
+            if first <= address[0] <= last:
                 variable.restore()
+                if address in self.saved:
+                    variable.value = self.saved[address]
+
+    def renumber(self, dictionary: ObjectDictionary) -> None:
+        """Take the defaults that the same objects have for another node id."""
+        self.dictionary = dictionary
+        for entry in dictionary:
+            self._variables[entry.address].entry = entry
 
     def read(self, index: int, subindex: int = 0) -> bytes:
         """Return what an SDO upload yields.

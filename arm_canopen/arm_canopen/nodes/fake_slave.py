@@ -9,13 +9,15 @@ from pathlib import Path
 import sys
 
 from ament_index_python.packages import get_package_share_directory
-from rcl_interfaces.msg import IntegerRange, ParameterDescriptor
+from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
 
 from ..config import load_eds
 from ..device.host import DeviceHost
+from ..device.lss_slave import UNCONFIGURED
+from ..exceptions import CanopenError
 from ..standard.cob_id import NODE_ID_MAX, NODE_ID_MIN
-from .slave_process import Population, run_slaves, text_parameter
+from .slave_process import memories, Population, run_slaves, text_parameter
 
 DEFAULT_NODE_ID = 2
 
@@ -37,16 +39,20 @@ def default_eds() -> Path:
 
 def _populate(node: Node, host: DeviceHost) -> Population:
     descriptor = ParameterDescriptor(
-        description='CANopen node id of the device',
+        description='CANopen node id of the device; 255: LSS has to give it one',
         read_only=True,
-        integer_range=[IntegerRange(from_value=NODE_ID_MIN, to_value=NODE_ID_MAX, step=1)],
     )
     node_id = int(node.declare_parameter('node_id', DEFAULT_NODE_ID, descriptor).value)
+    if not NODE_ID_MIN <= node_id <= NODE_ID_MAX and node_id != UNCONFIGURED:
+        raise CanopenError(
+            f'node_id {node_id} is not {NODE_ID_MIN} to {NODE_ID_MAX}; {UNCONFIGURED} makes a '
+            'device that LSS has to give an id'
+        )
     path = text_parameter(node, 'slave_config', '', 'EDS of the device; empty for our own drive')
     eds = load_eds(path or default_eds())
     for warning in eds.warnings:
         node.get_logger().warning(str(warning))
-    device = host.add(node_id, eds.dictionary)
+    device = host.add(node_id, eds.dictionary, memory=memories(node)(node_id))
     kind = 'drive' if device.drive is not None else 'device'
     return Population(f'simulated {kind} {node_id} of {eds.path}', {'slave': node_id})
 

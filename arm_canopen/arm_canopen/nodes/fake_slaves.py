@@ -12,7 +12,7 @@ from rclpy.node import Node
 from ..config import load_bus
 from ..device.host import DeviceHost
 from ..exceptions import CanopenError
-from .slave_process import Population, run_slaves, text_parameter
+from .slave_process import memories, Population, run_slaves, text_parameter
 
 
 def run_fake_slaves(args: Sequence[str] | None = None) -> int:
@@ -34,8 +34,9 @@ def _populate(node: Node, host: DeviceHost) -> Population:
     bus = load_bus(path)
     for warning in bus.warnings:
         node.get_logger().warning(str(warning))
+    memory = memories(node)
     for config in bus.nodes:
-        host.add(config.node_id, config.dictionary)
+        host.add(config.node_id, config.dictionary, memory=memory(config.node_id))
     drives = sum(device.drive is not None for device in host.devices)
     others = len(host.devices) - drives
     what = f'{drives} simulated drives' + (f' and {others} other devices' if others else '')

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 import logging
+from pathlib import Path
 import threading
 
 from rcl_interfaces.msg import ParameterDescriptor
@@ -18,6 +19,7 @@ from rclpy.utilities import try_shutdown
 
 from ..can import open_bus
 from ..device.host import DeviceHost
+from ..device.parameter_memory import ParameterFile, ParameterMemory
 from ..device.runner import DeviceRunner
 from ..device.scenario import ScenarioPlayer
 from ..device.scenario_file import load_scenario
@@ -29,6 +31,7 @@ CAN_INTERFACES = (
     'can0, vcan0, udp_multicast:239.x.y.z[:port], auto, or INTERFACE:CHANNEL[@BITRATE]'
 )
 
+STORE_DIRECTORY = 'folder of what the devices store (0x1010, LSS); empty: until they end'
 SCENARIO = 'YAML file with faults and their times; empty for none'
 
 
@@ -68,6 +71,18 @@ def text_parameter(node: Node, name: str, default: str, description: str) -> str
     """Declare a read-only text parameter and return its value."""
     descriptor = ParameterDescriptor(description=description, read_only=True)
     return str(node.declare_parameter(name, default, descriptor).value)
+
+
+def memories(node: Node) -> Callable[[int], ParameterMemory]:
+    """Declare ``store_directory``; return what gives each device its memory, by node id."""
+    folder = text_parameter(node, 'store_directory', '', STORE_DIRECTORY)
+
+    def memory(node_id: int) -> ParameterMemory:
+        return (
+            ParameterFile(Path(folder) / f'node_{node_id}.json') if folder else ParameterMemory()
+        )
+
+    return memory
 
 
 def run_slaves(
