@@ -13,6 +13,8 @@ from ..standard.nmt import NmtCommand, NmtState
 from ..standard.objects import Index
 from ..standard.sdo import Abort
 from .drive import Drive
+from .drive_fault import SharedErrors
+from .drive_objects import AXIS_OFFSET
 from .emcy_producer import EmcyProducer
 from .fault_injector import FaultInjector
 from .fault_line import FaultLine, Service, Traffic
@@ -35,6 +37,7 @@ Handler = Callable[[Frame, float], None]
 HEARTBEAT_ERROR = 0x8130
 SYNC_LENGTH_ERROR = 0x8240
 COMMUNICATION_OBJECTS = (0x1000, 0x1FFF)
+AXES_MAX = 8  # in a device (CiA 402-1)
 ALL_OBJECTS = (0x0000, 0xFFFF)
 ERROR_STATES: dict[int, NmtState] = {0: NmtState.PRE_OPERATIONAL, 2: NmtState.STOPPED}
 """Where a communication error leads from Operational (CiA 301, 7.5.2.33); 1 leads nowhere."""
@@ -50,7 +53,7 @@ class Device:
         node_id: CANopen node id; 255 while it has none.
         first_id: The one that it was made with; LSS may have changed it.
         store: Present values of all objects.
-        drive: The axis, None when the device is no drive.
+        drives: Its axes; none when the device is no drive.
         faults: What it does wrong on purpose.
         handlers: What it does with the frames of each identifier, in its present NMT state;
             another mapping takes its place when that changes.
@@ -98,9 +101,11 @@ class Device:
         self._nmt = NmtSlave(node_id, self, boot_time)
         self._errors = EmcyProducer(store, send)
         self._sync = SyncConsumer(store, self._on_sync, self._on_sync_length, self._subscribe)
-        is_drive = (Index.CONTROLWORD, 0) in store
-        self.drive: Drive | None = (
-            Drive(store, self._errors, self._sync, servo or ServoModel()) if is_drive else None
+        shared = SharedErrors(self._errors)
+        self.drives: tuple[Drive, ...] = tuple(
+            Drive(store, shared, self._sync, servo or ServoModel(), number=axis)
+            for axis in range(AXES_MAX)
+            if (Index.CONTROLWORD + axis * AXIS_OFFSET, 0) in store
         )
         self._sdo = SdoServers(node_id, store, send, self._subscribe)
         self._producer = HeartbeatProducer(node_id, store, lambda: self._nmt.state, send)
@@ -128,8 +133,13 @@ class Device:
             self._rpdos,
             self._tpdos,
         ]
-        self._powered_parts = parts if self.drive is None else [*parts, self.drive]
+        self._powered_parts = [*parts, *self.drives]
         self._parts: list[Timed] = self._powered_parts
+
+    @property
+    def drive(self) -> Drive | None:
+        """The first axis, None when the device is no drive."""
+        return self.drives[0] if self.drives else None
 
     @property
     def nmt_state(self) -> NmtState:
@@ -183,8 +193,8 @@ class Device:
         self._producer.stop()
         self._rpdos.stop(now)
         self._tpdos.stop()
-        if self.drive is not None:
-            self.drive.reset(now)
+        for drive in self.drives:
+            drive.reset(now)
         self._guarding.reset()
         self._lss.pending_id = self._memory.node_id or self.first_id
         self._nmt.switch_off()
@@ -200,8 +210,9 @@ class Device:
         """
         if self.powered:
             return
-        if self.drive is not None and not position_kept:
-            self.drive.lose_position(now)
+        if not position_kept:
+            for drive in self.drives:
+                drive.lose_position(now)
         self._parts = self._powered_parts
         self._subscribe()
         self.advance(now)
@@ -227,12 +238,12 @@ class Device:
         self._sync.reset()
         self._rpdos.configure()
         self._tpdos.configure()
-        if self.drive is not None:
+        for drive in self.drives:
             if whole:
-                self.drive.reset(now)
+                drive.reset(now)
             else:
-                self.drive.connection_lost(now)
-                for code in sorted(self.drive.faults):
+                drive.connection_lost(now)
+                for code in sorted(drive.faults):
                     self._errors.report(code, now)
         self._consumer.reset()
         self._guarding.reset()
@@ -244,12 +255,12 @@ class Device:
         if previous is NmtState.BOOT_UP:
             self._send(boot_up_frame(self.node_id))
             self._producer.start(now)
-            if self.drive is not None:
-                self.drive.start(now)
+            for drive in self.drives:
+                drive.start(now)
         if state is NmtState.STOPPED:
             self._sdo.reset()
-            if self.drive is not None:
-                self.drive.connection_lost(now)
+            for drive in self.drives:
+                drive.connection_lost(now)
         self._errors.allow(state is not NmtState.STOPPED, now)
         if state is NmtState.OPERATIONAL:
             self._rpdos.start()
@@ -302,8 +313,8 @@ class Device:
 
     def _refresh(self, now: float) -> None:
         """Let the objects hold the values of this time."""
-        if self.drive is not None:
-            self.drive.advance(now)
+        for drive in self.drives:
+            drive.advance(now)
 
     def _on_remote(self, frame: Frame, now: float) -> None:
         if frame.can_id == CobId.HEARTBEAT + self.node_id:
@@ -335,8 +346,8 @@ class Device:
         self._refresh(now)
         self._tpdos.sync(counter, now)
         self._rpdos.sync(now)
-        if self.drive is not None:
-            self.drive.sync(now)
+        for drive in self.drives:
+            drive.sync(now)
         self._tpdos.poll(now)
 
     def _on_sync_length(self, wrong: bool, now: float) -> None:
@@ -363,8 +374,8 @@ class Device:
     def _lose_contact(self, now: float, node_id: int = 0) -> None:
         """React to a communication error as 0x1029:01 and the drive's 0x6007 say."""
         self._errors.report(HEARTBEAT_ERROR, now, bytes((node_id, 0, 0, 0, 0)))
-        if self.drive is not None:
-            self.drive.connection_lost(now)
+        for drive in self.drives:
+            drive.connection_lost(now)
         target = ERROR_STATES.get(self._error_behaviour.value)
         if target is not None and self._nmt.state is NmtState.OPERATIONAL:
             self._nmt.enter(target, now)
@@ -373,6 +384,6 @@ class Device:
         self._regain_contact(now)
 
     def _regain_contact(self, now: float) -> None:
-        latched = self.drive is not None and HEARTBEAT_ERROR in self.drive.faults
+        latched = any(HEARTBEAT_ERROR in drive.faults for drive in self.drives)
         if not (latched or self._consumer.missing or self._guarding.lost):
             self._errors.clear(HEARTBEAT_ERROR, now)
