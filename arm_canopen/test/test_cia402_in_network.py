@@ -154,7 +154,7 @@ def test_refusals_before_init(net: VirtualNetwork) -> None:
     net.do(JOINT, 'init')
     with pytest.raises(DriveError, match=r'no mode of operation.*~/position_mode'):
         net.commands[JOINT].set_target(0.1)
-    with pytest.raises(DriveError, match=r'0x6502'):
+    with pytest.raises(DriveError, match=r'in no RPDO'):
         net.select(JOINT, OperationMode.CYCLIC_TORQUE)
 
 

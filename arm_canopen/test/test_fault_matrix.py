@@ -248,19 +248,8 @@ FAULTS = (
 )
 
 
-ROWS = [
-    pytest.param(
-        fault,
-        marks=pytest.mark.xfail(
-            fault.name == 'master unheard', reason='nobody starts the devices again', strict=True
-        ),
-    )
-    for fault in FAULTS
-]
-
-
 @pytest.mark.parametrize('mode', MODES, ids=lambda mode: mode.name)
-@pytest.mark.parametrize('fault', ROWS, ids=[fault.name for fault in FAULTS])
+@pytest.mark.parametrize('fault', FAULTS, ids=lambda fault: fault.name)
 def test_fault_in_motion(fault: Fault, mode: OperationMode) -> None:
     """It is said, the drive stops, targets are refused, and only a command brings it back."""
     arm = Arm()

@@ -21,7 +21,7 @@ from arm_canopen.can.frame import Frame
 from arm_canopen.exceptions import SdoAbortError, SdoTimeoutError
 from arm_canopen.master.events import EventKind, Severity
 from arm_canopen.master.status import node_status
-from arm_canopen.standard.nmt import NmtCommand, NmtState
+from arm_canopen.standard.nmt import nmt_frame, NmtCommand, NmtState
 
 SYNC, EMCY, HEARTBEAT = 0x080, 0x080, 0x700
 CONSUMER_TIME = 0.3  # [s] of the sample drives
@@ -196,6 +196,45 @@ def test_a_device_that_somebody_stops_is_warned_of_until_it_is_started() -> None
     net.run(0.2)
     assert not node.left_operational
     assert node.nmt_state is NmtState.OPERATIONAL
+
+
+@pytest.mark.parametrize('ours', [True, False], ids=['ours', "another tool's"])
+@pytest.mark.parametrize('command', [NmtCommand.STOP, NmtCommand.ENTER_PRE_OPERATIONAL])
+def test_a_state_that_somebody_commanded_is_left_alone(command: NmtCommand, ours: bool) -> None:
+    """The master does not start what a person stopped, by a service or by a tool on the bus."""
+    net = network('a')
+    net.boot()
+    net.run(0.5)
+    if ours:
+        net.network.send_nmt(command, 2)
+    else:
+        net.send_as('tool', Frame(0, nmt_frame(command, 2)))
+    net.run(3.0)
+    node = net.network.nodes['a']
+    assert node.left_operational
+    assert 'by itself' not in net.story()
+    net.send_as('tool', Frame(0, nmt_frame(NmtCommand.START)))
+    net.run(0.5)
+    assert node.operational
+
+
+def test_a_start_that_got_lost_is_sent_again() -> None:
+    """The device goes on to say that it is pre-operational: it is booted again."""
+    net = network('a')
+    lost: list[Frame] = []
+
+    def loses(sender: str, frame: Frame) -> bool:
+        start = frame.can_id == 0 and frame.data == nmt_frame(NmtCommand.START, 2)
+        if start and not lost:
+            lost.append(frame)
+            return True
+        return False
+
+    net.wire.loses = loses
+    net.start()
+    net.run_until(lambda: net.network.nodes['a'].nmt_state is NmtState.OPERATIONAL)
+    assert lost
+    assert 'left Operational by itself' in net.story()
 
 
 @pytest.mark.parametrize(
@@ -419,7 +458,7 @@ def test_strangers_can_be_read_by_sdo() -> None:
     net.boot()
     alone.boot()
     alone.connect('c', net.devices['c'])
-    net.devices['c']._sdo._send = lambda frame: alone.send_as('c', frame)
+    net.devices['c']._sdo.default._send = lambda frame: alone.send_as('c', frame)
     client = alone.network.sdo_client(9)
     assert client is alone.network.sdo_client(9)
     assert alone.network.sdo_client(2) is alone.network.nodes['a'].sdo

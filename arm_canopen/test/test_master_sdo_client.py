@@ -203,7 +203,7 @@ def test_any_value_survives_a_round_trip_with_the_simulated_device(value: bytes)
     domain = ObjectEntry(0x2002, 0, 'Blob', DataType.DOMAIN)
     store = ObjectStore(ObjectDictionary([domain]))
     line = Line()
-    server = SdoServer(NODE, store, lambda frame: line.receive(frame.data))
+    server = SdoServer(REQUEST, RESPONSE, store, lambda frame: line.receive(frame.data))
 
     def hand_over(request: bytes) -> None:
         server.receive(Frame(REQUEST, request), line.scheduler.now)

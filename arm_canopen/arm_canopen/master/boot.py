@@ -64,12 +64,16 @@ class BootProcess:
         self._master_heartbeat_timeout = master_heartbeat_timeout
         self._told = ''
 
-    async def run(self, *, announced: bool) -> None:
+    async def run(self, *, announced: bool, pause: float = 0.0) -> None:
         """Boot the device; returns when it is operational.
 
         Args:
             announced: A boot-up message came, so there is no need to look for the device.
+            pause: Time to wait before in [s].
         """
+        if pause > 0.0:
+            self._enter(BootPhase.WAITING)
+            await self._scheduler.timer(pause)
         while not await self._attempt(announced=announced):
             announced = False
             await self._scheduler.timer(self._node.config.boot_timeout)

@@ -15,13 +15,15 @@ from ..can.frame import Frame
 from ..config.model import BusConfig
 from ..exceptions import BusError, SdoError
 from ..standard.cob_id import CobId
-from ..standard.nmt import ALL_NODES, nmt_frame, NmtCommand, NmtState
+from ..standard.nmt import ALL_NODES, nmt_frame, NmtCommand, NmtState, parse_nmt
 from .boot import BootProcess
 from .events import Event, EventKind, Report, Severity
 from .process_image import SyncRound
 from .remote_node import RemoteNode
 from .scheduler import Scheduler, Task
 from .sdo_client import SdoClient
+
+DROP_PAUSE = 0.5  # [s] before a device that left Operational by itself is booted again
 
 CycleHook: TypeAlias = Callable[[float, float], None]
 
@@ -72,6 +74,7 @@ class Network:
         self._boots = {name: self._boot_process(node) for name, node in self.nodes.items()}
         self._boot_tasks: dict[str, Task[None]] = {}
         self._handlers: dict[int, Callable[[Frame], None]] = {}
+        self._handlers[CobId.NMT] = self._hear_nmt
         self._strangers: dict[int, SdoClient] = {}
         for node in self.nodes.values():
             self._connect(node)
@@ -142,6 +145,7 @@ class Network:
 
     def send_nmt(self, command: NmtCommand, node_id: int) -> None:
         """Send an NMT command to one device, or to all with id 0."""
+        self._note_nmt(command, node_id)
         self.send(Frame(CobId.NMT, nmt_frame(command, node_id)))
 
     def sdo_client(self, node_id: int) -> SdoClient:
@@ -180,6 +184,18 @@ class Network:
         for entry in node.image.inputs:
             self._handlers[entry.config.cob_id] = entry.receive
         node.on_boot_up = lambda: self._booted(node)
+        node.on_dropped_out = lambda: self._start_boot(node, announced=False, pause=DROP_PAUSE)
+
+    def _hear_nmt(self, frame: Frame) -> None:
+        """Note what another master or a tool commands, so that it is not worked against."""
+        parsed = parse_nmt(frame.data)
+        if parsed is not None:
+            self._note_nmt(*parsed)
+
+    def _note_nmt(self, command: NmtCommand, node_id: int) -> None:
+        for node in self.nodes.values():
+            if node_id in (ALL_NODES, node.config.node_id):
+                node.note_command(command)
 
     def _booted(self, node: RemoteNode) -> None:
         self._end_boot(node)
@@ -194,9 +210,10 @@ class Network:
         if running is not None:
             running.cancel(SdoError('the boot starts again'))
 
-    def _start_boot(self, node: RemoteNode, *, announced: bool) -> None:
+    def _start_boot(self, node: RemoteNode, *, announced: bool, pause: float = 0.0) -> None:
         self._end_boot(node)
-        task = self.scheduler.background(self._boots[node.name].run(announced=announced))
+        boot = self._boots[node.name].run(announced=announced, pause=pause)
+        task = self.scheduler.background(boot)
         self._boot_tasks[node.name] = task
 
     def _send_heartbeat(self, now: float) -> None:

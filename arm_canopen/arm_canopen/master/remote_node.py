@@ -14,7 +14,7 @@ from ..exceptions import CodecError, SdoAbortError, SdoError
 from ..standard.datatypes import decode, encode, Value
 from ..standard.dictionary import ObjectEntry
 from ..standard.emcy import Emergency
-from ..standard.nmt import NmtState, parse_heartbeat
+from ..standard.nmt import COMMANDED_STATES, NmtCommand, NmtState, parse_heartbeat
 from ..standard.objects import Index
 from ..standard.pdo import Number
 from .events import Event, EventKind, Report, Severity
@@ -22,6 +22,8 @@ from .process_image import ProcessImage, Reader, SyncRound, Writer
 from .scheduler import Promise, Scheduler
 from .sdo_client import SdoClient
 from .start_values import start_value
+
+START_TIME = 0.25  # [s] in which a device follows the command to start
 
 
 class BootPhase(Enum):
@@ -88,6 +90,7 @@ class RemoteNode:
         phase_detail: What it is doing in that phase, or why it failed.
         online: Booted, and not lost since.
         left_operational: Online, but somebody stopped it or sent it to pre-operational.
+        wanted: NMT state that was commanded last, by whomever on this bus; None when unknown.
         last_heartbeat: Steady time of the last heartbeat in [s].
         owes_heartbeat: It was started and never sent a heartbeat, though it is supervised; it has
             to show one before it is started again.
@@ -126,14 +129,17 @@ class RemoteNode:
         self.phase_detail = ''
         self.online = False
         self.left_operational = False
+        self.wanted: NmtState | None = None
         self.last_heartbeat = 0.0
         self.owes_heartbeat = False
         self.last_emergency: Emergency | None = None
         self.missed_pdos = 0
         self.on_boot_up: Callable[[], None] = lambda: None
         self.on_lost: Callable[[str], None] = lambda reason: None  # its driver stops
+        self.on_dropped_out: Callable[[], None] = lambda: None  # it has to be booted again
         self._supervised = False
         self._online_since = 0.0
+        self._commanded_at = 0.0
         self._scheduler = scheduler
         self._report = report
         self._polled: dict[tuple[int, int], BackgroundReader] = {}
@@ -177,6 +183,22 @@ class RemoteNode:
         if state is NmtState.BOOT_UP:
             self.last_emergency = None  # whatever it was, it ended with the restart
             self.on_boot_up()
+        elif self._dropped_out(state, frame.timestamp):
+            self.lost(
+                f'left Operational by itself (NMT state {state.name}): it has missed the master '
+                'or the start, or its error behaviour 0x1029 says so; it is booted again'
+            )
+            self.on_dropped_out()
+
+    def note_command(self, command: NmtCommand) -> None:
+        """An NMT command for this device is on the bus, from us or from somebody else."""
+        self.wanted = COMMANDED_STATES.get(command)
+        self._commanded_at = self._scheduler.now
+
+    def _dropped_out(self, state: NmtState, now: float) -> bool:
+        followed = now - self._commanded_at > START_TIME
+        started = self.online and self.wanted is NmtState.OPERATIONAL
+        return started and followed and state is not NmtState.OPERATIONAL
 
     def _nmt_state_changed(self, state: NmtState) -> None:
         before, self.nmt_state = self.nmt_state, state

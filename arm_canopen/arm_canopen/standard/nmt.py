@@ -28,10 +28,27 @@ class NmtState(IntEnum):
 
 ALL_NODES = 0
 
+COMMANDED_STATES: dict[NmtCommand, NmtState] = {
+    NmtCommand.START: NmtState.OPERATIONAL,
+    NmtCommand.STOP: NmtState.STOPPED,
+    NmtCommand.ENTER_PRE_OPERATIONAL: NmtState.PRE_OPERATIONAL,
+}
+"""States in which a device stays after a command (CiA 301, figure 48)."""
+
 
 def nmt_frame(command: NmtCommand, node_id: int = ALL_NODES) -> bytes:
     """Return the data of an NMT command for one node, or for all with id 0."""
     return bytes((command, node_id))
+
+
+def parse_nmt(data: bytes) -> tuple[NmtCommand, int] | None:
+    """Return command and node id (0 for all) of an NMT frame, None when it is none."""
+    if len(data) != 2:
+        return None
+    try:
+        return NmtCommand(data[0]), data[1]
+    except ValueError:
+        return None
 
 
 def parse_heartbeat(data: bytes) -> NmtState | None:
