@@ -9,7 +9,8 @@ import pytest
 
 from arm_canopen.can.frame import Frame
 from arm_canopen.device.device import Device
-from arm_canopen.device.faults import BusFault, FaultInjection, SETTINGS
+from arm_canopen.device.drive_fault import DriveFault
+from arm_canopen.device.faults import BusFault, Fault, FaultInjection, SETTINGS
 from arm_canopen.device.host import DeviceHost
 from arm_canopen.standard.drive import DriveState
 from arm_canopen.standard.nmt import NmtCommand, NmtState
@@ -30,7 +31,7 @@ def rig() -> Rig:
     return rig
 
 
-def inject(rig: Rig, fault: BusFault, **settings: object) -> None:
+def inject(rig: Rig, fault: Fault, **settings: object) -> None:
     """Begin a fault now."""
     rig.device.faults.inject(FaultInjection(fault, **settings), rig.now)  # type: ignore[arg-type]
 
@@ -244,8 +245,8 @@ def test_other_devices_of_the_process_are_not_touched() -> None:
     assert [frame.can_id for frame in sent] == [0x583]
 
 
-@pytest.mark.parametrize('fault', BusFault)
-def test_every_fault_says_itself(fault: BusFault) -> None:
+@pytest.mark.parametrize('fault', [*BusFault, *DriveFault])
+def test_every_fault_says_itself(fault: Fault) -> None:
     """A fault with its defaults is valid, and its text begins with its name."""
     assert str(FaultInjection(fault)).startswith(f'{fault.value}: ')
     assert 'seed' not in SETTINGS[fault] or FaultInjection(fault, seed=3).seed == 3
@@ -266,3 +267,44 @@ def test_nonsense_is_refused(fault: BusFault, settings: dict[str, float]) -> Non
     """Values out of range and settings of other faults are arguments of the wrong kind."""
     with pytest.raises(ValueError, match=next(iter(settings))):
         FaultInjection(fault, **settings)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize('fault', [fault for fault in DriveFault if fault.code])
+def test_faults_of_a_drive_that_last(rig: Rig, fault: DriveFault) -> None:
+    """While the cause is there a fault reset does not help; after its duration it does."""
+    rig.enable(3)
+    inject(rig, fault, duration=2.0)
+    rig.run(1.0)
+    assert rig.state == DriveState.FAULT.value
+    assert rig.get(0x603F) == fault.code
+    rig.command(0, 0x80, 0)
+    assert rig.state == DriveState.FAULT.value
+    rig.run(1.5)
+    rig.command(0, 0x80, 0)
+    assert rig.state is DriveState.SWITCH_ON_DISABLED
+    assert rig.device.faults.active == ()
+
+
+def test_fault_of_a_moment(rig: Rig) -> None:
+    """Without a duration a fault reset ends what happened once."""
+    inject(rig, DriveFault.OVER_CURRENT)
+    assert rig.device.faults.active == ()
+    rig.command(0, 0x80, 0)
+    assert rig.state is DriveState.SWITCH_ON_DISABLED
+
+
+def test_safe_torque_off_until_it_is_released(rig: Rig) -> None:
+    """STO takes the voltage, is no fault, and lasts."""
+    inject(rig, DriveFault.STO)
+    assert not rig.statusword & 0x10
+    rig.command(0x06, 0x07, 0x0F)
+    assert rig.state < DriveState.SWITCHED_ON
+    assert rig.get(0x603F) == 0
+    rig.device.faults.end(rig.now, DriveFault.STO)
+    rig.enable(3)
+
+
+def test_axis_that_there_is_not(rig: Rig) -> None:
+    """A fault of an axis needs that axis."""
+    with pytest.raises(ValueError, match='has 1 axes'):
+        inject(rig, DriveFault.OVER_CURRENT, axis=2)

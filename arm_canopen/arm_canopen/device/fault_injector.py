@@ -8,8 +8,10 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 from ..standard.objects import Index
+from .drive import Drive
+from .drive_fault import DriveFault
 from .fault_line import AFFECTED, FaultLine, LineFault
-from .faults import BusFault, FaultInjection
+from .faults import BusFault, Fault, FaultInjection
 from .object_store import ObjectStore
 from .timed import NEVER
 
@@ -32,6 +34,7 @@ class Powered(Protocol):
 
     node_id: int
     store: ObjectStore
+    drives: tuple[Drive, ...]
 
     def switch_off(self, now: float) -> None:
         """Cut the power."""
@@ -91,12 +94,25 @@ class FaultInjector:
         Args:
             injection: The fault.
             now: Steady time in [s].
+
+        Raises:
+            ValueError: It is a fault of a drive, and the device is none or lacks the axis.
         """
         self._line.now = now
+        if isinstance(injection.fault, DriveFault) and not self._axes(injection):
+            raise ValueError(
+                f'device {self._device.node_id} has {len(self._device.drives)} axes; '
+                f'{injection.fault.value} needs one'
+            )
         if injection.fault in POWER_FAULTS:
             self._cut_power(injection, now)
             return
-        if injection.fault is BusFault.WRONG_IDENTITY:
+        if isinstance(injection.fault, DriveFault):
+            for drive in self._axes(injection):
+                drive.inject(injection.fault, now, lasting=injection.lasting)
+            if not injection.lasting:
+                return
+        elif injection.fault is BusFault.WRONG_IDENTITY:
             self._disguise(injection)
         line = None
         if injection.fault in AFFECTED:
@@ -105,7 +121,7 @@ class FaultInjector:
         self._active[injection.key] = ActiveFault(injection, end, line)
         self._update_line()
 
-    def end(self, now: float, fault: BusFault | None = None) -> None:
+    def end(self, now: float, fault: Fault | None = None) -> None:
         """End a fault, or all; a device without power is switched on.
 
         Args:
@@ -131,11 +147,18 @@ class FaultInjector:
             self._update_line()
 
     def _ended(self, injection: FaultInjection, now: float) -> None:
-        if injection.fault is BusFault.WRONG_IDENTITY:
+        if isinstance(injection.fault, DriveFault):
+            for drive in self._axes(injection):
+                drive.clear(injection.fault, now)
+        elif injection.fault is BusFault.WRONG_IDENTITY:
             for address in IDENTITY_OBJECTS.values():
                 self._device.store.overlay.pop(address, None)
         elif injection.fault in POWER_FAULTS:
             self._device.switch_on(now, position_kept=injection.position_kept)
+
+    def _axes(self, injection: FaultInjection) -> tuple[Drive, ...]:
+        drives = self._device.drives
+        return drives[injection.axis - 1 : injection.axis] if injection.axis else drives
 
     def _cut_power(self, injection: FaultInjection, now: float) -> None:
         duration = injection.duration

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from ..can.frame import Frame
 from ..standard.sdo import Abort
-from .faults import BusFault, FaultInjection
+from .faults import BusFault, Fault, FaultInjection
 from .timed import NEVER
 
 Deliver = Callable[[Frame, float], None]
@@ -46,7 +46,7 @@ class Traffic(NamedTuple):
     number: int = 0
 
 
-AFFECTED: dict[BusFault, tuple[tuple[Service, bool], ...]] = {
+AFFECTED: dict[Fault, tuple[tuple[Service, bool], ...]] = {
     BusFault.SDO_DELAY: ((Service.SDO, True),),
     BusFault.SDO_SILENCE: ((Service.SDO, False),),
     BusFault.SDO_ABORT: ((Service.SDO, False),),
@@ -60,7 +60,9 @@ AFFECTED: dict[BusFault, tuple[tuple[Service, bool], ...]] = {
 }
 """Which frames each fault hits: their service, and whether the device sends them."""
 
-DELAYS = frozenset({BusFault.SDO_DELAY, BusFault.TPDO_DELAY, BusFault.RPDO_DELAY})
+DELAYS: frozenset[Fault] = frozenset(
+    {BusFault.SDO_DELAY, BusFault.TPDO_DELAY, BusFault.RPDO_DELAY}
+)
 
 
 class LineFault:

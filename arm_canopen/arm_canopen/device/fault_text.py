@@ -9,11 +9,12 @@ import difflib
 import re
 
 from ..standard.sdo_abort import AbortCode
-from .faults import BusFault, FaultInjection, SETTINGS
+from .drive_fault import DriveFault
+from .faults import BusFault, Fault, FaultInjection, SETTINGS
 
 OBJECT = re.compile(r'(?:0x)?([0-9a-f]{4})(?:[:/]([0-9a-f]{1,2}))?', re.IGNORECASE)
 KEPT_WORDS = {'true': True, 'yes': True, 'kept': True, 'false': False, 'no': False, 'lost': False}
-FAULTS: dict[str, BusFault] = {fault.value: fault for fault in BusFault}
+FAULTS: dict[str, Fault] = {fault.value: fault for fault in (*BusFault, *DriveFault)}
 """Faults by name."""
 
 
@@ -25,7 +26,7 @@ def unknown(what: str, name: str, known: Iterable[str]) -> str:
     return f'unknown {what} {name!r}; {hint}'
 
 
-def fault_named(name: str) -> BusFault:
+def fault_named(name: str) -> Fault:
     """Return the fault with a name.
 
     Raises:

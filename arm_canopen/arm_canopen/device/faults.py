@@ -6,8 +6,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from enum import Enum
+from typing import TypeAlias
 
 from ..standard.sdo_abort import AbortCode
+from .drive_fault import DriveFault
 
 
 class BusFault(Enum):
@@ -31,7 +33,9 @@ class BusFault(Enum):
     REBOOT = 'reboot'
 
 
-FAULT_TEXTS: dict[BusFault, str] = {
+Fault: TypeAlias = BusFault | DriveFault
+
+FAULT_TEXTS: dict[Fault, str] = {
     BusFault.SDO_DELAY: 'answers SDOs late',
     BusFault.SDO_SILENCE: 'does not answer SDOs',
     BusFault.SDO_ABORT: 'aborts SDOs',
@@ -45,11 +49,12 @@ FAULT_TEXTS: dict[BusFault, str] = {
     BusFault.DISCONNECT: 'is cut off from the bus and goes on by itself',
     BusFault.POWER_OFF: 'has no power',
     BusFault.REBOOT: 'starts anew',
+    **{fault: fault.text for fault in DriveFault},
 }
 """What a device does under each fault, in words."""
 
 _RANDOM = ('probability', 'count', 'seed')
-SETTINGS: dict[BusFault, tuple[str, ...]] = {
+SETTINGS: dict[Fault, tuple[str, ...]] = {
     BusFault.SDO_DELAY: ('delay',),
     BusFault.SDO_SILENCE: ('object', *_RANDOM),
     BusFault.SDO_ABORT: ('object', 'abort', *_RANDOM),
@@ -63,9 +68,11 @@ SETTINGS: dict[BusFault, tuple[str, ...]] = {
     BusFault.DISCONNECT: (),
     BusFault.POWER_OFF: ('position_kept',),
     BusFault.REBOOT: ('position_kept',),
+    **dict.fromkeys(DriveFault, ('axis',)),
 }
 """Which fields of :class:`FaultInjection` each fault uses, beside its duration."""
 
+LASTING = frozenset({DriveFault.STO, DriveFault.BLOCKED_MOTOR, DriveFault.ENCODER_LOSS})
 DELAY = 0.5  # [s] default: longer than the SDO time-out of a patient master
 
 
@@ -76,11 +83,14 @@ class FaultInjection:
     Attributes:
         fault: What goes wrong.
         duration: How long in [s]; 0 until it is ended. Of a reboot: how long the power is off.
+            Of faults of a drive 0 is a moment, so that a fault reset ends them, except for STO,
+            a blocked motor and a lost encoder.
         delay: How late frames are in [s].
         probability: Part of the frames in question that are hit, 0 to 1.
         count: How many frames are hit, then the fault is over; 0 for no such limit.
         seed: Beginning of the random numbers; the same seed hits the same frames.
         pdo: Number of the PDO, from 1; 0 for all.
+        axis: Number of the drive's axis, from 1; 0 for all.
         object: Index and sub-index; None for all.
         abort: SDO abort code.
         position_kept: The encoder knows its position after power-on (absolute), or counts from
@@ -92,13 +102,14 @@ class FaultInjection:
         serial: What 0x1018:04 shows.
     """
 
-    fault: BusFault
+    fault: Fault
     duration: float = 0.0
     delay: float = DELAY
     probability: float = 1.0
     count: int = 0
     seed: int = 0
     pdo: int = 0
+    axis: int = 0
     object: tuple[int, int] | None = None
     abort: int = AbortCode.GENERAL
     position_kept: bool = True
@@ -120,17 +131,22 @@ class FaultInjection:
                 raise ValueError(f'{name} {value} is not a time of 0 s or more')
         if not 0.0 <= self.probability <= 1.0:
             raise ValueError(f'probability {self.probability} is not 0 to 1')
-        if self.count < 0 or self.pdo < 0:
-            raise ValueError('count and pdo are 0 or more')
+        if min(self.count, self.pdo, self.axis) < 0:
+            raise ValueError('count, pdo and axis are 0 or more')
         allowed = ('fault', 'duration', *SETTINGS[self.fault])
         for field in fields(self):
             if field.name not in allowed and getattr(self, field.name) != field.default:
                 raise ValueError(f'{self.fault.value} has no setting {field.name!r}')
 
     @property
-    def key(self) -> tuple[BusFault, int, tuple[int, int] | None]:
-        """What it replaces when it is injected: the same fault of the same PDO or object."""
-        return self.fault, self.pdo, self.object
+    def key(self) -> tuple[Fault, int, int, tuple[int, int] | None]:
+        """What it replaces when it is injected: the same fault of the same part."""
+        return self.fault, self.pdo, self.axis, self.object
+
+    @property
+    def lasting(self) -> bool:
+        """It goes on until it is ended; otherwise it is over in a moment."""
+        return isinstance(self.fault, BusFault) or bool(self.duration) or self.fault in LASTING
 
     def __str__(self) -> str:
         """Say it in words."""
@@ -139,6 +155,8 @@ class FaultInjection:
             parts.append('0x{:04X}:{:02X}'.format(*self.object))
         if self.pdo:
             parts.append(f'PDO {self.pdo}')
+        if self.axis:
+            parts.append(f'axis {self.axis}')
         if 'delay' in SETTINGS[self.fault]:
             parts.append(f'by {self.delay:g} s')
         if self.probability < 1.0:

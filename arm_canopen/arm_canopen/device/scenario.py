@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from ..standard.drive import DriveState
 from ..standard.nmt import NmtState
 from .device import Device
-from .faults import BusFault, FaultInjection
+from .faults import Fault, FaultInjection
 from .host import DeviceHost
 from .timed import NEVER
 
@@ -72,7 +72,7 @@ class Step:
 
     node_ids: tuple[int, ...]
     injection: FaultInjection | None = None
-    ends: BusFault | None = None
+    ends: Fault | None = None
     after: float = 0.0
     event: Event | None = None
 

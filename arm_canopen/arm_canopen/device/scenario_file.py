@@ -36,8 +36,9 @@ from ..config.findings import Findings, RefusedError
 from ..config.scalars import describe, integer, number, scalar
 from ..standard.drive import DriveState
 from ..standard.nmt import NmtState
+from .drive_fault import DriveFault
 from .fault_text import FAULTS, parse_fault
-from .faults import BusFault, FaultInjection, SETTINGS
+from .faults import Fault, FaultInjection, SETTINGS
 from .scenario import Event, Step
 
 KIND = DocumentKind('scenario', 'parameter scenario', "begin with 'steps:' and a list below it")
@@ -114,7 +115,16 @@ class _Reader:
             ends = self._read(entries['end'], _ended)
             return Step(node_ids, ends=ends, after=after, event=event)
         injection = self._injection(item)
+        if injection is not None and isinstance(injection.fault, DriveFault):
+            self._check_drives(item, node_ids)
         return Step(node_ids, injection, after=after, event=event) if injection else None
+
+    def _check_drives(self, step: Mapping, node_ids: tuple[int, ...]) -> None:
+        others = [str(node_id) for node_id in node_ids if node_id not in self._drives]
+        if others:
+            place = step.entries['fault'].place
+            message = f'device {", ".join(others)} is no drive and cannot have this fault'
+            self._findings.error(place, message, 'name drives')
 
     def _injection(self, step: Mapping) -> FaultInjection | None:
         allowed = _settings_of(step)
@@ -201,7 +211,7 @@ def _fault(item: Item, settings: dict[str, str]) -> FaultInjection:
         raise RefusedError(str(error), 'correct it or leave it out') from error
 
 
-def _ended(item: Item) -> BusFault | None:
+def _ended(item: Item) -> Fault | None:
     name = scalar(item, 'the name of a fault').text
     if name == ALL:
         return None

@@ -17,6 +17,7 @@ from std_srvs.srv import SetBool, Trigger
 from arm_msgs.srv import InjectFault
 
 from ..device.device import Device
+from ..device.drive_fault import DriveFault
 from ..device.fault_text import FAULTS, parse_fault, split_settings, unknown
 from ..device.faults import BusFault, FAULT_TEXTS, FaultInjection, SETTINGS
 from ..device.runner import DeviceRunner
@@ -161,7 +162,10 @@ def switch_sto(active: bool, device: Device, now: float) -> str:
     Raises:
         ValueError: The device is no drive.
     """
-    if device.drive is None:
+    if active:
+        device.faults.inject(FaultInjection(DriveFault.STO), now)
+        return 'STO is active, the motor has no torque'
+    if not device.drives:
         raise ValueError(f'device {device.node_id} is no drive')
-    device.drive.set_voltage(not active, now)
-    return 'STO is active, the motor has no torque' if active else 'STO is released'
+    device.faults.end(now, DriveFault.STO)
+    return 'STO is released'
