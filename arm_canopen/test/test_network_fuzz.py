@@ -1,0 +1,96 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""200,000 random frames into a whole network: nothing breaks, hangs or moves unasked."""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+from virtual_network import bus_config, drive_config, VirtualNetwork
+
+from arm_canopen.can.frame import Frame
+from arm_canopen.standard.nmt import NmtState
+
+FRAMES = 50_000  # for each seed
+BURST = 100  # frames between two looks
+NODE_IDS = (2, 3)
+COMMANDING = frozenset(
+    base + node_id for base in (0x200, 0x300, 0x400, 0x500, 0x600) for node_id in NODE_IDS
+)
+"""Identifiers that tell a drive what to do: whoever sends there may move it."""
+
+
+def make_network() -> VirtualNetwork:
+    """Return a booted network with two drives."""
+    names = [drive_config(f'joint{node_id}', node_id) for node_id in NODE_IDS]
+    network = VirtualNetwork(bus_config(*names))
+    network.boot()
+    return network
+
+
+def random_frame(source: random.Random, *, commanding: bool) -> Frame:
+    """Return any frame; half of them have an identifier that somebody listens to."""
+    while True:
+        can_id = source.randrange(0x800)
+        if source.random() < 0.5:
+            base = source.choice((0x000, 0x080, 0x100, *range(0x180, 0x800, 0x80)))
+            can_id = (base + source.choice((0, 1, *NODE_IDS))) & 0x7FF
+        if commanding or can_id not in COMMANDING:
+            break
+    data = source.randbytes(source.choice((0, 1, 2, 4, 6, 8, 8, 8)))
+    if can_id == 0 and source.random() < 0.5:
+        data = bytes((source.choice((1, 2, 0x80, 0x81, 0x82)), source.choice((0, *NODE_IDS))))
+    kind = source.random()
+    return Frame(
+        can_id,
+        b'' if kind < 0.02 else data,
+        is_remote=kind < 0.02,
+        is_extended=0.02 < kind < 0.03,
+    )
+
+
+def make_noise(network: VirtualNetwork, source: random.Random, *, commanding: bool) -> None:
+    """Send a burst, as fast as the bus carries it, and let time pass."""
+    for _ in range(BURST):
+        network.send_as('noise', random_frame(source, commanding=commanding))
+    network.run(source.choice((0.001, 0.01, 0.02)))
+    del network.wire.log[:]
+    del network.feedback_times[:]
+
+
+@pytest.mark.parametrize('seed', range(2))
+def test_anything_on_the_bus(seed: int) -> None:
+    """Frames at every identifier, NMT and SDO included: afterwards the network works again."""
+    source = random.Random(seed)
+    network = make_network()
+    for _ in range(FRAMES // BURST):
+        make_noise(network, source, commanding=True)
+    network.run(5.0)
+    for name in list(network.devices):
+        network.power_off(name)
+        network.power_on(name)
+    network.run(2.0)  # until the master has noticed
+    assert network.network.unknown_frames > FRAMES // 10
+    network.run_until(network.all_ready, 120.0)
+    for name in network.drives:
+        network.do(name, 'recover')
+        network.do(name, 'disable')
+
+
+@pytest.mark.parametrize('seed', range(2))
+def test_noise_moves_nothing(seed: int) -> None:
+    """Frames at all identifiers that command no drive: no drive is enabled, nothing moves."""
+    source = random.Random(100 + seed)
+    network = make_network()
+    states: set[NmtState] = set()
+    for _ in range(FRAMES // BURST):
+        make_noise(network, source, commanding=False)
+        for device in network.devices.values():
+            states.add(device.nmt_state)
+            drive = device.drive
+            assert drive is not None
+            drive.advance(network.now)
+            assert drive.position == 0.0
+            assert not device.store.integer(0x6040).value & 0x08
+    assert states == {NmtState.PRE_OPERATIONAL, NmtState.OPERATIONAL, NmtState.STOPPED}
