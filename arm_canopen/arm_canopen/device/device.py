@@ -29,6 +29,7 @@ from .rpdo import RpdoEngine
 from .sdo_servers import SdoServers
 from .servo import ServoModel
 from .sync_consumer import SyncConsumer
+from .time_consumer import TimeConsumer
 from .timed import Timed
 from .tpdo import TpdoEngine
 
@@ -54,6 +55,7 @@ class Device:
         first_id: The one that it was made with; LSS may have changed it.
         store: Present values of all objects.
         drives: Its axes; none when the device is no drive.
+        clock: What it knows of the network's time.
         faults: What it does wrong on purpose.
         handlers: What it does with the frames of each identifier, in its present NMT state;
             another mapping takes its place when that changes.
@@ -119,7 +121,10 @@ class Device:
         self._storage.load()
         self._lss = LssSlave(node_id, store, self._memory, send, self._nmt.initialise)
         self._error_behaviour = store.integer(Index.ERROR_BEHAVIOUR, 1)
-        self._rpdos = RpdoEngine(store, self._on_pdo_changed, self._on_error)
+        self.clock = TimeConsumer(store, self._subscribe)
+        self._rpdos = RpdoEngine(
+            store, self._on_pdo_changed, self._on_error, self._sync.window_closed
+        )
         self._tpdos = TpdoEngine(store, self._on_pdo_changed, send)
         self.faults = FaultInjector(self, self._line)
         parts: list[Timed] = [
@@ -230,6 +235,7 @@ class Device:
         if self._lss.pending_id != self.node_id:
             self._renumber(self._lss.pending_id)
         self._lss.reset()
+        self.clock.reset()
         self.store.restore(*(ALL_OBJECTS if whole else COMMUNICATION_OBJECTS))
         self._errors.reset()
         self._errors.allow(False, now)
@@ -281,6 +287,8 @@ class Device:
         if state in (NmtState.PRE_OPERATIONAL, NmtState.OPERATIONAL):
             handlers.update((can_id, self._on_sdo) for can_id in self._sdo.can_ids)
             handlers[self._sync.can_id] = self._sync.receive
+            if self.clock.can_id is not None:
+                handlers[self.clock.can_id] = self.clock.receive
         if state is NmtState.OPERATIONAL:
             handlers.update(self._pdo_handlers())
         if self._line.faults:

@@ -37,6 +37,7 @@ class Rpdo(PdoChannel):
         number: int,
         changed: Callable[[PdoChannel, float], None],
         report: ChannelReport,
+        too_late: Callable[[float], bool],
     ) -> None:
         """Bind the records of an RPDO.
 
@@ -45,10 +46,12 @@ class Rpdo(PdoChannel):
             number: Offset of its records from 0x1400 and 0x1600.
             changed: Told the PDO and the time when a client changed it.
             report: Told the PDO, a code, whether that error is there, and the time.
+            too_late: Tells whether the synchronous window is over at a time.
         """
         self.deadline = NEVER
         self._short = self._late = False
         self._report = report
+        self._too_late = too_late
         self._held: bytes | None = None
         self._listeners: tuple[Callable[[float], None], ...] = ()
         self.number = number + 1
@@ -83,7 +86,8 @@ class Rpdo(PdoChannel):
                 self._late = False
                 self._report(self, TIMEOUT_ERROR, False, now)
         if self.transmission <= SYNCHRONOUS_MAX:
-            self._held = frame.data
+            if not self._too_late(now):  # discarded otherwise (CiA 301, 7.5.2.8)
+                self._held = frame.data
         else:
             self._write_objects(frame.data)
             self.tell(now)
@@ -153,7 +157,11 @@ class RpdoEngine:
     """
 
     def __init__(
-        self, store: ObjectStore, changed: Callable[[float], None], report: ErrorReport
+        self,
+        store: ObjectStore,
+        changed: Callable[[float], None],
+        report: ErrorReport,
+        too_late: Callable[[float], bool],
     ) -> None:
         """Bind every RPDO of a dictionary.
 
@@ -161,6 +169,7 @@ class RpdoEngine:
             store: Objects of the device.
             changed: Told the time when a client changed one of them.
             report: Told a code, whether that error is there, and the time.
+            too_late: Tells whether the synchronous window is over at a time.
         """
         first = int(Index.RPDO_COMMUNICATION)
         self.active: list[Rpdo] = []
@@ -169,7 +178,7 @@ class RpdoEngine:
         self._report = report
         self._wrong: dict[int, set[PdoChannel]] = {LENGTH_ERROR: set(), TIMEOUT_ERROR: set()}
         self.channels = [
-            Rpdo(store, number, self._channel_changed, self._channel_error)
+            Rpdo(store, number, self._channel_changed, self._channel_error, too_late)
             for number in channel_numbers(store, first, first + PDO_COUNT_MAX - 1)
         ]
 

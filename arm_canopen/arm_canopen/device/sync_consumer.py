@@ -35,7 +35,7 @@ class SyncConsumer:
         length_error: Callable[[bool, float], None],
         changed: Callable[[], None],
     ) -> None:
-        """Bind 0x1005, 0x1006 and 0x1019.
+        """Bind 0x1005, 0x1006, 0x1007 and 0x1019.
 
         Args:
             store: Objects of the device.
@@ -55,6 +55,7 @@ class SyncConsumer:
         self._cycle = store.integer(Index.CYCLE_PERIOD)  # [us]
         self._cycle.listener = lambda _now: self.reset()
         self._overflow = store.integer(Index.SYNC_OVERFLOW)
+        self._window = store.integer(Index.SYNC_WINDOW)  # [us]
 
     @property
     def can_id(self) -> int:
@@ -64,6 +65,11 @@ class SyncConsumer:
     def alive(self, now: float) -> bool:
         """Tell whether SYNC comes regularly at this time."""
         return self.period > 0.0 and now - self.last_time < LOST_PERIODS * self.period
+
+    def window_closed(self, now: float) -> bool:
+        """Tell whether it is too late for synchronous PDOs of this period (0x1007)."""
+        window = self._window.value * MICROSECOND
+        return window > 0.0 and now - self.last_time > window
 
     def reset(self) -> None:
         """Forget what was measured."""
