@@ -171,6 +171,18 @@ def test_boot_up_is_seen(wire: Wire, node: Any, command: str) -> None:
     assert node.nmt.state == 'PRE-OPERATIONAL'
 
 
+def test_node_guarding(wire: Wire, node: Any) -> None:
+    """python-canopen's remote frames are answered with the state, the toggle bit alternating."""
+    toggles: list[int] = []
+    node.nmt.add_heartbeat_callback(toggles.append)
+    for _ in range(3):
+        wire.network.send_message(0x700 + NODE_ID, b'', remote=True)
+    assert node.nmt.state == 'PRE-OPERATIONAL'
+    answers = [f.data[0] for _, f in wire.rig.sent if f.can_id == 0x700 + NODE_ID]
+    assert answers == [0x7F, 0xFF, 0x7F]
+    assert len(toggles) == 3
+
+
 def test_emergencies_arrive(wire: Wire, node: Any) -> None:
     """A fault and its reset are an active emergency and none."""
     wire.rig.drive.raise_fault(0x2310)
@@ -300,14 +312,27 @@ def test_state_machine_by_others(drive: Any) -> None:
     drive.state = 'SWITCH ON DISABLED'
 
 
-def test_homing_by_others(drive: Any) -> None:
-    """BaseNode402 homes the drive by method 35."""
-    drive.sdo[0x6098].raw = 35
+@pytest.mark.parametrize('method', [35, 19, 17, 33])
+def test_homing_by_others(drive: Any, method: int) -> None:
+    """BaseNode402 homes the drive by the present position, a switch or an index pulse."""
+    drive.sdo[0x6098].raw = method
+    drive.sdo[0x6099][1].raw = 9000
+    drive.sdo[0x6099][2].raw = 1000
+    drive.sdo[0x609A].raw = 100_000
     drive.sdo[0x607C].raw = 1234
     assert not drive.is_homed()
     assert drive.homing(timeout=ARRIVAL)
     assert drive.is_homed()
-    assert drive.sdo[0x6064].raw == 1234
+    assert drive.sdo[0x6064].raw == pytest.approx(1234, abs=0 if method == 35 else 50)
+
+
+@pytest.mark.parametrize('mode', list(BaseNode402.OPERATION_MODES))
+def test_modes_by_others(mode: str, drive: Any) -> None:
+    """BaseNode402 selects each mode, enabled."""
+    drive.state = 'OPERATION ENABLED'
+    drive.op_mode = mode
+    assert drive.op_mode == mode
+    assert drive.state == 'OPERATION ENABLED'
 
 
 def test_fault_reset_by_others(drive: Any) -> None:
