@@ -15,7 +15,7 @@ import pytest
 
 from arm_canopen.can import Bus, open_bus
 from arm_canopen.device import DeviceRunner
-from arm_canopen.device.faults import BusFault
+from arm_canopen.device.faults import BusFault, Fault
 from arm_canopen.standard.drive import Statusword
 
 rclpy = pytest.importorskip('rclpy')
@@ -55,7 +55,7 @@ class Services:
         assert future.done(), name
         return future.result()
 
-    def faults(self) -> dict[int, list[BusFault]]:
+    def faults(self) -> dict[int, list[Fault]]:
         """Return the faults that go on, by node id."""
         return self.runner.call(
             lambda: {

@@ -12,7 +12,7 @@ import pytest
 
 from arm_canopen.can.frame import Frame
 from arm_canopen.device.fault_text import parse_fault, split_settings
-from arm_canopen.device.faults import BusFault, FaultInjection
+from arm_canopen.device.faults import BusFault, Fault, FaultInjection
 from arm_canopen.device.host import DeviceHost
 from arm_canopen.device.scenario import ScenarioPlayer, Step
 from arm_canopen.device.scenario_file import load_scenario
@@ -68,7 +68,7 @@ class Stage:
         frame = Frame(0x600 + node_id, DownloadRequest(index, 0, data, size).encode())
         self.host.receive(frame, self.now)
 
-    def active(self, node_id: int) -> list[BusFault]:
+    def active(self, node_id: int) -> list[Fault]:
         """Return the faults that go on."""
         return [injection.fault for injection in self.host.device(node_id).faults.active]
 
@@ -179,6 +179,11 @@ WRONG: dict[str, tuple[str, str, str]] = {
         "unknown key 'delya'",
         'there are: ',
     ),
+    'fault of a drive without that axis number': (
+        'steps:\n  - {device: joint1, fault: over_current, axis: first}',
+        "axis is 'first', expected a whole number",
+        'correct it',
+    ),
     'value of a setting': (
         'steps:\n  - {device: joint1, fault: tpdo_loss, probability: often}',
         "probability is 'often', expected a number of 0 to 1",
@@ -262,6 +267,14 @@ def test_position_of_what_is_no_drive(tmp_path: Path) -> None:
         encoding='utf-8',
     )
     with pytest.raises(ConfigError, match='no drive'):
+        load_scenario(path, DEVICES, frozenset())
+
+
+def test_drive_fault_of_what_is_no_drive(tmp_path: Path) -> None:
+    """A device without a drive cannot have a fault of one."""
+    path = tmp_path / 'scenario.yaml'
+    path.write_text('steps: [{device: joint1, fault: over_current}]', encoding='utf-8')
+    with pytest.raises(ConfigError, match='device 2 is no drive'):
         load_scenario(path, DEVICES, frozenset())
 
 
