@@ -18,7 +18,7 @@ from typing import Any
 import can
 from can_addresses import free_virtual
 import canopen
-from canopen.profiles.p402 import BaseNode402
+from canopen.profiles.p402 import BaseNode402, OperationMode
 from device_rig import drive_dictionary, EDS, NODE_ID, Rig
 import pytest
 
@@ -312,14 +312,27 @@ def test_state_machine_by_others(drive: Any) -> None:
     drive.state = 'SWITCH ON DISABLED'
 
 
-def test_homing_by_others(drive: Any) -> None:
-    """BaseNode402 homes the drive by method 35."""
-    drive.sdo[0x6098].raw = 35
+@pytest.mark.parametrize('method', [35, 19, 17, 33])
+def test_homing_by_others(drive: Any, method: int) -> None:
+    """BaseNode402 homes the drive by the present position, a switch or an index pulse."""
+    drive.sdo[0x6098].raw = method
+    drive.sdo[0x6099][1].raw = 9000
+    drive.sdo[0x6099][2].raw = 1000
+    drive.sdo[0x609A].raw = 100_000
     drive.sdo[0x607C].raw = 1234
     assert not drive.is_homed()
     assert drive.homing(timeout=ARRIVAL)
     assert drive.is_homed()
-    assert drive.sdo[0x6064].raw == 1234
+    assert drive.sdo[0x6064].raw == pytest.approx(1234, abs=0 if method == 35 else 50)
+
+
+@pytest.mark.parametrize('mode', list(OperationMode.NAME2CODE))
+def test_modes_by_others(mode: str, drive: Any) -> None:
+    """BaseNode402 selects each mode, enabled."""
+    drive.state = 'OPERATION ENABLED'
+    drive.op_mode = mode
+    assert drive.op_mode == mode
+    assert drive.state == 'OPERATION ENABLED'
 
 
 def test_fault_reset_by_others(drive: Any) -> None:

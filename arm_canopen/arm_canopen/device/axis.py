@@ -7,6 +7,7 @@ from __future__ import annotations
 from .motor import MotorModel
 from .profile import hold, Limits, Motion, plan_velocity, Point
 from .servo import Servo, ServoModel, SETTLED
+from .switches import Switches
 
 
 class Axis:
@@ -19,6 +20,7 @@ class Axis:
         speed: Highest speed of the motor in [inc/s].
         motor: What it makes of a torque.
         load: Torque that it takes to hold the axis, in [0.1 % of the rated torque].
+        switches: Where its switches are.
         origin: Where the mechanical zero is in [inc]; homing moves it.
     """
 
@@ -29,6 +31,7 @@ class Axis:
         self.motor = MotorModel()
         self.load = 0.0
         self.origin = 0.0
+        self.switches = Switches()
         self.motion = hold(0.0, 0.0)
         self.demand = Point(0.0, 0.0, 0.0)
         self._servo = Servo(model)

@@ -22,6 +22,7 @@ from .modes.selection import ModeSelection
 from .object_store import ObjectStore
 from .servo import ServoModel
 from .state_machine import chosen, POWERED_STATES, StateMachine, VOLTAGE_STATES
+from .switches import INTERLOCK_BIT, Switches
 from .timed import NEVER
 
 FOLLOWING_ERROR_CODE = 0x8611
@@ -106,6 +107,11 @@ class Drive:
     def position(self) -> float:
         """Where the motor is in [inc]."""
         return self._axis.position
+
+    @property
+    def origin(self) -> float:
+        """Where the mechanical zero is in [inc]; homing moves the position, not the axis."""
+        return self._axis.origin
 
     @property
     def velocity(self) -> float:
@@ -229,6 +235,11 @@ class Drive:
         if self._machine.operating:
             self._mode.load_changed(now)
         self._publish(now)
+
+    def set_switches(self, switches: Switches) -> None:
+        """Put limit switches, home switch and index pulse in other places."""
+        self._axis.switches = switches
+        self._publish(self._axis.time)
 
     def set_voltage(self, present: bool, now: float | None = None, *, fault: bool = True) -> None:
         """Supply the power stage, or cut its supply.
@@ -358,6 +369,8 @@ class Drive:
         objects.position_demand.put(axis.demand.position)
         objects.velocity_demand.put(axis.demand.velocity)
         objects.following_error.put(axis.following_error)
+        inputs = axis.switches.inputs(axis.position - axis.origin)
+        objects.digital_inputs.put(inputs | (0 if self._machine.voltage else INTERLOCK_BIT))
         objects.vl_demand.put(axis.demand.velocity)
         objects.vl_actual.put(axis.velocity)
         self._publish_torque()

@@ -88,6 +88,16 @@ class Motion:
                 break
         return advanced(segment, max(0.0, time - segment.start))
 
+    def time_at(self, position: float) -> float:
+        """Return when the motion first passes a position, infinite when it does not."""
+        for index, segment in enumerate(self.segments):
+            last = index == len(self.segments) - 1
+            length = math.inf if last else self.segments[index + 1].start - segment.start
+            elapsed = _time_to(segment, position)
+            if elapsed <= length:
+                return segment.start + elapsed
+        return math.inf
+
     def pieces(self, begin: float, end: float) -> Iterator[tuple[Point, float]]:
         """Yield the start of each stretch between two times, and its duration in [s]."""
         for index, segment in enumerate(self.segments):
@@ -105,6 +115,27 @@ def advanced(segment: Segment, elapsed: float) -> Point:
     velocity = segment.velocity + segment.acceleration * elapsed
     mean = 0.5 * (segment.velocity + velocity)
     return Point(segment.position + mean * elapsed, velocity, segment.acceleration)
+
+
+def _time_to(segment: Segment, position: float) -> float:
+    """Return how long a segment takes to a position, infinite when it never gets there."""
+    way, velocity, acceleration = (
+        position - segment.position,
+        segment.velocity,
+        segment.acceleration,
+    )
+    if way == 0.0:
+        return 0.0
+    root = velocity**2 + 2.0 * acceleration * way
+    if root < 0.0:
+        return math.inf
+    # the smaller positive root, in the form without cancellation
+    times = [
+        2.0 * way / (velocity + sign * math.sqrt(root))
+        for sign in (1.0, -1.0)
+        if velocity + sign * math.sqrt(root)
+    ]
+    return min((time for time in times if time > 0.0), default=math.inf)
 
 
 def hold(position: float, now: float) -> Motion:

@@ -4,18 +4,20 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 from ...standard.drive import Controlword, OperationMode, Statusword
 from ..axis import Axis
 from ..drive_objects import DriveObjects, MILLISECOND, NO_WINDOW
-from ..profile import Limits, plan_move
+from ..profile import Limits, plan_move, plan_velocity
 from ..timed import NEVER
 from .mode import Dwell, Mode, SyncClock, TARGET_REACHED
 
 NEW_SET_POINT = int(Controlword.NEW_SET_POINT)
 CHANGE_IMMEDIATELY = int(Controlword.CHANGE_IMMEDIATELY)
 RELATIVE = int(Controlword.RELATIVE)
+BLEND = int(Controlword.CHANGE_ON_SET_POINT)
 ACKNOWLEDGE = int(Statusword.SET_POINT_ACKNOWLEDGE)
 
 
@@ -26,11 +28,13 @@ class SetPoint(NamedTuple):
         target: Where to go in [inc], within the software limits.
         limits: Velocity, acceleration and deceleration.
         clipped: The software limits changed the target.
+        blended: The move before passes its own target without a stop (bit 9).
     """
 
     target: float
     limits: Limits
     clipped: bool
+    blended: bool
 
 
 class ProfilePosition(Mode):
@@ -41,6 +45,9 @@ class ProfilePosition(Mode):
     ended, unless "change immediately" lets it take the place of the present one. The
     acknowledge bit stays set until the master has taken its bit back and there is room for
     another set-point.
+
+    With "change on set-point" the present move passes its target without a stop, where the
+    further set-point lies in the same direction; otherwise it stops there.
     """
 
     number = OperationMode.PROFILE_POSITION
@@ -52,14 +59,17 @@ class ProfilePosition(Mode):
         self._next: SetPoint | None = None
         self._preceding = 0.0  # target that a relative one counts from
         self._offered = False  # the master's bit of an accepted set-point is still set
+        self._passing = NEVER  # when the present target is passed without a stop
         self._dwell = Dwell()
 
     @property
     def next_event(self) -> float:
         """End of a move after which another one waits, or its target may be reached."""
-        if self._active is None or self.halted or self.axis.arrived:
+        if self._active is None or self.halted:
             return NEVER
-        return self.axis.motion.end
+        if self._next is not None and self._passing < NEVER:
+            return self._passing
+        return NEVER if self.axis.arrived else self.axis.motion.end
 
     @property
     def waiting(self) -> bool:
@@ -70,6 +80,7 @@ class ProfilePosition(Mode):
         """Stand still and wait for a set-point."""
         super().start(word, now)
         self._active = self._next = None
+        self._passing = NEVER
         self._offered = False
         self._preceding = self.axis.motion.at(self.axis.motion.end).position
         self._dwell.clear()
@@ -89,6 +100,7 @@ class ProfilePosition(Mode):
             self._begin(setpoint, now)
         elif self._next is None:
             self._next = setpoint
+            self._pass_target(now)
         else:  # no room: the acknowledge bit still says so
             return
         self._offered = True
@@ -100,10 +112,13 @@ class ProfilePosition(Mode):
             target += self._preceding
         within = self.objects.within_limits(target)
         velocity = float(self.objects.profile_velocity.value)
-        return SetPoint(within, self.objects.profile(velocity), within != target)
+        return SetPoint(
+            within, self.objects.profile(velocity), within != target, bool(word & BLEND)
+        )
 
     def _begin(self, setpoint: SetPoint, now: float) -> None:
         self._active = setpoint
+        self._passing = NEVER
         self.limited = setpoint.clipped
         self._dwell.clear()
         if self.halted:
@@ -113,16 +128,35 @@ class ProfilePosition(Mode):
         else:  # a profile velocity of 0 leads nowhere
             self.axis.stop(setpoint.limits.deceleration)
 
+    def _pass_target(self, now: float) -> None:
+        """Go through the present target to the next one, if that was asked for."""
+        active, following = self._active, self._next
+        if active is None or following is None or not following.blended or self.halted:
+            return
+        start = self.axis.demand
+        way = active.target - start.position
+        if way * (following.target - active.target) <= 0.0 or way * start.velocity < 0.0:
+            return
+        limits = active.limits
+        if not limits.velocity:
+            return
+        cruise = plan_velocity(start, math.copysign(limits.velocity, way), limits, now)
+        self._passing = cruise.time_at(active.target)
+        if self._passing < NEVER:
+            self.axis.follow(cruise)
+
     def resume(self, now: float) -> None:
         """Go on with the move that was halted."""
         if self._active is not None:
             self._begin(self._active, now)
+            self._pass_target(now)
 
     def event(self, now: float) -> None:
         """Begin the next move where the present one ends."""
         if self._next is not None:
             setpoint, self._next = self._next, None
             self._begin(setpoint, now)
+            self._pass_target(now)
 
     def update(self, now: float) -> None:
         """See whether the target is reached."""
