@@ -365,6 +365,7 @@ class Drive:
         objects, axis = self._objects, self._axis
         objects.statusword.value = self._statusword()
         objects.position_actual.put(axis.position)
+        objects.position_internal.put(axis.position - axis.origin)
         objects.velocity_actual.put(axis.velocity)
         objects.position_demand.put(axis.demand.position)
         objects.velocity_demand.put(axis.demand.velocity)

@@ -61,6 +61,7 @@ class DriveObjects:
 
     def _bind_actual_values(self, bind: Callable[..., Integer]) -> None:
         self.position_demand = bind(Index.POSITION_DEMAND)
+        self.position_internal = bind(Index.POSITION_ACTUAL_INTERNAL)
         self.position_actual = bind(Index.POSITION_ACTUAL)
         self.velocity_demand = bind(Index.VELOCITY_DEMAND)
         self.velocity_actual = bind(Index.VELOCITY_ACTUAL)
