@@ -142,7 +142,7 @@ def test_acknowledged_set_points_are_not_lost(setpoints: list[tuple[int, bool]])
             if not rig.statusword & 0x1000:
                 break
             watch(STEP)
-    watch(1.0)
+    watch(2.0)
     assert abs(rig.position - expected[-1]) < 0.01
     passed = 0
     for target in expected:

@@ -47,7 +47,7 @@ class ProfilePosition(Mode):
     another set-point.
 
     With "change on set-point" the present move passes its target without a stop, where the
-    further set-point lies in the same direction; otherwise it stops there.
+    further set-point lies far enough in the same direction; otherwise it stops there.
     """
 
     number = OperationMode.PROFILE_POSITION
@@ -141,8 +141,12 @@ class ProfilePosition(Mode):
         if not limits.velocity:
             return
         cruise = plan_velocity(start, math.copysign(limits.velocity, way), limits, now)
-        self._passing = cruise.time_at(active.target)
-        if self._passing < NEVER:
+        passing = cruise.time_at(active.target)
+        if passing == NEVER:
+            return
+        braking = cruise.at(passing).velocity ** 2 / (2.0 * following.limits.deceleration)
+        if braking <= abs(following.target - active.target):  # else it would overrun
+            self._passing = passing
             self.axis.follow(cruise)
 
     def resume(self, now: float) -> None:
