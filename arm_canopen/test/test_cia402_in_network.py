@@ -119,7 +119,7 @@ def test_a_fault_latches_and_speaks(net: VirtualNetwork, mode: OperationMode) ->
     assert 'FAULT' in told
     assert 'call ~/recover' in told
     rest = position_inc(net)
-    for verb in ('enable', 'disable', 'halt'):
+    for verb in ('enable', 'disable', 'halt', 'quick_stop', 'home'):
         with pytest.raises(DriveError, match=r'faulted.*recover.*Fault.*0x4210'):
             net.do(JOINT, verb)
     with pytest.raises(DriveError, match=r'faulted'):
@@ -187,12 +187,12 @@ def test_software_limits_are_checked_before_the_bus() -> None:
     net.commands[JOINT].set_target(-0.4)
 
 
-def test_halt_ends_what_runs_and_stops(net: VirtualNetwork) -> None:
-    """Halt in motion leads to rest, and the drive is not enabled afterwards."""
+def test_quick_stop_ends_what_runs_and_stops(net: VirtualNetwork) -> None:
+    """A quick stop in motion leads to rest, and the drive is not enabled afterwards."""
     enabled(net, OperationMode.PROFILE_VELOCITY)
     net.commands[JOINT].set_target(0.5)
     net.run(1.0)
-    net.do(JOINT, 'halt', preempt=True)
+    net.do(JOINT, 'quick_stop', preempt=True)
     net.run(1.0)
     assert net.drives[JOINT].velocity == 0.0
     assert net.drives[JOINT].state is DriveState.SWITCH_ON_DISABLED

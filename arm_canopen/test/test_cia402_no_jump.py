@@ -262,7 +262,7 @@ def test_shutdown_never_lets_a_moving_axis_go(
     loaded = Loaded(sdo_writes=writes)
     loaded.move(mode)
     if halted:
-        loaded.net.do(JOINT, 'halt', preempt=True)
+        loaded.net.do(JOINT, 'quick_stop', preempt=True)
         loaded.net.run(0.05)
         assert loaded.net.drives[JOINT].velocity > 0.1
     drive = loaded.net.devices[JOINT].drive

@@ -246,7 +246,10 @@ class VirtualNetwork:
         )
         scheduler = self.network.scheduler
         drives = [
-            Drive(node, scheduler) for node in self.network.nodes.values() if node.config.is_drive
+            Drive(node, scheduler, axis)
+            for node in self.network.nodes.values()
+            if node.config.is_drive
+            for axis in node.config.axes
         ]
         self.drives = {drive.name: drive for drive in drives}
         self.commands = {drive.name: DriveCommands(drive, scheduler) for drive in drives}

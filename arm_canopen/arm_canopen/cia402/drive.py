@@ -1,51 +1,51 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""One CiA 402 drive in the SYNC cycle: state in, controlword, mode and target out."""
+"""One axis of a CiA 402 drive in the SYNC cycle: state in, controlword, mode and target out."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
+from ..config.model import DriveConfig
 from ..exceptions import CodecError, DriveError, SdoError
 from ..master.events import EventKind, Severity
 from ..master.remote_node import RemoteNode
 from ..master.scheduler import Scheduler, Task
 from ..standard.drive import (
+    Controlword,
     DriveState,
     mode_title,
     OperationMode,
+    Statusword,
     statusword_text,
 )
 from ..standard.emcy import error_code_text
 from ..standard.objects import Index
 from .drive_objects import DriveObjects
-from .modes import (
-    CyclicPosition,
-    Homing,
-    InterpolatedPosition,
-    Mode,
-    NO_BITS,
-    NoMode,
-    ProfilePosition,
-    ProfileVelocity,
-)
+from .mode_table import build_modes
+from .modes import Actual, Mode, NO_BITS
 from .motion import AxisFeedback
-from .parameters import DriveParameters, read_parameters
+from .parameters import DriveParameters, ParameterReader
+from .position_modes import CyclicPosition
+from .rate_modes import MasterRamped
 from .state_machine import Command, fault_reset, next_command
 from .units import Units
 
 ASK_AGAIN = 1.0  # [s] after which a drive is asked again for what it did not answer
+RESUME_CYCLES = 20  # for which a drive that is halted may take to acknowledge a set-point
 FAULTY = (DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE)
 
 
 class Drive:
-    """A drive of the bus.
+    """An axis of a drive of the bus; most drives have one.
 
     ``read`` and ``write`` run in each cycle. What leads it somewhere sets its goal, mode and
     targets from coroutines in the same thread (``drive_commands.py``).
 
     Attributes:
         node: The device.
+        config: Settings of the axis.
+        name: Its name: that of the device, of its channel for one with several axes.
         units: Its units.
         objects: Its objects in the process image.
         state: State shown in the last cycle.
@@ -54,40 +54,49 @@ class Drive:
         parameters: What it told about itself.
         goal: State that the cycle leads to, None while nobody asked for one.
         resetting: Send fault resets while the drive is faulted.
+        halted: Stopped by a halt; the next target ends it.
         error: 0x603F in words when it was faulted last, else empty.
+        interrupted: Mode in which it was enabled when its device was lost, None otherwise.
         released: Called with a reason when a motion source loses the drive.
+        on_ready: Called when state and parameters are known after each boot.
     """
 
-    def __init__(self, node: RemoteNode, scheduler: Scheduler) -> None:
-        """Bind the drive to its device.
+    def __init__(
+        self, node: RemoteNode, scheduler: Scheduler, config: DriveConfig | None = None
+    ) -> None:
+        """Bind the axis to its device.
 
         Args:
             node: The device.
             scheduler: Time.
+            config: Settings of the axis; None for the first one.
         """
         self.node = node
-        self.units = Units(node.config.drive)
-        self.objects = DriveObjects(node)
+        self.config = config or node.config.drive
+        self.name = self.config.name or node.name
+        self.units = Units(self.config)
+        self.objects = DriveObjects(node, self.config.channel)
         self.state = DriveState.UNKNOWN
         self.parameters = DriveParameters()
         self.goal: DriveState | None = None
         self.error = ''
         self.released: Callable[[str], None] = lambda reason: None
+        self.on_ready: Callable[[], None] = lambda: None
         self.resetting = False
-        self.modes = self._build_modes()
+        self.halted = False
+        self.interrupted: OperationMode | None = None
+        self.modes = build_modes(self.objects, self.units, lambda: self.parameters, self._warn)
         self.mode: Mode = self.modes[OperationMode.NO_MODE]
-        self._cyclic_modes = [m for m in self.modes.values() if isinstance(m, CyclicPosition)]
+        self._reader = ParameterReader(node, self.config, self.units)
         self._scheduler = scheduler
         self._controlword = 0
         self._asked = False
         self._answered = False
+        self._announced = False
+        self._follows = False
+        self._resuming = 0
         self._background: list[Task[None]] = []
-        node.on_lost = self._on_lost
-
-    @property
-    def name(self) -> str:
-        """Name in bus.yml."""
-        return self.node.name
+        node.on_lost.append(self._on_lost)
 
     @property
     def position(self) -> float:
@@ -127,26 +136,32 @@ class Drive:
         )
 
     @property
-    def _holding_mode(self) -> CyclicPosition | None:
-        """The mode whose set-point holds the drive: it is powered and displays that mode."""
-        if self.state is not DriveState.OPERATION_ENABLED:
-            return None
-        shown = self.objects.mode_display
-        return next((mode for mode in self._cyclic_modes if mode.number == shown), None)
-
-    @property
-    def _keeps_target(self) -> bool:
-        """Whether the drive is powered in a mode in which its target must stay as it is."""
-        if self._holding_mode is not None:
-            return True
-        displayed = self.objects.mode_display == self.mode.number
-        return displayed and self.state is DriveState.OPERATION_ENABLED
-
-    @property
     def followable(self) -> bool:
         """Whether a stream of positions would be obeyed in this cycle."""
         mode = self.mode
         return self.obeys and isinstance(mode, CyclicPosition) and not mode.goes_to_single_target
+
+    @property
+    def homes_at_init(self) -> bool:
+        """Whether bus.yml asks for homing: it writes a method to 0x6098."""
+        index = self.objects.at(Index.HOMING_METHOD)
+        return any(
+            write.index == index and any(write.data) for write in self.node.config.sdo_writes
+        )
+
+    @property
+    def _holding_mode(self) -> Mode | None:
+        """The mode whose target acts on the drive: it is powered and displays that mode."""
+        if self.state is not DriveState.OPERATION_ENABLED:
+            return None
+        shown = self.objects.mode_display
+        return next((mode for mode in self.modes.values() if mode.number == shown), None)
+
+    @property
+    def _keeps_target(self) -> bool:
+        """Whether the drive is powered by a target that must stay as it is."""
+        held = self._holding_mode
+        return held is not None and (held is self.mode or not held.halts_by_bit)
 
     def feedback(self) -> AxisFeedback:
         """Return the state for motion sources."""
@@ -173,6 +188,8 @@ class Drive:
                 statusword_text(self.objects.statusword),
                 f'mode {mode_title(self.objects.mode_display)}',
             ]
+        if self.halted:
+            parts.append('halted')
         if self.error:
             parts.append(f'error {self.error}')
         if self.node.last_emergency is not None:
@@ -185,28 +202,41 @@ class Drive:
         """Take the state from the process image."""
         if self.node.operational and not self._asked:
             self._asked = True
-            poll = self.node.poll(self.node.config.poll_period)
-            self._background = [self._scheduler.background(work) for work in (self._ask(), poll)]
+            self._background = [self._scheduler.background(self._ask())]
+            if self.config is self.node.config.drive:  # one axis polls for all
+                poll = self.node.poll(self.node.config.poll_period)
+                self._background.append(self._scheduler.background(poll))
         if not self.node.operational or not self.objects.known:
             self.state = DriveState.UNKNOWN
             return
         before, self.state = self.state, self.objects.state
         if self.state is not before:
             self._state_changed(before)
+        self._watch_following()
+        if not self._announced and self.ready:
+            self._announced = True
+            self.on_ready()
 
     def write(self, now: float, period: float) -> None:
         """Write controlword, mode and target for this cycle."""
+        bits = NO_BITS
         if self.state is DriveState.UNKNOWN:
-            command, bits = Command.DISABLE_VOLTAGE, NO_BITS
+            command = Command.DISABLE_VOLTAGE
         else:
-            command, bits = self._command(), NO_BITS
+            command = self._command()
             if command is Command.ENABLE_OPERATION and self.obeys:
                 bits = self.mode.step(now, period, self.objects.statusword)
+                bits |= self._halt_bit()
             elif not self._keeps_target:
                 self._preload_all()
         self._controlword = int(command) | int(bits)
         self.objects.controlword.write(self._controlword)
         self.objects.mode.write(int(self.mode.number))
+
+    def resume(self) -> None:
+        """End a halt; the new target goes ahead of the bit, so that no old one revives."""
+        if self.halted:
+            self._resuming = RESUME_CYCLES
 
     def stream(self, setpoint: float) -> None:
         """Follow a motion source in this cycle.
@@ -214,29 +244,41 @@ class Drive:
         Raises:
             DriveError: The set-point is not finite, does not fit the object or is beyond a limit.
         """
-        self.check_limits(setpoint)
+        self.check_position(setpoint)
         if isinstance(self.mode, CyclicPosition):
+            self.halted = False
             self.mode.stream(setpoint)
 
     def select(self, mode: Mode) -> None:
         """Command another mode, preloaded with where the drive is, or where it is held."""
         held = self._holding_mode
-        if held is None:
-            mode.preload(int(self.objects.position), self.velocity)
-        elif held is not mode:
+        self.halted = False
+        if held is not None and held is mode:
+            self.mode = mode
+            return
+        actual = self._actual()
+        if isinstance(held, CyclicPosition):
             # under load the drive is not quite where it is held, and would sag to where it is
-            mode.preload(self.units.position_to_device(held.setpoint), held.velocity)
+            position_inc = self.units.position_to_device(held.setpoint)
+            actual = actual._replace(position_inc=position_inc, velocity=held.velocity)
+        mode.preload(actual)
         self.mode = mode
 
-    def _preload_all(self) -> None:
-        """Let every target be where the drive is, also those of modes that are not selected.
+    def check_target(self, target: float) -> None:
+        """Refuse a target beyond the limits that the drive has in the selected mode.
 
-        A drive may stay in the mode that it had, whatever was selected.
+        Raises:
+            DriveError: It is beyond; the message names the limits.
         """
-        for mode in self.modes.values():
-            mode.preload(int(self.objects.position), self.velocity)
+        told = self.parameters
+        if self.mode.setpoint is not None:
+            self.check_position(target)
+        elif self.mode.number in VELOCITY_MODES:
+            self._check_size(target, told.speed_limit, 'velocity', '0x607F')
+        elif self.mode.number in TORQUE_MODES:
+            self._check_size(target, told.effort_limit, 'torque', '0x6072')
 
-    def check_limits(self, target: float) -> None:
+    def check_position(self, target: float) -> None:
         """Refuse a position beyond the drive's software limits.
 
         Raises:
@@ -249,6 +291,59 @@ class Drive:
                 f'{limits[0]:g} to {limits[1]:g} (0x607D)'
             )
 
+    async def know_error(self) -> None:
+        """Read 0x603F, so that the answer can say what is wrong."""
+        index = self.objects.at(Index.ERROR_CODE)
+        if self.state not in FAULTY or (index, 0) not in self.node.config.dictionary:
+            return
+        try:
+            code = await self.node.read_object(index)
+        except (SdoError, CodecError):
+            return  # the statusword says that there is a fault, only its code stays unknown
+        self.error = error_code_text(int(code)) if isinstance(code, int) else ''
+
+    def report(self, severity: Severity, text: str) -> None:
+        """Tell the owner of the network something about this drive."""
+        about = text if self.name == self.node.name else f'{self.name}: {text}'
+        self.node.report(EventKind.DRIVE, severity, about)
+
+    def _halt_bit(self) -> Controlword:
+        if self._resuming:
+            self._resuming -= 1
+            if not self._resuming or not self.mode.handing_over:
+                self._resuming, self.halted = 0, False
+        return Controlword.HALT if self.halted and self.mode.halts_by_bit else NO_BITS
+
+    def _actual(self) -> Actual:
+        objects = self.objects
+        return Actual(int(objects.position), self.velocity, int(objects.torque))
+
+    def _preload_all(self) -> None:
+        """Let every target be where the drive is, also those of modes that are not selected.
+
+        A drive may stay in the mode that it had, whatever was selected; of two modes with one
+        target object the selected one writes last.
+        """
+        actual = self._actual()
+        for mode in self.modes.values():
+            mode.preload(actual)
+        self.mode.preload(actual)
+
+    def _check_size(self, target: float, limit: float | None, what: str, place: str) -> None:
+        if limit is not None and abs(target) > limit:
+            raise DriveError(
+                f'{self.name}: target {target:g} is beyond the greatest {what} {limit:g} ({place})'
+            )
+
+    def _watch_following(self) -> None:
+        """Bit 12 of the cyclic modes: a drive that has followed and does not any more is said."""
+        cyclic = isinstance(self.mode, (CyclicPosition, MasterRamped))
+        bit = bool(self.objects.statusword & Statusword.FOLLOWS_COMMAND)
+        before, self._follows = self._follows, self.obeys and cyclic and bit
+        if before and not bit and self.obeys and cyclic:
+            self.released('the drive does not follow its set-points (bit 12)')
+            self._warn(f'does not follow its set-points any more (bit 12): {self.describe()}')
+
     async def _ask(self) -> None:
         reason = await self._parameters_unread()
         if reason:
@@ -260,21 +355,11 @@ class Drive:
     async def _parameters_unread(self) -> str:
         """Read the parameters; return why that could not be done, or nothing."""
         try:
-            self.parameters = await read_parameters(self.node, self.units)
+            self.parameters = await self._reader.read()
         except SdoError as error:
             return str(error)
         self._answered = True
         return ''
-
-    async def know_error(self) -> None:
-        """Read 0x603F, so that the answer can say what is wrong."""
-        if self.state not in FAULTY or (Index.ERROR_CODE, 0) not in self.node.config.dictionary:
-            return
-        try:
-            code = await self.node.read_object(Index.ERROR_CODE)
-        except (SdoError, CodecError):
-            return  # the statusword says that there is a fault, only its code stays unknown
-        self.error = error_code_text(int(code)) if isinstance(code, int) else ''
 
     def _command(self) -> Command:
         if self.resetting and self.state is DriveState.FAULT:
@@ -285,6 +370,7 @@ class Drive:
 
     def _state_changed(self, before: DriveState) -> None:
         left = before is DriveState.OPERATION_ENABLED
+        self.halted = self.halted and not left
         if self.state in FAULTY and before not in FAULTY:
             self.goal = DriveState.SWITCH_ON_DISABLED
             self.released('fault')
@@ -308,36 +394,24 @@ class Drive:
     def _on_lost(self, reason: str) -> None:
         for task in self._background:
             task.cancel(SdoError(reason))
+        enabled = self.state is DriveState.OPERATION_ENABLED and self.goal is self.state
+        if enabled and not self.node.left_operational:
+            self.interrupted = self.mode.number
         self.goal = None
-        self.resetting = False
-        self._asked = self._answered = False
+        self.resetting = self.halted = self._follows = False
+        self._asked = self._answered = self._announced = False
         self.error = ''
         self.state = DriveState.UNKNOWN
         self.mode = self.modes[OperationMode.NO_MODE]
         self.released(reason)
 
-    def report(self, severity: Severity, text: str) -> None:
-        """Tell the owner of the network something about this drive."""
-        self.node.report(EventKind.DRIVE, severity, text)
-
-    def _build_modes(self) -> dict[OperationMode, Mode]:
-        modes: list[Mode] = [NoMode(), Homing()]
-        position = self.objects.target_writer(Index.TARGET_POSITION)
-        velocity = self.objects.target_writer(Index.TARGET_VELOCITY)
-        interpolation = self.objects.target_writer(Index.INTERPOLATION_DATA, 1)
-        if position is not None:
-            apart = self.objects.waits_for_sync_apart(Index.TARGET_POSITION)
-            modes.append(
-                ProfilePosition(self.units, position, self._warn, target_waits_for_sync=apart)
-            )
-            modes.append(CyclicPosition(self.units, position, lambda: self.parameters.profile))
-        if velocity is not None:
-            modes.append(ProfileVelocity(self.units, velocity))
-        if interpolation is not None:
-            modes.append(
-                InterpolatedPosition(self.units, interpolation, lambda: self.parameters.profile)
-            )
-        return {mode.number: mode for mode in modes}
-
     def _warn(self, text: str) -> None:
         self.report(Severity.WARNING, text)
+
+
+VELOCITY_MODES = (
+    OperationMode.VELOCITY,
+    OperationMode.PROFILE_VELOCITY,
+    OperationMode.CYCLIC_VELOCITY,
+)
+TORQUE_MODES = (OperationMode.PROFILE_TORQUE, OperationMode.CYCLIC_TORQUE)

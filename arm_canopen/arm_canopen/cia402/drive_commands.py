@@ -7,19 +7,19 @@ from __future__ import annotations
 from collections.abc import Callable, Coroutine
 from typing import Any
 
+from ..config.model import RecoveryPolicy
 from ..exceptions import DriveError
 from ..master.events import Severity
 from ..master.scheduler import Promise, Scheduler, Task
-from ..standard.drive import DriveState, OperationMode, Statusword
+from ..standard.drive import DriveState, OperationMode
 from .drive import Drive, FAULTY
-from .modes import CyclicPosition, Homing, Mode, NoMode
+from .homing import home, HomingProgress
+from .mode_table import REQUIRED_OBJECTS
+from .modes import NoMode
+from .position_modes import Move, ProfilePosition
+from .sequences import DriveSequences
 
-READY_TIMEOUT = 2.0  # [s] from operational to the first PDOs and parameters
-STATE_TIMEOUT = 5.0  # [s] for all steps to a state, as ros2_canopen has it
-MODE_TIMEOUT = 5.0  # [s] for 0x6061 to follow 0x6060
-STOP_TIMEOUT = 2.0  # [s] to come to rest when leaving
-REST_SHARE = 0.01  # share of the profile velocity below which an axis counts as standing
-HOMING_START = 0.1  # [s] after which a drive has overwritten the homing bits of the last time
+BRAKED_TIMEOUT = 10.0  # [s] for a halt to end in standstill
 
 
 class DriveCommands:
@@ -32,9 +32,13 @@ class DriveCommands:
     def __init__(self, drive: Drive, scheduler: Scheduler) -> None:
         """Take the drive and the time."""
         self.drive = drive
+        self._steps = DriveSequences(drive, scheduler)
         self._scheduler = scheduler
         self._running = ''
         self._task: Task[str] | None = None
+        self._stream_ends = 0.0
+        self._watch: Task[None] | None = None
+        drive.on_ready = self._recover_by_policy
 
     def run(
         self, name: str, sequence: Coroutine[Promise[Any], None, str], *, preempt: bool = False
@@ -46,8 +50,8 @@ class DriveCommands:
             sequence: The coroutine.
             preempt: End the one that runs instead of being refused; for what stops a drive.
         """
-        if preempt and self._task is not None:
-            self._task.cancel(DriveError(f'{self._running} was ended by {name}'))
+        if preempt:
+            self.cancel(f'{self._running} was ended by {name}')
         if self._task is not None and not self._task.done:
             sequence.close()
             refused: Promise[str] = Promise()
@@ -57,86 +61,161 @@ class DriveCommands:
         self._task = self._scheduler.spawn(sequence)
         return self._task
 
+    def cancel(self, reason: str) -> None:
+        """End the command that runs, if any."""
+        if self._task is not None:
+            self._task.cancel(DriveError(reason))
+
     def set_target(self, target: float) -> str:
-        """Move to a position, or at a velocity, in the mode that is selected.
+        """Move to a position, at a velocity or with a torque, in the mode that is selected.
 
         Raises:
             DriveError: The drive cannot take it; the message says why.
         """
-        drive = self.drive
-        if drive.state is not DriveState.OPERATION_ENABLED:
-            raise self._refused(f'takes no target; call {self._way_to_enable()}')
-        if not isinstance(drive.mode, NoMode) and not drive.obeys:
-            raise self._refused('takes no target now')
-        if drive.mode.setpoint is not None:
-            drive.check_limits(target)
+        self._end_stream()
+        return self._set(target)
+
+    def stream_target(self, target: float) -> None:
+        """Take one of a stream of targets; when the stream pauses for too long, the drive stops.
+
+        Raises:
+            DriveError: The drive cannot take it; the message says why.
+        """
+        self._set(target)
+        self._stream_ends = self._scheduler.now + self.drive.config.target_timeout
+        if self._watch is None or self._watch.done:
+            self._watch = self._scheduler.background(self._watch_stream())
+
+    def move(self, move: Move) -> str:
+        """Hand a move to the drive in mode 1, with all that the mode offers.
+
+        Raises:
+            DriveError: Another mode is selected, or the drive cannot take it.
+        """
+        drive, mode = self.drive, self.drive.mode
+        if not isinstance(mode, ProfilePosition):
+            raise self._steps.refused('moves only in mode 1; call ~/position_mode first')
+        self._require_obedience()
+        destination = mode.destination(move)
+        drive.check_target(destination)
         try:
-            drive.mode.set_target(target)
+            mode.move(move)
         except DriveError as error:
             raise DriveError(f'{drive.name}: {error}') from error
-        drive.released('a single target was commanded')
-        return f'target {target:g} in mode {drive.mode.number.title}'
+        self._end_stream()
+        self._resume()
+        how = 'at once' if move.immediate else 'after the moves before it'
+        return f'to {destination:g}, {how}'
 
     async def init(self) -> str:
-        """Reset a fault, enable, home if the drive has a homing method, and select no mode."""
-        drive = self.drive
-        await self._ready()
+        """Reset a fault, enable, home where bus.yml asks for it, and select no mode."""
+        drive, steps = self.drive, self._steps
+        await steps.ready()
         drive.released('the drive is initialised')
-        await self._reset_fault()
-        await self._reach(DriveState.OPERATION_ENABLED)
-        await self._come_to_rest()
+        await steps.reset_fault()
+        await steps.reach(DriveState.OPERATION_ENABLED)
+        await steps.come_to_rest()
         method = drive.parameters.homing_method
         homed = ''
         try:
             if method and drive.parameters.supports(OperationMode.HOMING):
-                await self._home()
-                homed = f', homed by method {method}'
+                if drive.homes_at_init:
+                    homed = f', {await home(steps)}'
+                else:
+                    homed = (
+                        f', not homed: method {method} is set in the drive (0x6098), but not in '
+                        'bus.yml; call ~/home if it shall be'
+                    )
         finally:
-            if drive.node.online:
+            if drive.node.online and not steps.quirks.no_mode_zero:
                 drive.select(drive.modes[OperationMode.NO_MODE])
         return f'{drive.state.title}{homed}; select a mode before the first target'
 
     async def enable(self) -> str:
         """Lead to Operation Enabled, without homing and without resetting a fault."""
-        await self._ready()
-        self._require_no_fault()
-        await self._reach(DriveState.OPERATION_ENABLED)
+        await self._steps.ready()
+        self._steps.require_no_fault()
+        await self._steps.reach(DriveState.OPERATION_ENABLED)
         return self.drive.describe()
 
     async def recover(self) -> str:
         """Reset a fault and lead to Operation Enabled, with no target left over."""
-        await self._ready()
-        await self._reset_fault()
-        await self._reach(DriveState.OPERATION_ENABLED)
+        await self._steps.ready()
+        await self._steps.reset_fault()
+        await self._steps.reach(DriveState.OPERATION_ENABLED)
         return self.drive.describe()
 
     async def disable(self) -> str:
         """Lead to Switched On, as ros2_canopen's service does; the motor is without torque."""
-        await self._ready()
-        self._require_no_fault()
-        self.drive.released('disabled')
-        if self.drive.state is DriveState.OPERATION_ENABLED:
-            await self._reach(DriveState.SWITCHED_ON)
+        drive = self.drive
+        await self._steps.ready()
+        self._steps.require_no_fault()
+        drive.released('disabled')
+        if drive.state is DriveState.OPERATION_ENABLED:
+            await self._steps.reach(DriveState.SWITCHED_ON)
         else:
-            self.drive.goal = DriveState.SWITCH_ON_DISABLED
-        return self.drive.describe()
+            drive.goal = DriveState.SWITCH_ON_DISABLED
+        return drive.describe()
 
     async def halt(self) -> str:
-        """Quick stop; what follows depends on the drive's option code 0x605A."""
-        drive = self.drive
-        await self._ready()
-        self._require_no_fault()
+        """Brake and stay enabled (bit 8, option code 0x605D); the next target goes on."""
+        drive, steps = self.drive, self._steps
+        await steps.ready()
+        steps.require_no_fault()
         drive.released('halted')
         if drive.state is not DriveState.OPERATION_ENABLED:
             drive.goal = DriveState.SWITCH_ON_DISABLED  # nor shall it be enabled any more
             return f'nothing to halt: {drive.describe()}'
+        self._end_stream()
+        if not drive.mode.halts_by_bit:
+            drive.mode.brake()
+        drive.halted = True
+        await steps.until(
+            lambda: drive.mode.braked and steps.is_slow(), BRAKED_TIMEOUT, 'standstill'
+        )
+        return drive.describe()
+
+    async def quick_stop(self) -> str:
+        """Quick stop; what follows depends on the drive's option code 0x605A."""
+        drive, steps = self.drive, self._steps
+        await steps.ready()
+        steps.require_no_fault()
+        drive.released('quick stop')
+        if drive.state is not DriveState.OPERATION_ENABLED:
+            drive.goal = DriveState.SWITCH_ON_DISABLED
+            return f'nothing to stop: {drive.describe()}'
         drive.goal = DriveState.QUICK_STOP_ACTIVE
-        await self._until(
+        await steps.until(
             lambda: drive.state is not DriveState.OPERATION_ENABLED,
-            STATE_TIMEOUT,
+            steps.quirks.state_timeout,
             'the quick stop',
         )
         return drive.describe()
+
+    async def home(
+        self,
+        method: int | None = None,
+        on_progress: Callable[[HomingProgress], None] | None = None,
+    ) -> str:
+        """Enable the drive if it is not, home it, and select the mode of before again.
+
+        Args:
+            method: Homing method for 0x6098; None takes what is in the drive.
+            on_progress: Told each phase when it begins.
+        """
+        drive, steps = self.drive, self._steps
+        await steps.ready()
+        steps.require_no_fault()
+        before = drive.mode
+        if on_progress is not None:
+            on_progress(HomingProgress.ENABLING)
+        await steps.reach(DriveState.OPERATION_ENABLED)
+        try:
+            answer = await home(steps, method, on_progress)
+        finally:
+            if drive.node.online:
+                drive.select(before)
+        return f'{answer}; {drive.describe()}'
 
     async def select_mode(self, number: OperationMode) -> str:
         """Switch the mode of operation; the drive is left as enabled as it was.
@@ -145,176 +224,103 @@ class DriveCommands:
             DriveError: The drive is offline or faulted, lacks the mode, or does not switch.
         """
         drive = self.drive
-        await self._ready()
-        self._require_no_fault()
+        await self._steps.ready()
+        self._steps.require_no_fault()
         mode = drive.modes.get(number)
         if mode is None or not drive.parameters.supports(number):
             raise DriveError(self._missing_mode(number))
         if drive.objects.mode_display == number and drive.mode is mode:
             return f'already in mode {number.title}; {drive.describe()}'
-        await self._switch(mode)
+        await self._steps.switch(mode)
         enabled = drive.state is DriveState.OPERATION_ENABLED
-        hint = '' if enabled else f'; not enabled, call {self._way_to_enable()}'
+        hint = '' if enabled else f'; not enabled, call {self._steps.way_to_enable()}'
         return f'{drive.describe()}{hint}'
 
     async def shutdown(self) -> str:
         """Bring the drive to rest and take its power away; never raises."""
-        drive = self.drive
+        drive, steps = self.drive, self._steps
+        drive.interrupted = None
         drive.released('shutting down')
         if drive.state is DriveState.OPERATION_ENABLED:
             drive.goal = DriveState.QUICK_STOP_ACTIVE
-            await self._settled(lambda: drive.state is not DriveState.OPERATION_ENABLED)
+            await steps.settled(lambda: drive.state is not DriveState.OPERATION_ENABLED)
         # option codes 5 to 8 hold in Quick Stop Active: wait for rest, then let go
-        await self._settled(lambda: not self._moves_in_quick_stop())
+        await steps.settled(
+            lambda: drive.state is not DriveState.QUICK_STOP_ACTIVE or steps.is_slow()
+        )
         drive.goal = DriveState.SWITCH_ON_DISABLED
-        await self._settled(lambda: drive.state is DriveState.SWITCH_ON_DISABLED)
+        await steps.settled(lambda: drive.state is DriveState.SWITCH_ON_DISABLED)
         return drive.describe()
 
-    async def _ready(self) -> None:
+    def _set(self, target: float) -> str:
         drive = self.drive
-        self._require_operational()
+        self._require_obedience()
+        drive.check_target(target)
         try:
-            await self._scheduler.until(
-                lambda: drive.ready or not drive.node.operational, READY_TIMEOUT
-            )
-        except TimeoutError:
-            raise DriveError(self._why_not_ready()) from None
-        self._require_operational()
+            drive.mode.set_target(target)
+        except DriveError as error:
+            raise DriveError(f'{drive.name}: {error}') from error
+        self._resume()
+        return f'target {target:g} in mode {drive.mode.number.title}'
 
-    def _require_operational(self) -> None:
-        if not self.drive.node.operational:
-            raise DriveError(f'{self.drive.name} is not operational: {self.drive.describe()}')
+    def _require_obedience(self) -> None:
+        drive, steps = self.drive, self._steps
+        if drive.state is not DriveState.OPERATION_ENABLED:
+            raise steps.refused(f'takes no target; call {steps.way_to_enable()}')
+        if not isinstance(drive.mode, NoMode) and not drive.obeys:
+            raise steps.refused('takes no target now')
 
-    def _why_not_ready(self) -> str:
+    def _resume(self) -> None:
+        self.drive.resume()
+        self.drive.released('a single target was commanded')
+
+    def _end_stream(self) -> None:
+        if self._watch is not None:
+            self._watch.cancel(DriveError('the stream was ended by a command'))
+
+    async def _watch_stream(self) -> None:
+        while self._scheduler.now < self._stream_ends:
+            await self._scheduler.timer(self._stream_ends - self._scheduler.now)
         drive = self.drive
-        if drive.state is DriveState.UNKNOWN:
-            return (
-                f'{drive.name} is operational, but its statusword, mode and position have not '
-                'come; do its TPDOs follow SYNC, and does the bus.yml have a sync_period?'
-            )
-        return (
-            f'{drive.name} has not answered the SDOs for its parameters (modes 0x6502, limits '
-            f'0x607D, profile 0x6081): {drive.describe()}'
+        if not drive.obeys:
+            return  # what has taken it away has said so
+        if drive.mode.setpoint is None or not drive.mode.halts_by_bit:
+            drive.mode.brake()
+        drive.report(
+            Severity.WARNING,
+            f'the stream of targets has paused for {drive.config.target_timeout * 1000:g} ms: '
+            'stopped; the next target goes on',
         )
 
-    async def _reach(self, goal: DriveState) -> None:
-        self.drive.goal = goal
-        try:
-            await self._until(lambda: self.drive.state is goal, STATE_TIMEOUT, goal.title)
-        except BaseException:  # also when it is cancelled: nobody waits for the rest of the way
-            self.drive.goal = DriveState.SWITCH_ON_DISABLED
-            raise
-
-    async def _come_to_rest(self) -> None:
-        """Let the profile of a cyclic mode brake, which another mode would end with a jerk."""
+    def _recover_by_policy(self) -> None:
+        """Go on after the device was lost in operation, if bus.yml wants that."""
         drive = self.drive
-        mode = drive.mode
-        if not drive.obeys or not isinstance(mode, CyclicPosition):
+        mode, drive.interrupted = drive.interrupted, None
+        if mode is None or drive.config.recovery is not RecoveryPolicy.AUTO:
             return
-        mode.brake()
-        ramp = abs(mode.velocity) / drive.parameters.profile.deceleration  # [s]
-        await self._until(lambda: mode.velocity == 0.0, STOP_TIMEOUT + ramp, 'standstill')
+        self._scheduler.background(self._resume_in(mode))
 
-    async def _reset_fault(self) -> None:
+    async def _resume_in(self, mode: OperationMode) -> None:
         drive = self.drive
-        if drive.state not in FAULTY:
-            return
-        drive.resetting = True
-        try:
-            await self._until(
-                lambda: drive.state not in FAULTY, STATE_TIMEOUT, 'the end of the fault'
-            )
-        finally:
-            drive.resetting = False
-        drive.error = ''
-
-    async def _switch(self, mode: Mode) -> None:
-        """Switch in the state that bus.yml wants, then return to the state of before."""
-        drive = self.drive
-        before = drive.mode
-        enabled = drive.state is DriveState.OPERATION_ENABLED
-        switching_state = drive.node.config.drive.switching_state
-        leave = enabled and switching_state is not DriveState.OPERATION_ENABLED
-        drive.released(f'mode {mode.number.title} was selected')
-        await self._come_to_rest()
-        if leave:
-            await self._reach(switching_state)
-        drive.select(mode)
-        try:
-            await self._until(
-                lambda: drive.objects.mode_display == mode.number,
-                MODE_TIMEOUT,
-                f'mode {mode.number.title} in 0x6061',
-            )
-        except DriveError:
-            if drive.node.online:
-                drive.select(before)
-            raise
-        if leave:
-            await self._reach(DriveState.OPERATION_ENABLED)
-
-    async def _home(self) -> None:
-        drive = self.drive
-        homing = drive.modes[OperationMode.HOMING]
-        if not isinstance(homing, Homing):
-            raise TypeError('mode 6 is no homing mode')
-        await self._switch(homing)
-        homing.started = True
-        done = Statusword.HOMING_ATTAINED | Statusword.TARGET_REACHED
-
-        def over() -> bool:
-            word = drive.objects.statusword
-            return bool(word & Statusword.HOMING_ERROR) or word & done == done
-
-        try:
-            await self._scheduler.timer(HOMING_START)
-            await self._until(over, drive.node.config.drive.homing_timeout, 'the end of homing')
-        finally:
-            homing.started = False
-        if drive.objects.statusword & Statusword.HOMING_ERROR:
-            raise self._refused(f'failed to home by method {drive.parameters.homing_method}')
-
-    async def _until(self, condition: Callable[[], bool], timeout: float, what: str) -> None:
-        drive = self.drive
-
-        def hopeless() -> bool:
-            return not drive.node.online or (drive.state in FAULTY and not drive.resetting)
-
-        try:
-            await self._scheduler.until(lambda: condition() or hopeless(), timeout)
-        except TimeoutError:
-            raise self._refused(f'did not reach {what} within {timeout:g} s') from None
-        if not condition():
+        if drive.state in FAULTY:
             await drive.know_error()
-            raise self._refused(f'did not reach {what}')
-
-    async def _settled(self, condition: Callable[[], bool]) -> None:
-        """Wait for a condition on the way out; there is nobody to raise an error to."""
-        drive = self.drive
-
-        def settled() -> bool:
-            return condition() or drive.state in (*FAULTY, DriveState.UNKNOWN)
-
+            drive.report(
+                Severity.WARNING, f'not enabled again: {drive.describe()}; call ~/recover'
+            )
+            return
         try:
-            await self._scheduler.until(settled, STOP_TIMEOUT)
-        except TimeoutError:
-            drive.report(Severity.ERROR, f'did not come to rest in time: {drive.describe()}')
+            await self.run('recovery', self._enable_in(mode))
+        except DriveError as error:
+            drive.report(Severity.ERROR, f'not enabled again: {error}')
+        else:
+            drive.report(Severity.INFO, f'enabled again (recovery: auto): {drive.describe()}')
 
-    def _moves_in_quick_stop(self) -> bool:
-        drive = self.drive
-        # a real encoder is never quite still, so slow enough counts as rest
-        slow = REST_SHARE * drive.parameters.profile.velocity
-        return drive.state is DriveState.QUICK_STOP_ACTIVE and abs(drive.velocity) > slow
-
-    def _require_no_fault(self) -> None:
-        if self.drive.state in FAULTY:
-            raise self._refused('is faulted; call ~/recover first')
-
-    def _refused(self, what: str) -> DriveError:
-        return DriveError(f'{self.drive.name} {what}: {self.drive.describe()}')
-
-    def _way_to_enable(self) -> str:
-        return '~/recover' if self.drive.state in FAULTY else '~/init or ~/enable'
+    async def _enable_in(self, mode: OperationMode) -> str:
+        await self._steps.ready()
+        await self._steps.reach(DriveState.OPERATION_ENABLED)
+        if mode is OperationMode.NO_MODE or mode is OperationMode.HOMING:
+            return self.drive.describe()
+        return await self.select_mode(mode)
 
     def _missing_mode(self, number: OperationMode) -> str:
         drive = self.drive
@@ -323,5 +329,7 @@ class DriveCommands:
         if not told.supports(number):
             why = f'the drive does not have it (0x6502 is 0x{told.supported_modes:X})'
         else:
-            why = 'its target object is in no RPDO of bus.yml, or this master does not drive it'
+            target = REQUIRED_OBJECTS.get(number)
+            place = f'0x{drive.objects.at(target):04X}' if target is not None else 'its target'
+            why = f'{place} is in no RPDO of bus.yml; map it'
         return f'{drive.name} has no mode {number.title}: {why}; it has: {offered}'

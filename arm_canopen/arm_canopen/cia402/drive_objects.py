@@ -10,20 +10,32 @@ from ..standard.drive import drive_state, DriveState
 from ..standard.objects import Index
 from ..standard.pdo import SYNCHRONOUS_MAX
 
+AXIS_OFFSET = 0x800  # between the objects of two axes (CiA 402-2, 7.2)
+
 
 class DriveObjects:
     """What the master reads from and writes to a drive in each cycle, in device units."""
 
-    def __init__(self, node: RemoteNode) -> None:
-        """Bind each object to its PDO; what the drive has but no PDO carries goes by SDO."""
+    def __init__(self, node: RemoteNode, channel: int = 0) -> None:
+        """Bind each object to its PDO; what the drive has but no PDO carries goes by SDO.
+
+        Args:
+            node: The device.
+            channel: Number of the axis, from 0.
+        """
         self._node = node
-        self._statusword = node.reader(Index.STATUSWORD)
-        self._mode = node.reader(Index.MODE_OF_OPERATION_DISPLAY)
-        self._position = node.reader(Index.POSITION_ACTUAL)
+        self._offset = AXIS_OFFSET * channel
+        self._statusword = node.reader(self.at(Index.STATUSWORD))
+        self._mode = node.reader(self.at(Index.MODE_OF_OPERATION_DISPLAY))
+        self._position = node.reader(self.at(Index.POSITION_ACTUAL))
         self._velocity = self._optional_reader(Index.VELOCITY_ACTUAL)
-        self._torque = node.image.reader(Index.TORQUE_ACTUAL)
-        self.controlword = node.writer(Index.CONTROLWORD)
-        self.mode = node.writer(Index.MODE_OF_OPERATION)
+        self._torque = node.image.reader(self.at(Index.TORQUE_ACTUAL))
+        self.controlword = node.writer(self.at(Index.CONTROLWORD))
+        self.mode = node.writer(self.at(Index.MODE_OF_OPERATION))
+
+    def at(self, index: int) -> int:
+        """Return the index of an object of the profile for this axis."""
+        return index + self._offset
 
     @property
     def known(self) -> bool:
@@ -63,17 +75,17 @@ class DriveObjects:
 
     def target_writer(self, index: int, subindex: int = 0) -> Writer | None:
         """Return a writer for a target object that a PDO carries, else None."""
-        return self._node.image.writer(index, subindex)
+        return self._node.image.writer(self.at(index), subindex)
 
     def waits_for_sync_apart(self, index: int) -> bool:
         """Whether an object is in a synchronous RPDO that does not carry the controlword."""
-        output = self._node.image.output_of(index)
-        if output is None or output is self._node.image.output_of(Index.CONTROLWORD):
+        output = self._node.image.output_of(self.at(index))
+        if output is None or output is self._node.image.output_of(self.at(Index.CONTROLWORD)):
             return False
         return output.config.transmission <= SYNCHRONOUS_MAX
 
     def _optional_reader(self, index: int) -> Reader | None:
-        mapped = self._node.image.reader(index)
-        if mapped is not None or (index, 0) not in self._node.config.dictionary:
+        mapped = self._node.image.reader(self.at(index))
+        if mapped is not None or (self.at(index), 0) not in self._node.config.dictionary:
             return mapped
-        return self._node.reader(index)
+        return self._node.reader(self.at(index))

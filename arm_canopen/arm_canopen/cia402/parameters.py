@@ -4,12 +4,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+import math
 
+from ..config.model import DriveConfig
 from ..exceptions import CodecError, SdoAbortError
 from ..master.remote_node import RemoteNode
 from ..standard.drive import OperationMode
 from ..standard.objects import Index
+from .drive_objects import AXIS_OFFSET
 from .setpoint_profile import ProfileLimits
 from .units import Units
 
@@ -17,6 +20,8 @@ READ_TIMEOUT = 0.5  # [s] nothing waits for these answers, so a slow device has 
 DEFAULT_VELOCITY = 0.5  # [unit/s] for drives without 0x6081: slow, but moving
 DEFAULT_ACCELERATION = 1.0  # [unit/s^2] for drives without 0x6083
 DEFAULT_PROFILE = ProfileLimits(DEFAULT_VELOCITY, DEFAULT_ACCELERATION, DEFAULT_ACCELERATION)
+DEFAULT_TORQUE_SLOPE_DEV = 1000.0  # [device units/s]: from 0 to the rated torque in a second
+REVOLUTION = 2.0 * math.pi  # [rad]
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,59 +32,129 @@ class DriveParameters:
         supported_modes: Bits of 0x6502.
         homing_method: 0x6098.
         position_limits: Software limits 0x607D in user units, lower first.
+        speed_limit: 0x607F in user units per second.
+        effort_limit: 0x6072 in user units.
         profile: Limits for profiles of the master's own, from 0x6081, 0x6083 and 0x6084.
+        torque_slope: Greatest change of a torque that the master ramps, in user units per second,
+            from 0x6087.
+        units: In words, where the units come from.
     """
 
     supported_modes: int | None = None
     homing_method: int = 0
     position_limits: tuple[float, float] | None = None
+    speed_limit: float | None = None
+    effort_limit: float | None = None
     profile: ProfileLimits = DEFAULT_PROFILE
+    torque_slope: float = DEFAULT_TORQUE_SLOPE_DEV
+    units: str = 'bus.yml'
 
     def supports(self, mode: OperationMode) -> bool:
         """Whether the drive has a mode; one that does not tell is believed to have all."""
         return self.supported_modes is None or bool(self.supported_modes & mode.support_bit)
 
 
-async def read_parameters(node: RemoteNode, units: Units) -> DriveParameters:
-    """Ask the drive for everything that its EDS knows of these objects.
+class ParameterReader:
+    """Asks one axis of a drive for everything that its EDS knows of these objects."""
 
-    Raises:
-        SdoError: The drive does not answer. Its limits are then unknown, which is not the same as
-            that it has none.
-    """
-    modes = await _read(node, Index.SUPPORTED_MODES)
-    method = await _read(node, Index.HOMING_METHOD)
-    lower = await _read(node, Index.SOFTWARE_POSITION_LIMIT, 1)
-    upper = await _read(node, Index.SOFTWARE_POSITION_LIMIT, 2)
-    limits = None
-    if lower is not None and upper is not None and lower < upper:
-        ends = sorted((units.position_from_device(lower), units.position_from_device(upper)))
-        limits = (ends[0], ends[1])
-    velocity = await _read(node, Index.PROFILE_VELOCITY)
-    acceleration = await _read(node, Index.PROFILE_ACCELERATION)
-    deceleration = await _read(node, Index.PROFILE_DECELERATION)
+    def __init__(self, node: RemoteNode, config: DriveConfig, units: Units) -> None:
+        """Take the axis.
 
-    def in_units(value: int | None, default: float) -> float:
-        return abs(units.velocity_from_device(value)) if value else default
+        Args:
+            node: The device.
+            config: Settings of the axis.
+            units: Its units; they become the drive's own where bus.yml gives none.
+        """
+        self._node = node
+        self._config = config
+        self._units = units
+        self._offset = AXIS_OFFSET * config.channel
 
-    return DriveParameters(
-        supported_modes=modes,
-        homing_method=method or 0,
-        position_limits=limits,
-        profile=ProfileLimits(
+    async def read(self) -> DriveParameters:
+        """Read all of them.
+
+        Raises:
+            SdoError: The drive does not answer. Its limits are then unknown, which is not the same
+                as that it has none.
+        """
+        source = await self._read_units() if self._config.units_from_device else 'bus.yml'
+        units = self._units
+        slope = await self._read(Index.TORQUE_SLOPE)
+        effort = await self._read(Index.MAX_TORQUE)
+        speed = await self._read(Index.MAX_PROFILE_VELOCITY)
+        return DriveParameters(
+            supported_modes=await self._read(Index.SUPPORTED_MODES),
+            homing_method=await self._read(Index.HOMING_METHOD) or 0,
+            position_limits=await self._position_limits(),
+            speed_limit=abs(units.velocity_from_device(speed)) if speed else None,
+            effort_limit=abs(units.effort_commanded(effort)) if effort else None,
+            profile=await self._profile(),
+            torque_slope=abs(units.effort_commanded(slope or DEFAULT_TORQUE_SLOPE_DEV)),
+            units=source,
+        )
+
+    async def _position_limits(self) -> tuple[float, float] | None:
+        lower = await self._read(Index.SOFTWARE_POSITION_LIMIT, 1)
+        upper = await self._read(Index.SOFTWARE_POSITION_LIMIT, 2)
+        if lower is None or upper is None or lower >= upper:
+            return None
+        convert = self._units.position_from_device
+        ends = sorted((convert(lower), convert(upper)))
+        return ends[0], ends[1]
+
+    async def _profile(self) -> ProfileLimits:
+        velocity = await self._read(Index.PROFILE_VELOCITY)
+        acceleration = await self._read(Index.PROFILE_ACCELERATION)
+        deceleration = await self._read(Index.PROFILE_DECELERATION)
+
+        def in_units(value: int | None, default: float) -> float:
+            return abs(self._units.velocity_from_device(value)) if value else default
+
+        return ProfileLimits(
             velocity=in_units(velocity, DEFAULT_VELOCITY),
             acceleration=in_units(acceleration, DEFAULT_ACCELERATION),
             deceleration=in_units(deceleration or acceleration, DEFAULT_ACCELERATION),
-        ),
-    )
+        )
 
+    async def _read_units(self) -> str:
+        """Take the units of the factor group (CiA 402-2, clause 8); say where they are from."""
+        resolution = await self._ratio(Index.POSITION_ENCODER_RESOLUTION)
+        feed = await self._ratio(Index.FEED_CONSTANT)
+        gear = await self._ratio(Index.GEAR_RATIO)
+        # position [user] = internal [inc] * feed / (resolution * gear); without a feed constant
+        # the drive counts increments of its encoder
+        counts = feed if feed is not None else (resolution or 0.0) * (gear or 1.0)
+        if not counts:
+            return 'thousandths, as neither bus.yml nor the drive (0x608F, 0x6092) says'
+        scale = counts / REVOLUTION
+        factor = await self._ratio(Index.VELOCITY_FACTOR)
+        velocity_scale = scale * (factor or 1.0)
+        self._units.use(
+            replace(
+                self._config,
+                scale_pos_to_dev=scale,
+                scale_pos_from_dev=1.0 / scale,
+                scale_vel_to_dev=velocity_scale,
+                scale_vel_from_dev=1.0 / velocity_scale,
+            )
+        )
+        return f'the drive (0x608F, 0x6091, 0x6092, 0x6096): {scale:g} per rad'
 
-async def _read(node: RemoteNode, index: int, subindex: int = 0) -> int | None:
-    entry = node.config.dictionary.get(index, subindex)
-    if entry is None or not entry.access.readable:
-        return None
-    try:
-        value = await node.read_object(index, subindex, timeout=READ_TIMEOUT)
-    except (SdoAbortError, CodecError):
-        return None  # a drive may lack what its EDS promises; the default stands
-    return value if isinstance(value, int) else None
+    async def _ratio(self, index: int) -> float | None:
+        """Read numerator and denominator; None when the drive has no such object."""
+        numerator = await self._read(index, 1)
+        denominator = await self._read(index, 2)
+        if not numerator or not denominator:
+            return None
+        return numerator / denominator
+
+    async def _read(self, index: int, subindex: int = 0) -> int | None:
+        profile_index = index + self._offset
+        entry = self._node.config.dictionary.get(profile_index, subindex)
+        if entry is None or not entry.access.readable:
+            return None
+        try:
+            value = await self._node.read_object(profile_index, subindex, timeout=READ_TIMEOUT)
+        except (SdoAbortError, CodecError):
+            return None  # a drive may lack what its EDS promises; the default stands
+        return value if isinstance(value, int) else None

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""User units (rad, rad/s) against device units (increments), by the factors of bus.yml."""
+"""User units (rad, rad/s, effort) against device units, by the factors of bus.yml or the drive."""
 
 from __future__ import annotations
 
@@ -9,11 +9,12 @@ import math
 from ..config.model import DriveConfig
 from ..exceptions import DriveError
 
+INT16_MAX = 2**15 - 1
 INT32_MAX = 2**31 - 1
 
 
 class Units:
-    """Converts positions and velocities of one drive.
+    """Converts positions, velocities and torques of one drive.
 
     To the device: ``position * scale_pos_to_dev + offset_pos_to_dev`` and
     ``velocity * scale_vel_to_dev``; from it: ``position * scale_pos_from_dev +
@@ -24,6 +25,10 @@ class Units:
         """Take the factors."""
         self._config = config
 
+    def use(self, config: DriveConfig) -> None:
+        """Take other factors, because the drive has told its own."""
+        self._config = config
+
     def position_to_device(self, position: float) -> int:
         """Convert a position to the nearest increment.
 
@@ -31,7 +36,12 @@ class Units:
             DriveError: It is not a number or does not fit 0x607A (INTEGER32).
         """
         config = self._config
-        return _to_int32(position, position * config.scale_pos_to_dev + config.offset_pos_to_dev)
+        scaled = position * config.scale_pos_to_dev + config.offset_pos_to_dev
+        return _to_integer(position, scaled, INT32_MAX)
+
+    def distance_to_device(self, distance: float) -> int:
+        """Convert a distance to the nearest increment; errors as for positions."""
+        return _to_integer(distance, distance * self._config.scale_pos_to_dev, INT32_MAX)
 
     def position_commanded(self, position_inc: float) -> float:
         """Return the target that :meth:`position_to_device` turns into these [inc].
@@ -43,7 +53,19 @@ class Units:
 
     def velocity_to_device(self, velocity: float) -> int:
         """Convert a velocity to the nearest device unit; errors as for positions."""
-        return _to_int32(velocity, velocity * self._config.scale_vel_to_dev)
+        return _to_integer(velocity, velocity * self._config.scale_vel_to_dev, INT32_MAX)
+
+    def vl_velocity_to_device(self, velocity: float) -> int:
+        """Convert a velocity for 0x6042, an INTEGER16; errors as for positions."""
+        return _to_integer(velocity, velocity * self._config.scale_vel_to_dev, INT16_MAX)
+
+    def effort_to_device(self, effort: float) -> int:
+        """Convert a torque for 0x6071, an INTEGER16; errors as for positions."""
+        return _to_integer(effort, effort * self._config.scale_eff_to_dev, INT16_MAX)
+
+    def effort_commanded(self, torque: float) -> float:
+        """Return the target that :meth:`effort_to_device` turns into this device torque."""
+        return torque / self._config.scale_eff_to_dev
 
     def position_from_device(self, position: float) -> float:
         """Convert increments to a position in user units."""
@@ -58,13 +80,13 @@ class Units:
         return torque * self._config.scale_eff_from_dev
 
 
-def _to_int32(value: float, scaled: float) -> int:
+def _to_integer(value: float, scaled: float, largest: int) -> int:
     if not math.isfinite(scaled):
         raise DriveError(f'target {value} is not a finite number')
     rounded = round(scaled)
-    if abs(rounded) > INT32_MAX:
+    if abs(rounded) > largest:
         raise DriveError(
-            f'target {value:g} is {rounded} device units, more than a drive can hold '
-            f'({INT32_MAX}); are the scale factors in bus.yml right?'
+            f'target {value:g} is {rounded} device units, more than the object can hold '
+            f'({largest}); are the scale factors in bus.yml right?'
         )
     return rounded

@@ -135,7 +135,7 @@ class RemoteNode:
         self.last_emergency: Emergency | None = None
         self.missed_pdos = 0
         self.on_boot_up: Callable[[], None] = lambda: None
-        self.on_lost: Callable[[str], None] = lambda reason: None  # its driver stops
+        self.on_lost: list[Callable[[str], None]] = []  # its drivers stop
         self.on_dropped_out: Callable[[], None] = lambda: None  # it has to be booted again
         self._supervised = False
         self._online_since = 0.0
@@ -214,7 +214,7 @@ class RemoteNode:
             # it hears no PDO any more: what it said before is no longer true, and whoever drives
             # it must not go on as if it followed
             self.image.clear()
-            self.on_lost(f'somebody sent it to NMT state {state.name}')
+            self._stop_drivers(f'somebody sent it to NMT state {state.name}')
 
     def receive_emergency(self, frame: Frame) -> None:
         """Take an EMCY message."""
@@ -258,8 +258,12 @@ class RemoteNode:
         self.report(EventKind.HEARTBEAT_LOST, Severity.ERROR, reason)
         self.nmt_state = None
         self.online = False
-        self.on_lost(reason)  # first, so that nobody asks the device again when its SDOs end
+        self._stop_drivers(reason)  # first, so that nobody asks it again when its SDOs end
         self.offline(reason)
+
+    def _stop_drivers(self, reason: str) -> None:
+        for driver_stops in self.on_lost:
+            driver_stops(reason)
 
     def offline(self, reason: str) -> None:
         """Stop talking to the device until it is booted again."""

@@ -131,9 +131,10 @@ class MasterProcess:
     def _build_drives(self) -> MotionGroup:
         scheduler = self._network.scheduler
         drives = [
-            Drive(device, scheduler)
+            Drive(device, scheduler, axis)
             for device in self._network.nodes.values()
             if device.config.is_drive
+            for axis in device.config.axes
         ]
         self._commands = {drive.name: DriveCommands(drive, scheduler) for drive in drives}
         return MotionGroup(drives, self._report)

@@ -1,0 +1,93 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Homing as a sequence (CiA 402-2, clause 11)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from enum import Enum
+
+from ..exceptions import CodecError, DriveError, SdoError
+from ..standard.drive import OperationMode, Statusword
+from ..standard.objects import Index
+from .modes import Homing
+from .sequences import DriveSequences
+
+HOMING_START = 0.1  # [s] after which a drive has overwritten the homing bits of the last time
+
+
+class HomingProgress(Enum):
+    """What happens at the moment."""
+
+    ENABLING = 'enabling'
+    SWITCHING = 'switching to mode 6'
+    HOMING = 'homing'
+    DONE = 'done'
+
+
+async def home(
+    steps: DriveSequences,
+    method: int | None = None,
+    on_progress: Callable[[HomingProgress], None] | None = None,
+) -> str:
+    """Home a drive that is enabled; it is left in mode 6.
+
+    Ended from outside, bit 4 is cleared, which interrupts the homing.
+
+    Args:
+        steps: Steps of the drive.
+        method: Value for 0x6098; None takes what is in the drive.
+        on_progress: Told each phase when it begins.
+
+    Returns:
+        What was done, in words.
+
+    Raises:
+        DriveError: The drive has no homing, refuses the method, or fails.
+    """
+    drive = steps.drive
+    tell = on_progress or (lambda progress: None)
+    homing = drive.modes[OperationMode.HOMING]
+    if not isinstance(homing, Homing):
+        raise TypeError('mode 6 is no homing mode')
+    if not drive.parameters.supports(OperationMode.HOMING):
+        raise steps.refused('has no homing (mode 6 is not in 0x6502)')
+    method = await _choose(steps, method)
+    tell(HomingProgress.SWITCHING)
+    await steps.switch(homing)
+    tell(HomingProgress.HOMING)
+    homing.started = True
+    try:
+        await steps.pause(HOMING_START)
+        await steps.until(
+            lambda: _is_over(steps), drive.config.homing_timeout, f'the end of homing {method}'
+        )
+    finally:
+        homing.started = False
+    if drive.objects.statusword & Statusword.HOMING_ERROR:
+        raise steps.refused(f'failed to home by method {method}')
+    tell(HomingProgress.DONE)
+    return f'homed by method {method}'
+
+
+async def _choose(steps: DriveSequences, method: int | None) -> int:
+    drive = steps.drive
+    if method is None:
+        if not drive.parameters.homing_method:
+            raise steps.refused('has no homing method (0x6098 is 0); name one')
+        return drive.parameters.homing_method
+    try:
+        await drive.node.write_object(drive.objects.at(Index.HOMING_METHOD), 0, method)
+    except (SdoError, CodecError) as error:
+        raise DriveError(f'{drive.name} does not take homing method {method}: {error}') from error
+    return method
+
+
+def _is_over(steps: DriveSequences) -> bool:
+    word = steps.drive.objects.statusword
+    if word & Statusword.HOMING_ERROR:
+        return True
+    done = Statusword.HOMING_ATTAINED
+    if not steps.quirks.homed_without_arrival:
+        done |= Statusword.TARGET_REACHED
+    return word & done == done

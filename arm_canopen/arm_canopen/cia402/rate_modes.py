@@ -1,0 +1,161 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Modes that command a velocity or a torque: 2, 3 and 9, 4 and 10.
+
+In the profile modes (2, 3, 4) the drive makes the ramp; in the cyclic synchronous ones (9, 10) it
+follows each value at once, so the master makes it.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable
+
+from ..master.process_image import Writer
+from ..standard.drive import Controlword, OperationMode
+from .modes import Actual, Mode, NO_BITS
+from .units import Units
+
+VL_RAMP = Controlword(0x70)
+"""Bits 4 to 6 of the velocity mode: ramp enabled, not locked, reference used (CiA 402-2, 16.3)."""
+
+
+class DriveRamped(Mode):
+    """A value that the drive itself ramps to."""
+
+    bits = NO_BITS
+
+    def __init__(self, units: Units, target: Writer) -> None:
+        """Take the way to the target object.
+
+        Args:
+            units: Units of the drive.
+            target: Its writer.
+        """
+        self._units = units
+        self._target = target
+
+    def set_target(self, target: float) -> None:
+        """Command a value."""
+        self._target.write(self._to_device(target))
+
+    def brake(self) -> None:
+        """Command standstill; the drive makes the ramp."""
+        self._target.write(0)
+
+    def step(self, now: float, period: float, statusword: int) -> Controlword:
+        """Leave all to the drive."""
+        return self.bits
+
+    @abstractmethod
+    def _to_device(self, target: float) -> int:
+        """Convert a target to device units."""
+
+
+class ProfileVelocity(DriveRamped):
+    """Mode 3: velocity 0x60FF in user units per second."""
+
+    number = OperationMode.PROFILE_VELOCITY
+
+    def preload(self, actual: Actual) -> None:
+        """Command standstill."""
+        self._target.write(0)
+
+    def _to_device(self, target: float) -> int:
+        return self._units.velocity_to_device(target)
+
+
+class Velocity(ProfileVelocity):
+    """Mode 2, of frequency converters: velocity 0x6042, which has 16 bits."""
+
+    number = OperationMode.VELOCITY
+    bits = VL_RAMP
+
+    def _to_device(self, target: float) -> int:
+        return self._units.vl_velocity_to_device(target)
+
+
+class ProfileTorque(DriveRamped):
+    """Mode 4: torque 0x6071 in units of effort."""
+
+    number = OperationMode.PROFILE_TORQUE
+
+    def preload(self, actual: Actual) -> None:
+        """Command the torque that the drive has, so that it drops no load."""
+        self._target.write(actual.torque)
+
+    def _to_device(self, target: float) -> int:
+        return self._units.effort_to_device(target)
+
+
+class MasterRamped(Mode):
+    """A value in each cycle, which the master ramps to the target."""
+
+    halts_by_bit = False
+
+    def __init__(self, units: Units, target: Writer, slope: Callable[[], float]) -> None:
+        """Take the way to the target object.
+
+        Args:
+            units: Units of the drive.
+            target: Its writer.
+            slope: Gives the greatest rate of change in user units per second.
+        """
+        self._units = units
+        self._target = target
+        self._slope = slope
+        self._value = 0.0
+        self._goal = 0.0
+
+    @property
+    def braked(self) -> bool:
+        """Whether zero is commanded."""
+        return self._value == 0.0
+
+    def set_target(self, target: float) -> None:
+        """Ramp to a value."""
+        self._to_device(target)  # refuse now what could not be sent on arrival
+        self._goal = target
+
+    def brake(self) -> None:
+        """Ramp to zero."""
+        self._goal = 0.0
+
+    def step(self, now: float, period: float, statusword: int) -> Controlword:
+        """Advance the ramp."""
+        change = self._slope() * period
+        self._value += max(-change, min(change, self._goal - self._value))
+        self._target.write(self._to_device(self._value))
+        return NO_BITS
+
+    @abstractmethod
+    def _to_device(self, target: float) -> int:
+        """Convert a target to device units."""
+
+
+class CyclicVelocity(MasterRamped):
+    """Mode 9: velocity 0x60FF in user units per second, each cycle."""
+
+    number = OperationMode.CYCLIC_VELOCITY
+
+    def preload(self, actual: Actual) -> None:
+        """Begin at the actual velocity, and brake from it."""
+        self._value, self._goal = actual.velocity, 0.0
+        self._target.write(self._to_device(actual.velocity))
+
+    def _to_device(self, target: float) -> int:
+        return self._units.velocity_to_device(target)
+
+
+class CyclicTorque(MasterRamped):
+    """Mode 10: torque 0x6071 in units of effort, each cycle."""
+
+    number = OperationMode.CYCLIC_TORQUE
+
+    def preload(self, actual: Actual) -> None:
+        """Keep the torque that the drive has, so that it drops no load."""
+        self._value = self._goal = self._units.effort_commanded(actual.torque)
+        self._target.write(actual.torque)
+
+    def _to_device(self, target: float) -> int:
+        return self._units.effort_to_device(target)

@@ -1,0 +1,202 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The steps that commands of a drive are made of: each waits for something, and says what not."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from ..exceptions import DriveError
+from ..master.events import Severity
+from ..master.scheduler import Scheduler
+from ..standard.drive import DriveState, OperationMode, Statusword
+from .drive import Drive, FAULTY, TORQUE_MODES
+from .modes import Mode
+from .quirks import quirks_of
+
+READY_TIMEOUT = 2.0  # [s] from operational to the first PDOs and parameters
+STOP_TIMEOUT = 2.0  # [s] to come to rest, beside the time of the ramp
+REST_SHARE = 0.01  # share of the profile velocity below which an axis counts as standing
+
+
+class DriveSequences:
+    """Steps of one drive, to be awaited in the thread of the network.
+
+    Attributes:
+        drive: The drive.
+        quirks: Where it deviates from the standard.
+    """
+
+    def __init__(self, drive: Drive, scheduler: Scheduler) -> None:
+        """Take the drive and the time."""
+        self.drive = drive
+        self.quirks = quirks_of(drive.config.quirks)
+        self._scheduler = scheduler
+
+    async def ready(self) -> None:
+        """Wait for state and parameters of a drive that has just come up.
+
+        Raises:
+            DriveError: It is offline, or does not tell them.
+        """
+        drive = self.drive
+        self._require_operational()
+        try:
+            await self._scheduler.until(
+                lambda: drive.ready or not drive.node.operational, READY_TIMEOUT
+            )
+        except TimeoutError:
+            raise DriveError(self._why_not_ready()) from None
+        self._require_operational()
+
+    async def reach(self, goal: DriveState) -> None:
+        """Lead to a state.
+
+        Raises:
+            DriveError: It is not reached; then the drive is led to Switch On Disabled.
+        """
+        drive = self.drive
+        drive.goal = goal
+        try:
+            await self.until(lambda: drive.state is goal, self.quirks.state_timeout, goal.title)
+        except BaseException:  # also when it is cancelled: nobody waits for the rest of the way
+            drive.goal = DriveState.SWITCH_ON_DISABLED
+            raise
+
+    async def come_to_rest(self) -> None:
+        """Brake what moves before another mode ends it with a jerk.
+
+        A torque is left alone: taking it away would drop a load.
+        """
+        drive, mode = self.drive, self.drive.mode
+        if not drive.obeys or mode.number in (*TORQUE_MODES, OperationMode.NO_MODE):
+            return
+        deceleration = drive.parameters.profile.deceleration
+        ramp = abs(drive.velocity) / deceleration  # [s]
+        mode.brake()
+        drive.halted = mode.halts_by_bit and not self.is_slow()
+        await self.until(lambda: mode.braked and self.is_slow(), STOP_TIMEOUT + ramp, 'standstill')
+
+    async def reset_fault(self) -> None:
+        """Reset a fault if there is one."""
+        drive = self.drive
+        if drive.state not in FAULTY:
+            return
+        drive.resetting = True
+        try:
+            await self.until(
+                lambda: drive.state not in FAULTY,
+                self.quirks.state_timeout,
+                'the end of the fault',
+            )
+        finally:
+            drive.resetting = False
+        drive.error = ''
+
+    async def switch(self, mode: Mode) -> None:
+        """Switch in the state that bus.yml wants, then return to the state of before.
+
+        Raises:
+            DriveError: 0x6061 does not show the mode in time; the one before is selected again.
+        """
+        drive = self.drive
+        before = drive.mode
+        enabled = drive.state is DriveState.OPERATION_ENABLED
+        switching_state = drive.config.switching_state
+        leave = enabled and switching_state is not DriveState.OPERATION_ENABLED
+        drive.released(f'mode {mode.number.title} was selected')
+        await self.come_to_rest()
+        if leave:
+            await self.reach(switching_state)
+        drive.select(mode)
+        try:
+            await self.until(
+                lambda: drive.objects.mode_display == mode.number,
+                self.quirks.mode_timeout,
+                f'mode {mode.number.title} in 0x6061',
+            )
+        except DriveError:
+            if drive.node.online:
+                drive.select(before)
+            raise
+        if leave:
+            await self.reach(DriveState.OPERATION_ENABLED)
+
+    async def pause(self, duration: float) -> None:
+        """Let time pass in [s]."""
+        await self._scheduler.timer(duration)
+
+    async def until(self, condition: Callable[[], bool], timeout: float, what: str) -> None:
+        """Wait for a condition.
+
+        Raises:
+            DriveError: It does not hold in time, or the drive faults or is lost before.
+        """
+        drive = self.drive
+
+        def hopeless() -> bool:
+            return not drive.node.online or (drive.state in FAULTY and not drive.resetting)
+
+        try:
+            await self._scheduler.until(lambda: condition() or hopeless(), timeout)
+        except TimeoutError:
+            raise self.refused(f'did not reach {what} within {timeout:g} s{self._why()}') from None
+        if not condition():
+            await drive.know_error()
+            raise self.refused(f'did not reach {what}')
+
+    async def settled(self, condition: Callable[[], bool]) -> None:
+        """Wait for a condition on the way out; there is nobody to raise an error to."""
+        drive = self.drive
+
+        def settled() -> bool:
+            return condition() or drive.state in (*FAULTY, DriveState.UNKNOWN)
+
+        try:
+            await self._scheduler.until(settled, STOP_TIMEOUT)
+        except TimeoutError:
+            drive.report(Severity.ERROR, f'did not come to rest in time: {drive.describe()}')
+
+    def is_slow(self) -> bool:
+        """Whether the axis stands; a real encoder is never quite still."""
+        return abs(self.drive.velocity) <= REST_SHARE * self.drive.parameters.profile.velocity
+
+    def require_no_fault(self) -> None:
+        """Refuse to go on with a drive that is faulted."""
+        if self.drive.state in FAULTY:
+            raise self.refused('is faulted; call ~/recover first')
+
+    def refused(self, what: str) -> DriveError:
+        """Return an error that says what, and how the drive is."""
+        return DriveError(f'{self.drive.name} {what}: {self.drive.describe()}')
+
+    def way_to_enable(self) -> str:
+        """Name the service that enables the drive."""
+        return '~/recover' if self.drive.state in FAULTY else '~/init or ~/enable'
+
+    def _why(self) -> str:
+        """Say which condition outside of the bus keeps the drive from being enabled."""
+        word = self.drive.objects.statusword
+        if not word & Statusword.VOLTAGE_ENABLED:
+            return (
+                ' (no voltage at the power stage, bit 4: is the safe torque off or the e-stop on?)'
+            )
+        if not word & Statusword.REMOTE:
+            return ' (bit 9, remote, is not set: is the drive under local control?)'
+        return ''
+
+    def _require_operational(self) -> None:
+        if not self.drive.node.operational:
+            raise DriveError(f'{self.drive.name} is not operational: {self.drive.describe()}')
+
+    def _why_not_ready(self) -> str:
+        drive = self.drive
+        if drive.state is DriveState.UNKNOWN:
+            return (
+                f'{drive.name} is operational, but its statusword, mode and position have not '
+                'come; do its TPDOs follow SYNC, and does the bus.yml have a sync_period?'
+            )
+        return (
+            f'{drive.name} has not answered the SDOs for its parameters (modes 0x6502, limits '
+            f'0x607D, profile 0x6081): {drive.describe()}'
+        )
