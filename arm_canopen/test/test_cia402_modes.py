@@ -313,6 +313,24 @@ def test_home_is_a_command_of_its_own() -> None:
     assert net.drives[JOINT].position == pytest.approx(0.2, abs=1e-3)
 
 
+def test_a_second_homing_is_a_new_one() -> None:
+    """Right after another one, too: the bits of the last do not pass for its own."""
+    speeds = (
+        sdo_write(0x6099, 1, 2_000),
+        sdo_write(0x6099, 2, 1_000),
+        sdo_write(0x609A, 0, 9_000),
+    )
+    net = booted(sdo_writes=(*MOTION_WRITES, *speeds))
+    commands = net.commands[JOINT]
+    net.result(commands.run('home', commands.home(35)))
+    running = commands.run('home', commands.home(17))
+    net.run(0.5)
+    assert not running.done
+    assert speed(net) < -0.01
+    net.result(running)
+    assert motor(net) == pytest.approx(0.0, abs=0.02)  # the switch is the new zero
+
+
 def test_a_homing_method_that_fails_says_so() -> None:
     """A method that the drive does not have, and one that ends in a homing error."""
     net = booted()

@@ -54,6 +54,7 @@ class Drive:
         parameters: What it told about itself.
         goal: State that the cycle leads to, None while nobody asked for one.
         resetting: Send fault resets while the drive is faulted.
+        period: Length of the last cycle in [s].
         halted: Stopped by a halt; the next target ends it.
         error: 0x603F in words when it was faulted last, else empty.
         interrupted: Mode in which it was enabled when its device was lost, None otherwise.
@@ -83,6 +84,7 @@ class Drive:
         self.released: Callable[[str], None] = lambda reason: None
         self.on_ready: Callable[[], None] = lambda: None
         self.resetting = False
+        self.period = 0.0
         self.halted = False
         self.interrupted: OperationMode | None = None
         self.modes = build_modes(self.objects, self.units, lambda: self.parameters, self._warn)
@@ -219,6 +221,7 @@ class Drive:
 
     def write(self, now: float, period: float) -> None:
         """Write controlword, mode and target for this cycle."""
+        self.period = period
         bits = NO_BITS
         if self.state is DriveState.UNKNOWN:
             command = Command.DISABLE_VOLTAGE

@@ -212,9 +212,12 @@ class DriveCommands:
         await steps.reach(DriveState.OPERATION_ENABLED)
         try:
             answer = await home(steps, method, on_progress)
-        finally:
+        except BaseException:  # also when it is cancelled, and there is no time to wait
             if drive.node.online:
                 drive.select(before)
+            raise
+        if before is not drive.mode and not steps.quirks.no_mode_zero:
+            await steps.switch(before)
         return f'{answer}; {drive.describe()}'
 
     async def select_mode(self, number: OperationMode) -> str:

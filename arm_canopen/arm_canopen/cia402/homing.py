@@ -13,6 +13,7 @@ from ..standard.objects import Index
 from .modes import Homing
 from .sequences import DriveSequences
 
+EDGE_CYCLES = 3  # of SYNC in which a drive sees bit 4 cleared
 HOMING_START = 0.1  # [s] after which a drive has overwritten the homing bits of the last time
 
 
@@ -55,6 +56,9 @@ async def home(
     method = await _choose(steps, method)
     tell(HomingProgress.SWITCHING)
     await steps.switch(homing)
+    # without a falling edge of bit 4 before, the drive would miss the start, and the bits of the
+    # last homing would pass for those of this one
+    await steps.pause(EDGE_CYCLES * drive.period)
     tell(HomingProgress.HOMING)
     homing.started = True
     try:

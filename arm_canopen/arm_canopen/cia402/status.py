@@ -16,6 +16,7 @@ class DriveStatus:
     """How a drive was at one moment.
 
     Attributes:
+        name: Name of the axis.
         node: The device below it.
         state: State of the power drive system.
         mode: Mode of operation in words.
@@ -28,6 +29,7 @@ class DriveStatus:
         summary: All of it in a sentence.
     """
 
+    name: str
     node: NodeStatus
     state: DriveState
     mode: str
@@ -59,6 +61,7 @@ def drive_status(drive: Drive, now: float) -> DriveStatus:
     """
     word = drive.objects.statusword
     return DriveStatus(
+        name=drive.name,
         node=node_status(drive.node, now),
         state=drive.state,
         mode=mode_title(drive.objects.mode_display),

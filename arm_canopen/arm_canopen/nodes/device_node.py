@@ -84,8 +84,8 @@ class DeviceNode(Node):
         self.create_subscription(COData, '~/tpdo', self._write_pdo, 10)
         for name, command in NMT_SERVICES.items():
             self._offer_nmt(name, command)
-        self.offer(CORead, 'sdo_read', self._read, self._answer_read)
-        self.offer(COWrite, 'sdo_write', self._write, self._answer_write)
+        self.offer(CORead, '~/sdo_read', self._read, self._answer_read)
+        self.offer(COWrite, '~/sdo_write', self._write, self._answer_write)
         ObjectServices(self, thread)
 
     def offer(
@@ -99,7 +99,7 @@ class DeviceNode(Node):
 
         Args:
             service_type: Its type.
-            name: Its name below that of the node.
+            name: Its name.
             handler: Called with each request that is admitted.
             respond: Fills the response in.
         """
@@ -113,7 +113,7 @@ class DeviceNode(Node):
                 return refused
             return handler(request)
 
-        self._deferred.create(self, service_type, f'~/{name}', guarded, respond)
+        self._deferred.create(self, service_type, name, guarded, respond)
 
     def offer_trigger(self, name: str, handler: Callable[[], Future[str]]) -> None:
         """Offer a std_srvs/Trigger whose message is what the future returns, or why it failed."""
@@ -184,7 +184,7 @@ class DeviceNode(Node):
             self._thread.network.send_nmt(command, node_id)
             return f'NMT {command.name} sent to node {node_id}'
 
-        self.offer_trigger(name, lambda: self._thread.call(send))
+        self.offer_trigger(f'~/{name}', lambda: self._thread.call(send))
 
     def _read(self, request: CORead.Request) -> Future[int]:
         device, index, subindex = self.device, request.index, request.subindex

@@ -61,7 +61,7 @@ def drive_diagnostic(bus: str, status: DriveStatus) -> DiagnosticStatus:
     unknown = status.state is DriveState.UNKNOWN
     return DiagnosticStatus(
         level=level,
-        name=f'{status.node.name}: drive',
+        name=f'{status.name}: drive',
         message=message,
         hardware_id=f'{bus}/{status.node.node_id}',
         values=_values(

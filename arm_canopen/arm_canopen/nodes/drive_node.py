@@ -1,36 +1,22 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The ROS node of one drive: the device node, and the services of ros2_canopen's 402 driver."""
+"""The ROS node of a drive: the device node, and the services of ros2_canopen's 402 driver."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Coroutine
-from concurrent.futures import Future
-from typing import Any
+from collections.abc import Sequence
 
-from canopen_interfaces.srv import COTargetDouble
 from rclpy.time import Time
 from sensor_msgs.msg import JointState
 
-from ..cia402.drive import Drive
 from ..cia402.drive_commands import DriveCommands
+from ..cia402.drive_objects import AXIS_OFFSET
+from ..master.remote_node import RemoteNode
 from ..master.runner import NetworkThread
-from ..master.scheduler import Promise
-from ..standard.drive import OperationMode
 from ..standard.objects import Index
+from .axis_services import AxisServices
 from .device_node import DeviceNode
 from .output_thread import OutputThread
-
-MODE_SERVICES: dict[str, OperationMode] = {
-    'position_mode': OperationMode.PROFILE_POSITION,
-    'velocity_mode': OperationMode.PROFILE_VELOCITY,
-    'torque_mode': OperationMode.PROFILE_TORQUE,
-    'interpolated_position_mode': OperationMode.INTERPOLATED_POSITION,
-    'cyclic_position_mode': OperationMode.CYCLIC_POSITION,
-    'cyclic_velocity_mode': OperationMode.CYCLIC_VELOCITY,
-    'cyclic_torque_mode': OperationMode.CYCLIC_TORQUE,
-}
-"""Services of ros2_canopen and the modes that they select."""
 
 OWNED_OBJECTS = frozenset(
     {
@@ -38,46 +24,53 @@ OWNED_OBJECTS = frozenset(
         Index.MODE_OF_OPERATION,
         Index.TARGET_POSITION,
         Index.TARGET_VELOCITY,
+        Index.VL_TARGET_VELOCITY,
+        Index.TARGET_TORQUE,
         Index.INTERPOLATION_DATA,
     }
 )
-"""Objects that the drive writes itself in each cycle."""
-
-Sequence = Callable[[], Coroutine[Promise[Any], None, str]]
+"""Objects of the first axis that the drive writes itself in each cycle."""
 
 
 class DriveNode(DeviceNode):
-    """Services and topics of one drive."""
+    """Services and topics of a drive with one axis or several.
+
+    Attributes:
+        axes: Its axes.
+        listened: Somebody listens to ``~/joint_states``.
+    """
 
     def __init__(
         self,
-        drive: Drive,
-        commands: DriveCommands,
+        device: RemoteNode,
+        axes: Sequence[DriveCommands],
         thread: NetworkThread,
         output: OutputThread,
     ) -> None:
         """Offer the services.
 
         Args:
-            drive: The drive.
-            commands: Its commands.
+            device: The device.
+            axes: Commands of its axes.
             thread: The thread of its network.
             output: The thread that publishes and answers.
         """
-        super().__init__(drive.node, thread, output)
-        self.drive = drive
-        self._commands = commands
+        super().__init__(device, thread, output)
+        self.axes = [commands.drive for commands in axes]
+        names = [axis.name for axis in self.axes]
+        self._owned = {
+            index + axis.config.channel * AXIS_OFFSET
+            for axis in self.axes
+            for index in OWNED_OBJECTS
+        }
         self._joint_states = self.create_publisher(JointState, '~/joint_states', 10)
-        self._message = JointState(name=[drive.name], position=[0.0], velocity=[0.0], effort=[0.0])
+        zeros = [0.0] * len(names)
+        self._message = JointState(name=names, position=zeros, velocity=zeros, effort=zeros)
         self.listened = False
-        self._offer('init', commands.init)
-        self._offer('enable', commands.enable)
-        self._offer('recover', commands.recover)
-        self._offer('disable', commands.disable, preempt=True)
-        self._offer('halt', commands.halt, preempt=True)
-        for name, mode in MODE_SERVICES.items():
-            self._offer_mode(name, mode)
-        self.offer(COTargetDouble, 'target', self._set_target, self._answer_target)
+        self._axis_services = [
+            AxisServices(self, commands, self._place(name), thread, output)
+            for commands, name in zip(axes, names, strict=True)
+        ]
 
     def update_listeners(self) -> None:
         """Look who listens, so that only what is heard is published."""
@@ -86,38 +79,24 @@ class DriveNode(DeviceNode):
 
     def owns_object(self, index: int) -> bool:
         """Whether the drive writes an object itself in each cycle."""
-        return index in OWNED_OBJECTS
+        return index in self._owned
 
-    def publish_joint_state(
-        self, stamp: Time, position: float, velocity: float, effort: float
-    ) -> None:
-        """Publish the state of the joint at the time of a SYNC."""
+    def sample(self) -> list[tuple[float, float, float]] | None:
+        """Return position, velocity and effort of each axis; None while they are unknown."""
+        if not self.device.online or not all(axis.objects.known for axis in self.axes):
+            return None
+        return [(axis.position, axis.velocity, axis.effort) for axis in self.axes]
+
+    def publish_joint_state(self, stamp: Time, sample: list[tuple[float, float, float]]) -> None:
+        """Publish the state of the joints at the time of a SYNC."""
         message = self._message
         message.header.stamp = stamp.to_msg()
-        message.position[0] = position
-        message.velocity[0] = velocity
-        message.effort[0] = effort
+        for number, (position, velocity, effort) in enumerate(sample):
+            message.position[number] = position
+            message.velocity[number] = velocity
+            message.effort[number] = effort
         self._joint_states.publish(message)
 
-    def _offer(self, name: str, sequence: Sequence, *, preempt: bool = False) -> None:
-        def run() -> Promise[str]:
-            self.admit()  # again, in the thread in which the node may have been deactivated
-            return self._commands.run(name, sequence(), preempt=preempt)
-
-        self.offer_trigger(name, lambda: self._thread.run(run))
-
-    def _offer_mode(self, name: str, mode: OperationMode) -> None:
-        self._offer(name, lambda: self._commands.select_mode(mode))
-
-    def _set_target(self, request: COTargetDouble.Request) -> Future[str]:
-        def set_target() -> str:
-            self.admit()
-            return self._commands.set_target(request.target)
-
-        return self._thread.call(set_target)
-
-    def _answer_target(self, response: COTargetDouble.Response, future: Future[str]) -> None:
-        error = future.exception()
-        response.success = error is None
-        if error is not None:
-            self.get_logger().warning(f'target: {error}')
+    def _place(self, axis: str) -> str:
+        """Return what the names of an axis' services begin with."""
+        return '~' if len(self.axes) == 1 else axis

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
@@ -35,7 +35,7 @@ class ManagedBus:
         self,
         node: Node,
         devices: Mapping[str, DeviceNode],
-        commands: Mapping[str, DriveCommands],
+        axes: Callable[[RemoteNode], Sequence[DriveCommands]],
         thread: NetworkThread,
         output: OutputThread,
     ) -> None:
@@ -44,7 +44,7 @@ class ManagedBus:
         Args:
             node: The master's node.
             devices: The nodes of the devices by name.
-            commands: Commands of those that are drives.
+            axes: Gives the commands of the axes of a device.
             thread: The thread of the network.
             output: The thread that publishes and answers.
         """
@@ -53,7 +53,7 @@ class ManagedBus:
         LifecycleServices(node, self._master, thread, output)
         managed = []
         for name, device in devices.items():
-            entry = Managed(name, self._work(device.device, commands.get(name)))
+            entry = Managed(name, self._work(device.device, axes(device.device)))
             device.admit = _gate(entry)
             LifecycleServices(device, entry, thread, output)
             managed.append(entry)
@@ -73,12 +73,14 @@ class ManagedBus:
         """
         _gate(self._master)()
 
-    def _work(self, device: RemoteNode, commands: DriveCommands | None) -> Work:
+    def _work(self, device: RemoteNode, axes: Sequence[DriveCommands]) -> Work:
         async def work(verb: Verb) -> None:
             if verb is Verb.ACTIVATE:
                 await self._booted(device)
-            elif verb in (Verb.DEACTIVATE, Verb.SHUTDOWN) and commands is not None:
-                await commands.run('shutdown', commands.shutdown(), preempt=True)
+            elif verb in (Verb.DEACTIVATE, Verb.SHUTDOWN):
+                await self._scheduler.gather(
+                    [axis.run('shutdown', axis.shutdown(), preempt=True) for axis in axes]
+                )
 
         return work
 

@@ -24,6 +24,7 @@ from ..cia402.status import drive_status
 from ..config.model import BusConfig
 from ..master.events import Event, EventKind, Severity
 from ..master.network import Network
+from ..master.remote_node import RemoteNode
 from ..master.runner import NetworkThread
 from ..master.status import node_status
 from .device_node import DeviceNode
@@ -37,7 +38,7 @@ LISTENER_PERIOD = 0.1  # [s] how soon a new subscriber hears something
 LAST_WORD_TIMEOUT = 0.5  # [s] for the last /diagnostics
 STOP_TIMEOUT = 8.0  # [s] for all drives to stop; each has its own shorter limits
 
-JointSample = tuple[DriveNode, float, float, float]
+JointSample = tuple[DriveNode, list[tuple[float, float, float]]]
 
 
 class MasterProcess:
@@ -75,11 +76,12 @@ class MasterProcess:
         self._devices = {
             device.name: DeviceNode(device, self._thread, self._output)
             for device in self._network.nodes.values()
-            if device.name not in self._group.drives
+            if not device.config.is_drive
         }
         self._drives = {
-            name: DriveNode(drive, self._commands[name], self._thread, self._output)
-            for name, drive in self._group.drives.items()
+            device.name: DriveNode(device, self._axes(device), self._thread, self._output)
+            for device in self._network.nodes.values()
+            if device.config.is_drive
         }
         services = MasterServices(node, self._thread, self._output)
         self._diagnostics = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
@@ -88,7 +90,7 @@ class MasterProcess:
         devices = {**self._devices, **self._drives}
         self.nodes: list[Node] = [node, *devices.values()]
         if config.master.is_lifecycle:
-            managed = ManagedBus(node, devices, self._commands, self._thread, self._output)
+            managed = ManagedBus(node, devices, self._axes, self._thread, self._output)
             services.admit = managed.admit
             self.nodes.append(managed.manager)
 
@@ -139,6 +141,9 @@ class MasterProcess:
         self._commands = {drive.name: DriveCommands(drive, scheduler) for drive in drives}
         return MotionGroup(drives, self._report)
 
+    def _axes(self, device: RemoteNode) -> list[DriveCommands]:
+        return [entry for entry in self._commands.values() if entry.drive.node is device]
+
     def _send(self, frame: Frame) -> None:
         self._can.send(frame)
         self._load.count(frame)
@@ -150,9 +155,9 @@ class MasterProcess:
         if self._feedback_posted:
             return  # the output thread is behind; it gets the newest when it is there again
         samples: list[JointSample] = [
-            (node, drive.position, drive.velocity, drive.effort)
+            (node, sample)
             for node in self._drives.values()
-            if node.listened and (drive := node.drive).node.online and drive.objects.known
+            if node.listened and (sample := node.sample()) is not None
         ]
         if samples:
             self._feedback_posted = True
@@ -169,19 +174,20 @@ class MasterProcess:
         )
         statuses = [bus_diagnostic(self._node.get_name(), status)]
         for device in self._network.nodes.values():
-            drive = self._group.drives.get(device.name)
-            if drive is None:
+            node = self._drives.get(device.name)
+            if node is None:
                 statuses.append(device_diagnostic(self._can.name, node_status(device, now)))
-            else:
-                statuses.append(drive_diagnostic(self._can.name, drive_status(drive, now)))
+                continue
+            drives = [drive_status(axis, now) for axis in node.axes]
+            statuses += [drive_diagnostic(self._can.name, drive) for drive in drives]
         return statuses
 
     def _publish_joints(self, sync_time: float, samples: list[JointSample]) -> None:
         self._feedback_posted = False
         age = int((time.monotonic() - sync_time) * 1e9)  # [ns]
         stamp = Time(nanoseconds=self._node.get_clock().now().nanoseconds - age)
-        for node, position, velocity, effort in samples:
-            node.publish_joint_state(stamp, position, velocity, effort)
+        for node, sample in samples:
+            node.publish_joint_state(stamp, sample)
 
     def _tell(self, event: Event) -> None:
         logger = self._node.get_logger()

@@ -34,8 +34,8 @@ class ObjectServices:
         self._node = node
         self._device = node.device
         self._thread = thread
-        node.offer(ReadObject, 'read_object', self._read, self._answer_read)
-        node.offer(WriteObject, 'write_object', self._write, self._answer_write)
+        node.offer(ReadObject, '~/read_object', self._read, self._answer_read)
+        node.offer(WriteObject, '~/write_object', self._write, self._answer_write)
 
     def _read(self, request: ReadObject.Request) -> Future[Transfer]:
         device, path = self._device, request.object

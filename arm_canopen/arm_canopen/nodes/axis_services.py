@@ -1,0 +1,135 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Services, topic and action by which one axis of a drive is commanded."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Coroutine
+from concurrent.futures import Future
+from typing import Any, TYPE_CHECKING
+
+from canopen_interfaces.srv import COTargetDouble
+from std_msgs.msg import Float64
+
+from arm_msgs.srv import Move as MoveService
+
+from ..cia402.drive_commands import DriveCommands
+from ..cia402.position_modes import Move
+from ..master.runner import NetworkThread
+from ..master.scheduler import Promise
+from ..standard.drive import OperationMode
+from .home_action import HomeAction
+from .output_thread import OutputThread
+
+if TYPE_CHECKING:
+    from .device_node import DeviceNode
+
+MODE_SERVICES: dict[str, OperationMode] = {
+    'position_mode': OperationMode.PROFILE_POSITION,
+    'vl_velocity_mode': OperationMode.VELOCITY,
+    'velocity_mode': OperationMode.PROFILE_VELOCITY,
+    'torque_mode': OperationMode.PROFILE_TORQUE,
+    'interpolated_position_mode': OperationMode.INTERPOLATED_POSITION,
+    'cyclic_position_mode': OperationMode.CYCLIC_POSITION,
+    'cyclic_velocity_mode': OperationMode.CYCLIC_VELOCITY,
+    'cyclic_torque_mode': OperationMode.CYCLIC_TORQUE,
+}
+"""Services and the modes that they select; ros2_canopen has all but the second."""
+
+Sequence = Callable[[], Coroutine[Promise[Any], None, str]]
+
+
+class AxisServices:
+    """What one axis offers, below ``~`` or, of several axes, below the name of its channel."""
+
+    def __init__(
+        self,
+        node: DeviceNode,
+        commands: DriveCommands,
+        place: str,
+        thread: NetworkThread,
+        output: OutputThread,
+    ) -> None:
+        """Offer everything.
+
+        Args:
+            node: The node of the device.
+            commands: Commands of the axis.
+            place: What the names begin with.
+            thread: The thread of the network.
+            output: The thread that publishes and answers.
+        """
+        self._node = node
+        self._commands = commands
+        self._place = place
+        self._thread = thread
+        self._refusal = ''
+        self._offer('init', commands.init)
+        self._offer('enable', commands.enable)
+        self._offer('recover', commands.recover)
+        self._offer('home', commands.home)
+        self._offer('disable', commands.disable, preempt=True)
+        self._offer('halt', commands.halt, preempt=True)
+        self._offer('quick_stop', commands.quick_stop, preempt=True)
+        self._offer('shutdown', commands.shutdown, preempt=True)
+        for name, mode in MODE_SERVICES.items():
+            self._offer_mode(name, mode)
+        node.offer(COTargetDouble, f'{place}/target', self._set_target, self._answer_target)
+        node.offer(MoveService, f'{place}/move', self._move, self._answer_move)
+        node.create_subscription(Float64, f'{place}/target', self._stream, 10)
+        self._home = HomeAction(node, commands, f'{place}/home', thread, output)
+
+    def _offer(self, name: str, sequence: Sequence, *, preempt: bool = False) -> None:
+        def run() -> Promise[str]:
+            self._node.admit()  # again, in the thread in which it may have been deactivated
+            return self._commands.run(name, sequence(), preempt=preempt)
+
+        self._node.offer_trigger(f'{self._place}/{name}', lambda: self._thread.run(run))
+
+    def _offer_mode(self, name: str, mode: OperationMode) -> None:
+        self._offer(name, lambda: self._commands.select_mode(mode))
+
+    def _set_target(self, request: COTargetDouble.Request) -> Future[str]:
+        return self._call(lambda: self._commands.set_target(request.target))
+
+    def _answer_target(self, response: COTargetDouble.Response, future: Future[str]) -> None:
+        error = future.exception()
+        response.success = error is None
+        if error is not None:
+            self._node.get_logger().warning(f'target: {error}')
+
+    def _move(self, request: MoveService.Request) -> Future[str]:
+        move = Move(
+            request.target,
+            relative=request.relative,
+            immediate=not request.queue,
+            blend=request.blend,
+        )
+        return self._call(lambda: self._commands.move(move))
+
+    def _answer_move(self, response: MoveService.Response, future: Future[str]) -> None:
+        error = future.exception()
+        response.success = error is None
+        response.message = future.result() if error is None else str(error)
+
+    def _stream(self, message: Float64) -> None:
+        self._call(lambda: self._commands.stream_target(message.data)).add_done_callback(
+            self._note_refusal
+        )
+
+    def _note_refusal(self, future: Future[None]) -> None:
+        """Say why a stream is refused, once until the reason changes."""
+        error = future.exception()
+        reason = '' if error is None else str(error)
+        if reason and reason != self._refusal:
+            self._node.output.post(
+                lambda: self._node.get_logger().warning(f'{self._place}/target: {reason}')
+            )
+        self._refusal = reason
+
+    def _call(self, command: Callable[[], Any]) -> Future[Any]:
+        def run() -> Any:  # noqa: ANN401
+            self._node.admit()
+            return command()
+
+        return self._thread.call(run)

@@ -1,0 +1,127 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Homing, halting, streaming and single moves of a drive, over DDS and a real bus."""
+
+from __future__ import annotations
+
+from typing import Any, TYPE_CHECKING
+
+from action_msgs.msg import GoalStatus
+from canopen_interfaces.srv import COTargetDouble
+import pytest
+from rclpy.action.client import ActionClient
+from sensor_msgs.msg import JointState
+from simulated_arm import SimulatedArm
+from std_msgs.msg import Float64
+
+from arm_msgs.action import Home
+from arm_msgs.srv import Move, WriteObject
+
+if TYPE_CHECKING:
+    from isolation import Isolation
+
+pytestmark = pytest.mark.scenario
+JOINT = '/panda_joint4'
+
+
+class Goal:
+    """One goal of the homing action."""
+
+    def __init__(self, arm: SimulatedArm, method: int) -> None:
+        """Send it, and wait until it is accepted."""
+        self.phases: list[str] = []
+        self._arm = arm
+        client = ActionClient(arm.client.node, Home, f'{JOINT}/home')
+        assert client.wait_for_server(10.0)
+        sent = client.send_goal_async(Home.Goal(method=method), self._note)
+        arm.client.spin_until(sent.done, 10.0, 'acceptance')
+        self.handle: Any = sent.result()
+        assert self.handle.accepted
+        self._result = self.handle.get_result_async()
+
+    def _note(self, message: Any) -> None:
+        self.phases.append(message.feedback.phase)
+
+    def result(self) -> Any:
+        """Wait for its end."""
+        self._arm.client.spin_until(self._result.done, 20.0, 'the result')
+        return self._result.result()
+
+
+def positions(arm: SimulatedArm) -> list[float]:
+    """Listen to the positions of the joint."""
+    messages: list[float] = []
+
+    def note(message: Any) -> None:
+        messages.append(message.position[0])
+
+    arm.client.node.create_subscription(JointState, f'{JOINT}/joint_states', note, 10)
+    return messages
+
+
+def test_homing_as_an_action_and_as_a_service(isolation: Isolation) -> None:
+    """Feedback tells the phase, cancelling stops it, a method that fails says why."""
+    with SimulatedArm(isolation) as arm:
+        goal = Goal(arm, 35)
+        done = goal.result()
+        assert done.status == GoalStatus.STATUS_SUCCEEDED
+        assert done.result.success
+        assert 'homed by method 35' in done.result.message
+        assert done.result.position == pytest.approx(0.0, abs=1e-3)
+
+        crawl = WriteObject.Request(object='0x6099:01', value='5')  # [inc/s]
+        assert arm.client.call(WriteObject, f'{JOINT}/write_object', crawl).success
+        slow = Goal(arm, 17)  # to a limit switch that is far away
+        arm.client.spin_until(lambda: 'homing' in slow.phases, 10.0, 'feedback')
+        assert not arm.client.trigger(f'{JOINT}/home').success  # busy
+        cancelled = slow.handle.cancel_goal_async()
+        arm.client.spin_until(cancelled.done, 10.0, 'the cancellation')
+        ended = slow.result()
+        assert ended.status == GoalStatus.STATUS_CANCELED
+        assert 'homing was cancelled' in ended.result.message
+
+        wrong = Goal(arm, 36).result()
+        assert wrong.status == GoalStatus.STATUS_ABORTED
+        assert 'method 36' in wrong.result.message
+        assert arm.client.trigger(f'{JOINT}/enable').success
+
+
+def test_halt_quick_stop_moves_and_streams(isolation: Isolation) -> None:
+    """Halt keeps the drive enabled, quick stop does not; moves add up; streams end in a stop."""
+    with SimulatedArm(isolation) as arm:
+        for service in ('init', 'position_mode'):
+            assert arm.client.trigger(f'{JOINT}/{service}').success
+        request = COTargetDouble.Request(target=3.0)
+        assert arm.client.call(COTargetDouble, f'{JOINT}/target', request).success
+        halted = arm.client.trigger(f'{JOINT}/halt')
+        assert halted.success, halted.message
+        assert 'Operation enabled' in halted.message
+
+        heard = positions(arm)
+        arm.client.spin_until(lambda: len(heard) > 5, 10.0, 'joint states')
+        relative = Move.Request(target=0.1, relative=True)
+        assert not arm.client.call(Move, '/panda_joint5/move', relative).success
+        back = arm.client.call(Move, f'{JOINT}/move', Move.Request(target=0.0))
+        assert back.success, back.message
+        for _ in range(2):
+            step = Move.Request(target=0.1, relative=True, queue=True)
+            assert arm.client.call(Move, f'{JOINT}/move', step).success
+        arm.client.spin_until(lambda: abs(heard[-1] - 0.2) < 2e-3, 20.0, 'position 0.2')
+
+        assert arm.client.trigger(f'{JOINT}/cyclic_position_mode').success
+        stream = arm.client.node.create_publisher(Float64, f'{JOINT}/target', 10)
+        arm.client.spin_until(
+            lambda: stream.get_subscription_count() > 0, 10.0, 'the subscription'
+        )
+
+        def send() -> bool:
+            stream.publish(Float64(data=0.0))
+            return abs(heard[-1]) < 2e-3
+
+        arm.client.spin_until(send, 20.0, 'position 0.0')
+        arm.master.wait_for('the stream of targets has paused')
+        stopped = arm.client.trigger(f'{JOINT}/quick_stop')
+        assert stopped.success, stopped.message
+        stream.publish(Float64(data=0.5))
+        arm.master.wait_for('~/target: panda_joint4 takes no target')
+        assert 'Switch on disabled' in arm.client.trigger(f'{JOINT}/shutdown').message
