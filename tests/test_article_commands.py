@@ -77,7 +77,7 @@ def test_refusals_say_why(arm: SimulatedArm) -> None:
     arm.master.wait_for('panda_joint2 takes no target.*init.*Switch on disabled')
     refused = call(arm, '/panda_joint2/torque_mode', TRIGGER)
     assert 'success=False' in refused
-    assert '0x6502' in refused
+    assert 'in no RPDO' in refused
 
 
 def test_candump_explains_the_bus(arm: SimulatedArm, isolation: Isolation) -> None:

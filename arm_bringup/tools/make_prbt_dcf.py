@@ -26,7 +26,9 @@ DEFAULTS: dict[str, int] = {
     '6084': 200_000,
     '6085': 400_000,
     '608Fsub1': 360_000,  # increments of a revolution
+    '608Fsub2': 1,
     '6092sub1': 360_000,
+    '6092sub2': 1,
 }
 HEADER = """\
 ; A simulated drive of a PRBT 6: that of arm_canopen/eds/cia402_drive.eds, from which

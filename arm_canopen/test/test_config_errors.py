@@ -103,9 +103,20 @@ DRIVERS = [
 ]
 
 REFUSED = [
-    Case('joint1', 'num_channels: 2 # <-', 'num_channels', 'several axes', 'remove'),
-    Case('joint1', 'channels: [] # <-', 'channels', 'one axis', 'remove'),
-    Case('joint1', 'channel: 1 # <-', 'channel', 'one axis', 'remove'),
+    Case('joint1', 'num_channels: 2 # <-', 'num_channels', 'no axis 1: 0x6840', 'use the EDS'),
+    Case('joint1', 'num_channels: 9 # <-', 'num_channels', 'out of range', '8 axes'),
+    Case('joint1', 'channels: [] # <-', 'channels', '0 entries for 1 channels', 'as many'),
+    Case('joint1', 'channel_names: [a, b] # <-', 'channel_names', '2 names for 1', 'as many'),
+    Case(
+        'joint1', 'recovery: always # <-', 'recovery', "unknown policy 'always'", 'manual or auto'
+    ),
+    Case(
+        'joint1',
+        'driver: "ros2_canopen::LifecycleCia402Driver" # <-',
+        'driver',
+        'is a lifecycle driver, but the master has a plain one',
+        'for all or for none',
+    ),
     Case('joint1', 'guard_time: 100 # <-', 'guard_time', 'heartbeat_producer', 'remove'),
     Case('joint1', 'boot: false # <-', 'boot', 'configures every', 'remove'),
     Case('joint1', 'software_file: x # <-', 'software_file', 'vendor', 'remove'),

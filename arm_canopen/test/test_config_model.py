@@ -16,10 +16,13 @@ from arm_canopen.config import DriveConfig, Identity, NodeConfig, PdoConfig
 from arm_canopen.config.device_keys import DEVICE_KEYS, DRIVE_KEYS, RPDO_KEYS, TPDO_KEYS
 from arm_canopen.config.eds import load_eds
 from arm_canopen.config.master_keys import MASTER_KEYS, OPTION_KEYS
+from arm_canopen.config.model import RecoveryPolicy
 from arm_canopen.config.schema import Key, Kind, Use
 from arm_canopen.config.settings import DeviceSettings, MasterSettings, Options
 from arm_canopen.standard.datatypes import DataType
 from arm_canopen.standard.drive import DriveState
+
+TWO_AXES_EDS = Path(__file__).parents[1] / 'eds' / 'cia402_two_axes.eds'
 
 
 @pytest.mark.parametrize(
@@ -48,6 +51,13 @@ from arm_canopen.standard.drive import DriveState
         ('homing_timeout_seconds: 30', 'drive.homing_timeout', 30.0),
         ('position_mode: 8', 'drive.position_mode', 8),
         ('velocity_mode: 3', 'drive.velocity_mode', 3),
+        ('effort_mode: 10', 'drive.effort_mode', 10),
+        ('scale_eff_to_dev: 20', 'drive.scale_eff_to_dev', 20.0),
+        ('target_timeout_ms: 50', 'drive.target_timeout', 0.05),
+        ('recovery: auto', 'drive.recovery', RecoveryPolicy.AUTO),
+        ('quirks: festo_cmmp', 'drive.quirks', 'festo_cmmp'),
+        ('offset_pos_to_dev: 1', 'drive.units_from_device', True),
+        ('scale_pos_to_dev: 2\nscale_pos_from_dev: 0.5', 'drive.units_from_device', False),
     ],
 )
 def test_keys_of_a_device(tmp_path: Path, piece: str, attribute: str, value: object) -> None:
@@ -147,6 +157,28 @@ def pdos(folder: Path, piece: str) -> tuple[tuple[PdoConfig, ...], tuple[PdoConf
     """Load the sample with a piece added to its device."""
     (node,) = load_text(folder, added('joint1', piece)).nodes
     return node.tpdos, node.rpdos
+
+
+TWO_AXES = """
+    num_channels: 2
+    channel_names: [shoulder, elbow]
+    channels: [{scale_pos_to_dev: 2, scale_pos_from_dev: 0.5}, {offset_pos_to_dev: 7}]
+    homing_timeout_seconds: 3
+"""
+
+
+def test_a_drive_with_two_axes(tmp_path: Path) -> None:
+    """Each channel has its name and its own factors; the rest counts for all of them."""
+    eds = TWO_AXES_EDS.read_text()
+    (node,) = load_text(tmp_path, added('joint1', TWO_AXES), eds=eds).nodes
+    assert [(axis.name, axis.channel) for axis in node.axes] == [('shoulder', 0), ('elbow', 1)]
+    assert [axis.scale_pos_to_dev for axis in node.axes] == [2.0, 1000.0]
+    assert [axis.units_from_device for axis in node.axes] == [False, True]
+    assert [axis.offset_pos_to_dev for axis in node.axes] == [0.0, 7.0]
+    assert {axis.homing_timeout for axis in node.axes} == {3.0}
+    unnamed = added('joint1', 'num_channels: 2')
+    (node,) = load_text(tmp_path, unnamed, eds=eds).nodes
+    assert [axis.name for axis in node.axes] == ['joint1_0', 'joint1_1']
 
 
 def test_all_pdos_of_the_eds_appear(tmp_path: Path) -> None:
@@ -250,7 +282,7 @@ TABLES: list[tuple[tuple[Key, ...], type, set[str]]] = [
     (OPTION_KEYS, Options, set()),
     (MASTER_KEYS, MasterSettings, set()),
     (DEVICE_KEYS, DeviceSettings, set()),
-    (DRIVE_KEYS, DriveConfig, set()),
+    (DRIVE_KEYS, DriveConfig, {'name', 'channel', 'units_from_device'}),
     (TPDO_KEYS, PdoConfig, {'number', 'cob_id', 'mapping', 'configured', 'fixed_mapping'}),
     (RPDO_KEYS, PdoConfig, set()),
 ]
@@ -262,7 +294,7 @@ def test_tables_and_records_fit(keys: tuple[Key, ...], record: type, elsewhere: 
     names = {field.name for field in fields(record)}
     filled = {key.field for key in keys if key.field}
     assert filled <= names
-    assert record is PdoConfig or filled == names
+    assert elsewhere or record is PdoConfig or filled == names
     assert len({key.name for key in keys}) == len(keys)
     if elsewhere:
         assert names == elsewhere | filled

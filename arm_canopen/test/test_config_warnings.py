@@ -15,7 +15,6 @@ import pytest
 @pytest.mark.parametrize(
     ('section', 'piece', 'key', 'message'),
     [
-        ('joint1', 'effort_mode: 4', 'effort_mode', 'known, not used yet: torque'),
         ('joint1', 'life_time_factor: 3', 'life_time_factor', 'no node guarding'),
         ('joint1', 'retry_factor: 5', 'retry_factor', 'no node guarding'),
         ('joint1', 'time_cob_id: 0x200', 'time_cob_id', 'no TIME'),

@@ -3,7 +3,8 @@
 """The keys of a device that ros2_canopen and Lely's dcfgen know.
 
 Names, units and defaults are theirs, so that their files can be read unchanged. Where a default
-differs, ``why`` says the reason.
+differs, ``why`` says the reason. Four keys are our own: ``scale_eff_to_dev``,
+``target_timeout_ms``, ``recovery`` and ``quirks``.
 """
 
 from __future__ import annotations
@@ -43,6 +44,9 @@ VELOCITY_MODES = {
         OperationMode.CYCLIC_VELOCITY,
     )
 }
+EFFORT_MODES = {
+    mode.value: mode.title for mode in (OperationMode.PROFILE_TORQUE, OperationMode.CYCLIC_TORQUE)
+}
 
 DEVICE_KEYS: tuple[Key, ...] = (
     NODE_ID,
@@ -70,28 +74,10 @@ DEVICE_KEYS: tuple[Key, ...] = (
     ),
     Key('diagnostics', Kind.BLOCK, use=Use.NEEDLESS),
     Key('enable_lazy_load', Kind.BOOLEAN, use=Use.NEEDLESS),
-    Key(
-        'num_channels',
-        Kind.INTEGER,
-        default=1,
-        use=Use.REFUSED,
-        why='drives with several axes are not supported in this version',
-    ),
-    Key('channel_names', Kind.BLOCK, use=Use.REFUSED, why='drives have one axis in this version'),
-    Key('channels', Kind.BLOCK, use=Use.REFUSED, why='drives have one axis in this version'),
-    Key(
-        'channel',
-        Kind.INTEGER,
-        default=0,
-        use=Use.REFUSED,
-        why='drives have one axis in this version',
-    ),
-    Key(
-        'effort_mode',
-        Kind.INTEGER,
-        use=Use.LATER,
-        why='torque modes are not offered in this version',
-    ),
+    Key('num_channels', Kind.INTEGER, 'num_channels', low=1, high=8, why='CiA 402 has 8 axes'),
+    Key('channel_names', Kind.BLOCK),
+    Key('channels', Kind.BLOCK),
+    Key('channel', Kind.INTEGER, use=Use.NEEDLESS),
     Key('revision_number', Kind.INTEGER, 'revision_number', low=0, high=U32_MAX),
     Key('serial_number', Kind.INTEGER, 'serial_number', low=0, high=U32_MAX),
     Key(
@@ -164,6 +150,7 @@ DRIVE_KEYS: tuple[Key, ...] = (
     Key('scale_vel_to_dev', Kind.NUMBER, 'scale_vel_to_dev', zero=False),
     Key('scale_pos_from_dev', Kind.NUMBER, 'scale_pos_from_dev', zero=False),
     Key('scale_vel_from_dev', Kind.NUMBER, 'scale_vel_from_dev', zero=False),
+    Key('scale_eff_to_dev', Kind.NUMBER, 'scale_eff_to_dev', zero=False),
     Key('scale_eff_from_dev', Kind.NUMBER, 'scale_eff_from_dev', zero=False),
     Key('offset_pos_to_dev', Kind.NUMBER, 'offset_pos_to_dev'),
     Key('offset_pos_from_dev', Kind.NUMBER, 'offset_pos_from_dev'),
@@ -171,7 +158,26 @@ DRIVE_KEYS: tuple[Key, ...] = (
     Key('homing_timeout_seconds', Kind.NUMBER, 'homing_timeout', low=0.1, high=3600),
     Key('position_mode', Kind.INTEGER, 'position_mode', choices=POSITION_MODES),
     Key('velocity_mode', Kind.INTEGER, 'velocity_mode', choices=VELOCITY_MODES),
+    Key('effort_mode', Kind.INTEGER, 'effort_mode', choices=EFFORT_MODES),
+    Key(
+        'target_timeout_ms',
+        Kind.NUMBER,
+        'target_timeout',
+        per_unit=MILLISECONDS,
+        low=10,
+        high=60_000,
+    ),
+    Key('recovery', Kind.TEXT, 'recovery'),
+    Key('quirks', Kind.TEXT, 'quirks'),
 )
+
+SCALE_KEYS = ('scale_pos_to_dev', 'scale_pos_from_dev', 'scale_vel_to_dev', 'scale_vel_from_dev')
+"""Without any of them units are those of the drive's factor group."""
+
+CHANNEL_KEYS: tuple[Key, ...] = tuple(
+    key for key in DRIVE_KEYS if key.name.startswith(('scale_', 'offset_'))
+)
+"""What an entry of ``channels`` may say of one axis."""
 
 SDO_KEYS: tuple[Key, ...] = (
     Key('index', Kind.INTEGER, 'index', low=1, high=U16_MAX, why='an object index has 16 bits'),

@@ -18,6 +18,7 @@ from .pdo_resolution import PdoDraft, PdoReader
 from .sdo_list import SdoReader
 from .settings import DeviceSettings, Options, read_device_settings, remappings
 
+AXIS_OFFSET = 0x800  # between the objects of two axes (CiA 402-2, 7.2)
 DRIVE_OBJECTS = (Index.CONTROLWORD, Index.STATUSWORD)
 
 
@@ -55,7 +56,7 @@ def read_device(
         eds_files: The EDS files of the bus.
         findings: Gets everything that is wrong.
     """
-    settings, drive = read_device_settings(name, section, findings)
+    settings, axes = read_device_settings(name, section, findings)
     eds = _find_eds(section, settings, options, eds_files, findings)
     names = remappings(section, findings)
     node_id = settings.node_id or (eds.node_id if eds is not None else None)
@@ -78,10 +79,11 @@ def read_device(
         sdo_timeout=settings.sdo_timeout,
         boot_timeout=settings.boot_timeout,
         sdo_writes=SdoReader(eds.dictionary, findings).read(section),
-        axes=(replace(drive, name=name),),
+        axes=axes,
         line=section.place.line,
     )
     _check_profile(config, section, findings)
+    _check_axes(config, section, findings)
     reader = PdoReader(name, section, eds, node_id or 0, findings=findings)
     pdos = reader.read(TPDO) + reader.read(RPDO)
     return DeviceDraft(config if node_id else None, section, settings, pdos if node_id else [])
@@ -134,3 +136,15 @@ def _check_profile(config: NodeConfig, section: Mapping, findings: Findings) -> 
             f'{config.driver} is for CiA 402 drives, but the EDS has no {names}',
             "take 'ros2_canopen::ProxyDriver', or the EDS of the drive",
         )
+
+
+def _check_axes(config: NodeConfig, section: Mapping, findings: Findings) -> None:
+    """Refuse more axes than the EDS has."""
+    for axis in config.axes[1:]:
+        index = Index.CONTROLWORD + AXIS_OFFSET * axis.channel
+        if config.is_drive and not config.dictionary.has_index(index):
+            findings.error(
+                section.entries['num_channels'].place,
+                f'the EDS has no axis {axis.channel}: 0x{index:04X} (controlword) is missing',
+                'correct num_channels, or use the EDS that fits the device',
+            )

@@ -17,7 +17,7 @@ from .eds_files import EdsFiles
 from .findings import Findings, Place
 from .layout import lay_out
 from .master import build_master
-from .model import BusConfig
+from .model import BusConfig, MasterConfig
 from .settings import read_master_settings, read_options
 
 
@@ -52,6 +52,7 @@ def load_bus(
     periods = [draft.settings.period for draft in drafts]
     master = build_master(layout.master, settings, options, periods, findings)
     unique = _check_node_ids(layout.master, settings.node_id, drafts, findings)
+    _check_lifecycle(master, drafts, findings)
     around = Surroundings(options, settings, master)
     nodes = tuple(
         finish_device(draft, draft.config, around, findings)
@@ -60,6 +61,22 @@ def load_bus(
     )
     findings.raise_errors()
     return BusConfig(file, master, nodes, findings.warnings)
+
+
+def _check_lifecycle(
+    master: MasterConfig, drafts: Sequence[DeviceDraft], findings: Findings
+) -> None:
+    """Refuse a mixture of managed and plain nodes, which nobody could bring up in order."""
+    for draft in drafts:
+        if draft.config is None or draft.config.is_lifecycle == master.is_lifecycle:
+            continue
+        kinds = ('a lifecycle driver', 'a plain one')
+        mine, others = kinds if draft.config.is_lifecycle else kinds[::-1]
+        findings.error(
+            draft.place_of('driver'),
+            f'{draft.config.driver} is {mine}, but the master has {others} ({master.driver})',
+            'take lifecycle drivers for all or for none',
+        )
 
 
 def _check_node_ids(

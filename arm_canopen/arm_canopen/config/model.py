@@ -202,6 +202,11 @@ class NodeConfig:
         return self.axes[0]
 
     @property
+    def is_lifecycle(self) -> bool:
+        """Its node is a lifecycle node."""
+        return 'Lifecycle' in self.driver
+
+    @property
     def is_drive(self) -> bool:
         """The device is driven by the CiA 402 driver."""
         return 'Cia402' in self.driver

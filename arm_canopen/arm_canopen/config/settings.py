@@ -7,9 +7,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 import re
 
-from ..standard.drive import DriveState
 from .device_keys import DEVICE_KEYS, DRIVE_KEYS
 from .document import Mapping
+from .drive_axes import read_axes, read_drive
 from .drivers import check_driver
 from .findings import Findings, Place
 from .master_keys import MASTER_KEYS, OPTION_KEYS
@@ -65,6 +65,7 @@ class DeviceSettings:
         dcf: EDS or DCF file, empty when not given.
         dcf_path: Its folder, None for that of the options.
         period: Cycle in [s] when there is no SYNC.
+        num_channels: Number of axes.
     """
 
     node_id: int | None = None
@@ -82,6 +83,7 @@ class DeviceSettings:
     heartbeat_multiplier: float | None = None
     mandatory: bool = False
     reset_communication: bool = True
+    num_channels: int = 1
 
 
 def read_options(section: Mapping, findings: Findings) -> Options:
@@ -101,13 +103,11 @@ def read_master_settings(section: Mapping, findings: Findings) -> MasterSettings
 
 def read_device_settings(
     name: str, section: Mapping, findings: Findings
-) -> tuple[DeviceSettings, DriveConfig]:
-    """Read the section of a device, apart from its PDOs and objects."""
+) -> tuple[DeviceSettings, tuple[DriveConfig, ...]]:
+    """Read the section of a device, apart from its PDOs and objects; return its axes, too."""
     values = read_section(section, DEVICE_KEYS + DRIVE_KEYS, findings)
     drive_fields = {key.field for key in DRIVE_KEYS}
-    if 'switching_state' in values:
-        values['switching_state'] = DriveState(values['switching_state'])
-    drive = DriveConfig(**{name: values.pop(name) for name in drive_fields & values.keys()})
+    drive = read_drive(section, {k: values.pop(k) for k in drive_fields & values.keys()}, findings)
     settings = DeviceSettings(**values)
     if not ROS_NAME.fullmatch(name):
         findings.error(
@@ -118,7 +118,7 @@ def read_device_settings(
     _check_names(section, settings.namespace, findings)
     check_driver(section, settings.driver, findings, for_master=False)
     _check_scales(section, drive, findings)
-    return settings, drive
+    return settings, read_axes(name, section, settings.num_channels, drive, findings)
 
 
 def remappings(section: Mapping, findings: Findings) -> dict[str, str]:
