@@ -19,7 +19,7 @@ PDO = [
         'joint1',
         """
         tpdo:
-          1:
+          1: {enabled: true}
           enabled: true # <-
         """,
         'tpdo.enabled',

@@ -9,6 +9,7 @@ which it is written. Duplicate keys are refused: YAML forbids them, loaders let 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
 import os
@@ -23,6 +24,8 @@ TAG_PREFIX = 'tag:yaml.org,2002:'
 MERGE_TAG = TAG_PREFIX + 'merge'
 INTEGER_TAG = TAG_PREFIX + 'int'
 TEXT_TAGS = (TAG_PREFIX + 'timestamp', TAG_PREFIX + 'value', MERGE_TAG)  # dates, '=' and '<<'
+SLIPPED_TAG = 'slipped'  # of a mapping that was put together by `indented_again`
+NUMBERED = ('tpdo', 'rpdo')  # whose keys are numbers
 SIZE_MAX = 4 * 1024 * 1024  # [byte]
 
 
@@ -167,6 +170,7 @@ class _Converter:
         self._findings = findings
         self._done: dict[int, Item] = {}
         self._open: set[int] = set()
+        self._kept: list[object] = []  # nodes of our own, so that no identity is given twice
 
     def convert(self, node: yaml.Node, place: Place) -> Item:
         """Convert a node that is written at a place."""
@@ -210,12 +214,23 @@ class _Converter:
     def _mapping(self, node: yaml.MappingNode, place: Place) -> Mapping:
         own: dict[str, Item] = {}
         merged: dict[str, Item] = {}
-        for key, value in node.value:
+        pairs = node.value
+        if place.key.rpartition('.')[2] in NUMBERED:
+            pairs = indented_again(pairs, lambda key: self._tell_slip(key, place))
+            self._kept.append(pairs)
+        for key, value in pairs:
             if key.tag == MERGE_TAG:
                 self._merge(value, place, merged)
             else:
                 self._entry(key, value, place, own)
         return Mapping(place, merged | own)
+
+    def _tell_slip(self, key: yaml.Node, place: Place) -> None:
+        self._findings.warning(
+            self._place(key, f'{place.key}.{key.value}'),
+            f'the keys after {key.value!r} are not indented below it; taken as if they were',
+            'indent them by two more spaces',
+        )
 
     def _entry(self, key: yaml.Node, value: yaml.Node, place: Place, own: dict[str, Item]) -> None:
         if not isinstance(key, yaml.ScalarNode):
@@ -250,6 +265,37 @@ class _Converter:
     def _place(self, node: yaml.Node, key: str) -> Place:
         mark = node.start_mark
         return Place(self._file, mark.line + 1, mark.column + 1, key)
+
+
+def indented_again(
+    pairs: list[tuple[yaml.Node, yaml.Node]], tell: Callable[[yaml.Node], None]
+) -> list[tuple[yaml.Node, yaml.Node]]:
+    """Put keys below the number that they follow, where a listing has lost their indentation.
+
+    A number without a value that is followed by words can mean nothing else.
+
+    Args:
+        pairs: Keys and values of a mapping as they are written.
+        tell: Told each number to which keys were put.
+    """
+    result: list[tuple[yaml.Node, yaml.Node]] = []
+    for key, value in pairs:
+        above = result[-1] if result else None
+        if above is None or key.tag == INTEGER_TAG or above[0].tag != INTEGER_TAG:
+            result.append((key, value))
+        elif isinstance(above[1], yaml.MappingNode) and above[1].tag == SLIPPED_TAG:
+            above[1].value.append((key, value))
+        elif _is_empty(above[1]):
+            tell(above[0])
+            slipped = yaml.MappingNode(SLIPPED_TAG, [(key, value)], key.start_mark)
+            result[-1] = (above[0], slipped)
+        else:
+            result.append((key, value))
+    return result
+
+
+def _is_empty(node: yaml.Node) -> bool:
+    return isinstance(node, yaml.ScalarNode) and node.value == ''
 
 
 def _key_text(key: yaml.ScalarNode) -> str:

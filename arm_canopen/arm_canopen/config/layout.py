@@ -38,6 +38,7 @@ class Layout:
 
 def lay_out(root: Mapping, findings: Findings) -> Layout:
     """Find the sections of either format."""
+    root = _lifted(root, findings)
     new = 'nodes' in root.entries or 'defaults' in root.entries
     devices = _new_devices(root, findings) if new else _old_devices(root, findings)
     if 'master' not in root.entries:
@@ -48,6 +49,29 @@ def lay_out(root: Mapping, findings: Findings) -> Layout:
         block(root, 'master', findings) or empty,
         devices,
     )
+
+
+def _lifted(root: Mapping, findings: Findings) -> Mapping:
+    """Take sections that are indented below ``options`` as sections of their own."""
+    options = root.entries.get('options')
+    if not isinstance(options, Mapping):
+        return root
+    sections = {
+        name: item
+        for name, item in options.entries.items()
+        if name in TOP_LEVEL and name not in root.entries
+    }
+    if not sections:
+        return root
+    for name, item in sections.items():
+        findings.warning(
+            item.place,
+            f"{name!r} is indented below 'options'; taken as a section of its own",
+            'indent it less',
+        )
+    rest = {name: item for name, item in options.entries.items() if name not in sections}
+    entries = root.entries | {'options': Mapping(options.place, rest)} | sections
+    return Mapping(root.place, entries)
 
 
 def _new_devices(root: Mapping, findings: Findings) -> dict[str, Mapping]:
