@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from ..config.model import DriveConfig
-from ..exceptions import CodecError, DriveError, SdoError
+from ..exceptions import CodecError, SdoError
 from ..master.events import EventKind, Severity
 from ..master.remote_node import RemoteNode
 from ..master.scheduler import Scheduler, Task
@@ -29,6 +29,7 @@ from .parameters import DriveParameters, ParameterReader
 from .position_modes import CyclicPosition
 from .rate_modes import MasterRamped
 from .state_machine import Command, fault_reset, next_command
+from .target_limits import check_target
 from .units import Units
 
 ASK_AGAIN = 1.0  # [s] after which a drive is asked again for what it did not answer
@@ -247,7 +248,7 @@ class Drive:
         Raises:
             DriveError: The set-point is not finite, does not fit the object or is beyond a limit.
         """
-        self.check_position(setpoint)
+        self.check_target(setpoint)
         if isinstance(self.mode, CyclicPosition):
             self.halted = False
             self.mode.stream(setpoint)
@@ -273,26 +274,7 @@ class Drive:
         Raises:
             DriveError: It is beyond; the message names the limits.
         """
-        told = self.parameters
-        if self.mode.setpoint is not None:
-            self.check_position(target)
-        elif self.mode.number in VELOCITY_MODES:
-            self._check_size(target, told.speed_limit, 'velocity', '0x607F')
-        elif self.mode.number in TORQUE_MODES:
-            self._check_size(target, told.effort_limit, 'torque', '0x6072')
-
-    def check_position(self, target: float) -> None:
-        """Refuse a position beyond the drive's software limits.
-
-        Raises:
-            DriveError: It is beyond; the message names the limits.
-        """
-        limits = self.parameters.position_limits
-        if limits is not None and not limits[0] <= target <= limits[1]:
-            raise DriveError(
-                f'{self.name}: target {target:g} is beyond the software limits '
-                f'{limits[0]:g} to {limits[1]:g} (0x607D)'
-            )
+        check_target(self.name, self.mode, self.parameters, target)
 
     async def know_error(self) -> None:
         """Read 0x603F, so that the answer can say what is wrong."""
@@ -331,12 +313,6 @@ class Drive:
         for mode in self.modes.values():
             mode.preload(actual)
         self.mode.preload(actual)
-
-    def _check_size(self, target: float, limit: float | None, what: str, place: str) -> None:
-        if limit is not None and abs(target) > limit:
-            raise DriveError(
-                f'{self.name}: target {target:g} is beyond the greatest {what} {limit:g} ({place})'
-            )
 
     def _watch_following(self) -> None:
         """Bit 12 of the cyclic modes: a drive that has followed and does not any more is said."""
@@ -410,11 +386,3 @@ class Drive:
 
     def _warn(self, text: str) -> None:
         self.report(Severity.WARNING, text)
-
-
-VELOCITY_MODES = (
-    OperationMode.VELOCITY,
-    OperationMode.PROFILE_VELOCITY,
-    OperationMode.CYCLIC_VELOCITY,
-)
-TORQUE_MODES = (OperationMode.PROFILE_TORQUE, OperationMode.CYCLIC_TORQUE)

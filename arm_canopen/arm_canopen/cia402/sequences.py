@@ -10,9 +10,10 @@ from ..exceptions import DriveError
 from ..master.events import Severity
 from ..master.scheduler import Scheduler
 from ..standard.drive import DriveState, OperationMode, Statusword
-from .drive import Drive, FAULTY, TORQUE_MODES
+from .drive import Drive, FAULTY
 from .modes import Mode
 from .quirks import quirks_of
+from .target_limits import TORQUE_MODES
 
 READY_TIMEOUT = 2.0  # [s] from operational to the first PDOs and parameters
 STOP_TIMEOUT = 2.0  # [s] to come to rest, beside the time of the ramp
