@@ -15,8 +15,8 @@ from virtual_network import (
     bus_config,
     drive_config,
     drive_dictionary,
+    every_mode,
     MOTION_WRITES,
-    pdo,
     PERIOD,
     SCALE,
     sdo_write,
@@ -29,7 +29,6 @@ from arm_canopen.cia402.position_modes import Move, QUEUE_MAX
 from arm_canopen.config.model import DriveConfig, NodeConfig, RecoveryPolicy
 from arm_canopen.exceptions import DriveError
 from arm_canopen.master.events import Severity
-from arm_canopen.standard.cob_id import rpdo_default, tpdo_default
 from arm_canopen.standard.drive import DriveState, OperationMode
 
 JOINT = 'joint1'
@@ -51,16 +50,7 @@ def by_name(value: object) -> str:
 
 def full_drive(**changes: Any) -> NodeConfig:
     """Return a drive whose RPDOs carry the targets of all modes."""
-    config = drive_config(JOINT, NODE_ID, **changes)
-    tpdos = (
-        *config.tpdos,
-        pdo(3, tpdo_default(3, NODE_ID), (0x6077, 0)),
-    )
-    rpdos = (
-        *config.rpdos[:2],
-        pdo(3, rpdo_default(3, NODE_ID), (0x60C1, 1), (0x6071, 0), (0x6042, 0)),
-    )
-    return replace(config, tpdos=tpdos, rpdos=rpdos)
+    return every_mode(drive_config(JOINT, NODE_ID, **changes))
 
 
 def booted(**changes: Any) -> VirtualNetwork:
@@ -253,21 +243,40 @@ def test_moves_are_for_mode_1_and_within_the_limits() -> None:
         net.commands[JOINT].move(Move(0.1, immediate=False))
 
 
-@pytest.mark.parametrize('mode', [*POSITIONS, *SPEEDS], ids=by_name)
+@pytest.mark.parametrize('mode', TORQUES, ids=by_name)
+def test_halt_in_a_torque_mode_holds_the_axis(mode: OperationMode) -> None:
+    """The drive brakes and holds (bit 8); the next torque begins from what holds it."""
+    net = booted()
+    enable(net, mode)
+    net.commands[JOINT].set_target(200.0)
+    net.run(0.5)
+    assert speed(net) > 0.05
+    assert 'halted' in net.do(JOINT, 'halt', preempt=True)
+    net.run(0.5)
+    rest = motor(net)
+    net.run(1.0)
+    assert motor(net) == pytest.approx(rest, abs=1e-3)
+    net.commands[JOINT].set_target(-200.0)
+    net.run(0.5)
+    assert speed(net) < -0.05
+
+
+@pytest.mark.parametrize('mode', ALL, ids=by_name)
 def test_a_stream_that_ends_is_a_smooth_stop(mode: OperationMode) -> None:
     """Said once; a target that is commanded afterwards stands for itself."""
     net = booted()
     enable(net, mode)
     for n in range(100):
-        value = 0.2 if mode in SPEEDS else 0.002 * n
+        value = target_of(mode) / 2 if mode not in POSITIONS else 0.002 * n
         net.commands[JOINT].stream_target(value)
         net.run(PERIOD)
-    assert speed(net) == pytest.approx(0.2, abs=0.06)
+    if mode not in TORQUES:
+        assert speed(net) == pytest.approx(0.2, abs=0.06)
     net.run(2.0)
     assert speed(net) == pytest.approx(0.0, abs=0.01)
     said = [text for text in net.told(Severity.WARNING) if 'stream of targets has paused' in text]
     assert len(said) == 1
-    net.commands[JOINT].set_target(0.1)
+    net.commands[JOINT].set_target(0.1 if mode not in TORQUES else 0.0)
     net.run(2.0)
     assert len([t for t in net.told(Severity.WARNING) if 'has paused' in t]) == 1
 

@@ -127,6 +127,14 @@ def drive_config(name: str, node_id: int, **changes: Any) -> NodeConfig:
     return replace(config, **{'axes': (axis,)} | changes)
 
 
+def every_mode(config: NodeConfig) -> NodeConfig:
+    """Return a drive of :func:`drive_config` whose PDOs carry what all modes need."""
+    node_id = config.node_id
+    torque = pdo(3, tpdo_default(3, node_id), (0x6077, 0))
+    targets = pdo(3, rpdo_default(3, node_id), (0x60C1, 1), (0x6071, 0), (0x6042, 0))
+    return replace(config, tpdos=(*config.tpdos, torque), rpdos=(*config.rpdos[:2], targets))
+
+
 def bus_config(*nodes: NodeConfig, **master: Any) -> BusConfig:
     """Return a bus with devices and, as keywords, other values for fields of MasterConfig."""
     settings: dict[str, Any] = {'node_id': 1, 'sync_period': PERIOD, 'cycle_period': PERIOD}

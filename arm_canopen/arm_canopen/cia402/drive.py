@@ -27,7 +27,6 @@ from .modes import Actual, Mode, NO_BITS
 from .motion import AxisFeedback
 from .parameters import DriveParameters, ParameterReader
 from .position_modes import CyclicPosition
-from .rate_modes import MasterRamped
 from .state_machine import Command, fault_reset, next_command
 from .target_limits import check_target
 from .units import Units
@@ -164,7 +163,7 @@ class Drive:
     def _keeps_target(self) -> bool:
         """Whether the drive is powered by a target that must stay as it is."""
         held = self._holding_mode
-        return held is not None and (held is self.mode or not held.halts_by_bit)
+        return held is not None and (held is self.mode or held.cyclic)
 
     def feedback(self) -> AxisFeedback:
         """Return the state for motion sources."""
@@ -230,7 +229,10 @@ class Drive:
             command = self._command()
             if command is Command.ENABLE_OPERATION and self.obeys:
                 bits = self.mode.step(now, period, self.objects.statusword)
-                bits |= self._halt_bit()
+                halt = self._halt_bit()
+                bits |= halt
+                if halt and self.mode.cyclic:
+                    self.mode.preload(self._actual())  # from there it goes on
             elif not self._keeps_target:
                 self._preload_all()
         self._controlword = int(command) | int(bits)
@@ -316,7 +318,7 @@ class Drive:
 
     def _watch_following(self) -> None:
         """Bit 12 of the cyclic modes: a drive that has followed and does not any more is said."""
-        cyclic = isinstance(self.mode, (CyclicPosition, MasterRamped))
+        cyclic = self.mode.cyclic
         bit = bool(self.objects.statusword & Statusword.FOLLOWS_COMMAND)
         before, self._follows = self._follows, self.obeys and cyclic and bit
         if before and not bit and self.obeys and cyclic:

@@ -287,8 +287,10 @@ class DriveCommands:
         drive = self.drive
         if not drive.obeys:
             return  # what has taken it away has said so
-        if drive.mode.setpoint is None or not drive.mode.halts_by_bit:
+        if not drive.mode.halts_by_bit:
             drive.mode.brake()
+        elif drive.mode.setpoint is None:  # in mode 1 it goes to the last target, and rests there
+            drive.halted = True
         drive.report(
             Severity.WARNING,
             f'the stream of targets has paused for {drive.config.target_timeout * 1000:g} ms: '

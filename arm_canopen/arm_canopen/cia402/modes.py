@@ -40,10 +40,12 @@ class Mode(ABC):
     Attributes:
         number: Its value in 0x6060.
         halts_by_bit: Bit 8 of the controlword stops it; else the master brakes its set-points.
+        cyclic: Its target acts on the drive in each cycle.
     """
 
     number: OperationMode
     halts_by_bit = True
+    cyclic = False
 
     @abstractmethod
     def preload(self, actual: Actual) -> None:

@@ -199,6 +199,7 @@ class CyclicPosition(Mode):
 
     number = OperationMode.CYCLIC_POSITION
     halts_by_bit = False
+    cyclic = True
     bits = NO_BITS
 
     def __init__(self, units: Units, target: Writer, limits: Callable[[], ProfileLimits]) -> None:

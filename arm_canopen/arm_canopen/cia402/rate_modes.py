@@ -91,7 +91,7 @@ class ProfileTorque(DriveRamped):
 class MasterRamped(Mode):
     """A value in each cycle, which the master ramps to the target."""
 
-    halts_by_bit = False
+    cyclic = True
 
     def __init__(self, units: Units, target: Writer, slope: Callable[[], float]) -> None:
         """Take the way to the target object.
@@ -106,11 +106,6 @@ class MasterRamped(Mode):
         self._slope = slope
         self._value = 0.0
         self._goal = 0.0
-
-    @property
-    def braked(self) -> bool:
-        """Whether zero is commanded."""
-        return self._value == 0.0
 
     def set_target(self, target: float) -> None:
         """Ramp to a value."""
@@ -137,6 +132,12 @@ class CyclicVelocity(MasterRamped):
     """Mode 9: velocity 0x60FF in user units per second, each cycle."""
 
     number = OperationMode.CYCLIC_VELOCITY
+    halts_by_bit = False
+
+    @property
+    def braked(self) -> bool:
+        """Whether standstill is commanded."""
+        return self._value == 0.0
 
     def preload(self, actual: Actual) -> None:
         """Begin at the actual velocity, and brake from it."""
@@ -148,7 +149,10 @@ class CyclicVelocity(MasterRamped):
 
 
 class CyclicTorque(MasterRamped):
-    """Mode 10: torque 0x6071 in units of effort, each cycle."""
+    """Mode 10: torque 0x6071 in units of effort, each cycle.
+
+    A torque cannot be braked by another torque, so the drive itself stops the axis (bit 8).
+    """
 
     number = OperationMode.CYCLIC_TORQUE
 
