@@ -32,6 +32,7 @@ from arm_canopen.master.events import Severity
 from arm_canopen.standard.drive import DriveState, OperationMode
 
 JOINT = 'joint1'
+CLEAR = b'\xc4\x60\x06'  # 0x60C4:06 in an SDO
 NODE_ID = 2
 SPEEDS = [OperationMode.VELOCITY, OperationMode.PROFILE_VELOCITY, OperationMode.CYCLIC_VELOCITY]
 TORQUES = [OperationMode.PROFILE_TORQUE, OperationMode.CYCLIC_TORQUE]
@@ -459,3 +460,21 @@ def test_unknown_quirks_are_refused_with_those_that_exist() -> None:
     config = replace(config, axes=(replace(config.drive, quirks='fesot'),))
     with pytest.raises(DriveError, match="'fesot' are unknown; known: festo_cmmp"):
         VirtualNetwork(bus_config(config))
+
+
+def test_the_buffer_of_mode_7_is_emptied_first() -> None:
+    """0x60C4:06 gets 0 and 1 before 0x6060 gets 7, so that no old set-point waits in it."""
+    net = booted()
+    net.do(JOINT, 'init')
+    begin = net.now
+    net.select(JOINT, OperationMode.INTERPOLATED_POSITION)
+    writes = [data for data in net.frames(0x600 + NODE_ID, since=begin) if data[1:4] == CLEAR]
+    assert [data[4] for data in writes] == [0, 1]
+    sent = [sent for sent in net.wire.log if sent.time >= begin]
+    last_write = max(n for n, entry in enumerate(sent) if entry.frame.data[1:4] == CLEAR)
+    first_seven = min(
+        n
+        for n, entry in enumerate(sent)
+        if entry.frame.can_id == 0x200 + NODE_ID and entry.frame.data[2] == 7
+    )
+    assert last_write < first_seven

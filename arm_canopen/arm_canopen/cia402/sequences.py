@@ -6,15 +6,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from ..exceptions import DriveError
+from ..exceptions import CodecError, DriveError, SdoError
 from ..master.events import Severity
 from ..master.scheduler import Scheduler
 from ..standard.drive import DriveState, OperationMode, Statusword
+from ..standard.objects import Index
 from .drive import Drive, FAULTY
 from .modes import Mode
 from .quirks import quirks_of
 from .target_limits import TORQUE_MODES
 
+BUFFER_CLEAR = 6  # sub-index of 0x60C4 (CiA 402-2, clause 12)
+BUFFER_EMPTY, BUFFER_OPEN = 0, 1
 READY_TIMEOUT = 2.0  # [s] from operational to the first PDOs and parameters
 STOP_TIMEOUT = 2.0  # [s] to come to rest, beside the time of the ramp
 REST_SHARE = 0.01  # share of the profile velocity below which an axis counts as standing
@@ -109,6 +112,8 @@ class DriveSequences:
         await self.come_to_rest()
         if leave:
             await self.reach(switching_state)
+        if mode.number is OperationMode.INTERPOLATED_POSITION:
+            await self._clear_buffer()
         drive.select(mode)
         try:
             await self.until(
@@ -122,6 +127,19 @@ class DriveSequences:
             raise
         if leave:
             await self.reach(DriveState.OPERATION_ENABLED)
+
+    async def _clear_buffer(self) -> None:
+        """Empty the buffer of mode 7, and open it, where the drive has one (0x60C4:06)."""
+        drive = self.drive
+        index = drive.objects.at(Index.INTERPOLATION_CONFIGURATION)
+        entry = drive.node.config.dictionary.get(index, BUFFER_CLEAR)
+        if entry is None or not entry.access.writable:
+            return
+        try:
+            for value in (BUFFER_EMPTY, BUFFER_OPEN):
+                await drive.node.write_object(index, BUFFER_CLEAR, value)
+        except (SdoError, CodecError) as error:
+            drive.report(Severity.WARNING, f'its buffer of mode 7 is as it was: {error}')
 
     async def pause(self, duration: float) -> None:
         """Let time pass in [s]."""
