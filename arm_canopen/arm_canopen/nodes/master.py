@@ -1,21 +1,27 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""``ros2 run arm_canopen master``: the master and all drives of a bus.yml."""
+"""``ros2 run arm_canopen master``: the master and all drives of one bus.yml or of several."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
+from dataclasses import dataclass
 import sys
 import threading
 
 from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
 import rclpy
+from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import try_shutdown
 
 from ..can import open_bus
+from ..can.bus import Bus
 from ..config import load_bus
+from ..config.model import BusConfig
 from ..exceptions import CanopenError
 from .master_process import MasterProcess
 from .spinning import make_executor, stop_on_signals, WAKE_PERIOD
@@ -30,8 +36,8 @@ def run_master(args: Sequence[str] | None = None, *, extend: Extend | None = Non
 
     Args:
         args: Command line; None for the process's own.
-        extend: Called with the process before it starts; returns further nodes for its executor,
-            which may attach motion sources.
+        extend: Called with the process of each bus before it starts; returns further nodes for
+            the executor, which may attach motion sources.
 
     Returns:
         Exit code: 0, or 1 when the bus could not be configured or opened.
@@ -41,15 +47,14 @@ def run_master(args: Sequence[str] | None = None, *, extend: Extend | None = Non
         args=None if args is None else list(args), signal_handler_options=SignalHandlerOptions.NO
     )
     stop = stop_on_signals()
-    node = Node('master')
     try:
-        return _run(node, stop, extend)
+        _run(stop, extend)
     except CanopenError as error:
-        node.get_logger().fatal(str(error))
+        get_logger('master').fatal(str(error))
         return 1
     finally:
-        node.destroy_node()
         try_shutdown()
+    return 0
 
 
 def main() -> None:
@@ -57,41 +62,99 @@ def main() -> None:
     sys.exit(run_master())
 
 
-def _run(node: Node, stop: threading.Event, extend: Extend | None) -> int:
-    bus_config, can_name, diagnostics_period = _parameters(node)
-    config = load_bus(bus_config)
+@dataclass(frozen=True, slots=True)
+class Parameters:
+    """Parameters of the program.
+
+    Attributes:
+        bus_configs: Paths of the bus.yml files, one for each bus.
+        can_names: Names of the CAN interfaces, in the same order.
+        diagnostics_period: Time between two /diagnostics messages in [s].
+    """
+
+    bus_configs: list[str]
+    can_names: list[str]
+    diagnostics_period: float
+
+
+def _run(stop: threading.Event, extend: Extend | None) -> None:
+    first = Node('master')
+    try:
+        parameters = _declare(first)
+    finally:
+        first.destroy_node()  # bus.yml, which is known from here on, says in which namespace it is
+    configs = [load_bus(path) for path in parameters.bus_configs]
+    _check_names(configs)
+    with ExitStack() as stack:
+        processes = []
+        for config, name in zip(configs, parameters.can_names, strict=True):
+            can = stack.enter_context(open_bus(name))
+            processes.append(_make_process(config, can, stack))
+        _serve(processes, stop, extend)
+
+
+def _make_process(config: BusConfig, can: Bus, stack: ExitStack) -> MasterProcess:
+    node = Node('master', namespace=config.master.namespace or None)
+    stack.callback(node.destroy_node)
+    parameters = _declare(node)
     for warning in config.warnings:
         node.get_logger().warning(str(warning))
-    with open_bus(can_name) as can:
-        process = MasterProcess(node, config, can, diagnostics_period=diagnostics_period)
-        nodes = [*process.nodes, *(extend(process) if extend is not None else ())]
-        executor = make_executor()
-        for entry in nodes:
-            executor.add_node(entry)
-        node.get_logger().info(f'{len(config.nodes)} devices of {config.file} on {can.name}')
+    node.get_logger().info(f'{len(config.nodes)} devices of {config.file} on {can.name}')
+    return MasterProcess(node, config, can, diagnostics_period=parameters.diagnostics_period)
+
+
+def _serve(
+    processes: Sequence[MasterProcess], stop: threading.Event, extend: Extend | None
+) -> None:
+    executor = make_executor()
+    nodes = [node for process in processes for node in process.nodes]
+    if extend is not None:
+        nodes += [node for process in processes for node in extend(process)]
+    for node in nodes:
+        executor.add_node(node)
+    for process in processes:
         process.start()
-        try:
-            while not stop.is_set():
-                executor.spin_once(timeout_sec=WAKE_PERIOD)
-        finally:
-            node.get_logger().info('stopping: quick stop, then disable')
-            process.stop()
-            executor.shutdown()
-            for entry in nodes[1:]:
-                entry.destroy_node()
-    return 0
+    try:
+        while not stop.is_set():
+            executor.spin_once(timeout_sec=WAKE_PERIOD)
+    finally:
+        with ThreadPoolExecutor() as pool:  # no bus waits for the drives of another to stop
+            list(pool.map(MasterProcess.stop, processes))
+        executor.shutdown()
+        masters = [process.nodes[0] for process in processes]
+        for node in nodes:
+            if node not in masters:
+                node.destroy_node()
 
 
-def _parameters(node: Node) -> tuple[str, str, float]:
+def _check_names(configs: Sequence[BusConfig]) -> None:
+    """Refuse two nodes of one name, which would answer each other's services."""
+    taken: set[tuple[str, str]] = set()
+    for config in configs:
+        names = [(config.master.namespace.strip('/'), 'master')]
+        names += [(node.namespace.strip('/'), node.name) for node in config.nodes]
+        for name in names:
+            if name in taken:
+                raise CanopenError(
+                    f'{config.file}: there is a node {"/".join(name).lstrip("/")!r} on another '
+                    "bus already; give master and defaults of each bus a 'namespace'"
+                )
+            taken.add(name)
+
+
+def _declare(node: Node) -> Parameters:
     def text(name: str, default: str, description: str) -> str:
         descriptor = ParameterDescriptor(description=description, read_only=True)
         return str(node.declare_parameter(name, default, descriptor).value)
 
-    bus_config = text('bus_config', '', 'bus.yml with the master and its devices')
-    can_name = text(
+    configs = text(
+        'bus_config', '', 'bus.yml with the master and its devices; several with commas'
+    )
+    can_names = text(
         'can_interface_name',
         'auto',
-        'can0, vcan0, udp_multicast:239.x.y.z[:port], auto, or INTERFACE:CHANNEL[@BITRATE]',
+        'can0, vcan0, udp_multicast:239.x.y.z[:port], auto, or INTERFACE:CHANNEL[@BITRATE]; one '
+        'for each bus.yml, with commas',
     )
     text('master_config', '', 'accepted for ros2_canopen; not needed')
     text('master_bin', '', 'accepted for ros2_canopen; not needed')
@@ -104,11 +167,17 @@ def _parameters(node: Node) -> tuple[str, str, float]:
             floating_point_range=[FloatingPointRange(from_value=0.05, to_value=60.0)],
         ),
     ).value
-    if not bus_config:
+    if not configs:
         raise CanopenError(
             'no bus_config: give the path of a bus.yml with --ros-args -p bus_config:=FILE'
         )
-    return bus_config, can_name, float(period)
+    parameters = Parameters(configs.split(','), can_names.split(','), float(period))
+    if len(parameters.bus_configs) != len(parameters.can_names):
+        raise CanopenError(
+            f'bus_config names {len(parameters.bus_configs)} buses, can_interface_name '
+            f'{len(parameters.can_names)}: give one interface for each bus.yml'
+        )
+    return parameters
 
 
 if __name__ == '__main__':
