@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from ..exceptions import CodecError, DriveError, SdoError
+from ..exceptions import DriveError, SdoError, SdoTimeoutError
 from ..master.events import Severity
 from ..master.scheduler import Scheduler
 from ..standard.drive import DriveState, OperationMode, Statusword
@@ -18,6 +18,7 @@ from .target_limits import TORQUE_MODES
 
 BUFFER_CLEAR = 6  # sub-index of 0x60C4 (CiA 402-2, clause 12)
 BUFFER_EMPTY, BUFFER_OPEN = 0, 1
+BUFFER_ATTEMPTS = 4
 READY_TIMEOUT = 2.0  # [s] from operational to the first PDOs and parameters
 STOP_TIMEOUT = 2.0  # [s] to come to rest, beside the time of the ramp
 REST_SHARE = 0.01  # share of the profile velocity below which an axis counts as standing
@@ -129,17 +130,35 @@ class DriveSequences:
             await self.reach(DriveState.OPERATION_ENABLED)
 
     async def _clear_buffer(self) -> None:
-        """Empty the buffer of mode 7, and open it, where the drive has one (0x60C4:06)."""
+        """Empty the buffer of mode 7, and open it, where the drive has one (0x60C4:06).
+
+        Raises:
+            DriveError: The drive does not answer; with a closed buffer it would not move.
+        """
         drive = self.drive
         index = drive.objects.at(Index.INTERPOLATION_CONFIGURATION)
         entry = drive.node.config.dictionary.get(index, BUFFER_CLEAR)
         if entry is None or not entry.access.writable:
             return
+        for value in (BUFFER_EMPTY, BUFFER_OPEN):
+            failure: SdoError | None = None
+            for _ in range(BUFFER_ATTEMPTS):
+                failure = await self._written(index, BUFFER_CLEAR, value)
+                if not isinstance(failure, SdoTimeoutError):
+                    break
+            if isinstance(failure, SdoTimeoutError):
+                raise self.refused(f'did not open its buffer of mode 7 ({failure})')
+            if failure is not None:
+                drive.report(Severity.WARNING, f'its buffer of mode 7 is as it was: {failure}')
+                return
+
+    async def _written(self, index: int, subindex: int, value: int) -> SdoError | None:
+        """Write an object; return why that failed, or None."""
         try:
-            for value in (BUFFER_EMPTY, BUFFER_OPEN):
-                await drive.node.write_object(index, BUFFER_CLEAR, value)
-        except (SdoError, CodecError) as error:
-            drive.report(Severity.WARNING, f'its buffer of mode 7 is as it was: {error}')
+            await self.drive.node.write_object(index, subindex, value)
+        except SdoError as error:
+            return error
+        return None
 
     async def pause(self, duration: float) -> None:
         """Let time pass in [s]."""
