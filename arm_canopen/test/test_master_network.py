@@ -503,3 +503,67 @@ def test_frames_of_one_cycle_fit_the_time_of_the_bus() -> None:
     # 3 RPDOs of each drive before SYNC, 2 TPDOs of each after it
     for moment, sync in net.feedback_times[-3:]:
         assert moment - sync == pytest.approx(11 * FRAME_TIME, rel=0.3)
+
+
+@pytest.mark.parametrize(
+    ('frame', 'what'),
+    [(Frame(0x80), 'SYNC'), (Frame(0x701, b'\x05'), 'the heartbeat 0x701')],
+    ids=['sync', 'heartbeat'],
+)
+def test_another_master_is_noticed(frame: Frame, what: str) -> None:
+    """It is said once what only the master of a bus sends."""
+    net = network('a')
+    net.boot()
+    for _ in range(5):
+        net.send_as('rival', frame)
+        net.run(0.01)
+    said = [text for text in net.told(Severity.ERROR) if 'another master is on this bus' in text]
+    assert len(said) == 1
+    assert what in said[0]
+
+
+def test_a_device_that_does_not_answer_sync_is_told_before_its_heartbeat_is_missed() -> None:
+    """Once, and again when it falls silent again."""
+    net = network('a')
+    net.boot()
+    net.run(0.2)
+    for count in (1, 2):
+        net.wire.loses = lambda sender, frame: frame.can_id in (0x182, 0x282)
+        net.run(1.0)
+        assert not net.network.nodes['a'].answers
+        told = [text for text in net.told(Severity.WARNING) if 'has not answered SYNC' in text]
+        assert len(told) == count
+        net.wire.loses = lambda sender, frame: False
+        net.run(0.2)
+        assert net.network.nodes['a'].answers
+
+
+def test_a_pause_of_the_cycle_is_told_with_its_consequence() -> None:
+    """Whoever reads of faults afterwards shall know whose fault it was."""
+    net = VirtualNetwork(
+        bus_config(drive_config('a', 2), heartbeat_producer=0.1, heartbeat_timeout=0.3)
+    )
+    net.network.note_pause(0.2)
+    net.network.note_pause(0.6)
+    short, long = net.told(Severity.WARNING)
+    assert 'held up for 200 ms' in short
+    assert 'taken it for dead' not in short
+    assert 'taken it for dead' in long
+
+
+def test_devices_do_not_miss_a_master_that_has_taken_its_leave() -> None:
+    """After the watch is ended there is no EMCY when the heartbeat stops."""
+    net = VirtualNetwork(
+        bus_config(
+            drive_config('a', 2, heartbeat_consumer=True),
+            heartbeat_producer=0.1,
+            heartbeat_timeout=0.3,
+        )
+    )
+    net.boot()
+    net.run(0.5)
+    node = net.network.nodes['a']
+    net.result(net.network.scheduler.spawn(node.unwatch()))
+    net.wire.loses = lambda sender, frame: sender == 'master'
+    net.run(2.0)
+    assert 'EMCY' not in net.story()

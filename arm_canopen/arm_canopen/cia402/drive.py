@@ -183,7 +183,8 @@ class Drive:
         if not self.node.online:
             phase = self.node.phase.value
             detail = f' ({self.node.phase_detail})' if self.node.phase_detail else ''
-            return f'offline: {phase}{detail}'
+            loss = f'; lost before: {self.node.loss}' if self.node.loss else ''
+            return f'offline: {phase}{detail}{loss}'
         parts = ['no statusword yet']
         if self.objects.known:
             parts = [

@@ -268,8 +268,12 @@ class DriveCommands:
 
     def _require_obedience(self) -> None:
         drive, steps = self.drive, self._steps
+        if not drive.node.online:
+            raise steps.refused('takes no target')
         if drive.state is not DriveState.OPERATION_ENABLED:
             raise steps.refused(f'takes no target; call {steps.way_to_enable()}')
+        if not drive.node.answers:
+            raise steps.refused('takes no target, because it does not answer SYNC')
         if not isinstance(drive.mode, NoMode) and not drive.obeys:
             raise steps.refused('takes no target now')
 

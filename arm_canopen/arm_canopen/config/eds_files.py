@@ -49,9 +49,7 @@ class EdsFiles:
         findings.error(
             item.place,
             f'there is no EDS {dcf!r}; looked for {tried}',
-            'set the environment variable'
-            if '$' in tried
-            else 'put the file there, or correct dcf or dcf_path',
+            _remedy(tried, candidates),
         )
         return None
 
@@ -75,6 +73,15 @@ class EdsFiles:
         if eds is not None:
             findings.extend_warnings(eds.warnings)
         return eds
+
+
+def _remedy(tried: str, candidates: list[Path]) -> str:
+    if '$' in tried:
+        return 'set the environment variable'
+    for path in candidates:
+        if path.is_symlink():
+            return f'{path} is a link to {path.readlink()}, which is not there; copy the file'
+    return 'put the file there, or correct dcf or dcf_path'
 
 
 def _exists(path: Path) -> bool:

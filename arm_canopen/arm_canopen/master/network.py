@@ -75,6 +75,10 @@ class Network:
         self._boot_tasks: dict[str, Task[None]] = {}
         self._handlers: dict[int, Callable[[Frame], None]] = {}
         self._handlers[CobId.NMT] = self._hear_nmt
+        self._rivals: set[int] = set()
+        self._handlers[CobId.HEARTBEAT + config.master.node_id] = self._hear_rival
+        if config.master.sync_period > 0:
+            self._handlers[CobId.SYNC] = self._hear_rival
         self._strangers: dict[int, SdoClient] = {}
         for node in self.nodes.values():
             self._connect(node)
@@ -191,6 +195,29 @@ class Network:
         parsed = parse_nmt(frame.data)
         if parsed is not None:
             self._note_nmt(*parsed)
+
+    def _hear_rival(self, frame: Frame) -> None:
+        """Say that somebody else sends what only the master of a bus sends."""
+        if frame.can_id in self._rivals:
+            return
+        self._rivals.add(frame.can_id)
+        what = 'SYNC' if frame.can_id == CobId.SYNC else f'the heartbeat 0x{frame.can_id:03X}'
+        text = (
+            f'another master is on this bus: somebody else sends {what}; two masters command the '
+            'same drives, so end one of them'
+        )
+        self._report(Event(EventKind.BUS, Severity.ERROR, '', text))
+
+    def note_pause(self, late: float) -> None:
+        """Say that a cycle came late by so many [s], before its consequences show."""
+        watched = self.config.master.heartbeat_timeout
+        text = f'the cycle was held up for {late * 1000:.0f} ms by this computer'
+        if 0 < watched < late:
+            text += (
+                f'; devices that wait {watched * 1000:.0f} ms for the heartbeat of the master '
+                'have taken it for dead'
+            )
+        self._report(Event(EventKind.BUS, Severity.WARNING, '', text))
 
     def _note_nmt(self, command: NmtCommand, node_id: int) -> None:
         for node in self.nodes.values():

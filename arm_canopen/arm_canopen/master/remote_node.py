@@ -23,6 +23,7 @@ from .scheduler import Promise, Scheduler
 from .sdo_client import SdoClient
 from .start_values import start_value
 
+SILENCE_MAX = 0.5  # [s] without an answer to SYNC after which a device takes no targets
 START_TIME = 0.25  # [s] in which a device follows the command to start
 
 
@@ -95,6 +96,7 @@ class RemoteNode:
         owes_heartbeat: It was started and never sent a heartbeat, though it is supervised; it has
             to show one before it is started again.
         last_emergency: Last EMCY that was no reset, None when the device reported its end.
+        loss: Why it was lost last, empty while it is online.
         missed_pdos: TPDOs that did not answer a SYNC.
     """
 
@@ -133,6 +135,7 @@ class RemoteNode:
         self.last_heartbeat = 0.0
         self.owes_heartbeat = False
         self.last_emergency: Emergency | None = None
+        self.loss = ''
         self.missed_pdos = 0
         self.on_boot_up: Callable[[], None] = lambda: None
         self.on_lost: list[Callable[[str], None]] = []  # its drivers stop
@@ -140,6 +143,8 @@ class RemoteNode:
         self._supervised = False
         self._online_since = 0.0
         self._commanded_at = 0.0
+        self._answered_at = 0.0
+        self._silent = False
         self._scheduler = scheduler
         self._report = report
         self._polled: dict[tuple[int, int], BackgroundReader] = {}
@@ -152,6 +157,11 @@ class RemoteNode:
         return self.online and not self.left_operational
 
     @property
+    def answers(self) -> bool:
+        """Whether it answers SYNC, as far as any TPDO of it does that."""
+        return self._scheduler.now - self._answered_at < SILENCE_MAX or not self._every_sync
+
+    @property
     def name(self) -> str:
         """Name in bus.yml."""
         return self.config.name
@@ -159,6 +169,9 @@ class RemoteNode:
     def expect_answers(self) -> None:
         """A SYNC is about to be sent: await the TPDOs that answer each one."""
         if self.online:
+            if not all(entry.awaited for entry in self._every_sync):
+                self._answered_at = self._scheduler.now
+                self._silent = False
             for entry in self._every_sync:
                 entry.expect()
 
@@ -170,6 +183,14 @@ class RemoteNode:
         """Count the TPDOs that did not answer the last SYNC, and return their number."""
         missed = sum(entry.awaited for entry in self._every_sync)
         self.missed_pdos += missed
+        if missed and self.operational and not self.answers and not self._silent:
+            self._silent = True
+            self.report(
+                EventKind.PDO,
+                Severity.WARNING,
+                f'has not answered SYNC for {SILENCE_MAX * 1000:g} ms, and takes no targets until '
+                'it does; is it still there?',
+            )
         return missed
 
     def receive_heartbeat(self, frame: Frame) -> None:
@@ -214,7 +235,9 @@ class RemoteNode:
             # it hears no PDO any more: what it said before is no longer true, and whoever drives
             # it must not go on as if it followed
             self.image.clear()
-            self._stop_drivers(f'somebody sent it to NMT state {state.name}')
+            itself = self.wanted is NmtState.OPERATIONAL
+            who = 'it left Operational by itself, for' if itself else 'somebody sent it to'
+            self._stop_drivers(f'{who} NMT state {state.name}')
 
     def receive_emergency(self, frame: Frame) -> None:
         """Take an EMCY message."""
@@ -241,7 +264,9 @@ class RemoteNode:
         self._supervised = self.config.heartbeat_timeout > 0
         self.last_heartbeat = now
         self.owes_heartbeat = False
-        self._online_since = now
+        self._online_since = self._answered_at = now
+        self._silent = False
+        self.loss = ''
 
     def heartbeat_overdue(self, now: float) -> bool:
         """Tell whether a supervised heartbeat did not come within its consumer time."""
@@ -256,6 +281,7 @@ class RemoteNode:
     def lost(self, reason: str) -> None:
         """The device is gone: forget what it said and tell whoever drives it."""
         self.report(EventKind.HEARTBEAT_LOST, Severity.ERROR, reason)
+        self.loss = reason
         self.nmt_state = None
         self.online = False
         self._stop_drivers(reason)  # first, so that nobody asks it again when its SDOs end
@@ -305,6 +331,15 @@ class RemoteNode:
                     continue  # the SDO counters show it; the value stays as old as it is
                 entry.value = value if isinstance(value, (int, float)) else None
             await self._scheduler.timer(period)
+
+    async def unwatch(self) -> None:
+        """Have the device watch the master no longer, before the master ends; never raises."""
+        if not self.online or not self.config.heartbeat_consumer:
+            return
+        try:
+            await self.write_object(Index.CONSUMER_HEARTBEAT, 1, 0)
+        except (SdoError, CodecError) as error:
+            self.report(EventKind.BOOT, Severity.WARNING, f'goes on to watch the master: {error}')
 
     def entry(self, index: int, subindex: int = 0) -> ObjectEntry:
         """Return what the EDS says of an object.

@@ -22,6 +22,7 @@ from .statistics import CycleFigures, CycleStatistics
 
 T = TypeVar('T')
 
+PAUSE_TOLD = 0.1  # [s] lateness of a cycle that is worth a word
 REOPEN_PAUSE = 0.1  # [s] between two looks at a bus that went away
 
 logger = logging.getLogger(__name__)
@@ -120,6 +121,8 @@ class NetworkThread:
             now = time.monotonic()
             skipped = int((now - deadline) / self.period)
             self._statistics.record(now - deadline, skipped)
+            if now - deadline > PAUSE_TOLD:
+                self._guarded(partial(self.network.note_pause, now - deadline))
             self._guarded(partial(self.network.cycle, now, self.period))
             deadline += (skipped + 1) * self.period
 

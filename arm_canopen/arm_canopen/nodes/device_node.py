@@ -45,7 +45,7 @@ NMT_SERVICES: dict[str, NmtCommand] = {
 }
 """Services and the NMT commands that they send; ros2_canopen has the first and the fourth."""
 
-LATCHED = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 class DeviceNode(Node):
@@ -190,7 +190,6 @@ class DeviceNode(Node):
         device, index, subindex = self.device, request.index, request.subindex
 
         async def read() -> int:
-            device.entry(index, subindex)
             data = await device.sdo.read(index, subindex, device.config.sdo_timeout)
             return raw_from_bytes(data)
 

@@ -109,7 +109,9 @@ class MasterProcess:
                 for commands in self._commands.values()
             ]
             await scheduler.gather(stops)
+            await scheduler.gather([scheduler.spawn(node.unwatch()) for node in devices])
 
+        devices = list(self._network.nodes.values())
         try:
             self._thread.run_coroutine(leave).result(STOP_TIMEOUT)
         except FutureTimeoutError:
