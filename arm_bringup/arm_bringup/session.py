@@ -14,7 +14,7 @@ import tempfile
 from typing import TYPE_CHECKING
 
 from .description import expand_xacro
-from .exceptions import RobotError
+from .exceptions import RobotError, StartError
 from .exclusive import exclusive
 from .robots import find_robot, installed_robots_folder, Robot, robot_names
 from .stack import arm_processes, Executable, find_executable, Stack, write_parameters
@@ -27,6 +27,8 @@ REAL_BUS = 'can0'
 """Bus without --can on hardware: never one on which only simulated drives could be."""
 SIMULATED_BUS = 'auto'
 """Bus without --can in simulation: vcan0 when it exists, else multicast on the loopback."""
+DOMAIN_MAX = 232
+"""Highest ROS domain whose UDP ports exist."""
 INTERPOLATED_POSITION = 7
 """Mode of operation (CiA 402-2, 0x6060)."""
 
@@ -139,6 +141,23 @@ def stream_mode_service(drives: Sequence[NodeConfig]) -> str:
     return 'cyclic_position_mode'
 
 
+def ros_domain(environment: Mapping[str, str]) -> str:
+    """Return the ROS domain that all processes will be in.
+
+    Args:
+        environment: Environment variables.
+
+    Raises:
+        StartError: ROS_DOMAIN_ID is no domain; every process would fail with its own words.
+    """
+    domain = environment.get('ROS_DOMAIN_ID') or '0'
+    if not domain.isdecimal() or int(domain) > DOMAIN_MAX:
+        raise StartError(
+            f'ROS_DOMAIN_ID is {domain!r}; it must be a whole number from 0 to {DOMAIN_MAX}'
+        )
+    return domain
+
+
 @contextlib.contextmanager
 def session(
     arguments: argparse.Namespace,
@@ -165,7 +184,7 @@ def session(
     robot = locate(arguments.robot)
     drives = read_drives(robot)
     bus = resolve_name(arguments.can or (SIMULATED_BUS if simulate else REAL_BUS))
-    domain = os.environ.get('ROS_DOMAIN_ID') or '0'
+    domain = ros_domain(os.environ)
     locks = Path(tempfile.gettempdir())
     with contextlib.ExitStack() as stack:
         stack.enter_context(exclusive(f'bus {bus}', locks))

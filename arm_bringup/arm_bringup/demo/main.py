@@ -70,13 +70,13 @@ def join_ros(given_up: Callable[[], bool]) -> Client:
     return ArmClient(given_up)
 
 
-def commands(joint: str, mode_service: str, bus: str, domain: str) -> list[str]:
+def commands(joint: str, mode_service: str, candump: str, domain: str) -> list[str]:
     """Return commands to try in a second terminal.
 
     Args:
         joint: Name of a drive.
         mode_service: Service that selects the mode of the wave.
-        bus: Name of the CAN bus.
+        candump: Command that shows the bus.
         domain: ROS domain, empty for the default one.
     """
     call = 'ros2 service call'
@@ -85,7 +85,7 @@ def commands(joint: str, mode_service: str, bus: str, domain: str) -> list[str]:
         f'{call} /{joint}/position_mode std_srvs/srv/Trigger',
         f'{call} /{joint}/target canopen_interfaces/srv/COTargetDouble "{{ target: 1.0 }}"',
         'ros2 topic hz /joint_states',
-        f'ros2 run arm_canopen candump {bus}',
+        candump,
         # back into the wave
         f'{call} /{joint}/{mode_service} std_srvs/srv/Trigger',
         f'{call} /wave/start std_srvs/srv/Trigger',
@@ -103,6 +103,9 @@ def run(arm: Session, duration: float | None) -> int:
         0, or 1 when something went wrong.
     """
     write = LineWriter(sys.stdout)
+    for name in sorted(set(arm.drives) - set(joint_limits(arm.urdf))):
+        write(f'warning: no joint of the description is called {name!r}; its drive stands still')
+    bus_config = os.path.relpath(arm.robot.bus_config)
     names = [spec.name for spec in arm.processes]
     setting = Setting(
         title=f'{arm.robot.name}: {len(arm.drives)} simulated drives on {arm.bus}',
@@ -110,7 +113,10 @@ def run(arm: Session, duration: float | None) -> int:
             name: limits for name, limits in joint_limits(arm.urdf).items() if name in arm.drives
         },
         commands=commands(
-            arm.drives[0], arm.mode_service, arm.bus, os.environ.get('ROS_DOMAIN_ID', '')
+            arm.drives[0],
+            arm.mode_service,
+            f'ros2 run arm_canopen candump {arm.bus} --bus-config {bus_config}',
+            os.environ.get('ROS_DOMAIN_ID', ''),
         ),
         painter=Painter('demo', names, wants_colour(sys.stdout, os.environ)),
     )

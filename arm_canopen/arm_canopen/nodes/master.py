@@ -24,6 +24,7 @@ from ..config import load_bus
 from ..config.model import BusConfig
 from ..exceptions import CanopenError
 from .master_process import MasterProcess
+from .misspelt import refuse_misspelt
 from .spinning import make_executor, stop_on_signals, WAKE_PERIOD
 
 SWITCH_INTERVAL = 0.0005  # [s] how long a busy callback may keep the interpreter from the cycle
@@ -167,6 +168,7 @@ def _declare(node: Node) -> Parameters:
             floating_point_range=[FloatingPointRange(from_value=0.05, to_value=60.0)],
         ),
     ).value
+    refuse_misspelt(node)
     if not configs:
         raise CanopenError(
             'no bus_config: give the path of a bus.yml with --ros-args -p bus_config:=FILE'

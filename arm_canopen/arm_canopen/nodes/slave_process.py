@@ -25,6 +25,7 @@ from ..device.scenario import ScenarioPlayer
 from ..device.scenario_file import load_scenario
 from ..exceptions import CanopenError
 from .fault_services import FaultServices
+from .misspelt import refuse_misspelt
 from .spinning import spin, stop_on_signals
 
 CAN_INTERFACES = (
@@ -123,6 +124,7 @@ def _run(node: Node, populate: Populate, default_bus: str, stop: threading.Event
         runner = DeviceRunner(bus)
         population = populate(node, runner.host)
         _play_scenario(node, runner.host, population)
+        refuse_misspelt(node)
         FaultServices(node, runner, population.names)
         runner.start()
         try:
