@@ -25,7 +25,7 @@ T = TypeVar('T')
 
 _POLL = 0.01  # [s]; one look costs below 1 ms with 30 topics
 _LIMIT = 4.0  # [s]; without an inquiry, a participant announces itself every 3 s
-_QUIET_FOR_LISTS = 0.06  # [s]; the endpoints of a participant come in one burst
+_QUIET_FOR_LISTS = 0.25  # [s]; the endpoints of a participant come in bursts, 60 ms apart and more
 _QUIET_FOR_NAMES = 0.3  # [s]; a node that is just starting gets its chance
 _QUIET_FOR_NETWORK = 0.5  # [s]; participants that the kernel does not tell cannot be counted
 _INQUIRY_PERIOD = 0.3  # [s]; an answer with all endpoints takes 0.1 s
