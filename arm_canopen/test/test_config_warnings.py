@@ -15,6 +15,8 @@ import pytest
 @pytest.mark.parametrize(
     ('section', 'piece', 'key', 'message'),
     [
+        ('joint1', 'mandatory: true', 'mandatory', 'does not stop the others'),
+        ('joint1', 'reset_communication: false', 'reset_communication', 'but it is disabled'),
         ('joint1', 'life_time_factor: 3', 'life_time_factor', 'no node guarding'),
         ('joint1', 'retry_factor: 5', 'retry_factor', 'no node guarding'),
         ('joint1', 'time_cob_id: 0x200', 'time_cob_id', 'no TIME'),

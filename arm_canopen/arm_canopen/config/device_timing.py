@@ -51,6 +51,7 @@ def finish_device(
     master = around.master
     _check_period(draft, master, findings)
     _check_sync(draft.pdos, master, findings)
+    _check_boot_keys(draft, config, findings)
     if config.is_drive:
         _check_drive_pdos(draft, findings)
     producer = _heartbeat_producer(draft, config.dictionary, findings)
@@ -63,6 +64,22 @@ def finish_device(
         tpdos=tuple(pdo.config for pdo in draft.pdos if pdo.direction is TPDO),
         rpdos=tuple(pdo.config for pdo in draft.pdos if pdo.direction is RPDO),
     )
+
+
+def _check_boot_keys(draft: DeviceDraft, config: NodeConfig, findings: Findings) -> None:
+    """Say what two keys do not do yet."""
+    if config.mandatory:
+        findings.warning(
+            draft.place_of('mandatory'),
+            'known, not used yet: the loss of a mandatory device does not stop the others',
+            'it may stay',
+        )
+    if config.is_drive and not config.reset_communication:
+        findings.warning(
+            draft.place_of('reset_communication'),
+            'a drive that is in operation when the master starts is not reset, but it is disabled',
+            'have the axis at rest and held before the master starts',
+        )
 
 
 def _heartbeat_producer(
