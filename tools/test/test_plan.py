@@ -142,6 +142,20 @@ def test_new_pins_are_installed(
     assert len(titles(environment, wish)) == (1 if name == 'dev.txt' else 5)
 
 
+@pytest.mark.usefixtures('packages')
+def test_a_package_brings_what_it_imports(
+    environment: Environment, layout: Layout, fake: Fake
+) -> None:
+    """Its requirements are installed when it, or what stands on it, is first built."""
+    (layout.requirements / 'arm_msgs.txt').write_text('heavy==1\n')
+    assert 'Installing what arm_msgs imports' in titles(environment, Wish(packages=('arm',)))
+    carry_out(plan(environment, ALL), fake())
+    assert titles(environment) == titles(environment, Wish(packages=('arm',))) == []
+    (layout.requirements / 'arm.txt').write_text('light==1\n')
+    assert titles(environment) == ['Installing what arm imports']
+    assert titles(environment, Wish(packages=('arm_msgs',))) == []
+
+
 def test_old_environment_stays_while_the_new_is_out_of_reach(
     environment: Environment, layout: Layout, fake: Fake
 ) -> None:
@@ -219,7 +233,7 @@ def test_interpreter_is_kept(environment: Environment, tmp_path: Path) -> None:
     wheels = environment.underlay
     other = tmp_path / 'python3.12'
     other.touch()
-    state = EnvironmentState('base', '', str(other))
+    state = EnvironmentState('base', {}, str(other))
     assert choose_python('', wheels, state, environment.python) == str(other)
     other.unlink()
     assert choose_python('', wheels, state, environment.python) == probe(environment.python)
@@ -243,7 +257,7 @@ def test_system_ros_decides_on_the_python(tmp_path: Path) -> None:
     name = f'python3.{probe("python3").version[1]}'
     (tmp_path / 'lib' / name / 'site-packages' / 'rclpy').mkdir(parents=True)
     (tmp_path / 'python3.1').touch()
-    of_wheels = EnvironmentState('base', '', str(tmp_path / 'python3.1'))
+    of_wheels = EnvironmentState('base', {}, str(tmp_path / 'python3.1'))
     for state in (None, of_wheels):
         chosen = choose_python('', Underlay(UnderlayKind.SYSTEM, tmp_path), state, '/bin/false')
         assert isinstance(chosen, Interpreter)

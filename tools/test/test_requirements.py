@@ -2,13 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """The pinned requirements are whole and agree with one another."""
 
+import itertools
 from pathlib import Path
 import re
 
 import pytest
 
 from workspace.layout import this_checkout
-from workspace.pins import NAMES
+from workspace.pins import BASE, pinned_names
 
 FOLDER = this_checkout().requirements
 PIN = re.compile(r'^([\w.-]+)==([^\s;]+)(?: ; (.*?))? \\$', re.MULTILINE)
@@ -20,7 +21,7 @@ def pins(name: str) -> dict[tuple[str, str], str]:
     return {(package, marker): version for package, version, marker in PIN.findall(text)}
 
 
-@pytest.mark.parametrize('name', NAMES)
+@pytest.mark.parametrize('name', pinned_names(FOLDER))
 def test_every_line_is_pinned_and_hashed(name: str) -> None:
     """Nothing is installed that was not looked at when the file was made."""
     entries = re.split(r'\n(?=\S)', (FOLDER / f'{name}.txt').read_text())
@@ -31,14 +32,18 @@ def test_every_line_is_pinned_and_hashed(name: str) -> None:
         assert '--hash=sha256:' in entry
 
 
-@pytest.mark.parametrize('name', ['apt', 'dev'])
-def test_files_agree_on_versions(name: str) -> None:
-    """What is tested on wheels is what runs beside /opt/ros/jazzy."""
-    ours, wheels = pins(name), pins('ros-wheels')
-    assert {key: ours[key] for key in ours.keys() & wheels.keys()} == {
-        key: wheels[key] for key in ours.keys() & wheels.keys()
-    }
-    assert ours.keys() & wheels.keys()
+@pytest.mark.parametrize(('one', 'other'), itertools.combinations(pinned_names(FOLDER)[1:], 2))
+def test_files_agree_on_versions(one: str, other: str) -> None:
+    """What is tested on wheels runs beside /opt/ros/jazzy; no package undoes another's set-up."""
+    ours, theirs = pins(one), pins(other)
+    shared = ours.keys() & theirs.keys()
+    assert {key: ours[key] for key in shared} == {key: theirs[key] for key in shared}
+
+
+@pytest.mark.parametrize('name', sorted({*pinned_names(FOLDER)} - {*BASE}))
+def test_numpy_is_left_to_the_underlay(name: str) -> None:
+    """No addition replaces the numpy that the ROS below was built for."""
+    assert 'numpy' not in {package for package, _ in pins(name)}
 
 
 def test_what_a_person_wrote_is_pinned() -> None:

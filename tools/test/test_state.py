@@ -46,7 +46,7 @@ def test_writing_breaks_hard_links(tmp_path: Path) -> None:
 
 def test_state_round_trip(tmp_path: Path) -> None:
     """What is written is read."""
-    state = EnvironmentState('base', 'dev', '/usr/bin/python3')
+    state = EnvironmentState('base', {'dev': 'mark'}, '/usr/bin/python3')
     write_state(tmp_path / 'state', state)
     assert read_state(tmp_path / 'state') == state
 

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping, Sequence
 import contextlib
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +20,7 @@ from .system import check
 from .underlay import Underlay, UnderlayKind
 
 REQUIREMENTS = {UnderlayKind.SYSTEM: 'apt.txt', UnderlayKind.WHEELS: 'ros-wheels.txt'}
+DEV = 'dev'  # the requirements of tests and checks
 _TITLES = {
     UnderlayKind.SYSTEM: 'Installing the Python packages',
     UnderlayKind.WHEELS: 'Installing ROS 2 Jazzy and the Python packages',
@@ -72,12 +73,7 @@ class Environment:
         python = str(Path(self.python).resolve())
         return fingerprint(*ros, python, str(self.layout.venv), fingerprint_files(files))
 
-    @property
-    def dev(self) -> str:
-        """Fingerprint of the tools for testing."""
-        return fingerprint_files((self.layout.requirements / 'dev.txt',))
-
-    def steps(self, state: EnvironmentState | None, *, dev: bool) -> list[Step]:
+    def steps(self, state: EnvironmentState | None, names: Iterable[str]) -> list[Step]:
         """List what has to be done, nothing when all is there.
 
         Whatever changes the environment first takes its state away, so an interrupted change of
@@ -85,13 +81,23 @@ class Environment:
 
         Args:
             state: What the environment says that it holds.
-            dev: Whether the tools for testing are needed.
+            names: What is needed besides: `DEV`, and packages, of which some have a requirements
+                file of their own.
         """
         fresh = state is not None and state.base == self.base
+        there = state.additions if fresh and state is not None else {}
+        wanted = self._additions(names)
+        missing = {name: mark for name, mark in wanted.items() if there.get(name) != mark}
         steps = [] if fresh else self._base_steps()
-        if dev and not (fresh and state is not None and state.dev == self.dev):
-            steps.append(Step('Installing the tools for tests and checks', self._install_dev))
+        if missing:
+            title = f'Installing {" and ".join(map(_purpose, missing))}'
+            steps.append(Step(title, lambda runner: self._install_additions(runner, missing)))
         return steps
+
+    def _additions(self, names: Iterable[str]) -> dict[str, str]:
+        """Fingerprint the requirements files that stand beside the base, by name."""
+        paths = {name: self.layout.requirements / f'{name}.txt' for name in names}
+        return {name: fingerprint_files((path,)) for name, path in paths.items() if path.is_file()}
 
     def _base_steps(self) -> list[Step]:
         return [
@@ -116,7 +122,7 @@ class Environment:
         # only a missing network counts: that the old tools fail is no reason to keep them
         with contextlib.suppress(StepFailedError):
             self._pip(runner, 'download', '--dest', self.layout.venv / '.download')
-            self._uv_install(runner, self.requirements, '--dry-run')
+            self._uv_install(runner, [self.requirements], '--dry-run')
 
     def _make(self, runner: Runner) -> None:
         self.layout.state.unlink(missing_ok=True)
@@ -128,7 +134,7 @@ class Environment:
 
     def _install(self, runner: Runner) -> None:
         self._pip(runner, 'install')
-        self._uv_install(runner, self.requirements)
+        self._uv_install(runner, [self.requirements])
 
     def _pip(self, runner: Runner, *command: Argument) -> None:
         pip: list[Argument] = [self.layout.venv_python, '-m', 'pip', *command]
@@ -136,12 +142,14 @@ class Environment:
         requirements: list[Argument] = ['-r', self.layout.requirements / 'uv.txt']
         runner.run('The installer uv', [*pip, *options, '--only-binary', ':all:', *requirements])
 
-    def _uv_install(self, runner: Runner, requirements: Path, *options: str) -> None:
+    def _uv_install(self, runner: Runner, requirements: Sequence[Path], *options: str) -> None:
         python = self.layout.venv_python
         uv: list[Argument] = [python, '-m', 'uv', 'pip', 'install', '--require-hashes']
         uv += ['--python', python]
         # what must be built from source is built with pinned tools too
-        uv += ['--build-constraints', self.requirements, *options, '-r', requirements]
+        uv += ['--build-constraints', self.requirements, *options]
+        for path in requirements:
+            uv += ['-r', path]
         runner.run('The Python packages', uv, show=lambda line: line.lstrip().startswith(_NEWS))
 
     def _finish(self, runner: Runner) -> None:
@@ -151,19 +159,26 @@ class Environment:
         shell.write_setup_scripts(self.layout.venv, self.underlay, libraries)
         front_end = self.layout.root / 'tools' / 'ros2_frontend'
         shell.write_front_end(self.layout.venv, self.underlay, front_end)
-        write_state(self.layout.state, EnvironmentState(self.base, '', self.python))
+        write_state(self.layout.state, EnvironmentState(self.base, {}, self.python))
 
-    def _install_dev(self, runner: Runner) -> None:
+    def _install_additions(self, runner: Runner, additions: Mapping[str, str]) -> None:
         before = read_state(self.layout.state)
         self.layout.state.unlink(missing_ok=True)
+        paths = [self.layout.requirements / f'{name}.txt' for name in additions]
         try:
-            self._uv_install(runner, self.layout.requirements / 'dev.txt')
+            # the files are complete but for numpy, which is the underlay's
+            self._uv_install(runner, paths, '--no-deps')
         except NetworkError:
             # uv changes nothing before all is downloaded: what was there is whole
             if before is not None:
                 write_state(self.layout.state, before)
             raise
-        write_state(self.layout.state, EnvironmentState(self.base, self.dev, self.python))
+        held = {**(before.additions if before is not None else {}), **additions}
+        write_state(self.layout.state, EnvironmentState(self.base, held, self.python))
+
+
+def _purpose(name: str) -> str:
+    return 'the tools for tests and checks' if name == DEV else f'what {name} imports'
 
 
 def remove_environment(layout: Layout) -> None:

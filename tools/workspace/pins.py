@@ -4,12 +4,20 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from .layout import Layout
 from .process import Argument, Runner
 from .system import PYTHON_OLDEST
 
-# in this order: dev.in is constrained by what ros-wheels.txt says
-NAMES = ('uv', 'ros-wheels', 'apt', 'dev')
+COMMON = 'common'  # only included by others
+BASE = ('uv', 'ros-wheels', 'apt')
+
+
+def pinned_names(requirements: Path) -> list[str]:
+    """List the files to pin: the base, then what is constrained by its versions."""
+    found = sorted(path.stem for path in requirements.glob('*.in'))
+    return [*BASE, *(name for name in found if name not in {*BASE, COMMON})]
 
 
 def renew(layout: Layout, runner: Runner) -> None:
@@ -18,7 +26,7 @@ def renew(layout: Layout, runner: Runner) -> None:
     Raises:
         WorkspaceError: They cannot be fetched, or do not fit together.
     """
-    for name in NAMES:
+    for name in pinned_names(layout.requirements):
         print(f'Pinning {name}.in', flush=True)
         command: list[Argument] = [
             layout.venv / 'bin' / 'uv',
@@ -29,6 +37,9 @@ def renew(layout: Layout, runner: Runner) -> None:
         ]
         options = ['--python-version', '.'.join(map(str, PYTHON_OLDEST)), '--generate-hashes']
         options += ['--no-annotate', '--no-emit-index-url', '--quiet']
+        if name not in BASE:
+            # the message extensions of each ROS need the numpy that they were built for
+            options += ['--no-emit-package', 'numpy']
         options += ['--custom-compile-command', 'make pins', '--output-file', f'{name}.txt']
         where = Runner(runner.environ, layout.requirements, runner.lock)
         where.run(f'Pinning {name}.in', [*command, *options, f'{name}.in'])

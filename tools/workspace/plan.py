@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import time
 
 from .build import Builder
-from .environment import Environment, Step
+from .environment import DEV, Environment, Step
 from .packages import find_packages, needed_packages
 from .process import Runner
 from .state import read_state
@@ -20,7 +20,7 @@ class Wish:
     """What a target needs.
 
     Attributes:
-        dev: Whether the tools for testing.
+        dev: Whether the tools for testing, and all that any package imports.
         build: Whether any package.
         packages: Which ones; none means all.
     """
@@ -37,11 +37,12 @@ def plan(environment: Environment, wish: Wish) -> list[Step]:
         UnknownPackageError: A package is wished for that the workspace does not have.
     """
     layout = environment.layout
-    steps = environment.steps(read_state(layout.state), dev=wish.dev)
-    if not wish.build:
-        return steps
     found = find_packages(layout.root)
     packages = needed_packages(found, wish.packages, environment.underlay)
+    names = [DEV, *sorted(found)] if wish.dev else sorted(packages) if wish.build else []
+    steps = environment.steps(read_state(layout.state), names)
+    if not wish.build:
+        return steps
     builder = Builder(layout, environment.base, environment.underlay.kind)
     stale = builder.stale(builder.fingerprints(packages))
     wanted = needed_packages(found, (), environment.underlay)

@@ -52,12 +52,12 @@ class EnvironmentState:
 
     Attributes:
         base: Fingerprint of all that every target needs.
-        dev: Fingerprint of the tools for testing, empty when they are not there.
+        additions: Fingerprint of each further requirements file that was installed, by its name.
         python: Interpreter that the environment was made from.
     """
 
     base: str
-    dev: str
+    additions: dict[str, str]
     python: str
 
 
