@@ -6,17 +6,13 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-import os
 import sys
+
+from process_supervisor import supervise, SupervisorError, USAGE_ERROR
 
 from .exceptions import BringupError
 from .session import add_arguments, REAL_BUS, robots_epilog, session, SIMULATED_BUS
-from .stack import Executable
-from .supervisor import Notice, Outcome, ProcessSpec, Runner, Severity
-from .terminal import LineWriter, Painter, wants_colour
-
-USAGE_ERROR = 2
-"""Exit code when nothing was started."""
+from .stack import MASTER
 
 
 def parse(argv: Sequence[str] | None) -> argparse.Namespace:
@@ -42,41 +38,6 @@ def parse(argv: Sequence[str] | None) -> argparse.Namespace:
     return parser.parse_args(argv)
 
 
-def supervise(processes: Sequence[ProcessSpec]) -> Outcome:
-    """Run processes with their output on standard output, until Ctrl-C or one ends.
-
-    Args:
-        processes: What to run.
-
-    Returns:
-        How it ended.
-    """
-    names = [spec.name for spec in processes]
-    painter = Painter('bringup', names, wants_colour(sys.stdout, os.environ))
-    write = LineWriter(sys.stdout)
-    with Runner(
-        processes,
-        lambda name, line: write(painter.line(name, line)),
-        lambda notice: write(painter.notice(notice)),
-    ) as runner:
-        outcome = runner.run()
-    if outcome.exit_code:
-        write(painter.notice(Notice(Severity.ERROR, explain(outcome))))
-    return outcome
-
-
-def explain(outcome: Outcome) -> str:
-    """Say why a bring-up failed, with what the process wrote last.
-
-    Args:
-        outcome: How it ended.
-    """
-    if not outcome.last_lines:
-        return outcome.reason
-    quoted = '\n'.join(f'    {line}' for line in outcome.last_lines)
-    return f'{outcome.reason}; it wrote last:\n{quoted}'
-
-
 def main(argv: Sequence[str] | None = None) -> int:
     """Bring an arm up and stay until it is to go down.
 
@@ -87,11 +48,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         0 after Ctrl-C or SIGTERM, 1 when a process failed, 2 when nothing was started.
     """
     arguments = parse(argv)
-    master = Executable('arm_canopen', 'master')
     try:
-        with session(arguments, simulate=arguments.simulate, master=master) as arm:
+        with session(arguments, simulate=arguments.simulate, master=MASTER) as arm:
             sys.stdout.write(f'{arm.robot.name} on CAN bus {arm.bus}\n')
             return supervise(arm.processes).exit_code
-    except BringupError as error:
+    except (BringupError, SupervisorError) as error:
         sys.stderr.write(f'{error}\n')
         return USAGE_ERROR

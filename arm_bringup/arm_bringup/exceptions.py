@@ -7,12 +7,12 @@
     BringupError
     ├── RobotError (ValueError)   a robot folder is unknown or incomplete; lists what there is
     ├── DescriptionError (ValueError)   a xacro file cannot be expanded, or its URDF is not usable
-    ├── StartError (OSError)      a process of the bring-up cannot be started
     ├── WaveError (ValueError)    the wave cannot be planned within the limits of a joint
     ├── CallError                 a service of the arm refused, or did not answer in time
     └── GivenUpError              what is waited for is no longer wanted
 
-Arguments of the wrong kind from a *programmer* stay ``ValueError``/``TypeError``.
+What cannot be started is told by ``process_supervisor.StartError``. Arguments of the wrong
+kind from a *programmer* stay ``ValueError``/``TypeError``.
 """
 
 from __future__ import annotations
@@ -33,14 +33,6 @@ class DescriptionError(BringupError, ValueError):
     """A xacro file cannot be expanded, or the URDF that it makes is not usable.
 
     Scenarios: malformed XML, an undefined xacro property, a movable joint without limits.
-    """
-
-
-class StartError(BringupError, OSError):
-    """A process of the bring-up cannot be started.
-
-    Scenarios: the package is not built, the workspace is not sourced, another bring-up of this
-    user holds the bus.
     """
 
 

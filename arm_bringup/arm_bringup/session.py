@@ -13,12 +13,19 @@ from pathlib import Path
 import tempfile
 from typing import TYPE_CHECKING
 
+from process_supervisor import (
+    exclusive,
+    Executable,
+    find_executable,
+    ProcessSpec,
+    ros_domain,
+    write_parameters,
+)
+
 from .description import expand_xacro
-from .exceptions import RobotError, StartError
-from .exclusive import exclusive
+from .exceptions import RobotError
 from .robots import find_robot, installed_robots_folder, Robot, robot_names
-from .stack import arm_processes, Executable, find_executable, Stack, write_parameters
-from .supervisor import ProcessSpec
+from .stack import arm_processes, Stack
 
 if TYPE_CHECKING:
     from arm_canopen import NodeConfig
@@ -27,8 +34,8 @@ REAL_BUS = 'can0'
 """Bus without --can on hardware: never one on which only simulated drives could be."""
 SIMULATED_BUS = 'auto'
 """Bus without --can in simulation: vcan0 when it exists, else multicast on the loopback."""
-DOMAIN_MAX = 232
-"""Highest ROS domain whose UDP ports exist."""
+REMEDY = 'another bus with --can and another ROS_DOMAIN_ID'
+"""What a second bring-up is told to take."""
 INTERPOLATED_POSITION = 7
 """Mode of operation (CiA 402-2, 0x6060)."""
 
@@ -141,23 +148,6 @@ def stream_mode_service(drives: Sequence[NodeConfig]) -> str:
     return 'cyclic_position_mode'
 
 
-def ros_domain(environment: Mapping[str, str]) -> str:
-    """Return the ROS domain that all processes will be in.
-
-    Args:
-        environment: Environment variables.
-
-    Raises:
-        StartError: ROS_DOMAIN_ID is no domain; every process would fail with its own words.
-    """
-    domain = environment.get('ROS_DOMAIN_ID') or '0'
-    if not domain.isdecimal() or int(domain) > DOMAIN_MAX:
-        raise StartError(
-            f'ROS_DOMAIN_ID is {domain!r}; it must be a whole number from 0 to {DOMAIN_MAX}'
-        )
-    return domain
-
-
 @contextlib.contextmanager
 def session(
     arguments: argparse.Namespace,
@@ -187,8 +177,8 @@ def session(
     domain = ros_domain(os.environ)
     locks = Path(tempfile.gettempdir())
     with contextlib.ExitStack() as stack:
-        stack.enter_context(exclusive(f'bus {bus}', locks))
-        stack.enter_context(exclusive(f'ROS domain {domain}', locks))
+        stack.enter_context(exclusive(f'bus {bus}', locks, REMEDY))
+        stack.enter_context(exclusive(f'ROS domain {domain}', locks, REMEDY))
         folder = stack.enter_context(tempfile.TemporaryDirectory(prefix='arm_bringup-'))
         urdf = expand_xacro(robot.description)
         parameters = Path(folder) / 'robot_description.yaml'

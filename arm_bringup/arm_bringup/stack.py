@@ -4,16 +4,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-import json
-import os
 from pathlib import Path
 
-from .exceptions import StartError
-from .robots import Robot
-from .supervisor import ProcessSpec
+from process_supervisor import Executable, FindExecutable, LOG_FORMAT, node_argv, ProcessSpec
 
+from .robots import Robot
+
+MASTER = Executable('arm_canopen', 'master')
+"""What runs the bus unless something else is asked for."""
 MASTER_READY = r'all \d+ devices operational'
 """What the master logs when every drive of the bus has booted."""
 SLAVES_READY = r'\d+ simulated drives.* on '
@@ -23,22 +23,6 @@ PUBLISHER_READY = r'publishing \d+ joints'
 
 MASTER_FIRST, THEN_LISTENERS, SLAVES_LAST = range(3)
 """Order of stopping: the master disables the drives, so they must still be there."""
-
-FindExecutable = Callable[[str, str], 'Path | None']
-"""Package and executable to its file; None when the package does not exist."""
-
-
-@dataclass(frozen=True, slots=True)
-class Executable:
-    """An executable of a ROS package.
-
-    Attributes:
-        package: Name of the package.
-        name: Name of the executable.
-    """
-
-    package: str
-    name: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,19 +42,8 @@ class Stack:
     bus: str
     simulate: bool
     ready_timeout: float = 30.0
-    master: Executable = Executable('arm_canopen', 'master')
+    master: Executable = MASTER
     master_parameters: Mapping[str, str] = field(default_factory=dict)
-
-
-def write_parameters(file: Path, urdf: str) -> None:
-    """Write a ROS parameter file with the description of the robot, for every node.
-
-    Args:
-        file: Where to.
-        urdf: The description.
-    """
-    # a JSON string is a YAML string, whatever characters are in it
-    file.write_text(f'/**:\n  ros__parameters:\n    robot_description: {json.dumps(urdf)}\n')
 
 
 def arm_processes(stack: Stack, parameters: Path, find: FindExecutable) -> list[ProcessSpec]:
@@ -78,7 +51,7 @@ def arm_processes(stack: Stack, parameters: Path, find: FindExecutable) -> list[
 
     Args:
         stack: What is to be brought up.
-        parameters: The file of :func:`write_parameters`.
+        parameters: The file of :func:`process_supervisor.write_parameters`.
         find: Finds executables.
 
     Returns:
@@ -102,7 +75,7 @@ def _slaves(stack: Stack, bus: Mapping[str, str], find: FindExecutable) -> Proce
         return None
     return ProcessSpec(
         name='slaves',
-        argv=_argv(Executable('arm_canopen', 'fake_slaves'), find, bus),
+        argv=node_argv(Executable('arm_canopen', 'fake_slaves'), find, bus),
         environment=LOG_FORMAT,
         ready=SLAVES_READY,
         ready_timeout=stack.ready_timeout,
@@ -115,7 +88,7 @@ def _master(
 ) -> ProcessSpec:
     return ProcessSpec(
         name='master',
-        argv=_argv(stack.master, find, {**bus, **stack.master_parameters}, parameters),
+        argv=node_argv(stack.master, find, {**bus, **stack.master_parameters}, parameters),
         environment=LOG_FORMAT,
         ready=MASTER_READY,
         ready_timeout=stack.ready_timeout,
@@ -127,7 +100,7 @@ def _publisher(stack: Stack, parameters: Path, find: FindExecutable) -> ProcessS
     executable = Executable('arm_canopen', 'canopen_joint_state_publisher')
     return ProcessSpec(
         name='joint_states',
-        argv=_argv(executable, find, {}, parameters),
+        argv=node_argv(executable, find, {}, parameters),
         environment=LOG_FORMAT,
         ready=PUBLISHER_READY,
         ready_timeout=stack.ready_timeout,
@@ -141,56 +114,8 @@ def _state_publisher(parameters: Path, find: FindExecutable) -> ProcessSpec | No
         return None  # not on PyPI; the arm moves without TF
     return ProcessSpec(
         name='robot_state',
-        argv=_argv(Executable(name, name), find, {}, parameters),
+        argv=node_argv(Executable(name, name), find, {}, parameters),
         environment=LOG_FORMAT,
         required=False,
         stop_order=THEN_LISTENERS,
     )
-
-
-LOG_FORMAT = {
-    'RCUTILS_CONSOLE_OUTPUT_FORMAT': '[{severity}] [{name}]: {message}',
-    'RCUTILS_COLORIZED_OUTPUT': '0',
-    'PYTHONUNBUFFERED': '1',
-}
-"""Short lines without colours: the bring-up adds its own, and searches in them."""
-
-
-def _argv(
-    executable: Executable,
-    find: FindExecutable,
-    values: Mapping[str, str],
-    parameters: Path | None = None,
-) -> tuple[str, ...]:
-    file = find(executable.package, executable.name)
-    if file is None:
-        raise StartError(
-            f'the package {executable.package} is not in AMENT_PREFIX_PATH; '
-            'build the workspace (make build) and source env.sh'
-        )
-    if not os.access(file, os.X_OK):
-        raise StartError(f'{file} does not exist; build the workspace (make build)')
-    argv = [str(file), '--ros-args']
-    if parameters is not None:
-        argv += ['--params-file', str(parameters)]
-    for name, value in values.items():
-        argv += ['-p', f'{name}:={value}']
-    return tuple(argv)
-
-
-def find_executable(package: str, name: str) -> Path | None:
-    """Find an executable as ``ros2 run`` does.
-
-    Args:
-        package: Its package.
-        name: Its name.
-
-    Returns:
-        Where it should be; None when the package does not exist.
-    """
-    from ament_index_python import get_package_prefix, PackageNotFoundError
-
-    try:
-        return Path(get_package_prefix(package)) / 'lib' / package / name
-    except PackageNotFoundError:
-        return None

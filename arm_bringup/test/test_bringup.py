@@ -14,7 +14,9 @@ import subprocess
 import sys
 
 import pytest
-from small_processes import PATIENCE
+
+PATIENCE = 30.0
+"""Longest time in [s] that a test waits for something that should happen at once."""
 
 PACKAGE = Path(__file__).parents[1]
 PANDA = PACKAGE / 'robots' / 'panda'
@@ -53,7 +55,10 @@ class Workspace:
         self.environment = {
             **os.environ,
             'AMENT_PREFIX_PATH': f'{folder / "prefix"}:{arm_bringup}',
-            'PYTHONPATH': os.pathsep.join([str(PACKAGE), str(PACKAGE.parent / 'arm_canopen')]),
+            'PYTHONPATH': os.pathsep.join(
+                str(PACKAGE.parent / name)
+                for name in ('arm_bringup', 'arm_canopen', 'process_supervisor')
+            ),
             'TMPDIR': str(folder),  # its locks are nobody else's
         }
 

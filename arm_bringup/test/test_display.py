@@ -12,8 +12,7 @@ from rich.console import Console
 from arm_bringup.demo.display import choose_display, LineDisplay, Setting, TableDisplay
 from arm_bringup.demo.figures import DriveFigures, Figures
 from arm_bringup.description import JointLimits
-from arm_bringup.supervisor import Notice, Severity
-from arm_bringup.terminal import LineWriter, Painter
+from process_supervisor import LineWriter, Notice, Painter, Severity
 
 JOINTS = [f'joint{i}' for i in range(7)]
 SETTING = Setting(

@@ -11,9 +11,9 @@ import runpy
 
 import pytest
 
-from arm_bringup.exceptions import RobotError, StartError
+from arm_bringup.exceptions import RobotError
 from arm_bringup.robots import find_robot, robot_names
-from arm_bringup.session import read_drives, ros_domain, stream_mode_service
+from arm_bringup.session import read_drives, stream_mode_service
 from arm_canopen import load_bus
 
 ROBOTS = Path(__file__).parents[1] / 'robots'
@@ -103,17 +103,3 @@ def test_the_dcf_of_the_prbt_is_made_of_the_same_eds() -> None:
     tool = runpy.run_path(str(ROBOTS.parent / 'tools' / 'make_prbt_dcf.py'))
     eds = ROBOTS.parents[1] / 'arm_canopen' / 'eds' / 'cia402_drive.eds'
     assert (ROBOTS / 'prbt' / 'prbt_0_1.dcf').read_text() == tool['derive'](eds.read_text())
-
-
-@pytest.mark.parametrize(('given', 'domain'), [(None, '0'), ('', '0'), ('7', '7'), ('232', '232')])
-def test_the_ros_domain_is_that_of_the_environment(given: str | None, domain: str) -> None:
-    """Zero when there is none."""
-    environment = {} if given is None else {'ROS_DOMAIN_ID': given}
-    assert ros_domain(environment) == domain
-
-
-@pytest.mark.parametrize('given', ['abc', '-1', '233', '1.5'])
-def test_what_is_no_ros_domain_is_refused_before_anything_starts(given: str) -> None:
-    """With one sentence instead of a traceback of each process."""
-    with pytest.raises(StartError, match=f'{given}.*0 to 232'):
-        ros_domain({'ROS_DOMAIN_ID': given})

@@ -7,12 +7,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-import yaml
 
-from arm_bringup.exceptions import StartError
 from arm_bringup.robots import Robot
-from arm_bringup.stack import arm_processes, Executable, Stack, write_parameters
-from arm_bringup.supervisor import ProcessSpec
+from arm_bringup.stack import arm_processes, Stack
+from process_supervisor import Executable, ProcessSpec, StartError
 
 ROBOT = Robot('panda', Path('/robots/panda/bus.yml'), Path('/robots/panda/panda.urdf.xacro'))
 PARAMETERS = Path('/tmp/parameters.yaml')
@@ -96,13 +94,3 @@ def test_a_workspace_that_is_not_built_says_so(tmp_path: Path) -> None:
         arm_processes(stack, PARAMETERS, lambda package, name: None)
     with pytest.raises(StartError, match=r'fake_slaves does not exist.*make build'):
         arm_processes(stack, PARAMETERS, lambda package, name: tmp_path / name)
-
-
-@pytest.mark.parametrize('urdf', ['<a b="c: d"/>', '# no comment\n\t<x/>', "it's ü \\ \u2028"])
-def test_a_description_survives_the_parameter_file(tmp_path: Path, urdf: str) -> None:
-    """Whatever characters are in it."""
-    file = tmp_path / 'parameters.yaml'
-    write_parameters(file, urdf)
-    assert yaml.safe_load(file.read_text()) == {
-        '/**': {'ros__parameters': {'robot_description': urdf}}
-    }

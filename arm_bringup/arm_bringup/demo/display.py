@@ -14,9 +14,9 @@ from typing import Protocol
 from rich.console import Console
 from rich.live import Live
 
+from process_supervisor import LineWriter, Notice, Painter, Severity, severity_of
+
 from ..description import JointLimits
-from ..supervisor import Notice, Severity
-from ..terminal import LineWriter, Painter, severity_of
 from .figures import Figures
 from .report import progress_line
 from .table import fits, render, Scene

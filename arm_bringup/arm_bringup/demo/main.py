@@ -13,13 +13,21 @@ import threading
 
 from rich.console import Console
 
-from ..bringup import explain, USAGE_ERROR
+from process_supervisor import (
+    Executable,
+    explain,
+    LineWriter,
+    Outcome,
+    Painter,
+    Runner,
+    SupervisorError,
+    USAGE_ERROR,
+    wants_colour,
+)
+
 from ..description import joint_limits
 from ..exceptions import BringupError
 from ..session import add_arguments, robots_epilog, Session, session, SIMULATED_BUS
-from ..stack import Executable
-from ..supervisor import Outcome, Runner
-from ..terminal import LineWriter, Painter, wants_colour
 from .display import choose_display, Setting, TableDisplay
 from .play import Client, Play, REFRESH
 
@@ -177,6 +185,6 @@ def main(argv: Sequence[str] | None = None) -> int:
             arguments, simulate=True, master=WAVE_MASTER, master_parameters=parameters
         ) as arm:
             return run(arm, arguments.duration)
-    except BringupError as error:
+    except (BringupError, SupervisorError) as error:
         sys.stderr.write(f'{error}\n')
         return USAGE_ERROR

@@ -11,8 +11,9 @@ import threading
 import time
 from typing import Protocol
 
+from process_supervisor import Outcome, Phase
+
 from ..exceptions import CallError, GivenUpError
-from ..supervisor import Outcome, Phase
 from .display import Display
 from .figures import Figures
 from .report import problems, summary_lines, warnings

@@ -11,7 +11,7 @@ from signal import Signals
 from hypothesis import given
 from hypothesis import strategies as st
 
-from arm_bringup.supervisor.stopping import StopSequence
+from process_supervisor.stopping import StopSequence
 
 STEPS = ((Signals.SIGINT, 5.0), (Signals.SIGTERM, 2.0), (Signals.SIGKILL, 1.0))
 

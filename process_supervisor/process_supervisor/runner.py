@@ -18,7 +18,7 @@ import time
 from types import TracebackType
 from typing import final
 
-from ..exceptions import StartError
+from .exceptions import StartError
 from .guardian import GuardianLink
 from .lines import LineSplitter
 from .spec import ProcessSpec

@@ -12,7 +12,7 @@ import math
 import re
 from signal import Signals
 
-from ..exceptions import StartError
+from .exceptions import StartError
 from .spec import ProcessSpec
 from .stopping import StopSequence
 

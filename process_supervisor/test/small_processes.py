@@ -11,7 +11,7 @@ from signal import Signals
 import sys
 import time
 
-from arm_bringup.supervisor import ProcessSpec, StopStep
+from process_supervisor import ProcessSpec, StopStep
 
 PATIENCE = 30.0
 """Longest time in [s] that a test waits for something that should happen at once."""

@@ -17,8 +17,8 @@ import threading
 import pytest
 from small_processes import PATIENCE, program, wait_for_end
 
-from arm_bringup.supervisor import Notice, Outcome, ProcessSpec, Runner
-from arm_bringup.supervisor.runner import LEAVE_SIGNALS
+from process_supervisor import Notice, Outcome, ProcessSpec, Runner
+from process_supervisor.runner import LEAVE_SIGNALS
 
 
 class Watch:
@@ -202,7 +202,7 @@ def test_a_killed_guardian_is_no_reason_to_end() -> None:
 
 SUPERVISOR = textwrap.dedent("""
     import sys
-    from arm_bringup.supervisor import Runner
+    from process_supervisor import Runner
     from small_processes import program
     specs = [
         program('deaf', 'slaves', ready='ready', stop_order=2),

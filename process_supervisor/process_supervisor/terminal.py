@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import re
 from typing import TextIO
 
-from .supervisor import Notice, Severity
+from .supervision import Notice, Severity
 
 RESET = '\x1b[0m'
 BOLD = '\x1b[1m'

@@ -8,8 +8,7 @@ import io
 
 import pytest
 
-from arm_bringup.supervisor import Notice, Severity
-from arm_bringup.terminal import LineWriter, Painter, severity_of, wants_colour
+from process_supervisor import LineWriter, Notice, Painter, Severity, severity_of, wants_colour
 
 
 class Terminal(io.StringIO):

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""One bring-up per bus and per ROS domain: a second one would only disturb the first."""
+"""One bring-up per bus, port and ROS domain: a second one would only disturb the first."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .exceptions import StartError
 
 
 @contextlib.contextmanager
-def exclusive(thing: str, folder: Path) -> Iterator[None]:
+def exclusive(thing: str, folder: Path, remedy: str) -> Iterator[None]:
     """Hold a lock on something, as long as the block runs.
 
     The kernel gives the lock back when this process ends, however it ends.
@@ -23,11 +23,12 @@ def exclusive(thing: str, folder: Path) -> Iterator[None]:
     Args:
         thing: What is used, as the user knows it: ``bus vcan0``.
         folder: Folder for the lock file.
+        remedy: What to take instead, for the message: ``another bus with --can``.
 
     Raises:
         StartError: Another process holds it; the message says which.
     """
-    file = folder / f'arm_bringup-{os.getuid()}-{re.sub("[^A-Za-z0-9.]+", "-", thing)}.lock'
+    file = folder / f'bringup-{os.getuid()}-{re.sub("[^A-Za-z0-9.]+", "-", thing)}.lock'
     # not truncated yet: it has the pid of the process that holds the lock
     descriptor = os.open(file, os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_NOFOLLOW, 0o600)
     with os.fdopen(descriptor, 'r+', encoding='ascii') as lock:
@@ -36,8 +37,8 @@ def exclusive(thing: str, folder: Path) -> Iterator[None]:
         except BlockingIOError as error:
             lock.seek(0)
             raise StartError(
-                f'another bring-up (process {lock.read().strip()}) is on {thing}; stop it, or '
-                'take another bus with --can and another ROS_DOMAIN_ID'
+                f'another bring-up (process {lock.read().strip()}) is on {thing}; stop it, '
+                f'or take {remedy}'
             ) from error
         lock.truncate(0)
         lock.write(f'{os.getpid()}\n')

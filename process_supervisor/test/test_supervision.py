@@ -8,8 +8,15 @@ from signal import Signals
 
 import pytest
 
-from arm_bringup.exceptions import StartError
-from arm_bringup.supervisor import Notice, Outcome, Phase, ProcessSpec, Severity, Supervision
+from process_supervisor import (
+    Notice,
+    Outcome,
+    Phase,
+    ProcessSpec,
+    Severity,
+    StartError,
+    Supervision,
+)
 
 
 class Bench:

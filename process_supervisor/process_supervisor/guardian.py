@@ -110,7 +110,7 @@ class GuardianLink:
 
     def __init__(self) -> None:
         """Start the guardian."""
-        package = Path(__file__).resolve().parents[1]
+        package = Path(__file__).resolve().parent
         code = (
             f'import sys; sys.path.insert(0, {str(package.parent)!r})\n'
             f'from {__name__} import main; main()'

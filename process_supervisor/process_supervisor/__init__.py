@@ -1,0 +1,63 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""A process supervisor: starts processes, waits until they are ready, stops them in order.
+
+The decisions are in :mod:`.supervision` and :mod:`.stopping`, which know no process, no clock and
+no signal handler: they are told what happened and when, and say what to do through callables.
+:mod:`.runner` does it with real processes; :mod:`.guardian` does it when the runner was killed.
+
+Around it stands what the bring-ups of all robots need: :mod:`.nodes` finds the executables of ROS
+packages, :mod:`.exclusive` keeps a second bring-up away, :mod:`.terminal` and :mod:`.console` show
+what the processes write.
+"""
+
+from .console import explain, supervise, USAGE_ERROR
+from .exceptions import StartError, SupervisorError
+from .exclusive import exclusive
+from .nodes import (
+    Executable,
+    find_executable,
+    FindExecutable,
+    first_found,
+    LOG_FORMAT,
+    node_argv,
+    ros_domain,
+    write_parameters,
+)
+from .runner import Runner
+from .spec import POLITE, ProcessSpec, StopStep
+from .supervision import Notice, Outcome, Phase, Severity, Supervision
+from .terminal import is_smart, LineWriter, Painter, severity_of, wants_colour
+
+__version__ = '0.1.0'
+
+__all__ = [
+    'LOG_FORMAT',
+    'POLITE',
+    'USAGE_ERROR',
+    'Executable',
+    'FindExecutable',
+    'LineWriter',
+    'Notice',
+    'Outcome',
+    'Painter',
+    'Phase',
+    'ProcessSpec',
+    'Runner',
+    'Severity',
+    'StartError',
+    'StopStep',
+    'Supervision',
+    'SupervisorError',
+    'exclusive',
+    'explain',
+    'find_executable',
+    'first_found',
+    'is_smart',
+    'node_argv',
+    'ros_domain',
+    'severity_of',
+    'supervise',
+    'wants_colour',
+    'write_parameters',
+]

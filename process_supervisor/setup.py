@@ -1,0 +1,22 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Build description of process_supervisor."""
+
+from setuptools import find_packages, setup
+
+setup(
+    name='process_supervisor',
+    version='0.1.0',
+    packages=find_packages(include=['process_supervisor', 'process_supervisor.*']),
+    package_data={'process_supervisor': ['py.typed']},
+    data_files=[
+        ('share/ament_index/resource_index/packages', ['resource/process_supervisor']),
+        ('share/process_supervisor', ['package.xml']),
+    ],
+    install_requires=['setuptools'],
+    zip_safe=True,
+    maintainer='The arm and quad developers',
+    maintainer_email='developers@example.org',
+    description='Starts the processes of a robot, waits until they are ready, stops them in order',
+    license='Apache-2.0',
+)
