@@ -1,0 +1,41 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Everything that quad_controller raises.
+
+::
+
+    QuadControllerError
+    ├── DescriptionError (ValueError)   a URDF is no quadruped that this package can walk with
+    ├── ParameterError (ValueError)     a parameter is outside of what makes sense
+    └── PolicyError (ValueError)        an ONNX policy does not fit this robot; names what differs
+
+Requests that can be refused while the robot runs (a mode, a velocity) raise nothing: they are
+answered with a reason. Arguments of the wrong kind from a *programmer* stay ``ValueError``.
+"""
+
+from __future__ import annotations
+
+
+class QuadControllerError(Exception):
+    """Root of all errors of this package."""
+
+
+class DescriptionError(QuadControllerError, ValueError):
+    """A robot description does not describe a quadruped that this package can walk with.
+
+    Scenarios: it is no XML, a leg's joint is missing, a hip does not turn about the x axis.
+    """
+
+
+class ParameterError(QuadControllerError, ValueError):
+    """A parameter is outside of what makes sense.
+
+    Scenarios: a duty of 1.2, a height that the legs do not reach, a misspelt name.
+    """
+
+
+class PolicyError(QuadControllerError, ValueError):
+    """A policy does not fit this robot, or cannot be loaded.
+
+    Scenarios: joints in the file that the robot lacks, another observation width, no metadata.
+    """
