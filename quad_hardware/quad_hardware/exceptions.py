@@ -1,0 +1,45 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Everything that quad_hardware raises.
+
+::
+
+    HardwareError
+    ├── CodecError (ValueError)        a value does not fit its field, or bytes are no payload
+    ├── CommandError (ValueError)      a joint command or a mapping is refused; nothing was sent
+    └── LinkError (OSError)            a serial port cannot be opened, or was lost
+        └── NoAnswerError (TimeoutError)   no robot answers on a port that is open
+
+Arguments of the wrong kind from a *programmer* stay ``ValueError``/``TypeError``.
+"""
+
+from __future__ import annotations
+
+
+class HardwareError(Exception):
+    """Root of all errors of this package."""
+
+
+class CodecError(HardwareError, ValueError):
+    """A value does not fit its field on the wire, or received bytes are no valid payload."""
+
+
+class CommandError(HardwareError, ValueError):
+    """A joint command or a joint mapping is refused before a byte was sent.
+
+    Scenarios: NaN or infinite positions, a wrong number of joints, an unknown joint name.
+    """
+
+
+class LinkError(HardwareError, OSError):
+    """A serial port cannot be opened, or the connection was lost.
+
+    Scenarios: no such device, no permission, the USB cable was pulled.
+    """
+
+
+class NoAnswerError(LinkError, TimeoutError):
+    """A port is open and no robot answers on it.
+
+    Scenarios: the robot is off, another program reads the same port, another baud rate.
+    """

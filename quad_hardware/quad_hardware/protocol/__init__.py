@@ -1,0 +1,89 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+r"""Both serial protocols of the XGO: one table each, codecs and a stream parser for both sides.
+
+The driver, the simulated robot, ``xgo_lib2`` and the protocol page all read these tables::
+
+    robot = StreamParser(OLD, HOST_KINDS)  # what a robot hears
+    for frame in robot.feed(port.read(4096)):
+        if frame.kind is Kind.READ and frame.address == Register.BATTERY:
+            port.write(Frame(Kind.REPLY, frame.address, b'\x55').encode(OLD))
+"""
+
+from .feedback import decode_feedback, Feedback
+from .frame import checksum, Frame
+from .function_table import Code, Fault, NEW, Refusal, STATE
+from .motors import (
+    ANGLE_SPANS,
+    ARM_MOTORS,
+    BULK_READ_ORDER,
+    LEG_MOTORS,
+    MOTOR_OF_JOINT,
+    MOTOR_ORDER,
+    slot_of,
+)
+from .parser import ParserCounters, StreamParser
+from .register_table import (
+    ACTION_RESET,
+    model_of_firmware,
+    MOTOR_OF_REGISTER,
+    OLD,
+    Register,
+    REGISTER_OF_MOTOR,
+    scatter,
+    Torque,
+)
+from .schema import (
+    Access,
+    Field,
+    Function,
+    HOST_KINDS,
+    Kind,
+    Model,
+    Protocol,
+    ROBOT_KINDS,
+    Scalar,
+    Span,
+)
+
+PROTOCOLS = (NEW, OLD)  # in the order of probing
+
+__all__ = [
+    'ACTION_RESET',
+    'ANGLE_SPANS',
+    'ARM_MOTORS',
+    'BULK_READ_ORDER',
+    'HOST_KINDS',
+    'LEG_MOTORS',
+    'MOTOR_OF_JOINT',
+    'MOTOR_OF_REGISTER',
+    'MOTOR_ORDER',
+    'NEW',
+    'OLD',
+    'PROTOCOLS',
+    'REGISTER_OF_MOTOR',
+    'ROBOT_KINDS',
+    'STATE',
+    'Access',
+    'Code',
+    'Fault',
+    'Feedback',
+    'Field',
+    'Frame',
+    'Function',
+    'Kind',
+    'Model',
+    'ParserCounters',
+    'Protocol',
+    'Refusal',
+    'Register',
+    'Scalar',
+    'Span',
+    'StreamParser',
+    'Torque',
+    'checksum',
+    'decode_feedback',
+    'model_of_firmware',
+    'scatter',
+    'slot_of',
+]

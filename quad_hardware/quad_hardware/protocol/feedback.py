@@ -1,0 +1,108 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The state frame of the new protocol as a value, both ways."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import math
+
+from ..exceptions import CodecError
+from .frame import Frame
+from .function_table import SLOTS, STATE
+from .schema import Kind
+
+Vector = tuple[float, float, float]
+Slots = tuple[float, ...]
+
+NO_VALUES: Slots = (0.0,) * SLOTS
+
+
+@dataclass(frozen=True, slots=True)
+class Feedback:
+    """State of a robot at one moment, in the units of the wire.
+
+    Attributes:
+        battery: Charge [%].
+        mode: Mode of the board.
+        faults: Bits of :class:`~.function_table.Fault`.
+        device_time: Clock of the board [ms], wraps at 2³².
+        attitude: Fused roll, pitch, yaw (fixed axes x, y, z) [deg].
+        raw_attitude: Unfused attitude [deg]; not to be used.
+        acceleration: Specific force x, y, z [m/s²]; +9.8 upwards at rest.
+        position: Angles by slot [deg].
+        velocity: Velocities by slot [deg/s].
+        load: Loads by slot [%].
+        temperature: Temperatures by slot [°C].
+        battery_voltage: Voltage of the battery [V].
+        sequence: Counts frames modulo 2¹⁶.
+    """
+
+    battery: int = 100
+    mode: int = 0
+    faults: int = 0
+    device_time: int = 0
+    attitude: Vector = (0.0, 0.0, 0.0)
+    raw_attitude: Vector = (0.0, 0.0, 0.0)
+    acceleration: Vector = (0.0, 0.0, 9.8)
+    position: Slots = NO_VALUES
+    velocity: Slots = NO_VALUES
+    load: Slots = NO_VALUES
+    temperature: Slots = NO_VALUES
+    battery_voltage: float = 0.0
+    sequence: int = 0
+
+    def frame(self) -> Frame:
+        """Return the frame that a robot pushes.
+
+        Raises:
+            CodecError: A value does not fit its field.
+        """
+        payload = STATE.pack(
+            battery=(self.battery,),
+            mode=(self.mode,),
+            faults=(self.faults,),
+            device_time=(self.device_time,),
+            euler1=self.raw_attitude,
+            euler2=self.attitude,
+            acceleration=self.acceleration,
+            position=self.position,
+            velocity=self.velocity,
+            load=self.load,
+            temperature=self.temperature,
+            battery_voltage=(self.battery_voltage,),
+            sequence=(self.sequence,),
+        )
+        return Frame(Kind.PUSH, STATE.address, payload)
+
+
+def decode_feedback(payload: bytes) -> Feedback:
+    """Decode the payload of a state frame.
+
+    Raises:
+        CodecError: The payload has another length, or a number in it is not finite.
+    """
+    values = STATE.unpack(payload)
+    for name, numbers in values.items():
+        if name != 'euler1' and not all(map(math.isfinite, numbers)):
+            raise CodecError(f'state frame: {name} holds {numbers}, which is no finite number')
+    return Feedback(
+        battery=int(values['battery'][0]),
+        mode=int(values['mode'][0]),
+        faults=int(values['faults'][0]),
+        device_time=int(values['device_time'][0]),
+        attitude=_vector(values['euler2']),
+        raw_attitude=_vector(values['euler1']),
+        acceleration=_vector(values['acceleration']),
+        position=values['position'],
+        velocity=values['velocity'],
+        load=values['load'],
+        temperature=values['temperature'],
+        battery_voltage=values['battery_voltage'][0],
+        sequence=int(values['sequence'][0]),
+    )
+
+
+def _vector(values: tuple[float, ...]) -> Vector:
+    x, y, z = values
+    return x, y, z

@@ -1,0 +1,58 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Frames of both protocols as values, and their bytes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..exceptions import CodecError
+from .schema import Kind, Protocol
+
+HEADER = b'\x55\x00'
+TAIL = b'\x00\xaa'
+LENGTH_AT, KIND_AT, ADDRESS_AT = 2, 3, 4  # [B] from the start of a frame
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """One frame.
+
+    Attributes:
+        kind: What it is for.
+        address: Register (old protocol), or ``main << 8 | sub`` (new protocol).
+        payload: Data; of a READ of the old protocol, one byte: how many to read.
+    """
+
+    kind: Kind
+    address: int
+    payload: bytes = b''
+
+    def encode(self, protocol: Protocol) -> bytes:
+        """Return the bytes on the wire.
+
+        Raises:
+            CodecError: The payload is too long, the address too large, or the protocol has no
+                such kind of frame.
+        """
+        length = protocol.overhead + len(self.payload)
+        if length > protocol.max_length:
+            raise CodecError(
+                f'payload of {len(self.payload)} bytes: a frame of the {protocol.name} protocol '
+                f'takes {protocol.max_length - protocol.overhead}; send it in parts'
+            )
+        if self.kind not in protocol.kinds:
+            raise CodecError(f'the {protocol.name} protocol has no frame of kind {self.kind.name}')
+        try:
+            address = self.address.to_bytes(protocol.address_size, 'big')
+        except OverflowError as error:
+            raise CodecError(
+                f'address {self.address:#x} does not fit the {protocol.name} protocol'
+            ) from error
+        body = bytes((length, self.kind)) + address + self.payload
+        return HEADER + body + bytes((checksum(body),)) + TAIL
+
+
+def checksum(body: bytes | bytearray | memoryview) -> int:
+    """Return the checksum of what stands between header and checksum."""
+    return 255 - sum(body) % 256

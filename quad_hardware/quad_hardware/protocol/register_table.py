@@ -1,0 +1,234 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The table of the old protocol: one-byte registers at 115200 baud.
+
+Public: the vendor's serial protocol page and its Python libraries (XGO-PythonLib 1.0.0, xgolib
+1.1.5). A register is a function code and no memory cell: 0x62 answers four bytes, 0x63 four
+others. Writes of several bytes do run through consecutive codes. Numbers of several bytes are
+little-endian in 0x62 to 0x65 and big-endian elsewhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from enum import IntEnum
+
+from .motors import ANGLE_SPANS, LEG_MOTORS
+from .schema import Access, Field, Function, Kind, Model, Protocol, Scalar, Span, table
+
+R, W, RW = Access.READ, Access.WRITE, Access.READ | Access.WRITE
+
+GRAVITY = 9.8  # [m/s²] what the vendor's library multiplies the accelerometer's g with
+ACCELERATION_STEP = GRAVITY / 16384  # [m/s²]
+RATE_STEP = 1 / 16.4  # [deg/s]
+
+
+class Register(IntEnum):
+    """Codes that the driver uses by name."""
+
+    BATTERY = 0x01
+    FIRMWARE = 0x07
+    TORQUE = 0x20
+    VX = 0x30
+    VY = 0x31
+    VYAW = 0x32
+    ACTION = 0x3E
+    MOTORS = 0x50
+    MOTOR_SPEED = 0x5C
+    BALANCE = 0x61
+    IMU = 0x65
+
+
+class Torque(IntEnum):
+    """Values of register 0x20; a leg (1 to 4, 5 the arm) is added to the last two."""
+
+    UNLOAD_ALL = 0x01
+    LOAD_ALL = 0x00
+    UNLOAD_LEG = 0x10
+    LOAD_LEG = 0x20
+
+
+ACTION_RESET = 255  # of register 0x3E: stop and stand in the default pose
+BULK_READ_SIZE = 15  # [B] at 0x50: 12 legs, then 51, 52 and 53
+
+ARM_REGISTERS: Mapping[int, int] = {51: 0x71, 52: 0x5D, 53: 0x5E, 54: 0x70}
+MOTOR_OF_REGISTER: Mapping[int, int] = {
+    **{Register.MOTORS + index: motor for index, motor in enumerate(LEG_MOTORS)},
+    **{register: motor for motor, register in ARM_REGISTERS.items()},
+}
+REGISTER_OF_MOTOR: Mapping[int, int] = {m: r for r, m in MOTOR_OF_REGISTER.items()}
+
+Spans = Mapping[Model, Span]
+
+
+def _spans(mini: tuple[float, float], lite: tuple[float, float] | None = None) -> Spans:
+    """Return ranges by model; mini2SW and mini3W are taken to have those of the mini."""
+    low, high = Span(*mini), Span(*(lite or mini))
+    return {Model.MINI: low, Model.LITE: high, Model.WHEELED: low}
+
+
+def _byte(
+    code: int,
+    name: str,
+    meaning: str,
+    spans: Spans | None = None,
+    unit: str = '',
+    *,
+    access: Access = W,
+) -> Function:
+    field = Field('value', Scalar.U8)
+    return Function(code, name, access, (field,), meaning, spans=spans or {}, unit=unit)
+
+
+def _row(
+    code: int, name: str, access: Access, meaning: str, *fields: Field, variable: bool = False
+) -> Function:
+    return Function(code, name, access, fields, meaning, variable=variable)
+
+
+def _float(code: int, name: str) -> Function:
+    return _row(code, name, R, 'attitude', Field('value', Scalar.F32, unit='deg'))
+
+
+def _system_rows() -> Iterator[Function]:
+    yield _byte(0x01, 'battery', '0 to 100', unit='%', access=R)
+    yield _byte(0x03, 'perform', '1 loops the demo actions, 0 stops')
+    yield _byte(0x04, 'calibration', '1 starts, 0 ends and stores the servo zeros: dangerous')
+    yield _byte(0x05, 'upgrade', '1: the board answers 0x55, then takes firmware at 350000 baud')
+    yield _byte(0x06, 'set_origin', '1 makes the present attitude the origin')
+    yield _row(
+        0x07,
+        'firmware',
+        R,
+        'ASCII, padded with NUL; M mini, L lite, R rider, W or MW wheeled',
+        Field('text', Scalar.U8, count=10),
+    )
+    yield _byte(0x09, 'gait', '0 trot, 1 walk, 2 high walk, 3 slow trot')
+    name = Field('text', Scalar.U8, count=10)
+    yield _row(0x13, 'bluetooth_name', W, 'ASCII, up to 10 characters', name, variable=True)
+    yield _byte(0x20, 'torque', '01 unload all, 00 load all, 10+leg unload, 20+leg load')
+    yield _byte(0x21, 'teach_record', 'pose id')
+    yield _byte(0x22, 'teach_play', 'pose id')
+    yield _byte(0x23, 'teach_arm_record', 'pose id')
+    yield _byte(0x24, 'teach_arm_play', 'pose id')
+
+
+def _motion_rows() -> Iterator[Function]:
+    yield _byte(0x30, 'vx', 'step length forward, 0x80 stops', _spans((-25, 25)), 'mm')
+    yield _byte(0x31, 'vy', 'step length left, 0x80 stops', _spans((-18, 18)), 'mm')
+    yield _byte(0x32, 'vyaw', 'turning rate, 0x80 stops', _spans((-100, 100)), 'deg/s')
+    yield _byte(0x33, 'body_x', 'body translation', _spans((-35, 35), (-25, 25)), 'mm')
+    yield _byte(0x34, 'body_y', 'body translation', _spans((-19.5, 19.5), (-18, 18)), 'mm')
+    yield _byte(0x35, 'body_z', 'body height', _spans((75, 120), (60, 110)), 'mm')
+    yield _byte(0x36, 'body_roll', 'body attitude', _spans((-20, 20)), 'deg')
+    yield _byte(0x37, 'body_pitch', 'body attitude', _spans((-22, 22), (-10, 10)), 'deg')
+    yield _byte(0x38, 'body_yaw', 'body attitude', _spans((-16, 16), (-12, 12)), 'deg')
+    for code, axis in enumerate(('roll', 'pitch', 'yaw'), 0x39):
+        yield _byte(code, f'swing_{axis}', '0 off, 1 to 255: period 8 to 1.5 s')
+    for code, axis in enumerate('xyz', 0x80):
+        yield _byte(code, f'sway_{axis}', '0 off, 1 to 255: period 8 to 1.5 s')
+    yield _byte(0x3C, 'mark_time', 'lift height, 0 off', _spans((10, 35), (10, 25)), 'mm')
+    yield _byte(0x3D, 'pace', '0 normal, 1 slow, 2 high')
+    yield _byte(0x3E, 'action', '1 to 24, 128 to 130, 144; 255 stands in the default pose')
+    turn = Field('value', Scalar.I16_BE, unit='deg')
+    meaning = 'turns by an angle; reading one byte answers 1 when done'
+    yield _row(0x3F, 'turn_by', RW, meaning, turn, variable=True)
+    axes = (
+        ('x', _spans((-35, 35), (-25, 25))),
+        ('y', _spans((-18, 18))),
+        ('z', _spans((75, 115), (60, 110))),
+    )
+    legs = ((leg, axis) for leg in range(1, 5) for axis in axes)
+    for code, (leg, (axis, spans)) in enumerate(legs, 0x40):
+        yield _byte(code, f'foot_{leg}_{axis}', 'foot position', spans, 'mm')
+
+
+def _servo_rows() -> Iterator[Function]:
+    for code, motor in sorted(MOTOR_OF_REGISTER.items()):
+        spans = {model: angles[motor] for model, angles in ANGLE_SPANS.items()}
+        access = RW if motor in LEG_MOTORS else W
+        meaning = 'servo angle; a write of 12 bytes at 50 sets all legs'
+        if motor not in LEG_MOTORS:
+            meaning = 'servo angle; 51 to 53 are read as bytes 13 to 15 of 50'
+        yield _byte(code, f'motor_{motor}', meaning, spans, 'deg', access=access)
+    yield _byte(0x5C, 'motor_speed', '1 to 255; only for commands to a single servo')
+    yield _byte(0x5F, 'middle', '1 moves all servos to the middle of their range')
+    for code, bus_servo in enumerate(range(91, 100), 0xA1):
+        angle = Field('value', Scalar.U16_BE, scale=360 / 4096, unit='deg')
+        yield _row(code, f'bus_servo_{bus_servo}', W, '12 bits, 0 is -180 degrees', angle)
+    yield _byte(0xB0, 'wheels_enable', '1 enables the wheels (mini3W)')
+    wheels = Field('values', Scalar.U8, count=4)
+    yield _row(0xB1, 'wheels', W, 'four wheels, 0x80 stops (mini3W)', wheels)
+
+
+def _sensor_rows() -> Iterator[Function]:
+    yield _byte(0x61, 'balance', '1: the board levels the body')
+    for code, axis in enumerate(('roll', 'pitch', 'yaw'), 0x62):
+        yield _float(code, axis)
+    yield _row(
+        0x65,
+        'imu',
+        R,
+        'all of the IMU',
+        Field('acceleration', Scalar.I16, 0, 3, ACCELERATION_STEP, 'm/s²'),
+        Field('rate', Scalar.I16, 6, 3, RATE_STEP, 'deg/s'),
+        Field('attitude', Scalar.F32, 12, 3, unit='deg', meaning='roll, pitch, yaw'),
+    )
+    for code, axis in enumerate(('roll', 'pitch', 'yaw'), 0x66):
+        angle = Field('value', Scalar.I16_BE, unit='deg')
+        yield _row(code, f'{axis}_int', R, 'attitude, whole degrees', angle)
+    yield _row(0x69, 'led', W, 'red, green, blue', Field('values', Scalar.U8, count=3))
+    for code, name in enumerate(('analog_out', 'digital_out'), 0x90):
+        yield _byte(code, name, 'value')
+    for code, name in enumerate(('analog_in', 'digital_in'), 0x92):
+        yield _byte(code, name, 'value', access=R)
+
+
+def _arm_rows() -> Iterator[Function]:
+    yield _byte(0x72, 'arm_mode', '1 keeps the gripper where it is while the body moves')
+    yield _byte(0x73, 'arm_x', 'gripper position', _spans((-80, 155)), 'mm')
+    yield _byte(0x74, 'arm_z', 'gripper position', _spans((-95, 155)), 'mm')
+    yield _byte(0x75, 'arm_speed', '1 to 255')
+    yield _byte(0x76, 'arm_theta', 'polar position', _spans((70, 270)), 'deg')
+    yield _byte(0x77, 'arm_r', 'polar position', _spans((80, 140)), 'mm')
+
+
+OLD = Protocol(
+    name='old',
+    origin='public: the vendor’s protocol page and Python libraries',
+    baud=115200,
+    address_size=1,
+    kinds=frozenset({Kind.WRITE, Kind.READ, Kind.REPLY}),
+    functions=table(
+        *sorted(
+            (*_system_rows(), *_motion_rows(), *_servo_rows(), *_sensor_rows(), *_arm_rows()),
+            key=lambda row: row.address,
+        )
+    ),
+)
+
+
+def scatter(address: int, payload: bytes) -> Iterator[tuple[int, bytes]]:
+    """Take a write of several bytes apart into the registers that it runs through.
+
+    Args:
+        address: Register of the frame.
+        payload: Its data.
+
+    Yields:
+        Register and its bytes; a register that the table lacks takes one byte.
+    """
+    start = 0
+    while start < len(payload):
+        function = OLD.functions.get(address)
+        size = function.length if function else 1
+        yield address, payload[start : start + size]
+        start += size
+        address += 1
+
+
+def model_of_firmware(firmware: str) -> Model | None:
+    """Return the model that a firmware version names by its first letters, None if unknown."""
+    if firmware.startswith(('MW', 'W')):
+        return Model.WHEELED
+    return {'M': Model.MINI, 'L': Model.LITE}.get(firmware[:1])

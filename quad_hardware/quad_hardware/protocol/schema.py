@@ -1,0 +1,265 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What a table of a serial protocol is made of.
+
+Encoder, decoder, simulated robot and the protocol page all read the same table, so that a
+change of the layout is a change of one row.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from enum import Enum, Flag, IntEnum
+import math
+import struct
+
+from ..exceptions import CodecError
+
+
+class Kind(IntEnum):
+    """What a frame is for: its TYPE byte."""
+
+    WRITE = 0x00  # host to robot, not answered
+    READ = 0x02  # host to robot
+    REPLY = 0x12  # robot to host, answers READ
+    NACK = 0x1F  # robot to host, refuses a frame (new protocol only)
+    PUSH = 0x20  # robot to host, unasked (new protocol only)
+
+
+HOST_KINDS = frozenset({Kind.WRITE, Kind.READ})  # what a host sends
+ROBOT_KINDS = frozenset({Kind.REPLY, Kind.NACK, Kind.PUSH})  # what a robot sends
+
+
+class Scalar(Enum):
+    """Number formats on the wire, as :mod:`struct` writes them."""
+
+    U8 = '<B'
+    U16 = '<H'
+    U32 = '<I'
+    I16 = '<h'
+    F32 = '<f'
+    U16_BE = '>H'
+    I16_BE = '>h'
+
+    @property
+    def size(self) -> int:
+        """Size [B]."""
+        return struct.calcsize(self.value)
+
+
+class Access(Flag):
+    """Which kinds of frame may carry a function."""
+
+    READ = 1
+    WRITE = 2
+    PUSH = 4
+
+
+class Model(Enum):
+    """Kinds of robot, which differ in the ranges that scale their bytes."""
+
+    MINI = 'mini'
+    LITE = 'lite'
+    WHEELED = 'wheeled'  # mini2SW and mini3W
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """Range of a quantity that a byte 0 to 255 spreads over.
+
+    Attributes:
+        low: Value of byte 0.
+        high: Value of byte 255.
+    """
+
+    low: float
+    high: float
+
+    def encode(self, value: float) -> int:
+        """Return the nearest byte; values outside are taken to the nearer end.
+
+        Raises:
+            CodecError: The value is no number.
+        """
+        if math.isnan(value):
+            raise CodecError('NaN has no byte; send a number')
+        share = (min(max(value, self.low), self.high) - self.low) / (self.high - self.low)
+        return math.floor(share * 255 + 0.5)
+
+    def decode(self, byte: int) -> float:
+        """Return the value of a byte."""
+        return byte / 255 * (self.high - self.low) + self.low
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """A run of equal numbers in a payload.
+
+    Attributes:
+        name: Key in what :meth:`Function.unpack` returns.
+        scalar: Number format.
+        offset: First byte in the payload [B].
+        count: How many numbers.
+        scale: Unit of one step on the wire, for integers.
+        unit: Unit of the value.
+        meaning: For the protocol page.
+    """
+
+    name: str
+    scalar: Scalar
+    offset: int = 0
+    count: int = 1
+    scale: float = 1.0
+    unit: str = ''
+    meaning: str = ''
+
+    @property
+    def size(self) -> int:
+        """Size of the whole run [B]."""
+        return self.scalar.size * self.count
+
+    @property
+    def layout(self) -> str:
+        """Format of the run for :mod:`struct`."""
+        return f'{self.scalar.value[0]}{self.count}{self.scalar.value[1]}'
+
+    def pack(self, values: Iterable[float]) -> bytes:
+        """Encode a run.
+
+        Raises:
+            CodecError: A wrong number of values, or one that does not fit.
+        """
+        numbers = tuple(values)
+        if len(numbers) != self.count:
+            raise CodecError(f'{self.name}: {len(numbers)} values given, {self.count} needed')
+        try:
+            if self.scalar is Scalar.F32:
+                return struct.pack(self.layout, *numbers)
+            steps = (round(value / self.scale) for value in numbers)
+            return struct.pack(self.layout, *steps)
+        except (struct.error, ValueError, OverflowError) as error:
+            raise CodecError(
+                f'{self.name}: {numbers} does not fit {self.scalar.name} in steps of {self.scale}'
+            ) from error
+
+    def unpack(self, payload: bytes, start: int = 0) -> tuple[float, ...]:
+        """Decode the run of a payload that begins at a byte of a larger one."""
+        numbers = struct.unpack_from(self.layout, payload, start + self.offset)
+        return numbers if self.scale == 1.0 else tuple(n * self.scale for n in numbers)
+
+
+@dataclass(frozen=True, slots=True)
+class Function:
+    """A row of a protocol table.
+
+    Attributes:
+        address: What stands in the frame.
+        name: Short name, unique in the table.
+        access: Which kinds of frame carry it.
+        fields: Payload, in the order of offsets.
+        repeated: The fields describe one group of several; a payload holds one group or more.
+        size: Length of the payload [B] where it is longer than its fields (filled with zeros),
+            or where the fields are ``repeated``: of one group.
+        spans: What a byte 0 to 255 spreads over, for functions of one byte.
+        unit: Unit of the spans.
+        meaning: For the protocol page.
+        variable: Payloads may also be shorter than ``size``.
+    """
+
+    address: int
+    name: str
+    access: Access
+    fields: tuple[Field, ...]
+    meaning: str
+    repeated: bool = False
+    size: int = 0
+    spans: Mapping[Model, Span] = field(default_factory=dict)
+    unit: str = ''
+    variable: bool = False
+
+    @property
+    def length(self) -> int:
+        """Length of a payload, or of one group of it [B]."""
+        return max(self.size, max((f.offset + f.size for f in self.fields), default=0))
+
+    def accepts(self, length: int) -> bool:
+        """Tell whether a payload may have a length [B]."""
+        if self.repeated:
+            return length > 0 and length % self.length == 0
+        return 0 < length <= self.length if self.variable else length == self.length
+
+    def pack(self, **values: Iterable[float]) -> bytes:
+        """Encode one payload (one group of it, where the fields are repeated).
+
+        Raises:
+            CodecError: A field is missing or unknown, or its values do not fit.
+        """
+        wrong = values.keys() ^ {f.name for f in self.fields}
+        if wrong:
+            raise CodecError(f'{self.name}: {", ".join(sorted(wrong))} missing or unknown')
+        payload = bytearray(self.length)
+        for part in self.fields:
+            payload[part.offset : part.offset + part.size] = part.pack(values[part.name])
+        return bytes(payload)
+
+    def unpack(self, payload: bytes) -> dict[str, tuple[float, ...]]:
+        """Decode a payload; repeated fields are run together over all groups.
+
+        Raises:
+            CodecError: The payload has a length that the function does not have.
+        """
+        if not self.accepts(len(payload)) or len(payload) % self.length:
+            raise CodecError(f'{self.name}: payload of {len(payload)} bytes, not {self.length}')
+        starts = range(0, len(payload), self.length)
+        return {
+            part.name: tuple(v for start in starts for v in part.unpack(payload, start))
+            for part in self.fields
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Protocol:
+    """A serial protocol: its envelope and its table.
+
+    Every frame is ``55 00 | LEN | TYPE | address | payload | CHK | 00 AA``; LEN counts the whole
+    frame, CHK is 255 minus the sum of everything from LEN to the payload, modulo 256.
+
+    Attributes:
+        name: Name for people, and of the parameter that chooses it.
+        origin: Where the layout is from.
+        baud: Speed of the line [bit/s], 8N1.
+        address_size: Bytes of an address, the most significant first [B].
+        kinds: Kinds of frame that there are.
+        functions: The table, by address.
+        max_length: Longest frame [B].
+    """
+
+    name: str
+    origin: str
+    baud: int
+    address_size: int
+    kinds: frozenset[Kind]
+    functions: Mapping[int, Function]
+    max_length: int = 255
+
+    @property
+    def overhead(self) -> int:
+        """Bytes of a frame without payload [B]."""
+        return 7 + self.address_size
+
+    def wire_time(self, length: int) -> float:
+        """Return how long that many bytes take on the line [s]: ten bits each in 8N1."""
+        return length * 10 / self.baud
+
+
+def table(*rows: Function) -> dict[int, Function]:
+    """Return rows by address.
+
+    Raises:
+        ValueError: Two rows have the same address or name.
+    """
+    result = {row.address: row for row in rows}
+    if len(result) != len(rows) or len({row.name for row in rows}) != len(rows):
+        raise ValueError('a protocol table names an address or a name twice')
+    return result
