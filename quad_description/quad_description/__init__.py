@@ -1,0 +1,20 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The XGO quadruped as a URDF, made from its numbers; nothing here imports rclpy."""
+
+from .exceptions import DescriptionError, PresetError
+from .joints import Joint, LEGS, movable_joints
+from .poses import Pose, pose_positions
+from .urdf import PRESETS, robot_urdf
+
+__all__ = [
+    'LEGS',
+    'PRESETS',
+    'DescriptionError',
+    'Joint',
+    'Pose',
+    'PresetError',
+    'movable_joints',
+    'pose_positions',
+    'robot_urdf',
+]

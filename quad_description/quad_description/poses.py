@@ -1,0 +1,45 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Poses to start from: joint positions by name."""
+
+from __future__ import annotations
+
+from enum import Enum
+from typing import Any
+
+from .figures import robot_numbers
+from .joints import LEGS
+
+_LEG_JOINTS = ('hip', 'thigh', 'calf')
+_ARM_JOINTS = ('yaw', 'thigh', 'calf')
+_GRIPPER = 'hand_right_joint'
+
+
+class Pose(Enum):
+    """A pose that robot.yaml has the numbers of."""
+
+    STAND = 'stand'
+    LIE = 'lie'
+
+
+def pose_positions(pose: Pose, arm: bool = False) -> dict[str, float]:
+    """Return the joint positions of a pose.
+
+    Args:
+        pose: Which one.
+        arm: With the joints of the arm.
+
+    Returns:
+        Positions in [rad], for the gripper in [m], by the joint's name in the order of the URDF.
+    """
+    numbers: dict[str, Any] = robot_numbers()['poses'][pose.value]
+    positions = {
+        f'{leg}_{joint}_joint': float(value)
+        for leg in LEGS
+        for joint, value in zip(_LEG_JOINTS, numbers['leg'], strict=True)
+    }
+    if arm:
+        for joint, value in zip(_ARM_JOINTS, numbers['arm'], strict=True):
+            positions[f'arm_{joint}_joint'] = float(value)
+        positions[_GRIPPER] = 0.0
+    return positions

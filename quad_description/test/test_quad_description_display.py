@@ -1,0 +1,128 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The display node: what it publishes, and the motion that it shows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+import subprocess
+import sys
+import time
+from typing import Any
+
+from hypothesis import given
+from hypothesis import strategies as st
+from isolation import Isolation
+import pytest
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+
+from quad_description import movable_joints, Pose, pose_positions, robot_urdf
+from quad_description.motion import sweep, SWEEP_DURATION
+
+PACKAGE = Path(__file__).parents[1]
+JOINTS = movable_joints(robot_urdf('lite'))
+REST = pose_positions(Pose.STAND)
+
+
+@given(st.floats(0, 1e4))
+def test_a_sweep_moves_one_joint_within_its_limits(elapsed: float) -> None:
+    """At any time at most one joint is off its rest, and none beyond a limit."""
+    positions = sweep(JOINTS, REST, elapsed)
+    assert sum(positions[name] != REST[name] for name in REST) <= 1
+    for joint in JOINTS:
+        assert joint.lower - 1e-9 <= positions[joint.name] <= joint.upper + 1e-9
+
+
+def test_a_sweep_reaches_both_ends_of_every_joint() -> None:
+    """A quarter of a turn is the upper limit, three quarters are the lower one."""
+    for index, joint in enumerate(JOINTS):
+        up = sweep(JOINTS, REST, (index + 0.25) * SWEEP_DURATION)
+        down = sweep(JOINTS, REST, (index + 0.75) * SWEEP_DURATION)
+        assert up[joint.name] == pytest.approx(joint.upper)
+        assert down[joint.name] == pytest.approx(joint.lower)
+
+
+class Listener:
+    """A node of the test in a domain of its own."""
+
+    def __init__(self, domain_id: int) -> None:
+        """Join a domain."""
+        self.context = Context()
+        rclpy.init(context=self.context, domain_id=domain_id)
+        self.node = Node('listener', context=self.context)
+        self.executor = SingleThreadedExecutor(context=self.context)
+        self.executor.add_node(self.node)
+
+    def wait_for(self, message_type: Any, topic: str, qos: Any) -> Any:
+        """Return the first message of a topic."""
+        messages: list[Any] = []
+        self.node.create_subscription(message_type, topic, messages.append, qos)
+        deadline = time.monotonic() + 20
+        while not messages:
+            assert time.monotonic() < deadline, f'nothing on {topic}'
+            self.executor.spin_once(0.05)
+        return messages[0]
+
+
+@pytest.fixture
+def listener(isolation: Isolation) -> Iterator[Listener]:
+    """Give the test's node, and leave the domain afterwards."""
+    listener = Listener(isolation.domain_id)
+    yield listener
+    listener.executor.shutdown()
+    listener.node.destroy_node()
+    rclpy.shutdown(context=listener.context)
+
+
+def display(isolation: Isolation, *parameters: str) -> subprocess.Popen[str]:
+    """Start the node as its own process."""
+    arguments = [word for text in parameters for word in ('-p', text)]
+    command = [sys.executable, '-m', 'quad_description.display', '--ros-args', *arguments]
+    return subprocess.Popen(
+        command,
+        cwd=PACKAGE,
+        env=isolation.env,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def test_the_display_publishes_what_viewers_need(listener: Listener, isolation: Isolation) -> None:
+    """A late subscriber gets the URDF, and joint states name every motor of it."""
+    process = display(isolation, 'preset:=mini', 'arm:=true', 'motion:=lie')
+    try:
+        states = listener.wait_for(JointState, '/joint_states', 10)
+        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        description = listener.wait_for(String, '/robot_description', latched)
+        assert description.data == robot_urdf('mini', arm=True)
+        assert dict(zip(states.name, states.position, strict=True)) == pose_positions(
+            Pose.LIE, arm=True
+        )
+    finally:
+        process.terminate()
+        process.communicate(timeout=20)
+
+
+@pytest.mark.parametrize(
+    ('parameter', 'message'),
+    [
+        ('motion:=dance', "motion 'dance' is none of sweep, stand, lie"),
+        ('preset:=rider', 'choose one of lite, mini'),
+        ('motoin:=lie', "did you mean 'motion'"),
+    ],
+)
+def test_a_wrong_parameter_ends_it_with_the_remedy(
+    isolation: Isolation, parameter: str, message: str
+) -> None:
+    """The node exits with 2 and says what is possible."""
+    process = display(isolation, parameter)
+    _, errors = process.communicate(timeout=30)
+    assert process.returncode == 2
+    assert message in errors
