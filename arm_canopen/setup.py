@@ -30,6 +30,7 @@ setup(
         'can.interface': ['arm_canopen = arm_canopen.can.plugin:ArmCanopenBus'],
         'console_scripts': [
             'candump = arm_canopen.nodes.candump:main',
+            'canopen = arm_canopen.cli.main:main',
             'canopen_joint_state_publisher = arm_canopen.nodes.joint_state_publisher:main',
             'fake_slave = arm_canopen.nodes.fake_slave:main',
             'fake_slaves = arm_canopen.nodes.fake_slaves:main',

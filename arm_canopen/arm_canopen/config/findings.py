@@ -80,6 +80,11 @@ class Findings:
             self.warning(_place(problem), problem.message, problem.remedy)
 
     @property
+    def errors(self) -> tuple[Problem, ...]:
+        """All errors, in the order of the lines."""
+        return tuple(sorted(self._errors.values(), key=_order))
+
+    @property
     def warnings(self) -> tuple[Problem, ...]:
         """All warnings."""
         return tuple(self._warnings.values())
@@ -91,7 +96,7 @@ class Findings:
             ConfigError: There are; it lists them in the order of the lines.
         """
         if self._errors:
-            raise ConfigError(sorted(self._errors.values(), key=_order))
+            raise ConfigError(self.errors)
 
 
 def _place(problem: Problem) -> Place:

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 import os
 from pathlib import Path
@@ -12,13 +12,17 @@ from pathlib import Path
 from .cob_ids import assign_cob_ids
 from .device_reader import DeviceDraft, read_device
 from .device_timing import finish_device, Surroundings
-from .document import Mapping, read_document
+from .document import Item, Mapping, read_document
 from .eds_files import EdsFiles
 from .findings import Findings, Place
-from .layout import lay_out
+from .layout import lay_out, Layout
 from .master import build_master
-from .model import BusConfig, MasterConfig
+from .model import BusConfig, MasterConfig, Written
+from .pdo_direction import RPDO, TPDO
 from .settings import read_master_settings, read_options
+
+PDO_SECTIONS = (RPDO.name, TPDO.name)
+DEPTH_MAX = 3  # device, tpdo, number; below are the keys of a PDO
 
 
 def load_bus(
@@ -36,6 +40,22 @@ def load_bus(
     Raises:
         ConfigError: Something is wrong; the error lists every problem with file, line, key and
             remedy.
+    """
+    config, findings = read_bus(path, bus_config_path=bus_config_path)
+    findings.raise_errors()
+    return config
+
+
+def read_bus(
+    path: str | os.PathLike[str], *, bus_config_path: str | os.PathLike[str] | None = None
+) -> tuple[BusConfig, Findings]:
+    """Read as much of a bus.yml as can be understood; arguments as with :func:`load_bus`.
+
+    Returns:
+        The bus without what is wrong, and everything that is wrong.
+
+    Raises:
+        ConfigError: The file cannot be read at all.
     """
     file = Path(path)
     findings = Findings()
@@ -59,8 +79,26 @@ def load_bus(
         for draft in _with_cob_ids(unique, findings)
         if draft.config is not None
     )
-    findings.raise_errors()
-    return BusConfig(file, master, nodes, findings.warnings)
+    return BusConfig(file, master, nodes, findings.warnings, _written(layout)), findings
+
+
+def _written(layout: Layout) -> dict[tuple[str, ...], Written]:
+    """Say where each key stands, by the names that lead to it."""
+    sections = {'master': layout.master, **layout.devices}
+    return {
+        names: Written(item.place.line, item.place.key)
+        for name, section in sections.items()
+        for names, item in _walk((name,), section)
+    }
+
+
+def _walk(names: tuple[str, ...], item: Item) -> Iterator[tuple[tuple[str, ...], Item]]:
+    yield names, item
+    if not isinstance(item, Mapping) or len(names) > DEPTH_MAX:
+        return
+    for name, child in item.entries.items():
+        if len(names) == 1 or names[1] in PDO_SECTIONS:
+            yield from _walk((*names, name), child)
 
 
 def _check_lifecycle(

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
@@ -11,6 +12,19 @@ from pathlib import Path
 from ..standard.dictionary import ObjectDictionary
 from ..standard.drive import DriveState
 from ..standard.pdo import MappedObject
+
+
+@dataclass(frozen=True, slots=True)
+class Written:
+    """Where something stands in bus.yml.
+
+    Attributes:
+        line: Line, from 1; 0 when it is not known.
+        key: Path of the key, such as ``defaults.tpdo.1.mapping``.
+    """
+
+    line: int = 0
+    key: str = ''
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,11 +64,13 @@ class SdoWrite:
         index: Object index.
         subindex: Sub-index.
         data: The value as it is sent.
+        written: Where bus.yml asks for it.
     """
 
     index: int
     subindex: int
     data: bytes
+    written: Written = field(default=Written(), compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -314,12 +330,22 @@ class BusConfig:
         master: The master.
         nodes: The devices in the order of the file.
         warnings: What was odd but could be understood.
+        written: Where each key stands, by the names that lead to it: ``('master', 'node_id')``,
+            ``('joint1', 'tpdo', '1', 'mapping')``; defaults belong to every device.
     """
 
     file: Path
     master: MasterConfig
     nodes: tuple[NodeConfig, ...]
     warnings: tuple[Problem, ...] = ()
+    written: Mapping[tuple[str, ...], Written] = field(default_factory=dict, compare=False)
+
+    def place_of(self, *names: str) -> Written:
+        """Return where a key stands, or else the nearest thing around it that does."""
+        for length in range(len(names), 0, -1):
+            if (written := self.written.get(names[:length])) is not None:
+                return written
+        return Written()
 
     def node(self, name: str) -> NodeConfig:
         """Return a device by name.

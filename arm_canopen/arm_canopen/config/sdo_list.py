@@ -22,7 +22,7 @@ from . import scalars
 from .device_keys import SDO_KEYS
 from .document import Item, Mapping, Scalar, ScalarKind
 from .findings import Findings, Place, RefusedError
-from .model import SdoWrite
+from .model import SdoWrite, Written
 from .schema import Key
 from .section import block, listing, read_section
 from .shared_keys import U8_MAX
@@ -85,10 +85,11 @@ class SdoReader:
             self._findings.refuse(place, reason)
             return None
         try:
-            return SdoWrite(*address, encode_value(entry, value))
+            data = encode_value(entry, value)
         except RefusedError as reason:
             self._findings.refuse(value.place, reason)
             return None
+        return SdoWrite(*address, data, Written(place.line, place.key))
 
 
 def read_address(item: Item, keys: tuple[Key, ...], findings: Findings) -> tuple[int, int] | None:

@@ -1,0 +1,61 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Arguments that several verbs have."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING, TypeAlias
+
+from ..standard.cob_id import NODE_ID_MAX, NODE_ID_MIN
+
+if TYPE_CHECKING:
+    SubParsers: TypeAlias = argparse._SubParsersAction[argparse.ArgumentParser]  # noqa: SLF001
+else:
+    SubParsers = object
+
+BITRATE_MIN, BITRATE_MAX = 10_000, 1_000_000  # [bit/s] CiA 301, table 1
+
+
+def bitrate(text: str) -> int:
+    """Read a bit rate in [bit/s]; ``k`` and ``M`` behind a number are thousands and millions."""
+    factors = {'k': 1000, 'M': 1_000_000}
+    factor = factors.get(text[-1:], 1)
+    digits = text[:-1] if factor > 1 else text
+    if not digits.isdecimal():
+        raise argparse.ArgumentTypeError(f'{text!r} is no bit rate; write 500000 or 500k')
+    number = int(digits) * factor
+    if not BITRATE_MIN <= number <= BITRATE_MAX:
+        hint = f'; {text}k perhaps' if factor == 1 and 10 <= number <= 1000 else ''
+        raise argparse.ArgumentTypeError(f'{text} bit/s is not 10k to 1M{hint}')
+    return number
+
+
+def node_id(text: str) -> int:
+    """Read a node id, decimal or hexadecimal with ``0x``."""
+    number = whole_number(text)
+    if not NODE_ID_MIN <= number <= NODE_ID_MAX:
+        raise argparse.ArgumentTypeError(f'{text} is no node id; take 1 to 127')
+    return number
+
+
+def whole_number(text: str) -> int:
+    """Read a number that is not negative, decimal or hexadecimal with ``0x``."""
+    try:
+        number = int(text, 0)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f'{text!r} is no whole number') from None
+    if number < 0:
+        raise argparse.ArgumentTypeError(f'{text} is negative')
+    return number
+
+
+def seconds(text: str) -> float:
+    """Read a time in [s]."""
+    try:
+        number = float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f'{text!r} is no time in s') from None
+    if not 0.0 < number <= 3600.0:
+        raise argparse.ArgumentTypeError(f'{text} s is not above 0 and up to an hour')
+    return number

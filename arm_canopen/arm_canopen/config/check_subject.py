@@ -1,0 +1,144 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""A device as the checks of a bus look at it: what its objects hold, and where that is written."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from ..exceptions import CodecError
+from ..standard.datatypes import decode
+from ..standard.drive import OperationMode
+from ..standard.objects import Index
+from .device_reader import AXIS_OFFSET
+from .findings import Findings, Place
+from .model import BusConfig, DriveConfig, NodeConfig, PdoConfig, SdoWrite
+from .pdo_direction import Direction, RPDO, TPDO
+from .shared_keys import HUNDRED_MICROSECONDS, MILLISECONDS
+
+CYCLIC_MODES = frozenset(
+    {
+        OperationMode.INTERPOLATED_POSITION,
+        OperationMode.CYCLIC_POSITION,
+        OperationMode.CYCLIC_VELOCITY,
+        OperationMode.CYCLIC_TORQUE,
+    }
+)
+"""Modes whose targets come with every SYNC (CiA 402-2, clauses 12 to 16)."""
+
+
+@dataclass(frozen=True, slots=True)
+class UsedMode:
+    """A mode that bus.yml says an axis is used in.
+
+    Attributes:
+        axis: The axis.
+        mode: The mode.
+        key: Key of bus.yml that says so.
+    """
+
+    axis: DriveConfig
+    mode: OperationMode
+    key: str
+
+    def at(self, index: int) -> int:
+        """Return the index of an object of the profile for this axis."""
+        return index + AXIS_OFFSET * self.axis.channel
+
+
+@dataclass(frozen=True, slots=True)
+class Subject:
+    """A device under check.
+
+    Attributes:
+        bus: Its bus.
+        node: The device.
+        findings: Gets what is wrong.
+    """
+
+    bus: BusConfig
+    node: NodeConfig
+    findings: Findings
+
+    def place(self, *names: str) -> Place:
+        """Return the place of a key of the device, or of the nearest thing around it."""
+        written = self.bus.place_of(self.node.name, *names)
+        return Place(self.bus.file, written.line or self.node.line, key=written.key)
+
+    def pdo_place(self, direction: Direction, pdo: PdoConfig, key: str = '') -> Place:
+        """Return the place of a PDO, or of one of its keys."""
+        return self.place(direction.name, str(pdo.number), *([key] if key else []))
+
+    def object_place(self, index: int, subindex: int) -> Place:
+        """Return the place that says what an object holds: the sdo list, or else the EDS."""
+        write = self.write_of(index, subindex)
+        if write is not None:
+            return Place(self.bus.file, write.written.line, key=write.written.key)
+        entry = self.node.dictionary.get(index, subindex)
+        line = entry.line if entry is not None else 0
+        return Place(self.node.eds, line, key=f'[{index:04X}sub{subindex:X}]')
+
+    def write_of(self, index: int, subindex: int) -> SdoWrite | None:
+        """Return the last write of an object that bus.yml asks for."""
+        for write in reversed(self.node.sdo_writes):
+            if (write.index, write.subindex) == (index, subindex):
+                return write
+        return None
+
+    def value(self, index: int, subindex: int = 0) -> int | None:
+        """Return the number that an object holds after boot, None when nobody says."""
+        entry = self.node.dictionary.get(index, subindex)
+        if entry is None:
+            return None
+        write = self.write_of(index, subindex)
+        value = entry.default
+        if write is not None:
+            try:
+                value = decode(entry.data_type, write.data)
+            except CodecError:
+                return None
+        return value if isinstance(value, int) else None
+
+    def used_modes(self) -> Iterator[UsedMode]:
+        """Yield the modes that bus.yml names for the axes of a drive."""
+        for axis in self.node.axes if self.node.is_drive else ():
+            for key in ('position_mode', 'velocity_mode', 'effort_mode'):
+                number = getattr(axis, key)
+                if number is not None:
+                    yield UsedMode(axis, OperationMode(number), key)
+
+    def pdos(self) -> Iterator[tuple[Direction, PdoConfig]]:
+        """Yield the PDOs that are in use."""
+        for direction, pdos in ((TPDO, self.node.tpdos), (RPDO, self.node.rpdos)):
+            for pdo in pdos:
+                if pdo.enabled and pdo.mapping:
+                    yield direction, pdo
+
+    def carriers(self, direction: Direction, index: int, subindex: int = 0) -> list[PdoConfig]:
+        """Return the PDOs in use that carry an object."""
+        return [
+            pdo
+            for way, pdo in self.pdos()
+            if way is direction
+            and any((m.index, m.subindex) == (index, subindex) for m in pdo.mapping)
+        ]
+
+    def inhibit_time(self, pdo: PdoConfig) -> float:
+        """Return the inhibit time of a TPDO in [s], by bus.yml or else the EDS; 0 for none."""
+        if pdo.inhibit_time is not None:
+            return pdo.inhibit_time
+        units = self.value(Index.TPDO_COMMUNICATION + pdo.number - 1, 3)
+        return (units or 0) / HUNDRED_MICROSECONDS
+
+    def event_time(self, pdo: PdoConfig) -> float:
+        """Return the event timer of a TPDO in [s], by bus.yml or else the EDS; 0 for none."""
+        if pdo.event_time is not None:
+            return pdo.event_time
+        return (self.value(Index.TPDO_COMMUNICATION + pdo.number - 1, 5) or 0) / MILLISECONDS
+
+
+def object_name(index: int) -> str:
+    """Name an object of the standards, for messages: ``0x607A (target position)``."""
+    first = 0x6000 + (index - 0x6000) % AXIS_OFFSET if index >= 0x6000 else index
+    return f'0x{index:04X} ({Index(first).name.lower().replace("_", " ")})'

@@ -1,0 +1,107 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What a bus.yml says that each file by itself allows, and that does not work as a whole.
+
+``load_bus`` refuses what cannot be understood or cannot run. Here is looked for what runs and
+disappoints: times that do not fit each other, objects that no PDO carries, a bus that is full.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+import os
+
+from ..exceptions import ConfigError
+from .check_drives import check_drive
+from .check_network import (
+    check_heartbeats,
+    check_identifiers,
+    check_master,
+    check_sync,
+    check_writes,
+)
+from .check_pdos import check_pdos
+from .check_subject import Subject
+from .findings import Findings, Place
+from .load import read_bus
+from .model import BusConfig, Problem
+from .traffic import estimate_load, LoadEstimate
+
+HIGH_LOAD = 0.7
+"""Share of the time above which frames of low priority begin to wait noticeably."""
+
+DEVICE_CHECKS: tuple[Callable[[Subject], None], ...] = (
+    check_drive,
+    check_pdos,
+    check_heartbeats,
+    check_sync,
+    check_writes,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """What was found.
+
+    Attributes:
+        errors: What cannot work.
+        warnings: What works, and probably not as it was meant.
+        load: What the bus will carry, None when the file could not be read.
+    """
+
+    errors: tuple[Problem, ...]
+    warnings: tuple[Problem, ...]
+    load: LoadEstimate | None = None
+
+
+def check_bus(config: BusConfig, bitrate: int | None = None) -> Report:
+    """Check a bus as a whole.
+
+    Args:
+        config: The bus; its own warnings are not repeated.
+        bitrate: Bit rate in [bit/s]; None takes that of bus.yml.
+    """
+    return _report(config, bitrate, Findings())
+
+
+def check_file(path: str | os.PathLike[str], bitrate: int | None = None) -> Report:
+    """Read a bus.yml and tell everything that is wrong with it and its EDS files at once.
+
+    Args:
+        path: The bus.yml.
+        bitrate: Bit rate in [bit/s]; None takes that of bus.yml.
+    """
+    try:
+        config, findings = read_bus(path)
+    except ConfigError as error:
+        return Report(error.problems, ())
+    return _report(config, bitrate, findings)
+
+
+def _report(config: BusConfig, bitrate: int | None, findings: Findings) -> Report:
+    subjects = [Subject(config, node, findings) for node in config.nodes]
+    check_master(config, findings)
+    for subject in subjects:
+        for check in DEVICE_CHECKS:
+            check(subject)
+    check_identifiers(subjects)
+    load = estimate_load(config, bitrate)
+    _check_load(config, load, findings)
+    warnings = sorted(findings.warnings, key=lambda problem: (str(problem.file), problem.line))
+    return Report(findings.errors, tuple(warnings), load)
+
+
+def _check_load(config: BusConfig, load: LoadEstimate, findings: Findings) -> None:
+    if load.load <= HIGH_LOAD:
+        return
+    written = config.place_of('master', 'sync_period')
+    place = Place(config.file, written.line, key=written.key)
+    at = f'{load.frames_per_second:.0f} frames/s at {load.bitrate / 1000:g} kbit/s'
+    remedy = 'make sync_period longer, map fewer or shorter PDOs, or raise the bit rate'
+    if load.load > 1:
+        message = f'the bus cannot carry this: {at} are a load of {load.load:.0%}'
+        findings.error(place, message, remedy)
+    else:
+        message = f'{at} are a load of {load.load:.0%} ({load.load_worst:.0%} at worst)'
+        findings.warning(place, message, remedy)

@@ -1,0 +1,97 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""``canopen check`` as a person or a CI job starts it."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+import subprocess
+import sys
+
+from config_samples import eds_text, write_bus
+import pytest
+
+from arm_canopen.cli.main import main
+
+PACKAGE = Path(__file__).parents[1]
+PANDA = PACKAGE.parent / 'arm_bringup' / 'robots' / 'panda' / 'bus.yml'
+
+
+def test_a_process_ends_with_its_exit_code(tmp_path: Path) -> None:
+    """As a program: findings on stdout, 1 for errors."""
+    (tmp_path / 'bus.yml').write_text('master:\n  node_id: 300\n')
+    process = subprocess.run(
+        [sys.executable, '-m', 'arm_canopen.cli.main', 'check', 'bus.yml'],
+        cwd=tmp_path,
+        env=os.environ | {'PYTHONPATH': str(PACKAGE)},
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+    )
+    assert process.returncode == 1
+    lines = process.stdout.splitlines()
+    assert 'bus.yml:2: error: master.node_id: 300 is out of range' in lines
+    assert lines[-1].startswith('bus.yml: 3 errors, ')
+    assert process.stderr == ''
+
+
+def test_the_article_is_checked(capsys: pytest.CaptureFixture[str]) -> None:
+    """The bus.yml of the article works, with two warnings that --strict makes errors."""
+    assert main(['check', str(PANDA)]) == 0
+    output = capsys.readouterr().out
+    assert f'{PANDA}:23: warning: defaults.sdo[5]: 0x60C2 (interpolation period) is 50' in output
+    assert f'{PANDA}:51: warning: defaults.rpdo.2: 0x607A (target position) is in RPDO' in output
+    assert 'load at 1000 kbit/s: 2912 frames/s, 26.7% (31.4% with the most stuffing)' in output
+    assert output.splitlines()[-1] == f'{PANDA}: 0 errors, 2 warnings'
+    assert main(['check', str(PANDA), '--strict']) == 1
+
+
+def test_equal_frames_of_several_devices_are_one_row(capsys: pytest.CaptureFixture[str]) -> None:
+    """The table has a row for each kind of frame; --frames lists each by its identifier."""
+    main(['check', str(PANDA), '--bitrate', '500k'])
+    output = capsys.readouterr().out
+    row = next(line for line in output.splitlines() if line.startswith('TPDO 2'))
+    # 700 frames/s of 8 bytes: 111 bits and 97 / 30 of stuffing each
+    assert row.split() == ['TPDO', '2', '7', '8', '700.0', '16.0%', 'every', 'SYNC']
+    main(['check', str(PANDA), '--bitrate', '500k', '--frames'])
+    rows = [line for line in capsys.readouterr().out.splitlines() if line.startswith('TPDO 2 of')]
+    assert [row.split()[4] for row in rows] == [f'{0x280 + node:03X}' for node in range(2, 9)]
+
+
+def test_a_full_bus_is_an_error(capsys: pytest.CaptureFixture[str]) -> None:
+    """What a bit rate cannot carry is refused, with the figures."""
+    assert main(['check', str(PANDA), '--bitrate', '250000']) == 1
+    output = capsys.readouterr().out
+    assert 'cannot carry this: 2912 frames/s at 250 kbit/s are a load of 107%' in output
+
+
+def test_a_good_file_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Nothing wrong is exit code 0, also with --strict."""
+    path = write_bus(tmp_path, eds=eds_text())
+    path.write_text(path.read_text().replace('  tpdo:', '  heartbeat_producer: 100\n  tpdo:', 1))
+    assert main(['check', '--strict', str(path)]) == 0
+    assert capsys.readouterr().out.splitlines()[-1] == f'{path}: 0 errors, 0 warnings'
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'message'),
+    [
+        ([], 'required: VERB'),
+        (['check'], 'required: BUS.yml'),
+        (['chekc', 'bus.yml'], "invalid choice: 'chekc'"),
+        (['check', 'bus.yml', '--bitrate', '500'], '500 bit/s is not 10k to 1M; 500k perhaps'),
+        (['check', 'bus.yml', '--bitrate', '2M'], '2M bit/s is not 10k to 1M'),
+        (['check', 'bus.yml', '--bitrate', 'fast'], "'fast' is no bit rate"),
+        (['check', 'bus.yml', '--ros-args', '-p'], '-p needs something behind it'),
+    ],
+)
+def test_wrong_usage_is_2(
+    arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Wrong usage is told on stderr, with exit code 2."""
+    with pytest.raises(SystemExit) as ending:
+        main(arguments)
+    assert ending.value.code == 2
+    assert message in capsys.readouterr().err
