@@ -8,7 +8,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from process_supervisor import Executable, FindExecutable, LOG_FORMAT, node_argv, ProcessSpec
+from process_supervisor import (
+    Executable,
+    FindExecutable,
+    first_found,
+    LOG_FORMAT,
+    node_argv,
+    ProcessSpec,
+)
 
 from .robots import Robot
 
@@ -20,6 +27,14 @@ SLAVES_READY = r'\d+ simulated drives.* on '
 """What the simulated slaves log when they are on the bus."""
 PUBLISHER_READY = r'publishing \d+ joints'
 """What the publisher of /joint_states logs when it has subscribed to the drives."""
+
+STATE_PUBLISHERS = (
+    Executable('robot_state_publisher', 'robot_state_publisher'),
+    Executable('robot_viewer', 'robot_state_publisher'),
+)
+"""What makes /tf: the public one where ROS has it."""
+TF_RATE = '100.0'
+"""Greatest rate of /tf in [Hz]; its default of 20 would halve what /joint_states has."""
 
 MASTER_FIRST, THEN_LISTENERS, SLAVES_LAST = range(3)
 """Order of stopping: the master disables the drives, so they must still be there."""
@@ -109,12 +124,12 @@ def _publisher(stack: Stack, parameters: Path, find: FindExecutable) -> ProcessS
 
 
 def _state_publisher(parameters: Path, find: FindExecutable) -> ProcessSpec | None:
-    name = 'robot_state_publisher'
-    if find(name, name) is None:
-        return None  # not on PyPI; the arm moves without TF
+    executable = first_found(STATE_PUBLISHERS, find)
+    if executable is None:
+        return None  # the arm moves without TF
     return ProcessSpec(
         name='robot_state',
-        argv=node_argv(Executable(name, name), find, {}, parameters),
+        argv=node_argv(executable, find, {'publish_frequency': TF_RATE}, parameters),
         environment=LOG_FORMAT,
         required=False,
         stop_order=THEN_LISTENERS,

@@ -81,10 +81,21 @@ def test_the_master_stops_before_the_slaves(tmp_path: Path) -> None:
     assert orders['master'] < orders['joint_states'] == orders['robot_state'] < orders['slaves']
 
 
-def test_robot_state_publisher_runs_where_it_is_installed(tmp_path: Path) -> None:
-    """It is no reason to end when it dies."""
-    found = processes(tmp_path, Stack(ROBOT, 'can0', simulate=True), 'robot_state_publisher')
+@pytest.mark.parametrize(
+    ('packages', 'taken'),
+    [
+        (['robot_viewer'], 'robot_viewer'),
+        (['robot_viewer', 'robot_state_publisher'], 'robot_state_publisher'),
+    ],
+    ids=['ours', 'public'],
+)
+def test_the_public_robot_state_publisher_runs_where_it_is_installed(
+    tmp_path: Path, packages: list[str], taken: str
+) -> None:
+    """Ours elsewhere; it is no reason to end when it dies."""
+    found = processes(tmp_path, Stack(ROBOT, 'can0', simulate=True), *packages)
     assert not found['robot_state'].required
+    assert found['robot_state'].argv[0].endswith(f'{taken}/robot_state_publisher')
 
 
 def test_a_workspace_that_is_not_built_says_so(tmp_path: Path) -> None:

@@ -1,0 +1,169 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""``ros2 run robot_viewer robot_state_publisher``: /joint_states and a URDF become /tf."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+import sys
+import time
+
+from geometry_msgs.msg import TransformStamped
+import rclpy
+from rclpy.executors import ExternalShutdownException
+from rclpy.logging import get_logger
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.qos import DurabilityPolicy, qos_profile_sensor_data, QoSProfile
+from rclpy.qos_overriding_options import QoSOverridingOptions
+from rclpy.time import Time
+from rclpy.utilities import remove_ros_args, try_shutdown
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+from tf2_msgs.msg import TFMessage
+
+from ..exceptions import DescriptionError, ParameterError, ViewerError
+from ..joint_watch import JointWatch
+from ..state_publisher import FrameTransform, Remark, StatePublisher
+from ..urdf import JointKind, read_urdf
+from .parameters import check, declare, DESCRIPTION, read_settings
+
+NAME = 'robot_state_publisher'
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+TF_DEPTH = 100
+"""Queue of /tf, as tf2_ros has it."""
+WATCH_PERIOD = 1.0
+"""Time in [s] between two looks for missing joints."""
+
+
+class RobotStatePublisher(Node):
+    """Publishes /tf, /tf_static and robot_description."""
+
+    def __init__(self, description: str = '') -> None:
+        """Publish what does not move, and subscribe.
+
+        Args:
+            description: URDF to be used when the parameter robot_description is not given.
+
+        Raises:
+            ParameterError: A parameter is wrong, or there is no description.
+            DescriptionError: The description cannot be used.
+        """
+        super().__init__(NAME)
+        declare(self, description)
+        if not self.get_parameter(DESCRIPTION).value:
+            raise ParameterError(
+                'no robot_description: give the URDF as a parameter, or the name of a URDF file '
+                'as an argument'
+            )
+        self._tf = self.create_publisher(TFMessage, '/tf', TF_DEPTH)
+        self._tf_static = self.create_publisher(TFMessage, '/tf_static', LATCHED)
+        self._description = self.create_publisher(String, 'robot_description', LATCHED)
+        self._apply()
+        self._subscription = self.create_subscription(
+            JointState,
+            'joint_states',
+            self._take,
+            qos_profile_sensor_data,
+            qos_overriding_options=QoSOverridingOptions.with_default_policies(),
+        )
+        self.add_on_set_parameters_callback(check)
+        self.add_post_set_parameters_callback(self._changed)
+        self.create_timer(WATCH_PERIOD, self._watch_joints)
+
+    def _apply(self) -> None:
+        text = str(self.get_parameter(DESCRIPTION).value)
+        model = read_urdf(text)
+        self._core = StatePublisher(model, read_settings(self))
+        self._watch = JointWatch(model, time.monotonic())
+        self._description.publish(String(data=text))
+        fixed = self._core.fixed()
+        self._tf_static.publish(_message(fixed, self.get_clock().now()))
+        for joint in model.joints:
+            if joint.kind in {JointKind.FLOATING, JointKind.PLANAR}:
+                how = 'left out' if joint.kind is JointKind.FLOATING else 'taken as fixed'
+                self.get_logger().info(f'{joint.kind.value} joint {joint.name} is {how}')
+        moving = sum(1 for _ in model.movable())
+        rate = self._core.settings.publish_frequency
+        self.get_logger().info(
+            f'publishing {len(fixed)} fixed and {moving} moving frames of robot {model.name!r}, '
+            + (f'at most {rate:g} times a second' if rate else 'at each message')
+        )
+
+    def _changed(self, parameters: list[Parameter]) -> None:
+        if any(parameter.name != 'use_sim_time' for parameter in parameters):
+            self._apply()
+
+    def _take(self, message: JointState) -> None:
+        stamp = message.header.stamp
+        stamp_ns = stamp.sec * 1_000_000_000 + stamp.nanosec
+        now = self.get_clock().now().nanoseconds
+        self._watch.take(message.name)
+        update = self._core.update(message.name, message.position, stamp_ns, now)
+        for remark in update.remarks:
+            self._remark(remark, message.name)
+        if update.transforms:
+            self._tf.publish(_message(update.transforms, Time(nanoseconds=update.stamp)))
+
+    def _remark(self, remark: Remark, names: Sequence[str]) -> None:
+        text = f'message about {", ".join(names[:3]) or "no joint"}: {remark.value}'
+        if remark is Remark.LENGTHS:
+            self.get_logger().error(text, throttle_duration_sec=5.0)
+        elif remark is Remark.BACKWARDS:
+            self.get_logger().warning(remark.value)
+        else:
+            self.get_logger().warning(f'{text} (told once)', once=True)
+
+    def _watch_joints(self) -> None:
+        topic = self._subscription.topic_name
+        for text in self._watch.warnings(time.monotonic(), topic):
+            self.get_logger().warning(text)
+
+
+def _message(transforms: Iterable[FrameTransform], stamp: Time) -> TFMessage:
+    time_message = stamp.to_msg()
+    return TFMessage(transforms=[_stamped(each, time_message) for each in transforms])
+
+
+def _stamped(named: FrameTransform, stamp: object) -> TransformStamped:
+    message = TransformStamped(child_frame_id=named.child)
+    message.header.frame_id = named.parent
+    message.header.stamp = stamp
+    translation, rotation = message.transform.translation, message.transform.rotation
+    translation.x, translation.y, translation.z = named.transform.translation
+    rotation.x, rotation.y, rotation.z, rotation.w = named.transform.rotation
+    return message
+
+
+def _read_argument(argv: Sequence[str]) -> str:
+    """Read the URDF file that the command line names, if it does."""
+    files = remove_ros_args(list(argv))[1:]
+    if not files:
+        return ''
+    if len(files) > 1:
+        raise ParameterError(f'one URDF file at most, not {" ".join(files)}')
+    try:
+        return Path(files[0]).read_text(encoding='utf-8')
+    except (OSError, UnicodeDecodeError) as error:
+        raise DescriptionError(f'{files[0]}: {error}') from error
+
+
+def main() -> int:
+    """Run until Ctrl-C.
+
+    Returns:
+        0, or 1 when it could not begin.
+    """
+    rclpy.init()
+    try:
+        node = RobotStatePublisher(_read_argument(sys.argv))
+        rclpy.spin(node)
+    except ViewerError as error:
+        get_logger(NAME).fatal(str(error))
+        return 1
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    finally:
+        try_shutdown()
+    return 0

@@ -1,0 +1,97 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What is read of a URDF, and what is refused."""
+
+from __future__ import annotations
+
+import pytest
+from viewer_robots import ARM
+
+from robot_viewer import DescriptionError, JointKind, Mimic, read_urdf
+
+TWO = '<robot name="r"><link name="a"/><link name="b"/>{}</robot>'
+JOINT = '<joint name="j" type="{}"><parent link="{}"/><child link="{}"/>{}</joint>'
+AGAIN = JOINT.format('fixed', 'a', 'b', '') + '</robot>'
+
+
+def two_links(kind: str = 'revolute', parent: str = 'a', child: str = 'b', inner: str = '') -> str:
+    """Make a URDF with one joint."""
+    return TWO.format(JOINT.format(kind, parent, child, inner))
+
+
+def test_a_tree_is_read_in_its_order() -> None:
+    """Links, joints, root; the movable joints are those with one degree of freedom."""
+    model = read_urdf(ARM)
+    assert (model.name, model.root) == ('arm', 'base')
+    assert model.links[:3] == ('base', 'upper', 'slider')
+    assert [joint.name for joint in model.movable()] == [
+        'shoulder', 'lift', 'roll', 'finger_joint', 'thumb_joint',
+    ]  # fmt: skip
+    assert {joint.kind for joint in model.joints} == set(JointKind)
+
+
+def test_an_axis_is_made_a_unit_vector_and_is_x_by_default() -> None:
+    """As URDF says."""
+    shoulder = read_urdf(ARM).joints[0]
+    assert shoulder.axis == (0.0, 0.0, 1.0)
+    assert read_urdf(two_links()).joints[0].axis == (1.0, 0.0, 0.0)
+
+
+def test_a_chain_of_mimics_leads_to_its_first_joint() -> None:
+    """Multipliers and offsets are composed, whatever the order in the file is."""
+    links = ''.join(f'<link name="{name}"/>' for name in 'abcd')
+    joints = [
+        JOINT.format('revolute', 'a', 'b', '').replace('"j"', '"first"'),
+        JOINT.format('revolute', 'a', 'c', '<mimic joint="first" multiplier="2" offset="1"/>')
+        .replace('"j"', '"second"'),
+        JOINT.format('revolute', 'a', 'd', '<mimic joint="second" multiplier="3" offset="10"/>')
+        .replace('"j"', '"third"'),
+    ]  # fmt: skip
+    for order in (joints, joints[::-1]):
+        model = read_urdf(f'<robot name="r">{links}{"".join(order)}</robot>')
+        found = {joint.name: joint.mimic for joint in model.joints}
+        assert found['second'] == Mimic('first', 2.0, 1.0)
+        assert found['third'] == Mimic('first', 6.0, 13.0)
+
+
+@pytest.mark.parametrize(
+    ('urdf', 'words'),
+    [
+        ('', 'empty'),
+        (' \n', 'empty'),
+        ('<robot', 'no XML'),
+        ('<sdf/>', '<sdf>'),
+        ('<robot name="r"/>', 'no <link>'),
+        ('<robot name="r"><link/></robot>', '<link> has no name'),
+        ('<robot name="r"><link name="a"/><link name="a"/></robot>', 'several links called a'),
+        ('<robot name="r"><link name="a"/><link name="b"/></robot>', 'no parent.*a, b'),
+        (two_links('hinge'), "joint j: type 'hinge'.*revolute"),
+        (two_links(parent='x'), "joint j: there is no link 'x'"),
+        (two_links().replace('</robot>', AGAIN), 'several joints called j'),
+        (two_links(parent='b'), 'joints above link b make a loop'),
+        (two_links(inner='<origin xyz="0 0"/>'), "joint j: <origin> needs three.*'0 0'"),
+        (two_links(inner='<origin rpy="0 0 nan"/>'), "<origin>: 'nan' is no finite"),
+        (two_links(inner='<axis xyz="0 0 0"/>'), 'joint j: <axis> has no direction'),
+        (two_links(inner='<mimic/>'), 'joint j: <mimic> names no joint'),
+        (two_links(inner='<mimic joint="j"/>'), 'mimics itself'),
+        (two_links(inner='<mimic joint="k"/>'), "mimics 'k', which is no movable joint"),
+        (two_links().replace('<parent link="a"/>', ''), 'joint j: it needs <parent'),
+    ],
+)
+def test_what_is_no_tree_is_refused_with_the_element(urdf: str, words: str) -> None:
+    """The message says where and what."""
+    with pytest.raises(DescriptionError, match=words):
+        read_urdf(urdf)
+
+
+def test_a_link_with_two_parents_and_a_mimic_of_a_mimic_of_itself_are_refused() -> None:
+    """Neither is a tree."""
+    second = JOINT.format('fixed', 'c', 'b', '').replace('"j"', '"k"')
+    urdf = two_links(inner='').replace('</robot>', f'<link name="c"/>{second}</robot>')
+    with pytest.raises(DescriptionError, match='link b is the child of two joints, j and k'):
+        read_urdf(urdf)
+    links = '<link name="a"/><link name="b"/><link name="c"/>'
+    first = JOINT.format('revolute', 'a', 'b', '<mimic joint="k"/>')
+    other = JOINT.format('revolute', 'a', 'c', '<mimic joint="j"/>').replace('"j" ', '"k" ')
+    with pytest.raises(DescriptionError, match='mimics itself by way of'):
+        read_urdf(f'<robot name="r">{links}{first}{other}</robot>')
