@@ -1,0 +1,157 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The pose of the body over its feet, and what keeps it level on a slope."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+import math
+
+from ..model.urdf import Vector
+from .velocity import approach
+
+
+@dataclass(frozen=True, slots=True)
+class BodyPose:
+    """A pose of the body relative to its normal one over the feet.
+
+    Attributes:
+        x: Forward in [m].
+        y: To the left in [m].
+        z: Up in [m].
+        roll: About x in [rad].
+        pitch: About y, positive is nose down, in [rad].
+        yaw: About z in [rad].
+    """
+
+    x: float = 0.0
+    y: float = 0.0
+    z: float = 0.0
+    roll: float = 0.0
+    pitch: float = 0.0
+    yaw: float = 0.0
+
+    @property
+    def finite(self) -> bool:
+        """Whether all parts are numbers."""
+        return all(map(math.isfinite, self.parts))
+
+    @property
+    def parts(self) -> tuple[float, float, float, float, float, float]:
+        """All six numbers."""
+        return self.x, self.y, self.z, self.roll, self.pitch, self.yaw
+
+
+UPRIGHT = BodyPose()
+
+
+@dataclass(frozen=True, slots=True)
+class BodyLimits:
+    """How far and how fast the body may be moved over the feet.
+
+    Attributes:
+        shift: Along x and y in [m].
+        height: Along z, up and down, in [m].
+        roll: About x in [rad].
+        pitch: About y in [rad].
+        yaw: About z in [rad].
+        speed: Along all axes in [m/s].
+        turn_speed: About all axes in [rad/s].
+    """
+
+    shift: float = 0.025
+    height: float = 0.03
+    roll: float = 0.35
+    pitch: float = 0.3
+    yaw: float = 0.25
+    speed: float = 0.05
+    turn_speed: float = 0.8
+
+    def clamp(self, pose: BodyPose) -> BodyPose:
+        """Return the nearest pose within the limits."""
+        most = (self.shift, self.shift, self.height, self.roll, self.pitch, self.yaw)
+        return BodyPose(
+            *(min(max(part, -limit), limit) for part, limit in zip(pose.parts, most, strict=True))
+        )
+
+    def approach(self, pose: BodyPose, target: BodyPose, dt: float) -> BodyPose:
+        """Return the pose after a step of motion towards a target."""
+        if pose == target:
+            return pose
+        move, turn = self.speed * dt, self.turn_speed * dt
+        return BodyPose(
+            approach(pose.x, target.x, move),
+            approach(pose.y, target.y, move),
+            approach(pose.z, target.z, move),
+            approach(pose.roll, target.roll, turn),
+            approach(pose.pitch, target.pitch, turn),
+            approach(pose.yaw, target.yaw, turn),
+        )
+
+
+def feet_in_body(feet: Sequence[Vector], pose: BodyPose, centre: Vector) -> list[Vector]:
+    """Return where the feet are in the body's frame when the body is moved and the feet stay.
+
+    Args:
+        feet: Feet in the frame of a body at its normal pose in [m].
+        pose: Where the body is instead.
+        centre: Point that the body turns about in [m].
+    """
+    sr, cr = math.sin(pose.roll), math.cos(pose.roll)
+    sp, cp = math.sin(pose.pitch), math.cos(pose.pitch)
+    sy, cy = math.sin(pose.yaw), math.cos(pose.yaw)
+    # columns of Rz(yaw) Ry(pitch) Rx(roll); its transpose takes a vector into the body
+    xx, xy, xz = cy * cp, sy * cp, -sp
+    yx, yy, yz = cy * sp * sr - sy * cr, sy * sp * sr + cy * cr, cp * sr
+    zx, zy, zz = cy * sp * cr + sy * sr, sy * sp * cr - cy * sr, cp * cr
+    moved = []
+    for foot in feet:
+        x = foot[0] - centre[0] - pose.x
+        y = foot[1] - centre[1] - pose.y
+        z = foot[2] - centre[2] - pose.z
+        moved.append(
+            (
+                centre[0] + xx * x + xy * y + xz * z,
+                centre[1] + yx * x + yy * y + yz * z,
+                centre[2] + zx * x + zy * y + zz * z,
+            )
+        )
+    return moved
+
+
+class Leveller:
+    """Turns the body against the tilt that was measured: proportional, filtered, bounded."""
+
+    def __init__(self, gain: float, most: float = 0.2, cut_off: float = 4.0) -> None:
+        """Start level.
+
+        Args:
+            gain: Correction per tilt; 0 switches it off.
+            most: Largest correction in [rad].
+            cut_off: Of the low-pass filter in [Hz].
+        """
+        self._gain = gain
+        self._most = most
+        self._rate = math.tau * cut_off
+        self._roll = 0.0
+        self._pitch = 0.0
+
+    def step(self, tilt: tuple[float, float] | None, pose: BodyPose, dt: float) -> BodyPose:
+        """Return the pose that is asked for, with the correction added.
+
+        Args:
+            tilt: Measured roll and pitch in [rad]; None lets the correction fade.
+            pose: Pose that is asked for; its own roll and pitch are no error.
+            dt: Duration of the step in [s].
+        """
+        roll, pitch = (0.0, 0.0) if tilt is None else (tilt[0] - pose.roll, tilt[1] - pose.pitch)
+        share = 1.0 - math.exp(-self._rate * dt)
+        self._roll += share * (self._bounded(roll) - self._roll)
+        self._pitch += share * (self._bounded(pitch) - self._pitch)
+        return BodyPose(
+            pose.x, pose.y, pose.z, pose.roll + self._roll, pose.pitch + self._pitch, pose.yaw
+        )
+
+    def _bounded(self, error: float) -> float:
+        return min(max(-self._gain * error, -self._most), self._most)

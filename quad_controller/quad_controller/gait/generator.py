@@ -1,0 +1,158 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The whole gait: a velocity and a body pose in, joint targets out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+import math
+
+from ..model.quadruped import Feet, Quadruped, Targets
+from .body import BodyPose, feet_in_body, Leveller, UPRIGHT
+from .parameters import GaitParameters
+from .schedule import Gait, Schedule
+from .servo_compensation import ServoCompensation
+from .stepping import Stepper
+from .velocity import REST, Velocity
+
+
+@dataclass(frozen=True, slots=True)
+class GaitStep:
+    """What one step gives.
+
+    Attributes:
+        targets: Positions of all joints in [rad].
+        contacts: Which legs stand, in the order of :class:`..model.leg.Leg`.
+        reachable: Whether the feet are where they should be; else limits cut them off.
+    """
+
+    targets: Targets
+    contacts: tuple[bool, ...]
+    reachable: bool
+
+
+class GaitGenerator:
+    """Walks.
+
+    Attributes:
+        velocity: Velocity that is walked at the moment.
+        gait: The gait at the moment.
+    """
+
+    def __init__(
+        self, robot: Quadruped, parameters: GaitParameters, others: Sequence[float] | None = None
+    ) -> None:
+        """Start standing.
+
+        Args:
+            robot: The robot.
+            parameters: Its tuning.
+            others: Positions of all joints, for those that are no legs' in [rad]; zero when None.
+
+        Raises:
+            DescriptionError: The legs do not reach the nominal height.
+        """
+        self._robot = robot
+        self._parameters = parameters
+        self.others: Targets = tuple(others or [0.0] * len(robot.names))
+        self._limits = parameters.velocity_limits
+        self._centre = robot.hip_centre
+        self._neutral = self._stance()
+        self.gait = self._wanted_gait = Gait.TROT
+        self._stepper = Stepper(
+            parameters.schedule(self.gait),
+            self._neutral,
+            parameters.swing_height,
+            parameters.stance_depth,
+        )
+        self._leveller = Leveller(parameters.level_gain)
+        self._compensation = (
+            ServoCompensation(robot, parameters.servo) if parameters.servo is not None else None
+        )
+        self.velocity = REST
+        self.pose = UPRIGHT
+
+    @property
+    def standing(self) -> bool:
+        """Whether all feet are at their places and the robot is at rest."""
+        return not self._stepper.walking and self.velocity.at_rest
+
+    @property
+    def stand_targets(self) -> Targets:
+        """Positions of all joints when the robot stands upright [rad]."""
+        return self._robot.place(self._robot.solve(self._neutral), self.others)
+
+    @property
+    def phase(self) -> float:
+        """Share of the gait's period that has passed."""
+        return self._stepper.phase
+
+    def choose(self, gait: Gait) -> None:
+        """Change the gait; the robot stops for it when it walks."""
+        self._wanted_gait = gait
+
+    def reset(self) -> None:
+        """Stand, at once; for when something else has moved the joints."""
+        self._stepper.reset()
+        self.velocity, self.pose = REST, UPRIGHT
+        if self._compensation is not None:
+            self._compensation.reset()
+
+    def step(
+        self,
+        velocity: Velocity,
+        pose: BodyPose,
+        tilt: tuple[float, float] | None,
+        dt: float,
+    ) -> GaitStep:
+        """Advance.
+
+        Args:
+            velocity: Velocity that is asked for; clamped and approached.
+            pose: Pose of the body that is asked for; clamped and approached.
+            tilt: Measured roll and pitch in [rad], None when they are not known.
+            dt: Duration of the step in [s].
+        """
+        self._advance_velocity(velocity, dt)
+        limits = self._parameters.body
+        self.pose = limits.approach(self.pose, limits.clamp(pose), dt)
+        feet = self._stepper.step(self.velocity, dt)
+        moved = self._leveller.step(tilt, self.pose, dt)
+        sway = self._stepper.sway
+        if sway:
+            moved = BodyPose(moved.x, moved.y + sway, moved.z, moved.roll, moved.pitch, moved.yaw)
+        solutions = self._robot.solve(feet_in_body(feet, moved, self._centre))
+        targets = self._robot.place(solutions, self.others)
+        contacts = self._stepper.contacts
+        if self._compensation is not None:
+            targets = self._compensation.step(targets, contacts, dt)
+        return GaitStep(targets, contacts, all(solution.reachable for solution in solutions))
+
+    def _advance_velocity(self, velocity: Velocity, dt: float) -> None:
+        if self._wanted_gait is not self.gait:
+            if self.standing:
+                self.gait = self._wanted_gait
+                self._stepper.schedule = self._parameters.schedule(self.gait)
+            velocity = REST
+        goal = self._within_schedule(self._limits.clamp(velocity))
+        self.velocity = self._limits.approach(self.velocity, goal, dt)
+
+    def _within_schedule(self, velocity: Velocity) -> Velocity:
+        """Slow down to where the gait keeps its balance; no foot is faster over the body."""
+        fastest = max(
+            math.hypot(velocity.x - velocity.yaw * place[1], velocity.y + velocity.yaw * place[0])
+            for place in self._neutral
+        )
+        most = self._schedule.speed
+        return velocity.scaled(most / fastest) if fastest > most else velocity
+
+    @property
+    def _schedule(self) -> Schedule:
+        return self._stepper.schedule
+
+    def _stance(self) -> Feet:
+        shift = self._parameters.com_x_translation
+        feet = self._robot.footprint(self._parameters.nominal_height, self.others)
+        one, two, three, four = ((foot[0] + shift, foot[1], foot[2]) for foot in feet)
+        return one, two, three, four

@@ -1,0 +1,109 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What can be tuned of the gait, in CHAMP's words where CHAMP has one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+import math
+
+from ..exceptions import ParameterError
+from .body import BodyLimits
+from .schedule import Gait, Schedule, SCHEDULES
+from .servo_compensation import ServoModel
+from .velocity import VelocityLimits
+
+
+@dataclass(frozen=True, slots=True)
+class GaitParameters:
+    """Tuning of the gait; the defaults are those that walk with the XGO's dimensions.
+
+    Attributes:
+        max_linear_velocity_x: Forward and backward in [m/s]; its servos are at their speed there.
+        max_linear_velocity_y: To a side in [m/s].
+        max_angular_velocity_z: Turning in [rad/s].
+        linear_acceleration: Change of the linear velocity in [m/s^2].
+        angular_acceleration: Change of the turning in [rad/s^2].
+        nominal_height: Hip axes above the centres of the feet in [m].
+        com_x_translation: Feet ahead of the centre of mass in [m], when the URDF's is not true.
+        swing_height: How high a foot is lifted in [m].
+        stance_depth: How far a standing foot is pushed below the ground in [m].
+        stance_duration: How long a foot stands in [s]; 0 takes that of the gait.
+        duty: Share of the period that a foot stands; 0 takes that of the gait.
+        sway: Body to the side away from the lifted legs in [m]; negative takes that of the gait.
+        level_gain: Turns the body against the measured tilt, per tilt; 0 is off.
+        servo: What to compensate for; None for servos that are firm.
+        body: How far the body may be moved over the feet.
+    """
+
+    max_linear_velocity_x: float = 0.3
+    max_linear_velocity_y: float = 0.15
+    max_angular_velocity_z: float = 1.5
+    linear_acceleration: float = 1.0
+    angular_acceleration: float = 4.0
+    nominal_height: float = 0.085
+    com_x_translation: float = 0.0
+    swing_height: float = 0.02
+    stance_depth: float = 0.0
+    stance_duration: float = 0.0
+    duty: float = 0.0
+    sway: float = -1.0
+    level_gain: float = 0.5
+    servo: ServoModel | None = None
+    body: BodyLimits = field(default_factory=BodyLimits)
+
+    def __post_init__(self) -> None:
+        """Refuse what makes no sense.
+
+        Raises:
+            ParameterError: A value is outside of its range; the message has name and range.
+        """
+        for name, (least, most) in RANGES.items():
+            value = getattr(self, name)
+            if not least <= value <= most:
+                raise ParameterError(f'{name} {value} is not within {least} to {most}')
+        if self.duty and not self.duty >= MIN_DUTY:
+            raise ParameterError(f'duty {self.duty} is below {MIN_DUTY}; 0 takes that of the gait')
+        if self.servo is not None and not (0.0 < self.servo.kp < math.inf):
+            raise ParameterError(f'servo_compensation.kp {self.servo.kp} is no stiffness above 0')
+
+    @property
+    def velocity_limits(self) -> VelocityLimits:
+        """How fast the robot may go."""
+        return VelocityLimits(
+            self.max_linear_velocity_x,
+            self.max_linear_velocity_y,
+            self.max_angular_velocity_z,
+            self.linear_acceleration,
+            self.angular_acceleration,
+        )
+
+    def schedule(self, gait: Gait) -> Schedule:
+        """Return a gait with what was tuned of it."""
+        schedule = SCHEDULES[gait]
+        return replace(
+            schedule,
+            stance_duration=self.stance_duration or schedule.stance_duration,
+            duty=self.duty or schedule.duty,
+            sway=schedule.sway if self.sway < 0.0 else self.sway,
+        )
+
+
+MIN_DUTY = 0.5  # below it there are moments without a foot on the ground
+
+RANGES: dict[str, tuple[float, float]] = {
+    'max_linear_velocity_x': (0.01, 2.0),
+    'max_linear_velocity_y': (0.01, 2.0),
+    'max_angular_velocity_z': (0.05, 6.0),
+    'linear_acceleration': (0.05, 20.0),
+    'angular_acceleration': (0.1, 100.0),
+    'nominal_height': (0.02, 1.0),
+    'com_x_translation': (-0.2, 0.2),
+    'swing_height': (0.0, 0.2),
+    'stance_depth': (0.0, 0.05),
+    'stance_duration': (0.0, 5.0),
+    'duty': (0.0, 0.95),
+    'sway': (-1.0, 0.1),
+    'level_gain': (0.0, 1.0),
+}
+"""Range of each parameter, both ends included; units as in :class:`GaitParameters`."""

@@ -1,0 +1,69 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""When each leg stands and swings, for each gait."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+import math
+
+
+class Gait(Enum):
+    """The gaits; the value is their name in ``set_mode``."""
+
+    TROT = 'trot'
+    CRAWL = 'crawl'
+    PACE = 'pace'
+
+
+@dataclass(frozen=True, slots=True)
+class Schedule:
+    """A gait; phases are shares of a period.
+
+    A leg stands while its own phase (the gait's plus its offset) is below the duty.
+
+    Attributes:
+        offsets: Lead of each leg's phase, front left, front right, back left, back right.
+        stance_duration: How long a foot stays on the ground in [s].
+        duty: Share of the period that a foot stands.
+        sway: How far the body moves to the side away from the legs in the air in [m].
+        speed: Largest speed of a foot over the body that the gait keeps its balance at in [m/s].
+    """
+
+    offsets: tuple[float, float, float, float]
+    stance_duration: float
+    duty: float
+    sway: float
+    speed: float
+
+    @property
+    def period(self) -> float:
+        """Duration of a cycle in [s]."""
+        return self.stance_duration / self.duty
+
+    @property
+    def swing_duration(self) -> float:
+        """How long a foot is in the air in [s]."""
+        return self.period - self.stance_duration
+
+    @property
+    def sway_phase(self) -> float:
+        """Phase at which the middle of the left legs' swings lies; the body is right then.
+
+        It is the phase of the first harmonic of "left legs in the air minus right legs".
+        """
+        sides = (1.0, -1.0, 1.0, -1.0)
+        centre = (1.0 + self.duty) / 2  # of the swing, in the leg's own phase
+        angles = [math.tau * (centre - offset) for offset in self.offsets]
+        sine = sum(side * math.sin(angle) for side, angle in zip(sides, angles, strict=True))
+        cosine = sum(side * math.cos(angle) for side, angle in zip(sides, angles, strict=True))
+        return math.atan2(sine, cosine) / math.tau
+
+
+SCHEDULES = {
+    Gait.TROT: Schedule((0.0, 0.5, 0.5, 0.0), 0.154, 0.55, 0.0, 0.45),
+    Gait.CRAWL: Schedule((0.0, 0.5, 0.75, 0.25), 0.8, 0.8, 0.012, 0.06),
+    Gait.PACE: Schedule((0.0, 0.5, 0.0, 0.5), 0.154, 0.55, 0.008, 0.15),
+}
+"""The gaits as they were found to walk in physics simulation with the XGO's dimensions."""

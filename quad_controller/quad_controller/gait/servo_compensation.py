@@ -1,0 +1,91 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Set-points that make soft servos be where a firm one would be.
+
+A position servo is a spring: it lags behind a moving set-point and sags under the robot's weight.
+The set-point is moved ahead by what the spring needs, from the motion of the next step and, for
+the legs that stand, from their share of the weight::
+
+    command = q + (damping / kp) q' + (inertia / kp) q'' - J^T f / kp,   f = m g / standing legs
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ..model.leg_kinematics import jacobian
+from ..model.quadruped import Quadruped, Targets
+
+GRAVITY = 9.81  # [m/s^2]
+
+
+@dataclass(frozen=True, slots=True)
+class ServoModel:
+    """A servo as a spring with a damper.
+
+    Attributes:
+        kp: Stiffness in [N m/rad].
+        damping: Its own velocity gain and the joint's friction in [N m s/rad].
+        inertia: What a joint turns in [kg m^2].
+        mass: Weight that the legs carry in [kg]; 0 takes that of the URDF.
+    """
+
+    kp: float = 2.45
+    damping: float = 0.05
+    inertia: float = 0.002
+    mass: float = 0.0
+
+
+class ServoCompensation:
+    """Changes joint targets; costs one step of delay, since it looks one step ahead."""
+
+    def __init__(self, robot: Quadruped, servo: ServoModel) -> None:
+        """Start without a past.
+
+        Args:
+            robot: The robot.
+            servo: Its servos.
+        """
+        self._robot = robot
+        self._servo = servo
+        self._weight = GRAVITY * (servo.mass or robot.mass)
+        self._window: list[tuple[Targets, tuple[bool, ...]]] = []
+
+    def reset(self) -> None:
+        """Forget the motion so far."""
+        self._window.clear()
+
+    def step(self, targets: Targets, contacts: tuple[bool, ...], dt: float) -> Targets:
+        """Return the set-points for the targets of one step ago.
+
+        Args:
+            targets: Where the joints shall be in [rad].
+            contacts: Which legs stand.
+            dt: Duration of the step in [s].
+        """
+        window = self._window
+        window.append((targets, contacts))
+        while len(window) < 3:
+            window.append((targets, contacts))
+        if len(window) > 3:
+            del window[0]
+        before, (now, stand), after = window[0][0], window[1], window[2][0]
+        step = max(dt, 1e-3)
+        lead, inertia = self._servo.damping / self._servo.kp, self._servo.inertia / self._servo.kp
+        moved = [
+            q + lead * (b - a) / (2 * step) + inertia * (b - 2 * q + a) / (step * step)
+            for a, q, b in zip(before, now, after, strict=True)
+        ]
+        self._carry(moved, now, stand)
+        return self._robot.clamp(moved)
+
+    def _carry(self, moved: list[float], now: Targets, stand: Sequence[bool]) -> None:
+        share = self._weight / max(sum(stand), 1) / self._servo.kp
+        legs = zip(self._robot.legs, self._robot.leg_indices, stand, strict=True)
+        for leg, indices, stands in legs:
+            if stands:
+                hip, thigh, calf = indices
+                columns = jacobian(leg, (now[hip], now[thigh], now[calf]))
+                for index, column in zip(indices, columns, strict=True):
+                    moved[index] -= column[2] * share

@@ -1,0 +1,190 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Where the feet go: they stay on the ground while they stand, and swing to their next place.
+
+A standing foot moves through the body's frame with minus the body's velocity at that foot, the
+turning included, so that it does not slip whatever the velocity does. A swinging foot follows a
+cubic Hermite curve that leaves and meets the ground with the ground's velocity, so that it does
+not scuff. It lands half a stroke ahead of its neutral place (Raibert's neutral point).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import math
+
+from ..model.quadruped import Feet
+from ..model.urdf import Vector
+from .schedule import Schedule
+from .velocity import Velocity
+
+FULL_LIFT_SPEED = 0.03  # [m/s] slower steps are lifted less
+FULL_LIFT_TRAVEL = 0.01  # [m] shorter steps are lifted less
+AT_PLACE = 1e-6  # [m] as near to its neutral place as a foot needs to be
+
+
+@dataclass(slots=True)
+class _Foot:
+    """Where a foot is from its neutral place in [m], and where it left the ground."""
+
+    x: float = 0.0
+    y: float = 0.0
+    z: float = 0.0
+    swings: bool = False
+    start_x: float = 0.0
+    start_y: float = 0.0
+
+
+class Stepper:
+    """Moves four feet through a gait.
+
+    Attributes:
+        schedule: The gait; may be exchanged while the feet stand.
+    """
+
+    def __init__(
+        self, schedule: Schedule, neutral: Feet, swing_height: float, depth: float
+    ) -> None:
+        """Start with all feet at their neutral places.
+
+        Args:
+            schedule: The gait.
+            neutral: Where the feet are without motion, in the body's frame in [m].
+            swing_height: How high a foot is lifted in [m].
+            depth: How far a standing foot is pushed below the ground in [m].
+        """
+        self.schedule = schedule
+        self._neutral = neutral
+        self._swing_height = swing_height
+        self._depth = depth
+        self._feet = [_Foot() for _ in neutral]
+        self._phase = 0.0
+        self._walking = False
+        self._engaged = 0.0
+
+    @property
+    def walking(self) -> bool:
+        """Whether any foot is off its neutral place or about to step."""
+        return self._walking
+
+    @property
+    def phase(self) -> float:
+        """Share of the period that has passed."""
+        return self._phase
+
+    @property
+    def contacts(self) -> tuple[bool, ...]:
+        """Which feet stand."""
+        return tuple(not foot.swings for foot in self._feet)
+
+    @property
+    def sway(self) -> float:
+        """How far the body shall be to the left in [m]."""
+        schedule = self.schedule
+        angle = math.tau * (self._phase - schedule.sway_phase)
+        return -schedule.sway * self._engaged * math.cos(angle)
+
+    def reset(self) -> None:
+        """Put all feet back to their neutral places, at once."""
+        self._feet = [_Foot() for _ in self._neutral]
+        self._phase = self._engaged = 0.0
+        self._walking = False
+
+    def step(self, velocity: Velocity, dt: float) -> list[Vector]:
+        """Advance and return the feet in the frame of a level body in [m].
+
+        Args:
+            velocity: Velocity of the body.
+            dt: Duration of the step in [s].
+        """
+        if not self._walking and not velocity.at_rest:
+            self._walking = True
+            self._phase = 0.0
+        if self._walking:
+            self._advance(velocity, dt)
+        if self._walking and velocity.at_rest and self._all_at_place() and self._engaged <= 0.0:
+            self.reset()
+        return [
+            (place[0] + foot.x, place[1] + foot.y, place[2] + foot.z)
+            for place, foot in zip(self._neutral, self._feet, strict=True)
+        ]
+
+    def _advance(self, velocity: Velocity, dt: float) -> None:
+        period = self.schedule.period
+        self._phase = math.fmod(self._phase + dt / period, 1.0)
+        # the sway comes and goes within a period, so that neither start nor stop is a jerk
+        goal = 0.0 if velocity.at_rest else 1.0
+        self._engaged += min(max(goal - self._engaged, -dt / period), dt / period)
+        legs = zip(self._neutral, self._feet, self.schedule.offsets, strict=True)
+        for place, foot, offset in legs:
+            hip_x = velocity.x - velocity.yaw * place[1]
+            hip_y = velocity.y + velocity.yaw * place[0]
+            leg_phase = math.fmod(self._phase + offset, 1.0)
+            if leg_phase >= self.schedule.duty:
+                self._swing(foot, leg_phase, velocity, (hip_x, hip_y), dt)
+                continue
+            stood = self._land(foot, leg_phase, hip_x, hip_y) if foot.swings else dt
+            self._stand(foot, leg_phase)
+            # how the ground moves under the foot itself, which is not just below the hip
+            turn_x, turn_y = -velocity.yaw * foot.y, velocity.yaw * foot.x
+            foot.x -= (hip_x + turn_x) * min(stood, dt)
+            foot.y -= (hip_y + turn_y) * min(stood, dt)
+
+    def _land(self, foot: _Foot, phase: float, hip_x: float, hip_y: float) -> float:
+        """End a swing that ended within this step; return how long the foot has stood in [s]."""
+        foot.swings = False
+        half = 0.5 * self.schedule.stance_duration
+        foot.x, foot.y = half * hip_x, half * hip_y
+        return phase * self.schedule.period
+
+    def _stand(self, foot: _Foot, phase: float) -> None:
+        schedule = self.schedule
+        foot.z = -self._depth * self._engaged * math.sin(math.pi * phase / schedule.duty)
+
+    def _swing(
+        self, foot: _Foot, phase: float, velocity: Velocity, hip: tuple[float, float], dt: float
+    ) -> None:
+        schedule = self.schedule
+        hip_x, hip_y = hip
+        if not foot.swings:
+            foot.swings = True
+            stood = max(dt - (phase - schedule.duty) * schedule.period, 0.0)
+            foot.start_x = foot.x - hip_x * stood
+            foot.start_y = foot.y - hip_y * stood
+        part = (phase - schedule.duty) / (1.0 - schedule.duty)
+        half, duration, yaw = 0.5 * schedule.stance_duration, schedule.swing_duration, velocity.yaw
+        end_x, end_y = half * hip_x, half * hip_y
+        foot.x = hermite(
+            (foot.start_x, (yaw * foot.start_y - hip_x) * duration),
+            (end_x, (yaw * end_y - hip_x) * duration),
+            part,
+        )
+        foot.y = hermite(
+            (foot.start_y, (-yaw * foot.start_x - hip_y) * duration),
+            (end_y, (-yaw * end_x - hip_y) * duration),
+            part,
+        )
+        travel = math.hypot(end_x - foot.start_x, end_y - foot.start_y)
+        speed = math.hypot(hip_x, hip_y)
+        scale = min(1.0, max(speed / FULL_LIFT_SPEED, travel / FULL_LIFT_TRAVEL))
+        foot.z = self._swing_height * scale * 0.5 * (1.0 - math.cos(math.tau * part))
+
+    def _all_at_place(self) -> bool:
+        return all(
+            abs(foot.x) < AT_PLACE and abs(foot.y) < AT_PLACE and abs(foot.z) < AT_PLACE
+            for foot in self._feet
+        )
+
+
+def hermite(start: tuple[float, float], end: tuple[float, float], part: float) -> float:
+    """Return a cubic between two values.
+
+    Args:
+        start: Value and change per part at part 0.
+        end: The same at part 1.
+        part: How much of the way is done, 0 to 1.
+    """
+    rest = 1.0 - part
+    rise = part * part * (3.0 - 2.0 * part)
+    bend = part * rest * (start[1] * rest - end[1] * part)
+    return start[0] + (end[0] - start[0]) * rise + bend

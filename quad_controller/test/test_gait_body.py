@@ -1,0 +1,142 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The body over the feet: pose, levelling, soft servos, and what parameters are taken."""
+
+from __future__ import annotations
+
+import math
+
+from hypothesis import given
+from hypothesis import strategies as st
+import numpy as np
+import pytest
+
+from quad_controller.exceptions import ParameterError
+from quad_controller.gait.body import BodyLimits, BodyPose, feet_in_body, Leveller, UPRIGHT
+from quad_controller.gait.generator import GaitGenerator
+from quad_controller.gait.parameters import GaitParameters
+from quad_controller.gait.servo_compensation import ServoCompensation, ServoModel
+from quad_controller.gait.velocity import REST, Velocity
+from quad_controller.model.quadruped import quadruped
+from quad_gait_urdf import urdf
+
+ROBOT = quadruped(urdf())
+CENTRE = ROBOT.hip_centre
+FEET = ROBOT.footprint(0.085, [0.0] * 12)
+poses = st.builds(BodyPose, *[st.floats(-0.03, 0.03)] * 3, *[st.floats(-0.4, 0.4)] * 3)
+
+
+@given(poses)
+def test_moving_the_body_is_rigid(pose: BodyPose) -> None:
+    """The feet keep their distances, and the body's motion brings them back where they were."""
+    moved = np.array(feet_in_body(FEET, pose, CENTRE))
+    feet = np.array(FEET)
+    assert np.linalg.norm(moved[0] - moved[3]) == pytest.approx(np.linalg.norm(feet[0] - feet[3]))
+    x, y, z = (
+        np.array([[1, 0, 0], [0, math.cos(pose.roll), -math.sin(pose.roll)],
+                  [0, math.sin(pose.roll), math.cos(pose.roll)]]),
+        np.array([[math.cos(pose.pitch), 0, math.sin(pose.pitch)], [0, 1, 0],
+                  [-math.sin(pose.pitch), 0, math.cos(pose.pitch)]]),
+        np.array([[math.cos(pose.yaw), -math.sin(pose.yaw), 0],
+                  [math.sin(pose.yaw), math.cos(pose.yaw), 0], [0, 0, 1]]),
+    )  # fmt: skip
+    back = (z @ y @ x @ (moved - CENTRE).T).T + CENTRE + [pose.x, pose.y, pose.z]
+    assert back == pytest.approx(feet)
+
+
+def test_a_body_that_hangs_to_the_right_is_lifted_there() -> None:
+    """Levelling stretches the legs of the side that hangs."""
+    leveller = Leveller(gain=0.5)
+    for _ in range(100):
+        pose = leveller.step((0.1, 0.0), UPRIGHT, 0.02)  # roll: left side up, right side down
+    heights = [foot[2] for foot in feet_in_body(FEET, pose, CENTRE)]
+    assert heights[1] < FEET[1][2] - 1e-3  # right foot further below the body
+    assert heights[0] > FEET[0][2] + 1e-3
+
+
+@given(st.floats(-3, 3), st.floats(-3, 3))
+def test_levelling_is_bounded_and_fades(roll: float, pitch: float) -> None:
+    """No tilt turns the body further than the bound, and without a tilt it comes back."""
+    leveller = Leveller(gain=0.8, most=0.2)
+    for _ in range(50):
+        pose = leveller.step((roll, pitch), UPRIGHT, 0.02)
+        assert abs(pose.roll) <= 0.2
+        assert abs(pose.pitch) <= 0.2
+    for _ in range(200):
+        pose = leveller.step(None, UPRIGHT, 0.02)
+    assert pose.parts == pytest.approx(UPRIGHT.parts, abs=1e-6)
+
+
+def test_a_tilt_that_was_asked_for_is_no_error() -> None:
+    """The body stays where it was sent when it measures just that."""
+    leveller = Leveller(gain=0.5)
+    asked = BodyPose(roll=0.1, pitch=-0.1)
+    for _ in range(50):
+        assert leveller.step((0.1, -0.1), asked, 0.02) == asked
+
+
+@given(poses, poses)
+def test_body_moves_slowly_and_within_limits(present: BodyPose, target: BodyPose) -> None:
+    """The body approaches a pose within its limits at no more than its speed."""
+    limits = BodyLimits()
+    goal = limits.clamp(target)
+    after = limits.approach(present, goal, 0.02)
+    change = np.abs(np.subtract(after.parts, present.parts))
+    assert (change[:3] <= limits.speed * 0.02 + 1e-12).all()
+    assert (change[3:] <= limits.turn_speed * 0.02 + 1e-12).all()
+    assert limits.clamp(goal) == goal
+
+
+def test_height_lowers_the_body() -> None:
+    """A negative height bends the knees."""
+    generator = GaitGenerator(ROBOT, GaitParameters())
+    for _ in range(100):
+        step = generator.step(REST, BodyPose(z=-0.02), None, 0.02)
+    assert step.reachable
+    for foot in ROBOT.feet(step.targets):
+        assert foot[2] == pytest.approx(FEET[0][2] + 0.02)
+
+
+def test_a_firm_servo_needs_no_compensation() -> None:
+    """With a stiff spring the set-points are the targets, one step later."""
+    compensation = ServoCompensation(ROBOT, ServoModel(kp=1e9))
+    generator = GaitGenerator(ROBOT, GaitParameters())
+    targets = [generator.step(Velocity(0.2), UPRIGHT, None, 0.02) for _ in range(50)]
+    sent = [compensation.step(one.targets, one.contacts, 0.02) for one in targets]
+    for before, after in zip(targets, sent[1:], strict=False):
+        assert after == pytest.approx(before.targets, abs=1e-6)
+
+
+def test_a_soft_servo_is_pushed_against_the_weight() -> None:
+    """Standing, the springs of the compensated set-points carry the robot's weight."""
+    servo = ServoModel(kp=2.0)
+    compensation = ServoCompensation(ROBOT, servo)
+    stand = GaitGenerator(ROBOT, GaitParameters()).stand_targets
+    sent = compensation.step(stand, (True,) * 4, 0.02)
+    step, lifted = 1e-6, 0.0
+    for leg in range(4):
+        for joint in ROBOT.leg_indices[leg]:
+            moved = list(stand)
+            moved[joint] += step
+            rise = (ROBOT.feet(moved)[leg][2] - ROBOT.feet(stand)[leg][2]) / step
+            # virtual work: what the spring's torque would lift, were the foot free
+            torque = servo.kp * (sent[joint] - stand[joint])
+            share = ROBOT.mass * 9.81 / 4
+            assert torque == pytest.approx(-rise * share, abs=1e-4)
+            lifted += abs(torque)
+    assert lifted > 0.1
+
+
+@pytest.mark.parametrize(
+    ('values', 'reason'),
+    [
+        ({'max_linear_velocity_x': math.nan}, 'max_linear_velocity_x nan'),
+        ({'duty': 0.4}, 'duty 0.4 is below 0.5'),
+        ({'swing_height': -0.01}, 'swing_height -0.01 is not within'),
+        ({'servo': ServoModel(kp=0.0)}, 'kp 0.0 is no stiffness'),
+    ],
+)
+def test_odd_parameters_are_refused(values: dict[str, float], reason: str) -> None:
+    """A parameter that makes no sense is named with its range."""
+    with pytest.raises(ParameterError, match=reason):
+        GaitParameters(**values)  # type: ignore[arg-type]

@@ -1,0 +1,174 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Laws of the feet: they do not slip, do not jump, and come home."""
+
+from __future__ import annotations
+
+import math
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+import numpy as np
+import pytest
+
+from quad_controller.gait.body import UPRIGHT
+from quad_controller.gait.generator import GaitGenerator
+from quad_controller.gait.parameters import GaitParameters
+from quad_controller.gait.schedule import Gait, SCHEDULES
+from quad_controller.gait.stepping import hermite, Stepper
+from quad_controller.gait.velocity import REST, Velocity
+from quad_controller.model.quadruped import quadruped
+from quad_gait_urdf import urdf
+
+ROBOT = quadruped(urdf())
+NEUTRAL = ROBOT.footprint(0.085, [0.0] * 12)
+PERIOD = 0.02  # [s]
+
+gaits = pytest.mark.parametrize('gait', Gait)
+velocities = st.builds(Velocity, st.floats(-0.2, 0.2), st.floats(-0.1, 0.1), st.floats(-1.0, 1.0))
+
+
+def stepper(gait: Gait = Gait.TROT) -> Stepper:
+    """Return a stepper with feet at their places."""
+    return Stepper(SCHEDULES[gait], NEUTRAL, 0.02, 0.0)
+
+
+@gaits
+def test_enough_feet_stand_in_every_phase(gait: Gait) -> None:
+    """Two feet stand in a trot and a pace, three in a crawl."""
+    least = 3 if gait is Gait.CRAWL else 2
+    schedule = SCHEDULES[gait]
+    for phase in np.linspace(0.0, 1.0, 997, endpoint=False):
+        stand = sum((phase + offset) % 1.0 < schedule.duty for offset in schedule.offsets)
+        assert stand >= least
+
+
+@gaits
+@settings(max_examples=30)
+@given(velocity=velocities)
+def test_standing_feet_do_not_slip(gait: Gait, velocity: Velocity) -> None:
+    """While a foot stands and the body moves on, the foot's place in the world stays."""
+    walker = stepper(gait)
+    dt = 0.002
+    places: list[np.ndarray | None] = [None] * 4
+    x = y = heading = 0.0
+    for _ in range(round(1.2 * walker.schedule.period / dt)):
+        before = walker.contacts
+        feet = walker.step(velocity, dt)
+        x += (velocity.x * math.cos(heading) - velocity.y * math.sin(heading)) * dt
+        y += (velocity.x * math.sin(heading) + velocity.y * math.cos(heading)) * dt
+        heading += velocity.yaw * dt
+        turn = np.array(
+            [[math.cos(heading), -math.sin(heading)], [math.sin(heading), math.cos(heading)]]
+        )
+        for index, (foot, stood, stands) in enumerate(
+            zip(feet, before, walker.contacts, strict=True)
+        ):
+            if not (stands and stood):
+                places[index] = None
+                continue
+            place = turn @ foot[:2] + [x, y]
+            first = places[index]
+            if first is None:
+                places[index] = place
+            else:
+                # the rest is Euler's error of the integration, second order in dt
+                assert np.linalg.norm(place - first) < 1e-3
+
+
+@gaits
+@settings(max_examples=30)
+@given(commands=st.lists(st.tuples(velocities, st.integers(1, 30)), min_size=1, max_size=6))
+def test_feet_move_continuously_and_come_home(
+    gait: Gait, commands: list[tuple[Velocity, int]]
+) -> None:
+    """Whatever is asked for, no foot jumps; after a stop all are where they began."""
+    generator = GaitGenerator(ROBOT, GaitParameters())
+    generator.choose(gait)
+    at_home = generator.stand_targets
+    previous = np.array(ROBOT.feet(at_home))
+    rest = [(REST, 200)]
+    for velocity, steps in [*commands, *rest]:
+        for _ in range(steps):
+            step = generator.step(velocity, UPRIGHT, None, PERIOD)
+            feet = np.array(ROBOT.feet(step.targets))
+            # a swing covers a stroke and a lift within some 6 steps
+            assert np.linalg.norm(feet - previous, axis=1).max() < 0.03
+            previous = feet
+    assert generator.standing
+    assert step.targets == pytest.approx(at_home, abs=1e-5)
+    assert all(step.contacts)
+
+
+@settings(max_examples=20)
+@given(velocity=velocities)
+def test_no_foot_touches_ground_at_another_speed(velocity: Velocity) -> None:
+    """A swinging foot leaves and meets the ground with the ground's velocity."""
+    walker = stepper()
+    dt = 5e-4
+    previous = np.array(walker.step(velocity, dt))
+    stood = walker.contacts
+    for _ in range(1200):
+        feet = np.array(walker.step(velocity, dt))
+        speed = (feet - previous)[:, :2] / dt
+        for index, (was, stands) in enumerate(zip(stood, walker.contacts, strict=True)):
+            if was != stands:
+                x, y = feet[index, :2]
+                ground = [-velocity.x + velocity.yaw * y, -velocity.y - velocity.yaw * x]
+                assert speed[index] == pytest.approx(ground, abs=0.01)
+        previous, stood = feet, walker.contacts
+
+
+ends = st.tuples(st.floats(-1, 1), st.floats(-1, 1))
+
+
+@given(ends, ends)
+def test_hermite_has_ends_and_slopes(start: tuple[float, float], end: tuple[float, float]) -> None:
+    """The curve meets its end points with the slopes that it is given."""
+    step = 1e-7
+    assert hermite(start, end, 0.0) == pytest.approx(start[0])
+    assert hermite(start, end, 1.0) == pytest.approx(end[0])
+    assert (hermite(start, end, step) - start[0]) / step == pytest.approx(start[1], abs=1e-5)
+    assert (end[0] - hermite(start, end, 1.0 - step)) / step == pytest.approx(end[1], abs=1e-5)
+
+
+@given(velocities, velocities, st.floats(0.001, 0.1))
+def test_velocity_changes_no_faster_than_allowed(
+    present: Velocity, target: Velocity, dt: float
+) -> None:
+    """Accelerations are bounded and the target is reached in the end."""
+    limits = GaitParameters().velocity_limits
+    after = limits.approach(present, target, dt)
+    change = math.hypot(after.x - present.x, after.y - present.y)
+    assert change <= limits.acceleration * dt + 1e-12
+    assert abs(after.yaw - present.yaw) <= limits.yaw_acceleration * dt + 1e-12
+    for _ in range(2000):
+        after = limits.approach(after, target, dt)
+    assert after == target
+
+
+@given(st.builds(Velocity, *[st.floats(-100, 100)] * 3))
+def test_velocity_is_clamped_in_its_direction(velocity: Velocity) -> None:
+    """The clamped velocity is in the ellipse and does not turn to a side."""
+    limits = GaitParameters().velocity_limits
+    clamped = limits.clamp(velocity)
+    assert math.hypot(clamped.x / limits.x, clamped.y / limits.y) <= 1.0 + 1e-12
+    assert abs(clamped.yaw) <= limits.yaw
+    assert clamped.x * velocity.y == pytest.approx(clamped.y * velocity.x, abs=1e-9)
+
+
+@gaits
+def test_gait_changes_only_at_rest(gait: Gait) -> None:
+    """Asked for another gait while it walks, the robot stops first and then goes on."""
+    generator = GaitGenerator(ROBOT, GaitParameters())
+    for _ in range(60):
+        generator.step(Velocity(0.1), UPRIGHT, None, PERIOD)
+    generator.choose(gait)
+    seen = [generator.gait]
+    for _ in range(200):
+        generator.step(Velocity(0.1), UPRIGHT, None, PERIOD)
+        if generator.gait is not seen[-1]:
+            assert generator.velocity.x <= 0.021
+            seen.append(generator.gait)
+    assert seen[-1] is gait
+    assert generator.velocity.x > 0.03
