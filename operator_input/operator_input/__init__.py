@@ -1,0 +1,26 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What a person moves a robot with: keys, with their release, from any terminal; and gamepads."""
+
+from .auto_repeat import AutoRepeat
+from .exceptions import DeviceError, OperatorInputError, PresetError, TerminalError
+from .held_keys import HeldKeys
+from .keyboard import Keyboard, ReleaseSource
+from .keys import all_released, KeyAction, KeyEvent
+from .terminal import StatusLine, TerminalKeyboard
+
+__all__ = [
+    'AutoRepeat',
+    'DeviceError',
+    'HeldKeys',
+    'KeyAction',
+    'KeyEvent',
+    'Keyboard',
+    'OperatorInputError',
+    'PresetError',
+    'ReleaseSource',
+    'StatusLine',
+    'TerminalError',
+    'TerminalKeyboard',
+    'all_released',
+]

@@ -1,0 +1,43 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Whether the person at the terminal sits at this machine's keyboard."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+import subprocess
+
+_SSH = ('SSH_CONNECTION', 'SSH_TTY', 'SSH_CLIENT')
+
+
+def is_local(
+    environment: Mapping[str, str],
+    ask_tmux: Callable[[], str] | None = None,
+) -> bool:
+    """Say whether keys come from a keyboard of this machine.
+
+    Inside tmux the person may have come by SSH after the shell was started; tmux knows.
+
+    Args:
+        environment: Variables of this process.
+        ask_tmux: Returns tmux's record of SSH_CONNECTION; replaced in tests.
+    """
+    if environment.get('STY'):  # screen does not say who is attached
+        return False
+    if environment.get('TMUX'):
+        answer = (ask_tmux or _ask_tmux)()
+        return answer.startswith('-SSH_CONNECTION')
+    return not any(environment.get(name) for name in _SSH)
+
+
+def _ask_tmux() -> str:
+    try:
+        return subprocess.run(
+            ['tmux', 'show-environment', 'SSH_CONNECTION'],
+            capture_output=True,
+            text=True,
+            timeout=1.0,
+            check=False,
+        ).stdout
+    except (OSError, subprocess.TimeoutExpired):
+        return ''

@@ -1,0 +1,40 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Everything that operator_input raises.
+
+::
+
+    OperatorInputError
+    ├── TerminalError (OSError)     there is no terminal to read keys from, or it is gone
+    ├── DeviceError (OSError)       an input device cannot be opened or read
+    └── PresetError (ValueError)    there is no gamepad preset of that name; lists what there is
+
+Arguments of the wrong kind from a *programmer* stay ``ValueError``/``TypeError``.
+"""
+
+from __future__ import annotations
+
+
+class OperatorInputError(Exception):
+    """Root of all errors of this package."""
+
+
+class TerminalError(OperatorInputError, OSError):
+    """There is no terminal to read keys from, or it is gone.
+
+    Scenarios: started by a service manager or with a pipe, the window was closed, SSH broke off.
+    """
+
+
+class DeviceError(OperatorInputError, OSError):
+    """An input device cannot be opened or read.
+
+    Scenarios: the user is not in the group input, the device was unplugged.
+    """
+
+
+class PresetError(OperatorInputError, ValueError):
+    """There is no gamepad preset of that name.
+
+    Scenarios: a name misspelt.
+    """

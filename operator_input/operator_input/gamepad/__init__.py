@@ -1,0 +1,21 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Gamepads: presets, state, hot-plug, deadman."""
+
+from .controls import AT_REST, Axis, Button, GamepadState
+from .deadman import Deadman, Grip, is_pressed
+from .gamepad import Gamepad
+from .presets import AUTO, PRESETS
+
+__all__ = [
+    'AT_REST',
+    'AUTO',
+    'PRESETS',
+    'Axis',
+    'Button',
+    'Deadman',
+    'Gamepad',
+    'GamepadState',
+    'Grip',
+    'is_pressed',
+]

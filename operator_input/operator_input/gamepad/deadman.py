@@ -1,0 +1,61 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The button without which nothing moves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+from .controls import Axis, Button, GamepadState
+
+TRIGGER_PRESSED = 0.5  # way of a trigger that counts as pressed
+
+
+class Grip(Enum):
+    """What the person allows."""
+
+    RELEASED = 'released'
+    HELD = 'held'
+    TURBO = 'turbo'
+
+
+@dataclass(frozen=True, slots=True)
+class Deadman:
+    """Which buttons allow motion.
+
+    Attributes:
+        enable: Must be held for any motion; None when none is needed.
+        turbo: Held too, or alone: fast; None for no such button.
+    """
+
+    enable: Button | None = Button.LEFT_SHOULDER
+    turbo: Button | None = Button.RIGHT_SHOULDER
+
+    def grip(self, state: GamepadState) -> Grip:
+        """Say what the person allows.
+
+        Args:
+            state: The gamepad.
+        """
+        if self.turbo is not None and is_pressed(self.turbo, state):
+            return Grip.TURBO
+        if self.enable is None or is_pressed(self.enable, state):
+            return Grip.HELD
+        return Grip.RELEASED
+
+
+def is_pressed(button: Button, state: GamepadState) -> bool:
+    """Say whether a button is pressed; a trigger is, too, when its axis is beyond the middle.
+
+    Args:
+        button: Which.
+        state: The gamepad.
+    """
+    if button in state.buttons:
+        return True
+    if button is Button.LEFT_TRIGGER:
+        return state.axis(Axis.LEFT_TRIGGER) > TRIGGER_PRESSED
+    if button is Button.RIGHT_TRIGGER:
+        return state.axis(Axis.RIGHT_TRIGGER) > TRIGGER_PRESSED
+    return False

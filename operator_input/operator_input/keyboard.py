@@ -1,0 +1,128 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The keyboard of a person: keys from a terminal, releases from wherever they are known."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+import contextlib
+from enum import Enum
+import os
+import select
+import time
+from types import TracebackType
+from typing import TYPE_CHECKING
+
+from .devices.events import InputDevices
+from .devices.kernel import KernelDevices
+from .devices.keyboards import Keyboards
+from .devices.local import is_local
+from .devices.release_matcher import ReleaseMatcher
+from .keys import KeyEvent
+from .terminal import Stage, StatusLine, TerminalKeyboard
+from .terminal.line import CONTROLLING_TERMINAL
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
+
+class ReleaseSource(Enum):
+    """Who says when a key goes up."""
+
+    TERMINAL = 'terminal'
+    """The Kitty keyboard protocol."""
+
+    KEYBOARD = 'keyboard'
+    """The keyboard itself, by evdev."""
+
+    TIME_OUT = 'time-out'
+    """Nobody; a key is up when its next repeat is overdue."""
+
+
+class Keyboard:
+    """Key events of a person, with true releases where the machine has any."""
+
+    def __init__(
+        self,
+        path: str = CONTROLLING_TERMINAL,
+        *,
+        devices: InputDevices | None = None,
+        environment: Mapping[str, str] = os.environ,
+        kitty: bool = True,
+    ) -> None:
+        """Prepare; the terminal is touched on entering the context.
+
+        Args:
+            path: Device of the terminal.
+            devices: Input devices; those of this machine when it is None.
+            environment: Tells whether the terminal is on this machine.
+            kitty: Ask the terminal for releases.
+        """
+        self._terminal = TerminalKeyboard(path, kitty=kitty)
+        self._matcher = ReleaseMatcher()
+        self._keyboards = Keyboards(devices or KernelDevices(), self._matcher)
+        self._watch_keyboards = is_local(environment)
+
+    @property
+    def release_source(self) -> ReleaseSource:
+        """Who says at the moment when a key goes up."""
+        if self._terminal.stage is Stage.ACTIVE:
+            return ReleaseSource.TERMINAL
+        return ReleaseSource.KEYBOARD if self._keyboards.names else ReleaseSource.TIME_OUT
+
+    def status_line(self) -> StatusLine:
+        """Return a status line on the same terminal.
+
+        Raises:
+            TerminalError: Outside of the context.
+        """
+        return StatusLine(self._terminal.line)
+
+    def wait(self, timeout: float, others: Iterable[int] = ()) -> list[KeyEvent]:
+        """Wait for something to happen to a key.
+
+        Args:
+            timeout: Longest wait [s].
+            others: File descriptors that end the wait too.
+
+        Returns:
+            What happened, in its order; empty after the time-out.
+
+        Raises:
+            TerminalError: The terminal was closed. All keys count as released.
+        """
+        if self._watch_keyboards:
+            self._keyboards.scan(time.monotonic())
+        waiting = [self._terminal.fileno(), *self._keyboards.filenos(), *others]
+        select.select(waiting, [], [], max(min(timeout, self._terminal.patience()), 0.0))
+        # the keyboard first: its press explains the character of the terminal
+        events = self._keyboards.read(time.monotonic())
+        for event in self._terminal.read():
+            events += self._matcher.terminal(event)
+        return events
+
+    def paused(self) -> contextlib.AbstractContextManager[None]:
+        """Give the terminal back for the time of a block, as for Ctrl-Z."""
+        return self._paused()
+
+    @contextlib.contextmanager
+    def _paused(self) -> Iterator[None]:
+        self._keyboards.close()
+        self._matcher.lose_all(time.monotonic())
+        with self._terminal.paused():
+            yield
+
+    def __enter__(self) -> Self:
+        """Open the terminal."""
+        self._terminal.__enter__()
+        return self
+
+    def __exit__(
+        self,
+        exc_type: type[BaseException] | None,
+        exc: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """Give the terminal back, whatever happened."""
+        self._keyboards.close()
+        self._terminal.__exit__(exc_type, exc, traceback)

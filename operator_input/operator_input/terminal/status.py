@@ -1,0 +1,87 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""One line at the bottom that is written again and again, and messages above it."""
+
+from __future__ import annotations
+
+import re
+from typing import Protocol
+import unicodedata
+
+_CONTROL = re.compile('\x1b\\[[0-9;]*m')
+RESET, CLEAR_LINE = '\x1b[0m', '\r\x1b[K'
+
+
+class Output(Protocol):
+    """What a status line needs of a terminal."""
+
+    def write(self, text: str) -> None:
+        """Write characters and control sequences."""
+
+    def width(self) -> int:
+        """Return the width [characters]."""
+
+
+class StatusLine:
+    """Shows a line in place; never wider than the window, so that it never wraps."""
+
+    def __init__(self, output: Output) -> None:
+        """Start without a line.
+
+        Args:
+            output: The terminal.
+        """
+        self._output = output
+        self._shown = ''
+
+    def show(self, text: str) -> None:
+        """Show a line, if it is not there yet.
+
+        Args:
+            text: May contain colours.
+        """
+        line = fitted(text, self._output.width() - 1)
+        if line != self._shown:
+            self._output.write(CLEAR_LINE + line)
+            self._shown = line
+
+    def say(self, text: str) -> None:
+        """Write lines above it, which stay.
+
+        Args:
+            text: May contain colours and several lines.
+        """
+        self._output.write(f'{CLEAR_LINE}{text}\n{self._shown}')
+
+    def end(self) -> None:
+        """Leave the line as it is, and go below it."""
+        if self._shown:
+            self._output.write('\n')
+        self._shown = ''
+
+
+def fitted(text: str, width: int) -> str:
+    """Cut a line so that it needs no more than some columns.
+
+    Args:
+        text: May contain colours; they are kept, and switched off where it is cut.
+        width: Columns.
+    """
+    result: list[str] = []
+    left, position = width, 0
+    while position < len(text):
+        control = _CONTROL.match(text, position)
+        piece = control[0] if control else text[position]
+        columns = 0 if control else _columns(piece)
+        if columns > left:
+            return ''.join(result) + (RESET if '\x1b' in text else '')
+        result.append(piece)
+        left -= columns
+        position += len(piece)
+    return ''.join(result)
+
+
+def _columns(character: str) -> int:
+    if unicodedata.combining(character):
+        return 0
+    return 2 if unicodedata.east_asian_width(character) in {'W', 'F'} else 1

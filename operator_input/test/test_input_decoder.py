@@ -1,0 +1,199 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+from hypothesis import given
+from hypothesis import strategies as st
+import pytest
+
+from operator_input import KeyAction, KeyEvent
+from operator_input.terminal.decoder import KeyDecoder
+from operator_input.terminal.reports import Kitty, Report, ReportKind
+
+PRESSED, REPEATED = KeyAction.PRESSED, KeyAction.REPEATED
+RELEASED, TYPED = KeyAction.RELEASED, KeyAction.TYPED
+
+
+def decode(text: str, *, kitty: bool = False) -> list[tuple[str, KeyAction]]:
+    """Decode a text and return the keys."""
+    decoder = KeyDecoder()
+    decoder.reports_releases = kitty
+    events = decoder.feed(text.encode(), 0.0)
+    return [(event.key, event.action) for event in events if isinstance(event, KeyEvent)]
+
+
+@pytest.mark.parametrize(
+    ('text', 'name'),
+    [
+        ('i', 'i'),
+        ('I', 'I'),
+        ('<', '<'),
+        (' ', 'space'),
+        ('\r', 'enter'),
+        ('\t', 'tab'),
+        ('\x7f', 'backspace'),
+        ('\x03', 'ctrl+c'),
+        ('\x1a', 'ctrl+z'),
+        ('\x1bi', 'alt+i'),
+        ('\x1b[A', 'up'),
+        ('\x1bOB', 'down'),
+        ('\x1b[5~', 'page_up'),
+        ('\x1b[6~', 'page_down'),
+        ('\x1b[1~', 'home'),
+        ('\x1b[H', 'home'),
+        ('\x1bOP', 'f1'),
+        ('\x1b[15~', 'f5'),
+        ('\x1b[17~', 'f6'),
+        ('\x1b[24~', 'f12'),
+        ('\x1b[1;5C', 'ctrl+right'),
+        ('\x1b[27;5;105~', 'ctrl+i'),
+        ('\x1b[105;5u', 'ctrl+i'),
+        ('ш', 'ш'),
+    ],
+)
+def test_old_encodings(text: str, name: str) -> None:
+    """Characters, xterm's, VT220's and modifyOtherKeys' sequences name their key."""
+    assert decode(text) == [(name, TYPED)]
+
+
+@pytest.mark.parametrize(
+    ('text', 'name'),
+    [
+        ('\x1b[105u', 'i'),
+        ('\x1b[105;;105u', 'i'),
+        ('\x1b[105;1:1;105u', 'i'),
+        ('\x1b[105:73;2:1;73u', 'I'),
+        ('\x1b[44:60;2:1;60u', '<'),
+        ('\x1b[44:60;2u', '<'),
+        ('\x1b[32;1:1;32u', 'space'),
+        ('\x1b[13u', 'enter'),
+        ('\x1b[27u', 'escape'),
+        ('\x1b[99;5u', 'ctrl+c'),
+        ('\x1b[1089::99;5u', 'ctrl+c'),
+        ('\x1b[1096::105;1:1;1096u', 'i'),
+        ('\x1b[1096:1064:105;2:1;1064u', 'I'),
+        ('\x1b[105;65:1;73u', 'I'),
+        ('\x1b[105;129:1;105u', 'i'),
+        ('\x1b[A', 'up'),
+        ('\x1b[1;1:1A', 'up'),
+        ('\x1b[5;1:1~', 'page_up'),
+        ('\x1b[57407u', '8'),
+        ('\x1b[57419u', 'up'),
+    ],
+)
+def test_kitty_presses(text: str, name: str) -> None:
+    """The protocol's optional parts, locks, other layouts and the keypad name the key meant."""
+    assert decode(text, kitty=True) == [(name, PRESSED)]
+
+
+def test_kitty_press_repeat_release() -> None:
+    """The three events of a key are told apart, in both forms of the protocol."""
+    text = '\x1b[105;1:1;105u\x1b[105;1:2;105u\x1b[105;1:3u'
+    assert decode(text, kitty=True) == [('i', PRESSED), ('i', REPEATED), ('i', RELEASED)]
+    text = '\x1b[1;1:1A\x1b[1;1:2A\x1b[1;1:3A'
+    assert decode(text, kitty=True) == [('up', PRESSED), ('up', REPEATED), ('up', RELEASED)]
+
+
+def test_release_has_the_name_of_the_press() -> None:
+    """Shift let go of before the letter: the release still belongs to the capital."""
+    text = '\x1b[105:73;2:1;73u' + '\x1b[105;1:3u'
+    assert decode(text, kitty=True) == [('I', PRESSED), ('I', RELEASED)]
+
+
+def test_shift_while_a_key_is_held_changes_the_key() -> None:
+    """A held i becomes I: one is released before the other is pressed."""
+    text = '\x1b[105;1:1;105u' + '\x1b[105:73;2:2;73u' + '\x1b[105:73;2:3u'
+    keys = decode(text, kitty=True)
+    assert keys == [('i', PRESSED), ('i', RELEASED), ('I', PRESSED), ('I', RELEASED)]
+
+
+@pytest.mark.parametrize('code', [57441, 57442, 57447, 57358, 57361])
+def test_modifiers_are_no_keys(code: int) -> None:
+    """Pressing Shift or Caps Lock is not 'any other key'."""
+    assert decode(f'\x1b[{code};2:1u\x1b[{code};1:3u', kitty=True) == []
+
+
+def test_repeat_of_a_key_that_is_not_down_is_no_press() -> None:
+    """A key that was held before we looked, or was let go of, does not start by its repeat."""
+    assert decode('\x1b[105;1:2;105u', kitty=True) == []
+
+
+def test_focus_lost_releases_all() -> None:
+    """A release that happens in another window is never seen, so leaving the window counts."""
+    keys = decode('\x1b[105;1:1;105u\x1b[O\x1b[105;1:2;105u', kitty=True)
+    assert keys == [('i', PRESSED), ('', KeyAction.ALL_RELEASED)]
+
+
+def test_pasted_text_is_not_typed() -> None:
+    """A paste moves nothing, what is typed after it does."""
+    assert decode('\x1b[200~iiii\x1b[A\x1bOA\x1b[201~k') == [('k', TYPED)]
+
+
+def test_reports() -> None:
+    """Answers of the terminal are not keys."""
+    events = KeyDecoder().feed(b'\x1b[?31u\x1b[?62;22c\x1b[0n', 0.0)
+    assert events == [
+        Report(ReportKind.KITTY_FLAGS, Kitty(31)),
+        Report(ReportKind.DEVICE_ATTRIBUTES),
+        Report(ReportKind.STATUS),
+    ]
+
+
+@pytest.mark.parametrize('text', ['\x1b]0;title\x07', '\x1bP1$r0m\x1b\\', '\x1b_Gi=1;OK\x1b\\'])
+def test_strings_are_skipped(text: str) -> None:
+    """Answers in strings, late ones of another program say, are not typed text."""
+    keys = [key for key, _ in decode(f'{text}k')]
+    assert 'k' in keys
+    assert not set(keys) - {'k', 'alt+\\'}
+
+
+def test_escape_key_comes_with_patience() -> None:
+    """An escape alone is the key, but only when nothing follows it."""
+    decoder = KeyDecoder()
+    assert decoder.feed(b'\x1b', 1.0) == []
+    assert decoder.is_pending
+    assert decoder.flush(1.1) == [KeyEvent('escape', TYPED, 1.1)]
+    assert not decoder.is_pending
+
+
+STREAMS = st.lists(
+    st.sampled_from(
+        [
+            'i',
+            'ш',
+            '\x1b[A',
+            '\x1bOP',
+            '\x1bx',
+            '\x1b[105;1:1;105u',
+            '\x1b[105;1:3u',
+            '\x1b[105:73;2:2;73u',
+            '\x1b[?31u',
+            '\x1b[200~p\x1b[201~',
+        ]
+    ),
+    max_size=20,
+).map(''.join)
+
+
+@given(STREAMS, st.data())
+def test_any_split_gives_the_same_keys(stream: str, data: st.DataObject) -> None:
+    """Where a read ends does not matter, not even inside of a character."""
+    octets = stream.encode()
+    whole, parts = KeyDecoder(), KeyDecoder()
+    whole.reports_releases = parts.reports_releases = True
+    cuts = sorted(data.draw(st.sets(st.integers(0, len(octets)), max_size=6)))
+    pieces = [octets[a:b] for a, b in zip([0, *cuts], [*cuts, len(octets)], strict=True)]
+    found = [event for piece in pieces for event in parts.feed(piece, 0.0)]
+    assert found == whole.feed(octets, 0.0)
+
+
+@given(st.binary(max_size=300))
+def test_noise_is_survived_and_forgotten(noise: bytes) -> None:
+    """Whatever comes, nothing is raised, and a key after a pause is read again."""
+    decoder = KeyDecoder()
+    decoder.reports_releases = True
+    decoder.feed(noise, 0.0)
+    # ends an open sequence, string and paste
+    decoder.feed(b'\x18' * 300 + b'\x1b[201~', 0.0)
+    decoder.flush(0.0)
+    assert decoder.feed(b'k', 1.0) == [KeyEvent('k', TYPED, 1.0)]

@@ -1,0 +1,172 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+import math
+
+from hypothesis import given
+from hypothesis import strategies as st
+import pytest
+
+from operator_input import all_released, AutoRepeat, HeldKeys, KeyAction, KeyEvent
+
+KEYS = 'ijkl'
+STEPS = st.lists(
+    st.tuples(
+        st.sampled_from(KEYS),
+        st.sampled_from(KeyAction),
+        st.sampled_from([0.0, 0.02, 0.03, 0.05, 0.1, 0.15, 0.3, 0.5, 0.66, 1.5]),
+    ),
+    max_size=60,
+)
+ACTIONS = {
+    'press': KeyAction.PRESSED,
+    'type': KeyAction.TYPED,
+    'repeat': KeyAction.REPEATED,
+    'release': KeyAction.RELEASED,
+}
+
+
+def fed(text: str) -> tuple[HeldKeys, AutoRepeat]:
+    """Feed events written as ``time action key``, separated by commas."""
+    auto_repeat = AutoRepeat()
+    keys = HeldKeys(auto_repeat)
+    for entry in text.split(','):
+        time, action, key = entry.split()
+        keys.feed(KeyEvent(key, ACTIONS[action], float(time)))
+    return keys, auto_repeat
+
+
+@given(STEPS)
+def test_typed_keys_are_up_after_the_longest_time_out(
+    steps: list[tuple[str, KeyAction, float]],
+) -> None:
+    """Without a pressed key everything stops, however characters came, within a known time."""
+    auto_repeat = AutoRepeat()
+    keys, now = HeldKeys(auto_repeat), 100.0
+    for key, action, gap in steps:
+        now += gap
+        keys.feed(KeyEvent(key, action, now))
+    for key in KEYS:
+        keys.feed(KeyEvent(key, KeyAction.RELEASED, now))
+    assert keys.current(now) is None or keys.deadline() < math.inf
+    assert keys.current(now + auto_repeat.longest) is None
+
+
+@given(STEPS)
+def test_released_key_is_never_current(steps: list[tuple[str, KeyAction, float]]) -> None:
+    """What was released, or all released, does not move anything until it is struck again."""
+    keys, now, up = HeldKeys(), 0.0, set(KEYS)
+    for key, action, gap in steps:
+        now += gap
+        keys.feed(KeyEvent(key, action, now))
+        if action is KeyAction.ALL_RELEASED:
+            up = set(KEYS)
+        elif action is KeyAction.RELEASED:
+            up.add(key)
+        elif action is not KeyAction.REPEATED:
+            up.discard(key)
+        assert not up & set(keys.held(now))
+
+
+@given(STEPS)
+def test_there_is_one_command_and_one_typed_key_at_most(
+    steps: list[tuple[str, KeyAction, float]],
+) -> None:
+    """The newest struck key is the current one; typed keys never add up."""
+    keys, now, pressed = HeldKeys(), 0.0, set[str]()
+    for key, action, gap in steps:
+        now += gap
+        keys.feed(KeyEvent(key, action, now))
+        if action is KeyAction.PRESSED:
+            pressed.add(key)
+        elif action is KeyAction.RELEASED:
+            pressed.discard(key)
+        elif action is KeyAction.ALL_RELEASED:
+            pressed.clear()
+        held = keys.held(now)
+        assert len(held) == len(set(held))
+        assert len(set(held) - pressed) <= 1
+        if action is KeyAction.PRESSED or (action is KeyAction.TYPED and key not in pressed):
+            assert keys.current(now) == key
+        assert keys.current(now) == (held[-1] if held else None)
+
+
+def test_pressed_key_is_held_until_its_release() -> None:
+    """No time-out ends a key whose release will be reported."""
+    keys, _ = fed('0 press i')
+    assert keys.current(3600.0) == 'i'
+    keys.feed(KeyEvent('i', KeyAction.RELEASED, 3600.0))
+    assert keys.current(3600.0) is None
+
+
+def test_typed_key_times_out_in_two_stages() -> None:
+    """One character holds for the delay of the repeat; repeats hold for a much shorter time."""
+    keys, _ = fed('0 type i')
+    assert keys.current(0.49) == 'i'
+    assert keys.current(0.5) is None
+    keys, _ = fed('0 type i, 0.4 type i, 0.43 type i')
+    assert keys.current(0.57) == 'i'
+    assert keys.current(0.58) is None
+
+
+def test_slow_repeat_delay_is_learned() -> None:
+    """A desktop that repeats after 0.66 s stutters once only."""
+    keys, auto_repeat = fed('0 type i, 0.66 type i, 0.69 type i, 0.72 type i')
+    assert auto_repeat.first > 0.66
+    keys.feed(KeyEvent('i', KeyAction.TYPED, 5.0))
+    assert keys.current(5.66) == 'i'
+
+
+def test_fast_repeat_delay_is_learned() -> None:
+    """A keyboard that repeats after 0.25 s makes a tap end after that, not after the guess."""
+    keys, auto_repeat = fed('0 type i, 0.25 type i, 0.28 type i, 0.31 type i')
+    assert 0.25 < auto_repeat.first < 0.35
+    keys.feed(KeyEvent('i', KeyAction.TYPED, 5.0))
+    assert keys.current(5.0 + auto_repeat.first) is None
+
+
+def test_taps_teach_nothing() -> None:
+    """Single taps, at whatever pace of a hand, leave the guess as it is."""
+    _, auto_repeat = fed('0 type i, 0.3 type i, 0.6 type i, 0.75 type i, 1.1 type i, 1.3 type i')
+    assert auto_repeat.first == AutoRepeat().first
+
+
+def test_second_tap_within_the_delay_gets_the_long_time_out() -> None:
+    """Once the delay is known, tap-and-hold does not stutter."""
+    keys, auto_repeat = fed(
+        '0 type i, 0.5 type i, 0.53 type i, 0.56 type i, 5 type i, 5.25 type i'
+    )
+    assert keys.current(5.25 + auto_repeat.first - 0.01) == 'i'
+
+
+def test_earlier_key_counts_again() -> None:
+    """Where releases are known, the key below the newest one takes over when that goes up."""
+    keys, _ = fed('0 press i, 1 press l')
+    assert keys.current(1.0) == 'l'
+    keys.feed(KeyEvent('l', KeyAction.RELEASED, 2.0))
+    assert keys.current(2.0) == 'i'
+
+
+def test_cleared_key_needs_a_new_press() -> None:
+    """After a stop, the repeats of a key that is still down move nothing."""
+    keys, _ = fed('0 press i')
+    keys.clear()
+    keys.feed(KeyEvent('i', KeyAction.REPEATED, 0.1))
+    assert keys.current(0.1) is None
+    keys.feed(KeyEvent('i', KeyAction.PRESSED, 0.2))
+    assert keys.current(0.2) == 'i'
+
+
+def test_all_released_ends_everything() -> None:
+    """When the window loses the focus nothing is held."""
+    keys, _ = fed('0 press i, 0 type l')
+    keys.feed(all_released(0.1))
+    assert keys.held(0.1) == ()
+
+
+@pytest.mark.parametrize(('first', 'repeat'), [(0.1, 0.2), (0.5, 0.0), (0.0, 0.0)])
+def test_senseless_time_outs_are_refused(first: float, repeat: float) -> None:
+    """A second stage that is longer than the first, or none at all, is an error of the caller."""
+    with pytest.raises(ValueError, match='time-outs'):
+        AutoRepeat(first, repeat)
