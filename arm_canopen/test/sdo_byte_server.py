@@ -35,7 +35,7 @@ class SdoByteServer:
         """Return the answer to a frame of a client; None to an abort."""
         assert len(request) == 8
         specifier = request[0] >> 5
-        if specifier in (1, 2):
+        if specifier in (1, 2, 5, 6):
             self._address = (request[1] | request[2] << 8, request[3])
             self._toggle = 0
             if self._address in self.refuses:

@@ -475,7 +475,9 @@ def test_a_time_out_that_begins_with_a_frame_counts_from_it() -> None:
     net.boot()
     node = net.network.nodes['a']
     begin = net.network.scheduler.now
-    node.image.inputs[0].listener = lambda entry: promises.append(node.sdo.read(0x1000, 0, 0.02))
+    node.image.inputs[0].listener = lambda entry: promises.append(
+        node.sdo.write(0x2000, 0, b'', 0.02)
+    )
     promises: list[object] = []
     net.network.receive(Frame(0x182, bytes(3), timestamp=begin + 0.5))
     assert len(promises) == 1

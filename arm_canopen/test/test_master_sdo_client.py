@@ -262,14 +262,14 @@ def test_an_abort_in_the_middle_of_segments_ends_the_transfer() -> None:
 def test_silence_ends_in_a_time_out_that_the_server_hears_of() -> None:
     """Not before the time-out; the server gets an abort, the caller the place and the time."""
     line = Line()
-    promise = read(line)
+    promise = write(line, b'x')
     line.sent.clear()
     line.pass_time(TIMEOUT * 0.99)
     assert not promise.done
     line.pass_time(TIMEOUT * 0.02)
-    with pytest.raises(SdoTimeoutError, match=r'joint1 .*0x1018:01 within 50 ms'):
+    with pytest.raises(SdoTimeoutError, match=r'joint1 .*0x2001:00 within 50 ms'):
         promise.result()
-    line.expect(ABORTED.format(place='18 10 01'))
+    line.expect(ABORTED.format(place='01 20 00'))
     assert line.client.counters.timed_out == 1
 
 
@@ -351,6 +351,86 @@ def test_a_late_answer_of_something_else_does_no_harm(late: str) -> None:
     assert promise.result() == b'\x2a'
 
 
+def test_a_late_answer_is_not_taken_for_the_next_one_of_its_object() -> None:
+    """Another object is read first: a server answers in order, so after that all is new."""
+    line = Line()
+    first, second = write(line, b'1'), write(line, b'2')
+    line.pass_time(TIMEOUT)
+    assert isinstance(first.error, SdoTimeoutError)
+    assert line.sent.pop() == bytes.fromhex('40 00 10 00 00 00 00 00')
+    line.receive('60 01 20 00 00 00 00 00')  # of the first
+    assert not second.done
+    line.sent.clear()
+    line.receive('4F 00 10 00 00 00 00 00')
+    line.expect('2F 01 20 00 32 00 00 00')
+    line.receive('60 01 20 00 00 00 00 00')
+    assert second.error is None
+    assert second.done
+
+
+def test_a_silent_device_is_not_written_to_blindly() -> None:
+    """While it is not known what it has heard, the next write of the object waits for a sign."""
+    line = Line()
+    promises = [write(line, b'1'), write(line, b'2')]
+    line.pass_time(TIMEOUT)
+    line.pass_time(TIMEOUT)
+    for promise in promises:
+        with pytest.raises(SdoTimeoutError, match='0x2001:00'):
+            promise.result()
+    assert [data[0] for data in line.sent if data[0] == 0x2F] == [0x2F]
+
+
+@given(st.lists(st.sampled_from(['answer', 'late', 'silence']), min_size=1, max_size=6))
+def test_every_answer_belongs_to_its_question(fates: list[str]) -> None:
+    """Whatever comes late or never: a value that is returned was read after it was asked for."""
+    line = Line()
+    late: list[bytes] = []
+    for number, fate in enumerate(fates):
+        server = SdoByteServer(values={(0x1018, 1): bytes((number,)), (0x1000, 0): b'\0'})
+        promise = read(line)
+        answers = [server.answer(request) or b'' for request in line.sent]
+        line.sent.clear()
+        for data in late:
+            line.receive(data)
+        late = answers if fate == 'late' else []
+        if fate == 'answer':
+            for data in answers:
+                line.receive(data)
+            line.serve(server.answer)
+        for _ in range(3):
+            line.pass_time(TIMEOUT / 2)
+            if fate == 'answer':
+                line.serve(server.answer)
+            late += [server.answer(data) or b'' for data in line.sent if fate == 'late']
+            line.sent.clear()
+        assert promise.done
+        if promise.error is None:
+            assert promise.result() == bytes((number,))
+
+
+def test_a_lost_frame_costs_a_read_no_time_out() -> None:
+    """The question is repeated, and a second answer does no harm."""
+    line = Line()
+    promise = read(line)
+    line.sent.clear()
+    line.pass_time(TIMEOUT / 2)
+    line.expect('40 18 10 01 00 00 00 00')
+    line.receive('4F 18 10 01 2A 00 00 00')
+    assert promise.result() == b'\x2a'
+    assert (line.client.counters.repeated, line.client.counters.timed_out) == (1, 0)
+
+
+def test_only_writes_that_may_be_repeated_are() -> None:
+    """A command must not be given twice because its confirmation was lost."""
+    line = Line()
+    write(line, b'1')
+    line.client.write(0x2002, 0, b'1', 1.0, repeat=True)
+    line.pass_time(TIMEOUT)
+    line.sent.clear()
+    line.pass_time(0.5)
+    line.expect('2F 02 20 00 31 00 00 00')
+
+
 def test_an_answer_without_a_question_is_counted() -> None:
     """Before, between and after transfers."""
     line = Line()
@@ -413,6 +493,31 @@ def test_a_device_that_never_comes_to_an_end_is_stopped() -> None:
     assert isinstance(promise.error, SdoAbortError)
 
 
+def test_a_device_that_announces_no_length_is_stopped_too(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """An upload without end is ended."""
+    monkeypatch.setattr('arm_canopen.master.sdo_client.UNANNOUNCED_MAX', 1000)
+    line = Line()
+    promise = read(line)
+    line.receive('40 18 10 01 00 00 00 00')
+    toggle = 0
+    while not promise.done:
+        line.receive(bytes((toggle << 4,)) + bytes(7))
+        toggle ^= 1
+    with pytest.raises(SdoAbortError, match=r'1001 bytes came'):
+        promise.result()
+
+
+def test_more_than_a_device_can_have_is_not_begun() -> None:
+    """A length of 4 GiB is a defect of the device."""
+    line = Line()
+    promise = read(line)
+    line.receive('41 18 10 01 FF FF FF FF')
+    with pytest.raises(SdoAbortError, match='4294967295 bytes announced'):
+        promise.result()
+
+
 def test_garbage_does_not_look_like_silence() -> None:
     """The time-out says that answers came which were none to this request."""
     line = Line()
@@ -433,7 +538,9 @@ def test_cancelling_ends_all_and_leaves_the_client_ready(progress: int) -> None:
     for _ in range(progress):
         if line.sent and (answer := server.answer(line.sent.pop(0))) is not None:
             line.receive(answer)
+    line.sent.clear()
     line.client.cancel_all('the device restarted')
+    assert [data[0] for data in line.sent] == [0x80], 'the device was not told'
     for promise in promises[1:] if progress == 3 else promises:
         with pytest.raises(SdoError, match='joint1: the device restarted'):
             promise.result()
@@ -454,7 +561,8 @@ def test_who_asks_again_when_cancelled_is_served_after_it() -> None:
     first.when_done(lambda _: again.append(read(line)))
     line.client.cancel_all('the device restarted')
     assert not again[0].done
-    line.receive('4F 18 10 01 2A 00 00 00')
+    line.sent = line.sent[-1:]
+    line.serve(SdoByteServer(values={(0x1018, 1): b'\x2a'}).answer)
     assert again[0].result() == b'\x2a'
 
 

@@ -4,27 +4,28 @@
 
 from __future__ import annotations
 
-from binascii import crc_hqx
 import struct
 
 from ..standard.sdo_abort import AbortCode
+from ..standard.sdo_block import (
+    ACKNOWLEDGE_UPLOAD,
+    block_frames,
+    BLOCK_SEGMENTS_MAX,
+    checksum,
+    CRC_BIT,
+    DOWNLOAD_ACKNOWLEDGED,
+    DOWNLOAD_ENDED,
+    DOWNLOAD_INITIATED,
+    end_frame,
+    END_UPLOAD,
+    LAST,
+    SEGMENT_BYTES,
+    SIZE_BIT,
+    START_UPLOAD,
+    UPLOAD_END,
+    UPLOAD_INITIATED,
+)
 from .object_store import refusal, STRING_BYTES_MAX
-
-SEGMENT_BYTES = 7  # [byte] payload of a segment
-BLOCK_SEGMENTS_MAX = 127  # a sequence number has 7 bits
-LAST = 0x80  # bit of a segment: no further ones follow
-CRC_BIT = 0x04  # of both initiations: checksums are supported
-SIZE_BIT = 0x02  # of both initiations: the length is told
-
-CLIENT_UPLOAD, CLIENT_DOWNLOAD = 5, 6  # client command specifiers
-DOWNLOAD_INITIATED, DOWNLOAD_ACKNOWLEDGED, DOWNLOAD_ENDED = 0xA0, 0xA2, 0xA1
-UPLOAD_INITIATED, UPLOAD_END = 0xC0, 0xC1
-END_UPLOAD, ACKNOWLEDGE_UPLOAD, START_UPLOAD = 1, 2, 3  # client subcommands of an upload
-
-
-def checksum(data: bytes) -> int:
-    """Return the CRC of a block transfer: polynomial x^16 + x^12 + x^5 + 1, initially 0."""
-    return crc_hqx(data, 0)
 
 
 class BlockDownload:
@@ -167,19 +168,9 @@ class BlockUpload:
         self._segments = segments
 
     def _block(self) -> list[bytes]:
-        frames = []
-        for number in range(1, self._segments + 1):
-            start = self._position + (number - 1) * SEGMENT_BYTES
-            part = self._data[start : start + SEGMENT_BYTES]
-            last = start + SEGMENT_BYTES >= len(self._data)
-            frames.append(bytes((number | (LAST if last else 0),)) + part.ljust(7, b'\0'))
-            if last:
-                break
+        frames = block_frames(self._data, self._position, self._segments)
         self._sent = len(frames)
         return frames
 
     def _end(self) -> bytes:
-        size = len(self._data)
-        unused = -size % SEGMENT_BYTES if size else SEGMENT_BYTES
-        crc = checksum(self._data) if self._with_crc else 0
-        return struct.pack('<BH5x', UPLOAD_END | unused << 2, crc)
+        return end_frame(UPLOAD_END, self._data, with_crc=self._with_crc)

@@ -28,8 +28,9 @@ from ..standard.sdo import (
     UploadSegmentRequest,
 )
 from ..standard.sdo_abort import AbortCode
+from ..standard.sdo_block import CLIENT_DOWNLOAD, CLIENT_UPLOAD
 from .object_store import ObjectStore, refusal, STRING_BYTES_MAX
-from .sdo_block import BlockDownload, BlockUpload, CLIENT_DOWNLOAD, CLIENT_UPLOAD
+from .sdo_block import BlockDownload, BlockUpload
 from .timed import NEVER
 
 FRAME_BYTES = 8  # [byte] shorter frames are no SDO

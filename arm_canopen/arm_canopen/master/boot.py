@@ -24,6 +24,8 @@ IDENTITY_SUBINDICES: tuple[tuple[str, int, str], ...] = (
 )
 """Attribute of Identity, sub-index of 0x1018 and its name (CiA 301, 7.5.2.19)."""
 
+ONCE = (Index.STORE_PARAMETERS, Index.RESTORE_PARAMETERS)
+
 
 class BootProcess:
     """Brings one device to operational, again and again until it is.
@@ -192,7 +194,10 @@ class BootProcess:
 
     async def _write(self, write: SdoWrite) -> None:
         self._enter(BootPhase.CONFIGURING, f'0x{write.index:04X}:{write.subindex:02X}')
-        await self._node.sdo.write(write.index, write.subindex, write.data, self._sdo_timeout)
+        address, timeout = (write.index, write.subindex), self._sdo_timeout
+        # a device would store or restore its parameters as often as it is asked
+        repeat = write.index not in ONCE
+        await self._node.sdo.write(*address, write.data, timeout, repeat=repeat)
 
     def _read(self, index: int, subindex: int) -> Promise[bytes]:
         return self._node.sdo.read(index, subindex, self._sdo_timeout)

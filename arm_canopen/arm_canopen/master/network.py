@@ -230,6 +230,7 @@ class Network:
             node.lost('restarted: a boot-up message came while it was operational')
         else:
             node.offline('the device restarted')
+        node.sdo.restarted()
         self._start_boot(node, announced=True)
 
     def _end_boot(self, node: RemoteNode) -> None:

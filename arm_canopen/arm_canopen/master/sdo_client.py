@@ -6,43 +6,32 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Coroutine
-from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 from ..can.frame import Frame
-from ..exceptions import CodecError, SdoAbortError, SdoError, SdoTimeoutError
-from ..standard.cob_id import CobId
+from ..exceptions import SdoAbortError, SdoError
 from ..standard.sdo import (
-    Abort,
-    decode_response,
     DownloadRequest,
     DownloadResponse,
     DownloadSegmentResponse,
     EXPEDITED_MAX,
-    Request,
-    Response,
     Segment,
     SEGMENT_MAX,
     UploadRequest,
     UploadResponse,
     UploadSegmentRequest,
 )
-from ..standard.sdo_abort import abort_text, AbortCode
+from ..standard.sdo_abort import AbortCode
 from .scheduler import Promise, Scheduler
+from .sdo_block_client import read_blocks, write_blocks
+from .sdo_channel import response, SdoChannel, SdoCounters
 
 T = TypeVar('T')
-Answer = TypeVar('Answer', UploadResponse, Segment, DownloadResponse, DownloadSegmentResponse)
-Transfer = Coroutine[Promise[Any], None, Any]
+Transfer: TypeAlias = Coroutine[Promise[Any], None, T]
 
-
-@dataclass(slots=True)
-class SdoCounters:
-    """What became of the transfers to one device."""
-
-    done: int = 0
-    aborted: int = 0
-    timed_out: int = 0
-    stale: int = 0  # answers that belong to no open request
+BLOCK_MIN = 256  # [byte] from which on a value is written in blocks
+SIZE_MAX = 16 << 20  # [byte] that a device may announce
+UNANNOUNCED_MAX = 1 << 20  # [byte] that it may send without having announced a length
 
 
 class SdoClient:
@@ -50,92 +39,76 @@ class SdoClient:
 
     Attributes:
         node_id: The device.
-        counters: What became of its transfers.
     """
 
     def __init__(
         self, node_id: int, name: str, scheduler: Scheduler, send: Callable[[Frame], None]
     ) -> None:
-        """Take the way to the bus.
-
-        Args:
-            node_id: The device.
-            name: Its name, for messages.
-            scheduler: Time.
-            send: Hands a frame to the bus.
-        """
+        """Take the way to the bus; arguments as of :class:`SdoChannel`."""
         self.node_id = node_id
-        self.counters = SdoCounters()
         self._name = name
         self._scheduler = scheduler
-        self._send = send
-        self._queue: deque[tuple[Transfer, Promise[Any]]] = deque()
+        self._channel = SdoChannel(node_id, name, scheduler, send)
+        self._queue: deque[tuple[Transfer[Any], Promise[Any]]] = deque()
         self._busy = False
-        self._expected: Promise[Response] | None = None
-        self._answer: type[Response] = Abort
-        self._address = (0, 0)
-        self._strays = 0  # frames since the open request that do not answer it
+        self._has_blocks = True  # as long as the device has not shown the contrary
 
-    def read(self, index: int, subindex: int, timeout: float) -> Promise[bytes]:
+    @property
+    def counters(self) -> SdoCounters:
+        """What became of the transfers."""
+        return self._channel.counters
+
+    def read(
+        self, index: int, subindex: int, timeout: float, *, block: bool = False
+    ) -> Promise[bytes]:
         """Queue an upload.
 
         Args:
             index: Object index.
             subindex: Sub-index.
-            timeout: Longest time for each answer of the device in [s].
+            timeout: Longest time for each answer of the device in [s]; the first question is
+                repeated within it.
+            block: The value may be long, so it is read in blocks when the device can do that.
 
         Returns:
             Promise of the bytes; rejected with SdoAbortError or SdoTimeoutError.
         """
-        return self._enqueue(self._upload(index, subindex, timeout))
+        return self._enqueue(self._upload(index, subindex, timeout, block=block))
 
-    def write(self, index: int, subindex: int, data: bytes, timeout: float) -> Promise[None]:
-        """Queue a download; arguments and errors as with :meth:`read`."""
-        return self._enqueue(self._download(index, subindex, data, timeout))
+    def write(
+        self, index: int, subindex: int, data: bytes, timeout: float, *, repeat: bool = False
+    ) -> Promise[None]:
+        """Queue a download; long values are written in blocks when the device can do that.
+
+        Args:
+            index: Object index.
+            subindex: Sub-index.
+            data: The value as it is sent.
+            timeout: Longest time for each answer of the device in [s].
+            repeat: Writing the value twice does no harm, so a lost frame may be sent again.
+
+        Returns:
+            Promise of the end; rejected with SdoAbortError or SdoTimeoutError.
+        """
+        return self._enqueue(self._download(index, subindex, data, timeout, repeat=repeat))
 
     def cancel_all(self, reason: str) -> None:
         """Reject every transfer, because the device restarted or went away."""
         queue, self._queue = self._queue, deque()
-        expected, self._expected = self._expected, None
-        if expected is not None:
-            expected.reject(SdoError(f'{self._name}: {reason}'))
+        self._channel.cancel(reason)
         for coroutine, promise in queue:
             coroutine.close()
             promise.reject(SdoError(f'{self._name}: {reason}'))
 
+    def restarted(self) -> None:
+        """The device has restarted; what is asked from now on is answered anew."""
+        self._channel.restarted()
+
     def receive(self, frame: Frame) -> None:
-        """Take an answer of the device.
+        """Take an answer of the device."""
+        self._channel.receive(frame.data)
 
-        What does not answer the open request is passed over: it is the late answer to one that
-        timed out, or meant for another client.
-        """
-        response = self._decode(frame.data)
-        if self._expected is None or response is None or not self._fits(response):
-            self.counters.stale += 1
-            self._strays += 1
-            return
-        expected, self._expected = self._expected, None
-        expected.resolve(response)
-
-    @staticmethod
-    def _decode(data: bytes) -> Response | None:
-        try:
-            return decode_response(data)
-        except CodecError:
-            return None
-
-    def _fits(self, response: Response) -> bool:
-        """Whether a response answers the open request."""
-        if isinstance(response, Abort):
-            # python-canopen's peers send aborts with index 0, so such an abort counts for any
-            return (response.index, response.subindex) in (self._address, (0, 0))
-        if not isinstance(response, self._answer):
-            return False
-        if isinstance(response, (UploadResponse, DownloadResponse)):
-            return (response.index, response.subindex) == self._address
-        return True
-
-    def _enqueue(self, transfer: Coroutine[Promise[Any], None, T]) -> Promise[T]:
+    def _enqueue(self, transfer: Transfer[T]) -> Promise[T]:
         promise: Promise[T] = Promise()
         self._queue.append((transfer, promise))
         if not self._busy:
@@ -155,88 +128,68 @@ class SdoClient:
                 promise.resolve(result)
         self._busy = False
 
-    async def _upload(self, index: int, subindex: int, timeout: float) -> bytes:
-        self._address = (index, subindex)
-        request = UploadRequest(index, subindex)
-        response = await self._exchange(request, UploadResponse, timeout)
-        if response.data is not None:
-            return response.data
-        return await self._upload_segments(response.size, timeout)
+    async def _upload(self, index: int, subindex: int, timeout: float, *, block: bool) -> bytes:
+        channel = self._channel
+        await channel.begin(index, subindex, timeout)
+        if block and self._has_blocks:
+            try:
+                return await read_blocks(channel, timeout, SIZE_MAX)
+            except SdoAbortError as error:
+                if error.code != AbortCode.COMMAND_SPECIFIER:
+                    raise
+                self._has_blocks = False
+        request = UploadRequest(index, subindex).encode()
+        match = response(UploadResponse, channel.address)
+        answer = await channel.exchange(request, match, timeout, repeat=True)
+        if answer.data is not None:
+            return answer.data
+        return await self._upload_segments(answer.size, timeout)
 
     async def _upload_segments(self, size: int | None, timeout: float) -> bytes:
+        channel, match = self._channel, response(Segment, self._channel.address)
+        limit = UNANNOUNCED_MAX if size is None else size
+        if limit > SIZE_MAX:
+            raise channel.refuse(AbortCode.OUT_OF_MEMORY, f' ({size} bytes announced)')
         data, toggle, last = bytearray(), False, False
         while not last:
-            segment = await self._exchange(UploadSegmentRequest(toggle), Segment, timeout)
+            request = UploadSegmentRequest(toggle).encode()
+            segment = await channel.exchange(request, match, timeout)
             if segment.toggle != toggle:
-                raise self._abort(AbortCode.TOGGLE_BIT)
+                raise channel.refuse(AbortCode.TOGGLE_BIT)
             data += segment.data
             toggle, last = not toggle, segment.last
-            if size is not None and (len(data) > size or (last and len(data) < size)):
-                raise self._abort(AbortCode.LENGTH)
+            if len(data) > limit or (size is not None and last and len(data) < size):
+                raise channel.refuse(AbortCode.LENGTH, f' ({len(data)} bytes came)')
         return bytes(data)
 
-    async def _download(self, index: int, subindex: int, data: bytes, timeout: float) -> None:
-        self._address = (index, subindex)
+    async def _download(
+        self, index: int, subindex: int, data: bytes, timeout: float, *, repeat: bool
+    ) -> None:
+        channel = self._channel
+        await channel.begin(index, subindex, timeout)
+        if len(data) >= BLOCK_MIN and self._has_blocks:
+            try:
+                await write_blocks(channel, self._scheduler, data, timeout)
+            except SdoAbortError as error:
+                if error.code != AbortCode.COMMAND_SPECIFIER:
+                    raise
+                self._has_blocks = False
+            else:
+                return
         short = 0 < len(data) <= EXPEDITED_MAX
         request = DownloadRequest(index, subindex, data if short else None, len(data))
-        await self._exchange(request, DownloadResponse, timeout)
+        match = response(DownloadResponse, channel.address)
+        await channel.exchange(request.encode(), match, timeout, repeat=repeat)
         if not short:
             await self._download_segments(data, timeout)
 
     async def _download_segments(self, data: bytes, timeout: float) -> None:
+        channel, match = self._channel, response(DownloadSegmentResponse, self._channel.address)
         toggle = False
         for start in range(0, max(len(data), 1), SEGMENT_MAX):
             chunk = data[start : start + SEGMENT_MAX]
             last = start + SEGMENT_MAX >= len(data)
-            segment = Segment(toggle, chunk, last)
-            response = await self._exchange(segment, DownloadSegmentResponse, timeout)
-            if response.toggle != toggle:
-                raise self._abort(AbortCode.TOGGLE_BIT)
+            answer = await channel.exchange(Segment(toggle, chunk, last).encode(), match, timeout)
+            if answer.toggle != toggle:
+                raise channel.refuse(AbortCode.TOGGLE_BIT)
             toggle = not toggle
-
-    async def _exchange(self, request: Request, answer: type[Answer], timeout: float) -> Answer:
-        expected: Promise[Response] = Promise()
-        self._expected, self._answer, self._strays = expected, answer, 0
-        self._send(Frame(CobId.SDO_REQUEST + self.node_id, request.encode()))
-        try:
-            response = await self._scheduler.wait(expected, timeout)
-        except TimeoutError:
-            self._expected = None
-            self.counters.timed_out += 1
-            self._send_abort(AbortCode.TIMED_OUT)
-            raise SdoTimeoutError(self._silence(timeout)) from None
-        if isinstance(response, answer):
-            return response
-        self.counters.aborted += 1
-        code = response.code if isinstance(response, Abort) else AbortCode.COMMAND_SPECIFIER
-        raise SdoAbortError(
-            f'{self._name} (node {self.node_id}) refused {self._place()}: {abort_text(code)}', code
-        )
-
-    def _silence(self, timeout: float) -> str:
-        strays = (
-            f'; it sent {self._strays} frames that do not belong to the request'
-            if self._strays
-            else ''
-        )
-        return (
-            f'{self._name} (node {self.node_id}) did not answer the SDO for {self._place()} '
-            f'within {timeout * 1000:g} ms{strays}'
-        )
-
-    def _abort(self, code: AbortCode) -> SdoAbortError:
-        self.counters.aborted += 1
-        self._send_abort(code)
-        return SdoAbortError(
-            f'the answer of {self._name} (node {self.node_id}) for {self._place()} '
-            f'was not understood: {abort_text(code)}',
-            code,
-        )
-
-    def _send_abort(self, code: AbortCode) -> None:
-        frame = Abort(*self._address, code).encode()
-        self._send(Frame(CobId.SDO_REQUEST + self.node_id, frame))
-
-    def _place(self) -> str:
-        index, subindex = self._address
-        return f'object 0x{index:04X}:{subindex:02X}'

@@ -4,12 +4,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ..standard.emcy import Emergency
 from ..standard.nmt import NmtState
 from .remote_node import BootPhase, RemoteNode
-from .sdo_client import SdoCounters
+from .sdo_channel import SdoCounters
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +50,6 @@ def node_status(node: RemoteNode, now: float) -> NodeStatus:
         now: Steady time in [s].
     """
     heard = node.config.heartbeat_timeout > 0 and node.last_heartbeat > 0
-    counters = node.sdo.counters
     return NodeStatus(
         name=node.name,
         node_id=node.config.node_id,
@@ -61,5 +60,5 @@ def node_status(node: RemoteNode, now: float) -> NodeStatus:
         heartbeat_age=now - node.last_heartbeat if heard else None,
         emergency=node.last_emergency,
         missed_pdos=node.missed_pdos,
-        sdo=SdoCounters(counters.done, counters.aborted, counters.timed_out, counters.stale),
+        sdo=replace(node.sdo.counters),
     )

@@ -12,6 +12,7 @@ from arm_msgs.srv import ReadObject, WriteObject
 from ..exceptions import CanopenError
 from ..master.object_text import bytes_from_text, text_from_bytes
 from ..master.runner import NetworkThread
+from ..standard.datatypes import DataType
 from ..standard.dictionary import ObjectEntry
 from ..standard.object_path import find_object, object_path
 
@@ -42,7 +43,9 @@ class ObjectServices:
 
         async def read() -> Transfer:
             entry = find_object(device.config.dictionary, path)
-            return entry, await device.sdo.read(*entry.address, device.config.sdo_timeout)
+            long = entry.data_type is DataType.DOMAIN
+            timeout = device.config.sdo_timeout
+            return entry, await device.sdo.read(*entry.address, timeout, block=long)
 
         return self._thread.run_coroutine(read)
 

@@ -1,0 +1,255 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""One question at a time to the SDO server of a device, and its answer (CiA 301, 7.2.4)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any, TypeAlias, TypeVar
+
+from ..can.frame import Frame
+from ..exceptions import CodecError, SdoAbortError, SdoError, SdoTimeoutError
+from ..standard.cob_id import CobId
+from ..standard.sdo import (
+    Abort,
+    decode_response,
+    DownloadResponse,
+    DownloadSegmentResponse,
+    Segment,
+    UploadRequest,
+    UploadResponse,
+)
+from ..standard.sdo_abort import abort_text, AbortCode
+from .scheduler import Promise, Scheduler
+
+T = TypeVar('T')
+Answer = TypeVar('Answer', UploadResponse, Segment, DownloadResponse, DownloadSegmentResponse)
+Address: TypeAlias = tuple[int, int]
+Match: TypeAlias = Callable[[bytes], T | None]
+
+REPEAT_AFTER = 0.25  # [s] before a question that may be repeated is asked again
+MARKERS: tuple[Address, ...] = ((0x1000, 0), (0x1001, 0), *((0x1018, sub) for sub in range(5)))
+"""Objects that a device has or refuses (CiA 301, table 65); the answer shows where others end."""
+OWED_MAX = 16  # answers to remember that never came
+_FRAME_SIZE = 8  # [byte]
+_ABORT = 0x80
+
+
+@dataclass(slots=True)
+class SdoCounters:
+    """What became of the transfers to one device."""
+
+    done: int = 0
+    aborted: int = 0
+    timed_out: int = 0
+    stale: int = 0  # answers that belong to no open request
+    repeated: int = 0  # questions that were asked again
+
+
+class SdoChannel:
+    """Sends questions to the SDO server of one device and finds their answers.
+
+    An answer does not say which question it belongs to, only its object. So answers that are
+    still owed are remembered: before their object is asked for again, another one is read, and
+    since a server answers in order, what comes after that is new.
+
+    Attributes:
+        counters: What became of the transfers.
+        address: The object of the present transfer.
+    """
+
+    def __init__(
+        self, node_id: int, name: str, scheduler: Scheduler, send: Callable[[Frame], None]
+    ) -> None:
+        """Take the way to the bus.
+
+        Args:
+            node_id: The device.
+            name: Its name, for messages.
+            scheduler: Time.
+            send: Hands a frame to the bus.
+        """
+        self.counters = SdoCounters()
+        self.address: Address = (0, 0)
+        self._title = f'{name} (node {node_id})'
+        self._name = name
+        self._request_id = CobId.SDO_REQUEST + node_id
+        self._scheduler = scheduler
+        self._send = send
+        self._answered: Promise[Any] | None = None
+        self._match: Match[Any] = lambda data: None
+        self._strays = 0  # frames since the open question that do not answer it
+        self._owed: list[Address] = []
+
+    async def begin(self, index: int, subindex: int, timeout: float) -> None:
+        """Begin a transfer; makes sure that no answer of an earlier one is taken for its own.
+
+        Raises:
+            SdoTimeoutError: The device does not answer at all.
+        """
+        if (index, subindex) in self._owed:
+            await self._settle(index, subindex, timeout)
+        self.address = (index, subindex)
+
+    def receive(self, data: bytes) -> None:
+        """Take a frame of the server.
+
+        What does not answer the open question is passed over: it is the late answer to one that
+        timed out, or meant for another client.
+        """
+        promise = self._answered
+        if promise is not None:
+            answer = self._abort_of(data) or self._match(data)
+            if answer is not None:
+                self._answered = None
+                promise.resolve(answer)
+                return
+        self.counters.stale += 1
+        self._strays += 1
+
+    def cancel(self, reason: str) -> None:
+        """End the open question, because the device restarted or went away."""
+        promise, self._answered = self._answered, None
+        if promise is not None:
+            self._owe(1)
+            self._send_abort(AbortCode.GENERAL)
+            promise.reject(SdoError(f'{self._name}: {reason}'))
+
+    def restarted(self) -> None:
+        """The device has restarted, so it owes no answer any more."""
+        self._owed = []
+
+    def send(self, data: bytes) -> None:
+        """Send a frame that is not answered."""
+        self._send(Frame(self._request_id, data))
+
+    async def exchange(
+        self, question: bytes | None, match: Match[T], timeout: float, *, repeat: bool = False
+    ) -> T:
+        """Ask, and wait for the answer.
+
+        Args:
+            question: The frame; None only waits for the next answer.
+            match: Reads an answer; None when the frame is none to this question.
+            timeout: Longest time to wait in [s].
+            repeat: Asking twice does no harm, so it is asked again when no answer comes.
+
+        Raises:
+            SdoAbortError: The device refused.
+            SdoTimeoutError: It did not answer; it was told that the transfer is over.
+            SdoError: The transfer was cancelled.
+        """
+        answer = await self._ask(question, match, timeout, repeat=repeat)
+        if not isinstance(answer, Abort):
+            return answer
+        self.counters.aborted += 1
+        text = f'{self._title} refused {_place(self.address)}: {abort_text(answer.code)}'
+        raise SdoAbortError(text, answer.code)
+
+    async def _ask(
+        self, question: bytes | None, match: Match[T], timeout: float, *, repeat: bool
+    ) -> T | Abort:
+        self._match, self._strays, asked = match, 0, 0
+        promise: Promise[T | Abort] = Promise()
+        self._answered = promise
+        begin = self._scheduler.now
+        for end in _ends_of_waits(timeout, repeat=repeat):
+            patience = begin + end - self._scheduler.now
+            if patience <= 0.0:  # time went by in one leap
+                continue
+            if question is not None:
+                self.send(question)
+            asked += 1
+            try:
+                answer = await self._scheduler.wait(promise, patience)
+            except TimeoutError:
+                continue
+            self.counters.repeated += asked - 1
+            self._owed = [self.address] * (asked - 1)
+            return answer
+        self._answered = None
+        self._owe(asked)
+        self.counters.timed_out += 1
+        self._send_abort(AbortCode.TIMED_OUT)
+        raise SdoTimeoutError(self._silence(self.address, timeout))
+
+    def refuse(self, code: AbortCode, detail: str = '') -> SdoAbortError:
+        """End the transfer, because of what the device sent; returns the error to raise."""
+        self.counters.aborted += 1
+        self._send_abort(code)
+        return SdoAbortError(
+            f'the answer of {self._title} for {_place(self.address)} was not understood: '
+            f'{abort_text(code)}{detail}',
+            code,
+        )
+
+    async def _settle(self, index: int, subindex: int, timeout: float) -> None:
+        """Let the answers that are owed pass, by reading an object that none of them is of."""
+        marker = next((place for place in MARKERS if place not in self._owed), MARKERS[0])
+        self.address = marker
+        question = UploadRequest(*marker).encode()
+        try:
+            # a refusal is an answer all the same
+            await self._ask(question, response(UploadResponse, marker), timeout, repeat=True)
+        except SdoTimeoutError:
+            raise SdoTimeoutError(self._silence((index, subindex), timeout)) from None
+
+    def _owe(self, asked: int) -> None:
+        self._owed = [*self._owed, *[self.address] * asked][-OWED_MAX:]
+
+    def _abort_of(self, data: bytes) -> Abort | None:
+        if len(data) != _FRAME_SIZE or data[0] != _ABORT:
+            return None
+        abort = decode_response(data)
+        # python-canopen's peers send aborts with index 0, so such an abort counts for any
+        if isinstance(abort, Abort) and (abort.index, abort.subindex) in (self.address, (0, 0)):
+            return abort
+        return None
+
+    def _send_abort(self, code: AbortCode) -> None:
+        self.send(Abort(*self.address, code).encode())
+
+    def _silence(self, address: Address, timeout: float) -> str:
+        strays = (
+            f'; it sent {self._strays} frames that do not belong to the request'
+            if self._strays
+            else ''
+        )
+        return (
+            f'{self._title} did not answer the SDO for {_place(address)} '
+            f'within {timeout * 1000:g} ms{strays}'
+        )
+
+
+def response(kind: type[Answer], address: Address) -> Match[Answer]:
+    """Return what reads an expedited or segmented answer of a kind, for an object."""
+
+    def match(data: bytes) -> Answer | None:
+        try:
+            answer = decode_response(data)
+        except CodecError:
+            return None
+        if not isinstance(answer, kind):
+            return None
+        if isinstance(answer, (UploadResponse, DownloadResponse)):
+            return answer if (answer.index, answer.subindex) == address else None
+        return answer
+
+    return match
+
+
+def _ends_of_waits(timeout: float, *, repeat: bool) -> Iterator[float]:
+    """Divide the time-out into waits, one for each time of asking, each twice the last."""
+    wait = min(timeout / 2, REPEAT_AFTER)
+    end = wait
+    while repeat and timeout - end >= wait:  # no wait is shorter than the first one
+        yield end
+        wait *= 2
+        end += wait
+    yield timeout
+
+
+def _place(address: Address) -> str:
+    index, subindex = address
+    return f'object 0x{index:04X}:{subindex:02X}'
