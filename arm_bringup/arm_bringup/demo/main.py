@@ -24,12 +24,14 @@ from process_supervisor import (
     USAGE_ERROR,
     wants_colour,
 )
+from process_supervisor.display import choose_display, Setting, TableDisplay
 
 from ..description import joint_limits
 from ..exceptions import BringupError
 from ..session import add_arguments, robots_epilog, Session, session, SIMULATED_BUS
-from .display import choose_display, Setting, TableDisplay
+from .figures import Figures
 from .play import Client, Play, REFRESH
+from .table import ArmView
 
 WAVE_MASTER = Executable('arm_bringup', 'wave_master')
 """The master of the demo."""
@@ -115,21 +117,23 @@ def run(arm: Session, duration: float | None) -> int:
         write(f'warning: no joint of the description is called {name!r}; its drive stands still')
     bus_config = os.path.relpath(arm.robot.bus_config)
     names = [spec.name for spec in arm.processes]
+    view = ArmView(
+        f'{arm.robot.name}: {len(arm.drives)} simulated drives on {arm.bus}',
+        {name: limits for name, limits in joint_limits(arm.urdf).items() if name in arm.drives},
+    )
     setting = Setting(
-        title=f'{arm.robot.name}: {len(arm.drives)} simulated drives on {arm.bus}',
-        limits={
-            name: limits for name, limits in joint_limits(arm.urdf).items() if name in arm.drives
-        },
-        commands=commands(
+        view,
+        Figures(),
+        commands(
             arm.drives[0],
             arm.mode_service,
             f'ros2 run arm_canopen candump {arm.bus} --bus-config {bus_config}',
             os.environ.get('ROS_DOMAIN_ID', ''),
         ),
-        painter=Painter('demo', names, wants_colour(sys.stdout, os.environ)),
+        Painter('demo', names, wants_colour(sys.stdout, os.environ)),
     )
     display = choose_display(setting, Console(), write)
-    play = Play(list(setting.limits), arm.mode_service, display, duration)
+    play = Play(list(view.limits), arm.mode_service, display, duration)
     try:
         with Runner(
             arm.processes, display.line, display.notice, on_interrupt=play.leave

@@ -12,9 +12,9 @@ import time
 from typing import Protocol
 
 from process_supervisor import Outcome, Phase
+from process_supervisor.display import Display
 
 from ..exceptions import CallError, GivenUpError
-from .display import Display
 from .figures import Figures
 from .report import problems, summary_lines, warnings
 
@@ -85,7 +85,11 @@ class Play:
     """
 
     def __init__(
-        self, joints: Sequence[str], mode_service: str, display: Display, duration: float | None
+        self,
+        joints: Sequence[str],
+        mode_service: str,
+        display: Display[Figures],
+        duration: float | None,
     ) -> None:
         """Prepare; nothing happens yet.
 

@@ -4,17 +4,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 import math
 
 from rich import box
-from rich.console import Group, RenderableType
+from rich.console import RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from process_supervisor.display import compose, Moment
+
 from ..description import JointLimits
 from .figures import AxisFigures, BusFigures, DriveFigures, ENABLED, Figures
+from .report import progress_line
 
 NARROWEST = 80
 """Columns of a terminal below which there is no table."""
@@ -27,8 +30,6 @@ GAUGE_WIDTH = 21
 LINES_AROUND = 7
 """Title, head, its rule, a blank line, two lines of the bus, and one that is left free: a full
 terminal would scroll at each refresh."""
-MESSAGE_ROOM = 2
-"""Lines that messages get before the commands do."""
 
 STATE_STYLES = {
     ENABLED: 'green',
@@ -56,84 +57,63 @@ SHORT = {
 
 
 @dataclass(frozen=True, slots=True)
-class Scene:
-    """What the table shows beside the figures.
+class ArmView:
+    """How the figures of an arm look.
 
     Attributes:
         title: Robot and bus.
         limits: The joints, in the order of the rows.
-        commands: Commands to try in a second terminal.
-        elapsed: Time since the start in [s].
-        phase: What is going on.
-        messages: What was said last.
     """
 
     title: str
     limits: Mapping[str, JointLimits]
-    commands: Sequence[str]
-    elapsed: float
-    phase: str
-    messages: Sequence[str] = ()
 
+    def fits(self, width: int, height: int) -> bool:
+        """Say whether a terminal has room for the table.
 
-def fits(width: int, height: int, joints: int) -> bool:
-    """Say whether a terminal has room for the table.
+        Args:
+            width: Its columns.
+            height: Its lines.
+        """
+        return width >= NARROWEST and height >= len(self.limits) + LINES_AROUND
 
-    Args:
-        width: Its columns.
-        height: Its lines.
-        joints: Number of rows.
-    """
-    return width >= NARROWEST and height >= joints + LINES_AROUND
+    def progress(self, figures: Figures) -> str:
+        """Say in a line how it goes.
 
+        Args:
+            figures: The latest.
+        """
+        return progress_line(figures, list(self.limits))
 
-def render(figures: Figures, scene: Scene, width: int, height: int) -> RenderableType:
-    """Draw everything; commands and messages that there is no room for are left out.
+    def render(self, figures: Figures, moment: Moment, width: int, height: int) -> RenderableType:
+        """Draw everything; commands and messages that there is no room for are left out.
 
-    Args:
-        figures: The latest.
-        scene: What else is shown.
-        width: Columns of the terminal.
-        height: Lines of the terminal.
-    """
-    drives = _drives(figures, scene, width)
-    parts: list[RenderableType] = [_title(scene, width), drives, Text(''), _bus(figures.bus)]
-    room = height - len(scene.limits) - LINES_AROUND
-    messages = [_message(text) for text in scene.messages[-MESSAGE_ROOM:]]
-    for lines in (messages, _commands(scene.commands, width)):
-        if lines and room > 1:
-            shown = lines[: room - 1]
-            parts += [Text(''), *shown]
-            room -= 1 + len(shown)
-    return Group(*parts)
+        Args:
+            figures: The latest.
+            moment: What else is shown.
+            width: Columns of the terminal.
+            height: Lines of the terminal.
+        """
+        body: list[RenderableType] = [self._drives(figures, width), Text(''), _bus(figures.bus)]
+        room = height - len(self.limits) - LINES_AROUND
+        return compose(self.title, moment, body, (min(width, WORDS_FROM), width), room)
 
-
-def _title(scene: Scene, width: int) -> RenderableType:
-    line = Table.grid(expand=False)
-    line.width = min(width, WORDS_FROM)
-    line.add_column(no_wrap=True, overflow='ellipsis', ratio=1)
-    line.add_column(justify='right', no_wrap=True)
-    right = Text(f'{scene.phase}  {scene.elapsed:.1f} s', style='cyan')
-    line.add_row(Text(scene.title, style='bold'), right)
-    return line
-
-
-def _drives(figures: Figures, scene: Scene, width: int) -> Table:
-    in_words = width >= WORDS_FROM
-    table = Table(box=box.HORIZONTALS, show_edge=False, padding=0, header_style='bold')
-    left = [('joint', 12), ('NMT', 11), ('CiA 402 state', 21), ('mode', 21 if in_words else 4)]
-    right = [('position', 8), ('velocity', 8), ('error', 8)]
-    for name, least in left:
-        table.add_column(name, no_wrap=True, min_width=least)
-    for name, least in right:
-        table.add_column(name, no_wrap=True, min_width=least, justify='right')
-    if width >= GAUGE_FROM:
-        table.add_column(' between its limits', no_wrap=True, min_width=GAUGE_WIDTH + 1)
-    for name, limits in scene.limits.items():
-        drive = figures.drives.get(name, DriveFigures())
-        cells = _cells(name, drive, figures.axes.get(name), in_words=in_words)
-        table.add_row(*cells, *([_gauge(drive, limits)] if width >= GAUGE_FROM else []))
-    return table
+    def _drives(self, figures: Figures, width: int) -> Table:
+        in_words = width >= WORDS_FROM
+        table = Table(box=box.HORIZONTALS, show_edge=False, padding=0, header_style='bold')
+        left = [('joint', 12), ('NMT', 11), ('CiA 402 state', 21), ('mode', 21 if in_words else 4)]
+        right = [('position', 8), ('velocity', 8), ('error', 8)]
+        for name, least in left:
+            table.add_column(name, no_wrap=True, min_width=least)
+        for name, least in right:
+            table.add_column(name, no_wrap=True, min_width=least, justify='right')
+        if width >= GAUGE_FROM:
+            table.add_column(' between its limits', no_wrap=True, min_width=GAUGE_WIDTH + 1)
+        for name, limits in self.limits.items():
+            drive = figures.drives.get(name, DriveFigures())
+            cells = _cells(name, drive, figures.axes.get(name), in_words=in_words)
+            table.add_row(*cells, *([_gauge(drive, limits)] if width >= GAUGE_FROM else []))
+        return table
 
 
 def _cells(
@@ -179,17 +159,3 @@ def _bus(bus: BusFigures) -> Text:
         ('cycle  ', 'bold'),
         f'jitter p50 {1000 * bus.jitter_p50:.2f} ms   p99 {1000 * bus.jitter_p99:.2f} ms',
     )
-
-
-def _message(text: str) -> Text:
-    return Text(text, style='yellow', no_wrap=True, overflow='ellipsis')
-
-
-def _commands(commands: Sequence[str], width: int) -> list[Text]:
-    """Fold long commands by character, as a terminal does, so that they can be copied."""
-    if not commands:
-        return []
-    indented = (f'  {command}' for command in commands)
-    folded = (line[i : i + width] for line in indented for i in range(0, len(line), width))
-    head = Text('try in a second terminal', style='bold')
-    return [head, *(Text(line, style='cyan', no_wrap=True) for line in folded)]

@@ -7,21 +7,44 @@ from __future__ import annotations
 import io
 
 import pytest
-from rich.console import Console
+from rich.console import Console, RenderableType
+from rich.text import Text
 
-from arm_bringup.demo.display import choose_display, LineDisplay, Setting, TableDisplay
-from arm_bringup.demo.figures import DriveFigures, Figures
-from arm_bringup.description import JointLimits
 from process_supervisor import LineWriter, Notice, Painter, Severity
-
-JOINTS = [f'joint{i}' for i in range(7)]
-SETTING = Setting(
-    'panda on vcan0',
-    {name: JointLimits(name, -1.0, 1.0, 1.0) for name in JOINTS},
-    ['ros2 topic hz /joint_states'],
-    Painter('demo', ['master'], colour=False),
+from process_supervisor.display import (
+    choose_display,
+    compose,
+    LineDisplay,
+    Moment,
+    Setting,
+    TableDisplay,
 )
-FIGURES = Figures(dict.fromkeys(JOINTS, DriveFigures(online=True, state='Operation enabled')))
+
+FIGURES = 3
+"""The figures of the demo of this test: how many widgets run."""
+
+
+class Widgets:
+    """A view of a single number."""
+
+    title = 'widgets on vcan0'
+
+    def fits(self, width: int, height: int) -> bool:
+        """Need the room of the smallest table."""
+        return width >= 80 and height >= 14
+
+    def render(self, figures: int, moment: Moment, width: int, height: int) -> RenderableType:
+        """Draw one line."""
+        return compose(self.title, moment, [Text(f'{figures} widgets')], (width, width), height)
+
+    def progress(self, figures: int) -> str:
+        """Count them."""
+        return f'{figures} widgets run'
+
+
+SETTING = Setting(
+    Widgets(), 0, ['ros2 topic hz /joint_states'], Painter('demo', ['master'], colour=False)
+)
 
 
 class Utf8(io.StringIO):
@@ -75,9 +98,9 @@ def test_lines_tell_phases_warnings_and_notices() -> None:
     display.notice(Notice(Severity.INFO, 'all is ready'))
     display.show(FIGURES)  # too soon after a phase
     text = lines.getvalue()
-    for words in ('panda on vcan0', 'booting', 'joint2 silent', 'Traceback', 'all is ready'):
+    for words in ('widgets on vcan0', 'booting', 'joint2 silent', 'Traceback', 'all is ready'):
         assert words in text
-    for words in ('joint1 operational', 'frames/s'):
+    for words in ('joint1 operational', 'widgets run'):
         assert words not in text
 
 
@@ -92,9 +115,9 @@ def test_the_table_shows_what_was_said_last_and_stays_when_it_is_closed() -> Non
     display.notice(Notice(Severity.INFO, 'stopping'))
     display.show(FIGURES)
     display.close()
-    pictures = file.getvalue().split('panda on vcan0')
+    pictures = file.getvalue().split('widgets on vcan0')
     waving = [picture for picture in pictures if 'waving' in picture][-1]
-    for words in ('waving', 'heartbeat lost', 'stopping', 'ros2 topic hz', 'Operation enabled'):
+    for words in ('waving', 'heartbeat lost', 'stopping', 'ros2 topic hz', '3 widgets'):
         assert words in waving
     assert 'joint1 operational' not in file.getvalue()
     assert 'ended' in pictures[-1]

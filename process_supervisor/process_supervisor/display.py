@@ -1,58 +1,101 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Where the demo shows how it goes: a live table in a terminal, lines elsewhere."""
+"""Where a demo shows how it goes: a live table in a terminal, lines elsewhere.
+
+What is in the table is the demo's own: it hands in a :class:`View` of its figures. This module is
+not imported by the package: it needs rich, which a mere bring-up and the guardian do not.
+"""
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 import threading
 import time
-from typing import Protocol
+from typing import Generic, Protocol, TypeVar
 
-from rich.console import Console
+from rich.console import Console, Group, RenderableType
 from rich.live import Live
+from rich.table import Table
+from rich.text import Text
 
-from process_supervisor import LineWriter, Notice, Painter, Severity, severity_of
+from .supervision import Notice, Severity
+from .terminal import LineWriter, Painter, severity_of
 
-from ..description import JointLimits
-from .figures import Figures
-from .report import progress_line
-from .table import fits, render, Scene
+FiguresT = TypeVar('FiguresT')
+FiguresT_contra = TypeVar('FiguresT_contra', contravariant=True)
 
 LINE_PERIOD = 3.0
 """Time between two lines of progress in [s]."""
 MESSAGES = 4
 """How many messages are kept below the table."""
+MESSAGE_ROOM = 2
+"""Lines that messages get before the commands do."""
 MESSAGE_LIFE = {Severity.INFO: 4.0, Severity.WARNING: 20.0, Severity.ERROR: 60.0}
 """How long a message is shown in [s]."""
 
 
 @dataclass(frozen=True, slots=True)
-class Setting:
-    """What does not change while the demo runs.
+class Moment:
+    """What is shown beside the figures.
 
     Attributes:
-        title: Robot and bus.
-        limits: The joints.
+        elapsed: Time since the start in [s].
+        phase: What is going on.
+        messages: What was said last.
+        commands: Commands to try in a second terminal.
+    """
+
+    elapsed: float
+    phase: str
+    messages: Sequence[str] = ()
+    commands: Sequence[str] = ()
+
+
+class View(Protocol[FiguresT_contra]):
+    """How a demo's figures look."""
+
+    @property
+    def title(self) -> str:
+        """What runs, and where."""
+
+    def fits(self, width: int, height: int) -> bool:
+        """Say whether a terminal of so many columns and lines has room for the table."""
+
+    def render(
+        self, figures: FiguresT_contra, moment: Moment, width: int, height: int
+    ) -> RenderableType:
+        """Draw the table into so many columns and lines."""
+
+    def progress(self, figures: FiguresT_contra) -> str:
+        """Say in a line how it goes."""
+
+
+@dataclass(frozen=True, slots=True)
+class Setting(Generic[FiguresT]):
+    """What does not change while a demo runs.
+
+    Attributes:
+        view: How its figures look.
+        figures: The first ones, before there are any.
         commands: Commands to try in a second terminal.
         painter: Puts names in front of lines.
     """
 
-    title: str
-    limits: Mapping[str, JointLimits]
+    view: View[FiguresT]
+    figures: FiguresT
     commands: Sequence[str]
     painter: Painter
 
 
-class Display(Protocol):
-    """What the demo needs of its place to show things."""
+class Display(Protocol[FiguresT_contra]):
+    """What a demo needs of its place to show things."""
 
     def phase(self, text: str) -> None:
         """Say what is going on now."""
 
-    def show(self, figures: Figures) -> None:
+    def show(self, figures: FiguresT_contra) -> None:
         """Show the latest figures; called several times a second."""
 
     def line(self, name: str, text: str) -> None:
@@ -65,10 +108,10 @@ class Display(Protocol):
         """Show nothing more; what is written after this is plain text below."""
 
 
-class LineDisplay:
+class LineDisplay(Generic[FiguresT]):
     """Lines: phases at once, figures every few seconds, warnings and errors of the processes."""
 
-    def __init__(self, setting: Setting, write: LineWriter) -> None:
+    def __init__(self, setting: Setting[FiguresT], write: LineWriter) -> None:
         """Begin.
 
         Args:
@@ -79,7 +122,7 @@ class LineDisplay:
         self._write = write
         self._begun = time.monotonic()
         self._next = 0.0
-        write(setting.title)
+        write(setting.view.title)
 
     def phase(self, text: str) -> None:
         """Write it, with the time since the start.
@@ -90,14 +133,14 @@ class LineDisplay:
         self._next = time.monotonic() + LINE_PERIOD
         self._stamped(text)
 
-    def show(self, figures: Figures) -> None:
+    def show(self, figures: FiguresT) -> None:
         """Write a line of progress, when the last one is old enough.
 
         Args:
             figures: The latest.
         """
         if time.monotonic() >= self._next:
-            self.phase(progress_line(figures, list(self._setting.limits)))
+            self.phase(self._setting.view.progress(figures))
 
     def line(self, name: str, text: str) -> None:
         """Write it when it is a warning or an error.
@@ -124,10 +167,10 @@ class LineDisplay:
         self._write(f'{time.monotonic() - self._begun:6.1f} s  {text}')
 
 
-class TableDisplay:
+class TableDisplay(Generic[FiguresT]):
     """A live table; what the processes say is kept below it when it is a warning."""
 
-    def __init__(self, setting: Setting, console: Console) -> None:
+    def __init__(self, setting: Setting[FiguresT], console: Console) -> None:
         """Begin with an empty table.
 
         Args:
@@ -138,7 +181,7 @@ class TableDisplay:
         self._console = console
         self._begun = time.monotonic()
         self._phase = 'starting'
-        self._figures = Figures()
+        self._figures = setting.figures
         self._messages: deque[tuple[float, str]] = deque(maxlen=MESSAGES)
         self._lock = threading.Lock()
         self._live = Live(console=console, auto_refresh=False, redirect_stdout=False)
@@ -154,7 +197,7 @@ class TableDisplay:
         self._phase = text
         self._refresh()
 
-    def show(self, figures: Figures) -> None:
+    def show(self, figures: FiguresT) -> None:
         """Draw the table anew.
 
         Args:
@@ -196,22 +239,18 @@ class TableDisplay:
     def _refresh(self) -> None:
         setting = self._setting
         now = time.monotonic()
-        scene = Scene(
-            setting.title,
-            setting.limits,
-            setting.commands,
-            now - self._begun,
-            self._phase,
-            [text for end, text in list(self._messages) if now < end],
-        )
+        messages = [text for end, text in list(self._messages) if now < end]
+        moment = Moment(now - self._begun, self._phase, messages, setting.commands)
         with self._lock:
             if self._live.is_started:
                 size = self._console.size
-                drawing = render(self._figures, scene, size.width, size.height)
+                drawing = setting.view.render(self._figures, moment, size.width, size.height)
                 self._live.update(drawing, refresh=True)
 
 
-def choose_display(setting: Setting, console: Console, write: LineWriter) -> Display:
+def choose_display(
+    setting: Setting[FiguresT], console: Console, write: LineWriter
+) -> Display[FiguresT]:
     """Choose the table where there is a terminal that has room for it.
 
     Args:
@@ -223,7 +262,58 @@ def choose_display(setting: Setting, console: Console, write: LineWriter) -> Dis
     plain = console.is_dumb_terminal or not console.encoding.startswith('utf')
     if plain or not console.is_terminal:
         return LineDisplay(setting, write)
-    if not fits(size.width, size.height, len(setting.limits)):
+    if not setting.view.fits(size.width, size.height):
         write(f'this terminal has {size.width} x {size.height} characters, too few for the table')
         return LineDisplay(setting, write)
     return TableDisplay(setting, console)
+
+
+def compose(
+    title: str,
+    moment: Moment,
+    body: Sequence[RenderableType],
+    widths: tuple[int, int],
+    room: int,
+) -> RenderableType:
+    """Put a picture together: title and phase, the body, messages, and commands.
+
+    Args:
+        title: What runs, and where.
+        moment: What is shown beside the figures.
+        body: What the demo drew.
+        widths: Columns of the title line and of the terminal.
+        room: Lines that are left for messages and commands; what has no room is left out.
+    """
+    title_width, width = widths
+    parts: list[RenderableType] = [_title_line(title, moment, title_width), *body]
+    messages = [_message(text) for text in moment.messages[-MESSAGE_ROOM:]]
+    for lines in (messages, _commands(moment.commands, width)):
+        if lines and room > 1:
+            shown = lines[: room - 1]
+            parts += [Text(''), *shown]
+            room -= 1 + len(shown)
+    return Group(*parts)
+
+
+def _title_line(title: str, moment: Moment, width: int) -> RenderableType:
+    line = Table.grid(expand=False)
+    line.width = width
+    line.add_column(no_wrap=True, overflow='ellipsis', ratio=1)
+    line.add_column(justify='right', no_wrap=True)
+    right = Text(f'{moment.phase}  {moment.elapsed:.1f} s', style='cyan')
+    line.add_row(Text(title, style='bold'), right)
+    return line
+
+
+def _message(text: str) -> Text:
+    return Text(text, style='yellow', no_wrap=True, overflow='ellipsis')
+
+
+def _commands(commands: Sequence[str], width: int) -> list[Text]:
+    """Fold long commands by character, as a terminal does, so that they can be copied."""
+    if not commands:
+        return []
+    indented = (f'  {command}' for command in commands)
+    folded = (line[i : i + width] for line in indented for i in range(0, len(line), width))
+    head = Text('try in a second terminal', style='bold')
+    return [head, *(Text(line, style='cyan', no_wrap=True) for line in folded)]
