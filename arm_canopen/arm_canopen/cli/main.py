@@ -16,10 +16,10 @@ import sys
 
 from ..exceptions import CanopenError
 from ..nodes.ros_arguments import split_ros_arguments
-from . import check
+from . import check, eds
 from .output import remark
 
-VERBS = (check,)
+VERBS = (check, eds)
 INTERRUPTED = 130  # exit code of a program that Ctrl-C ended
 
 

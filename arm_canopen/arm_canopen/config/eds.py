@@ -55,7 +55,7 @@ def load_eds(path: str | os.PathLike[str]) -> Eds:
     """
     path = Path(path)
     findings = Findings()
-    ini = read_ini(_read_text(path, findings))
+    ini = read_ini(read_eds_text(path, findings))
     objects = ObjectReader(ini)
     dictionary = ObjectDictionary(objects.entries(), source=str(path))
     if not len(dictionary):
@@ -68,7 +68,12 @@ def load_eds(path: str | os.PathLike[str]) -> Eds:
     return Eds(path, dictionary, _node_id(ini), _dummy_types(ini), findings.warnings)
 
 
-def _read_text(path: Path, findings: Findings) -> str:
+def read_eds_text(path: Path, findings: Findings) -> str:
+    """Return the text of an EDS or DCF.
+
+    Raises:
+        ConfigError: The file is missing, unreadable or too large to be one.
+    """
     try:
         if not path.is_file():
             findings.error(Place(path), 'there is no such file', 'correct the path of the EDS')

@@ -1,0 +1,96 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What the standards say of objects that devices share: data type and access."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+from ..standard.datatypes import DataType
+from ..standard.dictionary import AccessType
+from ..standard.objects import Index
+
+
+class Role(Enum):
+    """Who has to be able to do what."""
+
+    VALUE = 'the device says it'
+    SETTING = 'somebody writes it'
+    EITHER = 'writing is optional'
+
+
+READABLE_ONLY = frozenset({AccessType.READ_ONLY, AccessType.CONSTANT})
+ACCESS: dict[Role, frozenset[AccessType]] = {
+    Role.VALUE: READABLE_ONLY,
+    Role.SETTING: frozenset(AccessType) - READABLE_ONLY,
+    Role.EITHER: frozenset(AccessType) - {AccessType.WRITE_ONLY},
+}
+
+
+@dataclass(frozen=True, slots=True)
+class StandardObject:
+    """An object as a standard describes it."""
+
+    data_type: DataType
+    role: Role
+
+
+U8, U16, U32 = DataType.UNSIGNED8, DataType.UNSIGNED16, DataType.UNSIGNED32
+I8, I16, I32 = DataType.INTEGER8, DataType.INTEGER16, DataType.INTEGER32
+
+_ROWS: tuple[tuple[int, int, DataType, Role], ...] = (
+    # CiA 301, 7.5.2
+    (Index.DEVICE_TYPE, 0, U32, Role.VALUE),
+    (Index.ERROR_REGISTER, 0, U8, Role.VALUE),
+    (Index.SYNC_COB_ID, 0, U32, Role.EITHER),
+    (Index.CYCLE_PERIOD, 0, U32, Role.SETTING),
+    (Index.SYNC_WINDOW, 0, U32, Role.SETTING),
+    (Index.GUARD_TIME, 0, U16, Role.EITHER),
+    (Index.LIFE_TIME_FACTOR, 0, U8, Role.EITHER),
+    (Index.TIME_COB_ID, 0, U32, Role.EITHER),
+    (Index.EMCY_COB_ID, 0, U32, Role.EITHER),
+    (Index.EMCY_INHIBIT_TIME, 0, U16, Role.SETTING),
+    (Index.CONSUMER_HEARTBEAT, 1, U32, Role.SETTING),
+    (Index.PRODUCER_HEARTBEAT, 0, U16, Role.EITHER),
+    (Index.IDENTITY, 1, U32, Role.VALUE),
+    (Index.IDENTITY, 2, U32, Role.VALUE),
+    (Index.IDENTITY, 3, U32, Role.VALUE),
+    (Index.IDENTITY, 4, U32, Role.VALUE),
+    (Index.SYNC_OVERFLOW, 0, U8, Role.SETTING),
+    # CiA 402-2, clause 7 and the clauses of the modes
+    (Index.ERROR_CODE, 0, U16, Role.VALUE),
+    (Index.CONTROLWORD, 0, U16, Role.SETTING),
+    (Index.STATUSWORD, 0, U16, Role.VALUE),
+    (Index.QUICK_STOP_OPTION, 0, I16, Role.EITHER),
+    (Index.MODE_OF_OPERATION, 0, I8, Role.SETTING),
+    (Index.MODE_OF_OPERATION_DISPLAY, 0, I8, Role.VALUE),
+    (Index.POSITION_DEMAND, 0, I32, Role.VALUE),
+    (Index.POSITION_ACTUAL, 0, I32, Role.VALUE),
+    (Index.VELOCITY_ACTUAL, 0, I32, Role.VALUE),
+    (Index.TARGET_TORQUE, 0, I16, Role.SETTING),
+    (Index.TORQUE_ACTUAL, 0, I16, Role.VALUE),
+    (Index.TARGET_POSITION, 0, I32, Role.SETTING),
+    (Index.PROFILE_VELOCITY, 0, U32, Role.SETTING),
+    (Index.PROFILE_ACCELERATION, 0, U32, Role.SETTING),
+    (Index.PROFILE_DECELERATION, 0, U32, Role.SETTING),
+    (Index.QUICK_STOP_DECELERATION, 0, U32, Role.SETTING),
+    (Index.HOMING_METHOD, 0, I8, Role.SETTING),
+    (Index.INTERPOLATION_PERIOD, 1, U8, Role.EITHER),
+    (Index.INTERPOLATION_PERIOD, 2, I8, Role.EITHER),
+    (Index.TARGET_VELOCITY, 0, I32, Role.SETTING),
+    (Index.SUPPORTED_MODES, 0, U32, Role.VALUE),
+)
+
+STANDARD_OBJECTS: dict[tuple[int, int], StandardObject] = {
+    (index, subindex): StandardObject(data_type, role)
+    for index, subindex, data_type, role in _ROWS
+}
+"""By index and sub-index."""
+
+MANDATORY: dict[tuple[int, int], str] = {
+    (Index.DEVICE_TYPE, 0): 'device type',
+    (Index.ERROR_REGISTER, 0): 'error register',
+    (Index.IDENTITY, 1): 'vendor id',
+}
+"""What every CANopen device has (CiA 301, 7.5.2)."""
