@@ -25,6 +25,8 @@ T = TypeVar('T')
 PAUSE_TOLD = 0.1  # [s] lateness of a cycle that is worth a word
 REOPEN_PAUSE = 0.1  # [s] between two looks at a bus that went away
 
+ENDED = 'the CANopen master has ended'
+
 logger = logging.getLogger(__name__)
 
 
@@ -49,8 +51,10 @@ class NetworkThread:
         self.period = network.config.master.cycle_period
         self._bus = bus
         self._statistics = CycleStatistics(self.period)
-        self._work: deque[Callable[[], None]] = deque()
+        self._work: deque[tuple[Future[Any], Callable[[], None]]] = deque()
         self._stopping = False
+        self._ended = False
+        self._open: set[Future[Any]] = set()
         self._bus_failed = False
         self._thread = threading.Thread(target=self._run, name='canopen', daemon=True)
 
@@ -68,14 +72,7 @@ class NetworkThread:
     def call(self, function: Callable[[], T]) -> Future[T]:
         """Run a function in the thread of the cycle; it must not wait."""
         future: Future[T] = Future()
-
-        def work() -> None:
-            try:
-                future.set_result(function())
-            except Exception as error:  # noqa: BLE001  # belongs to whoever holds the future
-                future.set_exception(error)
-
-        self._hand_over(work)
+        self._hand_over(future, lambda: future.set_result(function()))
         return future
 
     def run(self, sequence: Callable[[], Promise[T]]) -> Future[T]:
@@ -87,18 +84,19 @@ class NetworkThread:
         future: Future[T] = Future()
 
         def finish(promise: Promise[T]) -> None:
+            self._open.discard(future)
+            if future.done():  # the thread ended before the sequence did
+                return
             if promise.error is not None:
                 future.set_exception(promise.error)
             else:
                 future.set_result(promise.result())
 
-        def work() -> None:
-            try:
-                sequence().when_done(finish)
-            except Exception as error:  # noqa: BLE001  # belongs to whoever holds the future
-                future.set_exception(error)
+        def begin() -> None:
+            self._open.add(future)
+            sequence().when_done(finish)
 
-        self._hand_over(work)
+        self._hand_over(future, begin)
         return future
 
     def run_coroutine(self, make: Callable[[], Coroutine[Promise[Any], None, T]]) -> Future[T]:
@@ -109,11 +107,32 @@ class NetworkThread:
         """Return the figures of the cycle; call it in the thread of the cycle."""
         return self._statistics.figures()
 
-    def _hand_over(self, work: Callable[[], None]) -> None:
-        self._work.append(work)
-        self._bus.wake()
+    def _hand_over(self, future: Future[Any], work: Callable[[], None]) -> None:
+        self._work.append((future, work))
+        if self._ended:
+            self._refuse_work()
+        else:
+            self._bus.wake()
+
+    def _refuse_work(self) -> None:
+        """Leave nobody waiting for what will not be done any more."""
+        while self._work:
+            future, _ = self._work.popleft()
+            if future.set_running_or_notify_cancel():
+                future.set_exception(BusError(ENDED))
 
     def _run(self) -> None:
+        try:
+            self._cycle_until_stopped()
+        except Exception:
+            logger.exception('the CANopen cycle has ended by a defect')
+        finally:
+            self._ended = True
+            self._refuse_work()
+            for future in self._open:
+                future.set_exception(BusError(ENDED))
+
+    def _cycle_until_stopped(self) -> None:
         self.network.start(time.monotonic())
         deadline = time.monotonic()
         while not self._stopping:
@@ -136,7 +155,7 @@ class NetworkThread:
             timer = self.network.scheduler.next_deadline()
             wake = deadline if timer is None else min(deadline, timer)
             frames = self._receive(max(0.0, wake - time.monotonic()))
-            self._guarded(partial(self._take, frames))
+            self._take(frames)
             now = time.monotonic()
             if now >= deadline:
                 return
@@ -158,9 +177,20 @@ class NetworkThread:
         receive = self.network.receive
         self.network.scheduler.set_time(time.monotonic())
         for frame in frames:
-            receive(frame)
+            try:
+                receive(frame)
+            except Exception:  # noqa: PERF203  # one frame must not cost the next
+                logger.exception('a defect in the CANopen master, at the frame %s', frame)
         while self._work:
-            self._work.popleft()()
+            self._do(*self._work.popleft())
+
+    def _do(self, future: Future[Any], work: Callable[[], None]) -> None:
+        if future.set_running_or_notify_cancel():
+            try:
+                work()
+            except Exception as error:  # noqa: BLE001  # belongs to whoever holds the future
+                self._open.discard(future)
+                future.set_exception(error)
 
     def _guarded(self, work: Callable[[], object]) -> None:
         """Let no defect in one cycle end the cycles that keep the drives under control."""
