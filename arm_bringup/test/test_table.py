@@ -22,7 +22,7 @@ from arm_bringup.demo.table import (
     WORDS_FROM,
 )
 from arm_bringup.description import JointLimits
-from process_supervisor.display import Moment
+from process_supervisor.picture import Moment
 
 JOINTS = [f'panda_joint{i}' for i in range(1, 8)]
 LIMITS = {name: JointLimits(name, -2.0, 2.0, 1.0) for name in JOINTS}

@@ -15,11 +15,10 @@ import threading
 import time
 from typing import Generic, Protocol, TypeVar
 
-from rich.console import Console, Group, RenderableType
+from rich.console import Console, RenderableType
 from rich.live import Live
-from rich.table import Table
-from rich.text import Text
 
+from .picture import Moment
 from .supervision import Notice, Severity
 from .terminal import LineWriter, Painter, severity_of
 
@@ -30,27 +29,8 @@ LINE_PERIOD = 3.0
 """Time between two lines of progress in [s]."""
 MESSAGES = 4
 """How many messages are kept below the table."""
-MESSAGE_ROOM = 2
-"""Lines that messages get before the commands do."""
 MESSAGE_LIFE = {Severity.INFO: 4.0, Severity.WARNING: 20.0, Severity.ERROR: 60.0}
 """How long a message is shown in [s]."""
-
-
-@dataclass(frozen=True, slots=True)
-class Moment:
-    """What is shown beside the figures.
-
-    Attributes:
-        elapsed: Time since the start in [s].
-        phase: What is going on.
-        messages: What was said last.
-        commands: Commands to try in a second terminal.
-    """
-
-    elapsed: float
-    phase: str
-    messages: Sequence[str] = ()
-    commands: Sequence[str] = ()
 
 
 class View(Protocol[FiguresT_contra]):
@@ -266,54 +246,3 @@ def choose_display(
         write(f'this terminal has {size.width} x {size.height} characters, too few for the table')
         return LineDisplay(setting, write)
     return TableDisplay(setting, console)
-
-
-def compose(
-    title: str,
-    moment: Moment,
-    body: Sequence[RenderableType],
-    widths: tuple[int, int],
-    room: int,
-) -> RenderableType:
-    """Put a picture together: title and phase, the body, messages, and commands.
-
-    Args:
-        title: What runs, and where.
-        moment: What is shown beside the figures.
-        body: What the demo drew.
-        widths: Columns of the title line and of the terminal.
-        room: Lines that are left for messages and commands; what has no room is left out.
-    """
-    title_width, width = widths
-    parts: list[RenderableType] = [_title_line(title, moment, title_width), *body]
-    messages = [_message(text) for text in moment.messages[-MESSAGE_ROOM:]]
-    for lines in (messages, _commands(moment.commands, width)):
-        if lines and room > 1:
-            shown = lines[: room - 1]
-            parts += [Text(''), *shown]
-            room -= 1 + len(shown)
-    return Group(*parts)
-
-
-def _title_line(title: str, moment: Moment, width: int) -> RenderableType:
-    line = Table.grid(expand=False)
-    line.width = width
-    line.add_column(no_wrap=True, overflow='ellipsis', ratio=1)
-    line.add_column(justify='right', no_wrap=True)
-    right = Text(f'{moment.phase}  {moment.elapsed:.1f} s', style='cyan')
-    line.add_row(Text(title, style='bold'), right)
-    return line
-
-
-def _message(text: str) -> Text:
-    return Text(text, style='yellow', no_wrap=True, overflow='ellipsis')
-
-
-def _commands(commands: Sequence[str], width: int) -> list[Text]:
-    """Fold long commands by character, as a terminal does, so that they can be copied."""
-    if not commands:
-        return []
-    indented = (f'  {command}' for command in commands)
-    folded = (line[i : i + width] for line in indented for i in range(0, len(line), width))
-    head = Text('try in a second terminal', style='bold')
-    return [head, *(Text(line, style='cyan', no_wrap=True) for line in folded)]

@@ -13,12 +13,11 @@ from rich.text import Text
 from process_supervisor import LineWriter, Notice, Painter, Severity
 from process_supervisor.display import (
     choose_display,
-    compose,
     LineDisplay,
-    Moment,
     Setting,
     TableDisplay,
 )
+from process_supervisor.picture import compose, Moment
 
 FIGURES = 3
 """The figures of the demo of this test: how many widgets run."""

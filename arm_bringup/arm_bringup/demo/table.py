@@ -13,7 +13,7 @@ from rich.console import RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from process_supervisor.display import compose, Moment
+from process_supervisor.picture import compose, Moment
 
 from ..description import JointLimits
 from .figures import AxisFigures, BusFigures, DriveFigures, ENABLED, Figures
