@@ -35,15 +35,17 @@ class ReleaseMatcher:
             now: Time [s].
 
         Returns:
-            A press, if its character has come already.
+            A press, if its character has come already; its release, if it was down.
         """
         if code in MODIFIERS:
             return []
+        # a second keyboard may have the same key down; then nobody knows whose character it was
+        events = self.key_up(code, now) if code in self._matched else []
         self._down[code] = now
         typed, self._last_typed = self._last_typed, None
         if typed is None or now - typed.time > OVERTAKEN:
-            return []
-        return self._match(code, typed.key, now)
+            return events
+        return events + self._match(code, typed.key, now)
 
     def key_up(self, code: int, now: float) -> list[KeyEvent]:
         """Take a key of a keyboard that went up.

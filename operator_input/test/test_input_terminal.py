@@ -1,0 +1,304 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+from collections.abc import Callable
+import signal
+import subprocess
+import sys
+import time
+
+from input_devices import InjectedDevice, InjectedDevices
+from input_terminal import ScriptedTerminal
+import pytest
+
+from operator_input import (
+    HeldKeys,
+    KeyAction,
+    Keyboard,
+    KeyEvent,
+    ReleaseSource,
+    TerminalError,
+    TerminalKeyboard,
+)
+from operator_input.terminal.negotiation import Stage
+
+PATIENCE = 10.0  # [s] of a test on a busy machine
+KEY_Q, KEY_I, KEY_SPACE = 16, 23, 57
+
+
+def read_until(
+    keyboard: TerminalKeyboard | Keyboard, enough: Callable[[list[KeyEvent]], bool]
+) -> list[KeyEvent]:
+    """Read keys until a condition holds."""
+    events: list[KeyEvent] = []
+    deadline = time.monotonic() + PATIENCE
+    while not enough(events):
+        assert time.monotonic() < deadline, f'only {events}'
+        events += (
+            keyboard.read(0.1) if isinstance(keyboard, TerminalKeyboard) else keyboard.wait(0.1)
+        )
+    return events
+
+
+def negotiate(keyboard: TerminalKeyboard) -> Stage:
+    """Read until the terminal has answered."""
+    read_until(keyboard, lambda _: keyboard.stage in {Stage.ACTIVE, Stage.ABSENT})
+    return keyboard.stage
+
+
+def fail_in_the_middle(terminal: ScriptedTerminal) -> None:
+    """Be a program with a defect."""
+    with TerminalKeyboard(terminal.path) as keyboard:
+        negotiate(keyboard)
+        raise ZeroDivisionError
+
+
+def actions(events: list[KeyEvent]) -> list[tuple[str, KeyAction]]:
+    """Leave the times out."""
+    return [(event.key, event.action) for event in events]
+
+
+def pressed(events: list[KeyEvent]) -> set[str]:
+    """Name the keys whose release will be reported."""
+    return {event.key for event in events if event.action is KeyAction.PRESSED}
+
+
+@pytest.mark.parametrize('kitty', [True, False])
+def test_terminal_is_given_back_as_it_was(kitty: bool) -> None:
+    """Settings, modes and the protocol's stack are restored; nothing is left for the shell."""
+    with ScriptedTerminal(kitty=kitty) as terminal:
+        before = terminal.settings()
+        with TerminalKeyboard(terminal.path) as keyboard:
+            negotiate(keyboard)
+            during = terminal.settings()
+            terminal.wait_written(rb'2004h')
+        terminal.wait_written(rb'2004l')
+        assert during != before
+        assert terminal.settings() == before
+        assert (terminal.flags, terminal.modes) == ([], set())
+        assert terminal.unread() == b''
+
+
+def test_terminal_is_given_back_after_an_error() -> None:
+    """An exception in the program does not leave a dead terminal behind."""
+    with ScriptedTerminal(kitty=True) as terminal:
+        before = terminal.settings()
+        with pytest.raises(ZeroDivisionError):
+            fail_in_the_middle(terminal)
+        terminal.wait_written(rb'\x1b\[<u')
+        assert terminal.settings() == before
+        assert terminal.flags == []
+
+
+def test_quick_exit_leaves_no_answer_behind() -> None:
+    """Left before the terminal answered: its answers do not appear at the shell's prompt."""
+    with ScriptedTerminal(kitty=True) as terminal:
+        with TerminalKeyboard(terminal.path):
+            pass
+        terminal.wait_written(rb'2004l')
+        assert terminal.unread() == b''
+        assert terminal.flags == []
+
+
+def test_true_releases() -> None:
+    """With the protocol, press, repeat and release arrive as such."""
+    with ScriptedTerminal(kitty=True) as terminal, TerminalKeyboard(terminal.path) as keyboard:
+        assert negotiate(keyboard) is Stage.ACTIVE
+        for event in (1, 2, 3):
+            terminal.key('i', event)
+        events = read_until(keyboard, lambda found: len(found) == 3)
+    names = [KeyAction.PRESSED, KeyAction.REPEATED, KeyAction.RELEASED]
+    assert actions(events) == [('i', name) for name in names]
+
+
+@pytest.mark.parametrize('answers', [True, False])
+def test_old_terminal(answers: bool) -> None:
+    """Without the protocol, or without any answer at all, characters are typed keys."""
+    with (
+        ScriptedTerminal(kitty=False, answers=answers) as terminal,
+        TerminalKeyboard(terminal.path) as keyboard,
+    ):
+        if answers:
+            assert negotiate(keyboard) is Stage.ABSENT
+        terminal.send('i\x03\x1b[A')
+        events = read_until(keyboard, lambda found: len(found) == 3)
+    assert actions(events) == [(key, KeyAction.TYPED) for key in ('i', 'ctrl+c', 'up')]
+
+
+def test_terminal_with_half_of_the_protocol() -> None:
+    """A terminal that does not report the releases of letters is an old one."""
+    with (
+        ScriptedTerminal(kitty=True, supported=1) as terminal,
+        TerminalKeyboard(terminal.path) as keyboard,
+    ):
+        assert negotiate(keyboard) is Stage.ABSENT
+        terminal.wait_written(rb'\x1b\[<u')
+        assert terminal.flags == []
+
+
+def test_escape_key() -> None:
+    """A lone escape is read as the key, in the end."""
+    with ScriptedTerminal(kitty=False) as terminal, TerminalKeyboard(terminal.path) as keyboard:
+        negotiate(keyboard)
+        terminal.send('\x1b')
+        events = read_until(keyboard, bool)
+    assert actions(events) == [('escape', KeyAction.TYPED)]
+
+
+def test_cut_line_releases_the_held_key() -> None:
+    """When the network is cut with a key held, the key does not stay held."""
+    with ScriptedTerminal(kitty=True) as terminal, TerminalKeyboard(terminal.path) as keyboard:
+        negotiate(keyboard)
+        terminal.key('i', 1)
+        read_until(keyboard, bool)
+        terminal.stall()
+        events = read_until(keyboard, bool)
+    assert actions(events) == [('', KeyAction.ALL_RELEASED)]
+
+
+def test_live_line_keeps_the_held_key() -> None:
+    """A terminal that answers keeps a silent key held well beyond the patience."""
+    with ScriptedTerminal(kitty=True) as terminal, TerminalKeyboard(terminal.path) as keyboard:
+        negotiate(keyboard)
+        terminal.key('i', 1)
+        events = read_until(keyboard, bool)
+        deadline = time.monotonic() + 1.5
+        while time.monotonic() < deadline:
+            events += keyboard.read(0.1)
+    assert actions(events) == [('i', KeyAction.PRESSED)]
+
+
+def test_closed_window_is_told() -> None:
+    """Reading from a window that was closed raises, instead of waiting for ever."""
+    with (
+        ScriptedTerminal(kitty=False) as terminal,
+        TerminalKeyboard(terminal.path) as keyboard,
+    ):
+        negotiate(keyboard)
+        terminal.hang_up()
+        with pytest.raises(TerminalError, match='gone'):
+            read_until(keyboard, lambda _: False)
+
+
+def test_pause_gives_the_terminal_back() -> None:
+    """During a pause the shell has its terminal; afterwards keys are read again."""
+    with ScriptedTerminal(kitty=True) as terminal, TerminalKeyboard(terminal.path) as keyboard:
+        negotiate(keyboard)
+        raw = terminal.settings()
+        with keyboard.paused():
+            assert terminal.settings() != raw
+            terminal.wait_written(rb'2004l')
+            terminal.wait_written(rb'\x1b\[<u')
+            assert terminal.flags == []
+        assert terminal.settings() == raw
+        assert negotiate(keyboard) is Stage.ACTIVE
+        terminal.key('k', 1)
+        assert actions(read_until(keyboard, bool)) == [('k', KeyAction.PRESSED)]
+
+
+@pytest.mark.parametrize('path', ['/dev/null', '/nonexistent/tty'])
+def test_no_terminal(path: str) -> None:
+    """What is no terminal is refused, with what it is."""
+    with pytest.raises(TerminalError, match=path), TerminalKeyboard(path):
+        pass
+
+
+def test_process_without_a_terminal_is_told_the_remedy() -> None:
+    """Started as a service, without a controlling terminal, the message says what to do."""
+    result = subprocess.run(
+        [sys.executable, '-c', 'from operator_input.show_keys import main; main()'],
+        start_new_session=True,
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE * 3,
+        env={'PYTHONPATH': ':'.join(sys.path)},
+        check=False,
+    )
+    assert result.returncode == 1
+    assert 'start this in a terminal' in result.stderr
+    assert 'Traceback' not in result.stderr
+
+
+def test_stuck_terminal_does_not_hold_the_writer_up() -> None:
+    """Writing more than a terminal takes returns; the robot's loop goes on."""
+    with ScriptedTerminal(kitty=False) as terminal, TerminalKeyboard(terminal.path) as keyboard:
+        negotiate(keyboard)
+        signal.alarm(int(PATIENCE))
+        try:
+            for _ in range(100):
+                keyboard.line.write('x' * 4096)
+        finally:
+            signal.alarm(0)
+
+
+def test_keyboard_reports_the_release_that_the_terminal_cannot() -> None:
+    """On an old terminal, the local keyboard's own word ends the hold."""
+    device = InjectedDevice('AT keyboard', {KEY_Q, KEY_I, KEY_SPACE})
+    with (
+        ScriptedTerminal(kitty=False) as terminal,
+        Keyboard(terminal.path, devices=InjectedDevices(device), environment={}) as keyboard,
+    ):
+        device.press(KEY_I)
+        terminal.send('i')
+        events = read_until(keyboard, bool)
+        assert keyboard.release_source is ReleaseSource.KEYBOARD
+        device.release(KEY_I)
+        events += read_until(keyboard, bool)
+    assert actions(events)[0] in {('i', KeyAction.PRESSED), ('i', KeyAction.TYPED)}
+    assert actions(events)[-1] == ('i', KeyAction.RELEASED)
+
+
+def test_unplugged_keyboard_lets_go() -> None:
+    """A keyboard pulled out with a key down: the key is released, time-outs take over."""
+    device = InjectedDevice('USB keyboard', {KEY_Q, KEY_I, KEY_SPACE})
+    devices = InjectedDevices(device)
+    held = HeldKeys()
+    with (
+        ScriptedTerminal(kitty=False) as terminal,
+        Keyboard(terminal.path, devices=devices, environment={}) as keyboard,
+    ):
+        device.press(KEY_I)
+        terminal.send('i')
+        events = read_until(
+            keyboard, lambda found: any(e.action is KeyAction.PRESSED for e in found)
+        )
+        devices.plugged.clear()
+        device.unplug()
+        events += read_until(keyboard, bool)
+        for event in events:
+            held.feed(event)
+        assert held.held(time.monotonic()) == ()
+        assert keyboard.release_source is ReleaseSource.TIME_OUT
+    assert device.is_closed
+
+
+def test_keyboards_are_not_asked_over_ssh() -> None:
+    """A person elsewhere is not at this machine's keyboard, which stays unopened."""
+    device = InjectedDevice('AT keyboard', {KEY_Q, KEY_I, KEY_SPACE})
+    with (
+        ScriptedTerminal(kitty=False) as terminal,
+        Keyboard(
+            terminal.path,
+            devices=InjectedDevices(device),
+            environment={'SSH_CONNECTION': '10.0.0.1 1 10.0.0.2 22'},
+        ) as keyboard,
+    ):
+        device.press(KEY_I)
+        terminal.send('i')
+        events = read_until(keyboard, bool)
+        assert keyboard.release_source is ReleaseSource.TIME_OUT
+    assert actions(events) == [('i', KeyAction.TYPED)]
+
+
+def test_devices_that_are_no_keyboards_are_closed() -> None:
+    """A power button is no keyboard."""
+    button = InjectedDevice('Power Button', {116})
+    with (
+        ScriptedTerminal(kitty=False) as terminal,
+        Keyboard(terminal.path, devices=InjectedDevices(button), environment={}) as keyboard,
+    ):
+        keyboard.wait(0.0)
+        assert keyboard.release_source is ReleaseSource.TIME_OUT
+    assert button.is_closed
