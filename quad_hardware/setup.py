@@ -7,8 +7,8 @@ from setuptools import find_packages, setup
 setup(
     name='quad_hardware',
     version='0.1.0',
-    packages=find_packages(include=['quad_hardware', 'quad_hardware.*']),
-    package_data={'quad_hardware': ['py.typed']},
+    packages=find_packages(include=['quad_hardware', 'quad_hardware.*', 'xgo_lib2']),
+    package_data={'quad_hardware': ['py.typed'], 'xgo_lib2': ['py.typed']},
     data_files=[
         ('share/ament_index/resource_index/packages', ['resource/quad_hardware']),
         ('share/quad_hardware', ['package.xml']),

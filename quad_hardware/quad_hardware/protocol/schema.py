@@ -218,7 +218,7 @@ class Function:
         }
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Protocol:
     """A serial protocol: its envelope and its table.
 

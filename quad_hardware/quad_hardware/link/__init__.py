@@ -1,0 +1,23 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The serial line: port, probing, conversation and the thread that keeps it going."""
+
+from .dialect import DialectCounters
+from .driver import Driver, LinkOptions, LinkState, LinkStatus
+from .port import SerialPort
+from .probe import ask, ask_firmware, connect, Connection
+from .state import RobotState
+
+__all__ = [
+    'Connection',
+    'DialectCounters',
+    'Driver',
+    'LinkOptions',
+    'LinkState',
+    'LinkStatus',
+    'RobotState',
+    'SerialPort',
+    'ask',
+    'ask_firmware',
+    'connect',
+]

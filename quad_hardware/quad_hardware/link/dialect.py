@@ -1,0 +1,96 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""How one talks to a robot: what is sent when, and what the answers mean.
+
+A dialect is a state machine without clock, thread or port: time comes in, bytes come out.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from ..protocol import Frame, Protocol
+from .state import RobotState
+
+
+@dataclass(slots=True)
+class DialectCounters:
+    """What a dialect has seen since its start.
+
+    Attributes:
+        states: Reports of the robot.
+        lost: Reports that never came, by their sequence numbers (new protocol).
+        unanswered: Requests without an answer in time (old protocol).
+        refused: Frames that the robot refused (new protocol).
+        unusable: Valid frames whose contents are not.
+    """
+
+    states: int = 0
+    lost: int = 0
+    unanswered: int = 0
+    refused: int = 0
+    unusable: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """What is to be done now.
+
+    Attributes:
+        send: Bytes to send, maybe none.
+        wake: When to come back at the latest, on the clock of the caller [s].
+    """
+
+    send: bytes
+    wake: float
+
+
+class Dialect(ABC):
+    """Conversation with one robot.
+
+    The caller does :meth:`step` again when its ``wake`` has come, after :meth:`command` and after
+    frames; and :meth:`hear` for each frame.
+    """
+
+    def __init__(self, protocol: Protocol, now: float) -> None:
+        """Begin a conversation.
+
+        Args:
+            protocol: What the robot speaks.
+            now: Time [s].
+        """
+        self.protocol = protocol
+        self._counters = DialectCounters()
+        self._now = now
+
+    @property
+    def counters(self) -> DialectCounters:
+        """A copy of the counters."""
+        return replace(self._counters)
+
+    @property
+    @abstractmethod
+    def motors(self) -> tuple[int, ...]:
+        """Ids of the motors whose angles the robot reports."""
+
+    @abstractmethod
+    def command(self, angles: Mapping[int, float]) -> None:
+        """Set the angles that are sent at the next possible moment.
+
+        Args:
+            angles: Servo angles by motor id [deg]; finite.
+        """
+
+    @abstractmethod
+    def withdraw(self) -> None:
+        """Forget a command that has not been sent yet."""
+
+    @abstractmethod
+    def step(self, now: float) -> Step:
+        """Return what is to be sent now."""
+
+    @abstractmethod
+    def hear(self, frame: Frame, now: float) -> RobotState | None:
+        """Take a frame of the robot; return the report that it completes, if any."""

@@ -1,0 +1,107 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Conversation in the new protocol: the robot pushes its state, commands go out at once."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from ..exceptions import CodecError
+from ..protocol import (
+    Code,
+    decode_feedback,
+    Feedback,
+    Frame,
+    Kind,
+    MOTOR_ORDER,
+    NEW,
+    STATE,
+)
+from .dialect import Dialect, Step
+from .state import RobotState
+
+ASK_AGAIN = 0.3  # [s] of silence after which the robot is asked to push its state
+_SERVOS = NEW.functions[Code.SERVOS]
+_STATE_LENGTH = NEW.overhead + STATE.length
+_SEQUENCE = 1 << 16
+
+
+class NewDialect(Dialect):
+    """Asks for 50 states a second, and again whenever they stop coming."""
+
+    def __init__(self, now: float, rate: int = 50) -> None:
+        """Begin a conversation.
+
+        Args:
+            now: Time [s].
+            rate: Reports a second [Hz].
+        """
+        super().__init__(NEW, now)
+        asking = (
+            Frame(Kind.WRITE, Code.FEEDBACK_RATE, bytes((rate,))),
+            Frame(Kind.WRITE, Code.FEEDBACK, b'\x01'),
+        )
+        self._ask = b''.join(frame.encode(NEW) for frame in asking)
+        self._ask_at = now
+        self._pending = b''
+        self._sequence: int | None = None
+
+    @property
+    def motors(self) -> tuple[int, ...]:
+        """Ids of the motors whose angles the robot reports."""
+        return MOTOR_ORDER
+
+    def command(self, angles: Mapping[int, float]) -> None:
+        """Set the angles that are sent at the next step, in one frame."""
+        groups = (_SERVOS.pack(motor=(m,), angle=(a,)) for m, a in angles.items())
+        self._pending = Frame(Kind.WRITE, Code.SERVOS, b''.join(groups)).encode(NEW)
+
+    def withdraw(self) -> None:
+        """Forget a command that has not been sent yet."""
+        self._pending = b''
+
+    def step(self, now: float) -> Step:
+        """Return a pending command, and the request for states where they are missing."""
+        send, self._pending = self._pending, b''
+        if now >= self._ask_at:
+            self._ask_at = now + ASK_AGAIN
+            send = self._ask + send
+        return Step(send, self._ask_at)
+
+    def hear(self, frame: Frame, now: float) -> RobotState | None:
+        """Take a frame of the robot; every state frame is a report."""
+        if frame.kind is Kind.NACK:
+            self._counters.refused += 1
+        if frame.kind is not Kind.PUSH or frame.address != STATE.address:
+            return None
+        try:
+            feedback = decode_feedback(frame.payload)
+        except CodecError:
+            self._counters.unusable += 1
+            return None
+        self._count(feedback.sequence)
+        self._ask_at = now + ASK_AGAIN
+        return _report(feedback, now)
+
+    def _count(self, sequence: int) -> None:
+        self._counters.states += 1
+        if self._sequence is not None:
+            missing = (sequence - self._sequence - 1) % _SEQUENCE
+            # a robot that restarted counts anew, which is no loss
+            self._counters.lost += missing if missing < _SEQUENCE // 2 else 0
+        self._sequence = sequence
+
+
+def _report(feedback: Feedback, now: float) -> RobotState:
+    return RobotState(
+        arrival=now,
+        wire_time=NEW.wire_time(_STATE_LENGTH),
+        attitude=feedback.attitude,
+        acceleration=feedback.acceleration,
+        positions=dict(zip(MOTOR_ORDER, feedback.position, strict=True)),
+        velocities=dict(zip(MOTOR_ORDER, feedback.velocity, strict=True)),
+        battery=feedback.battery,
+        voltage=feedback.battery_voltage or None,
+        faults=feedback.faults,
+        temperatures=dict(zip(MOTOR_ORDER, feedback.temperature, strict=True)),
+    )

@@ -1,0 +1,185 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Conversation in the old protocol: 50 times a second two bulk reads, and a bulk write between.
+
+A bulk write of 12 servos, a read of 15 and a read of the IMU take 8.1 ms of a 20 ms period at
+115200 baud; one frame per servo, as the vendor's library sends them, would not fit.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass
+import math
+
+from ..protocol import (
+    ANGLE_SPANS,
+    BULK_READ_ORDER,
+    Frame,
+    Kind,
+    LEG_MOTORS,
+    Model,
+    OLD,
+    Register,
+    REGISTER_OF_MOTOR,
+)
+from .dialect import Dialect, Step
+from .state import RobotState, Vector
+
+HOST_GAP = 0.001  # [s] the board drops some commands that follow each other faster
+BOARD_LATENCY = 0.010  # [s] what an answer may take beyond its time on the line
+BATTERY_PERIOD = 2.0  # [s]
+_IMU = OLD.functions[Register.IMU]
+
+
+@dataclass(frozen=True, slots=True)
+class _Request:
+    register: Register
+    size: int  # [B] of the answer
+
+    def encode(self) -> bytes:
+        """Return the bytes of the request."""
+        return Frame(Kind.READ, self.register, bytes((self.size,))).encode(OLD)
+
+    @property
+    def wire_time(self) -> float:
+        """Time on the line, request and answer [s]."""
+        return OLD.wire_time(len(self.encode()) + OLD.overhead + self.size)
+
+
+_READ_MOTORS = _Request(Register.MOTORS, len(BULK_READ_ORDER))
+_READ_IMU = _Request(Register.IMU, _IMU.length)
+_READ_BATTERY = _Request(Register.BATTERY, 1)
+
+
+class OldDialect(Dialect):
+    """Polls a robot; a command goes out as soon as the line is free."""
+
+    def __init__(self, now: float, model: Model = Model.LITE, rate: float = 50.0) -> None:
+        """Begin a conversation.
+
+        Args:
+            now: Time [s].
+            model: Whose ranges scale the bytes.
+            rate: Reports a second [Hz].
+        """
+        super().__init__(OLD, now)
+        self._spans = ANGLE_SPANS[model]
+        self._period = 1.0 / rate
+        self._cycle_at = now
+        self._battery_at = now
+        self._queue: deque[_Request] = deque()
+        self._waiting: _Request | None = None
+        self._deadline = math.inf
+        self._free_at = now
+        self._legs = b''
+        self._arm: dict[int, bytes] = {}
+        self._arm_sent: dict[int, bytes] = {}
+        self._angles: bytes | None = None
+        self._battery: float | None = None
+
+    @property
+    def motors(self) -> tuple[int, ...]:
+        """Ids of the motors whose angles the robot reports."""
+        return BULK_READ_ORDER
+
+    def command(self, angles: Mapping[int, float]) -> None:
+        """Set the angles that are sent when the line is free.
+
+        All legs go in one frame, so all of them must be there; the arm follows, where it changed.
+        """
+        self._legs = bytes(self._spans[motor].encode(angles[motor]) for motor in LEG_MOTORS)
+        for motor in angles.keys() - set(LEG_MOTORS):
+            self._arm[motor] = bytes((self._spans[motor].encode(angles[motor]),))
+
+    def withdraw(self) -> None:
+        """Forget a command that has not been sent yet."""
+        self._legs = b''
+        self._arm.clear()
+
+    def step(self, now: float) -> Step:
+        """Return the next frame, where one is due and the line is free."""
+        self._begin_cycle(now)
+        if self._waiting is not None and now >= self._deadline:
+            self._counters.unanswered += 1
+            self._waiting = None
+        send = self._next(now) if now >= self._free_at else b''
+        if send:
+            self._free_at = now + OLD.wire_time(len(send)) + HOST_GAP
+        wake = self._cycle_at
+        if self._waiting is not None:
+            wake = min(wake, self._deadline)
+        if self._legs or self._arm or (self._queue and self._waiting is None):
+            wake = min(wake, self._free_at)
+        return Step(send, wake)
+
+    def hear(self, frame: Frame, now: float) -> RobotState | None:
+        """Take an answer; with the one of the IMU a report is complete."""
+        waiting = self._waiting
+        if (
+            waiting is None
+            or frame.address != waiting.register
+            or len(frame.payload) != waiting.size
+        ):
+            self._counters.unusable += 1
+            return None
+        self._waiting = None
+        if waiting is _READ_BATTERY:
+            self._battery = float(frame.payload[0])
+        elif waiting is _READ_MOTORS:
+            self._angles = frame.payload
+        elif self._angles is not None:
+            return self._report(frame.payload, now)
+        return None
+
+    def _begin_cycle(self, now: float) -> None:
+        if now < self._cycle_at:
+            return
+        self._cycle_at += self._period
+        if self._cycle_at <= now:  # held up for longer than a period: no hurry to catch up
+            self._cycle_at = now + self._period
+        self._angles = None
+        self._queue = deque((_READ_MOTORS, _READ_IMU))
+        if now >= self._battery_at:
+            self._battery_at = now + BATTERY_PERIOD
+            self._queue.append(_READ_BATTERY)
+
+    def _next(self, now: float) -> bytes:
+        if self._legs:
+            payload, self._legs = self._legs, b''
+            return Frame(Kind.WRITE, Register.MOTORS, payload).encode(OLD)
+        while self._arm:
+            motor, payload = self._arm.popitem()
+            if self._arm_sent.get(motor) != payload:
+                self._arm_sent[motor] = payload
+                return Frame(Kind.WRITE, REGISTER_OF_MOTOR[motor], payload).encode(OLD)
+        if self._waiting is None and self._queue:
+            self._waiting = self._queue.popleft()
+            self._deadline = now + self._waiting.wire_time + BOARD_LATENCY
+            return self._waiting.encode()
+        return b''
+
+    def _report(self, imu: bytes, now: float) -> RobotState | None:
+        angles, self._angles = self._angles or b'', None
+        values = _IMU.unpack(imu)
+        if not all(math.isfinite(value) for value in values['attitude']):
+            self._counters.unusable += 1
+            return None
+        self._counters.states += 1
+        pairs = zip(BULK_READ_ORDER, angles, strict=True)
+        return RobotState(
+            arrival=now,
+            wire_time=OLD.wire_time(OLD.overhead + len(imu)),
+            attitude=_vector(values['attitude']),
+            acceleration=_vector(values['acceleration']),
+            positions={motor: self._spans[motor].decode(byte) for motor, byte in pairs},
+            velocities={},
+            rates=_vector(values['rate']),
+            battery=self._battery,
+        )
+
+
+def _vector(values: tuple[float, ...]) -> Vector:
+    x, y, z = values
+    return x, y, z

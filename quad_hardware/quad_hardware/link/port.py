@@ -1,0 +1,118 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""A serial port that is read without waiting, so that one thread can wait for several things."""
+
+from __future__ import annotations
+
+import errno
+import os
+from pathlib import Path
+import select
+import time
+from typing import TYPE_CHECKING
+
+import serial
+
+from ..exceptions import LinkError
+
+if TYPE_CHECKING:
+    from types import TracebackType
+
+    from typing_extensions import Self
+
+CHUNK = 4096  # [B] more than two frames
+WRITE_PATIENCE = 0.1  # [s] how long a port may take no bytes before it counts as lost
+
+
+class SerialPort:
+    """An open serial port, 8N1, which no other program of ours can open at the same time."""
+
+    def __init__(self, path: str, baud: int) -> None:
+        """Open the port.
+
+        Args:
+            path: Device file, or a link to one.
+            baud: Speed [bit/s].
+
+        Raises:
+            LinkError: It cannot be opened; the message names the remedy.
+        """
+        self.path = path
+        self.baud = baud
+        try:
+            self._serial = serial.Serial(path, baud, timeout=0, exclusive=True)
+        except (OSError, ValueError) as error:
+            raise LinkError(_explain(path, baud, error)) from error
+        self._serial.reset_input_buffer()
+
+    def fileno(self) -> int:
+        """Return the file descriptor, for :mod:`select`."""
+        return int(self._serial.fileno())
+
+    def read(self) -> bytes:
+        """Return what has arrived; to be called when :mod:`select` says that something has.
+
+        Raises:
+            LinkError: The port is gone.
+        """
+        try:
+            data = os.read(self.fileno(), CHUNK)
+        except BlockingIOError:
+            return b''
+        except OSError as error:
+            raise LinkError(f'{self.path} was lost: {error.strerror}') from error
+        if not data:  # ready, and nothing there: the line was hung up
+            raise LinkError(f'{self.path} was hung up; was the cable pulled?')
+        return data
+
+    def write(self, data: bytes) -> None:
+        """Send bytes; waits for :data:`WRITE_PATIENCE` at most.
+
+        Raises:
+            LinkError: The port is gone, or takes no more bytes.
+        """
+        deadline = time.monotonic() + WRITE_PATIENCE
+        while data := data[self._write_some(data) :]:
+            _, ready, _ = select.select([], [self], [], WRITE_PATIENCE)
+            if not ready or time.monotonic() > deadline:
+                raise LinkError(f'{self.path} takes no more bytes; is the robot on?')
+
+    def _write_some(self, data: bytes) -> int:
+        try:
+            return os.write(self.fileno(), data)
+        except BlockingIOError:
+            return 0
+        except OSError as error:
+            raise LinkError(f'{self.path} was lost: {error.strerror}') from error
+
+    def close(self) -> None:
+        """Close the port; closing it twice does nothing."""
+        self._serial.close()
+
+    def __enter__(self) -> Self:
+        """Use it in a with statement."""
+        return self
+
+    def __exit__(
+        self,
+        exc_type: type[BaseException] | None,
+        exc: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """Close the port."""
+        self.close()
+
+
+def _explain(path: str, baud: int, error: Exception) -> str:
+    number = getattr(error, 'errno', None)
+    if number == errno.ENOENT or not Path(path).exists():
+        remedy = 'there is no such device; is the robot plugged in, and is this its port?'
+    elif number == errno.EACCES:
+        remedy = 'no permission; run: sudo usermod -aG dialout $USER, then log in again'
+    elif number in {errno.EBUSY, errno.EAGAIN}:
+        remedy = 'another program has it open; see: fuser ' + path
+    elif isinstance(error, ValueError):
+        remedy = f'it does not do {baud} baud'
+    else:
+        remedy = str(error)
+    return f'cannot open {path}: {remedy}'

@@ -1,0 +1,128 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Finds out which protocol a robot speaks: by its firmware version, at 2 Mbaud, then at 115200."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+import select
+import time
+
+from ..exceptions import LinkError, NoAnswerError
+from ..protocol import (
+    Code,
+    Frame,
+    Kind,
+    NEW,
+    Protocol,
+    PROTOCOLS,
+    Register,
+    ROBOT_KINDS,
+    StreamParser,
+)
+from .port import SerialPort
+
+ANSWER_TIME = 0.15  # [s] a robot takes a few milliseconds
+ATTEMPTS = 2
+FIRMWARE_SIZE = 10  # [B]
+
+
+@dataclass(frozen=True, slots=True)
+class Connection:
+    """A robot that answered.
+
+    Attributes:
+        port: The open port, owned by whoever holds the connection.
+        protocol: What the robot speaks.
+        firmware: Its version.
+    """
+
+    port: SerialPort
+    protocol: Protocol
+    firmware: str
+
+
+def connect(path: str, protocols: Iterable[Protocol] = PROTOCOLS, baud: int = 0) -> Connection:
+    """Open a port and ask for the firmware version, in one protocol after the other.
+
+    Args:
+        path: Device file.
+        protocols: What to try, in this order.
+        baud: Speed [bit/s]; 0 takes each protocol's own.
+
+    Returns:
+        The first that answers.
+
+    Raises:
+        LinkError: The port cannot be opened or was lost.
+        NoAnswerError: Nobody answers; the message says what was tried.
+    """
+    tried = []
+    for protocol in protocols:
+        speed = baud or protocol.baud
+        tried.append(f'{protocol.name} protocol at {speed} baud')
+        port = SerialPort(path, speed)
+        try:
+            firmware = ask_firmware(port, protocol)
+        except LinkError:
+            port.close()
+            raise
+        if firmware is not None:
+            return Connection(port, protocol, firmware)
+        port.close()
+    raise NoAnswerError(
+        f'no robot answers on {path} ({", ".join(tried)}); '
+        'is it switched on, and is this its port?'
+    )
+
+
+def ask_firmware(port: SerialPort, protocol: Protocol) -> str | None:
+    """Return the firmware version of a robot, None when it does not answer.
+
+    Raises:
+        LinkError: The port was lost.
+    """
+    if protocol is NEW:
+        request = Frame(Kind.READ, Code.VERSION)
+    else:
+        request = Frame(Kind.READ, Register.FIRMWARE, bytes((FIRMWARE_SIZE,)))
+    for _ in range(ATTEMPTS):
+        answer = ask(port, protocol, request, FIRMWARE_SIZE, ANSWER_TIME)
+        if answer is not None:
+            return answer.rstrip(b'\0').decode('ascii', 'replace')
+    return None
+
+
+def ask(
+    port: SerialPort, protocol: Protocol, request: Frame, size: int, timeout: float
+) -> bytes | None:
+    """Send a request and wait for its answer.
+
+    Args:
+        port: Where the robot is.
+        protocol: What it speaks.
+        request: A READ frame.
+        size: Length of the answer [B]; others are passed over.
+        timeout: How long to wait [s].
+
+    Returns:
+        Payload of the answer, None when there is none in time.
+
+    Raises:
+        LinkError: The port was lost.
+    """
+    parser = StreamParser(protocol, ROBOT_KINDS)
+    port.write(request.encode(protocol))
+    deadline = time.monotonic() + timeout
+    while (left := deadline - time.monotonic()) > 0:
+        readable, _, _ = select.select([port], [], [], left)
+        frames = parser.feed(port.read()) if readable else parser.expire()
+        for frame in frames:
+            if (
+                frame.kind is Kind.REPLY
+                and frame.address == request.address
+                and len(frame.payload) == size
+            ):
+                return frame.payload
+    return None

@@ -1,0 +1,41 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What a robot reports, whichever protocol it speaks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class RobotState:
+    """One report, with angles by motor id in the units of the wire.
+
+    Attributes:
+        arrival: When its last byte came, on the monotonic clock [s].
+        wire_time: How long its bytes were on the line [s].
+        attitude: Roll, pitch, yaw of the body about fixed axes x, y, z [deg].
+        acceleration: Specific force x, y, z [m/s²]; +9.8 upwards at rest.
+        positions: Servo angles by motor id [deg].
+        velocities: Servo velocities by motor id [deg/s]; empty where they are not reported.
+        rates: Angular velocity x, y, z of the body [deg/s]; None where there is no gyro.
+        battery: Charge [%]; None while unknown.
+        voltage: Voltage of the battery [V]; None where it is not reported.
+        faults: Fault bits of the new protocol.
+        temperatures: Of the servos by motor id [°C]; empty where they are not reported.
+    """
+
+    arrival: float
+    wire_time: float
+    attitude: Vector
+    acceleration: Vector
+    positions: Mapping[int, float]
+    velocities: Mapping[int, float]
+    rates: Vector | None = None
+    battery: float | None = None
+    voltage: float | None = None
+    faults: int = 0
+    temperatures: Mapping[int, float] | None = None

@@ -1,0 +1,198 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""A robot without physics on a pseudo-terminal: servos are where they were told to be."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+import os
+from pathlib import Path
+import pty
+import random
+import select
+import threading
+import time
+import tty
+from typing import TYPE_CHECKING
+
+from quad_hardware.protocol import (
+    ANGLE_SPANS,
+    BULK_READ_ORDER,
+    Code,
+    Feedback,
+    Frame,
+    HOST_KINDS,
+    Kind,
+    Model,
+    MOTOR_OF_REGISTER,
+    MOTOR_ORDER,
+    NEW,
+    OLD,
+    Protocol,
+    Register,
+    scatter,
+    StreamParser,
+)
+
+if TYPE_CHECKING:
+    from types import TracebackType
+
+    from typing_extensions import Self
+
+PUSH_PERIOD = 0.02  # [s]
+
+
+@dataclass
+class Behaviour:
+    """What the robot does; a test changes it while it runs.
+
+    Attributes:
+        silent: It hears, and says nothing.
+        corrupt: Share of the bytes sent that are damaged.
+        attitude: Roll, pitch, yaw [deg].
+    """
+
+    silent: bool = False
+    corrupt: float = 0.0
+    attitude: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+@dataclass
+class PtyPeer:
+    """One robot.
+
+    Attributes:
+        link: Where its port is found, through every :meth:`replug`.
+        protocol: What it speaks.
+        firmware: What it answers when it is asked.
+        behaviour: How it behaves.
+        angles: Servo angles by motor id [deg].
+        commands: Angles of each servo command, in order of arrival.
+        gaps: Time between two host frames [s].
+    """
+
+    link: Path
+    protocol: Protocol = NEW
+    firmware: str = 'L-2.0.0'
+    behaviour: Behaviour = field(default_factory=Behaviour)
+    angles: dict[int, float] = field(default_factory=lambda: dict.fromkeys(MOTOR_ORDER, 0.0))
+    commands: list[dict[int, float]] = field(default_factory=list)
+    _pushing: bool = False
+    _sequence: int = 0
+
+    def __post_init__(self) -> None:
+        self._stop = threading.Event()
+        self._random = random.Random(1)
+        self._thread: threading.Thread | None = None
+
+    def plug(self) -> None:
+        """Appear at the link, on a new terminal."""
+        self._master, slave = pty.openpty()
+        tty.setraw(self._master)
+        tty.setraw(slave)
+        self._slave = slave
+        self.link.unlink(missing_ok=True)
+        self.link.symlink_to(os.ttyname(slave))
+        self._pushing = False
+        self._stop.clear()
+        self._thread = threading.Thread(target=self._run)
+        self._thread.start()
+
+    def unplug(self) -> None:
+        """Vanish: the port hangs up and the link is gone."""
+        if self._thread is None:
+            return
+        self._stop.set()
+        self._thread.join()
+        self._thread = None
+        os.close(self._master)
+        os.close(self._slave)
+        self.link.unlink(missing_ok=True)
+
+    def _run(self) -> None:
+        parser = StreamParser(self.protocol, HOST_KINDS)
+        next_push = time.monotonic()
+        while not self._stop.is_set():
+            ready, _, _ = select.select([self._master], [], [], 0.005)
+            if ready:
+                for frame in parser.feed(os.read(self._master, 4096)):
+                    self._take(frame)
+            if self._pushing and time.monotonic() >= next_push:
+                next_push = time.monotonic() + PUSH_PERIOD
+                self._sequence += 1
+                self._say(self._state().frame())
+
+    def _take(self, frame: Frame) -> None:
+        (self._new if self.protocol is NEW else self._old)(frame)
+
+    def _state(self) -> Feedback:
+        return Feedback(
+            attitude=self.behaviour.attitude,
+            battery=80,
+            battery_voltage=7.4,
+            position=tuple(self.angles[motor] for motor in MOTOR_ORDER),
+            sequence=self._sequence % 65536,
+        )
+
+    def _say(self, frame: Frame) -> None:
+        if self.behaviour.silent:
+            return
+        wire = bytearray(frame.encode(self.protocol))
+        for index in range(len(wire)):
+            if self._random.random() < self.behaviour.corrupt:
+                wire[index] ^= self._random.randrange(1, 256)
+        os.write(self._master, bytes(wire))
+
+    def _set(self, angles: dict[int, float]) -> None:
+        self.angles.update(angles)
+        self.commands.append(angles)
+
+    def _new(self, frame: Frame) -> None:
+        if frame.kind is Kind.READ and frame.address == Code.VERSION:
+            self._say(Frame(Kind.REPLY, Code.VERSION, self.firmware.encode().ljust(10, b'\0')))
+        elif frame.kind is Kind.READ and frame.address == Code.BATTERY:
+            self._say(Frame(Kind.REPLY, Code.BATTERY, bytes((80,))))
+        elif frame.address == Code.FEEDBACK:
+            self._pushing = bool(frame.payload[0])
+        elif frame.address == Code.SERVOS:
+            values = NEW.functions[Code.SERVOS].unpack(frame.payload)
+            self._set({int(m): a for m, a in zip(values['motor'], values['angle'], strict=True)})
+
+    def _old(self, frame: Frame) -> None:
+        spans = ANGLE_SPANS[Model.LITE]
+        if frame.kind is Kind.WRITE:
+            self._set(
+                {
+                    MOTOR_OF_REGISTER[r]: spans[MOTOR_OF_REGISTER[r]].decode(data[0])
+                    for r, data in scatter(frame.address, frame.payload)
+                }
+            )
+        elif frame.address == Register.FIRMWARE:
+            self._say(Frame(Kind.REPLY, frame.address, self.firmware.encode().ljust(10, b'\0')))
+        elif frame.address == Register.BATTERY:
+            self._say(Frame(Kind.REPLY, frame.address, bytes((80,))))
+        elif frame.address == Register.MOTORS:
+            motors = BULK_READ_ORDER[: frame.payload[0]]
+            data = bytes(spans[motor].encode(self.angles[motor]) for motor in motors)
+            self._say(Frame(Kind.REPLY, frame.address, data))
+        elif frame.address == Register.IMU:
+            values = OLD.functions[Register.IMU].pack(
+                acceleration=(0.0, 0.0, 9.8),
+                rate=(0.0, 0.0, 0.0),
+                attitude=self.behaviour.attitude,
+            )
+            self._say(Frame(Kind.REPLY, frame.address, values))
+
+    def __enter__(self) -> Self:
+        """Plug it in."""
+        self.plug()
+        return self
+
+    def __exit__(
+        self,
+        exc_type: type[BaseException] | None,
+        exc: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """Unplug it."""
+        self.unplug()

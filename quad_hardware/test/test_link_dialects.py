@@ -1,0 +1,188 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Both conversations without a port: what is sent when, in virtual time."""
+
+from __future__ import annotations
+
+import math
+
+from hypothesis import given
+from hypothesis import strategies as st
+import pytest
+
+from quad_hardware.link.dialect import Dialect
+from quad_hardware.link.new_dialect import ASK_AGAIN, NewDialect
+from quad_hardware.link.old_dialect import HOST_GAP, OldDialect
+from quad_hardware.link.state import RobotState
+from quad_hardware.protocol import (
+    ANGLE_SPANS,
+    BULK_READ_ORDER,
+    Code,
+    Feedback,
+    Frame,
+    HOST_KINDS,
+    Kind,
+    LEG_MOTORS,
+    Model,
+    MOTOR_ORDER,
+    NEW,
+    OLD,
+    Register,
+    StreamParser,
+)
+
+LEGS = dict.fromkeys(LEG_MOTORS, 10.0)
+IMU = OLD.functions[Register.IMU]
+
+
+def answer(frame: Frame) -> Frame:
+    """What a robot of the old protocol answers."""
+    if frame.address == Register.IMU:
+        payload = IMU.pack(acceleration=(0, 0, 9.8), rate=(0, 0, 10.0), attitude=(1.0, 2.0, 3.0))
+    else:
+        payload = bytes((128,)) * frame.payload[0]
+    return Frame(Kind.REPLY, frame.address, payload)
+
+
+class OldRig:
+    """A robot of the old protocol in virtual time: answers when request and answer are over."""
+
+    def __init__(self, latency: float = 0.002) -> None:
+        """Begin at time zero."""
+        self.now = 0.0
+        self.dialect: Dialect = OldDialect(self.now)
+        self.latency = latency
+        self.sent: list[tuple[float, Frame]] = []
+        self.states: list[RobotState] = []
+        self._answers: list[tuple[float, Frame]] = []
+        self._parser = StreamParser(OLD, HOST_KINDS)
+
+    def run(self, duration: float) -> None:
+        """Let time pass."""
+        end = self.now + duration
+        while self.now < end:
+            step = self.dialect.step(self.now)
+            for frame in self._parser.feed(step.send):
+                self.sent.append((self.now, frame))
+                if frame.kind is Kind.READ and self.latency < math.inf:
+                    reply = answer(frame)
+                    wire = OLD.wire_time(len(step.send) + len(reply.encode(OLD)))
+                    self._answers.append((self.now + wire + self.latency, reply))
+            if self._answers and self._answers[0][0] <= max(step.wake, self.now):
+                self.now, reply = self._answers.pop(0)
+                state = self.dialect.hear(reply, self.now)
+                self.states += [state] if state else []
+            else:
+                assert step.wake > self.now or step.send, 'it would spin'
+                self.now = max(step.wake, self.now)
+
+
+def test_the_old_protocol_is_polled_at_50_hz() -> None:
+    """Two bulk reads a period, and a report for each; the battery comes now and then."""
+    rig = OldRig()
+    rig.run(1.0)
+    addresses = [frame.address for _, frame in rig.sent]
+    assert addresses.count(Register.MOTORS) == addresses.count(Register.IMU) == 50
+    assert addresses.count(Register.BATTERY) == 1
+    assert len(rig.states) == 50
+    state = rig.states[-1]
+    assert state.attitude == (1.0, 2.0, 3.0)
+    assert state.rates == pytest.approx((0, 0, 10.0), abs=0.04)
+    assert state.battery == 128.0
+    assert set(state.positions) == set(BULK_READ_ORDER)
+
+
+def test_commands_of_the_old_protocol_fit_into_50_hz() -> None:
+    """Twelve servos in one frame each period; the reads go on, and the gap is kept."""
+    rig = OldRig()
+    for _ in range(50):
+        rig.dialect.command(LEGS)
+        rig.run(0.02)
+    writes = [frame for _, frame in rig.sent if frame.kind is Kind.WRITE]
+    span = ANGLE_SPANS[Model.LITE][11]
+    assert len(writes) == 50
+    assert {len(frame.payload) for frame in writes} == {12}
+    assert writes[0].payload[0] == span.encode(10.0)
+    assert len(rig.states) >= 49
+    for (t0, frame), (t1, _) in zip(rig.sent, rig.sent[1:], strict=False):
+        wire = OLD.wire_time(len(frame.encode(OLD)))
+        assert t1 - t0 >= wire + HOST_GAP - 1e-9
+
+
+def test_an_arm_joint_is_sent_when_it_changes() -> None:
+    """Registers of their own, one frame each, and not again for the same angle."""
+    rig = OldRig()
+    for _ in range(5):
+        rig.dialect.command({**LEGS, 52: 20.0})
+        rig.run(0.02)
+    arm = [frame for _, frame in rig.sent if frame.address == 0x5D]
+    assert [frame.payload[0] for frame in arm] == [ANGLE_SPANS[Model.LITE][52].encode(20.0)]
+
+
+def test_a_silent_old_robot_is_asked_again_and_counted() -> None:
+    """No answer ends a request after its time; nothing waits for ever, no report is made up."""
+    rig = OldRig(latency=math.inf)
+    rig.run(1.0)
+    assert rig.states == []
+    assert rig.dialect.counters.unanswered >= 50
+
+
+def test_half_a_report_is_no_report() -> None:
+    """An IMU answer without the angles of its period gives nothing."""
+    dialect = OldDialect(0.0)
+    motors = dialect.step(0.0)
+    (request,) = StreamParser(OLD, HOST_KINDS).feed(motors.send)
+    assert dialect.hear(Frame(Kind.REPLY, Register.IMU, bytes(24)), 0.001) is None
+    assert dialect.counters.unusable == 1
+    assert dialect.hear(answer(request), 0.002) is None
+    assert dialect.hear(answer(request), 0.002) is None  # asked once, answered twice
+    assert dialect.counters.unusable == 2
+
+
+def test_a_command_withdrawn_is_not_sent() -> None:
+    """In either protocol."""
+    for dialect in (OldDialect(0.0), NewDialect(0.0)):
+        dialect.step(0.0)
+        dialect.command(LEGS)
+        dialect.withdraw()
+        kinds = [
+            f.kind
+            for f in StreamParser(dialect.protocol, HOST_KINDS).feed(dialect.step(0.05).send)
+        ]
+        assert Kind.WRITE not in kinds
+
+
+def test_the_new_protocol_asks_until_states_come() -> None:
+    """Feedback is switched on at the start, and again whenever it stops."""
+    dialect = NewDialect(0.0)
+    asked = [f.address for f in StreamParser(NEW, HOST_KINDS).feed(dialect.step(0.0).send)]
+    assert asked == [Code.FEEDBACK_RATE, Code.FEEDBACK]
+    assert dialect.step(ASK_AGAIN / 2).send == b''
+    assert dialect.hear(Feedback().frame(), ASK_AGAIN / 2) is not None
+    assert dialect.step(ASK_AGAIN).send == b''
+    assert dialect.step(ASK_AGAIN * 1.5).send != b''
+
+
+@given(st.dictionaries(st.sampled_from(MOTOR_ORDER), st.floats(-180, 180), min_size=1))
+def test_a_command_of_the_new_protocol_is_one_frame(angles: dict[int, float]) -> None:
+    """All servos at once, to a hundredth of a degree."""
+    dialect = NewDialect(0.0)
+    dialect.step(0.0)
+    dialect.command(angles)
+    (frame,) = StreamParser(NEW, HOST_KINDS).feed(dialect.step(0.001).send)
+    values = NEW.functions[Code.SERVOS].unpack(frame.payload)
+    sent = dict(zip(values['motor'], values['angle'], strict=True))
+    assert sent == pytest.approx(angles, abs=0.0051)
+
+
+def test_lost_states_are_counted_by_their_sequence() -> None:
+    """Across the wrap; a robot that restarted lost nothing; states with NaN do not count."""
+    dialect = NewDialect(0.0)
+    for sequence in (65533, 65535, 0, 3):
+        dialect.hear(Feedback(sequence=sequence).frame(), 0.0)
+    assert dialect.counters.lost == 3
+    dialect.hear(Feedback(sequence=1).frame(), 0.0)
+    assert dialect.counters.lost == 3
+    bad = Feedback(acceleration=(math.nan, 0.0, 0.0)).frame()
+    assert dialect.hear(bad, 0.0) is None
+    assert (dialect.counters.states, dialect.counters.unusable) == (5, 1)

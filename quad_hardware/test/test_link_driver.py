@@ -1,0 +1,149 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The driver on real pseudo-terminals: found, lost, silent, damaged, replugged."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+import time
+
+import pytest
+
+from quad_hardware.link import Driver, LinkOptions, LinkState, RobotState
+from quad_hardware.protocol import LEG_MOTORS, NEW, OLD
+from quad_pty_peer import PtyPeer
+
+TIMEOUT = 15.0  # [s] for anything to happen
+LEGS = dict.fromkeys(LEG_MOTORS, 0.0)
+
+
+class Rig:
+    """A driver with a robot."""
+
+    def __init__(self, peer: PtyPeer) -> None:
+        """Prepare both."""
+        self.peer = peer
+        self.states: list[RobotState] = []
+        self.changes: list[tuple[LinkState, str]] = []
+        options = LinkOptions(str(peer.link))
+        self.driver = Driver(
+            options, self.states.append, lambda *change: self.changes.append(change)
+        )
+
+    def reach(self, state: LinkState) -> None:
+        """Wait until the link is in a state."""
+        wait_for(lambda: self.driver.status().state is state, f'{state} after {self.changes}')
+
+    def reports(self, count: int) -> None:
+        """Wait for more reports."""
+        until = len(self.states) + count
+        wait_for(lambda: len(self.states) >= until, f'{count} reports')
+
+
+def wait_for(condition: Callable[[], bool], what: str) -> None:
+    """Wait for something."""
+    deadline = time.monotonic() + TIMEOUT
+    while not condition():
+        assert time.monotonic() < deadline, f'no {what}'
+        time.sleep(0.002)
+
+
+@pytest.fixture(params=[NEW, OLD], ids=lambda protocol: protocol.name)
+def rig(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Rig]:
+    """A running driver with a robot of either protocol."""
+    with PtyPeer(tmp_path / 'port', request.param) as peer:
+        rig = Rig(peer)
+        rig.driver.start()
+        yield rig
+        rig.driver.stop()
+
+
+def test_a_robot_is_found_and_reports(rig: Rig) -> None:
+    """The status says what it is, and reports come."""
+    rig.peer.behaviour.attitude = (1.0, 2.0, 3.0)
+    rig.reports(10)
+    status = rig.driver.status()
+    assert status.state is LinkState.RUNNING
+    assert (status.protocol, status.firmware) == (rig.peer.protocol.name, 'L-2.0.0')
+    assert status.baud == rig.peer.protocol.baud
+    assert status.parser.damaged == status.parser.skipped == 0
+    assert rig.states[-1].attitude == (1.0, 2.0, 3.0)
+    assert [state for state, _ in rig.changes] == [LinkState.WAITING, LinkState.RUNNING]
+
+
+def test_a_command_reaches_the_servos(rig: Rig) -> None:
+    """All legs in one frame, and the next reports show it."""
+    rig.reports(1)
+    assert rig.driver.command(dict.fromkeys(LEG_MOTORS, 12.0))
+    wait_for(lambda: bool(rig.peer.commands), 'command')
+    assert rig.peer.commands[0].keys() == set(LEG_MOTORS)
+    rig.reports(2)
+    assert rig.states[-1].positions[42] == pytest.approx(12.0, abs=0.4)
+
+
+def test_silence_stops_the_commands(rig: Rig) -> None:
+    """Stale is said once, nothing is sent while it lasts, and it ends by itself."""
+    rig.reports(1)
+    rig.peer.behaviour.silent = True
+    rig.reach(LinkState.STALE)
+    sent = len(rig.peer.commands)
+    assert not rig.driver.command(LEGS)
+    rig.peer.behaviour.silent = False
+    rig.reach(LinkState.RUNNING)
+    assert len(rig.peer.commands) == sent
+    assert rig.driver.status().dropped == 1
+    states = [state for state, _ in rig.changes]
+    assert states.count(LinkState.STALE) == 1
+    assert rig.driver.command(LEGS)
+    wait_for(lambda: len(rig.peer.commands) > sent, 'command after the silence')
+
+
+def test_a_replugged_robot_is_found_again(rig: Rig) -> None:
+    """On another terminal behind the same link; the driver says what it waits for."""
+    rig.reports(1)
+    rig.peer.unplug()
+    rig.reach(LinkState.CONNECTING)
+    assert not rig.driver.command(LEGS)
+    wait_for(lambda: 'no such device' in rig.driver.status().detail, 'reason')
+    rig.peer.plug()
+    rig.reach(LinkState.RUNNING)
+    rig.reports(3)
+    assert rig.driver.status().connections == 2
+
+
+def test_damaged_bytes_cost_reports_and_nothing_else(rig: Rig) -> None:
+    """1 % of the bytes wrong: every report that comes is right, and damage is counted."""
+    rig.reports(1)
+    rig.peer.behaviour.corrupt = 0.01
+    first = len(rig.states)
+    wait_for(lambda: rig.driver.status().parser.skipped > 300, 'damage')
+    assert rig.driver.status().parser.damaged > 0
+    rig.peer.behaviour.corrupt = 0.0
+    rig.reach(LinkState.RUNNING)
+    rig.reports(3)
+    assert all(state.attitude == (0.0, 0.0, 0.0) for state in rig.states[first:])
+    assert all(abs(a) < 1.0 for state in rig.states for a in state.positions.values())
+
+
+def test_a_rider_is_not_taken_for_a_dog(tmp_path: Path) -> None:
+    """A firmware without legs is refused by name; nothing is sent to it."""
+    with PtyPeer(tmp_path / 'port', OLD, firmware='R-3.0') as peer:
+        rig = Rig(peer)
+        rig.driver.start()
+        wait_for(
+            lambda: "'R-3.0' is of no known quadruped" in rig.driver.status().detail, 'reason'
+        )
+        rig.driver.stop()
+        assert peer.commands == []
+
+
+def test_a_driver_stops_while_it_looks(tmp_path: Path) -> None:
+    """Without any port, it ends at once, and says so."""
+    changes: list[LinkState] = []
+    options = LinkOptions(str(tmp_path / 'nothing'))
+    driver = Driver(options, lambda _: None, lambda state, _: changes.append(state))
+    driver.start()
+    wait_for(lambda: 'no such device' in driver.status().detail, 'reason')
+    driver.stop()
+    assert changes[-1] is LinkState.STOPPED

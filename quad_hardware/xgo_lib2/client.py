@@ -1,0 +1,250 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""A robot on a serial port, one call at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+import math
+import select
+import time
+from typing import TYPE_CHECKING
+
+from quad_hardware.exceptions import CodecError, HardwareError, NoAnswerError
+from quad_hardware.link import ask, connect
+from quad_hardware.protocol import (
+    ANGLE_SPANS,
+    Code,
+    Frame,
+    Kind,
+    Model,
+    model_of_firmware,
+    NEW,
+    Register,
+    REGISTER_OF_MOTOR,
+    slot_of,
+)
+
+from .errors import XgoError, XgoNotSupportedError, XgoTimeoutError
+from .feedback import DeviceState, SendStateParser
+
+if TYPE_CHECKING:
+    from types import TracebackType
+
+    from typing_extensions import Self
+
+TIMEOUT = 0.5  # [s] for an answer
+HOST_GAP = 0.001  # [s] between commands of the old protocol
+
+
+@dataclass(frozen=True, slots=True)
+class Imu:
+    """What the IMU measures.
+
+    Attributes:
+        roll: Attitude about x [deg].
+        pitch: Attitude about y [deg].
+        yaw: Attitude about z [deg].
+        acceleration: Specific force x, y, z [m/s²].
+    """
+
+    roll: float
+    pitch: float
+    yaw: float
+    acceleration: tuple[float, float, float]
+
+
+class XgoDog:
+    """A robot, in whichever protocol it answers; close it, or use it in a with statement."""
+
+    def __init__(self, port: str = '/dev/ttyAMA0', baud: int = 0) -> None:
+        """Open a port and look for the robot.
+
+        Args:
+            port: Device file.
+            baud: Speed [bit/s]; 0 tries 2 000 000, then 115 200.
+
+        Raises:
+            XgoTimeoutError: Nobody answers.
+            XgoError: The port cannot be opened.
+        """
+        with _as_xgo_errors():
+            self._connection = connect(port, baud=baud)
+        self._parser = SendStateParser()
+        self._states: list[DeviceState] = []
+
+    @property
+    def protocol(self) -> str:
+        """Name of the protocol that the robot speaks: ``new`` or ``old``."""
+        return self._connection.protocol.name
+
+    def read_version(self) -> str:
+        """Return the firmware version.
+
+        Raises:
+            XgoError: The robot does not answer, or the port was lost.
+        """
+        if self._is_new:
+            answer = self._ask(Frame(Kind.READ, Code.VERSION), 10)
+        else:
+            answer = self._read_register(Register.FIRMWARE, 10)
+        return answer.rstrip(b'\0').decode('ascii', 'replace')
+
+    def system_read_battery(self) -> int:
+        """Return the charge of the battery [%].
+
+        Raises:
+            XgoError: The robot does not answer, or the port was lost.
+        """
+        if self._is_new:
+            return self._ask(Frame(Kind.READ, Code.BATTERY), 1)[0]
+        return self._read_register(Register.BATTERY, 1)[0]
+
+    def system_set_feedback(self, on: int) -> None:
+        """Have the robot push its state about 50 times a second (1), or no longer (0).
+
+        Raises:
+            XgoNotSupportedError: It speaks the old protocol, which is polled.
+            XgoError: The port was lost.
+        """
+        if not self._is_new:
+            raise XgoNotSupportedError(
+                'a robot of the old protocol pushes nothing; ask with read_imu and '
+                'read_servo_angles'
+            )
+        self._send(Frame(Kind.WRITE, Code.FEEDBACK, bytes((bool(on),))))
+
+    def read_state(self, timeout: float = TIMEOUT) -> DeviceState:
+        """Return the next state that the robot pushes.
+
+        Raises:
+            XgoTimeoutError: None comes; was ``system_set_feedback(1)`` called?
+        """
+        port = self._connection.port
+        deadline = time.monotonic() + timeout
+        while not self._states:
+            left = deadline - time.monotonic()
+            if left <= 0:
+                raise XgoTimeoutError(
+                    f'no state within {timeout} s; was system_set_feedback(1) called?'
+                )
+            readable, _, _ = select.select([port], [], [], left)
+            if readable:
+                with _as_xgo_errors():
+                    self._states += self._parser.feed_bytes(port.read())
+        return self._states.pop(0)
+
+    def read_imu(self) -> Imu:
+        """Return attitude and acceleration.
+
+        Raises:
+            XgoError: The robot does not answer; in the new protocol, it pushes no states.
+        """
+        if self._is_new:
+            self._states.clear()
+            state = self.read_state()
+            return Imu(state.roll, state.pitch, state.yaw, state.acceleration)
+        function = self._connection.protocol.functions[Register.IMU]
+        values = function.unpack(self._read_register(Register.IMU, function.length))
+        roll, pitch, yaw = values['attitude']
+        x, y, z = values['acceleration']
+        return Imu(roll, pitch, yaw, (x, y, z))
+
+    def write_servo_angle(self, motor_id: int, angle: float) -> None:
+        """Move one servo.
+
+        Args:
+            motor_id: As in :func:`xgo_lib2.registry.feedback_slot_of`.
+            angle: Target [deg].
+
+        Raises:
+            ValueError: There is no such motor, or the angle is not finite.
+            XgoError: The port was lost.
+        """
+        self.write_servo_angles({motor_id: angle})
+
+    def write_servo_angles(self, angles: Mapping[int, float]) -> None:
+        """Move several servos at once.
+
+        Args:
+            angles: Targets by motor id [deg].
+
+        Raises:
+            ValueError: There is no such motor, or an angle is not finite; nothing is sent.
+            XgoError: The port was lost.
+        """
+        for motor, angle in angles.items():
+            slot_of(motor)
+            if not math.isfinite(angle):
+                raise ValueError(f'motor {motor}: {angle} is no angle')
+        if self._is_new:
+            servos = NEW.functions[Code.SERVOS]
+            with _as_xgo_errors():
+                groups = (servos.pack(motor=(m,), angle=(a,)) for m, a in angles.items())
+                payload = b''.join(groups)
+            self._send(Frame(Kind.WRITE, Code.SERVOS, payload))
+            return
+        spans = ANGLE_SPANS[self._model]
+        for motor, angle in angles.items():
+            payload = bytes((spans[motor].encode(angle),))
+            self._send(Frame(Kind.WRITE, REGISTER_OF_MOTOR[motor], payload))
+            time.sleep(HOST_GAP)
+
+    def close(self) -> None:
+        """Close the port."""
+        self._connection.port.close()
+
+    def __enter__(self) -> Self:
+        """Use it in a with statement."""
+        return self
+
+    def __exit__(
+        self,
+        exc_type: type[BaseException] | None,
+        exc: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """Close the port."""
+        self.close()
+
+    @property
+    def _is_new(self) -> bool:
+        return self._connection.protocol is NEW
+
+    @property
+    def _model(self) -> Model:
+        model = model_of_firmware(self._connection.firmware)
+        if model is None:
+            raise XgoNotSupportedError(
+                f'firmware {self._connection.firmware!r} is of no robot with legs'
+            )
+        return model
+
+    def _send(self, frame: Frame) -> None:
+        with _as_xgo_errors():
+            self._connection.port.write(frame.encode(self._connection.protocol))
+
+    def _read_register(self, register: Register, size: int) -> bytes:
+        return self._ask(Frame(Kind.READ, register, bytes((size,))), size)
+
+    def _ask(self, request: Frame, size: int) -> bytes:
+        connection = self._connection
+        with _as_xgo_errors():
+            answer = ask(connection.port, connection.protocol, request, size, TIMEOUT)
+        if answer is None:
+            raise XgoTimeoutError(f'no answer from {connection.port.path} within {TIMEOUT} s')
+        return answer
+
+
+@contextmanager
+def _as_xgo_errors() -> Iterator[None]:
+    try:
+        yield
+    except NoAnswerError as error:
+        raise XgoTimeoutError(str(error)) from error
+    except CodecError:
+        raise  # a ValueError: what the caller gave does not fit
+    except HardwareError as error:
+        raise XgoError(str(error)) from error

@@ -1,0 +1,86 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The states that a robot pushes about 50 times a second."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from quad_hardware.exceptions import CodecError
+from quad_hardware.protocol import (
+    decode_feedback,
+    Feedback,
+    Kind,
+    NEW,
+    ParserCounters,
+    ROBOT_KINDS,
+    STATE,
+    StreamParser,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceState:
+    """State of a robot at one moment, in the units of the wire.
+
+    Attributes:
+        battery: Charge [%].
+        roll: Attitude about x [deg].
+        pitch: Attitude about y [deg].
+        yaw: Attitude about z [deg].
+        acceleration: Specific force x, y, z [m/s²]; about 9.8 in all at rest.
+        joint_pos_deg: 16 joint angles [deg], by :func:`xgo_lib2.registry.feedback_slot_of`.
+        joint_vel_deg_s: 16 joint velocities [deg/s], in the same order.
+        device_time_ms: Clock of the robot [ms].
+        sequence: Counts states modulo 2¹⁶.
+    """
+
+    battery: int
+    roll: float
+    pitch: float
+    yaw: float
+    acceleration: tuple[float, float, float]
+    joint_pos_deg: tuple[float, ...]
+    joint_vel_deg_s: tuple[float, ...]
+    device_time_ms: int
+    sequence: int
+
+
+class SendStateParser:
+    """Finds states in a stream of bytes that may be cut anywhere and damaged."""
+
+    def __init__(self) -> None:
+        """Begin with an empty buffer."""
+        self._parser = StreamParser(NEW, ROBOT_KINDS)
+
+    @property
+    def counters(self) -> ParserCounters:
+        """What was found so far: frames, skipped bytes, wrong checksums."""
+        return self._parser.counters
+
+    def feed_bytes(self, data: bytes) -> list[DeviceState]:
+        """Take bytes and return the states that they complete, the oldest first."""
+        states = []
+        for frame in self._parser.feed(data):
+            if frame.kind is Kind.PUSH and frame.address == STATE.address:
+                try:
+                    states.append(device_state(decode_feedback(frame.payload)))
+                except CodecError:
+                    continue  # a number in it is not finite
+        return states
+
+
+def device_state(feedback: Feedback) -> DeviceState:
+    """Return a state by the vendor's names."""
+    roll, pitch, yaw = feedback.attitude
+    return DeviceState(
+        battery=feedback.battery,
+        roll=roll,
+        pitch=pitch,
+        yaw=yaw,
+        acceleration=feedback.acceleration,
+        joint_pos_deg=feedback.position,
+        joint_vel_deg_s=feedback.velocity,
+        device_time_ms=feedback.device_time,
+        sequence=feedback.sequence,
+    )

@@ -1,0 +1,28 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What there is: functions by main and sub code, motors by feedback slot."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from quad_hardware.protocol import Function, MOTOR_ORDER, NEW, slot_of
+
+MOTOR_IDS = MOTOR_ORDER
+
+FUNCTIONS: Mapping[tuple[int, int], Function] = {
+    divmod(address, 256): function for address, function in NEW.functions.items()
+}
+
+
+def feedback_slot_of(motor_id: int) -> int:
+    """Return where a motor stands in ``joint_pos_deg`` and ``joint_vel_deg_s``.
+
+    Args:
+        motor_id: Ten times the leg (1 left front, 2 right front, 3 right rear, 4 left rear) plus
+            the joint (1 calf, 2 thigh, 3 hip), or 51 to 54 for gripper and arm.
+
+    Raises:
+        ValueError: There is no such motor.
+    """
+    return slot_of(motor_id)
