@@ -1,0 +1,16 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The simulated XGO: physics, servos, and a board that speaks the serial protocols.
+
+Physics in virtual time, without ROS, threads or a serial port (needs MuJoCo)::
+
+    from quad_description import robot_urdf
+    from quad_hardware.sim.physics import Robot
+
+    robot = Robot(robot_urdf('lite'))
+    robot.set_targets({'fl_thigh_joint': 0.9})
+    robot.step(0.02)
+    print(robot.base_pose.roll, robot.imu.specific_force)
+
+Nothing here is imported by the driver.
+"""

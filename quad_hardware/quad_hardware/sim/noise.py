@@ -1,0 +1,76 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""From the true state of a robot to what its sensors say of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+import math
+
+import numpy as np
+
+from .state import Array, Imu, Measurement, Vector
+
+ENCODER_STEP = 2 * math.pi / 4096  # [rad] the servos' magnetic encoder has 12 bits
+
+
+@dataclass(frozen=True, slots=True)
+class Noise:
+    """Standard deviations of the sensors.
+
+    Attributes:
+        attitude: Of the fused roll, pitch and yaw [rad].
+        angular_velocity: Of the gyro [rad/s].
+        specific_force: Of the accelerometer [m/s2].
+        position: Of a joint [rad].
+        velocity: Of a joint's speed [rad/s].
+        encoder_step: Least difference of two positions [rad]; 0 for none.
+    """
+
+    attitude: float = 0.0
+    angular_velocity: float = 0.0
+    specific_force: float = 0.0
+    position: float = 0.0
+    velocity: float = 0.0
+    encoder_step: float = 0.0
+
+    @property
+    def silent(self) -> bool:
+        """Whether measurements are the truth."""
+        return not any(getattr(self, name) for name in self.__slots__)
+
+
+NONE = Noise()
+"""Sensors that say the truth."""
+
+BOARD = Noise(
+    attitude=math.radians(0.1),
+    angular_velocity=0.01,
+    specific_force=0.05,
+    position=math.radians(0.05),
+    velocity=math.radians(2.0),
+    encoder_step=ENCODER_STEP,
+)
+"""A board with a 9-axis IMU and 12-bit encoders; the figures are ours."""
+
+
+def disturb(truth: Measurement, noise: Noise, random: np.random.Generator) -> Measurement:
+    """Return what noisy sensors say of a true state."""
+    if noise.silent:
+        return truth
+    count = len(truth.positions)
+    positions = truth.positions + noise.position * random.standard_normal(count)
+    if noise.encoder_step:
+        positions = np.round(positions / noise.encoder_step) * noise.encoder_step
+    imu = Imu(
+        _scatter(truth.imu.specific_force, noise.specific_force, random),
+        _scatter(truth.imu.angular_velocity, noise.angular_velocity, random),
+        _scatter(truth.imu.roll_pitch_yaw, noise.attitude, random),
+    )
+    velocities: Array = truth.velocities + noise.velocity * random.standard_normal(count)
+    return replace(truth, imu=imu, positions=positions, velocities=velocities)
+
+
+def _scatter(vector: Vector, deviation: float, random: np.random.Generator) -> Vector:
+    x, y, z = (float(v) for v in deviation * random.standard_normal(3) + np.array(vector))
+    return x, y, z

@@ -1,0 +1,339 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The robot in physics: targets in, time passes, poses and sensor values out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+import math
+from typing import Final
+
+import mujoco
+import numpy as np
+
+from quad_description import movable_joints
+
+from .exceptions import SetupError, SimulationError
+from .model import ACCELEROMETER, BASE, build_model, FEET, GYRO, IMU
+from .noise import disturb, Noise, NONE
+from .placing import place, start_positions
+from .servo import ServoModel, ServoParameters
+from .state import Array, BasePose, BaseVelocity, Imu, Measurement, Vector
+from .targets import TargetRamp, Targets
+from .terrain import FLAT, Terrain
+
+TIMESTEP: Final = 0.002  # [s]
+IMU_BANDWIDTH: Final = 20.0  # [Hz] low-pass of the accelerometer, as IMU chips have one
+
+
+class Robot:
+    """A quadruped that stands on the ground, driven by its servos.
+
+    Time passes in :meth:`step` only. Two robots with equal arguments and equal calls have equal
+    states, bit for bit, on one machine.
+
+    Attributes:
+        joint_names: The movable joints in the order of the URDF; all arrays have this order.
+        feet: Links of the feet, in the order of foot_forces.
+    """
+
+    def __init__(
+        self,
+        urdf: str,
+        servo: ServoModel | ServoParameters = ServoModel.FIRM,
+        terrain: Terrain = FLAT,
+        seed: int = 0,
+        *,
+        timestep: float = TIMESTEP,
+        pose: Mapping[str, float] | None = None,
+        noise: Noise = NONE,
+    ) -> None:
+        """Put the robot on the ground.
+
+        Args:
+            urdf: What it is made of.
+            servo: How its servos follow.
+            terrain: What it stands on.
+            seed: Of the sensors' noise.
+            timestep: Of the integration [s].
+            pose: Joint positions at the start [rad]; the standing pose for those left out.
+            noise: What :meth:`measure` adds to the truth.
+
+        Raises:
+            SetupError: The URDF cannot be simulated, or the pose names joints that it lacks.
+        """
+        if not 0.0 < timestep <= 0.01:
+            raise SetupError(f'timestep {timestep} s: give more than 0 and at most 0.01')
+        self._servo = servo.parameters if isinstance(servo, ServoModel) else servo
+        self._terrain, self._noise = terrain, noise
+        self._model = build_model(urdf, self._servo, terrain, timestep)
+        self._data = mujoco.MjData(self._model)
+        joints = movable_joints(urdf)
+        self.joint_names: Final = tuple(joint.name for joint in joints)
+        self.feet: Final = FEET
+        self._qpos = [int(self._model.joint(name).qposadr[0]) for name in self.joint_names]
+        self._qvel = [int(self._model.joint(name).dofadr[0]) for name in self.joint_names]
+        self._accelerometer = self._sensor(ACCELEROMETER)
+        self._gyro = self._sensor(GYRO)
+        self._touch = [self._sensor(foot).start for foot in FEET]
+        self._gains = self._model.actuator_gainprm.copy(), self._model.actuator_biasprm.copy()
+        self._smoothing = 1.0 - math.exp(-2.0 * math.pi * IMU_BANDWIDTH * timestep)
+        self._ramp = TargetRamp(joints, timestep, np.zeros(len(joints)))
+        self._random = np.random.default_rng(seed)
+        self._specific_force: Array = np.zeros(3)
+        self.reset(pose=pose, seed=seed)
+
+    def reset(self, *, pose: Mapping[str, float] | None = None, seed: int = 0) -> None:
+        """Stand on the ground again, as a new robot with these arguments would.
+
+        Args:
+            pose: Joint positions at the start [rad]; the standing pose for those left out.
+            seed: Of the sensors' noise.
+
+        Raises:
+            SetupError: The pose names joints that the robot lacks.
+        """
+        mujoco.mj_resetData(self._model, self._data)
+        self._random = np.random.default_rng(seed)
+        self._steps, self._owed = 0, 0.0
+        self._push_until: int | None = None
+        self.set_torque(True)
+        start = start_positions(self.joint_names, pose or {})
+        self._data.qpos[self._qpos] = start
+        self._data.ctrl[:] = start
+        self._ramp.jump(start)
+        place(self._model, self._data, self._terrain)
+        mujoco.mj_forward(self._model, self._data)
+        # at rest from the start: a filter that begins at zero would report a fall
+        gravity = np.array([0.0, 0.0, -self._model.opt.gravity[2]])
+        self._specific_force = self._imu_rotation().T @ gravity
+
+    # -- what may be done to it
+
+    def set_targets(self, targets: Targets, duration: float | None = None) -> None:
+        """Give the servos new targets.
+
+        Args:
+            targets: By name, or all in the order of the URDF; [rad], of a gripper [m]. What lies
+                beyond a limit of the URDF is taken to the limit.
+            duration: Time in which the set-point goes there [s]; None for the servo's own.
+
+        Raises:
+            CommandError: A name is unknown, a value is no number, or there are too many or few.
+        """
+        self._ramp.approach(targets, self._servo.interpolation if duration is None else duration)
+
+    def set_torque(self, on: bool, joints: Iterable[str] | None = None) -> None:
+        """Switch servos on or off; one that is switched on holds the position that it has.
+
+        Args:
+            on: Whether they hold.
+            joints: Their names; all for None.
+
+        Raises:
+            SetupError: There is no such joint.
+        """
+        names = self.joint_names if joints is None else tuple(joints)
+        unknown = sorted(set(names) - set(self.joint_names))
+        if unknown:
+            raise SetupError(f'no joint is named {", ".join(unknown)}')
+        for name in names:
+            index = self.joint_names.index(name)
+            switched_on = on and not self.torque_on(name)
+            for array, original in zip(
+                (self._model.actuator_gainprm, self._model.actuator_biasprm),
+                self._gains,
+                strict=True,
+            ):
+                array[index] = original[index] if on else 0.0
+            if switched_on:
+                self._ramp.approach({name: float(self._data.qpos[self._qpos[index]])}, 0.0)
+
+    def torque_on(self, joint: str) -> bool:
+        """Tell whether a servo holds."""
+        return bool(self._model.actuator_gainprm[self.joint_names.index(joint), 0] > 0.0)
+
+    def push(self, force: Vector, duration: float = 0.1) -> None:
+        """Push the trunk at its centre of mass; a push that is still going on ends.
+
+        Args:
+            force: [N] in the frame that has the robot's heading: x forward, y left, z up.
+            duration: [s]
+
+        Raises:
+            SetupError: A number is not finite, or the duration is negative.
+        """
+        if not (all(map(math.isfinite, force)) and math.isfinite(duration) and duration >= 0.0):
+            raise SetupError(f'push of {force} N for {duration} s: give finite numbers')
+        self._data.xfrc_applied[self._base, :3] = self._heading_to_world(force)
+        self._push_until = self._steps + round(duration / self._model.opt.timestep)
+
+    def kick(self, velocity: Vector) -> None:
+        """Change the velocity of the whole robot at once.
+
+        Args:
+            velocity: The change [m/s] in the frame that has the robot's heading.
+
+        Raises:
+            SetupError: A number is not finite.
+        """
+        if not all(map(math.isfinite, velocity)):
+            raise SetupError(f'kick of {velocity} m/s: give finite numbers')
+        self._data.qvel[:3] += self._heading_to_world(velocity)
+
+    def step(self, duration: float) -> None:
+        """Let time pass, in whole time steps; what is left over comes with the next call.
+
+        Args:
+            duration: [s]
+
+        Raises:
+            SimulationError: The physics blew up.
+        """
+        self._owed += duration / self._model.opt.timestep
+        count = int(self._owed + 1e-6)
+        self._owed -= count
+        for _ in range(count):
+            self._step_once()
+        if not math.isfinite(float(self._data.qacc.sum())):
+            raise SimulationError(
+                f'the physics blew up at {self.time:.3f} s; use a softer servo or a shorter step'
+            )
+
+    # -- what may be seen of it
+
+    @property
+    def time(self) -> float:
+        """Time since the start [s]."""
+        return self._steps * float(self._model.opt.timestep)
+
+    @property
+    def mass(self) -> float:
+        """Mass of all of it [kg]."""
+        return float(self._model.body_mass.sum())
+
+    @property
+    def base_pose(self) -> BasePose:
+        """Where base_link is."""
+        x, y, z, qw, qx, qy, qz = self._data.qpos[:7].tolist()
+        return BasePose((x, y, z), (qx, qy, qz, qw))
+
+    @property
+    def base_velocity(self) -> BaseVelocity:
+        """How base_link moves, expressed in base_link."""
+        # MuJoCo has the linear part in the world and the angular part in the body
+        linear = self._base_rotation().T @ self._data.qvel[:3]
+        return BaseVelocity(_vector(linear), _vector(self._data.qvel[3:6]))
+
+    @property
+    def centre_of_mass(self) -> Vector:
+        """Centre of mass of all of it, in the world [m]."""
+        return _vector(self._data.subtree_com[self._base])
+
+    @property
+    def joint_positions(self) -> Array:
+        """Positions [rad], of the gripper [m], a copy."""
+        return np.array(self._data.qpos[self._qpos])
+
+    @property
+    def joint_velocities(self) -> Array:
+        """Velocities [rad/s], of the gripper [m/s], a copy."""
+        return np.array(self._data.qvel[self._qvel])
+
+    @property
+    def joint_torques(self) -> Array:
+        """What the servos do [N m], the gripper's [N], a copy."""
+        return np.array(self._data.actuator_force)
+
+    @property
+    def joint_targets(self) -> Array:
+        """Where the servos' set-points are now [rad], of the gripper [m], a copy."""
+        return np.array(self._ramp.values)
+
+    @property
+    def imu(self) -> Imu:
+        """What an ideal IMU feels; its attitude is that of imu_link in the world."""
+        quaternion = np.empty(4)
+        mujoco.mju_mat2Quat(quaternion, self._imu_rotation().ravel())
+        w, x, y, z = quaternion.tolist()
+        pose = BasePose((0.0, 0.0, 0.0), (x, y, z, w))
+        return Imu(
+            _vector(self._specific_force),
+            _vector(self._data.sensordata[self._gyro]),
+            pose.roll_pitch_yaw,
+        )
+
+    @property
+    def foot_forces(self) -> Array:
+        """Normal force of the ground on each foot [N], a copy."""
+        return np.array(self._data.sensordata[self._touch])
+
+    @property
+    def foot_contacts(self) -> tuple[bool, ...]:
+        """Which feet touch the ground."""
+        return tuple(bool(force > 0.0) for force in self.foot_forces)
+
+    def link_position(self, link: str) -> Vector:
+        """Return where the origin of a link is, in the world [m]."""
+        return _vector(self._data.body(link).xpos)
+
+    def measure(self) -> Measurement:
+        """Return what the sensors say, with the noise that the robot was made with."""
+        truth = Measurement(
+            time=self.time,
+            imu=self.imu,
+            positions=self.joint_positions,
+            velocities=self.joint_velocities,
+            torques=self.joint_torques,
+            foot_forces=self.foot_forces,
+        )
+        return disturb(truth, self._noise, self._random)
+
+    # -- inside
+
+    @property
+    def _base(self) -> int:
+        return int(self._model.body(BASE).id)
+
+    def _sensor(self, name: str) -> slice:
+        sensor = self._model.sensor(name)
+        start = int(sensor.adr[0])
+        return slice(start, start + int(sensor.dim[0]))
+
+    def _step_once(self) -> None:
+        data = self._data
+        if self._ramp.advance():
+            data.ctrl[:] = self._ramp.values
+        if self._push_until is not None and self._steps >= self._push_until:
+            data.xfrc_applied[self._base] = 0.0
+            self._push_until = None
+        mujoco.mj_step(self._model, data)
+        self._specific_force += self._smoothing * (
+            data.sensordata[self._accelerometer] - self._specific_force
+        )
+        self._steps += 1
+
+    def _base_rotation(self) -> Array:
+        """Rotation of base_link to the world, of the positions as they are now."""
+        matrix = np.empty(9)
+        mujoco.mju_quat2Mat(matrix, self._data.qpos[3:7])
+        return matrix.reshape(3, 3)
+
+    def _imu_rotation(self) -> Array:
+        """Rotation of imu_link to the world."""
+        body = self._model.body(IMU)
+        matrix = np.empty(9)
+        mujoco.mju_quat2Mat(matrix, body.quat)
+        rotation: Array = self._base_rotation() @ matrix.reshape(3, 3)
+        return rotation
+
+    def _heading_to_world(self, vector: Vector) -> Array:
+        yaw = self.base_pose.roll_pitch_yaw[2]
+        x, y, z = vector
+        cos, sin = math.cos(yaw), math.sin(yaw)
+        return np.array([cos * x - sin * y, sin * x + cos * y, z])
+
+
+def _vector(array: Array) -> Vector:
+    x, y, z = array.tolist()
+    return x, y, z

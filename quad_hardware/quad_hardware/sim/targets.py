@@ -1,0 +1,106 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Targets of the servos: checked, kept within the limits, and approached along a straight line."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from quad_description import Joint
+
+from ..exceptions import CommandError
+from .state import Array
+
+Targets = Mapping[str, float] | Sequence[float] | Array
+"""Positions by name, or of all joints in the order of the URDF; [rad], of a gripper [m]."""
+
+
+class TargetRamp:
+    """The set-points of all servos, one value for each time step.
+
+    Attributes:
+        values: The set-points now [rad]; changes in place with every step.
+    """
+
+    def __init__(self, joints: Sequence[Joint], timestep: float, start: Array) -> None:
+        """Stand still.
+
+        Args:
+            joints: Names and limits, in the order of the values.
+            timestep: Time between two calls of :meth:`advance` [s].
+            start: The first set-points [rad].
+        """
+        self._index = {joint.name: index for index, joint in enumerate(joints)}
+        self._lower = np.array([joint.lower for joint in joints])
+        self._upper = np.array([joint.upper for joint in joints])
+        self._timestep = timestep
+        self.values: Array = start.copy()
+        self._goal: Array = start.copy()
+        self._slope: Array = np.zeros(len(joints))
+        self._left = np.zeros(len(joints), dtype=np.int64)
+        self._busy = 0  # steps until everything stands still
+
+    @property
+    def goal(self) -> Array:
+        """Where the set-points go [rad], a copy."""
+        return np.array(self._goal)
+
+    def jump(self, values: Array) -> None:
+        """Be at other set-points at once."""
+        self.values[:] = values
+        self._goal[:] = values
+        self._left[:] = 0
+        self._busy = 0
+
+    def approach(self, targets: Targets, duration: float) -> None:
+        """Begin to approach targets; joints that are not named go on with what they do.
+
+        Args:
+            targets: Where to; what lies beyond a limit is taken to the limit, as servos do.
+            duration: How long it takes [s]; 0 for a step.
+
+        Raises:
+            CommandError: A name is unknown, a value is no number, or there are too many or few.
+        """
+        indices, values = self._checked(targets)
+        goal = np.clip(values, self._lower[indices], self._upper[indices])
+        steps = max(round(duration / self._timestep), 1)
+        self._goal[indices] = goal
+        self._slope[indices] = (goal - self.values[indices]) / steps
+        self._left[indices] = steps
+        self._busy = int(self._left.max())
+
+    def advance(self) -> bool:
+        """Go one time step on; tell whether anything changed."""
+        if not self._busy:
+            return False
+        moving = self._left > 0
+        self.values[moving] += self._slope[moving]
+        arrived = self._left == 1
+        self.values[arrived] = self._goal[arrived]
+        self._left[moving] -= 1
+        self._busy -= 1
+        return True
+
+    def _checked(self, targets: Targets) -> tuple[list[int], Array]:
+        if isinstance(targets, Mapping):
+            unknown = sorted(targets.keys() - self._index.keys())
+            if unknown:
+                known = ', '.join(self._index)
+                raise CommandError(f'no joint is named {", ".join(unknown)}; there are {known}')
+            indices = [self._index[name] for name in targets]
+            values = np.array(list(targets.values()), dtype=np.float64)
+        else:
+            indices = list(self._index.values())
+            values = np.asarray(targets, dtype=np.float64)
+            if values.shape != (len(indices),):
+                raise CommandError(
+                    f'{values.shape} targets for {len(indices)} joints; give one for each'
+                )
+        if not np.all(np.isfinite(values)):
+            names = list(self._index)
+            bad = [names[indices[k]] for k in np.flatnonzero(~np.isfinite(values))]
+            raise CommandError(f'targets of {", ".join(bad)} are not finite; nothing moves')
+        return indices, values
