@@ -194,6 +194,27 @@ def test_an_interface_that_is_taken_away_is_named(vcan: str) -> None:
 
 
 @pytest.mark.vcan
+def test_an_adapter_that_is_plugged_in_again_is_used_again(vcan: str) -> None:
+    """Both directions work on the new interface of the old name, and no loss is made up."""
+    ip_link('set', 'up', vcan)
+    with open_bus(vcan) as bus:
+        ip_link('del', vcan)
+        with pytest.raises(BusError, match=vcan):
+            receive_for_ever(bus)
+        with pytest.raises(BusError, match=vcan):
+            bus.receive(0.0)
+        ip_link('add', 'dev', vcan, 'type', 'vcan')
+        ip_link('set', 'up', vcan)
+        bus.receive(0.0)
+        with open_bus(vcan) as other:
+            other.send(Frame(1))
+            assert unstamped(receive_count(bus, 1)) == [Frame(1)]
+            bus.send(Frame(2))
+            assert unstamped(receive_count(other, 1)) == [Frame(2)]
+        assert bus.counters.lost == 0
+
+
+@pytest.mark.vcan
 def test_a_short_transmit_queue_is_warned_of(vcan: str, caplog: pytest.LogCaptureFixture) -> None:
     """A queue shorter than one cycle of an arm is told with the command that mends it."""
     ip_link('set', vcan, 'up', 'txqueuelen', '10')

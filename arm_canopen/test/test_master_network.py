@@ -420,7 +420,8 @@ def test_strange_frames_are_counted_and_passed_over() -> None:
     ):
         net.network.receive(frame)
     assert node.image.inputs[0].count == count
-    assert net.network.unknown_frames == unknown + 4
+    assert net.network.unknown_frames == unknown + 3
+    assert net.network.controller.error_frames == 1
 
 
 def test_every_frame_is_shown_to_whoever_counts() -> None:
@@ -569,3 +570,36 @@ def test_devices_do_not_miss_a_master_that_has_taken_its_leave() -> None:
     net.wire.loses = lambda sender, frame: sender == 'master'
     net.run(2.0)
     assert 'EMCY' not in net.story()
+
+
+CONTROLLER = 0x204  # a controller problem, with counters
+
+
+def test_the_state_of_the_controller_is_told_when_it_changes() -> None:
+    """Error passive, bus off and the way back are said once each, with the counters."""
+    net = network('a')
+    net.boot()
+    story = [
+        (CONTROLLER, '00 08 00 00 00 00 60 00', 'error warning'),
+        (CONTROLLER, '00 08 00 00 00 00 62 00', ''),
+        (CONTROLLER, '00 20 00 00 00 00 80 05', 'error passive'),
+        (0x240, '00 00 00 00 00 00 F8 05', 'bus off'),
+        (0x300, '00 00 00 00 00 00 00 00', 'error active'),
+    ]
+    controller = net.network.controller
+    for can_id, data, expected in story:
+        before = len(net.told(Severity.INFO))
+        frame = Frame(can_id, bytes.fromhex(data), timestamp=net.now, is_error=True)
+        net.network.receive(frame)
+        told = net.told(Severity.INFO)[before:]
+        assert [expected in text for text in told] == [True] * bool(expected)
+    assert (controller.error_frames, controller.transmit_errors) == (5, 0)
+    assert 'controller restarted' in controller.last_error
+
+
+def test_an_empty_bus_is_told_once() -> None:
+    """Without anybody to acknowledge a frame each one is sent over and over."""
+    net = network('a')
+    for _ in range(100):
+        net.network.receive(Frame(0x020, bytes(8), timestamp=net.now, is_error=True))
+    assert len([text for text in net.told(Severity.WARNING) if 'acknowledges' in text]) == 1

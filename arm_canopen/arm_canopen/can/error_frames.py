@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from enum import Enum
+
 from .frame import Frame
 
 ERROR_CLASSES: tuple[tuple[int, str], ...] = (
@@ -44,7 +46,46 @@ PROTOCOL_VIOLATIONS: tuple[tuple[int, str], ...] = (
 
 _CONTROLLER = 0x004
 _PROTOCOL = 0x008
+_NO_ACKNOWLEDGE = 0x020
+_BUS_OFF = 0x040
+_RESTARTED = 0x100
 _COUNTERS = 0x200  # data[6] and data[7] are the transmit and receive error counters
+_WARNING_LEVEL, _PASSIVE, _ACTIVE_AGAIN = 0x0C, 0x30, 0x40  # of CONTROLLER_PROBLEMS
+
+
+class ControllerState(Enum):
+    """Error state of a CAN controller (ISO 11898-1, fault confinement); the value is in words."""
+
+    ACTIVE = 'error active'
+    WARNING = 'error warning'
+    PASSIVE = 'error passive'
+    BUS_OFF = 'bus off'
+
+
+def controller_state(frame: Frame) -> ControllerState | None:
+    """Return the state that an error frame tells of, None when it tells of none."""
+    if frame.can_id & _BUS_OFF:
+        return ControllerState.BUS_OFF
+    if frame.can_id & _RESTARTED:
+        return ControllerState.ACTIVE
+    problem = frame.data[1] if frame.can_id & _CONTROLLER and len(frame.data) > 1 else 0
+    if problem & _PASSIVE:
+        return ControllerState.PASSIVE
+    if problem & _WARNING_LEVEL:
+        return ControllerState.WARNING
+    return ControllerState.ACTIVE if problem & _ACTIVE_AGAIN else None
+
+
+def error_counters(frame: Frame) -> tuple[int, int] | None:
+    """Return the transmit and the receive error counter, None when the frame has none."""
+    if not frame.can_id & _COUNTERS or len(frame.data) < 8:
+        return None
+    return frame.data[6], frame.data[7]
+
+
+def is_unacknowledged(frame: Frame) -> bool:
+    """Whether an error frame says that no other station has acknowledged a frame."""
+    return bool(frame.can_id & _NO_ACKNOWLEDGE)
 
 
 def error_text(frame: Frame) -> str:

@@ -75,6 +75,10 @@ class StampReader:
         self._base_seconds = 0
         self._base_nanoseconds = 0
 
+    def reopened(self) -> None:
+        """The datagrams come from another socket now, which counts its losses anew."""
+        self._drops = 0
+
     def begin_batch(self) -> None:
         """Measure how far wall clock and steady clock are apart."""
         now = monotonic_ns()

@@ -44,6 +44,17 @@ class SocketCanBus(SocketBus):
         receiver = _open_socket(name)
         super().__init__(name, receiver)
         self._send_lock = Lock()
+        self._gone = False
+
+    def receive(self, timeout: float) -> list[Frame]:
+        """Wait for frames; an interface that went away is opened again when it is back.
+
+        Raises:
+            BusError: The interface is down or gone.
+        """
+        if self._gone and not self._closed:
+            self._reopen()
+        return super().receive(timeout)
 
     def send(self, frame: Frame) -> None:
         """Put the frame into the interface's transmit queue.
@@ -72,9 +83,20 @@ class SocketCanBus(SocketBus):
             return None
         return unpack(packed, stamp)
 
+    def _reopen(self) -> None:
+        receiver = _open_socket(self.name)
+        with self._send_lock:
+            old, self._receiver = self._receiver, receiver
+            self._gone = False
+        old.close()
+        self._stamps.reopened()
+        _log.info('%s is back', self.name)
+
     def _explain(self, error: OSError) -> BusError:
         if self._closed:
             return BusError(f'{self.name} is closed')
+        # the socket of an interface that was removed stays deaf when another of its name comes
+        self._gone = self._gone or error.errno in {errno.ENODEV, errno.ENXIO}
         return BusError(failure_text(self.name, error))
 
 

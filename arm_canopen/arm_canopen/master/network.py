@@ -17,6 +17,7 @@ from ..exceptions import BusError, SdoError
 from ..standard.cob_id import CobId
 from ..standard.nmt import ALL_NODES, nmt_frame, NmtCommand, NmtState, parse_nmt
 from .boot import BootProcess
+from .controller_watch import ControllerWatch
 from .events import Event, EventKind, Report, Severity
 from .process_image import SyncRound
 from .remote_node import RemoteNode
@@ -40,6 +41,7 @@ class Network:
             with the time of that SYNC in [s].
         on_frame: Called with each received frame, for statistics.
         missed_pdos: TPDOs that did not answer a SYNC, over all devices.
+        controller: The CAN controller as its error frames show it.
         unknown_frames: Frames with an identifier that nobody on this bus should use.
     """
 
@@ -58,6 +60,7 @@ class Network:
         self.on_feedback: Callable[[float], None] = lambda sync_time: None
         self.on_frame: Callable[[Frame], None] = lambda frame: None
         self.missed_pdos = 0
+        self.controller = ControllerWatch(report)
         self.unknown_frames = 0
         self._send_raw = send
         self._report = report
@@ -100,8 +103,11 @@ class Network:
         """Take a frame from the bus."""
         self.on_frame(frame)
         self.scheduler.set_time(frame.timestamp)
+        if frame.is_error:
+            self.controller.receive(frame)
+            return
         handler = self._handlers.get(frame.can_id)
-        if handler is None or frame.is_extended or frame.is_remote or frame.is_error:
+        if handler is None or frame.is_extended or frame.is_remote:
             self.unknown_frames += 1
             return
         handler(frame)

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
 from ..can.bus import BusCounters
+from ..can.error_frames import ControllerState
 from ..can.load import LoadFigures
 from ..cia402.status import DriveStatus
 from ..master.statistics import CycleFigures
@@ -28,6 +29,12 @@ class BusStatus:
         load: Frames per second and load.
         cycle: Figures of the SYNC cycle.
         missed_pdos: TPDOs that did not answer a SYNC, over all devices.
+        unknown_frames: Frames with an identifier that nobody on this bus should use.
+        controller: State of the CAN controller.
+        transmit_errors: Its transmit error counter.
+        receive_errors: Its receive error counter.
+        error_frames: Number of its error frames.
+        last_error: The last of them in words.
     """
 
     name: str
@@ -35,6 +42,12 @@ class BusStatus:
     load: LoadFigures
     cycle: CycleFigures
     missed_pdos: int
+    unknown_frames: int = 0
+    controller: ControllerState = ControllerState.ACTIVE
+    transmit_errors: int = 0
+    receive_errors: int = 0
+    error_frames: int = 0
+    last_error: str = ''
 
 
 def device_diagnostic(bus: str, status: NodeStatus) -> DiagnosticStatus:
@@ -83,12 +96,7 @@ def drive_diagnostic(bus: str, status: DriveStatus) -> DiagnosticStatus:
 def bus_diagnostic(master: str, status: BusStatus) -> DiagnosticStatus:
     """Describe the bus and its cycle."""
     counters, cycle = status.counters, status.cycle
-    level, message = DiagnosticStatus.OK, f'{status.load.frames_per_second:.0f} frames/s'
-    if counters.lost or counters.send_errors:
-        level = DiagnosticStatus.WARN
-        message = f'{counters.lost} frames lost, {counters.send_errors} not sent since the start'
-    elif status.load.load > HIGH_LOAD:
-        level, message = DiagnosticStatus.WARN, f'bus load {status.load.load:.0%}'
+    level, message = _bus_level(status)
     return DiagnosticStatus(
         level=level,
         name=f'{master}: bus',
@@ -109,9 +117,29 @@ def bus_diagnostic(master: str, status: BusStatus) -> DiagnosticStatus:
                 'jitter_p99': f'{cycle.jitter_p99:.6f}',
                 'jitter_max': f'{cycle.jitter_max:.6f}',
                 'missed_pdos': str(status.missed_pdos),
+                'unknown_frames': str(status.unknown_frames),
+                'controller': status.controller.value,
+                'transmit_errors': str(status.transmit_errors),
+                'receive_errors': str(status.receive_errors),
+                'error_frames': str(status.error_frames),
+                'last_error': status.last_error,
             }
         ),
     )
+
+
+def _bus_level(status: BusStatus) -> tuple[bytes, str]:
+    counters = status.counters
+    if status.controller in {ControllerState.BUS_OFF, ControllerState.PASSIVE}:
+        return DiagnosticStatus.ERROR, f'{status.controller.value}: {status.last_error}'
+    if status.controller is ControllerState.WARNING:
+        return DiagnosticStatus.WARN, f'{status.controller.value}: {status.last_error}'
+    if counters.lost or counters.send_errors:
+        text = f'{counters.lost} frames lost, {counters.send_errors} not sent since the start'
+        return DiagnosticStatus.WARN, text
+    if status.load.load > HIGH_LOAD:
+        return DiagnosticStatus.WARN, f'bus load {status.load.load:.0%}'
+    return DiagnosticStatus.OK, f'{status.load.frames_per_second:.0f} frames/s'
 
 
 def _device_level(status: NodeStatus) -> tuple[bytes, str]:

@@ -167,12 +167,19 @@ class MasterProcess:
 
     def _collect(self) -> list[DiagnosticStatus]:
         now = time.monotonic()
+        controller = self._network.controller
         status = BusStatus(
             self._can.name,
             self._can.counters,
             self._load.figures(now),
             self._thread.figures(),
             self._network.missed_pdos,
+            self._network.unknown_frames,
+            controller.state,
+            controller.transmit_errors,
+            controller.receive_errors,
+            controller.error_frames,
+            controller.last_error,
         )
         statuses = [bus_diagnostic(self._node.get_name(), status)]
         for device in self._network.nodes.values():
@@ -217,10 +224,12 @@ class MasterProcess:
 
     def _ask_diagnostics(self) -> Future[list[DiagnosticStatus]]:
         future = self._thread.call(self._collect)
-        future.add_done_callback(
-            lambda done: self._output.post(partial(self._publish_diagnostics, done.result()))
-        )
+        future.add_done_callback(self._post_diagnostics)
         return future
+
+    def _post_diagnostics(self, future: Future[list[DiagnosticStatus]]) -> None:
+        if future.exception() is None:  # else the network has ended
+            self._output.post(partial(self._publish_diagnostics, future.result()))
 
     def _publish_diagnostics(self, statuses: list[DiagnosticStatus]) -> None:
         message = DiagnosticArray(status=statuses)

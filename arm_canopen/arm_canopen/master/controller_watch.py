@@ -1,0 +1,77 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The CAN controller of this computer, as its error frames show it."""
+
+from __future__ import annotations
+
+from ..can.error_frames import (
+    controller_state,
+    ControllerState,
+    error_counters,
+    error_text,
+    is_unacknowledged,
+)
+from ..can.frame import Frame
+from .events import Event, EventKind, Report, Severity
+
+_CABLE = 'look at cable, termination, bit rate and ground'
+_TOLD: dict[ControllerState, tuple[Severity, str]] = {
+    ControllerState.ACTIVE: (Severity.INFO, 'the bus is free of errors again'),
+    ControllerState.WARNING: (Severity.WARNING, f'frames are disturbed; {_CABLE}'),
+    ControllerState.PASSIVE: (
+        Severity.ERROR,
+        f'many frames are disturbed, the next step is bus off; {_CABLE}',
+    ),
+    ControllerState.BUS_OFF: (
+        Severity.ERROR,
+        f'it has left the bus and sends nothing more; {_CABLE}. It comes back by `ip link set CAN '
+        'type can restart`, or by itself when the interface was set up with `restart-ms 100`',
+    ),
+}
+
+
+class ControllerWatch:
+    """Follows the error state of the controller, and says when it changes.
+
+    Attributes:
+        state: Its state, error active until it says something else.
+        transmit_errors: Its transmit error counter, as far as it tells it.
+        receive_errors: Its receive error counter.
+        error_frames: Number of error frames.
+        last_error: The last one in words, empty before the first.
+    """
+
+    def __init__(self, report: Report) -> None:
+        """Begin without errors.
+
+        Args:
+            report: Takes events.
+        """
+        self.state = ControllerState.ACTIVE
+        self.transmit_errors = 0
+        self.receive_errors = 0
+        self.error_frames = 0
+        self.last_error = ''
+        self._report = report
+        self._alone = False
+
+    def receive(self, frame: Frame) -> None:
+        """Take an error frame."""
+        self.error_frames += 1
+        self.last_error = error_text(frame)
+        counters = error_counters(frame)
+        if counters is not None:
+            self.transmit_errors, self.receive_errors = counters
+        if is_unacknowledged(frame) and not self._alone:
+            self._alone = True
+            text = 'nobody on the bus acknowledges frames: is any device powered and connected?'
+            self._tell(Severity.WARNING, text)
+        state = controller_state(frame)
+        if state is not None and state is not self.state:
+            self.state = state
+            self._alone = self._alone and state is not ControllerState.ACTIVE
+            severity, text = _TOLD[state]
+            self._tell(severity, f'CAN controller {state.value} ({self.last_error}): {text}')
+
+    def _tell(self, severity: Severity, text: str) -> None:
+        self._report(Event(EventKind.BUS, severity, '', text))
