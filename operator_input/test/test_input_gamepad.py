@@ -1,0 +1,272 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+from hypothesis import given
+from hypothesis import strategies as st
+from input_devices import BYTE_STICK, HAT, InjectedDevice, InjectedDevices, STICK, TRIGGER
+import pytest
+
+from operator_input import PresetError
+from operator_input.devices import AxisRange
+from operator_input.gamepad import AT_REST, Axis, Button, Deadman, Gamepad, GamepadState, Grip
+from operator_input.gamepad.presets import (
+    ABS_BRAKE,
+    ABS_GAS,
+    ABS_HAT0X,
+    ABS_HAT0Y,
+    ABS_RX,
+    ABS_RY,
+    ABS_RZ,
+    ABS_X,
+    ABS_Y,
+    ABS_Z,
+)
+from operator_input.gamepad.reading import position
+
+BTN_SOUTH, BTN_EAST, BTN_NORTH, BTN_WEST, BTN_TL, BTN_TR = 0x130, 0x131, 0x133, 0x134, 0x136, 0x137
+STANDARD_KEYS = range(0x130, 0x13F)
+STANDARD_AXES = {
+    ABS_X: STICK,
+    ABS_Y: STICK,
+    ABS_RX: STICK,
+    ABS_RY: STICK,
+    ABS_Z: TRIGGER,
+    ABS_RZ: TRIGGER,
+    ABS_HAT0X: HAT,
+    ABS_HAT0Y: HAT,
+}
+
+
+def xbox(path: str = '/dev/input/event7') -> InjectedDevice:
+    """Make what the driver xpad offers."""
+    name = 'Microsoft X-Box 360 pad'
+    return InjectedDevice(name, STANDARD_KEYS, STANDARD_AXES, vendor=0x045E, path=path)
+
+
+def playstation() -> InjectedDevice:
+    """Make what the driver hid-playstation offers; its sticks have 8 bits."""
+    axes = STANDARD_AXES | dict.fromkeys((ABS_X, ABS_Y, ABS_RX, ABS_RY), BYTE_STICK)
+    name = 'Sony Interactive Entertainment DualSense Wireless Controller'
+    return InjectedDevice(name, STANDARD_KEYS, axes, vendor=0x054C)
+
+
+def cheap() -> InjectedDevice:
+    """Make a pad without a driver: joystick buttons, right stick on Z and Rz."""
+    axes = dict.fromkeys((ABS_X, ABS_Y, ABS_Z, ABS_RZ), BYTE_STICK)
+    axes |= {ABS_BRAKE: TRIGGER, ABS_GAS: TRIGGER, ABS_HAT0X: HAT, ABS_HAT0Y: HAT}
+    return InjectedDevice('USB Gamepad', range(0x120, 0x12D), axes)
+
+
+def opened(device: InjectedDevice, preset: str = 'auto') -> Gamepad:
+    """Open a gamepad on a device."""
+    gamepad = Gamepad(InjectedDevices(device), preset=preset)
+    gamepad.scan(0.0)
+    assert gamepad.is_connected
+    return gamepad
+
+
+def test_xbox_preset_is_found_and_its_letters_are_right() -> None:
+    """The driver xpad calls X north; the button on the left is west for us."""
+    device = xbox()
+    gamepad = opened(device)
+    assert gamepad.name == 'Microsoft X-Box 360 pad (xbox)'
+    device.press(BTN_NORTH)
+    assert gamepad.read()[-1].buttons == {Button.WEST}
+
+
+def test_playstation_preset_is_found_and_its_symbols_are_right() -> None:
+    """The triangle is north, the cross south."""
+    device = playstation()
+    gamepad = opened(device)
+    assert gamepad.name.endswith('(ps)')
+    device.press(BTN_NORTH)
+    device.press(BTN_SOUTH)
+    assert gamepad.read()[-1].buttons == {Button.NORTH, Button.SOUTH}
+
+
+def test_pad_without_a_driver() -> None:
+    """Joystick buttons and HID axes: sticks, shoulders and triggers are found."""
+    device = cheap()
+    gamepad = opened(device)
+    assert gamepad.name.endswith('(generic)')
+    device.move(ABS_RZ, 0)
+    device.move(ABS_GAS, 255)
+    device.press(0x124)
+    state = gamepad.read()[-1]
+    assert state.axis(Axis.RIGHT_Y) == 1.0
+    assert state.axis(Axis.RIGHT_TRIGGER) == 1.0
+    assert state.buttons == {Button.LEFT_SHOULDER}
+
+
+def test_up_and_left_are_positive() -> None:
+    """The kernel counts right and down; robots count forward and left (REP 103)."""
+    device = xbox()
+    gamepad = opened(device)
+    device.move(ABS_Y, -32768)
+    device.move(ABS_X, -32768)
+    device.move(ABS_RX, 32767)
+    device.move(ABS_HAT0Y, -1)
+    state = gamepad.read()[-1]
+    assert (state.axis(Axis.LEFT_Y), state.axis(Axis.LEFT_X)) == (1.0, 1.0)
+    assert (state.axis(Axis.RIGHT_X), state.axis(Axis.DPAD_Y)) == (-1.0, 1.0)
+
+
+def test_chosen_preset_overrides_the_name() -> None:
+    """The user knows better than the vendor id."""
+    gamepad = opened(xbox(), preset='ps')
+    assert gamepad.name.endswith('(ps)')
+
+
+def test_unknown_preset_is_refused_with_the_list() -> None:
+    """A misspelt preset names the one meant and all there are."""
+    with pytest.raises(
+        PresetError, match=r"'xboks'; did you mean 'xbox'.*auto, xbox, ps, generic"
+    ):
+        Gamepad(InjectedDevices(), preset='xboks')
+
+
+def test_every_report_is_a_state() -> None:
+    """A press and its release in one reading are both seen."""
+    device = xbox()
+    gamepad = opened(device)
+    device.press(BTN_SOUTH)
+    device.release(BTN_SOUTH)
+    states = gamepad.read()
+    assert [state.buttons for state in states] == [{Button.SOUTH}, frozenset()]
+
+
+def test_unplugged_gamepad_is_at_rest() -> None:
+    """Pulled out with the stick forward: the last state is rest, and that stays so."""
+    device = xbox()
+    said: list[str] = []
+    gamepad = Gamepad(InjectedDevices(device), say=said.append)
+    gamepad.scan(0.0)
+    device.press(BTN_TL)
+    device.move(ABS_Y, -32768)
+    gamepad.read()
+    device.unplug()
+    assert gamepad.read() == [AT_REST]
+    assert gamepad.state == AT_REST
+    assert not gamepad.is_connected
+    assert device.is_closed
+    assert 'released' in said[-1]
+
+
+def test_gamepad_that_comes_later_is_used() -> None:
+    """Plugged in after the start, and again after it was pulled out."""
+    devices = InjectedDevices()
+    gamepad = Gamepad(devices)
+    gamepad.scan(0.0)
+    assert not gamepad.is_connected
+    for path in ('/dev/input/event7', '/dev/input/event9'):
+        devices.plugged = [xbox(path)]
+        gamepad.scan(100.0)
+        gamepad.scan(200.0)
+        assert gamepad.is_connected
+        devices.plugged[0].unplug()
+        gamepad.read()
+
+
+def test_stick_that_is_held_while_plugging_in_is_known() -> None:
+    """The state at the start is the device's, not rest: the deadman sees what is pressed."""
+    device = xbox()
+    device.axes[ABS_Y] = -32768
+    device.keys.add(BTN_TL)
+    state = opened(device).state
+    assert state.axis(Axis.LEFT_Y) == 1.0
+    assert Deadman().grip(state) is Grip.HELD
+
+
+def test_lost_events_are_made_up_for() -> None:
+    """When the kernel's buffer overflows, the release that was lost is found in the state."""
+    device = xbox()
+    gamepad = opened(device)
+    device.press(BTN_TL)
+    gamepad.read()
+    device.release(BTN_TL)
+    device.drop_events()
+    assert gamepad.read()[-1].buttons == frozenset()
+
+
+@pytest.mark.parametrize(
+    'other',
+    [
+        InjectedDevice('Keyboard', range(1, 120)),
+        InjectedDevice('Mouse', {0x110, 0x111}),
+        InjectedDevice('DualSense Motion Sensors', (), {ABS_X: STICK, ABS_Y: STICK}),
+        InjectedDevice('Touchpad', {0x14A}, {ABS_X: STICK, ABS_Y: STICK}),
+    ],
+    ids=lambda device: device.info.name,
+)
+def test_other_devices_are_left_alone(other: InjectedDevice) -> None:
+    """Keyboards, mice, and the tilt sensor of a gamepad are no gamepads."""
+    gamepad = Gamepad(InjectedDevices(other))
+    gamepad.scan(0.0)
+    assert not gamepad.is_connected
+    assert other.is_closed
+
+
+def test_device_by_path_and_by_name() -> None:
+    """Of two gamepads the one that was named is used."""
+    first, second = xbox('/dev/input/event1'), playstation()
+    for wanted in ('/dev/input/event7', 'DualSense'):
+        gamepad = Gamepad(InjectedDevices(first, second), device=wanted)
+        gamepad.scan(0.0)
+        assert gamepad.name.endswith('(ps)')
+    with pytest.raises(ValueError, match='neither a path nor an expression'):
+        Gamepad(InjectedDevices(), device='(')
+
+
+SPANS = st.tuples(st.integers(-40000, 40000), st.integers(1, 70000), st.integers(0, 20000)).map(
+    lambda numbers: AxisRange(numbers[0], numbers[0] + numbers[1], numbers[2])
+)
+
+
+@given(
+    st.sampled_from(Axis), SPANS, st.integers(-(10**6), 10**6), st.floats(0, 1, exclude_max=True)
+)
+def test_axis_is_bounded(axis: Axis, span: AxisRange, value: int, dead_zone: float) -> None:
+    """Whatever a device says of itself and sends, an axis is within its bounds."""
+    way = position(axis, span, value, dead_zone)
+    assert (0.0 if axis.is_trigger else -1.0) <= way <= 1.0
+
+
+@given(st.floats(0, 0.9), st.integers(0, 65534))
+def test_axis_is_monotonic_and_without_a_jump(dead_zone: float, value: int) -> None:
+    """Pushing further is never slower, and a step of the device is a small step of the axis."""
+    span = AxisRange(0, 65535)
+    here, there = (position(Axis.LEFT_X, span, each, dead_zone) for each in (value, value + 1))
+    assert 0.0 <= here - there <= 2.0 / 65535 / (1.0 - dead_zone) + 1e-9
+
+
+def test_axis_without_a_range_is_at_rest() -> None:
+    """A device that says nonsense moves nothing."""
+    assert position(Axis.LEFT_X, AxisRange(5, 5), 5, 0.1) == 0.0
+
+
+@pytest.mark.parametrize(
+    ('pressed', 'grip'),
+    [
+        ((), Grip.RELEASED),
+        ((Button.LEFT_SHOULDER,), Grip.HELD),
+        ((Button.RIGHT_SHOULDER,), Grip.TURBO),
+        ((Button.LEFT_SHOULDER, Button.RIGHT_SHOULDER), Grip.TURBO),
+        ((Button.SOUTH,), Grip.RELEASED),
+    ],
+)
+def test_deadman(pressed: tuple[Button, ...], grip: Grip) -> None:
+    """Only the two buttons allow motion."""
+    assert Deadman().grip(GamepadState(buttons=frozenset(pressed))) is grip
+
+
+def test_trigger_as_deadman() -> None:
+    """A trigger that is an axis counts as a button beyond its middle."""
+    deadman = Deadman(enable=Button.LEFT_TRIGGER, turbo=None)
+    assert deadman.grip(GamepadState({Axis.LEFT_TRIGGER: 0.4})) is Grip.RELEASED
+    assert deadman.grip(GamepadState({Axis.LEFT_TRIGGER: 0.6})) is Grip.HELD
+
+
+def test_no_deadman() -> None:
+    """Where none is wanted, motion is always allowed."""
+    assert Deadman(enable=None, turbo=None).grip(AT_REST) is Grip.HELD

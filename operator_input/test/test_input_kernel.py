@@ -1,0 +1,86 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+from collections.abc import Callable
+import os
+from pathlib import Path
+import time
+from typing import Any
+
+import pytest
+
+from operator_input import DeviceError
+from operator_input.devices import KernelDevices
+from operator_input.gamepad import AT_REST, Axis, Button, Gamepad, GamepadState
+
+UINPUT = Path('/dev/uinput')
+BTN_SOUTH, EV_KEY, EV_ABS, ABS_X, ABS_Y = 0x130, 1, 3, 0, 1
+
+
+def wait_for(condition: Callable[[], bool]) -> None:
+    """Wait until something holds."""
+    deadline = time.monotonic() + 10
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
+def test_folder_without_devices(tmp_path: Path) -> None:
+    """A container has no /dev/input; that is no error."""
+    assert KernelDevices(str(tmp_path / 'input')).paths() == []
+
+
+def test_devices_are_in_the_order_of_their_numbers(tmp_path: Path) -> None:
+    """event10 comes after event9, and what is no event device is left out."""
+    for name in ('event10', 'event9', 'mouse0', 'by-id'):
+        (tmp_path / name).touch()
+    paths = KernelDevices(str(tmp_path)).paths()
+    assert [Path(path).name for path in paths] == ['event9', 'event10']
+
+
+def test_file_that_is_no_device(tmp_path: Path) -> None:
+    """What cannot be opened is told with its path and the remedy."""
+    file = tmp_path / 'event0'
+    file.touch()
+    with pytest.raises(DeviceError, match=r'event0.*group input'):
+        KernelDevices(str(tmp_path)).open(str(file))
+
+
+def test_vanished_device(tmp_path: Path) -> None:
+    """A device that went away between looking and opening is a DeviceError too."""
+    with pytest.raises(DeviceError, match='event3'):
+        KernelDevices(str(tmp_path)).open(str(tmp_path / 'event3'))
+
+
+@pytest.mark.skipif(
+    not os.access(UINPUT, os.W_OK), reason='needs /dev/uinput, to make a gamepad of the kernel'
+)
+def test_gamepad_of_the_kernel() -> None:
+    """A gamepad that the kernel itself offers is found, read and lost."""
+    import evdev
+
+    stick = evdev.AbsInfo(value=0, min=-100, max=100, fuzz=0, flat=0, resolution=0)
+    capabilities: dict[int, Any] = {
+        EV_KEY: [BTN_SOUTH],
+        EV_ABS: [(ABS_X, stick), (ABS_Y, stick)],
+    }
+    name = f'Workspace test gamepad {os.getpid()}'
+    gamepad = Gamepad(KernelDevices(), device=name)
+    states: list[GamepadState] = []
+
+    def look() -> bool:
+        gamepad.scan(time.monotonic())
+        states.extend(gamepad.read())
+        return gamepad.is_connected
+
+    with evdev.UInput(capabilities, name=name) as uinput:
+        wait_for(look)
+        uinput.write(EV_KEY, BTN_SOUTH, 1)
+        uinput.write(EV_ABS, ABS_Y, -100)
+        uinput.syn()
+        wait_for(lambda: look() and bool(states))
+        assert states[-1].buttons == {Button.SOUTH}
+        assert states[-1].axis(Axis.LEFT_Y) == 1.0
+    wait_for(lambda: not look())
+    assert states[-1] == gamepad.state == AT_REST
