@@ -14,6 +14,10 @@ from ..can.error_frames import (
 from ..can.frame import Frame
 from .events import Event, EventKind, Report, Severity
 
+_RESTART = (
+    'it comes back by `ip link set CAN type can restart`, or by itself when the interface was set '
+    'up with `restart-ms 100`'
+)
 _CABLE = 'look at cable, termination, bit rate and ground'
 _TOLD: dict[ControllerState, tuple[Severity, str]] = {
     ControllerState.ACTIVE: (Severity.INFO, 'the bus is free of errors again'),
@@ -24,8 +28,7 @@ _TOLD: dict[ControllerState, tuple[Severity, str]] = {
     ),
     ControllerState.BUS_OFF: (
         Severity.ERROR,
-        f'it has left the bus and sends nothing more; {_CABLE}. It comes back by `ip link set CAN '
-        'type can restart`, or by itself when the interface was set up with `restart-ms 100`',
+        f'it has left the bus and sends nothing more; {_CABLE}; {_RESTART}',
     ),
 }
 
