@@ -37,7 +37,9 @@ class GaitGenerator:
 
     Attributes:
         velocity: Velocity that is walked at the moment.
+        pose: Pose of the body over its feet at the moment.
         gait: The gait at the moment.
+        others: Positions of all joints; those that are no legs' are sent as they are [rad].
     """
 
     def __init__(
@@ -80,8 +82,9 @@ class GaitGenerator:
 
     @property
     def stand_targets(self) -> Targets:
-        """Positions of all joints when the robot stands upright [rad]."""
-        return self._robot.place(self._robot.solve(self._neutral), self.others)
+        """Set-points of all joints when the robot stands upright [rad]."""
+        targets = self._robot.place(self._robot.solve(self._neutral), self.others)
+        return targets if self._compensation is None else self._compensation.at_rest(targets)
 
     @property
     def phase(self) -> float:

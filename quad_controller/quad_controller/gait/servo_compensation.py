@@ -56,6 +56,12 @@ class ServoCompensation:
         """Forget the motion so far."""
         self._window.clear()
 
+    def at_rest(self, targets: Targets) -> Targets:
+        """Return the set-points for standing still on all legs at some targets [rad]."""
+        moved = list(targets)
+        self._carry(moved, targets, (True,) * len(self._robot.legs))
+        return self._robot.clamp(moved)
+
     def step(self, targets: Targets, contacts: tuple[bool, ...], dt: float) -> Targets:
         """Return the set-points for the targets of one step ago.
 

@@ -1,0 +1,61 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""A policy as one of the motions: eased in, given up when it fails."""
+
+from __future__ import annotations
+
+from ..model.quadruped import Targets
+from ..states.motion import Motion, Situation
+from .interface import Policy
+
+MAX_BAD_STEPS = 3  # in a row; one may be a glitch, the robot stands on its last targets meanwhile
+WIND_DOWN = 0.5  # [s] without velocity before the gait takes over
+
+
+class PolicyMotion(Motion):
+    """Follows a policy.
+
+    Attributes:
+        failure: Why it was given up; empty while it works.
+    """
+
+    def __init__(self, policy: Policy, start: Targets, ease_time: float) -> None:
+        """Begin where the joints are.
+
+        Args:
+            policy: The policy; it is reset.
+            start: Last targets of all joints in [rad].
+            ease_time: Over how long the policy's targets take over in [s].
+        """
+        policy.reset(start)
+        self._policy = policy
+        self._start = self._last = start
+        self._ease_time = ease_time
+        self._time = 0.0
+        self._rest_time = 0.0
+        self._bad_steps = 0
+        self.failure = ''
+
+    @property
+    def settled(self) -> bool:
+        """Whether the robot has had time to stop, or the policy is of no use any more."""
+        return self._rest_time >= WIND_DOWN or bool(self.failure)
+
+    def step(self, situation: Situation, dt: float) -> Targets:
+        """Return the next targets; the last ones when there is nothing to go by."""
+        self._rest_time = self._rest_time + dt if situation.velocity.at_rest else 0.0
+        if situation.joints is None or situation.imu is None:
+            return self._last
+        step = self._policy.step(situation.joints, situation.imu, situation.velocity, dt)
+        if step.targets is None:
+            self._bad_steps += 1
+            if self._bad_steps >= MAX_BAD_STEPS:
+                self.failure = step.reason
+            return self._last
+        self._bad_steps = 0
+        self._time += dt
+        share = min(self._time / self._ease_time, 1.0) if self._ease_time > 0.0 else 1.0
+        self._last = tuple(
+            a + share * (b - a) for a, b in zip(self._start, step.targets, strict=True)
+        )
+        return self._last

@@ -1,0 +1,67 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What is asked for while the robot moves: a velocity, which goes stale, and a body pose."""
+
+from __future__ import annotations
+
+import math
+
+from ..gait.body import BodyPose, UPRIGHT
+from ..gait.velocity import REST, Velocity
+from .modes import Answer, MOVING_STATES, State
+
+
+class Commands:
+    """The newest commands.
+
+    Attributes:
+        pose: Pose of the body over its feet.
+        refused: How many commands were no numbers.
+    """
+
+    def __init__(self, timeout: float) -> None:
+        """Start at rest.
+
+        Args:
+            timeout: A velocity that is older counts as zero, in [s].
+        """
+        self._timeout = timeout
+        self._velocity = REST
+        self._age = math.inf
+        self.pose = UPRIGHT
+        self.refused = 0
+
+    def set_velocity(self, velocity: Velocity) -> Answer:
+        """Take a velocity; one that is no number stops the robot."""
+        if not velocity.finite:
+            self.refused += 1
+            self._velocity = REST
+            return Answer(False, f'refused {velocity}: it is no number; stopping')
+        self._velocity, self._age = velocity, 0.0
+        return Answer(True, '')
+
+    def set_pose(self, pose: BodyPose) -> Answer:
+        """Take a pose of the body; it stays until the next one."""
+        if not pose.finite:
+            self.refused += 1
+            return Answer(False, f'refused {pose}: it is no number; the pose stays')
+        self.pose = pose
+        return Answer(True, '')
+
+    def pass_time(self, dt: float) -> None:
+        """Let the velocity grow older by some [s]."""
+        self._age += dt
+
+    def velocity(self, state: State) -> Velocity:
+        """Return the velocity that counts in a state."""
+        if state not in MOVING_STATES or self._age > self._timeout:
+            return REST
+        if state is State.TURN:
+            return Velocity(yaw=self._velocity.yaw)
+        return self._velocity
+
+    def warning(self, state: State) -> tuple[str, ...]:
+        """Say whether a stream of velocities broke off instead of ending with zero."""
+        if state in MOVING_STATES and not self._velocity.at_rest and self._age > self._timeout:
+            return (f'the last velocity came {self._age:.1f} s ago; it counts as zero',)
+        return ()

@@ -1,0 +1,222 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The whole controller as a pure function of time: measurements in, joint targets out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import math
+
+from ..gait.body import BodyPose
+from ..gait.generator import GaitGenerator
+from ..gait.parameters import GaitParameters
+from ..gait.velocity import Velocity
+from ..model.quadruped import Quadruped, Targets
+from ..policy.interface import Policy
+from .commands import Commands
+from .faults import Fault, FaultLatch
+from .health import Health
+from .limiter import StepLimiter
+from .machine import Poses, StateMachine
+from .measurement import Measurement
+from .modes import Answer, GAIT_STATES, ModeRequest, MODES, parse_mode, State
+from .motion import Situation
+from .parameters import StateParameters
+from .shadow import Shadow
+from .status import Event, Output, Status
+
+MAX_STEP = 0.05  # [s] after a longer pause the gait goes on where it was instead of leaping
+
+UPRIGHT_STATES = GAIT_STATES | {State.POLICY, State.FAULT}
+"""States in which the robot is on its legs, and what is wrong with it is a fault."""
+
+
+class Controller:
+    """Brings a quadruped from lying to walking and back, whatever happens on the way.
+
+    Give it what arrived and how much time has passed with :meth:`step`; everything else can be
+    called between two steps. Nothing moves before it was asked to, the step between two
+    consecutive targets is bounded by the joints' speed, and faults stay until they are cleared.
+    """
+
+    def __init__(
+        self,
+        robot: Quadruped,
+        gait: GaitParameters,
+        states: StateParameters,
+        *,
+        policy: Policy | None = None,
+        dry_run: bool = False,
+        arm_pose: Sequence[float] = (),
+    ) -> None:
+        """Start relaxed.
+
+        Args:
+            robot: The robot.
+            gait: Tuning of the gait.
+            states: Limits of states, watchdogs and protections.
+            policy: What the mode ``policy`` follows.
+            dry_run: Whether the policy is only asked, and never followed.
+            arm_pose: Positions of the joints that belong to no leg when the robot stands, in
+                [rad]; empty leaves them where they are.
+
+        Raises:
+            DescriptionError: The legs do not reach the heights of the parameters.
+            ParameterError: ``arm_pose`` does not fit the robot.
+        """
+        poses = Poses(robot, states.lie_height, arm_pose)
+        self._generator = GaitGenerator(robot, gait, poses.typical)
+        self._policy = policy
+        self._machine = StateMachine(poses, self._generator, states, policy)
+        self._shadow = Shadow(policy) if policy is not None and dry_run else None
+        self._commands = Commands(states.command_timeout)
+        self._health = Health(len(robot.names), states)
+        self._limiter = StepLimiter(robot.limits, states.period)
+        self._latch = FaultLatch()
+        self._unreachable = 0
+
+    def set_mode(self, text: str) -> Answer:
+        """Ask for a mode.
+
+        Args:
+            text: One of :data:`.modes.MODES` or an alias.
+        """
+        request = parse_mode(text)
+        if request is None:
+            return Answer(False, f'{text!r} is no mode; there are {", ".join(MODES)}')
+        state = self._machine.state
+        if reason := self._refusal(request):
+            return Answer(False, f'stays in {state.value}: {reason}')
+        if request.gait is not None:
+            self._generator.choose(request.gait)
+        self._machine.goal = request.state
+        gait = f' with gait {request.gait.value}' if request.gait is not None else ''
+        way = '' if state is request.state else f', coming from {state.value}'
+        return Answer(True, f'{request.state.value}{gait}{way}')
+
+    def set_velocity(self, velocity: Velocity) -> Answer:
+        """Ask for a velocity; it counts until the next one or the time-out."""
+        return self._commands.set_velocity(velocity)
+
+    def set_body_pose(self, pose: BodyPose) -> Answer:
+        """Ask for a pose of the body over its feet; it stays until the next one."""
+        return self._commands.set_pose(pose)
+
+    def clear_fault(self) -> Answer:
+        """Forget the latched faults if their reasons are gone; nothing moves by this."""
+        machine = self._machine
+        if machine.state is not State.FAULT:
+            return Answer(True, f'there is no fault; the mode is {machine.state.value}')
+        if still := [f'{fault.value}: {reason}' for fault, reason in self._health.faults()]:
+            return Answer(False, f'still {"; ".join(still)}')
+        self._latch.clear()
+        machine.clear()
+        return Answer(True, f'cleared; the mode is {machine.state.value}')
+
+    @property
+    def status(self) -> Status:
+        """What can be told of it."""
+        health, machine = self._health, self._machine
+        return Status(
+            state=machine.state,
+            goal=machine.goal,
+            gait=self._generator.gait,
+            velocity=self._generator.velocity,
+            faults=self._latch.texts,
+            warnings=(*health.warnings, *self._commands.warning(machine.state)),
+            joints_age=health.joints_age,
+            imu_age=health.imu_age,
+            battery=health.battery,
+            refused=health.refused + self._commands.refused,
+            limited=self._limiter.limited,
+            unreachable=self._unreachable,
+        )
+
+    def step(self, measurement: Measurement, dt: float) -> Output:
+        """Advance.
+
+        Args:
+            measurement: What arrived since the last step.
+            dt: Time since the last step in [s].
+
+        Returns:
+            The targets to send, and what happened.
+        """
+        events = [Event(True, text) for text in self._health.take(measurement, dt)]
+        self._commands.pass_time(dt)
+        last = self._limiter.last or self._start()
+        if last is None:
+            return Output(None, None, tuple(events))
+        before = self._machine.state
+        events += self._watch(last)
+        if failure := self._machine.advance(last):
+            events.append(Event(True, f'the policy was given up: {failure}'))
+        state = self._machine.state
+        if state is not before and state is not State.FAULT:
+            events.append(Event(False, f'{before.value} -> {state.value}'))
+        situation, dt_motion = self._situation(), min(dt, MAX_STEP)
+        wanted = last if self._health.held else self._move(situation, dt_motion, last, events)
+        shadow = self._shadow.step(situation, dt_motion, last) if self._shadow else None
+        return Output(self._limiter.step(wanted, dt), shadow, tuple(events))
+
+    def _start(self) -> Targets | None:
+        """Begin where the joints are, as soon as that is known."""
+        if self._health.joints is None:
+            return None
+        targets = self._limiter.start(self._health.joints.positions)
+        self._machine.hold(targets)
+        return targets
+
+    def _watch(self, last: Targets) -> list[Event]:
+        """Latch faults of a robot that is on its legs."""
+        if self._machine.state not in UPRIGHT_STATES:
+            return []
+        return [
+            event
+            for fault, reason in self._health.faults()
+            for event in self._latch_fault(fault, reason, last)
+        ]
+
+    def _latch_fault(self, fault: Fault, reason: str, last: Targets) -> list[Event]:
+        if not self._latch.latch(fault, reason):
+            return []
+        reaction = self._latch.reaction
+        if reaction is not None:
+            self._machine.react(reaction, last)
+        return [Event(True, f'fault, {fault.value}: {reason}')]
+
+    def _move(
+        self, situation: Situation, dt: float, last: Targets, events: list[Event]
+    ) -> Targets:
+        wanted = self._machine.motion.step(situation, dt)
+        self._unreachable += not self._machine.reachable
+        if all(map(math.isfinite, wanted)):
+            return wanted
+        reason = f'{type(self._machine.motion).__name__} gave a target that is no number'
+        events += self._latch_fault(Fault.TARGET, reason, last)
+        return last
+
+    def _situation(self) -> Situation:
+        """Collect what a motion may know; a way to another state goes through rest."""
+        health, machine = self._health, self._machine
+        state = machine.state if machine.state is machine.goal else State.STAND
+        return Situation(
+            joints=None if health.held else health.joints,
+            imu=health.imu if health.tilt is not None else None,
+            velocity=self._commands.velocity(state),
+            pose=self._commands.pose,
+        )
+
+    def _refusal(self, request: ModeRequest) -> str:
+        """Say why a mode cannot be entered, nothing when it can."""
+        if self._machine.state is State.FAULT:
+            return f'{"; ".join(self._latch.texts)}; call ~/clear_fault when that is mended'
+        if request.state is State.POLICY and self._policy is None:
+            return 'no policy is loaded (parameter policy_file)'
+        if request.state is State.POLICY and self._shadow is not None:
+            return 'the policy is only watched in a dry run (parameter policy_dry_run)'
+        gentle = request.state in {State.RELAX, State.LIE}
+        for fault, reason in self._health.faults():
+            if fault is Fault.JOINTS or not gentle:
+                return f'{fault.value}: {reason}'
+        return ''

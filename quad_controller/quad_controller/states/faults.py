@@ -1,0 +1,64 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What ends a motion, and how."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from enum import Enum, IntEnum
+
+
+class Reaction(IntEnum):
+    """What the robot does; the larger one prevails when several faults are there."""
+
+    STAND = 1
+    LIE_DOWN = 2
+    HOLD = 3
+
+
+class Fault(Enum):
+    """Why; the value is for people."""
+
+    JOINTS = 'no joint states'
+    IMU = 'no attitude'
+    FALLEN = 'fallen'
+    BATTERY = 'battery low'
+    TARGET = 'no usable target'
+
+
+REACTIONS: Mapping[Fault, Reaction] = {
+    Fault.JOINTS: Reaction.HOLD,  # nobody knows where the legs are
+    Fault.IMU: Reaction.STAND,
+    Fault.FALLEN: Reaction.HOLD,  # legs in the air find no ground, and may be jammed
+    Fault.BATTERY: Reaction.LIE_DOWN,
+    Fault.TARGET: Reaction.HOLD,
+}
+
+
+class FaultLatch:
+    """Keeps faults until they are cleared."""
+
+    def __init__(self) -> None:
+        """Start without faults."""
+        self._faults: dict[Fault, str] = {}
+
+    @property
+    def texts(self) -> tuple[str, ...]:
+        """Each fault with its reason."""
+        return tuple(f'{fault.value}: {reason}' for fault, reason in self._faults.items())
+
+    @property
+    def reaction(self) -> Reaction | None:
+        """What to do, None without a fault."""
+        return max((REACTIONS[fault] for fault in self._faults), default=None)
+
+    def latch(self, fault: Fault, reason: str) -> bool:
+        """Keep a fault; return whether it is new."""
+        new = fault not in self._faults
+        if new:
+            self._faults[fault] = reason
+        return new
+
+    def clear(self) -> None:
+        """Forget all."""
+        self._faults.clear()

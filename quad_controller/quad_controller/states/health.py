@@ -1,0 +1,129 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Watches what is measured: its age, the attitude and the battery."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import math
+
+from .faults import Fault
+from .measurement import ImuSample, JointSample, Measurement
+from .parameters import StateParameters
+
+
+class Health:
+    """The newest measurements, how old they are, and what is wrong.
+
+    Attributes:
+        joints: The newest usable joint states, None before the first.
+        imu: The newest usable attitude, None before the first.
+        battery: The newest charge 0 to 1, None when nothing is known of it.
+        joints_age: Time since the joint states in [s].
+        imu_age: Time since the attitude in [s].
+        refused: How many samples could not be used.
+    """
+
+    def __init__(self, count: int, parameters: StateParameters) -> None:
+        """Start without a measurement.
+
+        Args:
+            count: How many joints there are.
+            parameters: Limits.
+        """
+        self._count = count
+        self._parameters = parameters
+        self.joints: JointSample | None = None
+        self.imu: ImuSample | None = None
+        self.battery: float | None = None
+        self.joints_age = self.imu_age = math.inf
+        self.refused = 0
+        self._fall_time = 0.0
+        self._low_time = 0.0
+
+    def take(self, measurement: Measurement, dt: float) -> list[str]:
+        """Take what is new.
+
+        Args:
+            measurement: What arrived.
+            dt: Time since the last call in [s].
+
+        Returns:
+            What was refused and why.
+        """
+        self.joints_age += dt
+        self.imu_age += dt
+        problems = [*self._take_joints(measurement.joints), *self._take_imu(measurement.imu)]
+        self.refused += len(problems)
+        battery = measurement.battery
+        if battery is not None and math.isfinite(battery):
+            self.battery = battery
+        parameters = self._parameters
+        low = self.battery is not None and self.battery < parameters.low_battery
+        self._low_time = self._low_time + dt if low else 0.0
+        self._fall_time = self._fall_time + dt if self._falls() else 0.0
+        return problems
+
+    @property
+    def tilt(self) -> tuple[float, float] | None:
+        """Roll and pitch in [rad], None when they are not known any more."""
+        if self.imu is None or self.imu_age > self._parameters.hold_age:
+            return None
+        return self.imu.roll_pitch
+
+    @property
+    def held(self) -> bool:
+        """Whether the joint states are too old to move on."""
+        return self.joints_age > self._parameters.hold_age
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is not right, but no fault yet."""
+        late = self._parameters.warn_age
+        texts = []
+        if late < self.joints_age < math.inf:
+            texts.append(f'joint states are {self.joints_age * 1e3:.0f} ms old')
+        if late < self.imu_age < math.inf:
+            texts.append(f'the attitude is {self.imu_age * 1e3:.0f} ms old')
+        return tuple(texts)
+
+    def faults(self) -> Iterator[tuple[Fault, str]]:
+        """Yield what keeps the robot from moving its legs, each with its reason and remedy."""
+        parameters = self._parameters
+        if self.joints_age > parameters.fault_age:
+            yield Fault.JOINTS, _age(self.joints_age, 'joint states', '/joint_states')
+        if parameters.require_imu and self.imu_age > parameters.fault_age:
+            yield Fault.IMU, _age(self.imu_age, 'attitude', '/imu')
+        if self.imu is not None and self._fall_time > parameters.fall_time:
+            angle = math.degrees(self.imu.tilt)
+            yield Fault.FALLEN, f'the body is tilted by {angle:.0f} deg; put it on its feet'
+        if self.battery is not None and self._low_time > parameters.battery_time:
+            yield Fault.BATTERY, f'{self.battery:.0%} left; charge it'
+
+    def _falls(self) -> bool:
+        if self.imu is None or self.imu_age > self._parameters.hold_age:
+            return False
+        rate = math.hypot(*self.imu.angular_velocity)
+        return self.imu.tilt > self._parameters.max_tilt or rate > self._parameters.max_turn_rate
+
+    def _take_joints(self, joints: JointSample | None) -> Iterator[str]:
+        if joints is None:
+            return
+        if problem := joints.problem(self._count):
+            yield f'refused {problem}'
+        else:
+            self.joints, self.joints_age = joints, 0.0
+
+    def _take_imu(self, imu: ImuSample | None) -> Iterator[str]:
+        if imu is None:
+            return
+        if problem := imu.problem():
+            yield f'refused {problem}'
+        else:
+            self.imu, self.imu_age = imu, 0.0
+
+
+def _age(age: float, what: str, topic: str) -> str:
+    if math.isinf(age):
+        return f'no {what} yet; is the hardware node running, and does it publish {topic}?'
+    return f'the last {what} came {age:.1f} s ago; look at the hardware node and its cable'

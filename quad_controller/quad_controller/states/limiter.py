@@ -1,0 +1,67 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The last thing that a target passes: limits, and a bound of the step from the one before."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import math
+
+from ..model.quadruped import Targets
+from ..model.urdf import Limits
+
+LONGEST_STEP = 1.5  # periods; a step that comes late may not be a leap
+
+
+class StepLimiter:
+    """Keeps targets within the joints' ranges, and steps within their speed.
+
+    Attributes:
+        limited: How many targets of single joints were cut so far.
+    """
+
+    def __init__(self, limits: Sequence[Limits], period: float) -> None:
+        """Start at no target.
+
+        Args:
+            limits: Of each joint.
+            period: Nominal time between two targets in [s].
+        """
+        self._limits = tuple(limits)
+        self._longest = LONGEST_STEP * period
+        self._last: Targets | None = None
+        self.limited = 0
+
+    @property
+    def last(self) -> Targets | None:
+        """What was let through last; None at the beginning."""
+        return self._last
+
+    def start(self, positions: Sequence[float]) -> Targets:
+        """Begin where the joints are [rad]."""
+        self._last = tuple(
+            limits.clamp(position)
+            for limits, position in zip(self._limits, positions, strict=True)
+        )
+        return self._last
+
+    def step(self, targets: Sequence[float], dt: float) -> Targets:
+        """Return what may be sent instead of some targets.
+
+        Args:
+            targets: What is wanted; finite.
+            dt: Time since the last step in [s].
+        """
+        if self._last is None:
+            return self.start(targets)
+        dt = min(dt, self._longest)
+        sent = []
+        for limits, before, wanted in zip(self._limits, self._last, targets, strict=True):
+            most = limits.velocity * dt
+            target = limits.clamp(wanted)
+            if abs(target - before) > most:
+                target = before + math.copysign(most, target - before)
+                self.limited += 1
+            sent.append(target)
+        self._last = tuple(sent)
+        return self._last

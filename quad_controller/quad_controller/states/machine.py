@@ -1,0 +1,205 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Which motion follows which: the way from one state to another.
+
+::
+
+    RELAX <-> LIE <-> STAND <-> WALK, TURN      (the gait comes to rest before it is left)
+                        ^-----> POLICY          (eased in; winds down, or fails, back to STAND)
+    any of STAND, WALK, TURN, POLICY -> FAULT   (then RELAX, LIE or STAND when it is cleared)
+
+From RELAX the robot stands up directly, from wherever its joints are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ..exceptions import ParameterError
+from ..gait.generator import GaitGenerator
+from ..model.quadruped import Quadruped, Targets
+from ..policy.interface import Policy
+from ..policy.motion import PolicyMotion
+from .faults import Reaction
+from .modes import GAIT_STATES, State
+from .motion import Blend, Hold, Motion, Walk
+from .parameters import StateParameters
+
+EASE_TIME = 0.7  # [s] over which a policy takes over
+
+
+class Poses:
+    """The poses that the robot goes to; joints that are no legs' may have one or stay."""
+
+    def __init__(self, robot: Quadruped, lie_height: float, arm_pose: Sequence[float]) -> None:
+        """Prepare them.
+
+        Args:
+            robot: The robot.
+            lie_height: Hip axes above the centres of the feet when it lies in [m].
+            arm_pose: Positions of the joints that are no legs' in [rad]; empty leaves them.
+
+        Raises:
+            DescriptionError: The legs do not reach the height.
+            ParameterError: There are not as many positions as joints.
+        """
+        if arm_pose and len(arm_pose) != len(robot.others):
+            names = ', '.join(robot.names[index] for index in robot.others) or 'none'
+            raise ParameterError(
+                f"arm_pose has {len(arm_pose)} positions; the joints that are no legs' are {names}"
+            )
+        self._robot = robot
+        self._arm = dict(zip(robot.others, arm_pose, strict=True)) if arm_pose else {}
+        self.typical = self.with_arm([0.0] * len(robot.names))
+        self._lying = robot.solve(robot.footprint(lie_height, self.typical))
+
+    def with_arm(self, targets: Sequence[float]) -> Targets:
+        """Return targets of all joints with those that are no legs' as the parameter says."""
+        moved = [self._arm.get(index, target) for index, target in enumerate(targets)]
+        return self._robot.clamp(moved)
+
+    def lying(self, targets: Targets) -> Targets:
+        """Return targets of all joints with the legs folded."""
+        return self._robot.place(self._lying, targets)
+
+
+class StateMachine:
+    """Goes from state to state, and knows the motion of each.
+
+    Attributes:
+        state: The state of now.
+        goal: The state that was asked for.
+        motion: What moves the joints now.
+    """
+
+    def __init__(
+        self,
+        poses: Poses,
+        generator: GaitGenerator,
+        parameters: StateParameters,
+        policy: Policy | None,
+    ) -> None:
+        """Start relaxed, without targets.
+
+        Args:
+            poses: Where to go.
+            generator: The gait.
+            parameters: How fast.
+            policy: What POLICY follows; it cannot be entered without.
+        """
+        self._poses, self._generator, self._policy = poses, generator, policy
+        self._parameters = parameters
+        self._walk = Walk(generator)
+        self._lie_down: Blend | None = None
+        self._reaction: Reaction | None = None
+        self.state = self.goal = State.RELAX
+        self.motion: Motion = self._walk
+
+    @property
+    def reachable(self) -> bool:
+        """Whether the gait's last step was within the legs' reach."""
+        return self.motion is not self._walk or self._walk.reachable
+
+    def hold(self, last: Targets) -> None:
+        """Stay at some targets [rad]."""
+        self.motion = Hold(last, self._parameters.hold_band)
+
+    def react(self, reaction: Reaction, last: Targets) -> None:
+        """Go into FAULT, or to a stronger reaction there.
+
+        Args:
+            reaction: What the faults ask for.
+            last: The last targets of all joints in [rad].
+        """
+        self.state = self.goal = State.FAULT
+        self._reaction = reaction
+        if reaction is Reaction.HOLD:
+            self.hold(last)
+
+    def clear(self) -> None:
+        """Leave FAULT for the state that the robot is in anyway."""
+        if self._reaction is Reaction.HOLD:
+            self.state = self.goal = State.RELAX
+        elif self._reaction is Reaction.LIE_DOWN:
+            lies = self.motion is self._lie_down
+            self.state, self.goal = State.LIE if lies else State.STAND, State.LIE
+        else:
+            self.state = self.goal = State.STAND
+        self._reaction = None
+
+    def advance(self, last: Targets) -> str:
+        """Change state and motion when it is time.
+
+        Args:
+            last: The last targets of all joints in [rad].
+
+        Returns:
+            Why the policy was given up; empty as a rule.
+        """
+        failure = self.motion.failure if isinstance(self.motion, PolicyMotion) else ''
+        if self.state is State.FAULT:
+            self._advance_fault(last)
+            return failure
+        if failure:
+            walks = self._parameters.policy_fallback_walks and self.goal is State.POLICY
+            if self.goal is State.POLICY:
+                self.goal = State.WALK if walks else State.STAND
+            self._enter(State.STAND, last)
+        self._stand_after_blend()
+        following = self._next()
+        if following is not None:
+            self._enter(following, last)
+        return failure
+
+    def _next(self) -> State | None:
+        """Return the state to enter now on the way to the goal, None to go on as it is."""
+        state, goal, motion = self.state, self.goal, self.motion
+        if state is goal:
+            return None
+        if state in GAIT_STATES and goal in GAIT_STATES | {State.POLICY}:
+            ready = motion is self._walk and (goal in GAIT_STATES or motion.settled)
+            return goal if ready else None
+        if not motion.settled:
+            return None
+        if goal is State.LIE or (goal is State.RELAX and state is not State.LIE):
+            return State.LIE
+        if goal is State.RELAX:
+            return State.RELAX if motion.finished else None
+        return State.STAND
+
+    def _enter(self, state: State, last: Targets) -> None:
+        if state is State.RELAX:
+            self.hold(last)
+        elif state is State.LIE:
+            self._lie(last)
+        elif state is State.POLICY and self._policy is not None:
+            self.motion = PolicyMotion(self._policy, last, EASE_TIME)
+        elif self.motion is not self._walk:
+            self._stand(last)
+        self.state = state
+
+    def _advance_fault(self, last: Targets) -> None:
+        if self._reaction is Reaction.LIE_DOWN:
+            if self.motion is not self._lie_down and self.motion.settled:
+                self._lie(last)
+        elif self._reaction is Reaction.STAND:
+            if isinstance(self.motion, PolicyMotion):
+                self._stand(last)
+            self._stand_after_blend()
+
+    def _stand_after_blend(self) -> None:
+        """Let the gait take over when the robot has stood up."""
+        up = self.state is State.STAND or self._reaction is Reaction.STAND
+        if up and isinstance(self.motion, Blend) and self.motion.finished:
+            self._generator.reset()
+            self.motion = self._walk
+
+    def _lie(self, last: Targets) -> None:
+        self.motion = self._lie_down = self._blend(last, self._poses.lying(last))
+
+    def _stand(self, last: Targets) -> None:
+        self._generator.others = self._poses.with_arm(last)
+        self.motion = self._blend(last, self._generator.stand_targets)
+
+    def _blend(self, start: Targets, end: Targets) -> Blend:
+        return Blend(start, end, self._parameters.blend_speed, self._parameters.blend_time)

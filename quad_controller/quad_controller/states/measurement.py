@@ -1,0 +1,99 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What the controller is told in one step: only what is new since the last one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import math
+
+from ..model.urdf import Vector
+
+NORM_TOLERANCE = 0.1  # of a quaternion's length; beyond it the message is no orientation
+
+
+@dataclass(frozen=True, slots=True)
+class JointSample:
+    """Joints as they were measured, in the order of :attr:`..model.quadruped.Quadruped.names`.
+
+    Attributes:
+        positions: In [rad] or [m].
+        velocities: In [rad/s] or [m/s].
+    """
+
+    positions: tuple[float, ...]
+    velocities: tuple[float, ...]
+
+    def problem(self, count: int) -> str:
+        """Say what is wrong with it, nothing when it can be used.
+
+        Args:
+            count: How many joints there are.
+        """
+        for what, values in (('positions', self.positions), ('velocities', self.velocities)):
+            if len(values) != count:
+                return f'{len(values)} joint {what} instead of {count}'
+            if not all(map(math.isfinite, values)):
+                return f'joint {what} that are no numbers'
+        return ''
+
+
+@dataclass(frozen=True, slots=True)
+class ImuSample:
+    """The body's attitude and motion, in the body's frame.
+
+    Attributes:
+        orientation: Unit quaternion of the body in the world, x, y, z, w.
+        angular_velocity: In [rad/s].
+        acceleration: Specific force in [m/s^2]: +9.81 along z at rest (REP 145).
+    """
+
+    orientation: tuple[float, float, float, float]
+    angular_velocity: Vector
+    acceleration: Vector
+
+    def problem(self) -> str:
+        """Say what is wrong with it, nothing when it can be used."""
+        parts = (*self.orientation, *self.angular_velocity, *self.acceleration)
+        if not all(map(math.isfinite, parts)):
+            return 'imu values that are no numbers'
+        if abs(math.hypot(*self.orientation) - 1.0) > NORM_TOLERANCE:
+            return 'an imu orientation that is no unit quaternion'
+        return ''
+
+    @property
+    def down(self) -> Vector:
+        """Direction of gravity in the body's frame; (0, 0, -1) upright."""
+        x, y, z, w = self.orientation
+        norm = x * x + y * y + z * z + w * w
+        return (
+            -2.0 * (x * z - w * y) / norm,
+            -2.0 * (y * z + w * x) / norm,
+            2.0 * (x * x + y * y) / norm - 1.0,
+        )
+
+    @property
+    def roll_pitch(self) -> tuple[float, float]:
+        """Rotations about x and then y of the level body, in [rad]."""
+        x, y, z = self.down
+        return math.atan2(-y, -z), math.asin(min(max(x, -1.0), 1.0))
+
+    @property
+    def tilt(self) -> float:
+        """Angle between the body's z axis and up in [rad]."""
+        return math.acos(min(max(-self.down[2], -1.0), 1.0))
+
+
+@dataclass(frozen=True, slots=True)
+class Measurement:
+    """What arrived since the last step.
+
+    Attributes:
+        joints: The newest joint states, None when there were none.
+        imu: The newest attitude, None when there was none.
+        battery: Charge 0 to 1, None when nothing was said of it.
+    """
+
+    joints: JointSample | None = None
+    imu: ImuSample | None = None
+    battery: float | None = None

@@ -1,0 +1,77 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The states of the controller and the words with which they are asked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+from ..gait.schedule import Gait
+
+
+class State(Enum):
+    """What the controller is doing; the value is its name for people."""
+
+    RELAX = 'relax'
+    LIE = 'lie'
+    STAND = 'stand'
+    WALK = 'walk'
+    TURN = 'turn'
+    POLICY = 'policy'
+    FAULT = 'fault'
+
+
+GAIT_STATES = frozenset({State.STAND, State.WALK, State.TURN})
+"""States in which the geometric gait moves the legs."""
+
+MOVING_STATES = frozenset({State.WALK, State.TURN, State.POLICY})
+"""States in which the robot follows velocities."""
+
+ALIASES = {'sit': 'lie', 'trot': 'gait:trot', 'crawl': 'gait:crawl', 'pace': 'gait:pace'}
+"""Other words for modes, which other robots have."""
+
+GAIT_PREFIX = 'gait:'
+
+MODES = (
+    *(state.value for state in State if state is not State.FAULT),
+    *(GAIT_PREFIX + gait.value for gait in Gait),
+)
+"""The words that can be asked for."""
+
+
+@dataclass(frozen=True, slots=True)
+class ModeRequest:
+    """What a word asks for.
+
+    Attributes:
+        state: State to go to.
+        gait: Gait to walk with, None for the one that is set.
+    """
+
+    state: State
+    gait: Gait | None = None
+
+
+def parse_mode(text: str) -> ModeRequest | None:
+    """Return what a word asks for, None when it is no mode."""
+    word = text.strip().lower()
+    word = ALIASES.get(word, word)
+    if word not in MODES:
+        return None
+    if word.startswith(GAIT_PREFIX):
+        return ModeRequest(State.WALK, Gait(word.removeprefix(GAIT_PREFIX)))
+    return ModeRequest(State(word))
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What becomes of a request.
+
+    Attributes:
+        accepted: Whether it is followed.
+        message: What happens now, or why not and what can be done.
+    """
+
+    accepted: bool
+    message: str

@@ -1,0 +1,143 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What can move the joints, one thing at a time: holding, going to a pose, walking."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+import math
+
+from ..gait.body import BodyPose
+from ..gait.generator import GaitGenerator
+from ..gait.velocity import Velocity
+from ..model.quadruped import Targets
+from .measurement import ImuSample, JointSample
+
+
+@dataclass(frozen=True, slots=True)
+class Situation:
+    """What a motion may know of the world in one step.
+
+    Attributes:
+        joints: The joints, None when they are not known any more.
+        imu: Attitude and turning, None when they are not known any more.
+        velocity: Velocity that is asked for.
+        pose: Pose of the body that is asked for.
+    """
+
+    joints: JointSample | None
+    imu: ImuSample | None
+    velocity: Velocity
+    pose: BodyPose
+
+
+class Motion(ABC):
+    """Makes joint targets, step after step.
+
+    A motion is wound down by a velocity of zero; it may be left for one that begins elsewhere as
+    soon as it is :attr:`settled`.
+    """
+
+    @property
+    def settled(self) -> bool:
+        """Whether the robot is at rest on its feet, or was not walking in the first place."""
+        return True
+
+    @property
+    def finished(self) -> bool:
+        """Whether it has come to where it leads."""
+        return True
+
+    @abstractmethod
+    def step(self, situation: Situation, dt: float) -> Targets:
+        """Return the next targets of all joints in [rad].
+
+        Args:
+            situation: What is known.
+            dt: Duration of the step in [s].
+        """
+
+
+class Hold(Motion):
+    """Stays; a joint that something else has moved is not pulled back, the set-point follows.
+
+    So servos that were switched off can be moved by hand and do not leap when they are switched
+    on again.
+    """
+
+    def __init__(self, targets: Targets, band: float) -> None:
+        """Hold some targets.
+
+        Args:
+            targets: Positions of all joints in [rad].
+            band: How far a joint may be off in [rad].
+        """
+        self._targets = targets
+        self._band = band
+
+    def step(self, situation: Situation, dt: float) -> Targets:
+        """Return the targets, near to where the joints are."""
+        if situation.joints is not None:
+            self._targets = tuple(
+                min(max(target, position - self._band), position + self._band)
+                for target, position in zip(self._targets, situation.joints.positions, strict=True)
+            )
+        return self._targets
+
+
+class Blend(Motion):
+    """Goes from one pose to another, all joints together, with a soft start and end."""
+
+    def __init__(self, start: Targets, end: Targets, speed: float, least: float) -> None:
+        """Plan it.
+
+        Args:
+            start: Where the joints are in [rad].
+            end: Where they shall be in [rad].
+            speed: Speed of the fastest joint in [rad/s].
+            least: Shortest duration in [s].
+        """
+        self._start, self._end = start, end
+        way = max(abs(b - a) for a, b in zip(start, end, strict=True))
+        # a cosine is pi / 2 times as fast in its middle as on average
+        self._duration = max(least, way * math.pi / 2 / speed)
+        self._time = 0.0
+
+    @property
+    def finished(self) -> bool:
+        """Whether it is there."""
+        return self._time >= self._duration
+
+    def step(self, situation: Situation, dt: float) -> Targets:
+        """Return the next targets."""
+        self._time += dt
+        if self.finished:
+            return self._end
+        share = 0.5 * (1.0 - math.cos(math.pi * self._time / self._duration))
+        return tuple(a + share * (b - a) for a, b in zip(self._start, self._end, strict=True))
+
+
+class Walk(Motion):
+    """The geometric gait; stands when the velocity is zero.
+
+    Attributes:
+        reachable: Whether the legs reached where they should in the last step.
+    """
+
+    def __init__(self, generator: GaitGenerator) -> None:
+        """Use a generator, from standing."""
+        self._generator = generator
+        self.reachable = True
+
+    @property
+    def settled(self) -> bool:
+        """Whether all feet stand at their places."""
+        return self._generator.standing
+
+    def step(self, situation: Situation, dt: float) -> Targets:
+        """Return the next targets."""
+        tilt = situation.imu.roll_pitch if situation.imu is not None else None
+        step = self._generator.step(situation.velocity, situation.pose, tilt, dt)
+        self.reachable = step.reachable
+        return step.targets

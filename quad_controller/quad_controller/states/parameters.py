@@ -1,0 +1,86 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Limits of the states, watchdogs and protections."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import math
+
+from ..exceptions import ParameterError
+
+
+@dataclass(frozen=True, slots=True)
+class StateParameters:
+    """Tuning of everything but the gait and the policy.
+
+    Attributes:
+        period: Nominal time between two steps in [s].
+        command_timeout: A velocity older than this counts as zero, in [s].
+        warn_age: Joint states and attitude older than this are reported, in [s].
+        hold_age: Older than this, nothing moves on, in [s].
+        fault_age: Older than this is a fault, in [s].
+        max_tilt: A larger angle between the body's z axis and up is a fall, in [rad].
+        max_turn_rate: A body that turns faster is falling, in [rad/s].
+        fall_time: How long it must be so in [s].
+        low_battery: Charge below which the robot lies down; 0 never.
+        battery_time: How long the charge must be lower in [s].
+        require_imu: Whether the robot may move its legs only with a known attitude.
+        lie_height: Hip axes above the centres of the feet when it lies, in [m].
+        blend_speed: Speed of the fastest joint between two poses in [rad/s].
+        blend_time: Shortest time between two poses in [s].
+        hold_band: How far a joint may be off a set-point that holds it, in [rad]; it follows then.
+        policy_fallback_walks: Whether the gait goes on walking when a policy fails, or stands.
+    """
+
+    period: float = 0.02
+    command_timeout: float = 0.5
+    warn_age: float = 0.06
+    hold_age: float = 0.2
+    fault_age: float = 0.5
+    max_tilt: float = 0.9
+    max_turn_rate: float = 8.0
+    fall_time: float = 0.1
+    low_battery: float = 0.1
+    battery_time: float = 3.0
+    require_imu: bool = True
+    lie_height: float = 0.055
+    blend_speed: float = 1.0
+    blend_time: float = 1.0
+    hold_band: float = 0.25
+    policy_fallback_walks: bool = False
+
+    def __post_init__(self) -> None:
+        """Refuse what makes no sense.
+
+        Raises:
+            ParameterError: A value is outside of its range; the message has name and range.
+        """
+        for name, (least, most) in STATE_RANGES.items():
+            value = getattr(self, name)
+            if not least <= value <= most:
+                raise ParameterError(f'{name} {value} is not within {least} to {most}')
+        if not self.warn_age <= self.hold_age <= self.fault_age:
+            raise ParameterError(
+                f'warn_age {self.warn_age}, hold_age {self.hold_age} and fault_age '
+                f'{self.fault_age} must grow in this order'
+            )
+
+
+STATE_RANGES: dict[str, tuple[float, float]] = {
+    'period': (0.002, 0.1),
+    'command_timeout': (0.05, 10.0),
+    'warn_age': (0.01, 5.0),
+    'hold_age': (0.02, 5.0),
+    'fault_age': (0.05, 10.0),
+    'max_tilt': (0.1, math.pi),
+    'max_turn_rate': (1.0, 100.0),
+    'fall_time': (0.0, 2.0),
+    'low_battery': (0.0, 0.9),
+    'battery_time': (0.0, 60.0),
+    'lie_height': (0.01, 1.0),
+    'blend_speed': (0.1, 10.0),
+    'blend_time': (0.2, 10.0),
+    'hold_band': (0.02, 3.2),
+}
+"""Range of each parameter, both ends included; units as in :class:`StateParameters`."""

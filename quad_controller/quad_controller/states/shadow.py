@@ -1,0 +1,33 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""A policy that is asked but not followed, to see what it would do."""
+
+from __future__ import annotations
+
+from ..model.quadruped import Targets
+from ..policy.interface import Policy
+from .motion import Situation
+
+
+class Shadow:
+    """Runs a policy beside what really moves the robot."""
+
+    def __init__(self, policy: Policy) -> None:
+        """Use a policy; it is reset in the first step."""
+        self._policy = policy
+        self._started = False
+
+    def step(self, situation: Situation, dt: float, last: Targets) -> Targets | None:
+        """Return what the policy would send, None when it has nothing to go by or fails.
+
+        Args:
+            situation: What is known.
+            dt: Duration of the step in [s].
+            last: The last targets of all joints in [rad].
+        """
+        if situation.joints is None or situation.imu is None:
+            return None
+        if not self._started:
+            self._policy.reset(last)
+            self._started = True
+        return self._policy.step(situation.joints, situation.imu, situation.velocity, dt).targets

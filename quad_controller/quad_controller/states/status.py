@@ -1,0 +1,73 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What can be told of the controller."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..gait.schedule import Gait
+from ..gait.velocity import Velocity
+from ..model.quadruped import Targets
+from .modes import State
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """The controller at one moment.
+
+    Attributes:
+        state: What it is doing.
+        goal: What it is on the way to.
+        gait: The gait.
+        velocity: Velocity that the gait walks.
+        faults: Latched faults with their reasons.
+        warnings: What is not right but no fault.
+        joints_age: Time since the joint states in [s].
+        imu_age: Time since the attitude in [s].
+        battery: Charge 0 to 1, None when it is not known.
+        refused: Samples and commands that could not be used.
+        limited: Targets of single joints that were too fast and were cut.
+        unreachable: Steps in which a leg did not reach its target.
+    """
+
+    state: State
+    goal: State
+    gait: Gait
+    velocity: Velocity
+    faults: tuple[str, ...]
+    warnings: tuple[str, ...]
+    joints_age: float
+    imu_age: float
+    battery: float | None
+    refused: int
+    limited: int
+    unreachable: int
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Something that people should hear of once.
+
+    Attributes:
+        error: Whether it is a fault, or else news.
+        text: What happened, and the remedy if there is one.
+    """
+
+    error: bool
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Output:
+    """What one step gives.
+
+    Attributes:
+        targets: Positions of all joints in [rad]; None as long as no joint state was received.
+        shadow: What the policy would do, in a dry run; None otherwise.
+        events: News.
+    """
+
+    targets: Targets | None
+    shadow: Targets | None
+    events: tuple[Event, ...]

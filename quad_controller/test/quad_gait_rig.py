@@ -1,0 +1,107 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""A controller with a robot that follows at once, in time that the test makes pass."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+import math
+
+from quad_controller.gait.parameters import GaitParameters
+from quad_controller.gait.velocity import Velocity
+from quad_controller.model.quadruped import quadruped, Targets
+from quad_controller.policy.interface import PolicyStep
+from quad_controller.states.controller import Controller
+from quad_controller.states.measurement import ImuSample, JointSample, Measurement
+from quad_controller.states.modes import State
+from quad_controller.states.parameters import StateParameters
+from quad_gait_urdf import Build, urdf
+
+PERIOD = 0.02  # [s]
+UPRIGHT = ImuSample((0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0), (0.0, 0.0, 9.81))
+ROBOT = quadruped(urdf())
+ARM_ROBOT = quadruped(urdf(Build(arm=True)))
+FOLDED = tuple([0.1, 1.3, -0.9] * 4)
+
+
+def tilted(angle: float) -> ImuSample:
+    """Return the attitude of a body that is rolled by an angle [rad]."""
+    return replace(UPRIGHT, orientation=(math.sin(angle / 2), 0.0, 0.0, math.cos(angle / 2)))
+
+
+class StillPolicy:
+    """A policy that stands, and answers wrongly when it is told to."""
+
+    name = 'still'
+
+    def __init__(self, targets: Targets) -> None:
+        """Answer always the same targets."""
+        self.targets: Targets | None = targets
+        self.resets = 0
+        self.velocities: list[Velocity] = []
+
+    def reset(self, others: Targets) -> None:
+        """Count."""
+        self.resets += 1
+
+    def step(
+        self, joints: JointSample, imu: ImuSample, velocity: Velocity, dt: float
+    ) -> PolicyStep:
+        """Answer."""
+        self.velocities.append(velocity)
+        return PolicyStep(self.targets, '' if self.targets is not None else 'broken on purpose')
+
+
+class Rig:
+    """Makes time pass for a controller."""
+
+    def __init__(self, controller: Controller | None = None, positions: Targets = FOLDED) -> None:
+        """Start with a folded robot."""
+        self.controller = controller or Controller(ROBOT, GaitParameters(), StateParameters())
+        self.positions = positions
+        self.imu: ImuSample | None = UPRIGHT
+        self.joints = True
+        self.battery: float | None = None
+        self.largest_step = 0.0
+        self.log: list[str] = []
+
+    def is_in(self, state: State) -> bool:
+        """Return whether the controller is in a state."""
+        return self.controller.status.state is state
+
+    def step(self, velocity: Velocity | None = None) -> Targets | None:
+        """Pass one period."""
+        if velocity is not None:
+            self.controller.set_velocity(velocity)
+        still = (0.0,) * len(self.positions)
+        measured = Measurement(
+            joints=JointSample(self.positions, still) if self.joints else None,
+            imu=self.imu,
+            battery=self.battery,
+        )
+        output = self.controller.step(measured, PERIOD)
+        self.log += [event.text for event in output.events]
+        if output.targets is not None:
+            pairs = zip(output.targets, self.positions, strict=True)
+            self.largest_step = max(self.largest_step, *(abs(a - b) for a, b in pairs))
+            self.positions = output.targets
+        return output.targets
+
+    def run(self, duration: float, velocity: Velocity | None = None) -> None:
+        """Pass some seconds, commanding a velocity all along."""
+        for _ in range(round(duration / PERIOD)):
+            self.step(velocity)
+
+    def ask(self, mode: str) -> str:
+        """Ask for a mode that has to be accepted."""
+        answer = self.controller.set_mode(mode)
+        assert answer.accepted, answer.message
+        return answer.message
+
+    def until(self, state: State, velocity: Velocity | None = None) -> None:
+        """Pass time until a state is reached, ten seconds at most."""
+        for _ in range(round(10 / PERIOD)):
+            if self.is_in(state):
+                return
+            self.step(velocity)
+        raise AssertionError(f'not in {state}; {self.log}')

@@ -1,0 +1,395 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Behaviour of the states: ways between them, time-outs, faults, and what may never happen."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+import math
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+import pytest
+
+from quad_controller.exceptions import ParameterError
+from quad_controller.gait.body import BodyPose
+from quad_controller.gait.generator import GaitGenerator
+from quad_controller.gait.parameters import GaitParameters
+from quad_controller.gait.velocity import Velocity
+from quad_controller.states.controller import Controller
+from quad_controller.states.measurement import JointSample, Measurement
+from quad_controller.states.modes import MODES, State
+from quad_controller.states.parameters import StateParameters
+from quad_gait_rig import ARM_ROBOT, FOLDED, PERIOD, Rig, ROBOT, StillPolicy, tilted, UPRIGHT
+
+STAND = GaitGenerator(ROBOT, GaitParameters()).stand_targets
+FORWARD = Velocity(0.1)
+
+
+def policy_rig(**parameters: bool) -> tuple[Rig, StillPolicy]:
+    """Return a rig with a policy that stands."""
+    policy = StillPolicy(STAND)
+    controller = Controller(ROBOT, GaitParameters(), StateParameters(**parameters), policy=policy)
+    return Rig(controller), policy
+
+
+def standing(rig: Rig | None = None) -> Rig:
+    """Return a rig that has stood up."""
+    rig = rig or Rig()
+    rig.step()
+    rig.ask('stand')
+    rig.run(3.0)
+    assert rig.is_in(State.STAND)
+    return rig
+
+
+def test_nothing_is_sent_before_the_joints_are_known() -> None:
+    """Without joint states there is no target, and no mode but an answer that says why."""
+    rig = Rig()
+    rig.joints = False
+    assert rig.step() is None
+    answer = rig.controller.set_mode('walk')
+    assert not answer.accepted
+    assert '/joint_states' in answer.message
+
+
+def test_nothing_moves_before_it_is_asked_to() -> None:
+    """Relaxed, the targets are where the joints were found."""
+    rig = Rig()
+    rig.run(2.0, FORWARD)
+    assert rig.positions == FOLDED
+    assert rig.largest_step == 0.0
+
+
+def test_a_joint_moved_by_hand_is_not_pulled_back() -> None:
+    """Relaxed, the set-point stays within a band of where a joint was moved."""
+    rig = Rig()
+    rig.step()
+    moved = (*FOLDED[:1], FOLDED[1] - 1.0, *FOLDED[2:])
+    measured = Measurement(JointSample(moved, (0.0,) * 12), UPRIGHT)
+    for _ in range(100):
+        targets = rig.controller.step(measured, PERIOD).targets
+    assert targets is not None
+    assert abs(targets[1] - moved[1]) <= 0.25 + 1e-9
+
+
+def test_stands_up_walks_and_lies_down() -> None:
+    """Each mode is reached, and the gait comes to rest before the legs are folded."""
+    rig = standing()
+    assert rig.positions == pytest.approx(STAND)
+    rig.ask('walk')
+    rig.run(1.0, FORWARD)
+    assert rig.controller.status.velocity.x == pytest.approx(0.1)
+    rig.ask('relax')
+    rig.until(State.RELAX, FORWARD)
+    assert rig.controller.status.velocity.at_rest
+    feet = ROBOT.feet(rig.positions)
+    assert feet[0][2] == pytest.approx(ROBOT.legs[0].hip[2] - 0.055, abs=1e-6)
+    assert [line for line in rig.log if '->' in line] == [
+        'relax -> stand', 'stand -> walk', 'walk -> lie', 'lie -> relax',
+    ]  # fmt: skip
+
+
+def test_turning_ignores_the_linear_part() -> None:
+    """In TURN only the yaw rate counts."""
+    rig = standing()
+    rig.ask('turn')
+    rig.run(1.0, Velocity(0.2, 0.1, 0.5))
+    assert rig.controller.status.velocity == Velocity(yaw=0.5)
+
+
+def test_a_stream_that_breaks_off_stops_the_robot() -> None:
+    """Half a second after the last velocity the robot is on its way to rest, and says why."""
+    rig = standing()
+    rig.ask('walk')
+    rig.run(1.0, FORWARD)
+    rig.run(0.4)
+    assert rig.controller.status.velocity.x == pytest.approx(0.1)
+    rig.run(0.6)
+    assert rig.controller.status.velocity.at_rest
+    assert 'counts as zero' in rig.controller.status.warnings[0]
+    assert rig.is_in(State.WALK)
+    rig.run(0.5, FORWARD)
+    assert rig.controller.status.velocity.x == pytest.approx(0.1)
+
+
+def test_the_same_gait_by_all_of_its_names() -> None:
+    """gait:crawl walks with that gait; a wrong mode is answered with the list of all."""
+    rig = standing()
+    assert 'crawl' in rig.ask('gait:crawl')
+    rig.run(1.0, Velocity(0.02))
+    assert rig.controller.status.gait.value == 'crawl'
+    answer = rig.controller.set_mode('dance')
+    assert not answer.accepted
+    assert all(mode in answer.message for mode in MODES)
+
+
+@pytest.mark.parametrize('value', [math.nan, math.inf])
+def test_velocities_and_poses_that_are_no_numbers_are_refused(value: float) -> None:
+    """They stop the robot or change nothing, and are answered with a reason."""
+    rig = standing()
+    rig.ask('walk')
+    rig.run(0.5, FORWARD)
+    assert 'no number' in rig.controller.set_velocity(Velocity(0.1, value)).message
+    assert 'no number' in rig.controller.set_body_pose(BodyPose(roll=value)).message
+    rig.run(0.5)
+    assert rig.controller.status.velocity.at_rest
+    assert rig.controller.status.refused == 2
+
+
+def test_silent_joints_hold_then_fault_and_need_clearing() -> None:
+    """The legs stop at 0.2 s, the fault latches at 0.5 s, and nothing moves by itself after."""
+    rig = standing()
+    rig.ask('walk')
+    rig.run(1.0, FORWARD)
+    rig.joints = False
+    rig.run(0.3, FORWARD)
+    held = rig.positions
+    assert rig.is_in(State.WALK)
+    rig.run(0.3, FORWARD)
+    assert rig.is_in(State.FAULT)
+    assert rig.positions == held
+    assert not rig.controller.clear_fault().accepted
+    rig.joints = True
+    rig.run(1.0, FORWARD)
+    assert rig.positions == held
+    assert 'no joint states' in rig.controller.set_mode('walk').message
+    assert rig.controller.clear_fault().accepted
+    rig.run(1.0, FORWARD)
+    assert rig.positions == held
+    rig.ask('walk')
+    rig.until(State.WALK)
+
+
+def test_a_short_gap_is_survived() -> None:
+    """After 0.3 s of silence the robot walks on."""
+    rig = standing()
+    rig.ask('walk')
+    rig.run(1.0, FORWARD)
+    rig.joints = False
+    rig.run(0.3, FORWARD)
+    rig.joints = True
+    rig.run(1.0, FORWARD)
+    assert rig.is_in(State.WALK)
+    assert rig.controller.status.velocity.x == pytest.approx(0.1)
+
+
+def test_a_lost_attitude_stops_the_walk_on_its_feet() -> None:
+    """Without an attitude the gait ends in standing."""
+    rig = standing()
+    rig.ask('walk')
+    rig.run(1.0, FORWARD)
+    rig.imu = None
+    rig.run(2.0, FORWARD)
+    assert rig.is_in(State.FAULT)
+    assert rig.positions == pytest.approx(STAND, abs=1e-3)
+    rig.imu = UPRIGHT
+    rig.step()
+    assert rig.controller.clear_fault().message == 'cleared; the mode is stand'
+
+
+def test_an_attitude_may_be_done_without() -> None:
+    """With require_imu off the robot walks without it."""
+    parameters = StateParameters(require_imu=False)
+    rig = Rig(Controller(ROBOT, GaitParameters(), parameters))
+    rig.imu = None
+    standing(rig).ask('walk')
+    rig.run(1.0, FORWARD)
+    assert rig.is_in(State.WALK)
+
+
+def test_a_fallen_robot_stops_moving() -> None:
+    """A tilt that lasts is a fault; on its side the robot refuses to get up again."""
+    rig = standing()
+    rig.ask('walk')
+    rig.run(1.0, FORWARD)
+    rig.imu = tilted(1.2)
+    rig.run(0.06, FORWARD)
+    assert rig.is_in(State.WALK)
+    rig.run(0.1, FORWARD)
+    assert rig.is_in(State.FAULT)
+    held = rig.positions
+    rig.run(1.0, FORWARD)
+    assert rig.positions == held
+    assert 'tilted by 69 deg' in rig.controller.clear_fault().message
+    rig.imu = UPRIGHT
+    rig.step()
+    assert rig.controller.clear_fault().message == 'cleared; the mode is relax'
+
+
+def test_whirling_is_falling() -> None:
+    """A body that turns faster than any gait does is a fault too."""
+    rig = standing()
+    rig.imu = replace(UPRIGHT, angular_velocity=(9.0, 0.0, 0.0))
+    rig.run(0.2)
+    assert rig.is_in(State.FAULT)
+
+
+def test_a_robot_that_is_carried_while_relaxed_is_no_fault() -> None:
+    """Tilting a relaxed robot latches nothing, but it does not stand up then."""
+    rig = Rig()
+    rig.imu = tilted(1.5)
+    rig.run(1.0)
+    assert rig.is_in(State.RELAX)
+    assert 'put it on its feet' in rig.controller.set_mode('stand').message
+
+
+def test_a_low_battery_lies_down() -> None:
+    """A charge that stays low ends every motion gently; one low reading does not."""
+    rig = standing()
+    rig.ask('walk')
+    rig.battery = 0.05
+    rig.run(1.0, FORWARD)
+    rig.battery = 0.5
+    rig.run(0.1, FORWARD)
+    assert rig.is_in(State.WALK)
+    rig.battery = 0.05
+    rig.run(6.0, FORWARD)
+    assert rig.is_in(State.FAULT)
+    feet = ROBOT.feet(rig.positions)
+    assert feet[0][2] == pytest.approx(ROBOT.legs[0].hip[2] - 0.055, abs=1e-6)
+    rig.battery = 0.9
+    rig.step()
+    assert rig.controller.clear_fault().message == 'cleared; the mode is lie'
+
+
+def test_the_stronger_reaction_prevails() -> None:
+    """A robot that falls while it lies down for its battery stops moving at once."""
+    rig = standing()
+    rig.battery = 0.01
+    rig.run(3.3)
+    assert rig.is_in(State.FAULT)
+    rig.imu = tilted(1.2)
+    rig.run(0.3)
+    held = rig.positions
+    rig.run(1.0)
+    assert rig.positions == held
+    assert len(rig.controller.status.faults) == 2
+
+
+def test_measurements_that_are_no_numbers_count_as_missing() -> None:
+    """NaN joints hold and fault like silence, and are named."""
+    rig = standing()
+    bad = Measurement(JointSample((math.nan,) * 12, (0.0,) * 12), UPRIGHT)
+    for _ in range(40):
+        output = rig.controller.step(bad, PERIOD)
+        assert output.targets == rig.positions
+    assert rig.is_in(State.FAULT)
+    assert rig.controller.status.refused == 40
+
+
+def test_other_joints_stay_where_they_are_or_go_where_told() -> None:
+    """An arm is left alone unless it was given a pose."""
+    for arm_pose, expected in (((), 0.4), ((-1.0,), -1.0)):
+        controller = Controller(ARM_ROBOT, GaitParameters(), StateParameters(), arm_pose=arm_pose)
+        rig = standing(Rig(controller, (*FOLDED, 0.4)))
+        rig.ask('walk')
+        rig.run(1.0, FORWARD)
+        assert rig.positions[12] == pytest.approx(expected)
+    with pytest.raises(ParameterError, match='arm_yaw_joint'):
+        Controller(ARM_ROBOT, GaitParameters(), StateParameters(), arm_pose=(1.0, 2.0))
+
+
+def test_the_policy_is_entered_and_left_from_standing() -> None:
+    """It is reset, gets the velocity, and gets none on the way out."""
+    rig, policy = policy_rig()
+    standing(rig).ask('policy')
+    rig.until(State.POLICY)
+    assert policy.resets == 1
+    rig.run(1.0, FORWARD)
+    assert policy.velocities[-1] == FORWARD
+    rig.ask('walk')
+    rig.until(State.WALK, FORWARD)
+    assert policy.velocities[-1].at_rest
+
+
+@pytest.mark.parametrize('walks', [False, True])
+def test_a_policy_that_fails_is_replaced_by_the_gait(walks: bool) -> None:
+    """Two bad answers are bridged, three in a row end it, without a jump and with the reason."""
+    rig, policy = policy_rig(policy_fallback_walks=walks)
+    standing(rig).ask('policy')
+    rig.until(State.POLICY)
+    rig.run(1.0, FORWARD)
+    policy.targets = None
+    rig.run(2 * PERIOD, FORWARD)
+    assert rig.is_in(State.POLICY)
+    rig.run(2.0, FORWARD)
+    assert rig.is_in(State.WALK if walks else State.STAND)
+    assert 'the policy was given up: broken on purpose' in rig.log
+
+
+def test_a_dry_run_watches_the_policy_only() -> None:
+    """The policy's targets are told beside those of the gait, and its mode is refused."""
+    policy = StillPolicy(STAND)
+    controller = Controller(
+        ROBOT, GaitParameters(), StateParameters(), policy=policy, dry_run=True
+    )
+    rig = standing(Rig(controller))
+    output = controller.step(Measurement(JointSample(rig.positions, (0.0,) * 12), UPRIGHT), PERIOD)
+    assert output.shadow == STAND
+    assert 'dry run' in controller.set_mode('policy').message
+
+
+def test_without_a_policy_its_mode_is_refused() -> None:
+    """The answer says which parameter is missing."""
+    assert 'policy_file' in standing().controller.set_mode('policy').message
+
+
+@pytest.mark.parametrize(
+    'values', [{'period': 0.0}, {'max_tilt': math.nan}, {'warn_age': 0.4}, {'hold_age': 0.6}]
+)
+def test_odd_parameters_are_refused(values: dict[str, float]) -> None:
+    """A parameter that makes no sense is named."""
+    with pytest.raises(ParameterError, match=next(iter(values))):
+        StateParameters(**values)  # type: ignore[arg-type]
+
+
+wild = st.floats(allow_nan=True, allow_infinity=True)
+moments = st.fixed_dictionaries(
+    {
+        'mode': st.sampled_from([*MODES, 'nonsense', None, None, None]),
+        'clear': st.booleans(),
+        'velocity': st.none() | st.builds(Velocity, wild, wild, wild)
+        | st.builds(Velocity, *[st.floats(-2, 2)] * 3),
+        'pose': st.none() | st.builds(BodyPose, *[st.floats(-0.5, 0.5)] * 6),
+        'joints': st.sampled_from(['follow', 'follow', 'follow', 'none', 'nan', 'blocked']),
+        'imu': st.sampled_from([UPRIGHT, UPRIGHT, UPRIGHT, None, tilted(0.3), tilted(1.5)]),
+        'battery': st.none() | st.floats(0.0, 1.0),
+        'policy': st.sampled_from([STAND, STAND, None, FOLDED, (5.0,) * 12]),
+        'dt': st.sampled_from([PERIOD] * 5 + [0.0, 0.001, 0.1, 1.0]),
+        'steps': st.integers(1, 40),
+    }
+)  # fmt: skip
+
+
+@settings(max_examples=60)
+@given(script=st.lists(moments, min_size=1, max_size=12))
+def test_no_sequence_of_events_makes_a_target_jump(script: list[dict[str, object]]) -> None:
+    """Whatever is asked and measured, targets are finite, in range, and bounded in their step."""
+    rig, policy = policy_rig()
+    controller = rig.controller
+    rig.run(0.1)
+    positions = previous = rig.positions
+    for moment in script:
+        policy.targets = moment['policy']  # type: ignore[assignment]
+        if moment['mode'] is not None:
+            controller.set_mode(str(moment['mode']))
+        if moment['clear']:
+            controller.clear_fault()
+        if moment['pose'] is not None:
+            controller.set_body_pose(moment['pose'])  # type: ignore[arg-type]
+        dt = float(moment['dt'])  # type: ignore[arg-type]
+        for _ in range(int(moment['steps'])):  # type: ignore[call-overload]
+            if moment['velocity'] is not None:
+                controller.set_velocity(moment['velocity'])  # type: ignore[arg-type]
+            measured = {
+                'follow': previous, 'blocked': positions, 'nan': (math.nan,) * 12, 'none': None,
+            }[str(moment['joints'])]  # fmt: skip
+            joints = JointSample(measured, (0.0,) * 12) if measured is not None else None
+            measurement = Measurement(joints, moment['imu'], moment['battery'])  # type: ignore[arg-type]
+            targets = controller.step(measurement, dt).targets
+            assert targets is not None
+            for target, before, limits in zip(targets, previous, ROBOT.limits, strict=True):
+                assert limits.lower <= target <= limits.upper
+                assert abs(target - before) <= limits.velocity * min(dt, 1.5 * PERIOD) + 1e-9
+            previous = targets
