@@ -86,6 +86,21 @@ def test_homing_as_an_action_and_as_a_service(isolation: Isolation) -> None:
         assert arm.client.trigger(f'{JOINT}/enable').success
 
 
+def test_many_homings_at_a_time_harm_nobody(isolation: Isolation) -> None:
+    """Goals that are refused because another one runs end at once, and the master goes on."""
+    with SimulatedArm(isolation) as arm:
+        client = ActionClient(arm.client.node, Home, f'{JOINT}/home')
+        assert client.wait_for_server(10.0)
+        for _ in range(5):
+            sent = [client.send_goal_async(Home.Goal(method=35)) for _ in range(6)]
+            arm.client.spin_until(lambda: all(goal.done() for goal in sent), 10.0, 'acceptance')  # noqa: B023
+            ends = [goal.result().get_result_async() for goal in sent]
+            arm.client.spin_until(lambda: all(end.done() for end in ends), 20.0, 'the results')  # noqa: B023
+            reached = [end.result().result.success for end in ends]
+            assert reached.count(True) == 1, [end.result().result.message for end in ends]
+        assert arm.client.trigger(f'{JOINT}/enable').success
+
+
 def test_halt_quick_stop_moves_and_streams(isolation: Isolation) -> None:
     """Halt keeps the drive enabled, quick stop does not; moves add up; streams end in a stop."""
     with SimulatedArm(isolation) as arm:

@@ -109,9 +109,23 @@ def test_joints_never_heard_of_are_silent_from_the_start() -> None:
     """In URDF order, without those that follow others."""
     publisher = Publisher(RobotJoint('a'), RobotJoint('b', Mimic('a')), RobotJoint('c'))
     assert publisher.aggregator.silent(0.0) == ['a', 'c']
-    publisher.hear('c', 1)
+    waited = round(STALE_AFTER * 1e9 / PERIOD_NS) + 1
+    for cycle in range(1, waited + 1):
+        publisher.hear('c', cycle)
+    assert publisher.sets == []
+    publisher.hear('c', waited + 1)
     assert publisher.sets[-1].names == ['c']
-    assert publisher.aggregator.silent(0.01) == ['a']
+    assert publisher.aggregator.silent(waited * 0.01) == ['a']
+
+
+def test_nobody_sees_half_a_robot_at_the_start() -> None:
+    """The first set that is published has every joint that has a drive."""
+    publisher = Publisher()
+    publisher.hear('elbow', 1)
+    publisher.hear('elbow', 2)
+    publisher.hear('wrist', 2)
+    publisher.hear('base', 2)
+    assert [state.names for state in publisher.sets] == [NAMES]
 
 
 def test_a_mimic_joint_follows_by_its_law_unless_it_is_heard_itself() -> None:

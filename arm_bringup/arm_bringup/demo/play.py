@@ -131,8 +131,9 @@ class Play:
             make_client: Makes the demo's ROS client, here in this thread.
         """
         ended = {Phase.STOPPING, Phase.STOPPED}
-        client = make_client(lambda: supervisor.phase in ended)
+        client: Client | None = None
         try:
+            client = make_client(lambda: supervisor.phase in ended)
             self._course(client, lambda: supervisor.phase is Phase.RUNNING)
             supervisor.stop(Outcome(0, 'the demo has ended'))
         except GivenUpError:
@@ -143,8 +144,8 @@ class Play:
             supervisor.stop(Outcome(1, f'{type(error).__name__}: {error}'))
             raise
         finally:
-            self._follow_stop(client, lambda: supervisor.phase is Phase.STOPPED)
-            client.close()
+            if client is not None:
+                self._accompany(client, lambda: supervisor.phase is Phase.STOPPED)
 
     def _course(self, client: Client, ready: Callable[[], bool]) -> None:
         init, mode, wave = self._services()
@@ -199,6 +200,12 @@ class Play:
             problems(figures, self._joints),
             warnings(figures),
         )
+
+    def _accompany(self, client: Client, stopped: Callable[[], bool]) -> None:
+        try:
+            self._follow_stop(client, stopped)
+        finally:
+            client.close()
 
     def _follow_stop(self, client: Client, stopped: Callable[[], bool]) -> None:
         """Keep the picture alive until everything has ended: the drives go to disabled in it."""

@@ -41,7 +41,8 @@ class JointAggregator:
 
     Drives on one bus share the stamp of their SYNC, so a round is one SYNC. A sample of a later
     stamp, or a second one of the same joint, ends a round that is still incomplete. Joints that
-    are silent are left out after a while instead of being invented.
+    are silent are left out after a while instead of being invented; until then nothing is
+    published without them, so that nobody sees a robot of one joint at the start.
     """
 
     def __init__(self, joints: Sequence[RobotJoint]) -> None:
@@ -57,6 +58,7 @@ class JointAggregator:
         self._round: set[str] = set()
         self._expected: set[str] = set()
         self._published = False
+        self._began: float | None = None  # steady time of the first sample in [s]
 
     def update(self, name: str, stamp: int, sample: JointSample, now: float) -> list[JointSet]:
         """Take a sample.
@@ -71,16 +73,18 @@ class JointAggregator:
             The sets that are ready now: none, one, or two when this sample both ended a round and
             completed the next.
         """
+        if self._began is None:
+            self._began = now
         ready = []
         if stamp > self._stamp or name in self._round:
-            if not self._published and self._round:
+            if not self._published and self._round and self._may_publish(now):
                 ready.append(self._close(now))
             self._expected = self._round
             self._round, self._stamp, self._published = set(), stamp, False
         self._round.add(name)
         self._samples[name] = sample
         self._heard[name] = now
-        if not self._published and self._round >= self._expected:
+        if not self._published and self._round >= self._expected and self._may_publish(now):
             ready.append(self._close(now))
         return ready
 
@@ -95,6 +99,11 @@ class JointAggregator:
             for joint in self._joints
             if joint.mimic is None and not self._is_heard(joint.name, now)
         ]
+
+    def _may_publish(self, now: float) -> bool:
+        """Whether every joint was heard, or has had its time to be."""
+        began = now if self._began is None else self._began
+        return now - began > STALE_AFTER or not self.silent(now)
 
     def _close(self, now: float) -> JointSet:
         self._published = True

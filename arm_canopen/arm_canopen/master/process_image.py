@@ -220,6 +220,12 @@ class ProcessImage:
             return entry
         return None
 
+    def mapped_output(self, index: int, subindex: int = 0) -> MappedObject | None:
+        """Return how an object stands in an RPDO, None when it is in none."""
+        for entry, position in self._mapped_outputs(index, subindex):
+            return entry.config.mapping[position]
+        return None
+
     def _mapped_outputs(self, index: int, subindex: int) -> Iterator[tuple[Output, int]]:
         for entry in self.outputs:
             for position, mapped in enumerate(entry.config.mapping):

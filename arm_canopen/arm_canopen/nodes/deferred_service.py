@@ -76,8 +76,10 @@ class DeferredServices:
             deferred = Deferred()
 
             def finish(future: Future[Any]) -> None:
-                respond(response, future)
-                deferred.resolve(response)
+                try:
+                    respond(response, future)
+                finally:  # a client gets an answer, also when it could not be filled in
+                    deferred.resolve(response)
 
             def finished(future: Future[Any]) -> None:
                 self._output.post(lambda: finish(future))

@@ -17,7 +17,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from ..exceptions import CanopenError, CodecError, SdoError
+from ..exceptions import CanopenError, SdoError
 from ..master.object_access import bytes_from_raw, number_from_raw, raw_from_bytes, raw_from_number
 from ..master.process_image import Input
 from ..master.remote_node import RemoteNode
@@ -143,6 +143,18 @@ class DeviceNode(Node):
         """Whether the driver of this device writes an object itself in each cycle."""
         return False
 
+    def check_owner(self, index: int) -> None:
+        """Refuse to write what the driver of this device writes.
+
+        Raises:
+            CanopenError: It writes the object itself in each cycle.
+        """
+        if self.owns_object(index):
+            raise CanopenError(
+                f'0x{index:04X} of {self.device.name} is written by its driver in each cycle; '
+                'use the services of the drive'
+            )
+
     def _received(self, entry: Input) -> None:
         values = entry.values or ()
         self.output.post(partial(self._publish_objects, entry, values))
@@ -159,23 +171,18 @@ class DeviceNode(Node):
             self.get_logger().warning(f'~/tpdo: {error}')
             return
         place = f'0x{message.index:04X}:{message.subindex:02X}'
-        output = self.device.image.output_of(message.index, message.subindex)
-        if output is None:
+        mapped = self.device.image.mapped_output(message.index, message.subindex)
+        writer = self.device.image.writer(message.index, message.subindex)
+        if mapped is None or writer is None:
             self.get_logger().warning(f'~/tpdo: {place} is in no RPDO of the device; map it')
             return
-        if self.owns_object(message.index):
-            self.get_logger().warning(
-                f'~/tpdo: {place} is written by the drive in each cycle; use its services'
-            )
+        try:
+            self.check_owner(message.index)
+            value = number_from_raw(mapped, message.data)
+        except CanopenError as error:
+            self.get_logger().warning(f'~/tpdo: {place}: {error}')
             return
-        for position, mapped in enumerate(output.config.mapping):
-            if (mapped.index, mapped.subindex) == (message.index, message.subindex):
-                try:
-                    value = number_from_raw(mapped, message.data)
-                except CodecError as error:
-                    self.get_logger().warning(f'~/tpdo: {place}: {error}')
-                    return
-                self._thread.call(partial(output.values.__setitem__, position, value))
+        self._thread.call(partial(writer.write, value))
 
     def _offer_nmt(self, name: str, command: NmtCommand) -> None:
         node_id = self.device.config.node_id
@@ -202,6 +209,7 @@ class DeviceNode(Node):
         device, index, subindex = self.device, request.index, request.subindex
 
         def write() -> Promise[None]:
+            self.check_owner(index)
             data = bytes_from_raw(device.entry(index, subindex).data_type, request.data)
             return device.sdo.write(index, subindex, data, device.config.sdo_timeout)
 

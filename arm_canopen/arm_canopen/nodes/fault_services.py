@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from concurrent.futures import CancelledError
+from concurrent.futures import TimeoutError as FutureTimeoutError
 from functools import partial
 import re
 import time
@@ -110,7 +111,7 @@ class FaultServices:
         try:
             response.message = work()
             response.success = True
-        except (ValueError, TimeoutError, CancelledError) as error:
+        except (ValueError, FutureTimeoutError, CancelledError) as error:
             response.message = str(error) or 'the simulated devices do not run'
             response.success = False
         log = self._node.get_logger().info if response.success else self._node.get_logger().warning

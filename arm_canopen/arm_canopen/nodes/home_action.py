@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from concurrent.futures import Future
+from dataclasses import dataclass, field
 from functools import partial
 import math
 import time
@@ -27,6 +28,17 @@ if TYPE_CHECKING:
 FEEDBACK_PERIOD = 0.1  # [s]
 
 
+@dataclass(slots=True)
+class _Homing:
+    """A goal from its acceptance to its end."""
+
+    phase: str = HomingProgress.ENABLING.value
+    begin: float = field(default_factory=time.monotonic)
+    timer: Any = None
+    task: Promise[str] | None = None
+    result: Any = None
+
+
 class HomeAction:
     """The action ``~/home`` of one axis.
 
@@ -47,8 +59,7 @@ class HomeAction:
         self._commands = commands
         self._thread = thread
         self._output = output
-        self._phases: dict[bytes, str] = {}
-        self._results: dict[bytes, Home.Result] = {}
+        self._goals: dict[bytes, _Homing] = {}
         self._server = ActionServer(
             node,
             Home,
@@ -61,51 +72,62 @@ class HomeAction:
     def _start(self, goal: Any) -> None:  # noqa: ANN401  # rclpy has no types here
         # goal.execute() would end the goal when its callback returns, which is now
         goal._update_state(rclpy_implementation.GoalEvent.EXECUTE)  # noqa: SLF001
-        begin = time.monotonic()
-        key = bytes(goal.goal_id.uuid)
-        self._phases[key] = HomingProgress.ENABLING.value
-        timer = self._node.create_timer(
-            FEEDBACK_PERIOD, lambda: self._publish_feedback(goal, time.monotonic() - begin)
+        homing = _Homing()
+        self._goals[bytes(goal.goal_id.uuid)] = homing
+        # made and destroyed in the executor only: it may be about to run the timer
+        homing.timer = self._node.create_timer(
+            FEEDBACK_PERIOD, partial(self._publish_feedback, goal, homing)
         )
 
         def tell(progress: HomingProgress) -> None:
-            self._phases[key] = progress.value
+            homing.phase = progress.value
 
         def run() -> Promise[str]:
             self._node.admit()
             method = goal.request.method or None
-            return self._commands.run('home', self._commands.home(method, tell))
+            homing.task = self._commands.run('home', self._commands.home(method, tell))
+            return homing.task
 
         def finished(future: Future[str]) -> None:
-            self._output.post(partial(self._finish, goal, timer, future))
+            self._output.post(partial(self._finish, goal, homing, future))
 
         self._thread.run(run).add_done_callback(finished)
 
     def _cancel(self, goal: Any) -> CancelResponse:  # noqa: ANN401
-        self._thread.call(lambda: self._commands.cancel('homing was cancelled'))
+        homing = self._goals.get(bytes(goal.goal_id.uuid))
+
+        def cancel() -> None:
+            # only its own command; another one may run by now
+            if homing is not None and homing.task is not None and not homing.task.done:
+                self._commands.cancel('homing was cancelled')
+
+        self._thread.call(cancel)
         return CancelResponse.ACCEPT
 
-    def _publish_feedback(self, goal: Any, elapsed: float) -> None:  # noqa: ANN401
-        phase = self._phases.get(bytes(goal.goal_id.uuid))
-        if phase is not None and goal.is_active:
-            position = self._commands.drive.position
-            goal.publish_feedback(Home.Feedback(phase=phase, position=position, elapsed=elapsed))
+    def _publish_feedback(self, goal: Any, homing: _Homing) -> None:  # noqa: ANN401
+        if homing.result is None and goal.is_active:
+            elapsed = time.monotonic() - homing.begin
+            goal.publish_feedback(
+                Home.Feedback(phase=homing.phase, position=self._position(), elapsed=elapsed)
+            )
 
-    def _finish(self, goal: Any, timer: Any, future: Future[str]) -> None:  # noqa: ANN401
-        self._node.destroy_timer(timer)
-        key = bytes(goal.goal_id.uuid)
-        self._phases.pop(key, None)
-        error = future.exception()
+    def _position(self) -> float:
         drive = self._commands.drive
-        self._results[key] = Home.Result(
+        return drive.position if drive.objects.known else math.nan
+
+    def _finish(self, goal: Any, homing: _Homing, future: Future[str]) -> None:  # noqa: ANN401
+        error = future.exception()
+        homing.result = Home.Result(
             success=error is None,
             message=future.result() if error is None else str(error),
-            position=drive.position if drive.objects.known else math.nan,
+            position=self._position(),
         )
         self._server.notify_execute(goal, None)  # leads to _conclude, in the executor
 
     def _conclude(self, goal: Any) -> Home.Result:  # noqa: ANN401
-        result = self._results.pop(bytes(goal.goal_id.uuid))
+        homing = self._goals.pop(bytes(goal.goal_id.uuid))
+        self._node.destroy_timer(homing.timer)
+        result = homing.result
         if result.success:
             goal.succeed()
         elif goal.is_cancel_requested:

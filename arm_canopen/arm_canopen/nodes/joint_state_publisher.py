@@ -10,6 +10,7 @@ import time
 
 from rcl_interfaces.msg import ParameterDescriptor
 import rclpy
+from rclpy.exceptions import InvalidTopicNameException, ParameterException
 from rclpy.node import Node
 from rclpy.time import Time
 from rclpy.utilities import try_shutdown
@@ -45,11 +46,20 @@ class JointStatePublisher(Node):
         self._silent: list[str] = []
         self._publisher = self.create_publisher(JointState, 'joint_states', 10)
         for joint in joints:
-            topic = f'{joint.name}/joint_states'
-            self.create_subscription(JointState, topic, partial(self._take, joint.name), 10)
+            self._listen_to(joint.name)
         self.create_timer(WATCH_PERIOD, self._watch)
         names = ', '.join(joint.name for joint in joints)
         self.get_logger().info(f'publishing {len(joints)} joints: {names}')
+
+    def _listen_to(self, joint: str) -> None:
+        topic = f'{joint}/joint_states'
+        try:
+            self.create_subscription(JointState, topic, partial(self._take, joint), 10)
+        except InvalidTopicNameException:
+            self.get_logger().error(
+                f'joint {joint!r} cannot be the name of a ROS topic, so no drive reports it; it '
+                'may have letters, digits and _, beginning with a letter'
+            )
 
     def _take(self, joint: str, message: JointState) -> None:
         if joint not in message.name:
@@ -93,7 +103,7 @@ def main() -> None:
     rclpy.init()
     try:
         node = JointStatePublisher()
-    except CanopenError as error:
+    except (CanopenError, ParameterException) as error:
         rclpy.logging.get_logger('canopen_joint_state_publisher').fatal(str(error))
         try_shutdown()
         sys.exit(1)

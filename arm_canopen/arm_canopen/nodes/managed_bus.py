@@ -28,7 +28,7 @@ class ManagedBus:
     A device that is not active obeys nothing. Deactivating a drive stops and disables it.
 
     Attributes:
-        manager: The node ``/lifecycle_manager``.
+        manager: The node ``lifecycle_manager``, in the namespace of the master.
     """
 
     def __init__(
@@ -58,7 +58,7 @@ class ManagedBus:
             LifecycleServices(device, entry, thread, output)
             managed.append(entry)
         supervisor = Supervisor(self._master, managed, self._scheduler)
-        self.manager = Node(MANAGER)
+        self.manager = Node(MANAGER, namespace=node.get_namespace())
         text = ParameterDescriptor(
             description='accepted for ros2_canopen; not needed', read_only=True
         )

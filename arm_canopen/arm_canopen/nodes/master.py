@@ -13,6 +13,7 @@ import threading
 
 from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
 import rclpy
+from rclpy.exceptions import ParameterException
 from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
@@ -23,6 +24,7 @@ from ..can.bus import Bus
 from ..config import load_bus
 from ..config.model import BusConfig
 from ..exceptions import CanopenError
+from .managed_bus import MANAGER
 from .master_process import MasterProcess
 from .misspelt import refuse_misspelt
 from .spinning import make_executor, stop_on_signals, WAKE_PERIOD
@@ -50,7 +52,7 @@ def run_master(args: Sequence[str] | None = None, *, extend: Extend | None = Non
     stop = stop_on_signals()
     try:
         _run(stop, extend)
-    except CanopenError as error:
+    except (CanopenError, ParameterException) as error:
         get_logger('master').fatal(str(error))
         return 1
     finally:
@@ -132,7 +134,10 @@ def _check_names(configs: Sequence[BusConfig]) -> None:
     """Refuse two nodes of one name, which would answer each other's services."""
     taken: set[tuple[str, str]] = set()
     for config in configs:
-        names = [(config.master.namespace.strip('/'), 'master')]
+        namespace = config.master.namespace.strip('/')
+        names = [(namespace, 'master')]
+        if config.master.is_lifecycle:
+            names.append((namespace, MANAGER))
         names += [(node.namespace.strip('/'), node.name) for node in config.nodes]
         for name in names:
             if name in taken:

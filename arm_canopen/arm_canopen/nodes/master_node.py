@@ -40,6 +40,8 @@ class MasterServices:
 
     Attributes:
         admit: Called for every request; raises CanopenError when none is taken at the moment.
+        check_owner: Called with node id and object index before an SDO write; raises CanopenError
+            when the driver of that device writes the object itself.
     """
 
     def __init__(self, node: Node, thread: NetworkThread, output: OutputThread) -> None:
@@ -51,6 +53,7 @@ class MasterServices:
             output: The thread that answers.
         """
         self.admit: Callable[[], None] = lambda: None
+        self.check_owner: Callable[[int, int], None] = lambda node_id, index: None
         self._node = node
         self._thread = thread
         services = DeferredServices(output)
@@ -76,6 +79,7 @@ class MasterServices:
     def _write(self, request: COWriteID.Request) -> Future[None]:
         def write() -> Promise[None]:
             self.admit()
+            self.check_owner(request.nodeid, request.index)
             data = bytes_from_raw(_data_type(request.canopen_datatype), request.data)
             client = self._thread.network.sdo_client(_node_id(request.nodeid))
             return client.write(request.index, request.subindex, data, SDO_TIMEOUT)

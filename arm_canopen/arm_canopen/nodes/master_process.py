@@ -36,6 +36,7 @@ from .output_thread import OutputThread
 
 LISTENER_PERIOD = 0.1  # [s] how soon a new subscriber hears something
 LAST_WORD_TIMEOUT = 0.5  # [s] for the last /diagnostics
+ATTACH_TIMEOUT = 1.0  # [s] for what the next cycle does
 STOP_TIMEOUT = 8.0  # [s] for all drives to stop; each has its own shorter limits
 
 JointSample = tuple[DriveNode, list[tuple[float, float, float]]]
@@ -84,6 +85,7 @@ class MasterProcess:
             if device.config.is_drive
         }
         services = MasterServices(node, self._thread, self._output)
+        services.check_owner = self._check_owner
         self._diagnostics = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
         node.create_timer(diagnostics_period, self._ask_diagnostics)
         node.create_timer(LISTENER_PERIOD, self._update_listeners)
@@ -126,11 +128,11 @@ class MasterProcess:
         Raises:
             KeyError: An axis is no drive of this bus.
         """
-        self._thread.call(lambda: self._group.attach(source)).result()
+        self._thread.call(lambda: self._group.attach(source)).result(ATTACH_TIMEOUT)
 
     def detach(self, source: MotionSource) -> None:
         """End a motion source, from any thread; drives that it moved are braked."""
-        self._thread.call(lambda: self._group.detach(source)).result()
+        self._thread.call(lambda: self._group.detach(source)).result(ATTACH_TIMEOUT)
 
     def _build_drives(self) -> MotionGroup:
         scheduler = self._network.scheduler
@@ -142,6 +144,11 @@ class MasterProcess:
         ]
         self._commands = {drive.name: DriveCommands(drive, scheduler) for drive in drives}
         return MotionGroup(drives, self._report)
+
+    def _check_owner(self, node_id: int, index: int) -> None:
+        for node in self._drives.values():
+            if node.device.config.node_id == node_id:
+                node.check_owner(index)
 
     def _axes(self, device: RemoteNode) -> list[DriveCommands]:
         return [entry for entry in self._commands.values() if entry.drive.node is device]

@@ -65,9 +65,9 @@ class ObjectServices:
 
         async def write() -> Transfer:
             entry = find_object(device.config.dictionary, path)
-            if self._node.owns_object(entry.index):
-                raise CanopenError(f'{entry} is written by the drive itself; use its services')
+            self._node.check_owner(entry.index)
             data = bytes(request.data) or bytes_from_text(entry.data_type, request.value)
+            text_from_bytes(entry.data_type, data)  # refuses raw bytes that are no such value
             await device.sdo.write(*entry.address, data, device.config.sdo_timeout)
             return entry, data
 

@@ -29,7 +29,10 @@ def make_executor() -> Executor:
 
 
 def stop_on_signals() -> threading.Event:
-    """Set an event at the first SIGINT or SIGTERM; the second one ends the process at once.
+    """Set an event at the first SIGINT or SIGTERM; a second SIGINT ends the process at once.
+
+    A SIGTERM does not: what stops processes (``ros2 launch``, say) sends one when the first
+    signal seems to do nothing, while the drives come to rest.
 
     For programs that must not be interrupted anywhere: initialise rclpy with
     ``SignalHandlerOptions.NO``, call this, and hand the event to :func:`spin`.
@@ -37,7 +40,7 @@ def stop_on_signals() -> threading.Event:
     stop = threading.Event()
 
     def handle(number: int, _frame: object) -> None:
-        if stop.is_set():
+        if stop.is_set() and number == signal.SIGINT:
             signal.signal(number, signal.SIG_DFL)
             signal.raise_signal(number)
         stop.set()
