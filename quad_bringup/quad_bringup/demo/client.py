@@ -1,0 +1,238 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The demo's ROS client: commands velocities, asks for modes, and hears what comes of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+import math
+import time
+from typing import Any
+
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import Quaternion, Twist
+from nav_msgs.msg import Odometry
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import qos_profile_sensor_data, QoSProfile
+from rclpy.signals import SignalHandlerOptions
+from sensor_msgs.msg import BatteryState, Imu, JointState
+
+from quad_msgs.msg import JointCommand
+from quad_msgs.srv import SetMode
+
+from ..exceptions import CallError, GivenUpError
+from .figures import Figures, UNKNOWN
+from .itinerary import STANDSTILL, Velocity
+from .play import Milestones
+from .rhythm import Beat
+from .track import Pose, tilt_of, Track
+
+SPIN = 0.05
+"""Longest time in [s] after which a wait looks whether it shall be given up."""
+COMMAND_PERIOD = 0.1
+"""Time in [s] between two velocity commands; the controller's time-out is 0.5 s."""
+LOOP_PERIOD = 0.02
+"""Period of the controller in [s]."""
+CONTROLLER = 'controller_node'
+"""Node whose status in /diagnostics has the state."""
+COMMAND_QOS = QoSProfile(depth=1)
+"""Of /joint_command: reliable, only the latest."""
+
+
+class QuadClient:
+    """A node of its own; use it in one thread."""
+
+    def __init__(
+        self, joints: Sequence[str], ground_truth: str, given_up: Callable[[], bool]
+    ) -> None:
+        """Join the ROS graph.
+
+        Args:
+            joints: Names of the joints, in the order of /joint_command.
+            ground_truth: Topic on which the simulator says where the body is.
+            given_up: True when nothing shall be waited for any more.
+        """
+        self._joints = list(joints)
+        self._given_up = given_up
+        self._truth, self._odometry = Track(), Track()
+        self._beat = Beat(LOOP_PERIOD)
+        self._commanded: Velocity | None = None
+        self._state, self._fault = UNKNOWN, ''
+        self._height = self._tilt = self._tilt_max = self._battery = math.nan
+        self._targets: Mapping[str, float] = {}
+        self._positions: Mapping[str, float] = {}
+        self._context = Context()
+        rclpy.init(context=self._context, signal_handler_options=SignalHandlerOptions.NO)
+        self._node = Node('demo', context=self._context, enable_rosout=False)
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self._node)
+        self._twist = self._node.create_publisher(Twist, 'cmd_vel', 1)
+        self._modes = self._node.create_client(SetMode, 'set_mode')
+        self._node.create_timer(COMMAND_PERIOD, self._send)
+        self._subscribe(ground_truth)
+
+    def _subscribe(self, ground_truth: str) -> None:
+        sensor = qos_profile_sensor_data
+        topics: Iterable[tuple[Any, str, Callable[[Any], None], Any]] = (
+            (Odometry, ground_truth, self._take_truth, sensor),
+            (Odometry, 'odom', self._take_odometry, sensor),
+            (Imu, 'imu', self._take_imu, sensor),
+            (JointState, 'joint_states', self._take_joints, sensor),
+            (BatteryState, 'battery_state', self._take_battery, sensor),
+            (JointCommand, 'joint_command', self._take_targets, COMMAND_QOS),
+            (DiagnosticArray, '/diagnostics', self._take_diagnostics, 50),
+        )
+        for kind, topic, callback, qos in topics:
+            self._node.create_subscription(kind, topic, callback, qos)
+
+    def close(self) -> None:
+        """Leave the ROS graph."""
+        self._executor.shutdown()
+        self._node.destroy_node()
+        self._context.try_shutdown()
+
+    @property
+    def figures(self) -> Figures:
+        """What was heard last."""
+        return Figures(
+            state=self._state,
+            fault=self._fault,
+            commanded=self._commanded or STANDSTILL,
+            measured=self._truth.velocity,
+            odometry=self._odometry.velocity,
+            height=self._height,
+            tilt=self._tilt,
+            tilt_max=self._tilt_max,
+            targets=self._targets,
+            positions=self._positions,
+            rhythm=self._beat.rhythm(),
+            battery=self._battery,
+        )
+
+    @property
+    def milestones(self) -> Milestones:
+        """What the body has covered so far."""
+        return Milestones(self._truth.milestone, self._odometry.milestone)
+
+    def command(self, velocity: Velocity | None) -> None:
+        """Command a velocity from now on, ten times a second.
+
+        Args:
+            velocity: What to command; None to be silent.
+        """
+        self._commanded = velocity
+        self._send()
+
+    def watch_tilt(self) -> None:
+        """Measure the greatest tilt, and the rhythm of the loop, from now on."""
+        self._tilt_max = self._tilt
+        self._beat = Beat(LOOP_PERIOD)
+
+    def set_mode(self, mode: str, timeout: float) -> str:
+        """Ask the controller for a mode.
+
+        Args:
+            mode: One that it knows.
+            timeout: Longest time in [s] for an answer.
+
+        Returns:
+            What it answered.
+
+        Raises:
+            CallError: It refused, or did not answer in time.
+            GivenUpError: It is no longer wanted.
+        """
+        end = time.monotonic() + timeout
+        self.wait_until(self._modes.service_is_ready, timeout, 'the service /set_mode')
+        future = self._modes.call_async(SetMode.Request(mode=mode))
+        left = max(0.0, end - time.monotonic())
+        self.wait_until(future.done, left, f'an answer of /set_mode to {mode!r}')
+        answer: SetMode.Response = future.result()
+        if not answer.success:
+            raise CallError(f'the mode {mode!r} was refused: {answer.message}')
+        return str(answer.message)
+
+    def listen(self, duration: float) -> None:
+        """Hear what comes in.
+
+        Args:
+            duration: For how long in [s].
+        """
+        end = time.monotonic() + duration
+        while (left := end - time.monotonic()) > 0:
+            self._executor.spin_once(timeout_sec=left)
+
+    def wait_until(self, condition: Callable[[], bool], timeout: float, what: str) -> None:
+        """Wait for something.
+
+        Args:
+            condition: True when it is there; asked after whatever comes in.
+            timeout: Longest time in [s].
+            what: What is waited for, for the message.
+
+        Raises:
+            CallError: It did not come in time.
+            GivenUpError: It is no longer wanted.
+        """
+        end = time.monotonic() + timeout
+        while not condition():
+            if time.monotonic() > end:
+                raise CallError(f'waited {timeout:g} s in vain for {what}')
+            if self._given_up():
+                raise GivenUpError(what)
+            self._executor.spin_once(timeout_sec=SPIN)
+
+    def _send(self) -> None:
+        if self._commanded is None:
+            return
+        twist = Twist()
+        twist.linear.x, twist.linear.y = self._commanded.forward, self._commanded.left
+        twist.angular.z = self._commanded.turn
+        self._twist.publish(twist)
+
+    def _take_truth(self, message: Odometry) -> None:
+        pose = _pose(message)
+        self._truth.take(pose)
+        self._height = pose.z
+
+    def _take_odometry(self, message: Odometry) -> None:
+        self._odometry.take(_pose(message))
+
+    def _take_imu(self, message: Imu) -> None:
+        self._tilt = tilt_of(_rotation(message.orientation))
+        self._tilt_max = max(self._tilt, self._tilt_max)
+
+    def _take_joints(self, message: JointState) -> None:
+        self._positions = dict(zip(message.name, message.position, strict=False))
+
+    def _take_battery(self, message: BatteryState) -> None:
+        self._battery = 100.0 * message.percentage
+
+    def _take_targets(self, message: JointCommand) -> None:
+        self._beat.take(_seconds(message.header.stamp))
+        self._targets = dict(zip(self._joints, message.position, strict=False))
+
+    def _take_diagnostics(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            if CONTROLLER in status.name:
+                values = {each.key: each.value for each in status.values}
+                self._state = values.get('state', self._state)
+                self._fault = status.message if self._state == 'fault' else ''
+
+
+def _seconds(stamp: Time) -> float:
+    return float(stamp.sec + 1e-9 * stamp.nanosec)
+
+
+def _rotation(quaternion: Quaternion) -> tuple[float, float, float, float]:
+    return (quaternion.x, quaternion.y, quaternion.z, quaternion.w)
+
+
+def _pose(message: Odometry) -> Pose:
+    position = message.pose.pose.position
+    rotation = _rotation(message.pose.pose.orientation)
+    return Pose(_seconds(message.header.stamp), position.x, position.y, position.z, rotation)

@@ -1,0 +1,90 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What the demo's robot is told to do, stretch by stretch."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+import itertools
+
+SHORTEST = 6.0
+"""Least duration in [s] in which every stretch can show something."""
+SETTLING = 1.0
+"""Time in [s] of a stretch that is not measured: the robot takes up speed."""
+SETTLING_SHARE = 0.4
+"""Largest part of a stretch that is settling."""
+USUAL = 20.0
+"""Duration in [s] of a round when the demo has no end."""
+
+
+@dataclass(frozen=True, slots=True)
+class Velocity:
+    """A velocity of the body in its own frame (REP 103).
+
+    Attributes:
+        forward: Along x in [m/s].
+        left: Along y in [m/s].
+        turn: About z, counter-clockwise, in [rad/s].
+    """
+
+    forward: float = 0.0
+    left: float = 0.0
+    turn: float = 0.0
+
+
+STANDSTILL = Velocity()
+
+
+@dataclass(frozen=True, slots=True)
+class Stretch:
+    """A part of the demo with one velocity.
+
+    Attributes:
+        name: What it shows.
+        velocity: What is commanded.
+        duration: How long in [s].
+    """
+
+    name: str
+    velocity: Velocity
+    duration: float
+
+    @property
+    def settling(self) -> float:
+        """Time in [s] from its beginning that is not measured."""
+        return min(SETTLING, SETTLING_SHARE * self.duration)
+
+
+SHARES = (
+    ('walk', Velocity(forward=0.2), 0.4),
+    ('turn', Velocity(turn=0.8), 0.25),
+    ('strafe', Velocity(left=0.1), 0.25),
+    ('stop', STANDSTILL, 0.1),
+)
+"""Stretches of a round, with their share of its time; speeds that the XGO's gait is made for."""
+
+
+def one_round(duration: float) -> list[Stretch]:
+    """Plan a round.
+
+    Args:
+        duration: Its time in [s].
+
+    Raises:
+        ValueError: That is too short to show anything.
+    """
+    if not duration >= SHORTEST:
+        raise ValueError(f'{duration:g} s is too short; the demo needs {SHORTEST:g} s')
+    return [Stretch(name, velocity, share * duration) for name, velocity, share in SHARES]
+
+
+def itinerary(duration: float | None) -> Iterator[Stretch]:
+    """Say what comes after what.
+
+    Args:
+        duration: Time in [s] for one round; None for rounds without end.
+    """
+    if duration is not None:
+        return iter(one_round(duration))
+    return itertools.cycle(one_round(USUAL))

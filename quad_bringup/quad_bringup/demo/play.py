@@ -1,0 +1,249 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The course of the demo: stand up, walk, turn, strafe, stop, lie down."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+import math
+import threading
+import time
+from typing import Protocol
+
+from process_supervisor import Outcome, Phase
+from process_supervisor.display import Display
+
+from ..exceptions import CallError, GivenUpError
+from .figures import Figures
+from .itinerary import itinerary, STANDSTILL, Stretch, Velocity
+from .report import Measured, problems, summary_lines
+from .track import mean_velocity, Milestone
+
+REFRESH = 0.2
+"""Time between two pictures in [s]."""
+MODE_TIMEOUT = 15.0
+"""Longest time in [s] for a mode to be reached."""
+KEPT_STRETCHES = 40
+"""How many stretches a demo without end remembers for its summary."""
+
+
+@dataclass(frozen=True, slots=True)
+class Milestones:
+    """What the body has covered, as two sources tell it; None for a silent one.
+
+    Attributes:
+        measured: The simulator.
+        odometry: /odom.
+    """
+
+    measured: Milestone | None
+    odometry: Milestone | None
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """How a demo went.
+
+    Attributes:
+        summary: The lines of its summary, empty when it did not get as far as walking.
+        problems: What went wrong.
+    """
+
+    summary: list[str]
+    problems: list[str]
+
+
+class Client(Protocol):
+    """What the demo needs of ROS; :class:`.client.QuadClient` is the real one."""
+
+    @property
+    def figures(self) -> Figures:
+        """What was heard last."""
+
+    @property
+    def milestones(self) -> Milestones:
+        """What the body has covered so far."""
+
+    def command(self, velocity: Velocity | None) -> None:
+        """Command a velocity from now on, again and again; None to be silent."""
+
+    def watch_tilt(self) -> None:
+        """Measure the greatest tilt from now on."""
+
+    def set_mode(self, mode: str, timeout: float) -> str:
+        """Ask for a mode; return the answer."""
+
+    def wait_until(self, condition: Callable[[], bool], timeout: float, what: str) -> None:
+        """Wait for something."""
+
+    def listen(self, duration: float) -> None:
+        """Hear what comes in."""
+
+    def close(self) -> None:
+        """Leave the ROS graph."""
+
+
+MakeClient = Callable[[Callable[[], bool]], Client]
+"""Joins the ROS graph; the client asks the argument whether its waiting shall be given up."""
+
+
+class Supervisor(Protocol):
+    """What the demo needs of the supervisor of its processes."""
+
+    @property
+    def phase(self) -> Phase:
+        """What it is doing."""
+
+    def stop(self, outcome: Outcome) -> None:
+        """Ask for an orderly end."""
+
+
+class Play:
+    """Runs the demo in a thread of its own, beside the supervisor.
+
+    Attributes:
+        result: How it went, when the thread has ended.
+    """
+
+    def __init__(self, display: Display[Figures], mode: str, duration: float | None) -> None:
+        """Prepare; nothing happens yet.
+
+        Args:
+            display: Where it is shown.
+            mode: Mode in which it walks.
+            duration: How long it walks in [s]; None until :meth:`leave`.
+        """
+        self.result = Result([], [])
+        self._display = display
+        self._mode = mode
+        self._duration = duration
+        self._measured: list[Measured] = []
+        self._leaving = threading.Event()
+        self._up = threading.Event()
+        self._next_picture = 0.0
+        self._phase = ''
+
+    @property
+    def left(self) -> bool:
+        """The user asked for the end."""
+        return self._leaving.is_set()
+
+    def leave(self) -> bool:
+        """Ask for the end, from any thread.
+
+        Returns:
+            True when the robot is on its feet: then it lies down first.
+        """
+        self._leaving.set()
+        return self._up.is_set()
+
+    def run(self, supervisor: Supervisor, make_client: MakeClient) -> None:
+        """Run until the end, and stop the supervisor then.
+
+        Args:
+            supervisor: About to be run in the main thread.
+            make_client: Makes the demo's ROS client, here in this thread.
+        """
+        ended = {Phase.STOPPING, Phase.STOPPED}
+        client = make_client(lambda: supervisor.phase in ended)
+        try:
+            self._course(client, lambda: supervisor.phase is Phase.RUNNING)
+            supervisor.stop(Outcome(0, 'the demo has ended'))
+        except GivenUpError:
+            pass  # the supervisor knows why
+        except CallError as error:
+            supervisor.stop(Outcome(1, str(error)))
+        except Exception as error:
+            supervisor.stop(Outcome(1, f'{type(error).__name__}: {error}'))
+            raise
+        finally:
+            self._follow_stop(client, lambda: supervisor.phase is Phase.STOPPED)
+            client.close()
+
+    def _course(self, client: Client, ready: Callable[[], bool]) -> None:
+        self._enter('starting')
+        self._wait(client, ready, math.inf, 'the processes')
+        self._reach(client, 'stand', 'standing up')
+        self._up.set()
+        client.watch_tilt()
+        self._reach(client, self._mode, self._mode)
+        for stretch in itinerary(self._duration):
+            if self.left:
+                break
+            self._go(client, stretch)
+        self._conclude(client.figures)
+        client.command(STANDSTILL)
+        self._reach(client, 'lie', 'lying down')
+        client.command(None)
+
+    def _reach(self, client: Client, mode: str, phase: str) -> None:
+        """Ask for a mode and wait until it is there."""
+        self._enter(phase)
+        client.set_mode(mode, MODE_TIMEOUT)
+        self._wait(client, lambda: client.figures.state == mode, MODE_TIMEOUT, f'mode {mode}')
+
+    def _go(self, client: Client, stretch: Stretch) -> None:
+        """Command the velocity of a stretch, and measure what comes of it."""
+        self._enter(stretch.name)
+        client.command(stretch.velocity)
+        begin = time.monotonic()
+        self._wait_for_time(client, begin + stretch.settling)
+        before = client.milestones
+        self._wait_for_time(client, begin + stretch.duration)
+        after = client.milestones
+        if self.left:
+            return  # cut short: that is no measurement
+        measured = Measured(
+            stretch,
+            _between(before.measured, after.measured),
+            _between(before.odometry, after.odometry),
+        )
+        self._measured = [*self._measured, measured][-KEPT_STRETCHES:]
+
+    def _wait_for_time(self, client: Client, end: float) -> None:
+        self._wait(client, lambda: self.left or time.monotonic() >= end, math.inf, 'the time')
+
+    def _wait(
+        self, client: Client, condition: Callable[[], bool], timeout: float, what: str
+    ) -> None:
+        """Wait for something while the picture goes on; a fault of the controller ends it."""
+
+        def reached() -> bool:
+            self._show(client)
+            if client.figures.fault:
+                self._conclude(client.figures)
+                raise CallError(f'the controller is in a fault: {client.figures.fault}')
+            return condition()
+
+        client.wait_until(reached, timeout, what)
+
+    def _enter(self, phase: str) -> None:
+        if phase != self._phase:
+            self._phase = phase
+            self._display.phase(phase)
+
+    def _show(self, client: Client) -> None:
+        now = time.monotonic()
+        if now >= self._next_picture:
+            self._next_picture = now + REFRESH
+            self._display.show(client.figures)
+
+    def _conclude(self, figures: Figures) -> None:
+        if self._measured:
+            self.result = Result(
+                summary_lines(figures, self._measured), problems(figures, self._measured)
+            )
+
+    def _follow_stop(self, client: Client, stopped: Callable[[], bool]) -> None:
+        """Keep the picture alive until everything has ended."""
+        client.command(None)
+        self._enter('stopping')
+        while not stopped():
+            client.listen(REFRESH / 4)
+            self._show(client)
+        self._display.show(client.figures)
+
+
+def _between(begin: Milestone | None, end: Milestone | None) -> Velocity | None:
+    return None if begin is None or end is None else mean_velocity(begin, end)

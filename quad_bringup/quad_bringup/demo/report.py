@@ -1,0 +1,143 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Progress in a line, the summary at the end, and whether all went well."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+import math
+
+from .figures import Figures
+from .itinerary import Stretch, Velocity
+
+LINEAR_TOLERANCE = 0.05
+"""Greatest difference of commanded and measured speed in [m/s]."""
+TURN_TOLERANCE = 0.2
+"""Greatest difference of commanded and measured rate in [rad/s]."""
+TILT_LIMIT = math.radians(15.0)
+"""A body that leaned more than this in [rad] did not walk, it stumbled."""
+LOWEST_RATE = 45.0
+"""Joint commands per second below which the loop did not hold its 50 Hz."""
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """A stretch of the demo, and what came of it.
+
+    Attributes:
+        stretch: What was commanded.
+        measured: Mean velocity of the simulated body; None without ground truth.
+        odometry: Mean velocity by /odom; None without it.
+    """
+
+    stretch: Stretch
+    measured: Velocity | None
+    odometry: Velocity | None
+
+    @property
+    def best(self) -> Velocity | None:
+        """What is known best of how it moved."""
+        return self.measured or self.odometry
+
+
+def progress_line(figures: Figures) -> str:
+    """Say how it goes.
+
+    Args:
+        figures: The latest.
+    """
+    speed = figures.measured or figures.odometry
+    return (
+        f'{figures.state}, commanded {velocity_text(figures.commanded)}, '
+        f'measured {velocity_text(speed)}, tilt {math.degrees(figures.tilt):.1f}°, '
+        f'{rhythm_text(figures)}'
+    )
+
+
+def velocity_text(velocity: Velocity | None) -> str:
+    """Write a velocity: forward, left, turn.
+
+    Args:
+        velocity: What to write; None for unknown.
+    """
+    if velocity is None:
+        return 'unknown'
+    # adding 0.0 turns a rounded -0.0 into 0.0
+    return (
+        f'{round(velocity.forward, 3) + 0.0:+.3f} {round(velocity.left, 3) + 0.0:+.3f} m/s '
+        f'{round(velocity.turn, 2) + 0.0:+.2f} rad/s'
+    )
+
+
+def rhythm_text(figures: Figures) -> str:
+    """Write the rate and jitter of the loop.
+
+    Args:
+        figures: The latest.
+    """
+    rhythm = figures.rhythm
+    return (
+        f'joint commands {rhythm.rate:.1f} Hz, jitter p50/p99 '
+        f'{1000 * rhythm.jitter_p50:.2f}/{1000 * rhythm.jitter_p99:.2f} ms'
+    )
+
+
+def summary_lines(figures: Figures, stretches: Sequence[Measured]) -> list[str]:
+    """Sum a demo up.
+
+    Args:
+        figures: The last ones before it lay down.
+        stretches: What was measured.
+    """
+    head = f'{"":<7} {"time":>6}  {"commanded":<28} {"measured in physics":<28} by /odom'
+    rows = [
+        f'{each.stretch.name:<7} {each.stretch.duration:5.1f}s  '
+        f'{velocity_text(each.stretch.velocity):<28} {velocity_text(each.measured):<28} '
+        f'{velocity_text(each.odometry)}'
+        for each in stretches
+    ]
+    body = f'tilt at most {math.degrees(figures.tilt_max):.1f}°, {rhythm_text(figures)}'
+    return [head, *rows, body]
+
+
+def problems(figures: Figures, stretches: Sequence[Measured]) -> list[str]:
+    """Say what went wrong.
+
+    Args:
+        figures: The last ones before it lay down.
+        stretches: What was measured.
+
+    Returns:
+        One sentence each; empty when all went well.
+    """
+    return [
+        *(text for each in stretches for text in _wrong_speed(each)),
+        *_wrong_body(figures),
+    ]
+
+
+def _wrong_speed(each: Measured) -> Iterator[str]:
+    name = each.stretch.name
+    speed, wanted = each.best, each.stretch.velocity
+    if speed is None:
+        yield f'{name}: nobody says how the robot moved, neither ground truth nor /odom'
+        return
+    linear = math.hypot(speed.forward - wanted.forward, speed.left - wanted.left)
+    if not linear <= LINEAR_TOLERANCE or not abs(speed.turn - wanted.turn) <= TURN_TOLERANCE:
+        yield f'{name}: commanded {velocity_text(wanted)}, but moved {velocity_text(speed)}'
+
+
+def _wrong_body(figures: Figures) -> Iterator[str]:
+    if figures.fault:
+        yield f'the controller is in a fault: {figures.fault}'
+    if not figures.tilt_max <= TILT_LIMIT:
+        yield (
+            f'the body leaned by {math.degrees(figures.tilt_max):.1f}°, more than '
+            f'{math.degrees(TILT_LIMIT):.0f}°'
+        )
+    if not figures.rhythm.rate >= LOWEST_RATE:
+        yield (
+            f'{figures.rhythm.rate:.1f} joint commands a second, less than {LOWEST_RATE:g}: '
+            'is this machine too busy?'
+        )

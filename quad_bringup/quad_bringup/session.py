@@ -1,0 +1,139 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What bring-up and demo have in common: from the command line to a list of processes."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+import contextlib
+from dataclasses import dataclass
+import os
+from pathlib import Path
+import tempfile
+
+from process_supervisor import (
+    exclusive,
+    find_executable,
+    ProcessSpec,
+    ros_domain,
+    write_parameters,
+)
+from quad_description import movable_joints, PRESETS, robot_urdf
+
+from .exceptions import ArgumentError
+from .stack import quad_processes, Stack
+
+GAITS = ('trot', 'crawl', 'pace')
+"""Gaits of quad_controller."""
+REMEDY = 'another --port and another ROS_DOMAIN_ID'
+"""What a second bring-up is told to take."""
+
+
+@dataclass(frozen=True, slots=True)
+class Session:
+    """A quadruped that is about to be brought up.
+
+    Attributes:
+        title: What runs, and where.
+        joints: Names of its joints, in the order of /joint_command.
+        processes: What is to be run.
+    """
+
+    title: str
+    joints: list[str]
+    processes: list[ProcessSpec]
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments that bring-up and demo share.
+
+    Args:
+        parser: Where to.
+    """
+    parser.add_argument(
+        '--preset',
+        choices=PRESETS,
+        default='lite',
+        help='which robot it is (default: %(default)s)',
+    )
+    parser.add_argument('--arm', action='store_true', help='the robot has its arm')
+    way = parser.add_mutually_exclusive_group()
+    way.add_argument(
+        '--gait',
+        choices=GAITS,
+        default='trot',
+        help='how the geometric gait puts its feet (default: %(default)s)',
+    )
+    way.add_argument(
+        '--policy',
+        metavar='FILE',
+        type=Path,
+        help='ONNX policy to load and check; mode "policy" lets it walk',
+    )
+    parser.add_argument(
+        '--timeout',
+        metavar='S',
+        type=_seconds,
+        default=30.0,
+        help='longest time until all is ready in [s]; inf waits for ever (default: %(default)s)',
+    )
+
+
+def _seconds(text: str) -> float:
+    value = float(text)
+    if not value > 0:
+        raise argparse.ArgumentTypeError(f'{text} is no positive number of seconds')
+    return value
+
+
+@contextlib.contextmanager
+def session(arguments: argparse.Namespace, port: str | None) -> Iterator[Session]:
+    """Prepare a bring-up; the port and the ROS domain are its own as long as the block runs.
+
+    Args:
+        arguments: What :func:`add_arguments` parsed; ``calibration`` may be there, too.
+        port: Serial port of the robot; None for a simulated one.
+
+    Raises:
+        ArgumentError: A file is not there.
+        StartError: An executable is missing, or another bring-up is on this port or domain.
+    """
+    policy, calibration = (
+        _existing(name, getattr(arguments, name, None)) for name in ('policy', 'calibration')
+    )
+    domain = ros_domain(os.environ)
+    locks = Path(tempfile.gettempdir())
+    with contextlib.ExitStack() as stack:
+        if port is not None:
+            name = f'port {os.path.realpath(port)}'  # two names of one port are one port
+            stack.enter_context(exclusive(name, locks, REMEDY))
+        stack.enter_context(exclusive(f'ROS domain {domain}', locks, REMEDY))
+        prefix = 'quad_bringup-'
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix=prefix)))
+        urdf = robot_urdf(arguments.preset, arm=arguments.arm)
+        parameters = folder / 'robot_description.yaml'
+        write_parameters(parameters, urdf)
+        wanted = Stack(
+            port=port or str(folder / 'xgo'),
+            preset=arguments.preset,
+            simulate=port is None,
+            arm=arguments.arm,
+            gait=arguments.gait,
+            policy=policy,
+            calibration=calibration,
+            ready_timeout=arguments.timeout,
+        )
+        title = f'XGO {wanted.preset}{" with arm" if wanted.arm else ""}' + (
+            f', simulated, on {wanted.port}' if wanted.simulate else f' on {wanted.port}'
+        )
+        joints = [joint.name for joint in movable_joints(urdf)]
+        yield Session(title, joints, quad_processes(wanted, parameters, find_executable))
+
+
+def _existing(name: str, path: Path | None) -> Path | None:
+    if path is None:
+        return None
+    if not path.is_file():
+        raise ArgumentError(f'--{name}: there is no file {path}')
+    return path.resolve()

@@ -1,0 +1,147 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The processes of a quadruped: which there are, with which arguments, and when each is ready."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from process_supervisor import (
+    Executable,
+    FindExecutable,
+    first_found,
+    LOG_FORMAT,
+    node_argv,
+    ProcessSpec,
+    StartError,
+)
+
+SIMULATOR_READY = r'simulated .* on '
+"""What fake_xgo logs when its serial port is there."""
+HARDWARE_READY = r'connected '
+"""What hardware_node logs when the robot has answered and feedback comes in."""
+CONTROLLER_READY = r'ready'
+"""What controller_node logs when it has heard the joints and answers /set_mode."""
+PUBLISHER_READY = r'[Rr]obot'
+"""What every robot_state_publisher logs when it has read the description."""
+
+STATE_PUBLISHERS = (
+    Executable('robot_state_publisher', 'robot_state_publisher'),
+    Executable('robot_viewer', 'robot_state_publisher'),
+)
+"""What makes /tf of the legs: the public one where ROS has it."""
+TF_RATE = 100.0
+"""Greatest rate of /tf in [Hz]; its default of 20 would halve what /joint_states has."""
+
+CONTROLLER_FIRST, THEN_BRIDGE, SIMULATOR_LAST = range(3)
+"""Order of stopping: who commands before who transmits before who obeys."""
+
+
+@dataclass(frozen=True, slots=True)
+class Stack:
+    """What is to be brought up.
+
+    Attributes:
+        port: Serial port of the robot; with ``simulate`` a link to the simulated one's.
+        preset: Preset of the description.
+        simulate: With a simulated robot at the port.
+        arm: The robot has its arm.
+        gait: Gait of the controller.
+        policy: Policy that the controller loads; None for the geometric gait alone.
+        calibration: Parameter file that ``quad_hardware calibrate`` has written.
+        ready_timeout: How long each process may take to be ready in [s].
+    """
+
+    port: str
+    preset: str = 'lite'
+    simulate: bool = False
+    arm: bool = False
+    gait: str = 'trot'
+    policy: Path | None = None
+    calibration: Path | None = None
+    ready_timeout: float = 30.0
+
+
+def quad_processes(stack: Stack, parameters: Path, find: FindExecutable) -> list[ProcessSpec]:
+    """Say which processes make a quadruped.
+
+    Args:
+        stack: What is to be brought up.
+        parameters: A ROS parameter file with the robot description.
+        find: Finds executables.
+
+    Returns:
+        The processes; they start side by side.
+
+    Raises:
+        StartError: An executable is missing.
+    """
+    processes = [
+        _bridge(stack, parameters, find),
+        _controller(stack, parameters, find),
+        _state_publisher(stack, parameters, find),
+    ]
+    return [_simulator(stack, find), *processes] if stack.simulate else processes
+
+
+def _simulator(stack: Stack, find: FindExecutable) -> ProcessSpec:
+    executable = Executable('quad_hardware', 'fake_xgo')
+    program, *ros_arguments = node_argv(executable, find)
+    options = ['--link', stack.port, '--preset', stack.preset, *(['--arm'] if stack.arm else [])]
+    return ProcessSpec(
+        name='fake_xgo',
+        argv=(program, *options, *ros_arguments),
+        environment=LOG_FORMAT,
+        ready=SIMULATOR_READY,
+        ready_timeout=stack.ready_timeout,
+        stop_order=SIMULATOR_LAST,
+    )
+
+
+def _bridge(stack: Stack, parameters: Path, find: FindExecutable) -> ProcessSpec:
+    argv = node_argv(
+        Executable('quad_hardware', 'hardware_node'), find, {'port': stack.port}, parameters
+    )
+    if stack.calibration is not None:
+        argv = (*argv, '--params-file', str(stack.calibration))
+    return ProcessSpec(
+        name='hardware',
+        argv=argv,
+        environment=LOG_FORMAT,
+        ready=HARDWARE_READY,
+        ready_timeout=stack.ready_timeout,
+        stop_order=THEN_BRIDGE,
+    )
+
+
+def _controller(stack: Stack, parameters: Path, find: FindExecutable) -> ProcessSpec:
+    values = {'gait': stack.gait}
+    if stack.policy is not None:
+        values['policy'] = str(stack.policy)
+    executable = Executable('quad_controller', 'controller_node')
+    return ProcessSpec(
+        name='controller',
+        argv=node_argv(executable, find, values, parameters),
+        environment=LOG_FORMAT,
+        ready=CONTROLLER_READY,
+        ready_timeout=stack.ready_timeout,
+        stop_order=CONTROLLER_FIRST,
+    )
+
+
+def _state_publisher(stack: Stack, parameters: Path, find: FindExecutable) -> ProcessSpec:
+    executable = first_found(STATE_PUBLISHERS, find)
+    if executable is None:
+        raise StartError(
+            'there is no robot_state_publisher; build the workspace (make build) and source env.sh'
+        )
+    return ProcessSpec(
+        name='robot_state',
+        argv=node_argv(executable, find, {'publish_frequency': f'{TF_RATE}'}, parameters),
+        environment=LOG_FORMAT,
+        ready=PUBLISHER_READY,
+        ready_timeout=stack.ready_timeout,
+        required=False,
+        stop_order=THEN_BRIDGE,
+    )

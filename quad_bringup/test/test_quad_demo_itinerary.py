@@ -1,0 +1,69 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What the demo does when, and how regular a loop was."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+from hypothesis import given
+from hypothesis import strategies as st
+import pytest
+
+from quad_bringup.demo.itinerary import itinerary, one_round, SHORTEST, STANDSTILL, Velocity
+from quad_bringup.demo.rhythm import Beat
+
+
+@given(st.floats(SHORTEST, 1000.0))
+def test_a_round_takes_its_time_and_ends_at_rest(duration: float) -> None:
+    """It walks forward at 0.2 m/s, turns and strafes; every stretch has time to be measured."""
+    stretches = list(itinerary(duration))
+    assert sum(each.duration for each in stretches) == pytest.approx(duration)
+    assert stretches[0].velocity == Velocity(forward=0.2)
+    assert [each.name for each in stretches] == ['walk', 'turn', 'strafe', 'stop']
+    assert stretches[-1].velocity == STANDSTILL
+    assert all(0 < each.settling < 0.5 * each.duration for each in stretches)
+
+
+def test_without_an_end_there_is_round_after_round() -> None:
+    """Until it is left."""
+    names = [each.name for each in itertools.islice(itinerary(None), 9)]
+    assert names[:4] == names[4:8]
+    assert names[8] == 'walk'
+
+
+@pytest.mark.parametrize('duration', [0.0, -1.0, SHORTEST - 0.1, math.nan])
+def test_too_short_a_round_is_refused(duration: float) -> None:
+    """With what it needs."""
+    with pytest.raises(ValueError, match='too short'):
+        one_round(duration)
+
+
+def test_a_regular_stream_has_its_rate_and_no_jitter() -> None:
+    """50 messages a second."""
+    beat = Beat(0.02)
+    for index in range(200):
+        beat.take(5.0 + 0.02 * index)
+    rhythm = beat.rhythm()
+    assert rhythm.rate == pytest.approx(50.0)
+    assert rhythm.jitter_p99 == pytest.approx(0.0, abs=1e-9)
+
+
+def test_jitter_is_the_deviation_from_the_period() -> None:
+    """A tenth of the messages is 5 ms late: that is in p99 and not in p50."""
+    beat = Beat(0.02)
+    for index in range(400):
+        beat.take(0.02 * index + (0.005 if index % 10 == 0 else 0.0))
+    rhythm = beat.rhythm()
+    assert rhythm.jitter_p50 == pytest.approx(0.0, abs=1e-9)
+    assert rhythm.jitter_p99 == pytest.approx(0.005)
+    assert rhythm.rate == pytest.approx(50.0, rel=0.01)
+
+
+def test_one_message_has_no_rhythm() -> None:
+    """Nor has none."""
+    beat = Beat(0.02)
+    assert math.isnan(beat.rhythm().rate)
+    beat.take(1.0)
+    assert math.isnan(beat.rhythm().rate)
