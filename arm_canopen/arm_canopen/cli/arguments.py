@@ -5,14 +5,21 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, TypeAlias
 
+from ..exceptions import CanopenError
 from ..standard.cob_id import NODE_ID_MAX, NODE_ID_MIN
 
 if TYPE_CHECKING:
     SubParsers: TypeAlias = argparse._SubParsersAction[argparse.ArgumentParser]  # noqa: SLF001
 else:
     SubParsers = object
+
+
+class UsageError(CanopenError):
+    """The command line asks for something that there is not; nothing was sent yet."""
+
 
 BITRATE_MIN, BITRATE_MAX = 10_000, 1_000_000  # [bit/s] CiA 301, table 1
 
@@ -59,3 +66,43 @@ def seconds(text: str) -> float:
     if not 0.0 < number <= 3600.0:
         raise argparse.ArgumentTypeError(f'{text} s is not above 0 and up to an hour')
     return number
+
+
+def add_bus_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add what names a bus and its devices."""
+    parser.add_argument(
+        '--can',
+        metavar='BUS',
+        help='can0, vcan0, udp_multicast:239.x.y.z, ... (default: parameter can_interface_name, '
+        'else auto)',
+    )
+    parser.add_argument(
+        '--bus-config',
+        metavar='BUS.yml',
+        help='names devices and objects (default: parameter bus_config)',
+    )
+
+
+def add_node_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add what names a device of a bus."""
+    parser.add_argument(
+        'node', metavar='NODE', help='node id, or name of a device of --bus-config'
+    )
+    add_bus_arguments(parser)
+    parser.add_argument(
+        '--eds', metavar='FILE', help='EDS of the device, when there is no bus.yml'
+    )
+    parser.add_argument(
+        '--timeout',
+        type=seconds,
+        metavar='S',
+        help='longest time for an answer in s (default: sdo_timeout_ms of bus.yml, else 0.5)',
+    )
+
+
+def take_parameters(options: argparse.Namespace, parameters: Mapping[str, str]) -> None:
+    """Fill options that were not given from ROS parameters of the names that the nodes have."""
+    if 'can' in options:
+        options.can = options.can or parameters.get('can_interface_name') or 'auto'
+    if 'bus_config' in options:
+        options.bus_config = options.bus_config or parameters.get('bus_config')

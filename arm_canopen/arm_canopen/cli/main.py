@@ -16,10 +16,11 @@ import sys
 
 from ..exceptions import CanopenError
 from ..nodes.ros_arguments import split_ros_arguments
-from . import check, eds
+from . import check, diff, eds, objects, scan
+from .arguments import take_parameters, UsageError
 from .output import remark
 
-VERBS = (check, eds)
+VERBS = (check, eds, scan, objects, diff)
 INTERRUPTED = 130  # exit code of a program that Ctrl-C ended
 
 
@@ -31,7 +32,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     Returns:
         Exit code: 0, 1 when something is wrong (with a file, a device or the bus), 2 for wrong
-        usage.
+        usage, when nothing was sent.
     """
     parser = _parser()
     try:
@@ -39,6 +40,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except ValueError as error:
         parser.error(str(error))
     options = parser.parse_args(arguments.own)
+    take_parameters(options, arguments.parameters)
     try:
         code = int(options.run(options))
         sys.stdout.flush()
@@ -50,7 +52,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return INTERRUPTED
     except (CanopenError, OSError) as error:
         remark(str(error))
-        return 1
+        return 2 if isinstance(error, UsageError) else 1
     return code
 
 
