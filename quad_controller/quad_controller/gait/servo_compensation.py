@@ -32,8 +32,8 @@ class ServoModel:
     """
 
     kp: float = 2.45
-    damping: float = 0.05
-    inertia: float = 0.002
+    damping: float = 0.09
+    inertia: float = 0.001
     mass: float = 0.0
 
 

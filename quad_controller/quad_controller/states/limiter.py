@@ -17,18 +17,20 @@ class StepLimiter:
     """Keeps targets within the joints' ranges, and steps within their speed.
 
     Attributes:
-        limited: How many targets of single joints were cut so far.
+        limited: How many targets of single joints were too fast so far, and were cut.
     """
 
-    def __init__(self, limits: Sequence[Limits], period: float) -> None:
+    def __init__(self, limits: Sequence[Limits], period: float, speed: float = 1.0) -> None:
         """Start at no target.
 
         Args:
             limits: Of each joint.
             period: Nominal time between two targets in [s].
+            speed: Speed of a target per speed of its joint.
         """
         self._limits = tuple(limits)
         self._longest = LONGEST_STEP * period
+        self._speed = speed
         self._last: Targets | None = None
         self.limited = 0
 
@@ -54,7 +56,7 @@ class StepLimiter:
         """
         if self._last is None:
             return self.start(targets)
-        dt = min(dt, self._longest)
+        dt = min(dt, self._longest) * self._speed
         sent = []
         for limits, before, wanted in zip(self._limits, self._last, targets, strict=True):
             most = limits.velocity * dt

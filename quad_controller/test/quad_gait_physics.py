@@ -1,0 +1,109 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""A controller and a robot in physics, in virtual time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import math
+
+from quad_controller.gait.parameters import GaitParameters
+from quad_controller.gait.velocity import REST, Velocity
+from quad_controller.model.quadruped import quadruped
+from quad_controller.policy.interface import Policy
+from quad_controller.states.controller import Controller
+from quad_controller.states.measurement import ImuSample, JointSample, Measurement
+from quad_controller.states.modes import State
+from quad_controller.states.parameters import StateParameters
+from quad_description import robot_urdf
+from quad_hardware.sim.physics import Robot
+
+PERIOD = 0.02  # [s]
+MODEL = quadruped(robot_urdf())
+
+
+@dataclass(frozen=True)
+class Travel:
+    """How the robot went; means over a stretch of time, in its own frame.
+
+    Attributes:
+        x: Forward in [m/s].
+        y: To the left in [m/s].
+        yaw: Turning in [rad/s].
+        tilt: Largest angle between the body's z axis and up in [rad].
+    """
+
+    x: float
+    y: float
+    yaw: float
+    tilt: float
+
+
+def measure(robot: Robot) -> Measurement:
+    """Return what ideal sensors of the robot say."""
+    angular = robot.base_velocity.angular
+    return Measurement(
+        JointSample(tuple(robot.joint_positions.tolist()), tuple(robot.joint_velocities.tolist())),
+        ImuSample(robot.base_pose.orientation, angular, robot.imu.specific_force),
+        0.8,
+    )
+
+
+class PhysicsRig:
+    """Lets a controller walk a robot."""
+
+    def __init__(
+        self,
+        robot: Robot | None = None,
+        gait: GaitParameters | None = None,
+        policy: Policy | None = None,
+    ) -> None:
+        """Stand up."""
+        self.robot = robot or Robot(robot_urdf())
+        self.controller = Controller(
+            MODEL, gait or GaitParameters(), StateParameters(), policy=policy
+        )
+        self.tilt = 0.0
+        self.step(REST)
+        self.mode('stand')
+        self.run(2.0)
+
+    def mode(self, mode: str) -> None:
+        """Ask for a mode that has to be accepted."""
+        answer = self.controller.set_mode(mode)
+        assert answer.accepted, answer.message
+
+    def step(self, velocity: Velocity) -> None:
+        """Pass one period."""
+        self.controller.set_velocity(velocity)
+        output = self.controller.step(measure(self.robot), PERIOD)
+        if output.targets is not None:
+            self.robot.set_targets(dict(zip(MODEL.names, output.targets, strict=True)))
+        self.robot.step(PERIOD)
+        self.tilt = max(self.tilt, self.robot.base_pose.tilt)
+
+    def run(self, duration: float, velocity: Velocity = REST) -> None:
+        """Pass some seconds with a velocity."""
+        for _ in range(round(duration / PERIOD)):
+            self.step(velocity)
+
+    def travel(self, duration: float, velocity: Velocity) -> Travel:
+        """Walk with a velocity and return how the robot went."""
+        self.tilt = 0.0
+        x = y = turned = 0.0
+        before = self.robot.base_pose
+        for _ in range(round(duration / PERIOD)):
+            self.step(velocity)
+            after = self.robot.base_pose
+            heading = before.roll_pitch_yaw[2]
+            dx, dy = (b - a for a, b in zip(before.position[:2], after.position[:2], strict=True))
+            x += dx * math.cos(heading) + dy * math.sin(heading)
+            y += dy * math.cos(heading) - dx * math.sin(heading)
+            turned += math.remainder(after.roll_pitch_yaw[2] - heading, math.tau)
+            before = after
+        return Travel(x / duration, y / duration, turned / duration, self.tilt)
+
+    @property
+    def faulted(self) -> bool:
+        """Whether the controller has given up."""
+        return self.controller.status.state is State.FAULT

@@ -1,0 +1,125 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The gait in physics: it goes where it is told to, upright, and survives pushes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+import math
+
+import pytest
+
+from quad_controller.gait.parameters import GaitParameters
+from quad_controller.gait.servo_compensation import ServoModel
+from quad_controller.gait.velocity import Velocity
+from quad_description import robot_urdf
+from quad_gait_physics import PhysicsRig
+from quad_hardware.sim.physics import Robot
+from quad_hardware.sim.servo import ServoParameters
+from quad_hardware.sim.terrain import Terrain
+
+LEVEL = math.radians(5.0)
+
+
+@pytest.mark.parametrize(
+    'velocity',
+    [
+        Velocity(0.1),
+        Velocity(0.2),
+        Velocity(0.3),
+        Velocity(-0.15),
+        Velocity(0.0, 0.1),
+        Velocity(0.0, -0.1),
+        Velocity(0.0, 0.0, 1.0),
+        Velocity(0.15, 0.0, -0.6),
+    ],
+)
+def test_trot_goes_where_it_is_told_to(velocity: Velocity) -> None:
+    """Twenty seconds of trot keep speed and direction, and the body upright."""
+    rig = PhysicsRig()
+    rig.mode('walk')
+    rig.run(1.0, velocity)
+    travel = rig.travel(19.0, velocity)
+    assert not rig.faulted
+    assert travel.x == pytest.approx(velocity.x, abs=0.03)
+    assert travel.y == pytest.approx(velocity.y, abs=0.02)
+    assert travel.yaw == pytest.approx(velocity.yaw, abs=max(0.1 * abs(velocity.yaw), 0.06))
+    assert travel.tilt < LEVEL
+
+
+@pytest.mark.parametrize('gait', ['crawl', 'pace'])
+@pytest.mark.parametrize(
+    'velocity', [Velocity(0.05), Velocity(0.0, 0.04), Velocity(0.0, 0.0, 0.4)]
+)
+def test_other_gaits_go_where_they_are_told_to(gait: str, velocity: Velocity) -> None:
+    """Crawl and pace keep a fifth of the speed, at least, and do not fall."""
+    rig = PhysicsRig()
+    rig.mode(f'gait:{gait}')
+    rig.run(2.0, velocity)
+    travel = rig.travel(8.0, velocity)
+    assert not rig.faulted
+    assert travel.x == pytest.approx(velocity.x, abs=0.015)
+    assert travel.y == pytest.approx(velocity.y, abs=0.015)
+    assert travel.yaw == pytest.approx(velocity.yaw, abs=0.08)
+    assert travel.tilt < LEVEL
+
+
+@pytest.mark.parametrize('kick', [(0.0, 0.5, 0.0), (0.5, 0.0, 0.0), (-0.5, 0.0, 0.0)])
+def test_a_push_is_survived(kick: tuple[float, float, float]) -> None:
+    """A change of the whole robot's velocity by 0.5 m/s throws it neither over nor off course."""
+    rig = PhysicsRig()
+    rig.mode('walk')
+    rig.run(2.0, Velocity(0.2))
+    rig.robot.kick(kick)
+    rig.run(2.0, Velocity(0.2))
+    assert not rig.faulted
+    travel = rig.travel(4.0, Velocity(0.2))
+    assert travel.x == pytest.approx(0.2, abs=0.03)
+    assert travel.tilt < LEVEL
+
+
+def test_a_whole_outing() -> None:
+    """It stands up, walks about with every change of direction, and lies down where it stands."""
+    rig = PhysicsRig()
+    start = rig.robot.base_pose.position[2]
+    rig.mode('walk')
+    for velocity in (
+        Velocity(0.3), Velocity(-0.2), Velocity(0.0, 0.1), Velocity(0.0, 0.0, 1.5),
+        Velocity(0.15, 0.0, -0.6), Velocity(),
+    ):  # fmt: skip
+        rig.run(2.0, velocity)
+    assert rig.tilt < LEVEL
+    rig.mode('lie')
+    rig.run(3.0)
+    assert not rig.faulted
+    assert rig.robot.base_pose.position[2] < start - 0.02
+    assert rig.controller.status.unreachable == 0
+
+
+def test_levelling_turns_the_body_towards_level_on_a_slope() -> None:
+    """Across a slope the body is tilted less with levelling than without."""
+    tilts = []
+    for gain in (0.0, 0.8):
+        slope = Terrain.slope(math.radians(8.0), math.pi / 2)
+        rig = PhysicsRig(Robot(robot_urdf(), terrain=slope), GaitParameters(level_gain=gain))
+        rig.mode('walk')
+        rig.run(2.0, Velocity(0.1))
+        assert not rig.faulted
+        tilts.append(abs(rig.robot.base_pose.roll_pitch_yaw[0]))
+    assert tilts[1] < 0.75 * tilts[0]
+
+
+def test_compensation_makes_soft_servos_keep_their_speed() -> None:
+    """Servos that lose a third of the speed keep it when their softness is known."""
+    soft = ServoParameters(
+        stiffness=2.45, velocity_gain=0.042, damping=0.05, armature=0.001, interpolation=0.02
+    )
+    errors = []
+    for model in (None, ServoModel(kp=2.45, damping=0.092, inertia=0.001)):
+        gait = replace(GaitParameters(), servo=model)
+        rig = PhysicsRig(Robot(robot_urdf(), servo=soft), gait)
+        rig.mode('walk')
+        rig.run(1.0, Velocity(0.2))
+        errors.append(abs(rig.travel(5.0, Velocity(0.2)).x - 0.2))
+    assert errors[0] > 0.04
+    assert errors[1] < 0.03
