@@ -12,6 +12,7 @@ setup(
     data_files=[
         ('share/ament_index/resource_index/packages', ['resource/quad_bringup']),
         ('share/quad_bringup', ['package.xml']),
+        ('share/quad_bringup/launch', ['launch/bringup.launch.py']),
     ],
     install_requires=['setuptools'],
     zip_safe=True,

@@ -1,0 +1,55 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The launch file's arguments become the bring-up's, and nothing else."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from quad_bringup.bringup import parse
+from quad_bringup.exceptions import ArgumentError
+from quad_bringup.launching import LAUNCH_ARGUMENTS, words
+
+DEFAULTS = {argument.name: argument.default for argument in LAUNCH_ARGUMENTS}
+
+
+def test_without_arguments_it_is_the_real_robot_on_its_own_computer() -> None:
+    """As in the article: ros2 launch quad_bringup bringup.launch.py."""
+    arguments = parse(words(DEFAULTS))
+    assert not arguments.simulate
+    assert arguments.port == '/dev/ttyAMA0'
+    assert arguments.preset == 'lite'
+
+
+def test_every_argument_reaches_the_bring_up() -> None:
+    """Under its own name."""
+    given = {'preset': 'mini', 'arm': 'True', 'policy': '/a.onnx', 'calibration': '/c.yaml'}
+    arguments = parse(words({**DEFAULTS, **given, 'port': '/dev/ttyUSB0'}))
+    assert (arguments.port, arguments.preset, arguments.arm) == ('/dev/ttyUSB0', 'mini', True)
+    assert (arguments.policy, arguments.calibration) == (Path('/a.onnx'), Path('/c.yaml'))
+    assert parse(words({**DEFAULTS, 'gait': 'pace'})).gait == 'pace'
+
+
+def test_a_simulated_robot_has_a_port_of_its_own() -> None:
+    """The default port is no reason to refuse."""
+    arguments = parse(words({**DEFAULTS, 'simulate': 'true'}))
+    assert arguments.simulate
+    assert arguments.port is None
+
+
+def test_a_flag_that_is_neither_true_nor_false_is_refused() -> None:
+    """With its name."""
+    with pytest.raises(ArgumentError, match='arm:=maybe'):
+        words({**DEFAULTS, 'arm': 'maybe'})
+
+
+def test_launch_can_read_the_file() -> None:
+    """Where ROS has launch; all arguments are declared."""
+    launch = pytest.importorskip('launch')
+    file = Path(__file__).parents[1] / 'launch' / 'bringup.launch.py'
+    source = launch.launch_description_sources.PythonLaunchDescriptionSource(str(file))
+    description = source.get_launch_description(launch.LaunchContext())
+    declared = {argument.name for argument in description.get_launch_arguments()}
+    assert declared == set(DEFAULTS)
