@@ -112,6 +112,22 @@ def test_up_and_left_are_positive() -> None:
     assert (state.axis(Axis.RIGHT_X), state.axis(Axis.DPAD_Y)) == (-1.0, 1.0)
 
 
+def test_d_pad_of_four_buttons() -> None:
+    """Where the d-pad is four buttons it is the same axes, also after events were lost."""
+    device = InjectedDevice(
+        'PS3', [*STANDARD_KEYS, *range(0x220, 0x224)], {ABS_X: STICK, ABS_Y: STICK}
+    )
+    gamepad = opened(device)
+    device.press(0x220)
+    device.press(0x223)
+    state = gamepad.read()[-1]
+    assert (state.axis(Axis.DPAD_Y), state.axis(Axis.DPAD_X)) == (1.0, -1.0)
+    device.release(0x220)
+    device.drop_events()
+    state = gamepad.read()[-1]
+    assert (state.axis(Axis.DPAD_Y), state.axis(Axis.DPAD_X)) == (0.0, -1.0)
+
+
 def test_chosen_preset_overrides_the_name() -> None:
     """The user knows better than the vendor id."""
     gamepad = opened(xbox(), preset='ps')

@@ -36,15 +36,15 @@ class Button(Enum):
     EAST = 'east'
     WEST = 'west'
     NORTH = 'north'
-    LEFT_SHOULDER = 'left shoulder'
-    RIGHT_SHOULDER = 'right shoulder'
-    LEFT_TRIGGER = 'left trigger'
-    RIGHT_TRIGGER = 'right trigger'
+    LEFT_SHOULDER = 'left_shoulder'
+    RIGHT_SHOULDER = 'right_shoulder'
+    LEFT_TRIGGER = 'left_trigger'
+    RIGHT_TRIGGER = 'right_trigger'
     SELECT = 'select'
     START = 'start'
     GUIDE = 'guide'
-    LEFT_STICK = 'left stick'
-    RIGHT_STICK = 'right stick'
+    LEFT_STICK = 'left_stick'
+    RIGHT_STICK = 'right_stick'
 
 
 @dataclass(frozen=True, slots=True)

@@ -87,6 +87,14 @@ HID_BUTTONS = {
 }
 """Buttons of pads without a driver, in the order that most of them have."""
 
+DPAD_BUTTONS = {
+    0x220: (Axis.DPAD_Y, 1.0),
+    0x221: (Axis.DPAD_Y, -1.0),
+    0x222: (Axis.DPAD_X, 1.0),
+    0x223: (Axis.DPAD_X, -1.0),
+}
+"""Buttons of pads that have four of them for the d-pad: the axis and the side that they mean."""
+
 
 @dataclass(frozen=True, slots=True)
 class Preset:

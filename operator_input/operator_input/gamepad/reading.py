@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from ..devices.events import AxisRange, DeviceInfo, DeviceState, EV_ABS, EV_KEY, InputEvent
 from .controls import Axis, Button, GamepadState
-from .presets import Preset
+from .presets import DPAD_BUTTONS, Preset
 
 
 class GamepadReading:
@@ -34,6 +34,7 @@ class GamepadReading:
         self._dead_zone = dead_zone
         self._axes = dict.fromkeys((preset.axes[code] for code in self._ranges), 0.0)
         self._buttons: set[Button] = set()
+        self._keys = info.keys
 
     def state(self) -> GamepadState:
         """Return the present state."""
@@ -47,6 +48,9 @@ class GamepadReading:
         """
         if event.type == EV_ABS:
             self._move(event.code, event.value)
+        elif event.type == EV_KEY and event.code in DPAD_BUTTONS:
+            axis, side = DPAD_BUTTONS[event.code]
+            self._axes[axis] = side if event.value else 0.0
         elif event.type == EV_KEY and event.code in self._preset.buttons:
             button = self._preset.buttons[event.code]
             if event.value:
@@ -65,6 +69,10 @@ class GamepadReading:
         }
         for code, value in state.axes.items():
             self._move(code, value)
+        for code in DPAD_BUTTONS.keys() & self._keys:
+            self.feed(InputEvent(EV_KEY, code, 0))
+        for code in DPAD_BUTTONS.keys() & state.keys:
+            self.feed(InputEvent(EV_KEY, code, 1))
 
     def _move(self, code: int, value: int) -> None:
         span = self._ranges.get(code)

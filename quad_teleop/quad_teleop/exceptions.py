@@ -1,0 +1,32 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Everything that quad_teleop raises.
+
+::
+
+    TeleopError
+    ├── SettingError (ValueError)   a parameter is misspelt, or its value makes no sense
+    └── CommandError (ValueError)   a velocity is no number
+
+Arguments of the wrong kind from a *programmer* stay ``ValueError``/``TypeError``.
+"""
+
+from __future__ import annotations
+
+
+class TeleopError(Exception):
+    """Root of all errors of this package."""
+
+
+class SettingError(TeleopError, ValueError):
+    """A parameter is misspelt, or its value makes no sense.
+
+    Scenarios: a priority above 255, two sources on one topic, a speed above its limit.
+    """
+
+
+class CommandError(TeleopError, ValueError):
+    """A velocity is no number.
+
+    Scenarios: a planner divided by zero and sends NaN.
+    """

@@ -1,0 +1,93 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What each key does: the map of teleop_twist_keyboard, and what a walking robot has besides.
+
+``t`` and ``b``, up and down there, are the height of the body here. Roll, yaw and height by
+letters are those of champ_teleop.
+"""
+
+from __future__ import annotations
+
+from .body_pose import BodyPose
+from .modes import Mode
+from .velocity import Direction
+
+MOVES = {
+    'u': Direction(x=1, yaw=1),
+    'i': Direction(x=1),
+    'o': Direction(x=1, yaw=-1),
+    'j': Direction(yaw=1),
+    'l': Direction(yaw=-1),
+    'm': Direction(x=-1, yaw=-1),
+    ',': Direction(x=-1),
+    '.': Direction(x=-1, yaw=1),
+    'U': Direction(x=1, y=1),
+    'I': Direction(x=1),
+    'O': Direction(x=1, y=-1),
+    'J': Direction(y=1),
+    'L': Direction(y=-1),
+    'M': Direction(x=-1, y=1),
+    '<': Direction(x=-1),
+    '>': Direction(x=-1, y=-1),
+}
+"""Keys that move as long as they are held."""
+
+SPEEDS = {
+    'q': (1, 1),
+    'z': (-1, -1),
+    'w': (1, 0),
+    'x': (-1, 0),
+    'e': (0, 1),
+    'c': (0, -1),
+}
+"""Keys that change the linear and the angular speed, in steps."""
+
+MODES = {
+    '0': Mode.LIE,
+    '1': Mode.STAND,
+    '2': Mode.WALK,
+    '3': Mode.TURN,
+}
+"""Keys that ask the controller for a mode."""
+
+POSES = {
+    't': BodyPose(height=1),
+    'b': BodyPose(height=-1),
+    'v': BodyPose(height=1),
+    'n': BodyPose(height=-1),
+    'page_up': BodyPose(height=1),
+    'page_down': BodyPose(height=-1),
+    'f': BodyPose(roll=-1),
+    'h': BodyPose(roll=1),
+    'left': BodyPose(roll=-1),
+    'right': BodyPose(roll=1),
+    'a': BodyPose(pitch=1),
+    'd': BodyPose(pitch=-1),
+    'down': BodyPose(pitch=1),
+    'up': BodyPose(pitch=-1),
+    'r': BodyPose(yaw=1),
+    'y': BodyPose(yaw=-1),
+}
+"""Keys that tilt and lift the body, a step for each stroke."""
+
+NEUTRAL_KEYS = frozenset({'g', 'home'})
+"""Keys that let the body stand as it does by itself."""
+
+STOP_KEYS = frozenset({'space', 'k'})
+"""Keys that stop at once, and say so even when nothing moves. Any other key stops a motion too."""
+
+HELP_KEY = '?'
+
+QUIT_KEYS = frozenset({'ctrl+c', 'ctrl+d', 'ctrl+\\'})
+SUSPEND_KEY = 'ctrl+z'
+
+HELP = """\
+  hold to move     Shift: sideways     body                   speed
+    u  i  o            U  I  O         t b  v n  up, down     q z  both
+    j  k  l            J  K  L         f h       roll         w x  walking
+    m  ,  .            M  <  >         a d       pitch        e c  turning
+                                       r y       yaw
+  1 stand  2 walk  3 turn  0 lie       g         neutral      ?    this help
+  Space, letting go and any other key stop. Ctrl-C quits.\
+"""
+"""The map, for the eye: plain characters, fits into 79 columns."""

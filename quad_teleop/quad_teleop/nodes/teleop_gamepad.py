@@ -1,0 +1,160 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""``ros2 run quad_teleop teleop_gamepad``: drive with a gamepad, while the deadman is held."""
+
+from __future__ import annotations
+
+import difflib
+import select
+import threading
+import time
+
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+
+from operator_input.devices import KernelDevices
+from operator_input.gamepad import AUTO, Button, Deadman, Gamepad
+
+from ..command_stream import ZEROS
+from ..exceptions import SettingError
+from ..gamepad_teleop import GamepadTeleop
+from ..requests import ModeRequest, PoseRequest, Request
+from ..speeds import Speeds
+from .mode_client import ModeClient
+from .outputs import Outputs
+from .parameters import number, refuse_misspelt, text
+from .program import run
+from .settings import declare_speeds, declare_steps, declare_stream
+
+LONGEST_WAIT = 0.1  # [s] for which answers of services and a signal may wait
+NO_BUTTON = 'none'
+NORMAL, TURBO = Speeds(0.15, 0.6), Speeds(0.3, 1.2)
+
+
+class TeleopGamepad(Node):
+    """Publishes velocities and body poses, and asks for modes.
+
+    Attributes:
+        teleop: Decides what to publish.
+        outputs: Publishes it.
+        gamepad: What is read.
+    """
+
+    def __init__(self) -> None:
+        """Declare the parameters and advertise the topics.
+
+        Raises:
+            SettingError: A parameter is misspelt or makes no sense.
+            PresetError: There is no preset of that name.
+        """
+        super().__init__('teleop_gamepad')
+        self.outputs = Outputs(self)
+        self.teleop = GamepadTeleop(
+            declare_speeds(self, '', NORMAL),
+            declare_speeds(self, 'turbo_', TURBO),
+            Deadman(
+                enable=self._button('enable_button', Button.LEFT_SHOULDER, 'Held to move'),
+                turbo=self._button('turbo_button', Button.RIGHT_SHOULDER, 'Held to move fast'),
+            ),
+            declare_steps(self),
+            declare_stream(self),
+        )
+        preset = text(self, 'preset', AUTO, 'auto, xbox, ps or generic')
+        device = text(self, 'device', '', 'Path, or expression for the name; empty for any')
+        dead_zone = number(self, 'deadzone', 0.08, (0.0, 0.9), 'Share of the way that is rest')
+        refuse_misspelt(self)
+        say = self.get_logger().info
+        self.gamepad = Gamepad(
+            KernelDevices(), preset=preset, device=device, dead_zone=dead_zone, say=say
+        )
+
+    def _button(self, name: str, default: Button, meaning: str) -> Button | None:
+        names = {button.value: button for button in Button}
+        value = text(self, name, default.value, f'{meaning}; {", ".join(names)} or {NO_BUTTON}')
+        if value == NO_BUTTON:
+            return None
+        if value not in names:
+            close = difflib.get_close_matches(value, names, n=1)
+            wanted = f'did you mean {close[0]!r}?' if close else f'there are {", ".join(names)}'
+            raise SettingError(f'{name} is {value!r}, which is no button; {wanted}')
+        return names[value]
+
+
+class Session:
+    """Reads, publishes, asks."""
+
+    def __init__(self, node: TeleopGamepad, stop: threading.Event) -> None:
+        """Prepare.
+
+        Args:
+            node: The node.
+            stop: Ends it.
+        """
+        self._node = node
+        self._stop = stop
+        self._modes = ModeClient(node, node.get_logger().info)
+        self._executor = SingleThreadedExecutor()
+        self._executor.add_node(node)
+
+    def run(self) -> None:
+        """Serve until the event is set."""
+        node = self._node
+        node.gamepad.scan(time.monotonic())
+        if not node.gamepad.is_connected:
+            node.get_logger().warning(
+                'no gamepad yet: plug one in; to read it, a user must be in the group input '
+                '(sudo usermod -aG input $USER, then log in again)'
+            )
+        try:
+            while not self._stop.is_set():
+                self._serve()
+        finally:
+            node.gamepad.close()
+            self._end()
+            self._executor.shutdown()
+
+    def _serve(self) -> None:
+        node, now = self._node, time.monotonic()
+        node.gamepad.scan(now)
+        wait = min(max(node.teleop.due() - now, 0.0), LONGEST_WAIT)
+        select.select(node.gamepad.filenos(), [], [], wait)
+        for state in node.gamepad.read():
+            for request in node.teleop.feed(state):
+                self._obey(request)
+            self._publish()
+        self._publish()
+        self._executor.spin_once(timeout_sec=0)
+        self._modes.check(time.monotonic())
+
+    def _obey(self, request: Request) -> None:
+        match request:
+            case ModeRequest(mode):
+                self._modes.ask(mode, time.monotonic())
+            case PoseRequest(pose):
+                self._node.outputs.publish_pose(pose)
+            case _:
+                self._node.get_logger().warning(f'{request} is nothing that a gamepad can do')
+
+    def _publish(self) -> None:
+        velocity = self._node.teleop.step(time.monotonic())
+        if velocity is not None:
+            self._node.outputs.publish(velocity)
+
+    def _end(self) -> None:
+        """Publish the last zeros, and see them off."""
+        self._node.teleop.end()
+        for _ in range(ZEROS):
+            self._publish()
+            pause = self._node.teleop.due() - time.monotonic()
+            if 0.0 < pause < LONGEST_WAIT:
+                time.sleep(pause)
+        self._node.outputs.flush()
+
+
+def main() -> None:
+    """Entry point."""
+    run(lambda stop: Session(TeleopGamepad(), stop).run())
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,151 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""``ros2 run quad_teleop twist_mux``: several sources of velocities, one robot."""
+
+from __future__ import annotations
+
+from functools import partial
+import threading
+import time
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from geometry_msgs.msg import Twist, TwistStamped
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from std_msgs.msg import Bool
+
+from ..exceptions import CommandError, SettingError
+from ..mux import Input, Inputs, Multiplexer, read_inputs
+from .parameters import flag, refuse_similar
+from .program import run
+
+WATCH_PERIOD = 0.05  # [s] between two looks whether the heard source fell silent
+DIAGNOSTIC_PERIOD = 1.0  # [s]
+WAKE_PERIOD = 0.1  # [s] how late a signal may be noticed
+GROUPS = ('topics', 'locks')
+
+
+class TwistMux(Node):
+    """Forwards the velocities of the source of the highest priority to ``cmd_vel_out``."""
+
+    def __init__(self) -> None:
+        """Read the parameters and subscribe.
+
+        Raises:
+            SettingError: A parameter is misspelt, missing or wrong.
+        """
+        super().__init__('twist_mux', automatically_declare_parameters_from_overrides=True)
+        inputs = self._inputs()
+        self._mux = Multiplexer(inputs)
+        stamped = self._stamped()
+        self._type: Any = TwistStamped if stamped else Twist
+        self._output = self.create_publisher(self._type, 'cmd_vel_out', 1)
+        self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
+        for source in inputs.sources:
+            take = partial(self._velocity, source.name)
+            self.create_subscription(self._type, source.topic, take, 1)
+        for lock in inputs.locks:
+            self.create_subscription(Bool, lock.topic, partial(self._lock, lock.name), 1)
+        # a simulated clock that stands still must not keep the robot moving
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(WATCH_PERIOD, self._watch, clock=steady)
+        self.create_timer(DIAGNOSTIC_PERIOD, self._diagnose, clock=steady)
+        self._tell(inputs)
+
+    def _inputs(self) -> Inputs:
+        topics, locks = (
+            {path: self.get_parameter(f'{group}.{path}').value for path in paths}
+            for group in GROUPS
+            for paths in [self.get_parameters_by_prefix(group)]
+        )
+        return read_inputs(topics, locks)
+
+    def _stamped(self) -> bool:
+        known = {'use_stamped', 'use_sim_time', *GROUPS}
+        groups = {name.partition('.')[0] for name in self.get_parameters_by_prefix('')}
+        refuse_similar(groups - known, known)
+        if not self.has_parameter('use_stamped'):
+            return flag(self, 'use_stamped', False, 'TwistStamped in and out, instead of Twist')
+        value = self.get_parameter('use_stamped').value
+        if not isinstance(value, bool):
+            raise SettingError(f'use_stamped is {value!r}: it must be true or false')
+        return value
+
+    def _velocity(self, name: str, message: Any) -> None:  # noqa: ANN401
+        twist = message.twist if isinstance(message, TwistStamped) else message
+        linear, angular = twist.linear, twist.angular
+        parts = (linear.x, linear.y, linear.z, angular.x, angular.y, angular.z)
+        try:
+            if self._mux.velocity(name, parts, time.monotonic()):
+                self._output.publish(message)
+        except CommandError as error:
+            self.get_logger().warning(str(error), throttle_duration_sec=1.0)
+
+    def _lock(self, name: str, message: Bool) -> None:
+        self._mux.lock(name, message.data, time.monotonic())
+        self._watch()
+
+    def _watch(self) -> None:
+        if self._mux.zero_due(time.monotonic()):
+            message = self._type()
+            if isinstance(message, TwistStamped):
+                message.header.stamp = self.get_clock().now().to_msg()
+            self._output.publish(message)
+
+    def _diagnose(self) -> None:
+        message = DiagnosticArray(status=[self._status(time.monotonic())])
+        message.header.stamp = self.get_clock().now().to_msg()
+        self._diagnostics.publish(message)
+
+    def _status(self, now: float) -> DiagnosticStatus:
+        active, lock_priority = self._mux.active(now), self._mux.lock_priority(now)
+        values = {
+            f'velocity {each.name}': _text(
+                'masked' if self._mux.is_masked(each, now) else 'unmasked', each
+            )
+            for each in self._mux.inputs.sources
+        }
+        values |= {
+            f'lock {each.name}': _text(
+                'locked' if self._mux.is_locked(each, now) else 'free', each
+            )
+            for each in self._mux.inputs.locks
+        }
+        values['current priority'] = str(lock_priority)
+        return DiagnosticStatus(
+            level=DiagnosticStatus.OK,
+            name='twist_mux: Twist mux status',
+            message=f'{active.name} is heard' if active else 'no source is heard',
+            hardware_id='none',
+            values=[KeyValue(key=key, value=value) for key, value in values.items()],
+        )
+
+    def _tell(self, inputs: Inputs) -> None:
+        for kind, group in (('source', inputs.sources), ('lock', inputs.locks)):
+            for each in sorted(group, key=lambda one: -one.priority):
+                self.get_logger().info(f'{kind} {each.name}: {_text("", each).strip()}')
+
+
+def _text(state: str, each: Input) -> str:
+    timeout = f'{each.timeout:g} s' if each.timeout else 'no'
+    return f'{state} ({each.topic}, priority {each.priority}, {timeout} time-out)'
+
+
+def main() -> None:
+    """Entry point."""
+    run(_serve)
+
+
+def _serve(stop: threading.Event) -> None:
+    executor = SingleThreadedExecutor()
+    executor.add_node(TwistMux())
+    while not stop.is_set():
+        executor.spin_once(timeout_sec=WAKE_PERIOD)
+    executor.shutdown()
+
+
+if __name__ == '__main__':
+    main()

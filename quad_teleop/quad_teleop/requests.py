@@ -1,0 +1,56 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What a person can ask for besides a velocity."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from .body_pose import BodyPose
+from .modes import Mode
+
+
+@dataclass(frozen=True, slots=True)
+class ModeRequest:
+    """Ask the controller for a mode.
+
+    Attributes:
+        mode: Which.
+    """
+
+    mode: Mode
+
+
+@dataclass(frozen=True, slots=True)
+class PoseRequest:
+    """Let the body stand otherwise.
+
+    Attributes:
+        pose: How.
+    """
+
+    pose: BodyPose
+
+
+@dataclass(frozen=True, slots=True)
+class Note:
+    """Tell the person something.
+
+    Attributes:
+        text: What.
+    """
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Quit:
+    """End the program."""
+
+
+@dataclass(frozen=True, slots=True)
+class Suspend:
+    """Give the terminal back to the shell for a while."""
+
+
+Request = ModeRequest | PoseRequest | Note | Quit | Suspend
