@@ -19,8 +19,8 @@ from process_supervisor import (
 
 SIMULATOR_READY = r'simulated .* on '
 """What fake_xgo logs when its serial port is there."""
-HARDWARE_READY = r'connected '
-"""What hardware_node logs when the robot has answered and feedback comes in."""
+HARDWARE_READY = r'running: '
+"""What hardware_node logs when the robot has answered and reports come in."""
 CONTROLLER_READY = r'ready'
 """What controller_node logs when it has heard the joints and answers /set_mode."""
 PUBLISHER_READY = r'[Rr]obot'

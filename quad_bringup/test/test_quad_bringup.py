@@ -21,7 +21,7 @@ WORKSPACE = Path(__file__).parents[2]
 
 READY = {
     ('quad_hardware', 'fake_xgo'): '[INFO] [fake_xgo]: simulated XGO lite on {link}',
-    ('quad_hardware', 'hardware_node'): '[INFO] [hardware_node]: connected to {port}',
+    ('quad_hardware', 'hardware_node'): '[INFO] [hardware_node]: running: {port}',
     ('quad_controller', 'controller_node'): '[INFO] [controller_node]: ready',
     ('robot_viewer', 'robot_state_publisher'): '[INFO] [robot_state_publisher]: Robot initialized',
 }
@@ -130,7 +130,7 @@ def test_a_real_robot_is_on_the_port_that_was_named(workspace: Workspace) -> Non
         process.communicate(timeout=PATIENCE)
     assert process.returncode == 0
     assert 'XGO mini on /dev/ttyAMA0' in seen
-    assert "connected to ['port:=/dev/ttyAMA0']" in seen
+    assert "running: ['port:=/dev/ttyAMA0']" in seen
     assert 'fake_xgo' not in seen
 
 
