@@ -76,6 +76,9 @@ def read_device(
         identity=_identity(settings, eds.dictionary),
         mandatory=settings.mandatory,
         reset_communication=settings.reset_communication,
+        retry_factor=(
+            settings.retry_factor if 'retry_factor' in section.entries else options.retry_factor
+        ),
         sdo_timeout=settings.sdo_timeout,
         boot_timeout=settings.boot_timeout,
         sdo_writes=SdoReader(eds.dictionary, findings).read(section),

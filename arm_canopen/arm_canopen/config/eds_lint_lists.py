@@ -101,16 +101,17 @@ def check_lists(path: Path, ini: IniFile, findings: Findings) -> None:
                     f'0x{index:04X} is listed a second time, first in [{seen[index]}]',
                     'remove it',
                 )
-            elif _proper_list(index) != title:
+            elif proper_list(index) != title:
                 findings.warning(
                     place,
                     f'0x{index:04X} does not belong here',
-                    f'move it to [{_proper_list(index)}]',
+                    f'move it to [{proper_list(index)}]',
                 )
             seen.setdefault(index, title)
 
 
-def _proper_list(index: int) -> str:
+def proper_list(index: int) -> str:
+    """Return the title of the list that an object belongs to."""
     if index in MANDATORY_INDICES:
         return LISTS['mandatoryobjects']
     return LISTS['manufacturerobjects' if index in MANUFACTURER else 'optionalobjects']

@@ -5,10 +5,12 @@
 from __future__ import annotations
 
 from .document import Mapping
-from .findings import Findings
-from .model import MasterConfig
+from .findings import Findings, RefusedError
+from .model import Identity, MasterConfig
+from .scalars import integer, key_number
+from .section import block
 from .settings import MasterSettings, Options, remappings
-from .shared_keys import MILLISECONDS, U16_MAX
+from .shared_keys import MILLISECONDS, U8_MAX, U16_MAX
 
 HEARTBEAT_TIME_MAX = U16_MAX / MILLISECONDS  # [s] 0x1016 holds 16 bits
 
@@ -46,10 +48,45 @@ def build_master(
         remappings=remappings(section, findings),
         bitrate=round(settings.bitrate),
         sync_period=settings.sync_period,
+        sync_window=settings.sync_window,
         sync_overflow=settings.sync_overflow,
+        time_cob_id=settings.time_cob_id,
         cycle_period=settings.sync_period or min(device_periods, default=0.01),
         heartbeat_producer=settings.heartbeat_producer,
         heartbeat_timeout=timeout,
         start_nodes=settings.start_nodes,
+        start_all_nodes=settings.start_all_nodes,
+        nmt_inhibit_time=settings.nmt_inhibit_time,
+        emcy_inhibit_time=settings.emcy_inhibit_time,
+        error_behavior=_error_behaviour(section, findings),
+        identity=Identity(
+            0,
+            settings.vendor_id,
+            settings.product_code,
+            settings.revision_number,
+            settings.serial_number,
+        ),
+        boot_time=settings.boot_time,
         boot_timeout=settings.boot_timeout,
     )
+
+
+def _error_behaviour(section: Mapping, findings: Findings) -> dict[int, int]:
+    """Read 0x1029 of the master: what it does by kind of error (CiA 301, 7.5.2.28)."""
+    given = block(section, 'error_behavior', findings)
+    result: dict[int, int] = {}
+    for name, item in given.entries.items() if given else ():
+        subindex = key_number(name, U8_MAX)
+        if subindex is None:
+            findings.error(item.place, f'{name!r} is no sub-index', "write '1: 0' and the like")
+            continue
+        try:
+            value = integer(item)
+        except RefusedError as reason:
+            findings.refuse(item.place, reason)
+            continue
+        if 0 <= value <= U8_MAX:
+            result[subindex] = value
+        else:
+            findings.error(item.place, f'{value} is no error behaviour', 'take 0, 1 or 2')
+    return result

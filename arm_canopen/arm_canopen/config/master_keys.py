@@ -8,9 +8,12 @@ differs, ``why`` says the reason.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from .schema import Key, Kind, Use
 from .shared_keys import (
     DRIVER,
+    HUNDRED_MICROSECONDS,
     KILOBIT,
     MICROSECONDS,
     MILLISECONDS,
@@ -22,6 +25,7 @@ from .shared_keys import (
     RETRY_FACTOR,
     TIME_COB_ID,
     U16_MAX,
+    U32_MAX,
 )
 
 NO_DICTIONARY = 'the master has no object dictionary of its own'
@@ -42,10 +46,10 @@ MASTER_KEYS: tuple[Key, ...] = (
     NAMESPACE,
     REMAPPINGS,
     Key('baudrate', Kind.INTEGER, 'bitrate', per_unit=KILOBIT, choices=BITRATES),
-    Key('vendor_id', Kind.INTEGER, default=0, use=Use.LATER, why=NO_DICTIONARY),
-    Key('product_code', Kind.INTEGER, default=0, use=Use.LATER, why=NO_DICTIONARY),
-    Key('revision_number', Kind.INTEGER, default=0, use=Use.LATER, why=NO_DICTIONARY),
-    Key('serial_number', Kind.INTEGER, default=0, use=Use.LATER, why=NO_DICTIONARY),
+    Key('vendor_id', Kind.INTEGER, 'vendor_id', low=0, high=U32_MAX, default=0, use=Use.LATER, why=NO_DICTIONARY),
+    Key('product_code', Kind.INTEGER, 'product_code', low=0, high=U32_MAX, default=0, use=Use.LATER, why=NO_DICTIONARY),
+    Key('revision_number', Kind.INTEGER, 'revision_number', low=0, high=U32_MAX, default=0, use=Use.LATER, why=NO_DICTIONARY),
+    Key('serial_number', Kind.INTEGER, 'serial_number', low=0, high=U32_MAX, default=0, use=Use.LATER, why=NO_DICTIONARY),
     Key('heartbeat_consumer', Kind.BOOLEAN, 'watch_devices', default=True),
     Key(
         'heartbeat_producer',
@@ -68,13 +72,13 @@ MASTER_KEYS: tuple[Key, ...] = (
         zero=True,
         why='the unit is microseconds, 10 ms is 10000',
     ),
-    Key('sync_window', Kind.INTEGER, default=0, use=Use.LATER, why='its length is not supervised'),
+    Key('sync_window', Kind.INTEGER, 'sync_window', per_unit=MICROSECONDS, low=0, high=U32_MAX, default=0, use=Use.LATER, why='its length is not supervised'),
     Key('sync_overflow', Kind.INTEGER, 'sync_overflow', low=2, high=240, zero=True),
-    TIME_COB_ID,
+    replace(TIME_COB_ID, field='time_cob_id', low=0),
     Key(
-        'emcy_inhibit_time', Kind.INTEGER, default=0, use=Use.LATER, why='the master sends no EMCY'
+        'emcy_inhibit_time', Kind.INTEGER, 'emcy_inhibit_time', per_unit=HUNDRED_MICROSECONDS, low=0, high=U16_MAX, default=0, use=Use.LATER, why='the master sends no EMCY'
     ),
-    Key('nmt_inhibit_time', Kind.INTEGER, default=0, use=Use.LATER, why='NMT is sent at once'),
+    Key('nmt_inhibit_time', Kind.INTEGER, 'nmt_inhibit_time', per_unit=HUNDRED_MICROSECONDS, low=0, high=U16_MAX, default=0, use=Use.LATER, why='NMT is sent at once'),
     Key('error_behavior', Kind.BLOCK, use=Use.LATER, why='the master has no NMT state'),
     Key(
         'start',
@@ -87,6 +91,7 @@ MASTER_KEYS: tuple[Key, ...] = (
     Key(
         'start_all_nodes',
         Kind.BOOLEAN,
+        'start_all_nodes',
         default=False,
         use=Use.LATER,
         why='each device is started when it is ready',
@@ -106,7 +111,7 @@ MASTER_KEYS: tuple[Key, ...] = (
         why='an error of a mandatory device does not stop the others in this version',
     ),
     Key(
-        'boot_time', Kind.INTEGER, default=0, use=Use.LATER, why='devices are waited for for ever'
+        'boot_time', Kind.INTEGER, 'boot_time', per_unit=MILLISECONDS, low=0, high=U32_MAX, default=0, use=Use.LATER, why='devices are waited for for ever'
     ),
     Key('boot_timeout', Kind.NUMBER, 'boot_timeout', per_unit=MILLISECONDS, low=1, high=60_000),
 )

@@ -29,7 +29,7 @@ class Use(Enum):
 
     READ = auto()  # fills a field of the model
     NEEDLESS = auto()  # accepted: what it asks for is so anyway
-    LATER = auto()  # told in a warning: known, not used yet
+    LATER = auto()  # told in a warning: known, not used yet; a field is for other tools' files
     REFUSED = auto()  # ignoring it would change motion or safety, so only its default is accepted
 
 

@@ -62,7 +62,7 @@ def _read_key(key: Key, item: Item, values: dict[str, Any], findings: Findings) 
     is_default = value is not None and value == key.default
     if key.field:
         values[key.field] = key.to_model(value)
-    elif key.use is Use.REFUSED and not is_default:
+    if key.use is Use.REFUSED and not is_default:
         findings.error(
             item.place, f'{describe(item)} is not supported: {key.why}', 'remove the key'
         )

@@ -28,10 +28,12 @@ class Options:
     Attributes:
         dcf_path: Folder of the EDS files, empty for none.
         heartbeat_multiplier: Heartbeat periods until a heartbeat counts as lost.
+        retry_factor: Missing answers after which a guarded device counts as lost.
     """
 
     dcf_path: str = ''
     heartbeat_multiplier: float = 3.0
+    retry_factor: int = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +42,7 @@ class MasterSettings:
 
     Attributes:
         watch_devices: The master supervises the devices' heartbeats.
+        vendor_id: Part of ``identity``, as the three below.
         heartbeat_multiplier: Periods that devices wait for the master's heartbeat, None for the
             options' value.
     """
@@ -52,8 +55,18 @@ class MasterSettings:
     heartbeat_producer: float = 0.0
     heartbeat_multiplier: float | None = None
     sync_period: float = 0.0
+    sync_window: float = 0.0
     sync_overflow: int = 0
+    time_cob_id: int = 0x100
     start_nodes: bool = True
+    start_all_nodes: bool = False
+    nmt_inhibit_time: float = 0.0
+    emcy_inhibit_time: float = 0.0
+    vendor_id: int = 0
+    product_code: int = 0
+    revision_number: int = 0
+    serial_number: int = 0
+    boot_time: float = 0.0
     boot_timeout: float = 2.0
 
 
@@ -84,6 +97,7 @@ class DeviceSettings:
     mandatory: bool = False
     reset_communication: bool = True
     num_channels: int = 1
+    retry_factor: int = 3
 
 
 def read_options(section: Mapping, findings: Findings) -> Options:

@@ -37,7 +37,14 @@ MULTIPLIER = Key(
     why='below 1 every heartbeat would count as lost',
 )
 RETRY_FACTOR = Key(
-    'retry_factor', Kind.INTEGER, default=3, use=Use.LATER, why='there is no node guarding'
+    'retry_factor',
+    Kind.INTEGER,
+    'retry_factor',
+    low=0,
+    high=U8_MAX,
+    default=3,
+    use=Use.LATER,
+    why='there is no node guarding',
 )
 TIME_COB_ID = Key(
     'time_cob_id', Kind.INTEGER, default=0x100, use=Use.LATER, why='no TIME is sent or read'
