@@ -102,6 +102,7 @@ def _report(feedback: Feedback, now: float) -> RobotState:
         velocities=dict(zip(MOTOR_ORDER, feedback.velocity, strict=True)),
         battery=feedback.battery,
         voltage=feedback.battery_voltage or None,
+        device_time=feedback.device_time / 1000.0,
         faults=feedback.faults,
         temperatures=dict(zip(MOTOR_ORDER, feedback.temperature, strict=True)),
     )

@@ -7,6 +7,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+DEVICE_TIME_WRAP = 2**32 / 1000.0  # [s]
+
 Vector = tuple[float, float, float]
 
 
@@ -24,6 +26,8 @@ class RobotState:
         rates: Angular velocity x, y, z of the body [deg/s]; None where there is no gyro.
         battery: Charge [%]; None while unknown.
         voltage: Voltage of the battery [V]; None where it is not reported.
+        device_time: When it was made, on the clock of the robot [s], which wraps at
+            :data:`DEVICE_TIME_WRAP`; None where it is not reported.
         faults: Fault bits of the new protocol.
         temperatures: Of the servos by motor id [°C]; empty where they are not reported.
     """
@@ -37,5 +41,6 @@ class RobotState:
     rates: Vector | None = None
     battery: float | None = None
     voltage: float | None = None
+    device_time: float | None = None
     faults: int = 0
     temperatures: Mapping[int, float] | None = None

@@ -1,0 +1,15 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What the robot does not report and the controller needs: rates, odometry, height."""
+
+from .estimator import Estimate, Estimator, EstimatorSettings, RateSource
+from .odometry import OdometrySettings, OdometryState
+
+__all__ = [
+    'Estimate',
+    'Estimator',
+    'EstimatorSettings',
+    'OdometrySettings',
+    'OdometryState',
+    'RateSource',
+]

@@ -1,0 +1,150 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Everything that is published of a report: joints, IMU, odometry, in SI units."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+import math
+
+from ..joints import JointMap
+from ..link.state import RobotState
+from .feet import Feet
+from .filters import AttitudeRate, JointRate
+from .gravity import disagreement
+from .odometry import LegOdometry, OdometrySettings, OdometryState
+from .plausibility import Plausibility
+from .rotation import from_roll_pitch_yaw, Quaternion, Vector
+from .sample_clock import SampleClock
+
+
+class RateSource(Enum):
+    """Where the angular velocity is from."""
+
+    AUTO = 'auto'  # the gyro where it is reported
+    DIFFERENTIATED = 'differentiated'  # always from the attitude
+    NONE = 'none'  # not published
+
+
+@dataclass(frozen=True, slots=True)
+class EstimatorSettings:
+    """How reports are read.
+
+    Attributes:
+        rate_source: Where the angular velocity is from.
+        rate_cutoff: Of the low-pass of differentiated angular velocities [Hz].
+        joint_cutoff: Of the low-pass of differentiated joint velocities [Hz].
+        odometry: How the legs are read.
+    """
+
+    rate_source: RateSource = RateSource.AUTO
+    rate_cutoff: float = 12.0
+    joint_cutoff: float = 12.0
+    odometry: OdometrySettings = field(default_factory=OdometrySettings)
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """One report in SI units.
+
+    Attributes:
+        time: When it was made, on the monotonic clock [s].
+        positions: By joint [rad], of the gripper [m]; joints that are not reported are missing.
+        velocities: Of the same joints [rad/s], [m/s].
+        attitude: From base_link to the world, (x, y, z, w); its yaw is the robot's.
+        angular_velocity: Of the body, in base_link [rad/s]; None when it is not wanted.
+        rate_measured: The angular velocity is that of a gyro.
+        acceleration: Specific force in base_link [m/s²].
+        gravity_error: Between accelerometer and attitude [rad]; None while the body accelerates.
+        odometry: Where the body is.
+    """
+
+    time: float
+    positions: dict[str, float]
+    velocities: dict[str, float]
+    attitude: Quaternion
+    angular_velocity: Vector | None
+    rate_measured: bool
+    acceleration: Vector
+    gravity_error: float | None
+    odometry: OdometryState
+
+
+class Estimator:
+    """Turns reports into estimates.
+
+    Attributes:
+        refused: Reports that could not be.
+        refusal: Why the last of them could not be.
+    """
+
+    def __init__(self, urdf: str, joints: JointMap, settings: EstimatorSettings) -> None:
+        """Begin without a report.
+
+        Raises:
+            CommandError: The legs of the URDF cannot be read.
+        """
+        self.refused = 0
+        self.refusal = ''
+        self._joints = joints
+        self._settings = settings
+        self._feet = Feet(urdf, joints.names)
+        self._clock = SampleClock()
+        self._plausibility = Plausibility()
+        self._rate = AttitudeRate(settings.rate_cutoff)
+        self._joint_rate = JointRate(settings.joint_cutoff)
+        self._odometry = LegOdometry(settings.odometry, self._feet.radius)
+
+    def command(self, time: float, targets: Sequence[float]) -> None:
+        """Note what was sent to the legs, which tells the feet that stand from those that swing.
+
+        Args:
+            time: When, on the monotonic clock [s].
+            targets: Positions of the first joints, in their order [rad].
+        """
+        self._odometry.command(time, self._feet.poses(self._padded(targets)))
+
+    def update(self, state: RobotState) -> Estimate | None:
+        """Take a report; return None when it cannot be."""
+        reason = self._plausibility.check(state)
+        if reason:
+            self.refused += 1
+            self.refusal = reason
+            return None
+        time = self._clock.time(state)
+        roll, pitch, yaw = map(math.radians, state.attitude)
+        attitude = from_roll_pitch_yaw(roll, pitch, yaw)
+        positions = self._joints.positions(state.positions)
+        velocities = self._joints.velocities(state.velocities)
+        if not velocities:
+            velocities = self._joint_rate.update(time, positions)
+        placed = self._padded([positions.get(name, 0.0) for name in self._joints.names])
+        rate, measured = self._angular_velocity(time, attitude, state)
+        return Estimate(
+            time=time,
+            positions=positions,
+            velocities=velocities,
+            attitude=attitude,
+            angular_velocity=rate,
+            rate_measured=measured,
+            acceleration=state.acceleration,
+            gravity_error=disagreement(attitude, state.acceleration),
+            odometry=self._odometry.update(time, self._feet.poses(placed), attitude),
+        )
+
+    def _angular_velocity(
+        self, time: float, attitude: Quaternion, state: RobotState
+    ) -> tuple[Vector | None, bool]:
+        source = self._settings.rate_source
+        differentiated = self._rate.update(time, attitude)
+        if source is RateSource.NONE:
+            return None, False
+        if source is RateSource.AUTO and state.rates is not None:
+            x, y, z = map(math.radians, state.rates)
+            return (x, y, z), True
+        return differentiated, False
+
+    def _padded(self, positions: Sequence[float]) -> list[float]:
+        return [*positions, *([0.0] * (len(self._joints.names) - len(positions)))]

@@ -1,0 +1,66 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Reports that cannot be: an eight-bit checksum lets one damaged frame in 256 through."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import math
+
+from ..link.state import RobotState
+
+LARGEST_ANGLE = 200.0  # [deg] of a servo
+LARGEST_SPEED = 3000.0  # [deg/s] of a servo
+LARGEST_ACCELERATION = 200.0  # [m/s²]
+LARGEST_JUMP = 60.0  # [deg] between reports; a servo does 12 degrees in 20 ms
+JUMP_TIME = 0.1  # [s] after which anything may have happened
+PATIENCE = 2  # reports in a row that are refused for a jump, before it is believed
+
+
+class Plausibility:
+    """Says what is wrong with a report, if anything."""
+
+    def __init__(self) -> None:
+        """Begin without a report."""
+        self._last: RobotState | None = None
+        self._refused = 0
+
+    def check(self, state: RobotState) -> str:
+        """Return why a report cannot be; empty when it can."""
+        reason = next(_impossible(state), '')
+        if reason:
+            return reason
+        last = self._last
+        if last is not None and state.arrival - last.arrival < JUMP_TIME:
+            reason = next(_jumps(last, state), '')
+        if reason and self._refused < PATIENCE:
+            self._refused += 1
+            return reason
+        self._refused = 0
+        self._last = state
+        return ''
+
+
+def _impossible(state: RobotState) -> Iterator[str]:
+    numbers = (*state.attitude, *state.acceleration, *state.positions.values())
+    if not all(map(math.isfinite, (*numbers, *state.velocities.values()))):
+        yield 'a number is not finite'
+    if math.hypot(*state.acceleration) > LARGEST_ACCELERATION:
+        yield f'acceleration {state.acceleration} m/s²'
+    if any(abs(angle) > 360.0 for angle in state.attitude):
+        yield f'attitude {state.attitude} deg'
+    for motor, angle in state.positions.items():
+        if abs(angle) > LARGEST_ANGLE:
+            yield f'motor {motor} at {angle:.4g} deg'
+    for motor, speed in state.velocities.items():
+        if abs(speed) > LARGEST_SPEED:
+            yield f'motor {motor} at {speed:.4g} deg/s'
+
+
+def _jumps(last: RobotState, state: RobotState) -> Iterator[str]:
+    for motor, angle in state.positions.items():
+        if abs(angle - last.positions.get(motor, angle)) > LARGEST_JUMP:
+            yield f'motor {motor} jumped to {angle:.4g} deg'
+    for name, before, now in zip('rpy', last.attitude, state.attitude, strict=True):
+        if abs(math.remainder(now - before, 360.0)) > LARGEST_JUMP:
+            yield f'attitude {name} jumped to {now:.4g} deg'

@@ -1,0 +1,8 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""From joints of the URDF to servos and back, and what is let through to them."""
+
+from .command import Command, CommandLimiter, LimiterSettings
+from .mapping import JointMap, JointServo, servo_of
+
+__all__ = ['Command', 'CommandLimiter', 'JointMap', 'JointServo', 'LimiterSettings', 'servo_of']

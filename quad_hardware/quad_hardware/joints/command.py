@@ -1,0 +1,138 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What a joint command may do: right length, finite numbers, within limits, no jumps."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+import math
+
+from ..exceptions import CommandError
+from .mapping import JointMap
+
+NOMINAL_PERIOD = 0.02  # [s]
+LONGEST_PERIOD = 0.03  # [s] a pause between two commands does not add up to a jump
+
+
+@dataclass(frozen=True, slots=True)
+class LimiterSettings:
+    """How fast targets may move.
+
+    Attributes:
+        speed: Fastest [rad/s]; of the gripper, times its travel in a radian of servo.
+        start_speed: Fastest at the beginning of a stream of commands [rad/s].
+        start_time: After which ``speed`` is reached [s].
+        stream_timeout: A pause that ends a stream [s].
+    """
+
+    speed: float = 12.0
+    start_speed: float = 2.0
+    start_time: float = 0.5
+    stream_timeout: float = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """What is sent for a joint command.
+
+    Attributes:
+        targets: Positions [rad], [m] of the first joints, in their order.
+        clamped: Joints that were asked to go beyond their limits.
+        slowed: Joints that were asked to move faster than allowed.
+    """
+
+    targets: tuple[float, ...]
+    clamped: tuple[str, ...] = ()
+    slowed: tuple[str, ...] = ()
+
+
+class CommandLimiter:
+    """Lets commands through so that no servo target jumps.
+
+    A stream of commands begins where the joints are measured to be; it ends with a pause, or
+    when :meth:`reset` is called because the robot was lost.
+    """
+
+    def __init__(self, joints: JointMap, settings: LimiterSettings | None = None) -> None:
+        """Begin without a stream."""
+        self._joints = joints
+        self._settings = settings or LimiterSettings()
+        degree = math.pi / 180.0
+        self._share = tuple(servo.gain / degree for servo in joints.servos)
+        self._targets: list[float] = []
+        self._began_at = 0.0
+        self._last_at = -math.inf
+
+    @property
+    def largest_step(self) -> float:
+        """Farthest that a target of a leg joint moves with one command [rad]."""
+        return self._settings.speed * LONGEST_PERIOD
+
+    def reset(self) -> None:
+        """End the stream: the next command begins anew."""
+        self._last_at = -math.inf
+
+    def step(
+        self, positions: Sequence[float], measured: Sequence[float | None], now: float
+    ) -> Command:
+        """Take a command.
+
+        Args:
+            positions: Targets of all joints, or of the legs only, in the order of the URDF
+                [rad], [m].
+            measured: Where the joints are; None where that is not known.
+            now: Time [s].
+
+        Raises:
+            CommandError: A wrong length, or a number that is not finite; nothing is to be sent.
+        """
+        names = self._joints.names
+        if len(positions) not in {len(names), self._joints.leg_count}:
+            raise CommandError(
+                f'{len(positions)} positions for {len(names)} joints; give one for each of '
+                f'{", ".join(names)}'
+                + (f', or the first {self._joints.leg_count}' if len(names) > 12 else '')
+            )
+        wrong = [name for name, p in zip(names, positions, strict=False) if not math.isfinite(p)]
+        if wrong:
+            raise CommandError(
+                f'no finite position for {", ".join(wrong)}; the command is refused'
+            )
+        if now - self._last_at > self._settings.stream_timeout:
+            self._begin(positions, measured, now)
+        elapsed = min(max(now - self._last_at, 0.0), LONGEST_PERIOD)
+        self._last_at = now
+        return self._approach(positions, self._speed(now) * elapsed)
+
+    def _begin(
+        self, positions: Sequence[float], measured: Sequence[float | None], now: float
+    ) -> None:
+        wanted = [*positions, *(math.nan for _ in range(len(measured) - len(positions)))]
+        # the angle of a servo that is not reported is taken to be what is asked of it
+        self._targets = [
+            want if place is None else place for want, place in zip(wanted, measured, strict=True)
+        ]
+        self._began_at = now
+        self._last_at = now - NOMINAL_PERIOD
+
+    def _speed(self, now: float) -> float:
+        settings = self._settings
+        share = min((now - self._began_at) / settings.start_time, 1.0)
+        return settings.start_speed + share * (settings.speed - settings.start_speed)
+
+    def _approach(self, positions: Sequence[float], step: float) -> Command:
+        clamped, slowed = [], []
+        for index, wanted in enumerate(positions):
+            servo = self._joints.servos[index]
+            goal = min(max(wanted, servo.lower), servo.upper)
+            if goal != wanted:
+                clamped.append(servo.joint)
+            last, reach = self._targets[index], step * self._share[index]
+            if math.isnan(last):
+                last = goal
+            target = min(max(goal, last - reach), last + reach)
+            if target != goal:
+                slowed.append(servo.joint)
+            self._targets[index] = target
+        return Command(tuple(self._targets[: len(positions)]), tuple(clamped), tuple(slowed))

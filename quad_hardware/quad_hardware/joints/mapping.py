@@ -1,0 +1,132 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Joint positions of the URDF [rad] against servo angles on the wire [deg].
+
+``position = offset + sign * gain * angle``. For a turning joint the gain is pi/180. For the
+gripper, which slides, the travel of the joint is spread over the servo's whole range.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+import math
+
+from quad_description import Joint
+
+from ..exceptions import CommandError
+from ..protocol import ANGLE_SPANS, LEG_MOTORS, Model, MOTOR_OF_JOINT
+
+GRIPPER_MOTOR = 51
+DEGREE = math.pi / 180.0  # [rad]
+
+
+@dataclass(frozen=True, slots=True)
+class JointServo:
+    """A joint and the servo that moves it.
+
+    Attributes:
+        joint: Name in the URDF.
+        motor: Id on the wire.
+        sign: 1 or -1.
+        offset: Position of the joint where the servo is at zero [rad], of the gripper [m].
+        lower: Least position that is sent [rad], [m].
+        upper: Greatest position that is sent [rad], [m].
+        gain: Position a degree of the servo is worth [rad/deg], [m/deg].
+    """
+
+    joint: str
+    motor: int
+    sign: int = 1
+    offset: float = 0.0
+    lower: float = -math.inf
+    upper: float = math.inf
+    gain: float = DEGREE
+
+    def __post_init__(self) -> None:
+        """Refuse what would move a servo the wrong way or not at all."""
+        if self.sign not in {1, -1}:
+            raise CommandError(f'{self.joint}: sign {self.sign} is neither 1 nor -1')
+        if not math.isfinite(self.offset):
+            raise CommandError(f'{self.joint}: offset {self.offset} is no position')
+        if not self.lower <= self.upper:
+            raise CommandError(f'{self.joint}: lower {self.lower} is above upper {self.upper}')
+
+    def position(self, angle: float) -> float:
+        """Return the position of the joint [rad], [m] for a servo angle [deg]."""
+        return self.offset + self.sign * self.gain * angle
+
+    def velocity(self, speed: float) -> float:
+        """Return the velocity of the joint [rad/s], [m/s] for one of the servo [deg/s]."""
+        return self.sign * self.gain * speed
+
+    def angle(self, position: float) -> float:
+        """Return the servo angle [deg] for a position of the joint [rad], [m]."""
+        return self.sign * (position - self.offset) / self.gain
+
+
+def servo_of(joint: Joint, motor: int | None = None) -> JointServo:
+    """Return the servo of a joint, with sign 1, no offset and the limits of the URDF.
+
+    Args:
+        joint: From the URDF.
+        motor: Its id, where it is not the one that the vendor's names imply.
+
+    Raises:
+        CommandError: The joint has no known motor.
+    """
+    number = MOTOR_OF_JOINT.get(joint.name) if motor is None else motor
+    if number is None:
+        known = ', '.join(MOTOR_OF_JOINT)
+        raise CommandError(
+            f'no motor is known for joint {joint.name!r} of the URDF; rename it (known: {known}) '
+            f'or set joints.{joint.name}.motor'
+        )
+    if number != GRIPPER_MOTOR:
+        return JointServo(joint.name, number, lower=joint.lower, upper=joint.upper)
+    span = ANGLE_SPANS[Model.LITE][GRIPPER_MOTOR]
+    gain = (joint.upper - joint.lower) / (span.high - span.low)
+    offset = joint.lower - gain * span.low
+    return JointServo(joint.name, number, 1, offset, joint.lower, joint.upper, gain)
+
+
+class JointMap:
+    """All joints of a robot, in the order of the URDF."""
+
+    def __init__(self, servos: Iterable[JointServo]) -> None:
+        """Keep the servos.
+
+        Raises:
+            CommandError: A leg's motor is missing, or two joints have the same motor.
+        """
+        self.servos = tuple(servos)
+        self.names = tuple(servo.joint for servo in self.servos)
+        motors = [servo.motor for servo in self.servos]
+        missing = [motor for motor in LEG_MOTORS if motor not in motors]
+        if missing:
+            joints = [name for name, motor in MOTOR_OF_JOINT.items() if motor in missing]
+            raise CommandError(
+                f'the URDF has no joint for motors {", ".join(map(str, missing))}; '
+                f'by the vendor’s names {", ".join(joints)}'
+            )
+        twice = sorted({motor for motor in motors if motors.count(motor) > 1})
+        if twice:
+            raise CommandError(f'motor {", ".join(map(str, twice))} moves two joints of the URDF')
+
+    @property
+    def leg_count(self) -> int:
+        """How many joints the legs have."""
+        return len(LEG_MOTORS)
+
+    def positions(self, angles: Mapping[int, float]) -> dict[str, float]:
+        """Return positions [rad], [m] by joint, of those whose servo is reported."""
+        return {s.joint: s.position(angles[s.motor]) for s in self.servos if s.motor in angles}
+
+    def velocities(self, speeds: Mapping[int, float]) -> dict[str, float]:
+        """Return velocities [rad/s], [m/s] by joint, as :meth:`positions`."""
+        return {s.joint: s.velocity(speeds[s.motor]) for s in self.servos if s.motor in speeds}
+
+    def angles(self, positions: Sequence[float]) -> dict[int, float]:
+        """Return servo angles [deg] by motor for the first joints of the robot."""
+        pairs = zip(self.servos, positions, strict=False)
+        return {servo.motor: servo.angle(position) for servo, position in pairs}

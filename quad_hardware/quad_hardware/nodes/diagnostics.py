@@ -1,0 +1,126 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The link, the robot and the joint commands as /diagnostics (REP 107)."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field
+import math
+
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+
+from ..estimation import Estimate, Estimator
+from ..link import LinkState, LinkStatus, RobotState
+from ..protocol import Fault
+
+LOW_BATTERY, EMPTY_BATTERY = 20.0, 10.0  # [%]
+HOT_SERVO = 65.0  # [°C]
+GRAVITY_ERROR = math.radians(15.0)  # [rad] between accelerometer and attitude
+DAMAGE_SHARE = 0.01  # of the frames, above which a cable is bad
+
+_LINK_LEVELS = {
+    LinkState.CONNECTING: DiagnosticStatus.ERROR,
+    LinkState.WAITING: DiagnosticStatus.WARN,
+    LinkState.RUNNING: DiagnosticStatus.OK,
+    LinkState.STALE: DiagnosticStatus.STALE,
+    LinkState.STOPPED: DiagnosticStatus.ERROR,
+}
+
+
+@dataclass(slots=True)
+class CommandCounters:
+    """What became of joint commands.
+
+    Attributes:
+        received: All of them.
+        refused: Of wrong length or not finite.
+        unsent: Came while the link was not running.
+        clamped: Went beyond limits and were taken to them.
+        slowed: Asked for more speed than allowed, and were approached.
+        reason: Why the last one was refused, or which joints were clamped.
+        troubled: Something was refused or clamped since the last look.
+        largest_step: Of a target since the last look [rad].
+    """
+
+    received: int = 0
+    refused: int = 0
+    unsent: int = 0
+    clamped: int = 0
+    slowed: int = 0
+    reason: str = ''
+    troubled: bool = field(default=False)
+    largest_step: float = 0.0
+
+
+def link_diagnostic(node: str, port: str, status: LinkStatus) -> DiagnosticStatus:
+    """Describe the serial link."""
+    level, message = _LINK_LEVELS[status.state], status.detail
+    parser = status.parser
+    if level == DiagnosticStatus.OK and parser.damaged > DAMAGE_SHARE * max(parser.frames, 100):
+        level = DiagnosticStatus.WARN
+        message = f'{parser.damaged} damaged frames of {parser.frames}; is the cable loose?'
+    values = {
+        'state': status.state.value,
+        'protocol': status.protocol,
+        'baud': status.baud,
+        'firmware': status.firmware,
+        'connections': status.connections,
+        'report_age': '' if math.isinf(status.age) else f'{status.age:.3f}',
+        'commands_sent': status.commands,
+        'commands_dropped': status.dropped,
+        **asdict(parser),
+        **asdict(status.dialect),
+    }
+    return _status(level, f'{node}: serial link', message, port, values)
+
+
+def robot_diagnostic(
+    node: str, port: str, state: RobotState, estimate: Estimate | None, estimator: Estimator
+) -> DiagnosticStatus:
+    """Describe battery, servos and IMU."""
+    level, message = DiagnosticStatus.OK, 'no faults'
+    error = estimate.gravity_error if estimate else None
+    hot = {m: t for m, t in (state.temperatures or {}).items() if t > HOT_SERVO}
+    if error is not None and error > GRAVITY_ERROR:
+        level = DiagnosticStatus.WARN
+        message = f'accelerometer and attitude disagree by {math.degrees(error):.0f} degrees'
+    if hot:
+        level = DiagnosticStatus.WARN
+        message = f'hot servos: {", ".join(map(str, hot))}'
+    if state.battery is not None and state.battery < LOW_BATTERY:
+        empty = state.battery < EMPTY_BATTERY
+        level = DiagnosticStatus.ERROR if empty else DiagnosticStatus.WARN
+        message = f'battery at {state.battery:.0f} %; charge it'
+    faults = Fault(state.faults & sum(Fault))
+    if faults:
+        level = DiagnosticStatus.ERROR
+        names = (str(fault.name).lower().replace('_', ' ') for fault in Fault if fault in faults)
+        message = f'the robot reports {", ".join(names)}'
+    values = {
+        'battery': '' if state.battery is None else f'{state.battery:.0f}',
+        'voltage': '' if state.voltage is None else f'{state.voltage:.2f}',
+        'faults': state.faults,
+        'gravity_error': '' if error is None else f'{error:.3f}',
+        'hottest_servo': max((state.temperatures or {0: 0.0}).values()),
+        'implausible_reports': estimator.refused,
+        'last_implausible': estimator.refusal,
+    }
+    return _status(level, f'{node}: robot', message, port, values)
+
+
+def command_diagnostic(node: str, port: str, counters: CommandCounters) -> DiagnosticStatus:
+    """Describe what became of joint commands, and begin to look anew."""
+    level = DiagnosticStatus.WARN if counters.troubled else DiagnosticStatus.OK
+    message = counters.reason if counters.troubled else f'{counters.received} received'
+    values = {k: v for k, v in asdict(counters).items() if k != 'troubled'}
+    counters.troubled, counters.largest_step = False, 0.0
+    return _status(level, f'{node}: joint commands', message, port, values)
+
+
+def _status(
+    level: bytes, name: str, message: str, hardware: str, values: dict[str, object]
+) -> DiagnosticStatus:
+    pairs = [KeyValue(key=key, value=str(value)) for key, value in values.items()]
+    return DiagnosticStatus(
+        level=level, name=name, message=message, hardware_id=hardware, values=pairs
+    )

@@ -1,0 +1,207 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""``ros2 run quad_hardware hardware_node``: the robot on its serial port as ROS topics."""
+
+from __future__ import annotations
+
+import math
+import sys
+import time
+
+from builtin_interfaces.msg import Time as TimeMessage
+from diagnostic_msgs.msg import DiagnosticArray
+from nav_msgs.msg import Odometry
+import rclpy
+from rclpy.node import Node
+from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
+from rclpy.time import Time
+from rclpy.utilities import try_shutdown
+from sensor_msgs.msg import BatteryState, Imu, JointState
+from tf2_msgs.msg import TFMessage
+
+from quad_msgs.msg import JointCommand
+
+from ..estimation import Estimate, Estimator
+from ..exceptions import CommandError, HardwareError
+from ..joints import Command, CommandLimiter
+from ..link import Driver, LinkState, RobotState
+from . import messages
+from .diagnostics import (
+    command_diagnostic,
+    CommandCounters,
+    link_diagnostic,
+    robot_diagnostic,
+)
+from .parameters import declare_parameters
+from .spinning import spin, stop_on_signals
+
+COMMAND_QOS = QoSProfile(
+    reliability=ReliabilityPolicy.RELIABLE, history=HistoryPolicy.KEEP_LAST, depth=1
+)
+SENSOR_DEPTH = 10  # reliable, which best-effort subscribers can hear as well
+WARN_PERIOD = 2.0  # [s] between two warnings of the same kind
+
+
+class HardwareNode(Node):
+    """Publishes what the robot reports, and sends it what ``/joint_command`` asks for.
+
+    Reports are published in the driver's thread, so that nothing delays them; commands are
+    checked in a callback and handed to that thread.
+    """
+
+    def __init__(self) -> None:
+        """Declare parameters, topics and the driver; :meth:`begin` opens the port.
+
+        Raises:
+            HardwareError: A parameter or the URDF does not make sense.
+        """
+        super().__init__('hardware_node')
+        self._settings = settings = declare_parameters(self)
+        self._joints = settings.joints
+        self._limiter = CommandLimiter(settings.joints, settings.limiter)
+        self._estimator = Estimator(settings.urdf, settings.joints, settings.estimator)
+        self._driver = Driver(settings.link, self._report, self._link_changed)
+        self._state: RobotState | None = None
+        self._estimate: Estimate | None = None
+        self._counters = CommandCounters()
+        self._last_targets: tuple[float, ...] = ()
+        self._joint_states = self.create_publisher(JointState, 'joint_states', SENSOR_DEPTH)
+        self._imu = self.create_publisher(Imu, 'imu', SENSOR_DEPTH)
+        self._odom = self.create_publisher(Odometry, 'odom', SENSOR_DEPTH)
+        self._battery = self.create_publisher(BatteryState, 'battery_state', SENSOR_DEPTH)
+        self._tf = self.create_publisher(TFMessage, '/tf', 100)
+        self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', SENSOR_DEPTH)
+        self.create_subscription(JointCommand, 'joint_command', self._take, COMMAND_QOS)
+        self.create_timer(settings.diagnostics_period, self._diagnose)
+        count = len(self._joints.names)
+        self.get_logger().info(f'{count} joints; looking for the robot on {settings.link.path}')
+
+    def begin(self) -> None:
+        """Start looking for the robot."""
+        self._driver.start()
+
+    def end(self) -> None:
+        """Close the port; the servos hold their last target."""
+        self._driver.stop()
+
+    def _report(self, state: RobotState) -> None:
+        """Publish a report; runs in the thread of the driver."""
+        estimate = self._estimator.update(state)
+        if estimate is None:
+            self.get_logger().warning(
+                f'report refused: {self._estimator.refusal}',
+                throttle_duration_sec=WARN_PERIOD,
+            )
+            return
+        self._state, self._estimate = state, estimate
+        settings, stamp = self._settings, self._stamp(estimate.time)
+        self._joint_states.publish(messages.joint_state(estimate, stamp))
+        self._imu.publish(messages.imu(estimate, settings.deviations, settings.frames.imu, stamp))
+        self._odom.publish(
+            messages.odometry(estimate, settings.deviations, settings.frames, stamp)
+        )
+        if settings.frames.publish:
+            self._tf.publish(messages.transforms(estimate, settings.frames, stamp))
+
+    def _stamp(self, monotonic: float) -> TimeMessage:
+        """Return a moment of the monotonic clock on the clock of ROS."""
+        age = round((time.monotonic() - monotonic) * 1e9)
+        now = self.get_clock().now().nanoseconds
+        stamp: TimeMessage = Time(nanoseconds=max(now - age, 0)).to_msg()
+        return stamp
+
+    def _link_changed(self, state: LinkState, detail: str) -> None:
+        """Say how the link is; runs in the thread of the driver."""
+        if state is not LinkState.RUNNING:
+            self._limiter.reset()
+        if state in {LinkState.STALE, LinkState.CONNECTING}:
+            self.get_logger().warning(f'{state.value}: {detail}')
+        elif state is not LinkState.STOPPED:
+            self.get_logger().info(f'{state.value}: {detail}')
+
+    def _take(self, message: JointCommand) -> None:
+        self._counters.received += 1
+        now, estimate = time.monotonic(), self._estimate
+        try:
+            self._check_rest(message)
+            place = estimate.positions if estimate else {}
+            measured = [place.get(name) for name in self._joints.names]
+            command = self._limiter.step(message.position, measured, now)
+        except CommandError as error:
+            self._counters.refused += 1
+            self._trouble(f'joint command refused: {error}')
+            return
+        if self._driver.command(self._joints.angles(command.targets)):
+            self._estimator.command(now, command.targets)
+            self._count(command)
+        else:
+            self._limiter.reset()
+            self._last_targets = ()
+            self._counters.unsent += 1
+            self._trouble(f'joint command not sent: {self._driver.status().detail}')
+
+    def _check_rest(self, message: JointCommand) -> None:
+        """Refuse velocities and efforts that do not fit the positions; servos take neither."""
+        for name, values in (('velocity', message.velocity), ('effort', message.effort)):
+            if values and len(values) != len(message.position):
+                raise CommandError(
+                    f'{len(values)} values of {name} for {len(message.position)} positions; '
+                    'leave them out or give one for each'
+                )
+            if not all(map(math.isfinite, values)):
+                raise CommandError(f'{name} holds what is no finite number')
+
+    def _count(self, command: Command) -> None:
+        counters, legs = self._counters, self._joints.leg_count
+        pairs = zip(self._last_targets[:legs], command.targets[:legs], strict=False)
+        step = max((abs(after - before) for before, after in pairs), default=0.0)
+        counters.largest_step = max(counters.largest_step, step)
+        self._last_targets = command.targets
+        counters.slowed += bool(command.slowed)
+        if command.clamped:
+            counters.clamped += 1
+            self._trouble(f'beyond limits, taken to them: {", ".join(command.clamped)}')
+
+    def _trouble(self, reason: str) -> None:
+        self._counters.reason, self._counters.troubled = reason, True
+        self.get_logger().warning(reason, throttle_duration_sec=WARN_PERIOD)
+
+    def _diagnose(self) -> None:
+        name, port, state = self.get_name(), self._settings.link.path, self._state
+        now = self.get_clock().now().to_msg()
+        array = DiagnosticArray()
+        array.header.stamp = now
+        array.status = [
+            link_diagnostic(name, port, self._driver.status()),
+            command_diagnostic(name, port, self._counters),
+        ]
+        if state is not None:
+            array.status.append(
+                robot_diagnostic(name, port, state, self._estimate, self._estimator)
+            )
+            self._battery.publish(messages.battery(state, now))
+        self._diagnostics.publish(array)
+
+
+def main() -> None:
+    """Entry point."""
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    stop = stop_on_signals()
+    try:
+        node = HardwareNode()
+    except HardwareError as error:
+        rclpy.logging.get_logger('hardware_node').fatal(str(error))
+        try_shutdown()
+        sys.exit(2)
+    node.begin()
+    try:
+        spin(node, stop)
+    finally:
+        node.end()
+        node.destroy_node()
+        try_shutdown()
+
+
+if __name__ == '__main__':
+    main()

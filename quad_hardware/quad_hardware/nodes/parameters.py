@@ -1,0 +1,210 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The parameters of ``hardware_node``: what they mean, their ranges, and what they make."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from rclpy.node import Node
+
+from quad_description import DescriptionError, Joint, movable_joints, PRESETS, robot_urdf
+
+from ..estimation import EstimatorSettings, OdometrySettings, RateSource
+from ..exceptions import CommandError
+from ..joints import JointMap, JointServo, LimiterSettings, servo_of
+from ..link import LinkOptions
+from ..protocol import Model, Protocol, PROTOCOLS
+from .parameter_reader import ParameterReader, refuse_misspelt
+
+AUTO = 'auto'
+_PROTOCOLS: Mapping[str, tuple[Protocol, ...]] = {AUTO: PROTOCOLS} | {
+    protocol.name: (protocol,) for protocol in PROTOCOLS
+}
+_MODELS: Mapping[str, Model | None] = {AUTO: None} | {model.value: model for model in Model}
+
+
+@dataclass(frozen=True, slots=True)
+class Frames:
+    """Names of the frames, and how they hang together.
+
+    Attributes:
+        odom: Fixed where the robot began.
+        base: The body.
+        footprint: On the ground below the body.
+        imu: Of the IMU.
+        footprint_is_parent: odom, footprint, base; else odom, base, footprint.
+        publish: Transforms are published.
+    """
+
+    odom: str
+    base: str
+    footprint: str
+    imu: str
+    footprint_is_parent: bool
+    publish: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Deviations:
+    """Standard deviations that are published with the IMU.
+
+    Attributes:
+        orientation: [rad]
+        rate: Of the differentiated angular velocity [rad/s].
+        gyro: Of the angular velocity of a gyro [rad/s].
+        acceleration: [m/s²]
+    """
+
+    orientation: float
+    rate: float
+    gyro: float
+    acceleration: float
+
+
+@dataclass(frozen=True, slots=True)
+class NodeSettings:
+    """Everything that the parameters say.
+
+    Attributes:
+        link: Where the robot is.
+        urdf: What it is.
+        joints: Its servos.
+        limiter: How fast targets may move.
+        estimator: How its reports are read.
+        frames: Names of the frames.
+        deviations: Published with the IMU.
+        diagnostics_period: [s]
+    """
+
+    link: LinkOptions
+    urdf: str
+    joints: JointMap
+    limiter: LimiterSettings
+    estimator: EstimatorSettings
+    frames: Frames
+    deviations: Deviations
+    diagnostics_period: float
+
+
+def declare_parameters(node: Node) -> NodeSettings:
+    """Declare all parameters of the node and read them.
+
+    Raises:
+        CommandError: One does not make sense; the message names it, its value and the remedy.
+    """
+    read = ParameterReader(node)
+    link = LinkOptions(
+        path=read.text('port', '/dev/ttyAMA0', 'serial port of the robot'),
+        protocols=read.choice('protocol', AUTO, _PROTOCOLS, 'protocol of the robot; auto asks it'),
+        baud=read.whole('baud', 0, (0, 4_000_000), 'speed [bit/s]; 0: that of the protocol'),
+        model=read.choice('model', AUTO, _MODELS, 'ranges of the old protocol; auto: by firmware'),
+        rate=read.whole('rate', 50, (10, 100), 'reports a second [Hz]'),
+    )
+    urdf = _urdf(read)
+    settings = NodeSettings(
+        link=link,
+        urdf=urdf,
+        joints=_joint_map(read, urdf),
+        limiter=LimiterSettings(
+            speed=read.number('max_joint_speed', 12.0, (0.1, 100.0), 'of targets [rad/s]'),
+            start_speed=read.number(
+                'start_joint_speed', 2.0, (0.1, 100.0), 'of targets when commands begin [rad/s]'
+            ),
+        ),
+        estimator=_estimator(read),
+        frames=_frames(read),
+        deviations=_deviations(read),
+        diagnostics_period=read.number('diagnostics_period', 1.0, (0.1, 60.0), 'period [s]'),
+    )
+    refuse_misspelt(node)
+    return settings
+
+
+def _urdf(read: ParameterReader) -> str:
+    text = read.text('robot_description', '', 'URDF as XML text; empty: of quad_description')
+    presets = {name: name for name in PRESETS}
+    preset = read.choice('preset', 'lite', presets, 'robot of quad_description')
+    arm = read.flag('arm', default=False, meaning='the robot of quad_description has its arm')
+    return text or robot_urdf(preset, arm=arm)
+
+
+def _joint_map(read: ParameterReader, urdf: str) -> JointMap:
+    try:
+        joints = movable_joints(urdf)
+    except DescriptionError as error:
+        raise CommandError(f'robot_description: {error}') from error
+    return JointMap(_servo(read, joint) for joint in joints)
+
+
+def _servo(read: ParameterReader, joint: Joint) -> JointServo:
+    prefix = f'joints.{joint.name}'
+    motor = read.whole(f'{prefix}.motor', 0, (0, 99), 'id of its motor; 0: by its name')
+    servo = servo_of(joint, motor or None)
+    return replace(
+        servo,
+        sign=read.whole(f'{prefix}.sign', 1, (-1, 1), '1 or -1: the servo turns as the joint'),
+        offset=read.number(
+            f'{prefix}.offset', servo.offset, (-7.0, 7.0), 'position at servo zero [rad], [m]'
+        ),
+        lower=read.number(f'{prefix}.lower', servo.lower, None, 'least target [rad], [m]'),
+        upper=read.number(f'{prefix}.upper', servo.upper, None, 'greatest target [rad], [m]'),
+    )
+
+
+def _estimator(read: ParameterReader) -> EstimatorSettings:
+    sources = {source.value: source for source in RateSource}
+    default = OdometrySettings()
+    return EstimatorSettings(
+        rate_source=read.choice(
+            'angular_velocity_source',
+            RateSource.AUTO.value,
+            sources,
+            'auto: the gyro where it is reported, else differentiated attitude',
+        ),
+        rate_cutoff=read.number('rate_cutoff', 12.0, (0.5, 25.0), 'of its low-pass [Hz]'),
+        joint_cutoff=read.number(
+            'joint_velocity_cutoff', 12.0, (0.5, 25.0), 'of differentiated velocities [Hz]'
+        ),
+        odometry=OdometrySettings(
+            delay=read.number('odometry.delay', default.delay, (0.0, 0.3), 'lag of servos [s]'),
+            tolerance=read.number(
+                'odometry.tolerance', default.tolerance, (0.0, 0.05), 'height of a foot down [m]'
+            ),
+            margin=read.number(
+                'odometry.margin', default.margin, (0.0, 0.1), 'around a swing, not counted [s]'
+            ),
+            scale_x=read.number('odometry.scale_x', 1.0, (0.1, 10.0), 'factor of the way forward'),
+            scale_y=read.number(
+                'odometry.scale_y', 1.0, (0.1, 10.0), 'factor of the way sideways'
+            ),
+        ),
+    )
+
+
+def _frames(read: ParameterReader) -> Frames:
+    modes = {'child': False, 'parent': True}
+    return Frames(
+        odom=read.text('odom_frame', 'odom', 'where the robot began'),
+        base=read.text('base_frame', 'base_link', 'the body'),
+        footprint=read.text('footprint_frame', 'base_footprint', 'on the ground below the body'),
+        imu=read.text('imu_frame', 'imu_link', 'the IMU'),
+        footprint_is_parent=read.choice(
+            'footprint_mode',
+            'child',
+            modes,
+            'child: odom, base_link, base_footprint; parent: odom, base_footprint, base_link',
+        ),
+        publish=read.flag('publish_tf', default=True, meaning='publish the transforms'),
+    )
+
+
+def _deviations(read: ParameterReader) -> Deviations:
+    span = (0.0, 10.0)
+    return Deviations(
+        orientation=read.number('orientation_stddev', 0.02, span, '[rad]'),
+        rate=read.number('angular_velocity_stddev', 0.15, span, 'differentiated [rad/s]'),
+        gyro=read.number('gyro_stddev', 0.02, span, 'of a gyro [rad/s]'),
+        acceleration=read.number('linear_acceleration_stddev', 0.3, span, '[m/s²]'),
+    )

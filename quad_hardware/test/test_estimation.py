@@ -1,0 +1,176 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Rates, gravity, times and plausibility: laws over random motions."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+import math
+
+from hypothesis import given
+from hypothesis import strategies as st
+import pytest
+
+from quad_hardware.estimation.filters import AttitudeRate, JointRate
+from quad_hardware.estimation.gravity import (
+    disagreement,
+    gravity_from_acceleration,
+    gravity_from_attitude,
+)
+from quad_hardware.estimation.plausibility import PATIENCE, Plausibility
+from quad_hardware.estimation.rotation import (
+    about_z,
+    conjugate,
+    from_roll_pitch_yaw,
+    IDENTITY,
+    multiply,
+    Quaternion,
+    rotate,
+    rotation_vector,
+    Vector,
+    yaw_of,
+)
+from quad_hardware.estimation.sample_clock import SampleClock
+from quad_hardware.link.state import DEVICE_TIME_WRAP, RobotState
+from quad_hardware.protocol import LEG_MOTORS
+
+ANGLES = st.floats(-3.1, 3.1)
+ROTATIONS = st.builds(from_roll_pitch_yaw, ANGLES, st.floats(-1.5, 1.5), ANGLES)
+VECTORS = st.tuples(*[st.floats(-10, 10)] * 3)
+STATE = RobotState(
+    arrival=0.0,
+    wire_time=0.00127,
+    attitude=(0.0, 0.0, 0.0),
+    acceleration=(0.0, 0.0, 9.8),
+    positions=dict.fromkeys(LEG_MOTORS, 0.0),
+    velocities=dict.fromkeys(LEG_MOTORS, 0.0),
+)
+
+
+def spun(rate: Vector, time: float) -> Quaternion:
+    """The rotation that a constant body rate makes."""
+    speed = math.hypot(*rate)
+    if speed < 1e-9:
+        return IDENTITY
+    x, y, z = (component / speed * math.sin(speed * time / 2) for component in rate)
+    return x, y, z, math.cos(speed * time / 2)
+
+
+@given(ROTATIONS, ROTATIONS, VECTORS)
+def test_rotations_are_a_group_that_acts(a: Quaternion, b: Quaternion, v: Vector) -> None:
+    """One after the other is their product; the inverse undoes."""
+    assert rotate(multiply(a, b), v) == pytest.approx(rotate(a, rotate(b, v)), abs=1e-9)
+    assert rotate(conjugate(a), rotate(a, v)) == pytest.approx(v, abs=1e-9)
+
+
+@given(ANGLES, st.floats(-1.5, 1.5), ANGLES, VECTORS)
+def test_angles_turn_about_fixed_axes(roll: float, pitch: float, yaw: float, v: Vector) -> None:
+    """First x, then y, then z (REP 103); the yaw comes back."""
+    rotation = from_roll_pitch_yaw(roll, pitch, yaw)
+    step = rotate(from_roll_pitch_yaw(roll, 0, 0), v)
+    step = rotate(from_roll_pitch_yaw(0, pitch, 0), step)
+    assert rotate(rotation, v) == pytest.approx(rotate(about_z(yaw), step), abs=1e-9)
+    assert math.remainder(yaw_of(rotation) - yaw, math.tau) == pytest.approx(0, abs=1e-9)
+
+
+@given(st.tuples(*[st.floats(-1, 1)] * 3))
+def test_a_rotation_vector_is_axis_times_angle(vector: Vector) -> None:
+    """Also for a rotation by nothing."""
+    assert rotation_vector(spun(vector, 1.0)) == pytest.approx(vector, abs=1e-6)
+
+
+@given(ROTATIONS, st.tuples(*[st.floats(-4, 4)] * 3))
+def test_a_constant_rate_is_found_from_any_attitude(start: Quaternion, rate: Vector) -> None:
+    """In the frame of the body, through every wrap of yaw, once the filter has settled."""
+    estimate = AttitudeRate(cutoff=12.0)
+    for tick in range(30):
+        found = estimate.update(tick * 0.02, multiply(start, spun(rate, tick * 0.02)))
+    assert found == pytest.approx(rate, abs=1e-4)
+
+
+def test_after_a_gap_the_rate_begins_at_rest() -> None:
+    """A robot that was carried while it was silent did not spin; nor does time run backwards."""
+    rates = AttitudeRate(cutoff=12.0)
+    rates.update(0.0, IDENTITY)
+    assert rates.update(0.02, about_z(0.1))[2] > 1.0
+    assert rates.update(1.0, about_z(3.0)) == (0.0, 0.0, 0.0)
+    assert rates.update(0.9, about_z(0.0)) == (0.0, 0.0, 0.0)
+    joints = JointRate(cutoff=12.0)
+    joints.update(0.0, {'a': 0.0})
+    assert joints.update(0.02, {'a': 0.1})['a'] > 1.0
+    assert joints.update(1.0, {'a': 9.0}) == {'a': 0.0}
+    assert joints.update(1.02, {'b': 1.0}) == {'b': 0.0}
+
+
+@given(ROTATIONS)
+def test_both_directions_of_gravity_agree_at_rest(attitude: Quaternion) -> None:
+    """An accelerometer at rest reads upwards, so gravity is its opposite."""
+    felt = rotate(conjugate(attitude), (0.0, 0.0, 9.8))
+    assert gravity_from_acceleration(felt) == pytest.approx(gravity_from_attitude(attitude))
+    assert disagreement(attitude, felt) == pytest.approx(0.0, abs=1e-6)
+
+
+def test_gravity_is_not_read_while_accelerating() -> None:
+    """A push is no tilt; upright, gravity is (0, 0, -1); axes that are swapped are seen."""
+    assert gravity_from_acceleration((9.0, 0.0, 9.8)) is None
+    assert gravity_from_attitude(IDENTITY) == (0.0, 0.0, -1.0)
+    assert disagreement(IDENTITY, (9.8, 0.0, 0.0)) == pytest.approx(math.pi / 2)
+
+
+@given(st.lists(st.floats(0.0, 0.01), min_size=2, max_size=60))
+def test_the_clock_of_the_robot_takes_the_jitter_away(delays: list[float]) -> None:
+    """Steps are those of the robot, and no report is dated after its arrival."""
+    clock, times = SampleClock(), []
+    start = DEVICE_TIME_WRAP - 0.1  # the counter wraps on the way
+    for tick, delay in enumerate(delays):
+        made = tick * 0.02
+        arrival = made + delay + STATE.wire_time
+        device = round((start + made) % DEVICE_TIME_WRAP, 3)
+        times.append(clock.time(replace(STATE, arrival=arrival, device_time=device)))
+        assert times[-1] <= arrival - STATE.wire_time + 1e-9
+    quickest = min(range(len(delays)), key=delays.__getitem__)
+    steps = [b - a for a, b in zip(times[quickest:], times[quickest + 1 :], strict=False)]
+    assert all(abs(step - 0.02) < 1e-5 + 1e-3 for step in steps)
+
+
+def test_a_robot_that_restarts_is_dated_anew() -> None:
+    """Its counter goes back to zero; without a counter, the arrival counts."""
+    clock = SampleClock()
+    clock.time(replace(STATE, arrival=100.0, device_time=50.0))
+    begun = 101.0 - STATE.wire_time
+    assert clock.time(replace(STATE, arrival=101.0, device_time=0.5)) == pytest.approx(begun)
+    assert clock.time(replace(STATE, arrival=5.0)) == 5.0 - STATE.wire_time / 2
+
+
+@pytest.mark.parametrize(
+    ('change', 'reason'),
+    [
+        ({'attitude': (0.0, 1e9, 0.0)}, 'attitude'),
+        ({'attitude': (0.0, math.nan, 0.0)}, 'not finite'),
+        ({'acceleration': (0.0, 0.0, 3e4)}, 'acceleration'),
+        ({'positions': {11: 1e5}}, 'motor 11 at'),
+        ({'velocities': {12: -1e5}}, 'motor 12 at'),
+    ],
+)
+def test_a_report_that_cannot_be_is_refused(change: dict[str, object], reason: str) -> None:
+    """However often it comes, and the message says what is wrong with it."""
+    plausibility = Plausibility()
+    assert plausibility.check(STATE) == ''
+    for _ in range(PATIENCE + 3):
+        assert reason in plausibility.check(replace(STATE, **change))  # type: ignore[arg-type]
+    assert plausibility.check(STATE) == ''
+
+
+def test_a_jump_is_believed_when_it_stays() -> None:
+    """One damaged report is refused; a robot that really is elsewhere is not."""
+    plausibility = Plausibility()
+    plausibility.check(STATE)
+    jumped = replace(STATE, positions=dict.fromkeys(LEG_MOTORS, 90.0))
+    answers = [bool(plausibility.check(jumped)) for _ in range(PATIENCE + 2)]
+    assert answers == [True] * PATIENCE + [False] * 2
+    turned = replace(jumped, attitude=(0.0, 0.0, 179.0))
+    assert 'attitude' in plausibility.check(turned)
+    later = replace(turned, arrival=1.0)
+    assert plausibility.check(later) == ''
+    wrapped = replace(turned, arrival=1.02, attitude=(0.0, 0.0, -179.0))
+    assert plausibility.check(wrapped) == ''

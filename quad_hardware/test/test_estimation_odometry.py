@@ -1,0 +1,166 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Leg odometry: exact for legs that roll, within limits for a robot that trots in physics."""
+
+from __future__ import annotations
+
+from functools import cache
+import math
+import random
+
+import numpy as np
+import pytest
+
+from quad_description import movable_joints, Pose, pose_positions, robot_urdf
+from quad_hardware.estimation.feet import Array, Feet, FootPoses
+from quad_hardware.estimation.odometry import LegOdometry, OdometrySettings, OdometryState
+from quad_hardware.estimation.rotation import from_roll_pitch_yaw, IDENTITY, rotate
+from quad_hardware.exceptions import CommandError
+from quad_hardware.sim.physics import Robot
+
+URDF = robot_urdf('lite')
+NAMES = [joint.name for joint in movable_joints(URDF)]
+PERIOD = 0.02  # [s]
+GAIT_PERIOD, DUTY, LIFT, HEIGHT = 0.28, 0.55, 0.02, 0.085  # a trot that is known to walk
+
+
+@cache
+def feet_of(urdf: str) -> Feet:
+    """The legs of a robot, read once."""
+    return Feet(urdf, NAMES)
+
+
+def solve(wanted: Array, angles: Array) -> Array:
+    """Joint angles that put the feet somewhere, by Newton's method."""
+    legs = feet_of(URDF)
+    for _ in range(12):
+        error = wanted - legs.poses(angles).position
+        if np.abs(error).max() < 1e-7:
+            break
+        columns = []
+        for joint in range(3):
+            moved = angles.copy()
+            moved[joint::3] += 1e-6
+            columns.append((legs.poses(moved).position - legs.poses(angles).position) / 1e-6)
+        jacobian = np.stack(columns, axis=2)
+        angles = angles + np.linalg.solve(jacobian, error[..., None])[..., 0].ravel()
+    return angles
+
+
+def trot(phase: float, velocity: tuple[float, float], neutral: Array) -> Array:
+    """Feet of a trot at a phase, in base_link [m]."""
+    feet: Array = neutral.copy()
+    for leg, offset in enumerate((0.0, 0.5, 0.5, 0.0)):
+        at = (phase + offset) % 1.0
+        if at < DUTY:
+            share = 0.5 - at / DUTY
+        else:
+            swing = (at - DUTY) / (1 - DUTY)
+            share = -0.5 + swing * swing * (3 - 2 * swing)
+            feet[leg, 2] += LIFT * 0.5 * (1 - math.cos(2 * math.pi * swing))
+        feet[leg, :2] += np.array(velocity) * share * DUTY * GAIT_PERIOD
+    return feet
+
+
+def walk(velocity: tuple[float, float], duration: float) -> tuple[Array, OdometryState, float]:
+    """Trot in physics; return the true way in the first heading, the estimate, the height."""
+    robot, legs, rng = Robot(URDF), feet_of(URDF), random.Random(1)
+    odometry = LegOdometry(OdometrySettings(), legs.radius)
+    stand = pose_positions(Pose.STAND)
+    angles = np.array([stand[name] for name in NAMES])
+    neutral = legs.poses(angles).position.copy()
+    neutral[:, 0] = [0.025, 0.025, -0.125, -0.125]
+    neutral[:, 2] = -0.022 - HEIGHT
+    angles = solve(neutral, angles)
+    robot.set_targets(list(angles))
+    robot.step(1.0)
+    start, yaw = np.array(robot.base_pose.position), robot.imu.roll_pitch_yaw[2]
+    state = None
+    for tick in range(round(duration / PERIOD)):
+        time = tick * PERIOD
+        measured = robot.joint_positions + [rng.gauss(0, math.radians(0.1)) for _ in NAMES]
+        attitude = [angle + rng.gauss(0, math.radians(0.1)) for angle in robot.imu.roll_pitch_yaw]
+        state = odometry.update(time, legs.poses(measured), from_roll_pitch_yaw(*attitude))
+        ramp = min(time / 0.5, 1.0)
+        speed = velocity[0] * ramp, velocity[1] * ramp
+        angles = solve(trot(time / GAIT_PERIOD, speed, neutral), angles)
+        robot.set_targets(list(angles))
+        odometry.command(time, legs.poses(angles))
+        robot.step(PERIOD)
+    assert state is not None
+    x, y, _ = np.array(robot.base_pose.position) - start
+    true = np.array(
+        [math.cos(yaw) * x + math.sin(yaw) * y, -math.sin(yaw) * x + math.cos(yaw) * y]
+    )
+    return true, state, robot.base_pose.position[2]
+
+
+@pytest.mark.parametrize('velocity', [(0.2, 0.0), (-0.15, 0.0), (0.0, 0.1)])
+def test_a_trot_is_followed(velocity: tuple[float, float]) -> None:
+    """Within 10 % of the way, with noise on joints and attitude; height within 5 mm."""
+    true, state, height = walk(velocity, 4.0)
+    way = float(np.hypot(*true))
+    assert way > 0.2
+    assert math.hypot(state.x - true[0], state.y - true[1]) < 0.1 * way
+    assert state.height == pytest.approx(height, abs=0.005)
+    assert state.position_variance > (0.05 * way) ** 2
+
+
+def test_standing_goes_nowhere() -> None:
+    """Noise on the joints does not add up to a way worth the name."""
+    odometry, rng = LegOdometry(OdometrySettings(), 0.01), random.Random(1)
+    feet = feet_of(URDF)
+    for tick in range(500):
+        angles = [rng.gauss(0.0, math.radians(0.1)) for _ in NAMES]
+        state = odometry.update(tick * PERIOD, feet.poses(angles), IDENTITY)
+    assert math.hypot(state.x, state.y) < 0.01
+
+
+@pytest.mark.parametrize('yaw', [0.0, 1.0, 3.1])
+def test_a_rolling_foot_counts(yaw: float) -> None:
+    """A wheel that turns by an angle goes by angle times radius, in the heading of the start."""
+    odometry = LegOdometry(OdometrySettings(), 0.01)
+    position = np.array(
+        [[0.1, 0.1, -0.1], [0.1, -0.1, -0.1], [-0.1, 0.1, -0.1], [-0.1, -0.1, -0.1]]
+    )
+    for tick in range(51):
+        angle = tick * 0.01
+        turned = np.array(
+            [
+                [math.cos(angle), 0, math.sin(angle)],
+                [0, 1, 0],
+                [-math.sin(angle), 0, math.cos(angle)],
+            ]
+        )
+        poses = FootPoses(position, np.broadcast_to(turned, (4, 3, 3)))
+        state = odometry.update(tick * PERIOD, poses, from_roll_pitch_yaw(0.0, 0.0, yaw))
+    assert state.x == pytest.approx(0.5 * 0.01, rel=1e-3)
+    assert state.y == pytest.approx(0.0, abs=1e-9)
+    assert state.height == pytest.approx(0.11)
+
+
+def test_a_gap_is_no_way() -> None:
+    """A robot that was carried to another stance while it was silent has not walked."""
+    odometry = LegOdometry(OdometrySettings(), 0.01)
+    feet = feet_of(URDF)
+    odometry.update(0.0, feet.poses([0.0] * 12), IDENTITY)
+    state = odometry.update(2.0, feet.poses([0.2] * 12), IDENTITY)
+    assert (state.x, state.y, state.velocity_x) == (0.0, 0.0, 0.0)
+
+
+def test_feet_are_where_physics_has_them() -> None:
+    """The chains of the URDF agree with the simulator's, in a pose without symmetry."""
+    pose = {name: 0.1 * math.sin(3 * index) for index, name in enumerate(NAMES)}
+    robot = Robot(URDF, pose=pose)
+    (x, y, z), rotation = robot.base_pose.position, robot.base_pose.orientation
+    found = feet_of(URDF).poses([pose[name] for name in NAMES]).position
+    for leg, foot in enumerate(robot.feet):
+        place = rotate(rotation, (found[leg, 0], found[leg, 1], found[leg, 2]))
+        wanted = np.array(robot.link_position(foot)) - (x, y, z)
+        assert place == pytest.approx(wanted, abs=1e-6)
+
+
+def test_a_leg_that_is_missing_is_named() -> None:
+    """A URDF whose foot hangs on nothing."""
+    with pytest.raises(CommandError, match='no chain from base_link to fl_foot'):
+        Feet(URDF.replace('<child link="fl_foot"', '<child link="other"'), NAMES)

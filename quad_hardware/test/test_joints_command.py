@@ -1,0 +1,109 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Joint commands: refused when they are wrong, and never a jump."""
+
+from __future__ import annotations
+
+import math
+
+from hypothesis import given
+from hypothesis import strategies as st
+import pytest
+
+from quad_description import movable_joints, robot_urdf
+from quad_hardware.exceptions import CommandError
+from quad_hardware.joints import CommandLimiter, JointMap, LimiterSettings, servo_of
+
+JOINTS = JointMap(servo_of(joint) for joint in movable_joints(robot_urdf('lite')))
+ARM_JOINTS = JointMap(servo_of(joint) for joint in movable_joints(robot_urdf('lite', arm=True)))
+HOME = [0.0] * 12
+POSITIONS = st.lists(st.floats(-1e3, 1e3), min_size=12, max_size=12)
+
+
+@given(
+    POSITIONS,
+    st.lists(st.tuples(POSITIONS, st.floats(0.0, 2.0)), min_size=1, max_size=20),
+)
+def test_no_target_jumps_or_leaves_its_limits(
+    measured: list[float], stream: list[tuple[list[float], float]]
+) -> None:
+    """From wherever the robot is, whatever is asked for, at whatever intervals."""
+    limiter = CommandLimiter(JOINTS)
+    measured = [
+        min(max(p, s.lower), s.upper) for p, s in zip(measured, JOINTS.servos, strict=True)
+    ]
+    last, now = measured, 0.0
+    for wanted, pause in stream:
+        now += pause
+        targets = list(limiter.step(wanted, last, now).targets)
+        steps = [abs(b - a) for a, b in zip(last, targets, strict=True)]
+        assert max(steps) <= limiter.largest_step + 1e-9
+        assert all(s.lower <= t <= s.upper for t, s in zip(targets, JOINTS.servos, strict=True))
+        last = targets
+
+
+@pytest.mark.parametrize('value', [math.nan, math.inf, -math.inf])
+def test_what_is_no_number_is_refused_by_joint(value: float) -> None:
+    """And the stream goes on with the next command."""
+    limiter = CommandLimiter(JOINTS)
+    limiter.step(HOME, HOME, 0.0)
+    wrong = [*HOME[:4], value, *HOME[5:]]
+    with pytest.raises(CommandError, match='no finite position for fr_thigh_joint'):
+        limiter.step(wrong, HOME, 0.02)
+    assert limiter.step([0.01] * 12, HOME, 0.04).targets == (0.01,) * 12
+
+
+@pytest.mark.parametrize('length', [0, 1, 11, 13, 16])
+def test_a_wrong_length_is_refused(length: int) -> None:
+    """The message names the joints, in their order."""
+    with pytest.raises(
+        CommandError, match=f'{length} positions for 12 joints.*fl_hip_joint, fl_t'
+    ):
+        CommandLimiter(JOINTS).step([0.0] * length, HOME, 0.0)
+
+
+def test_a_robot_with_arm_takes_legs_or_all() -> None:
+    """Twelve positions leave the arm alone."""
+    limiter = CommandLimiter(ARM_JOINTS)
+    assert len(limiter.step(HOME, [0.0] * 16, 0.0).targets) == 12
+    assert len(limiter.step([0.0] * 16, [0.0] * 16, 0.02).targets) == 16
+    with pytest.raises(CommandError, match='or the first 12'):
+        limiter.step([0.0] * 15, [0.0] * 16, 0.04)
+
+
+def test_a_stream_begins_slowly_where_the_robot_is() -> None:
+    """The first step is small, later ones are large, and it is told that they are slowed."""
+    limiter = CommandLimiter(JOINTS, LimiterSettings(speed=10.0, start_speed=1.0, start_time=0.5))
+    wanted = [*HOME[:1], 1.0, *HOME[2:]]
+    first = limiter.step(wanted, HOME, 0.0)
+    assert first.targets[1] == pytest.approx(0.02)
+    assert first.slowed == ('fl_thigh_joint',)
+    for tick in range(1, 50):
+        last = limiter.step(wanted, HOME, tick * 0.02)
+    assert last.targets[1] == 1.0
+    assert last.slowed == ()
+
+
+def test_after_a_pause_the_stream_begins_anew() -> None:
+    """The robot may have been moved meanwhile; the same holds after a reset."""
+    limiter = CommandLimiter(JOINTS)
+    limiter.step(HOME, HOME, 0.0)
+    moved = [0.3] * 12
+    assert limiter.step(HOME, moved, 1.0).targets[1] == pytest.approx(0.3 - 0.04)
+    limiter.reset()
+    assert limiter.step(HOME, moved, 1.02).targets[1] == pytest.approx(0.3 - 0.04)
+
+
+def test_limits_are_told() -> None:
+    """Beyond a limit, the target is the limit, and the joint is named."""
+    limiter = CommandLimiter(JOINTS)
+    command = limiter.step([9.0, *HOME[1:]], [0.52, *HOME[1:]], 0.0)
+    assert command.clamped == ('fl_hip_joint',)
+    assert command.targets[0] == JOINTS.servos[0].upper
+
+
+def test_a_servo_that_is_not_reported_takes_its_target() -> None:
+    """There is nothing to begin from."""
+    measured = [*([0.0] * 12), None, 0.0, 0.0, 0.0]
+    command = CommandLimiter(ARM_JOINTS).step([*HOME, 0.7, 0.0, 0.0, 0.0], measured, 0.0)
+    assert command.targets[12] == 0.7
