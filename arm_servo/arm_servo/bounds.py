@@ -1,0 +1,146 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""How fast each joint may move now: in front of its limits, and of near pairs of links."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .arrays import Array, frozen
+from .collision import Proximity
+from .limits import JointLimits
+from .model import RobotModel
+from .otg import brakeable_velocity, MotionState
+from .report import Cause, Limiter
+
+PRESSING = 1e-9
+"""Force of a bound above which it counts as pressing."""
+
+
+@dataclass(frozen=True, slots=True)
+class BrakeSettings:
+    """How motion brakes in front of limits.
+
+    Attributes:
+        margin: Least distance between links that a command may bring about in [m].
+        horizon: Distance at which a pair of links is taken into account in [m].
+        pairs: Greatest number of pairs taken into account.
+        approach: Greatest speed of approach per distance to the margin in [1/s].
+        braking: Share of acceleration and jerk that braking in front of a limit plans with.
+    """
+
+    margin: float = 0.01
+    horizon: float = 0.15
+    pairs: int = 3
+    approach: float = 4.0
+    braking: float = 0.7
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Bounds:
+    """Bounds of the joint speeds in a state.
+
+    Attributes:
+        below: Ways left to the lower limits in [rad].
+        above: Ways left to the upper limits in [rad].
+        slowest: Least speeds that can be braked in front of the lower limits in [rad/s].
+        fastest: Greatest speeds that can be braked in front of the upper limits in [rad/s].
+        lower: Those, and what can be reached soon, in [rad/s].
+        upper: Those, and what can be reached soon, in [rad/s].
+        near: The nearest pairs of links.
+        rows: Their gradients (m, n) in [m/rad].
+        least: Their least changes of distance (m) in [m/s].
+    """
+
+    below: Array
+    above: Array
+    slowest: Array
+    fastest: Array
+    lower: Array
+    upper: Array
+    near: Sequence[Proximity]
+    rows: Array
+    least: Array
+
+
+class Brakes:
+    """Finds the bounds of an arm's joint speeds."""
+
+    def __init__(self, model: RobotModel, settings: BrakeSettings) -> None:
+        """Prepare.
+
+        Args:
+            model: The arm.
+            settings: How it brakes.
+        """
+        limits, share = model.limits, settings.braking
+        self._model, self._settings, self._limits = model, settings, limits
+        self._braking = JointLimits(
+            limits.names,
+            limits.lower,
+            limits.upper,
+            limits.velocity,
+            frozen(limits.acceleration * share),
+            frozen(limits.jerk * share),
+        )
+        # what a speed can change by while its acceleration builds up and down, and a little more
+        self._change = frozen(
+            1.5 * limits.acceleration**2 / limits.jerk + 0.01 * limits.acceleration
+        )
+
+    def bounds(self, state: MotionState) -> Bounds:
+        """Find the bounds in a state.
+
+        Args:
+            state: Commanded state of the joints.
+        """
+        settings, limits = self._settings, self._limits
+        near = self._model.nearest(state.position, settings.horizon, settings.pairs)
+        below, above = state.position - limits.lower, limits.upper - state.position
+        slowest = -brakeable_velocity(below, self._braking)
+        fastest = brakeable_velocity(above, self._braking)
+        lower = np.minimum(np.maximum(slowest, state.velocity - self._change), fastest)
+        upper = np.maximum(np.minimum(fastest, state.velocity + self._change), slowest)
+        rows = np.array([pair.gradient for pair in near]).reshape(len(near), len(limits))
+        allowed = np.array(
+            [-settings.approach * max(pair.distance - settings.margin, 0.0) for pair in near]
+        )
+        # no more than can be had soon: a fast approach is braked as hard as can be
+        best = np.maximum(rows, 0.0) @ upper + np.minimum(rows, 0.0) @ lower
+        least = np.minimum(allowed, best)
+        return Bounds(below, above, slowest, fastest, lower, upper, near, rows, least)
+
+    def pressing(self, bounds: Bounds, forces: Array, factor: float) -> list[Limiter]:
+        """Name the bounds and rows that press.
+
+        Args:
+            bounds: The bounds.
+            forces: How hard they press, of :class:`Solution`.
+            factor: What is left of the asked speed.
+        """
+        count, share = len(self._limits), min(max(factor, 0.0), 1.0)
+        found = []
+        for place in np.flatnonzero(np.abs(forces) > PRESSING):
+            if place >= count:
+                pair = bounds.near[place - count]
+                name = ' - '.join(pair.links)
+                found.append(Limiter(Cause.COLLISION, name, pair.distance, share))
+            else:
+                found.append(self._bound(bounds, int(place), bool(forces[place] > 0), share))
+        return found
+
+    def _bound(self, bounds: Bounds, joint: int, rising: bool, share: float) -> Limiter:
+        """Name the limit behind a bound."""
+        name = self._limits.names[joint]
+        if rising:
+            bound, brakeable, way = bounds.upper, bounds.fastest, bounds.above
+        else:
+            bound, brakeable, way = -bounds.lower, -bounds.slowest, bounds.below
+        if bound[joint] < brakeable[joint] - PRESSING:
+            return Limiter(Cause.JOINT_ACCELERATION, name, float(bound[joint]), share)
+        if brakeable[joint] >= self._limits.velocity[joint]:
+            return Limiter(Cause.JOINT_VELOCITY, name, float(bound[joint]), share)
+        return Limiter(Cause.JOINT_POSITION, name, float(way[joint]), share)

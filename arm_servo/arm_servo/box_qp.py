@@ -1,0 +1,62 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""A small quadratic program with bounds and rows, solved by daqp."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import daqp
+import numpy as np
+
+from .arrays import Array
+
+OPTIMAL = 1
+"""Exit flag of daqp."""
+
+FREE = 1e30
+"""What daqp takes for no bound."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Program:
+    """Minimise x'Hx/2 + g'x with lower <= x <= upper and rows x >= least.
+
+    Attributes:
+        hessian: H, positive definite (n, n).
+        gradient: g (n).
+        lower: Least values (n).
+        upper: Greatest values (n).
+        rows: Rows (m, n); m may be 0.
+        least: Least values of the rows (m).
+    """
+
+    hessian: Array
+    gradient: Array
+    lower: Array
+    upper: Array
+    rows: Array
+    least: Array
+
+    def solve(self) -> Solution | None:
+        """Return the answer; None when there is none."""
+        above = np.concatenate((self.upper, np.full(len(self.least), FREE)))
+        below = np.concatenate((self.lower, self.least))
+        values, _, flag, info = daqp.solve(self.hessian, self.gradient, self.rows, above, below)
+        if flag != OPTIMAL or not np.isfinite(values).all():
+            return None
+        return Solution(np.clip(values, self.lower, self.upper), np.array(info['lam']))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Solution:
+    """Answer of a program.
+
+    Attributes:
+        values: The variables (n).
+        forces: How hard each bound (n), then each row (m) presses: above zero where the upper
+            bound presses, below zero where the lower one does, zero where none does.
+    """
+
+    values: Array
+    forces: Array

@@ -1,0 +1,75 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Everything that arm_servo raises.
+
+::
+
+    ServoError
+    ├── ModelError (ValueError)     description, SRDF and limits do not make an arm
+    ├── CommandError (ValueError)   a command is refused before anything moves
+    │   └── GoalError               a trajectory is refused; carries the code of the action
+    └── NotReadyError               nothing can be commanded before the arm's position is known
+
+Arguments of the wrong kind from a *programmer* stay ``ValueError``/``TypeError``.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+
+class GoalCode(IntEnum):
+    """Codes of control_msgs/action/FollowJointTrajectory."""
+
+    SUCCESSFUL = 0
+    INVALID_GOAL = -1
+    INVALID_JOINTS = -2
+    OLD_HEADER_TIMESTAMP = -3
+    PATH_TOLERANCE_VIOLATED = -4
+    GOAL_TOLERANCE_VIOLATED = -5
+
+
+class ServoError(Exception):
+    """Root of all errors of this package."""
+
+
+class ModelError(ServoError, ValueError):
+    """Description, SRDF and limits do not make an arm.
+
+    Scenarios: a joint of the group has no acceleration limit, the group is unknown, the tip link
+    is misspelt, a pose of the SRDF is beyond a limit.
+    """
+
+
+class CommandError(ServoError, ValueError):
+    """A command is refused before anything moves.
+
+    Scenarios: a NaN, an unknown joint, a twist that is not six numbers, a speed override of 120 %.
+    """
+
+
+class GoalError(CommandError):
+    """A trajectory is refused before anything moves.
+
+    Scenarios: times that do not increase, a joint that the arm lacks, a point beyond a limit.
+
+    Attributes:
+        code: Code of the action's result.
+    """
+
+    def __init__(self, code: GoalCode, reason: str) -> None:
+        """Keep the code beside the reason.
+
+        Args:
+            code: Code of the action's result.
+            reason: What is wrong, and the remedy.
+        """
+        super().__init__(reason)
+        self.code = code
+
+
+class NotReadyError(ServoError):
+    """Nothing can be commanded before the arm's position is known.
+
+    Scenarios: a command before the first joint state, or after the set-point was dropped.
+    """

@@ -1,0 +1,194 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Limits of the joints' motion: from the description, narrowed by a limits file.
+
+The file has MoveIt's format (joint_limits.yaml)::
+
+    joint_limits:
+      joint_1:
+        has_velocity_limits: true
+        max_velocity: 1.57          # [rad/s]
+        has_acceleration_limits: true
+        max_acceleration: 3.49      # [rad/s2]
+        has_jerk_limits: true
+        max_jerk: 70.0              # [rad/s3]
+
+Position limits (``has_position_limits``, ``min_position``, ``max_position``) and velocities may be
+narrower than those of the description, never wider. Metres stand for radians at a sliding joint.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from .arrays import Array, frozen, Mask
+from .exceptions import ModelError
+
+KEYS = {
+    'velocity': ('max_velocity',),
+    'acceleration': ('max_acceleration',),
+    'jerk': ('max_jerk',),
+    'position': ('min_position', 'max_position'),
+}
+"""Names of the numbers behind each ``has_..._limits`` of MoveIt's format."""
+
+SLACK = 1e-3
+"""How much a limit may exceed the description's for rounding, as a share."""
+
+KNOWN = frozenset(
+    {
+        *(f'has_{kind}_limits' for kind in KEYS),
+        *(key for keys in KEYS.values() for key in keys),
+        'has_deceleration_limits',
+        'max_deceleration',
+        'has_effort_limits',
+        'max_effort',
+        'angle_wraparound',
+    }
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JointLimits:
+    """Limits of every joint of a group, in its order; radians or metres.
+
+    Attributes:
+        names: Names of the joints.
+        lower: Least positions in [rad]; minus infinity for a continuous joint.
+        upper: Greatest positions in [rad]; infinity for a continuous joint.
+        velocity: Greatest speeds in [rad/s].
+        acceleration: Greatest accelerations in [rad/s2].
+        jerk: Greatest jerks in [rad/s3].
+    """
+
+    names: tuple[str, ...]
+    lower: Array
+    upper: Array
+    velocity: Array
+    acceleration: Array
+    jerk: Array
+
+    def __len__(self) -> int:
+        """Return the number of joints."""
+        return len(self.names)
+
+    @property
+    def continuous(self) -> Mask:
+        """Mask of the joints that turn without end."""
+        mask: Mask = np.isinf(self.lower) & np.isinf(self.upper)
+        return mask
+
+
+@dataclass(frozen=True, slots=True)
+class JointRange:
+    """What a description says of a joint: lower, upper in [rad], speed in [rad/s]."""
+
+    lower: float
+    upper: float
+    velocity: float
+
+
+def load_limits(path: Path) -> Mapping[str, Any]:
+    """Read the ``joint_limits`` of a limits file.
+
+    Args:
+        path: The file.
+
+    Raises:
+        ModelError: The file cannot be read, or has no table ``joint_limits``.
+    """
+    try:
+        document = yaml.safe_load(path.read_text(encoding='utf-8'))
+    except (OSError, yaml.YAMLError) as error:
+        raise ModelError(f'{path}: {error}') from error
+    table = document.get('joint_limits') if isinstance(document, dict) else None
+    if not isinstance(table, dict):
+        raise ModelError(f'{path}: there is no table joint_limits')
+    return table
+
+
+def merge_limits(
+    names: Sequence[str], ranges: Mapping[str, JointRange], table: Mapping[str, Any]
+) -> JointLimits:
+    """Join a description's ranges with the table of a limits file.
+
+    Args:
+        names: The joints of the group, in its order.
+        ranges: The description's ranges by joint.
+        table: The limits file's entries by joint; others than the group's are passed over.
+
+    Raises:
+        ModelError: A joint is missing, a number is missing, not positive, misspelt or wider than
+            the description's.
+    """
+    rows = [_row(name, ranges[name], table) for name in names]
+    lower, upper, velocity, acceleration, jerk = (
+        frozen(column) for column in zip(*rows, strict=True)
+    )
+    return JointLimits(tuple(names), lower, upper, velocity, acceleration, jerk)
+
+
+def _row(
+    name: str, span: JointRange, table: Mapping[str, Any]
+) -> tuple[float, float, float, float, float]:
+    entry = table.get(name)
+    if not isinstance(entry, dict):
+        known = ', '.join(table) or 'none'
+        raise ModelError(f'joint {name} is missing in the limits file, which has: {known}')
+    if unknown := sorted(set(entry) - KNOWN):
+        raise ModelError(f'joint {name}: unknown key {unknown[0]!r} in the limits file')
+    velocity = _positive(name, entry, 'velocity', span.velocity)
+    if velocity > span.velocity * (1 + SLACK):
+        raise ModelError(
+            f'joint {name}: max_velocity {velocity:g} is wider than the description'
+            f' ({span.velocity:g}); a limits file may only narrow'
+        )
+    lower, upper = _span(name, entry, span)
+    return (
+        lower,
+        upper,
+        velocity,
+        _positive(name, entry, 'acceleration', None),
+        _positive(name, entry, 'jerk', None),
+    )
+
+
+def _positive(name: str, entry: Mapping[str, Any], kind: str, default: float | None) -> float:
+    key = KEYS[kind][0]
+    if not entry.get(f'has_{kind}_limits', key in entry):
+        if default is not None:
+            return default
+        raise ModelError(f'joint {name}: the limits file lacks {key}; motion is limited in it')
+    return _number(name, entry, key, least=0.0)
+
+
+def _span(name: str, entry: Mapping[str, Any], span: JointRange) -> tuple[float, float]:
+    if not entry.get('has_position_limits', 'max_position' in entry):
+        return span.lower, span.upper
+    lower, upper = (_number(name, entry, key) for key in KEYS['position'])
+    if lower < span.lower - SLACK or upper > span.upper + SLACK:
+        raise ModelError(
+            f'joint {name}: positions {lower:g}..{upper:g} are wider than the description'
+            f' ({span.lower:g}..{span.upper:g}); a limits file may only narrow'
+        )
+    if lower >= upper:
+        raise ModelError(
+            f'joint {name}: min_position {lower:g} is not below max_position {upper:g}'
+        )
+    return lower, upper
+
+
+def _number(name: str, entry: Mapping[str, Any], key: str, least: float = -math.inf) -> float:
+    value = entry.get(key)
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise ModelError(f'joint {name}: {key} is {value!r}, a number is needed')
+    if not math.isfinite(value) or value <= least:
+        raise ModelError(f'joint {name}: {key} is {value}, a positive number is needed')
+    return float(value)

@@ -1,0 +1,268 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""A robot arm as the motion core sees it: joints, limits, kinematics, distances."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from .arrays import Array, frozen, Native
+from .collision import CollisionModel, Proximity
+from .description import Description
+from .exceptions import CommandError, ModelError
+from .limits import JointLimits, merge_limits
+from .srdf import Group, parse_srdf, SemanticDescription
+
+MOST_JOINTS = 8
+"""Joints of the longest chain that is offered."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pose:
+    """Position and orientation of a frame in another.
+
+    Attributes:
+        rotation: Rotation matrix (3, 3), from the frame to the other.
+        position: Origin of the frame in the other in [m].
+    """
+
+    rotation: Array
+    position: Array
+
+
+class RobotModel:
+    """An arm: a group of joints between a base and a tip link.
+
+    Poses and Jacobians are expressed in the base link; twists and Jacobian rows are linear before
+    angular, taken at the origin of the tip. Positions are plain angles, also of continuous joints.
+    It caches the kinematics of the last position, so it belongs to one loop.
+
+    Attributes:
+        name: Name of the robot.
+        group: Name of the group.
+        base: Name of its base link.
+        tip: Name of its tip link.
+        limits: Limits of the joints, with their names.
+        poses: Named poses of the SRDF, in the order of the joints.
+        notes: What was passed over in the description, in words.
+        reach: Greatest distance of the tip from the first joint's axis frame in [m].
+    """
+
+    def __init__(
+        self,
+        urdf: str,
+        srdf: str,
+        limits: Mapping[str, Any],
+        group: str | None = None,
+        tip: str | None = None,
+    ) -> None:
+        """Build and check the arm.
+
+        Args:
+            urdf: Robot description as XML text.
+            srdf: Semantic description as XML text.
+            limits: The table ``joint_limits`` of a limits file.
+            group: The group; by default the only one of the SRDF.
+            tip: The tip link; by default the end of the group's chain.
+
+        Raises:
+            ModelError: The three do not fit together; the message names what to mend.
+        """
+        description, semantic = Description(urdf), parse_srdf(srdf)
+        chosen = semantic.group(group if group is not None else _only(semantic))
+        names = description.group_joints(chosen, semantic)
+        if len(names) > MOST_JOINTS:
+            raise ModelError(f'group {chosen.name}: {len(names)} joints, {MOST_JOINTS} at most')
+        self.name, self.group = description.name, chosen.name
+        self.base, self.tip = _ends(description, chosen, semantic, names, tip)
+        self.limits: JointLimits = merge_limits(names, description.ranges, limits)
+        self.notes = description.notes
+        self.poses = _poses(self.limits, semantic.poses.get(chosen.name, {}))
+        self._model = _reduced(description, names)
+        self._data = self._model.createData()
+        self._order = [self._model.joints[self._model.getJointId(n)].idx_q for n in names]
+        self._plain = self._order == list(range(len(names)))
+        self._tip_frame = self._model.getFrameId(self.tip)
+        self._base_frame = self._model.getFrameId(self.base)
+        self._at: Array | None = None
+        self._collision = CollisionModel(
+            self._model, self._data, description.shapes, semantic.disabled
+        )
+        self.reach = self._reach()
+
+    def __len__(self) -> int:
+        """Return the number of joints."""
+        return len(self.limits)
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of the joints, in order."""
+        return self.limits.names
+
+    @property
+    def pairs(self) -> Sequence[tuple[str, str]]:
+        """Links of each pair of shapes that is checked for collision."""
+        return self._collision.pairs
+
+    @property
+    def frames(self) -> Sequence[str]:
+        """Names of the links that can be asked for."""
+        return [f.name for f in self._model.frames if f.type == pin.FrameType.BODY]
+
+    def pose(self, positions: Array, link: str | None = None) -> Pose:
+        """Return the pose of a link in the base link.
+
+        Args:
+            positions: Joint positions in [rad].
+            link: Name of the link; by default the tip.
+
+        Raises:
+            CommandError: There is no such link.
+        """
+        self._update(positions)
+        base = self._placement(self._base_frame)
+        placement = base.actInv(self._placement(self._frame(link)))
+        return Pose(placement.rotation.copy(), placement.translation.copy())
+
+    def jacobian(self, positions: Array) -> Array:
+        """Return the Jacobian of the tip (6, n), expressed in the base link.
+
+        Args:
+            positions: Joint positions in [rad].
+        """
+        self._update(positions)
+        world = pin.getFrameJacobian(
+            self._model, self._data, self._tip_frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        )
+        rotation = self._placement(self._base_frame).rotation.T
+        turned: Array = np.vstack((rotation @ world[:3], rotation @ world[3:]))
+        return turned if self._plain else turned[:, self._order]
+
+    def nearest(self, positions: Array, within: float, count: int) -> list[Proximity]:
+        """Return the nearest pairs of shapes with the gradients of their distances.
+
+        Args:
+            positions: Joint positions in [rad].
+            within: Greatest distance of interest in [m].
+            count: How many pairs at most.
+        """
+        self._update(positions)
+        found = self._collision.nearest(within, count)
+        if self._plain:
+            return found
+        return [replace(p, gradient=p.gradient[self._order]) for p in found]
+
+    def clearance(self, positions: Array) -> float:
+        """Return the least distance between two shapes in [m]; infinity when none are checked.
+
+        Args:
+            positions: Joint positions in [rad].
+        """
+        if not self._collision.pairs:
+            return float('inf')
+        pin.forwardKinematics(self._model, self._data, self._pin_order(positions))
+        self._at = None  # the Jacobians are not those of these positions
+        return float(self._collision.measure().min())
+
+    def index(self, joint: str) -> int:
+        """Return the place of a joint.
+
+        Raises:
+            CommandError: The arm has no such joint.
+        """
+        if joint not in self.limits.names:
+            known = ', '.join(self.limits.names)
+            raise CommandError(f'there is no joint {joint!r} in {self.group}; joints: {known}')
+        return self.limits.names.index(joint)
+
+    def _update(self, positions: Array) -> None:
+        if self._at is not None and np.array_equal(positions, self._at):
+            return
+        pin.computeJointJacobians(self._model, self._data, self._pin_order(positions))
+        self._at = np.array(positions)
+
+    def _pin_order(self, positions: Array) -> Array:
+        if self._plain:
+            return positions
+        ordered = np.empty(len(self))
+        ordered[self._order] = positions
+        return ordered
+
+    def _placement(self, frame: int) -> Native:
+        return pin.updateFramePlacement(self._model, self._data, frame)
+
+    def _frame(self, link: str | None) -> int:
+        if link is None:
+            return int(self._tip_frame)
+        if not self._model.existFrame(link, pin.FrameType.BODY):
+            raise CommandError(f'there is no link {link!r} in {self.name}; links: {self.frames}')
+        return int(self._model.getFrameId(link))
+
+    def _reach(self) -> float:
+        """Sum the lengths from joint to joint out to the tip."""
+        lengths = [
+            np.linalg.norm(self._model.jointPlacements[i].translation)
+            for i in range(2, self._model.njoints)
+        ]
+        tip = self._model.frames[self._tip_frame].placement.translation
+        return float(sum(lengths) + np.linalg.norm(tip))
+
+
+def _only(semantic: SemanticDescription) -> str:
+    if len(semantic.groups) != 1:
+        known = ', '.join(semantic.groups) or 'none'
+        raise ModelError(f'the SRDF has the groups {known}: name the one to move')
+    return next(iter(semantic.groups))
+
+
+def _ends(
+    description: Description,
+    group: Group,
+    semantic: SemanticDescription,
+    joints: Sequence[str],
+    tip: str | None,
+) -> tuple[str, str]:
+    """Return the base link and the tip link of a group."""
+    chains = list(group.chains)
+    for name in group.subgroups:
+        chains += semantic.group(name).chains
+    base = chains[0][0] if chains else description.joints[joints[0]].parent
+    end = tip or (chains[-1][1] if chains else description.joints[joints[-1]].child)
+    on_chain = {joint.name for joint in description.chain(base, end)}
+    if beside := [name for name in joints if name not in on_chain]:
+        raise ModelError(
+            f'group {group.name}: joint {beside[0]} is not between {base!r} and {end!r};'
+            ' the joints of an arm are one chain'
+        )
+    return base, end
+
+
+def _poses(limits: JointLimits, poses: Mapping[str, Mapping[str, float]]) -> Mapping[str, Array]:
+    found: dict[str, Array] = {}
+    for name, pose in poses.items():
+        if missing := [joint for joint in limits.names if joint not in pose]:
+            raise ModelError(f'pose {name!r} of the SRDF lacks joint {missing[0]}')
+        values = frozen([pose[joint] for joint in limits.names])
+        outside = (values < limits.lower) | (values > limits.upper)
+        if outside.any():
+            joint = limits.names[int(np.argmax(outside))]
+            raise ModelError(f'pose {name!r} of the SRDF: joint {joint} is beyond its limits')
+        found[name] = values
+    return found
+
+
+def _reduced(description: Description, joints: Sequence[str]) -> Native:
+    """Build the kinematics, all joints but the group's locked at the middle or zero."""
+    try:
+        model = pin.buildModelFromXML(description.xml)
+    except (RuntimeError, ValueError, ArithmeticError) as error:
+        raise ModelError(f'the robot description makes no kinematic tree: {error}') from error
+    rest = pin.neutral(model)
+    rest = np.clip(rest, model.lowerPositionLimit, model.upperPositionLimit)
+    locked = [number for number in range(1, model.njoints) if model.names[number] not in joints]
+    return pin.buildReducedModel(model, locked, rest)

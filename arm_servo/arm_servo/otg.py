@@ -1,0 +1,255 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Jerk-limited steps between states of motion, by ruckig from state to state.
+
+Way-points are never given to ruckig: it would send them to a service on the network.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import ruckig
+
+from .arrays import Array, frozen, Native
+from .limits import JointLimits
+
+LEAST_SHARE = 0.05
+"""Least share of its acceleration that a joint keeps while others set the pace."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MotionState:
+    """State of motion of every joint.
+
+    Attributes:
+        position: Positions in [rad].
+        velocity: Velocities in [rad/s].
+        acceleration: Accelerations in [rad/s2].
+    """
+
+    position: Array
+    velocity: Array
+    acceleration: Array
+
+    @classmethod
+    def at_rest(cls, position: Sequence[float] | Array) -> MotionState:
+        """Return the state of standing still.
+
+        Args:
+            position: Positions in [rad].
+        """
+        zero = np.zeros(len(position))
+        return cls(frozen(position), frozen(zero), frozen(zero))
+
+    @property
+    def moving(self) -> bool:
+        """Whether a joint moves, or is about to."""
+        return bool(np.any(self.velocity) or np.any(self.acceleration))
+
+
+class Plan:
+    """A jerk-limited motion from one state to another.
+
+    Attributes:
+        duration: How long it takes in [s].
+        lower: Least position of each joint on it in [rad].
+        upper: Greatest position of each joint on it in [rad].
+    """
+
+    __slots__ = ('_lower', '_trajectory', '_upper', 'duration')
+
+    def __init__(self, trajectory: Native) -> None:
+        """Wrap a trajectory of ruckig."""
+        self._trajectory = trajectory
+        self.duration = float(trajectory.duration)
+        self._lower: Array | None = None
+        self._upper: Array | None = None
+
+    def at(self, time: float) -> MotionState:
+        """Return the state at a time since the start; beyond the end it goes on evenly.
+
+        Args:
+            time: Time in [s].
+        """
+        position, velocity, acceleration = self._trajectory.at_time(time)
+        return MotionState(np.array(position), np.array(velocity), np.array(acceleration))
+
+    @property
+    def extremes(self) -> tuple[Array, Array]:
+        """Least and greatest position of each joint on the way in [rad]."""
+        if self._lower is None or self._upper is None:
+            bounds = self._trajectory.position_extrema
+            self._lower = np.array([bound.min for bound in bounds])
+            self._upper = np.array([bound.max for bound in bounds])
+        return self._lower, self._upper
+
+
+class Generator:
+    """Plans jerk-limited motions of one arm.
+
+    It is ruckig with the arm's limits; None where ruckig has no answer, which its callers meet
+    with :func:`hard_brake`.
+    """
+
+    def __init__(self, limits: JointLimits) -> None:
+        """Prepare.
+
+        Args:
+            limits: Limits of the joints.
+        """
+        count = len(limits)
+        self._limits = limits
+        self._otg = ruckig.Ruckig(count)
+        velocity, apart = ruckig.ControlInterface.Velocity, ruckig.Synchronization.No
+        self._to_velocity = self._input(velocity, apart)
+        self._to_position = self._input(
+            ruckig.ControlInterface.Position, ruckig.Synchronization.Phase
+        )
+        self._to_standstill = self._input(velocity, apart)
+        self._to_standstill.target_velocity = np.zeros(count)
+
+    def to_velocity(self, state: MotionState, velocity: Array) -> Plan | None:
+        """Plan to a velocity, the joints in step so that the direction is kept.
+
+        Each joint gets the share of its acceleration and jerk that its change of speed has in the
+        change of the joint that needs longest. Other than ruckig's own synchronisation this holds
+        when the target changes in every cycle.
+
+        Args:
+            state: Where to start.
+            velocity: Velocities to reach in [rad/s], within the limits.
+        """
+        limits, demand = self._limits, self._to_velocity
+        share = _shares(velocity - state.velocity, limits.acceleration)
+        unwound = state.acceleration * np.abs(state.acceleration) / (2.0 * limits.jerk * share)
+        share = _shares(velocity - state.velocity - unwound, limits.acceleration)
+        _start(demand, state)
+        demand.max_acceleration = np.maximum(
+            limits.acceleration * share, np.abs(state.acceleration)
+        )
+        demand.max_jerk = limits.jerk * share
+        demand.target_velocity = velocity
+        return self._plan(demand)
+
+    def brake(self, state: MotionState) -> Plan | None:
+        """Plan the shortest way to a standstill, each joint for itself.
+
+        Args:
+            state: Where to start.
+        """
+        _start(self._to_standstill, state)
+        return self._plan(self._to_standstill)
+
+    def to_state(
+        self, state: MotionState, target: MotionState, shortest: float | None = None
+    ) -> Plan | None:
+        """Plan to a state.
+
+        Args:
+            state: Where to start.
+            target: Where to arrive, its velocity and acceleration within the limits.
+            shortest: Least duration in [s].
+        """
+        demand = self._to_position
+        _start(demand, state)
+        demand.target_position = target.position
+        demand.target_velocity = target.velocity
+        demand.target_acceleration = target.acceleration
+        demand.minimum_duration = shortest
+        return self._plan(demand)
+
+    def slowed(self, share: float) -> Generator:
+        """Return a generator with a share of the velocities.
+
+        Args:
+            share: Above 0, at most 1.
+        """
+        limits = self._limits
+        return Generator(
+            JointLimits(
+                limits.names,
+                limits.lower,
+                limits.upper,
+                frozen(limits.velocity * share),
+                limits.acceleration,
+                limits.jerk,
+            )
+        )
+
+    def _input(self, interface: Native, synchronization: Native) -> Native:
+        demand = ruckig.InputParameter(len(self._limits))
+        demand.control_interface = interface
+        demand.synchronization = synchronization
+        demand.max_velocity = self._limits.velocity
+        demand.max_acceleration = self._limits.acceleration
+        demand.max_jerk = self._limits.jerk
+        return demand
+
+    def _plan(self, demand: Native) -> Plan | None:
+        trajectory = ruckig.Trajectory(len(self._limits))
+        try:
+            result = self._otg.calculate(demand, trajectory)
+        except ruckig.RuckigError:
+            return None
+        if result not in {ruckig.Result.Working, ruckig.Result.Finished}:
+            return None
+        return Plan(trajectory)
+
+
+def _start(demand: Native, state: MotionState) -> None:
+    demand.current_position = state.position
+    demand.current_velocity = state.velocity
+    demand.current_acceleration = state.acceleration
+
+
+def _shares(change: Array, acceleration: Array) -> Array:
+    """Return the share of each joint's acceleration that changes all speeds in the same time."""
+    needed = np.abs(change) / acceleration
+    shares: Array = np.maximum(needed / max(float(needed.max()), 1e-12), LEAST_SHARE)
+    return shares
+
+
+def hard_brake(state: MotionState, limits: JointLimits, period: float) -> MotionState:
+    """Slow down for a period with the greatest deceleration: for when ruckig has no answer.
+
+    Args:
+        state: State at the start of the period.
+        limits: Limits of the joints.
+        period: Its length in [s].
+
+    Returns:
+        The state at the end; the jerk limit does not hold on the way.
+    """
+    step = limits.acceleration * period
+    velocity = np.sign(state.velocity) * np.maximum(np.abs(state.velocity) - step, 0.0)
+    position = state.position + 0.5 * (state.velocity + velocity) * period
+    return MotionState(
+        position,
+        velocity,
+        np.where(velocity == 0.0, 0.0, -np.sign(velocity) * limits.acceleration),
+    )
+
+
+def brakeable_velocity(distance: Array, limits: JointLimits) -> Array:
+    """Return the velocity that can be braked to a standstill within a distance.
+
+    A stop from velocity v with a jerk j up to the deceleration a takes the way
+    v/2 (v/a + a/j) where a is reached (v >= a^2/j), v sqrt(v/j) where it is not.
+
+    Args:
+        distance: Ways left in [rad]; negative ones count as zero.
+        limits: Limits of the joints.
+
+    Returns:
+        Velocities in [rad/s], at most those of the limits.
+    """
+    way = np.maximum(distance, 0.0)
+    a, j = limits.acceleration, limits.jerk
+    knee = a * a / j
+    short = np.cbrt(way * way * j)
+    long = -0.5 * knee + np.sqrt(0.25 * knee * knee + 2.0 * a * np.where(np.isinf(way), 0.0, way))
+    velocity = np.where(way <= knee * a / j, short, long)
+    return np.minimum(np.where(np.isinf(way), np.inf, velocity), limits.velocity)

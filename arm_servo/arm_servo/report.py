@@ -1,0 +1,67 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What limits a motion, in numbers and in words."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+
+class Cause(Enum):
+    """Why a motion is slower than asked."""
+
+    JOINT_POSITION = 'joint limit'
+    JOINT_VELOCITY = 'joint speed'
+    JOINT_ACCELERATION = 'joint acceleration'
+    COLLISION = 'collision'
+    SINGULARITY = 'singularity'
+    HOLD = 'path'
+    STOP_CHECK = 'stop check'
+    SOLVER = 'solver'
+
+
+@dataclass(frozen=True, slots=True)
+class Limiter:
+    """One thing that limits a motion.
+
+    Attributes:
+        cause: Its kind.
+        name: What it is: a joint, two links, an axis of the tool.
+        amount: Way left in [rad] or [m], speed asked in [rad/s], or measure of the singularity.
+        factor: What it leaves of the asked speed, 0 to 1.
+    """
+
+    cause: Cause
+    name: str
+    amount: float
+    factor: float
+
+    def __str__(self) -> str:
+        """Say it in a few words."""
+        if self.cause is Cause.COLLISION:
+            return f'collision: {self.name} at {1e3 * self.amount:.0f} mm, {self.factor:.2f}x'
+        if self.cause is Cause.JOINT_POSITION:
+            return f'joint limit: {self.name}, {self.amount:.3f} left, {self.factor:.2f}x'
+        if self.cause is Cause.JOINT_VELOCITY:
+            return f'joint speed: {self.name} would need {self.amount:.2f}, {self.factor:.2f}x'
+        return f'{self.cause.value}: {self.name}, {self.factor:.2f}x'
+
+
+@dataclass(frozen=True, slots=True)
+class MotionReport:
+    """How a command is carried out.
+
+    Attributes:
+        factor: Achieved share of the asked speed; 1 when nothing limits it.
+        limiters: What limits it, the strongest first.
+    """
+
+    factor: float = 1.0
+    limiters: tuple[Limiter, ...] = ()
+
+    def __str__(self) -> str:
+        """Say it in one line."""
+        if not self.limiters:
+            return 'free'
+        return '; '.join(str(limiter) for limiter in self.limiters)

@@ -1,0 +1,106 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Semantic description (SRDF): groups, named poses, pairs of links without collision check."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from xml.etree import ElementTree as ET
+
+from .exceptions import ModelError
+
+Pair = frozenset[str]
+"""Two links, in no order."""
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """A group of joints.
+
+    Attributes:
+        name: Its name.
+        chains: Base and tip link of each chain in it.
+        joints: Joints that it lists one by one.
+        subgroups: Groups that it contains.
+    """
+
+    name: str
+    chains: tuple[tuple[str, str], ...]
+    joints: tuple[str, ...]
+    subgroups: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class SemanticDescription:
+    """What an SRDF says.
+
+    Attributes:
+        groups: Groups by name.
+        poses: Positions in [rad] or [m] by joint, by pose, by group.
+        disabled: Pairs of links that need no collision check.
+    """
+
+    groups: Mapping[str, Group]
+    poses: Mapping[str, Mapping[str, Mapping[str, float]]]
+    disabled: frozenset[Pair]
+
+    def group(self, name: str) -> Group:
+        """Return a group.
+
+        Args:
+            name: Its name.
+
+        Raises:
+            ModelError: There is none of this name; lists those that there are.
+        """
+        if name not in self.groups:
+            known = ', '.join(self.groups) or 'none'
+            raise ModelError(f'there is no group {name!r} in the SRDF; groups: {known}')
+        return self.groups[name]
+
+
+def parse_srdf(text: str) -> SemanticDescription:
+    """Read an SRDF.
+
+    Args:
+        text: The SRDF as XML text.
+
+    Raises:
+        ModelError: The text is no SRDF.
+    """
+    try:
+        root = ET.fromstring(text)  # noqa: S314  a robot's own description, not from the network
+    except ET.ParseError as error:
+        raise ModelError(f'the SRDF is no XML: {error}') from error
+    groups = {group.name: group for group in map(_group, root.findall('group'))}
+    poses: dict[str, dict[str, Mapping[str, float]]] = {name: {} for name in groups}
+    for state in root.findall('group_state'):
+        poses.setdefault(state.get('group', ''), {})[state.get('name', '')] = _pose(state)
+    disabled = frozenset(
+        frozenset((each.get('link1', ''), each.get('link2', '')))
+        for each in root.findall('disable_collisions')
+    )
+    return SemanticDescription(groups, poses, disabled)
+
+
+def _group(element: ET.Element) -> Group:
+    return Group(
+        element.get('name', ''),
+        tuple(
+            (chain.get('base_link', ''), chain.get('tip_link', ''))
+            for chain in element.findall('chain')
+        ),
+        tuple(joint.get('name', '') for joint in element.findall('joint')),
+        tuple(group.get('name', '') for group in element.findall('group')),
+    )
+
+
+def _pose(state: ET.Element) -> Mapping[str, float]:
+    try:
+        return {
+            joint.get('name', ''): float(joint.get('value', ''))
+            for joint in state.findall('joint')
+        }
+    except ValueError as error:
+        raise ModelError(f'pose {state.get("name")!r} of the SRDF: {error}') from error

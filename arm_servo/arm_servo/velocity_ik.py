@@ -1,0 +1,257 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""From an asked speed of the tool or of joints to joint speeds that keep every limit.
+
+A quadratic program finds the joint speeds x that come nearest to the asked twist V::
+
+    min  |W (J x - V)|^2 + sum_i d_i^2 (v_i' x)^2 + w (n' x - e)^2
+    with  -b(q - lower) <= x <= b(upper - q)          brakes in front of a joint's limit
+          x0 - c <= x <= x0 + c                       what accelerations can bring about soon
+          (dd/dq) x >= -k (d - margin)                brakes in front of each near pair of links
+
+Held axes weigh more in W than commanded ones, so that what a limit takes away is taken from the
+command and not paid for by a drift. d_i damps the directions that are nearly lost, and only those;
+n is the way out of a singular pose. Whatever the arm is in, standing still or leaving is feasible.
+The answer is then slowed as a whole to the joints' greatest speeds, which keeps its direction.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .arrays import Array, Mask
+from .bounds import Bounds, Brakes, BrakeSettings
+from .box_qp import Program
+from .model import RobotModel
+from .otg import brakeable_velocity, MotionState
+from .report import Cause, Limiter, MotionReport
+from .singular import Directions, directions, LOST, way_out
+
+AXES = ('x', 'y', 'z', 'rotation x', 'rotation y', 'rotation z')
+"""Names of the axes of a twist."""
+
+FULL = 0.05
+"""Scaled twist from which on a singular pose is left at full speed in [rad/s]."""
+
+WANDER = 3.0
+"""How far a way out is followed while the asked direction stays lost in [rad]."""
+
+RIDGE = 1e-5
+"""Weight of the joint speeds that keeps the program definite."""
+
+
+@dataclass(frozen=True, slots=True)
+class IkSettings:
+    """How the velocity inverse kinematics weighs.
+
+    Attributes:
+        hold_weight: Weight of held axes against commanded ones.
+        drift_weight: Weight of axes that may drift.
+        escape: Share of a joint's speed with which it leaves a singular pose.
+        brakes: How it brakes in front of limits.
+    """
+
+    hold_weight: float = 30.0
+    drift_weight: float = 0.01
+    escape: float = 0.3
+    brakes: BrakeSettings = field(default_factory=BrakeSettings)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TwistTask:
+    """An asked speed of the tool.
+
+    Attributes:
+        twist: Linear [m/s], then angular [rad/s], along the task's axes (6).
+        axes: Rotation from the task's axes to the base link (3, 3).
+        commanded: Mask of the axes that the command moves (6).
+        drifting: Mask of the other axes that need not be held (6).
+        correction: Speed that brings the held axes back where they belong (6).
+    """
+
+    twist: Array
+    axes: Array
+    commanded: Mask
+    drifting: Mask
+    correction: Array = field(default_factory=lambda: np.zeros(6))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class IkAnswer:
+    """Joint speeds, and what limits them.
+
+    Attributes:
+        velocity: Joint speeds in [rad/s].
+        report: What limits them.
+    """
+
+    velocity: Array
+    report: MotionReport
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Weighted:
+    """A task with its weights: jacobian (k, n), command and correction (k)."""
+
+    jacobian: Array
+    command: Array
+    correction: Array
+
+
+class VelocityIk:
+    """Velocity inverse kinematics of an arm.
+
+    It remembers the sense in which it leaves a singular pose and where it began, nothing else.
+    """
+
+    def __init__(self, model: RobotModel, settings: IkSettings | None = None) -> None:
+        """Prepare.
+
+        Args:
+            model: The arm.
+            settings: Weights and margins.
+        """
+        self._model = model
+        self._settings = settings or IkSettings()
+        self._limits = model.limits
+        self._brakes = Brakes(model, self._settings.brakes)
+        length = model.reach / 3.0
+        self._scale = np.array([1.0 / length] * 3 + [1.0] * 3)
+        self._sense: Array | None = None
+        self._entered: Array | None = None
+
+    def cartesian(self, state: MotionState, task: TwistTask) -> IkAnswer:
+        """Find joint speeds for a speed of the tool.
+
+        Args:
+            state: Commanded state of the joints.
+            task: What is asked.
+        """
+        weights = np.where(task.commanded, 1.0, self._settings.hold_weight)
+        weights[task.drifting & ~task.commanded] = self._settings.drift_weight
+        weights *= self._scale
+        bounds = self._brakes.bounds(state)
+        # the directions of the weighted task: how well the command does while held axes stay
+        asked = _Weighted(
+            self._turned(state.position, task.axes, weights),
+            task.twist * weights,
+            task.correction * weights,
+        )
+        found = directions(asked.jacobian, asked.command, asked.correction, self._limits.velocity)
+        hessian = asked.jacobian.T @ asked.jacobian
+        hessian += (found.joints.T * found.damping) @ found.joints
+        gradient = -((asked.command + asked.correction) @ asked.jacobian)
+        way = self._way_out(state, task, weights, found, asked.command)
+        if way is not None:
+            fade = 1.0 - float(found.share[-1]) / LOST
+            hessian += fade * np.outer(way, way)
+            gradient -= (fade * fade * self._escape_speed(way, asked.command)) * way
+        return self._answer(hessian, gradient, bounds, asked, found)
+
+    def joints(self, state: MotionState, velocity: Array, commanded: Mask) -> IkAnswer:
+        """Find joint speeds near asked ones; joints that are not commanded are held.
+
+        Args:
+            state: Commanded state of the joints.
+            velocity: Asked speeds in [rad/s].
+            commanded: Mask of the joints that the command moves.
+        """
+        self._sense = self._entered = None
+        weight = np.where(commanded, 1.0, self._settings.hold_weight)
+        asked = _Weighted(np.diag(weight), weight * velocity, np.zeros(len(weight)))
+        hessian = np.diag(weight * weight)
+        bounds = self._brakes.bounds(state)
+        return self._answer(hessian, -(weight * weight * velocity), bounds, asked, None)
+
+    def _turned(self, position: Array, axes: Array, weights: Array) -> Array:
+        """Return the weighted Jacobian along a task's axes."""
+        jacobian = self._model.jacobian(position)
+        turned = np.vstack((axes.T @ jacobian[:3], axes.T @ jacobian[3:]))
+        turned *= weights[:, None]
+        return turned
+
+    def _way_out(
+        self,
+        state: MotionState,
+        task: TwistTask,
+        weights: Array,
+        found: Directions,
+        command: Array,
+    ) -> Array | None:
+        """Return the way out of a singular pose, where the command needs one and has one."""
+        if not (found.lost.any() and command.any()):
+            self._sense = self._entered = None
+            return None
+        if self._entered is None:
+            self._entered = state.position
+        if np.linalg.norm(state.position - self._entered) > WANDER:
+            return None  # it leads nowhere
+
+        def weighted(position: Array) -> Array:
+            return self._turned(position, task.axes, weights)
+
+        way = way_out(weighted, state.position, found, command)
+        self._sense = None if way is None else way * self._oriented(way, state)
+        return self._sense
+
+    def _escape_speed(self, way: Array, command: Array) -> float:
+        """Return how fast to follow a way out in [rad/s]: slower for a slow command."""
+        fastest = self._settings.escape / float(np.max(np.abs(way) / self._limits.velocity))
+        return fastest * min(1.0, float(np.linalg.norm(command)) / FULL)
+
+    def _oriented(self, way: Array, state: MotionState) -> float:
+        """Return the sense, 1 or -1: as before, else away from the nearer limits."""
+        if self._sense is not None:
+            return 1.0 if way @ self._sense >= 0 else -1.0
+        upper = brakeable_velocity(self._limits.upper - state.position, self._limits)
+        lower = brakeable_velocity(state.position - self._limits.lower, self._limits)
+        concerned = np.abs(way) > 0.1
+        forth, back = (
+            float(np.min(np.where(sense * way > 0, upper, lower)[concerned], initial=np.inf))
+            for sense in (1.0, -1.0)
+        )
+        return 1.0 if forth >= back else -1.0
+
+    def _answer(
+        self,
+        hessian: Array,
+        gradient: Array,
+        bounds: Bounds,
+        asked: _Weighted,
+        found: Directions | None,
+    ) -> IkAnswer:
+        """Solve, slow down to the joints' speeds, and say what limits."""
+        hessian[np.diag_indices_from(hessian)] += RIDGE
+        lower, upper, rows, least = bounds.lower, bounds.upper, bounds.rows, bounds.least
+        solution = Program(hessian, gradient, lower, upper, rows, least).solve()
+        if solution is None:  # too fast for the rows; standing still is feasible
+            lower, upper = np.minimum(lower, 0.0), np.maximum(upper, 0.0)
+            solution = Program(hessian, gradient, lower, upper, rows, least).solve()
+        if solution is None:
+            stuck = Limiter(Cause.SOLVER, 'no answer; standing still', 0.0, 0.0)
+            return IkAnswer(np.zeros(len(gradient)), MotionReport(0.0, (stuck,)))
+        velocity, command = solution.values, asked.command
+        excess = np.abs(velocity) / self._limits.velocity
+        fastest = int(excess.argmax())
+        slowed = 1.0 / max(1.0, float(excess[fastest]))
+        size = float(command @ command)
+        factor = float(command @ (asked.jacobian @ velocity)) * slowed / size if size else 1.0
+        limiters = self._brakes.pressing(bounds, solution.forces, factor)
+        if slowed < 0.999:
+            name, needed = self._limits.names[fastest], float(abs(velocity[fastest]))
+            limiters.append(Limiter(Cause.JOINT_VELOCITY, name, needed, slowed))
+        if found is not None and size:
+            limiters += _losses(found, command, factor)
+        return IkAnswer(velocity * slowed, MotionReport(factor, tuple(limiters)))
+
+
+def _losses(found: Directions, command: Array, factor: float) -> list[Limiter]:
+    """Name what the command loses to directions that the arm lacks here."""
+    parts = command @ found.tool
+    kept = float(np.sum(found.share * parts * parts) / (command @ command))
+    if kept > 0.99 or factor > 0.99:
+        return []
+    axis = AXES[int(np.argmax(np.abs(command)))]
+    return [Limiter(Cause.SINGULARITY, f'{axis} is lost here', found.least, max(kept, 0.0))]

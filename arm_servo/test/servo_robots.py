@@ -1,0 +1,88 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Arms for the tests: the robots of arm_bringup, and chains of any length."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from arm_bringup.description import expand_xacro
+from arm_servo.arrays import Array, frozen
+from arm_servo.limits import load_limits
+from arm_servo.model import RobotModel
+
+FOLDER = Path(__file__).parents[2] / 'arm_bringup' / 'robots'
+
+ROBOTS = ('panda', 'prbt', 'gp110')
+
+# the straight pose of each arm, where it is singular; Panda's fourth joint does not reach zero
+STRAIGHT: Mapping[str, Array] = {
+    'panda': frozen([0.0, 0.0, 0.0, -0.0698, 0.0, 1.0, 0.0]),
+    'prbt': frozen([0.0] * 6),
+    'gp110': frozen([0.0] * 6),
+}
+
+
+@cache
+def texts(name: str) -> tuple[str, str]:
+    """Return URDF and SRDF of a robot."""
+    folder = FOLDER / name
+    urdf = expand_xacro(folder / f'{name}.urdf.xacro')
+    return urdf, (folder / f'{name}.srdf').read_text(encoding='utf-8')
+
+
+def table(name: str) -> dict[str, Any]:
+    """Return the limits of a robot."""
+    return dict(load_limits(FOLDER / name / 'limits.yaml'))
+
+
+@cache
+def robot(name: str) -> RobotModel:
+    """Return a robot of arm_bringup."""
+    urdf, srdf = texts(name)
+    return RobotModel(urdf, srdf, table(name))
+
+
+def ready(name: str) -> Array:
+    """Return the pose of a robot from which it can move in every direction."""
+    return robot(name).poses['ready']
+
+
+def chain_texts(kinds: str) -> tuple[str, str, dict[str, Any]]:
+    """Return URDF, SRDF and limits of a chain.
+
+    Args:
+        kinds: One letter per joint: x, y or z for a revolute joint about it, c for a continuous
+            joint about z, p for a sliding one along x.
+    """
+    parts = ['<robot name="chain"><link name="base"/>']
+    for number, kind in enumerate(kinds):
+        parent = f'link_{number}' if number else 'base'
+        axis = {'x': '1 0 0', 'y': '0 1 0', 'p': '1 0 0'}.get(kind, '0 0 1')
+        sort = {'c': 'continuous', 'p': 'prismatic'}.get(kind, 'revolute')
+        parts.append(
+            f'<link name="link_{number + 1}"><collision><origin xyz="0 0 0.05"/><geometry>'
+            f'<sphere radius="0.03"/></geometry></collision></link>'
+            f'<joint name="j{number + 1}" type="{sort}"><origin xyz="0.05 0 0.2"/>'
+            f'<parent link="{parent}"/><child link="link_{number + 1}"/><axis xyz="{axis}"/>'
+            f'<limit lower="-2" upper="2" velocity="2" effort="1"/></joint>'
+        )
+    parts.append('</robot>')
+    names = [f'j{number + 1}' for number in range(len(kinds))]
+    srdf = (
+        '<robot name="chain"><group name="arm">'
+        f'<chain base_link="base" tip_link="link_{len(kinds)}"/></group></robot>'
+    )
+    limits = {
+        name: {'max_velocity': 2.0, 'max_acceleration': 5.0, 'max_jerk': 50.0} for name in names
+    }
+    return ''.join(parts), srdf, limits
+
+
+@cache
+def chain(kinds: str) -> RobotModel:
+    """Return a chain, see :func:`chain_texts`."""
+    return RobotModel(*chain_texts(kinds))

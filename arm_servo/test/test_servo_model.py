@@ -1,0 +1,204 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The robot model against the numbers of the arms, differences, and broken files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import math
+from typing import Any
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+import numpy as np
+import pinocchio as pin
+import pytest
+from servo_robots import chain, chain_texts, ready, robot, ROBOTS, table, texts
+
+from arm_servo.arrays import Array
+from arm_servo.exceptions import CommandError, ModelError
+from arm_servo.limits import load_limits
+from arm_servo.model import Pose, RobotModel
+
+CHAINS = ('zyy', 'zyyz', 'zyyzy', 'cyyzyz', 'zpyzyzc', 'zyzyzyzy')
+
+# pose, position of the tip in [m]: numbers of the makers
+CHECKS = [
+    ('panda', [0.0] * 7, (0.088, 0.0, 0.926)),
+    ('panda', [0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785], (0.3070, 0.0, 0.5903)),
+    ('prbt', [0.0] * 6, (0.0, 0.0, 1.0014)),
+    ('prbt', [0.0, 0.0, math.pi / 2, 0.0, math.pi / 2, 0.0], (-0.307, 0.0, 0.5264)),
+    ('gp110', [0.0] * 6, (1.540, 0.0, 1.645)),
+    ('gp110', [0.0, 0.0, 0.0, 0.0, -math.pi / 2, 0.0], (1.340, 0.0, 1.445)),
+]
+
+
+def twist_between(before: Pose, after: Pose) -> Array:
+    """Return the twist from one pose to another in unit time."""
+    angular = pin.log3(after.rotation @ before.rotation.T)
+    return np.concatenate((after.position - before.position, angular))
+
+
+def any_position(model: RobotModel, seed: int) -> Array:
+    """Return joint positions within the limits."""
+    lower = np.maximum(model.limits.lower, -math.pi)
+    upper = np.minimum(model.limits.upper, math.pi)
+    return np.random.default_rng(seed).uniform(lower, upper)
+
+
+@pytest.mark.parametrize(('name', 'positions', 'xyz'), CHECKS)
+def test_the_tip_is_where_the_maker_says(
+    name: str, positions: list[float], xyz: tuple[float, float, float]
+) -> None:
+    """Forward kinematics meets the check poses."""
+    assert robot(name).pose(np.array(positions)).position == pytest.approx(xyz, abs=1e-4)
+
+
+@pytest.mark.parametrize('model', [*map(robot, ROBOTS), *map(chain, CHAINS)], ids=str)
+@settings(max_examples=15, deadline=None)
+@given(seed=st.integers(0, 10**6))
+def test_jacobians_are_differences(model: RobotModel, seed: int) -> None:
+    """The Jacobian of every arm, 3 to 8 joints, is the difference quotient of its pose."""
+    at, step = any_position(model, seed), 1e-6
+    differences = [
+        twist_between(model.pose(at - step * unit), model.pose(at + step * unit)) / (2 * step)
+        for unit in np.eye(len(model))
+    ]
+    assert model.jacobian(at) == pytest.approx(np.array(differences).T, abs=1e-7)
+
+
+@pytest.mark.parametrize('name', ROBOTS)
+@settings(max_examples=15, deadline=None)
+@given(seed=st.integers(0, 10**6))
+def test_gradients_of_distances_are_differences(name: str, seed: int) -> None:
+    """Apart or in contact, the gradient of a distance is its difference quotient."""
+    model, step = robot(name), 1e-3
+    at = any_position(model, seed)
+    for near in model.nearest(at, 0.3, 4):
+        if abs(near.distance) < 5e-3:
+            continue  # the normal turns about at the touch
+
+        def distance(positions: Array, pair: int = near.pair) -> float:
+            every = model.nearest(positions, math.inf, len(model.pairs))
+            return next(each.distance for each in every if each.pair == pair)
+
+        quotient = [
+            (distance(at + step * unit) - distance(at - step * unit)) / (2 * step)
+            for unit in np.eye(len(model))
+        ]
+        assert near.gradient == pytest.approx(quotient, abs=0.02)
+
+
+def test_a_tip_other_than_the_groups() -> None:
+    """Any link at the end of the chain can be the tip."""
+    urdf, srdf = texts('panda')
+    model = RobotModel(urdf, srdf, table('panda'), tip='panda_hand_tcp')
+    assert model.pose(ready('panda')).position[2] == pytest.approx(0.4869, abs=1e-4)
+
+
+def test_a_cylinder_with_two_spheres_is_one_capsule() -> None:
+    """Panda's capsules count once each: its pairs are those of links, not of their parts."""
+    pairs = robot('panda').pairs
+    assert len(pairs) == len(set(pairs)) > 0
+
+
+@pytest.mark.parametrize('name', ROBOTS)
+def test_where_an_arm_starts_from_is_free(name: str) -> None:
+    """The pose to start from is neither in contact nor singular."""
+    model = robot(name)
+    assert model.clearance(ready(name)) > 0.02
+    assert np.linalg.svd(model.jacobian(ready(name)))[1][-1] > 0.1
+
+
+def test_continuous_joints_have_no_end() -> None:
+    """A continuous joint's position is a plain angle, of any number of turns."""
+    model = chain('cyyzyz')
+    assert model.limits.continuous.tolist() == [True, False, False, False, False, False]
+    turned = np.array([4 * math.pi, 0.1, 0.2, 0.3, 0.4, 0.5])
+    back = turned - np.array([4 * math.pi, 0.0, 0.0, 0.0, 0.0, 0.0])
+    assert model.pose(turned).position == pytest.approx(model.pose(back).position, abs=1e-9)
+
+
+Broken = Callable[[str, str, dict[str, Any]], tuple[str, str, dict[str, Any]]]
+
+BROKEN: dict[str, tuple[Broken, str]] = {
+    'joint missing in limits': (
+        lambda u, s, t: (u, s, {k: v for k, v in t.items() if k != 'j2'}),
+        'joint j2 is missing',
+    ),
+    'no acceleration': (
+        lambda u, s, t: (u, s, {**t, 'j2': {'max_velocity': 1.0, 'max_jerk': 9.0}}),
+        'lacks max_acceleration',
+    ),
+    'negative jerk': (
+        lambda u, s, t: (u, s, {**t, 'j2': {**t['j2'], 'max_jerk': -1.0}}),
+        'max_jerk is -1',
+    ),
+    'word for a number': (
+        lambda u, s, t: (u, s, {**t, 'j2': {**t['j2'], 'max_jerk': 'high'}}),
+        "'high'",
+    ),
+    'wider velocity': (
+        lambda u, s, t: (u, s, {**t, 'j2': {**t['j2'], 'max_velocity': 3.0}}),
+        'wider than the description',
+    ),
+    'wider positions': (
+        lambda u, s, t: (u, s, {**t, 'j2': {**t['j2'], 'min_position': -3, 'max_position': 1}}),
+        'wider than the description',
+    ),
+    'misspelt key': (
+        lambda u, s, t: (u, s, {**t, 'j2': {**t['j2'], 'max_yerk': 1.0}}),
+        "'max_yerk'",
+    ),
+    'no group': (lambda u, s, t: (u, '<robot name="chain"/>', t), 'groups none'),
+    'srdf no xml': (lambda u, s, t: (u, '<robot', t), 'SRDF is no XML'),
+    'urdf no xml': (lambda u, s, t: ('<robot', s, t), 'description is no XML'),
+    'unknown tip': (lambda u, s, t: (u, s.replace('link_3', 'link_9'), t), "'link_9'"),
+    'no limit': (
+        lambda u, s, t: (
+            u.replace('<limit lower="-2" upper="2" velocity="2" effort="1"/>', ''),
+            s,
+            t,
+        ),
+        'needs <limit',
+    ),
+    'pose beyond': (
+        lambda u, s, t: (
+            u,
+            s.replace(
+                '</robot>',
+                '<group_state name="far" group="arm"><joint name="j1" value="9"/>'
+                '<joint name="j2" value="0"/><joint name="j3" value="0"/></group_state></robot>',
+            ),
+            t,
+        ),
+        "'far'",
+    ),
+}
+
+
+@pytest.mark.parametrize(('broken', 'words'), BROKEN.values(), ids=BROKEN.keys())
+def test_broken_files_are_told(broken: Broken, words: str) -> None:
+    """What does not make an arm is refused in words that name it."""
+    with pytest.raises(ModelError, match=words):
+        RobotModel(*broken(*chain_texts('zyy')))
+
+
+def test_unknown_names_are_told_with_the_known_ones() -> None:
+    """Unknown groups, joints and links are refused, and those that exist are listed."""
+    with pytest.raises(ModelError, match=r"'leg'.*groups: arm"):
+        RobotModel(*chain_texts('zyy'), group='leg')
+    with pytest.raises(CommandError, match='joints: j1, j2, j3'):
+        chain('zyy').index('j4')
+    with pytest.raises(CommandError, match='link_3'):
+        chain('zyy').pose(np.zeros(3), 'hand')
+
+
+def test_a_limits_file_that_is_none(tmp_path: Any) -> None:
+    """A file without the table, or no file at all, is told with its path."""
+    path = tmp_path / 'limits.yaml'
+    with pytest.raises(ModelError, match=r'limits\.yaml'):
+        load_limits(path)
+    path.write_text('joints: {}\n', encoding='utf-8')
+    with pytest.raises(ModelError, match='joint_limits'):
+        load_limits(path)
