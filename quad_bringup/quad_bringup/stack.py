@@ -17,8 +17,8 @@ from process_supervisor import (
     StartError,
 )
 
-SIMULATOR_READY = r'simulated .* on '
-"""What fake_xgo logs when its serial port is there."""
+SIMULATOR_READY = r'^fake_xgo: .* -> '
+"""What fake_xgo writes when its serial port is there."""
 HARDWARE_READY = r'running: '
 """What hardware_node logs when the robot has answered and reports come in."""
 CONTROLLER_READY = r'ready'

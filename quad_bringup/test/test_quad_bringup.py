@@ -20,7 +20,7 @@ PATIENCE = 30.0
 WORKSPACE = Path(__file__).parents[2]
 
 READY = {
-    ('quad_hardware', 'fake_xgo'): '[INFO] [fake_xgo]: simulated XGO lite on {link}',
+    ('quad_hardware', 'fake_xgo'): 'fake_xgo: lite (servos firm) at {link} -> /dev/pts/7, protocol both',
     ('quad_hardware', 'hardware_node'): '[INFO] [hardware_node]: running: {port}',
     ('quad_controller', 'controller_node'): '[INFO] [controller_node]: ready',
     ('robot_viewer', 'robot_state_publisher'): '[INFO] [robot_state_publisher]: Robot initialized',
