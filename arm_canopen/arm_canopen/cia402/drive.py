@@ -21,18 +21,18 @@ from ..standard.drive import (
 )
 from ..standard.emcy import error_code_text
 from ..standard.objects import Index
+from .cyclic_position import CyclicPosition
 from .drive_objects import DriveObjects
+from .halt import Halt
 from .mode_table import build_modes
 from .modes import Actual, Mode, NO_BITS
 from .motion import AxisFeedback
 from .parameters import DriveParameters, ParameterReader
-from .position_modes import CyclicPosition
 from .state_machine import Command, fault_reset, next_command
 from .target_limits import check_target
 from .units import Units
 
 ASK_AGAIN = 1.0  # [s] after which a drive is asked again for what it did not answer
-RESUME_CYCLES = 20  # for which a drive that is halted may take to acknowledge a set-point
 FAULTY = (DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE)
 
 
@@ -55,7 +55,7 @@ class Drive:
         goal: State that the cycle leads to, None while nobody asked for one.
         resetting: Send fault resets while the drive is faulted.
         period: Length of the last cycle in [s].
-        halted: Stopped by a halt; the next target ends it.
+        halt: What keeps it halted.
         error: 0x603F in words when it was faulted last, else empty.
         interrupted: Mode in which it was enabled when its device was lost, None otherwise.
         released: Called with a reason when a motion source loses the drive.
@@ -85,7 +85,7 @@ class Drive:
         self.on_ready: Callable[[], None] = lambda: None
         self.resetting = False
         self.period = 0.0
-        self.halted = False
+        self.halt = Halt()
         self.interrupted: OperationMode | None = None
         self.modes = build_modes(self.objects, self.units, lambda: self.parameters, self._warn)
         self.mode: Mode = self.modes[OperationMode.NO_MODE]
@@ -96,7 +96,6 @@ class Drive:
         self._answered = False
         self._announced = False
         self._follows = False
-        self._resuming = 0
         self._background: list[Task[None]] = []
         node.on_lost.append(self._on_lost)
 
@@ -122,6 +121,11 @@ class Drive:
         if commanded is None or self.state is not DriveState.OPERATION_ENABLED:
             return self.position
         return commanded
+
+    @property
+    def halted(self) -> bool:
+        """Whether it is stopped by a halt; the next target ends it."""
+        return self.halt.held
 
     @property
     def ready(self) -> bool:
@@ -229,21 +233,21 @@ class Drive:
         else:
             command = self._command()
             if command is Command.ENABLE_OPERATION and self.obeys:
-                bits = self.mode.step(now, period, self.objects.statusword)
-                halt = self._halt_bit()
-                bits |= halt
-                if halt and self.mode.cyclic:
-                    self.mode.preload(self._actual())  # from there it goes on
+                bits = self._step(now, period)
             elif not self._keeps_target:
                 self._preload_all()
         self._controlword = int(command) | int(bits)
         self.objects.controlword.write(self._controlword)
         self.objects.mode.write(int(self.mode.number))
 
+    def hold(self) -> None:
+        """Brake, and stay halted until a new target is taken."""
+        self.mode.brake()
+        self.halt.hold()
+
     def resume(self) -> None:
-        """End a halt; the new target goes ahead of the bit, so that no old one revives."""
-        if self.halted:
-            self._resuming = RESUME_CYCLES
+        """End a halt as soon as the drive has the new target, so that no old one revives."""
+        self.halt.leave(self._scheduler.now)
 
     def stream(self, setpoint: float) -> None:
         """Follow a motion source in this cycle.
@@ -253,13 +257,13 @@ class Drive:
         """
         self.check_target(setpoint)
         if isinstance(self.mode, CyclicPosition):
-            self.halted = False
+            self.halt.release()
             self.mode.stream(setpoint)
 
     def select(self, mode: Mode) -> None:
         """Command another mode, preloaded with where the drive is, or where it is held."""
         held = self._holding_mode
-        self.halted = False
+        self.halt.release()
         if held is not None and held is mode:
             self.mode = mode
             return
@@ -295,12 +299,19 @@ class Drive:
         about = text if self.name == self.node.name else f'{self.name}: {text}'
         self.node.report(EventKind.DRIVE, severity, about)
 
-    def _halt_bit(self) -> Controlword:
-        if self._resuming:
-            self._resuming -= 1
-            if not self._resuming or not self.mode.handing_over:
-                self._resuming, self.halted = 0, False
-        return Controlword.HALT if self.halted and self.mode.halts_by_bit else NO_BITS
+    def _step(self, now: float, period: float) -> Controlword:
+        """Advance the mode by a cycle, and the halt; return their bits of the controlword."""
+        bits = self.mode.step(now, period, self.objects.statusword)
+        if not self.halt.advance(now, self.mode):
+            self.mode.brake()
+            self._warn(
+                'stays halted: it has not taken its new target (bit 12); ~/disable and ~/enable '
+                'make it forget the moves that it holds'
+            )
+        halt = self.halt.bits(self.mode)
+        if halt and self.mode.cyclic:
+            self.mode.preload(self._actual())  # from there it goes on
+        return bits | halt
 
     def _actual(self) -> Actual:
         objects = self.objects
@@ -352,7 +363,8 @@ class Drive:
 
     def _state_changed(self, before: DriveState) -> None:
         left = before is DriveState.OPERATION_ENABLED
-        self.halted = self.halted and not left
+        if left:
+            self.halt.release()
         if self.state in FAULTY and before not in FAULTY:
             self.goal = DriveState.SWITCH_ON_DISABLED
             self.released('fault')
@@ -380,7 +392,8 @@ class Drive:
         if enabled and not self.node.left_operational:
             self.interrupted = self.mode.number
         self.goal = None
-        self.resetting = self.halted = self._follows = False
+        self.resetting = self._follows = False
+        self.halt.release()
         self._asked = self._answered = self._announced = False
         self.error = ''
         self.state = DriveState.UNKNOWN

@@ -5,7 +5,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Coroutine
-from typing import Any
+from dataclasses import replace
+from typing import Any, TypeVar
 
 from ..config.model import RecoveryPolicy
 from ..exceptions import DriveError
@@ -18,6 +19,8 @@ from .mode_table import REQUIRED_OBJECTS
 from .modes import NoMode
 from .position_modes import Move, ProfilePosition
 from .sequences import DriveSequences
+
+T = TypeVar('T')
 
 BRAKED_TIMEOUT = 10.0  # [s] for a halt to end in standstill
 
@@ -96,15 +99,14 @@ class DriveCommands:
         if not isinstance(mode, ProfilePosition):
             raise self._steps.refused('moves only in mode 1; call ~/position_mode first')
         self._require_obedience()
-        destination = mode.destination(move)
+        if drive.halted and not drive.halt.leaving:
+            move = replace(move, immediate=True)  # the halt has ended the moves before it
+        destination = self._named(lambda: mode.destination(move))
         drive.check_target(destination)
-        try:
-            mode.move(move)
-        except DriveError as error:
-            raise DriveError(f'{drive.name}: {error}') from error
+        self._named(lambda: mode.move(move))
         self._end_stream()
         self._resume()
-        how = 'at once' if move.immediate else 'after the moves before it'
+        how = 'at once' if move.immediate and mode.waiting == 1 else 'after the moves before it'
         return f'to {destination:g}, {how}'
 
     async def init(self) -> str:
@@ -167,9 +169,7 @@ class DriveCommands:
             drive.goal = DriveState.SWITCH_ON_DISABLED  # nor shall it be enabled any more
             return f'nothing to halt: {drive.describe()}'
         self._end_stream()
-        if not drive.mode.halts_by_bit:
-            drive.mode.brake()
-        drive.halted = True
+        drive.hold()
         await steps.until(
             lambda: drive.mode.braked and steps.is_slow(), BRAKED_TIMEOUT, 'standstill'
         )
@@ -259,12 +259,16 @@ class DriveCommands:
         drive = self.drive
         self._require_obedience()
         drive.check_target(target)
-        try:
-            drive.mode.set_target(target)
-        except DriveError as error:
-            raise DriveError(f'{drive.name}: {error}') from error
+        self._named(lambda: drive.mode.set_target(target))
         self._resume()
         return f'target {target:g} in mode {drive.mode.number.title}'
+
+    def _named(self, ask: Callable[[], T]) -> T:
+        """Ask the mode for something; what it refuses gets the name of the drive."""
+        try:
+            return ask()
+        except DriveError as error:
+            raise DriveError(f'{self.drive.name}: {error}') from error
 
     def _require_obedience(self) -> None:
         drive, steps = self.drive, self._steps
@@ -291,10 +295,8 @@ class DriveCommands:
         drive = self.drive
         if not drive.obeys:
             return  # what has taken it away has said so
-        if not drive.mode.halts_by_bit:
-            drive.mode.brake()
-        elif drive.mode.setpoint is None:  # in mode 1 it goes to the last target, and rests there
-            drive.halted = True
+        if not drive.mode.halts_by_bit or drive.mode.setpoint is None:
+            drive.hold()  # in mode 1 it goes to the last target, and rests there
         drive.report(
             Severity.WARNING,
             f'the stream of targets has paused for {drive.config.target_timeout * 1000:g} ms: '

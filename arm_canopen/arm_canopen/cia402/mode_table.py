@@ -8,10 +8,11 @@ from collections.abc import Callable, Iterator
 
 from ..standard.drive import OperationMode
 from ..standard.objects import Index
+from .cyclic_position import CyclicPosition, InterpolatedPosition
 from .drive_objects import DriveObjects
 from .modes import Homing, Mode, NoMode
 from .parameters import DriveParameters
-from .position_modes import CyclicPosition, InterpolatedPosition, ProfilePosition
+from .position_modes import ProfilePosition
 from .rate_modes import CyclicTorque, CyclicVelocity, ProfileTorque, ProfileVelocity, Velocity
 from .units import Units
 

@@ -78,9 +78,9 @@ class Mode(ABC):
         return True
 
     @property
-    def handing_over(self) -> bool:
-        """Whether a target is on its way to the drive."""
-        return False
+    def taken(self) -> bool:
+        """Whether the drive has a target that was commanded after the last brake."""
+        return True
 
     @property
     def setpoint(self) -> float | None:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Modes that command a position: 1 (profile), 7 (interpolated) and 8 (cyclic synchronous)."""
+"""Mode 1, profile position: moves and the handshake by which the drive takes them."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
-import math
 
 from ..exceptions import DriveError
 from ..master.process_image import Writer
 from ..standard.drive import Controlword, OperationMode, Statusword
 from .modes import Actual, Mode, NO_BITS
-from .setpoint_profile import ProfileLimits, SetpointProfile
 from .units import Units
 
 ACKNOWLEDGE_TIMEOUT = 1.0  # [s] a drive acknowledges a set-point within a few cycles
 QUEUE_MAX = 16  # moves that may wait for the drive
+EDGE_CYCLES = 3  # of SYNC in which a drive sees bit 4 change
+FULL_AFTER = 0.1  # [s] after which bit 12 is no late answer any more, but a full buffer
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,13 +57,31 @@ class Handshake(Enum):
     WRITTEN = 'the value is on its way, bit 4 follows in the next cycle'
     OFFERED = 'bit 4 is set, the drive has not acknowledged yet'
     RELEASED = 'acknowledged, bit 4 is cleared, the drive still shows bit 12'
+    WITHDRAWN = 'bit 4 is cleared without an acknowledge, until the drive has seen that'
+    IMPOSED = 'bit 4 is set though the buffer is full (bit 12): an immediate move empties it'
+    AWAITED = 'bit 4 is cleared after that; bit 12 goes when the set-point was taken'
+
+
+@dataclass(frozen=True, slots=True)
+class Waiting:
+    """A move that waits for the drive.
+
+    Attributes:
+        value: What is written to 0x607A.
+        move: The move.
+        destination: Where it ends in user units.
+    """
+
+    value: int
+    move: Move
+    destination: float
 
 
 class ProfilePosition(Mode):
     """Mode 1: the drive makes the profile; set-points are handed over by bits 4 and 12.
 
     Of immediate moves the newest counts: it replaces those that still wait for the handshake.
-    Others queue, and none of them is lost.
+    Others queue, and none of them is lost; relative ones too, for each counts from the one before.
     """
 
     number = OperationMode.PROFILE_POSITION
@@ -89,55 +107,80 @@ class ProfilePosition(Mode):
         self._units = units
         self._target = target
         self._warn = warn
-        self._queue: deque[tuple[int, Move]] = deque()
+        self._queue: deque[Waiting] = deque()
         self._bits = Controlword.CHANGE_IMMEDIATELY
         self._offered_at = 0.0
-        self._blocked_since: float | None = None
+        self._full_since: float | None = None
+        self._cycles_left = 0
         self._setpoint: float | None = None
+        self._reference: float | None = None
+        self._taken = False
         self.handshake = Handshake.IDLE
 
     @property
     def setpoint(self) -> float | None:
-        """Target of the last move, in user units."""
+        """Target of the last move that was handed over, in user units."""
         return self._setpoint
 
     @property
-    def handing_over(self) -> bool:
-        """Whether a set-point waits or is being handed over."""
-        return bool(self._queue) or self.handshake in (Handshake.WRITTEN, Handshake.OFFERED)
+    def taken(self) -> bool:
+        """Whether the drive has acknowledged a set-point after the last brake."""
+        return self._taken
+
+    @property
+    def waiting(self) -> int:
+        """Number of moves that have not been handed over."""
+        return len(self._queue)
 
     def preload(self, actual: Actual) -> None:
         """Write the actual position as the target, without announcing it."""
-        self._queue.clear()
-        self.handshake = Handshake.IDLE
+        self._forget()
         self._bits = Controlword.CHANGE_IMMEDIATELY
-        self._setpoint = self._units.position_commanded(actual.position_inc)
+        self._setpoint = self._reference = self._units.position_commanded(actual.position_inc)
         self._target.write(actual.position_inc)
+
+    def brake(self) -> None:
+        """Forget what the drive has not taken; what it has taken is halted by bit 8."""
+        self._forget()
+        self._reference = None
 
     def set_target(self, target: float) -> None:
         """Go to a position at once."""
         self.move(Move(target))
 
     def destination(self, move: Move) -> float:
-        """Return where a move ends, in user units."""
-        return move.target + ((self._setpoint or 0.0) if move.relative else 0.0)
+        """Return where a move ends, in user units.
+
+        Raises:
+            DriveError: It is relative, and what it counts from was halted or never acknowledged.
+        """
+        if not move.relative:
+            return move.target
+        reference = self._queue[-1].destination if self._queue else self._reference
+        if reference is None:
+            raise DriveError(
+                'a relative move counts from the last set-point, which was halted or not '
+                'acknowledged; command an absolute position first'
+            )
+        return reference + move.target
 
     def move(self, move: Move) -> None:
         """Queue a move for the handshake.
 
         Raises:
-            DriveError: The value does not fit 0x607A, or too many moves wait.
+            DriveError: The value does not fit 0x607A, too many moves wait, or it is relative and
+                there is nothing to count from.
         """
         to_device = self._units.distance_to_device if move.relative else None
         value = (to_device or self._units.position_to_device)(move.target)
-        if move.immediate:
+        waiting = Waiting(value, move, self.destination(move))
+        if move.immediate and not move.relative:
             self._queue.clear()
         elif len(self._queue) >= QUEUE_MAX:
             raise DriveError(
                 f'{QUEUE_MAX} moves wait for the drive already; send the next one later'
             )
-        self._setpoint = self.destination(move)
-        self._queue.append((value, move))
+        self._queue.append(waiting)
 
     def step(self, now: float, period: float, statusword: int) -> Controlword:
         """Advance the handshake."""
@@ -145,136 +188,87 @@ class ProfilePosition(Mode):
         if self.handshake is Handshake.OFFERED:
             self._watch_acknowledge(now, acknowledged=acknowledged)
         elif self.handshake is Handshake.WRITTEN:
-            self._offer(now)
+            self._offer(now, acknowledged=acknowledged)
+        elif self.handshake in (Handshake.WITHDRAWN, Handshake.IMPOSED):
+            self._show_edge(now)
+        elif self.handshake is Handshake.AWAITED:
+            self._watch_emptied(now, acknowledged=acknowledged)
         elif acknowledged:
-            self._watch_release(now)
+            self._watch_full(now)
         else:
-            self._take_waiting(now)
-        if self.handshake is Handshake.OFFERED:
+            self._full_since = None
+            self._hand_over(now, acknowledged=False)
+        if self.handshake in (Handshake.OFFERED, Handshake.IMPOSED):
             return self._bits | Controlword.NEW_SET_POINT
         return self._bits
 
-    def _take_waiting(self, now: float) -> None:
+    def _forget(self) -> None:
+        self._queue.clear()
+        self._taken = False
+        if self.handshake in (Handshake.OFFERED, Handshake.IMPOSED):
+            self.handshake = Handshake.WITHDRAWN
+            self._cycles_left = EDGE_CYCLES
+        elif self.handshake is not Handshake.WITHDRAWN:
+            self.handshake = Handshake.IDLE
+
+    def _hand_over(self, now: float, *, acknowledged: bool) -> None:
         self.handshake = Handshake.IDLE
-        self._blocked_since = None
         if not self._queue:
             return
-        value, move = self._queue.popleft()
-        self._target.write(value)
-        self._bits = move.bits
+        waiting = self._queue.popleft()
+        self._target.write(waiting.value)
+        self._bits = waiting.move.bits
+        self._setpoint = self._reference = waiting.destination
         if self._target_waits_for_sync:
             self.handshake = Handshake.WRITTEN
         else:
-            self._offer(now)
+            self._offer(now, acknowledged=acknowledged)
 
-    def _offer(self, now: float) -> None:
+    def _offer(self, now: float, *, acknowledged: bool) -> None:
         self._offered_at = now
-        self.handshake = Handshake.OFFERED
+        self._cycles_left = EDGE_CYCLES
+        self.handshake = Handshake.IMPOSED if acknowledged else Handshake.OFFERED
 
-    def _watch_release(self, now: float) -> None:
-        if not self._queue or not self._queue[0][1].immediate:
-            self._blocked_since = None  # a full buffer empties when the move that runs has ended
-        elif self._blocked_since is None:
-            self._blocked_since = now
-        elif now - self._blocked_since > ACKNOWLEDGE_TIMEOUT:
-            self._blocked_since = math.inf  # said once
-            self._warn(
-                f'bit 12 has been set for {ACKNOWLEDGE_TIMEOUT:g} s, so a new set-point cannot be '
-                'handed over; it will be when the drive takes the bit back'
-            )
+    def _show_edge(self, now: float) -> None:
+        self._cycles_left -= 1
+        if self._cycles_left > 0:
+            return
+        self._offered_at = now
+        imposed = self.handshake is Handshake.IMPOSED
+        self.handshake = Handshake.AWAITED if imposed else Handshake.IDLE
+
+    def _watch_full(self, now: float) -> None:
+        """Bit 12 stays, so the buffer of the drive is full; an immediate move empties it.
+
+        CiA 402-2, 10.3.2: with bit 5 a set-point is processed at once, and those that wait in
+        the drive are discarded. Others wait until the move that runs has ended.
+        """
+        if not self._queue or not self._queue[0].move.immediate:
+            self._full_since = None
+        elif self._full_since is None:
+            self._full_since = now
+        elif now - self._full_since > FULL_AFTER:
+            self._full_since = None
+            self._hand_over(now, acknowledged=True)
+
+    def _watch_emptied(self, now: float, *, acknowledged: bool) -> None:
+        if not acknowledged:
+            self._taken = True
+            self._hand_over(now, acknowledged=False)
+        elif now - self._offered_at > ACKNOWLEDGE_TIMEOUT:
+            self._not_acknowledged('bit 12 stays set')
 
     def _watch_acknowledge(self, now: float, *, acknowledged: bool) -> None:
         if acknowledged:
+            self._taken = True
             self.handshake = Handshake.RELEASED
         elif now - self._offered_at > ACKNOWLEDGE_TIMEOUT:
-            self.handshake = Handshake.RELEASED
-            self._warn(
-                f'the set-point was not acknowledged within {ACKNOWLEDGE_TIMEOUT:g} s (bit 12); '
-                'it may not have been taken'
-            )
+            self._not_acknowledged('bit 12 stays clear')
 
-
-class CyclicPosition(Mode):
-    """Mode 8: a set-point each cycle, from a stream or from a profile towards a single target."""
-
-    number = OperationMode.CYCLIC_POSITION
-    halts_by_bit = False
-    cyclic = True
-    bits = NO_BITS
-
-    def __init__(self, units: Units, target: Writer, limits: Callable[[], ProfileLimits]) -> None:
-        """Take the way to the target object.
-
-        Args:
-            units: Units of the drive.
-            target: Writer of 0x607A (or 0x60C1:1).
-            limits: Gives the profile limits of the drive.
-        """
-        self._units = units
-        self._target = target
-        self._limits = limits
-        self._profile = SetpointProfile(0.0)
-        self._streamed: float | None = None
-
-    @property
-    def setpoint(self) -> float:
-        """Set-point of this cycle, in user units."""
-        return self._profile.position
-
-    @property
-    def goes_to_single_target(self) -> bool:
-        """Whether the profile is on the way to a single target."""
-        return self._profile.target is not None and not self._profile.at_rest
-
-    def preload(self, actual: Actual) -> None:
-        """Hold the actual position."""
-        self._streamed = None
-        position = self._units.position_commanded(actual.position_inc)
-        self._profile = SetpointProfile(position, actual.velocity)
-        self._target.write(actual.position_inc)
-
-    def set_target(self, target: float) -> None:
-        """Go to a single target by a profile."""
-        self._units.position_to_device(target)  # refuse now what could not be sent on arrival
-        self._profile.target = target
-
-    @property
-    def velocity(self) -> float:
-        """Rate of the set-point in user units per second."""
-        return self._profile.velocity
-
-    def brake(self) -> None:
-        """Come to a stop within the limits, wherever that is."""
-        self._streamed = None
-        self._profile.target = None
-
-    @property
-    def braked(self) -> bool:
-        """Whether the set-point stands."""
-        return self._profile.velocity == 0.0
-
-    def stream(self, setpoint: float) -> None:
-        """Take the set-point of a motion source for this cycle.
-
-        Raises:
-            DriveError: It is not finite or does not fit the object.
-        """
-        self._units.position_to_device(setpoint)
-        self._streamed = setpoint
-
-    def step(self, now: float, period: float, statusword: int) -> Controlword:
-        """Write the streamed set-point, or the profile's; a stream that ends is braked."""
-        if self._streamed is not None:
-            self._profile.follow(self._streamed, period)
-            self._streamed = None
-        else:
-            self._profile.step(period, self._limits())
-        self._target.write(self._units.position_to_device(self._profile.position))
-        return self.bits
-
-
-class InterpolatedPosition(CyclicPosition):
-    """Mode 7: as mode 8, into 0x60C1:1, with bit 4 enabling the interpolation."""
-
-    number = OperationMode.INTERPOLATED_POSITION
-    bits = Controlword.ENABLE_INTERPOLATION
+    def _not_acknowledged(self, why: str) -> None:
+        self.handshake = Handshake.RELEASED
+        self._reference = None
+        self._warn(
+            f'the set-point was not acknowledged within {ACKNOWLEDGE_TIMEOUT:g} s ({why}); it '
+            'may not have been taken'
+        )

@@ -84,6 +84,9 @@ class ProfileTorque(DriveRamped):
         """Command the torque that the drive has, so that it drops no load."""
         self._target.write(actual.torque)
 
+    def brake(self) -> None:
+        """Leave it to bit 8: no torque at all would drop a load."""
+
     def _to_device(self, target: float) -> int:
         return self._units.effort_to_device(target)
 
@@ -155,6 +158,9 @@ class CyclicTorque(MasterRamped):
     """
 
     number = OperationMode.CYCLIC_TORQUE
+
+    def brake(self) -> None:
+        """Leave it to bit 8."""
 
     def preload(self, actual: Actual) -> None:
         """Keep the torque that the drive has, so that it drops no load."""

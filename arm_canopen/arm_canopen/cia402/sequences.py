@@ -79,7 +79,8 @@ class DriveSequences:
         deceleration = drive.parameters.profile.deceleration
         ramp = abs(drive.velocity) / deceleration  # [s]
         mode.brake()
-        drive.halted = mode.halts_by_bit and not self.is_slow()
+        if mode.halts_by_bit and not self.is_slow():
+            drive.halt.hold()
         await self.until(lambda: mode.braked and self.is_slow(), STOP_TIMEOUT + ramp, 'standstill')
 
     async def reset_fault(self) -> None:
