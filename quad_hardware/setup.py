@@ -21,6 +21,7 @@ setup(
     license='Apache-2.0',
     entry_points={
         'console_scripts': [
+            'fake_xgo = quad_hardware.sim.fake_xgo:main',
             'hardware_node = quad_hardware.nodes.hardware_node:main',
             'protocol = quad_hardware.protocol.page:main',
         ],

@@ -72,6 +72,14 @@ class TargetRamp:
         self._left[indices] = steps
         self._busy = int(self._left.max())
 
+    def check(self, targets: Targets) -> None:
+        """Refuse what :meth:`approach` would refuse, and change nothing.
+
+        Raises:
+            CommandError: A name is unknown, a value is no number, or there are too many or few.
+        """
+        self._checked(targets)
+
     def advance(self) -> bool:
         """Go one time step on; tell whether anything changed."""
         if not self._busy:

@@ -1,0 +1,139 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The robot's servos as the board sees them: ids and degrees instead of joints and radians.
+
+A servo's angle is the joint's position in degrees, sign +1 and offset 0. The gripper's servo
+spreads the travel of the jaw over its whole range.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+import math
+
+import numpy as np
+
+from quad_description import Joint
+
+from ..protocol import ANGLE_SPANS, Model, MOTOR_OF_JOINT, MOTOR_ORDER, slot_of
+from .exceptions import SetupError
+from .plant import Plant
+from .state import Array, Measurement
+
+GRIPPER = 51
+NO_LOAD_SPEED = 527.0  # [deg/s] 9.2 rad/s: what servo speed 255 means here; no page says it
+MAX_SPEED = 255
+
+
+@dataclass(frozen=True, slots=True)
+class _Scale:
+    gain: float  # [rad/deg], of the gripper [m/deg]
+    offset: float  # [rad], [m]
+
+    def position(self, angle: float) -> float:
+        return self.offset + self.gain * angle
+
+    def angle(self, position: float) -> float:
+        return (position - self.offset) / self.gain
+
+
+def _scale(joint: Joint, motor: int, model: Model) -> _Scale:
+    if motor != GRIPPER:
+        return _Scale(math.pi / 180.0, 0.0)
+    span = ANGLE_SPANS[model][motor]
+    gain = (joint.upper - joint.lower) / (span.high - span.low)
+    return _Scale(gain, joint.lower - gain * span.low)
+
+
+class Servos:
+    """All servos of a robot, by motor id.
+
+    Attributes:
+        fitted: Ids of the servos that the robot has, in the order of the wire.
+    """
+
+    def __init__(self, plant: Plant, joints: Iterable[Joint], model: Model) -> None:
+        """Connect to a robot.
+
+        Args:
+            plant: The robot.
+            joints: Its joints.
+            model: Whose ranges the gripper has.
+
+        Raises:
+            SetupError: A joint has no motor on this board.
+        """
+        self._plant = plant
+        self._joint: dict[int, str] = {}
+        self._scale: dict[int, _Scale] = {}
+        for joint in joints:
+            motor = MOTOR_OF_JOINT.get(joint.name)
+            if motor is None:
+                raise SetupError(f'the board has no servo for joint {joint.name}')
+            self._joint[motor] = joint.name
+            self._scale[motor] = _scale(joint, motor, model)
+        self._index = {motor: plant.joint_names.index(name) for motor, name in self._joint.items()}
+        self.fitted = tuple(motor for motor in MOTOR_ORDER if motor in self._joint)
+        self._speed = dict.fromkeys(self.fitted, MAX_SPEED)
+
+    def command(self, angles: Mapping[int, float], duration: float | None = None) -> None:
+        """Send servos to angles [deg]; servos that the robot lacks are left out.
+
+        Args:
+            angles: By motor id.
+            duration: Time of the way [s]; None for the servo's own.
+        """
+        positions = {
+            self._joint[motor]: self._scale[motor].position(angle)
+            for motor, angle in angles.items()
+            if motor in self._joint
+        }
+        self._plant.set_targets(positions, duration)
+
+    def command_one(self, motor: int, angle: float) -> None:
+        """Send one servo to an angle [deg], at the speed that is set for it."""
+        if motor not in self._joint:
+            return
+        speed = self._speed[motor]
+        if speed >= MAX_SPEED:
+            self.command({motor: angle})
+            return
+        now = self._scale[motor].angle(float(self._plant.joint_targets[self._index[motor]]))
+        self.command({motor: angle}, abs(angle - now) / (NO_LOAD_SPEED * speed / MAX_SPEED))
+
+    def set_speed(self, motors: Iterable[int], speed: int) -> None:
+        """Set how fast single commands are carried out, 1 to 255."""
+        self._speed |= dict.fromkeys(motors, max(speed, 1))
+
+    def set_torque(self, motors: Iterable[int], on: bool) -> None:
+        """Switch servos on or off; those that the robot lacks are left out."""
+        names = [self._joint[motor] for motor in motors if motor in self._joint]
+        self._plant.set_torque(on, names)
+
+    def torque_on(self, motor: int) -> bool:
+        """Tell whether a servo holds."""
+        return self._plant.torque_on(self._joint[motor])
+
+    def angles(self, measured: Measurement) -> tuple[float, ...]:
+        """Return angles by slot [deg]; 0 for servos that the robot lacks."""
+        slots = [0.0] * len(MOTOR_ORDER)
+        for motor in self.fitted:
+            position = float(measured.positions[self._index[motor]])
+            slots[slot_of(motor)] = self._scale[motor].angle(position)
+        return tuple(slots)
+
+    def speeds(self, measured: Measurement) -> tuple[float, ...]:
+        """Return velocities by slot [deg/s]; 0 for servos that the robot lacks."""
+        slots = [0.0] * len(MOTOR_ORDER)
+        for motor in self.fitted:
+            velocity = float(measured.velocities[self._index[motor]])
+            slots[slot_of(motor)] = velocity / self._scale[motor].gain
+        return tuple(slots)
+
+    def by_slot(self, values: Array) -> tuple[float, ...]:
+        """Return values of the joints by slot."""
+        slots = np.zeros(len(MOTOR_ORDER))
+        for motor in self.fitted:
+            slots[slot_of(motor)] = values[self._index[motor]]
+        return tuple(slots.tolist())
