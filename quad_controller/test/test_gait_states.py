@@ -332,7 +332,7 @@ def test_a_dry_run_watches_the_policy_only() -> None:
 
 def test_without_a_policy_its_mode_is_refused() -> None:
     """The answer says which parameter is missing."""
-    assert 'policy_file' in standing().controller.set_mode('policy').message
+    assert 'parameter policy' in standing().controller.set_mode('policy').message
 
 
 @pytest.mark.parametrize(

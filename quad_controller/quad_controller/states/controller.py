@@ -10,6 +10,7 @@ import math
 from ..gait.body import BodyPose
 from ..gait.generator import GaitGenerator
 from ..gait.parameters import GaitParameters
+from ..gait.schedule import Gait
 from ..gait.velocity import Velocity
 from ..model.quadruped import Quadruped, Targets
 from ..policy.interface import Policy
@@ -48,6 +49,7 @@ class Controller:
         policy: Policy | None = None,
         dry_run: bool = False,
         arm_pose: Sequence[float] = (),
+        first_gait: Gait = Gait.TROT,
     ) -> None:
         """Start relaxed.
 
@@ -59,6 +61,7 @@ class Controller:
             dry_run: Whether the policy is only asked, and never followed.
             arm_pose: Positions of the joints that belong to no leg when the robot stands, in
                 [rad]; empty leaves them where they are.
+            first_gait: Gait to begin with.
 
         Raises:
             DescriptionError: The legs do not reach the heights of the parameters.
@@ -66,6 +69,7 @@ class Controller:
         """
         poses = Poses(robot, states.lie_height, arm_pose)
         self._generator = GaitGenerator(robot, gait, poses.typical)
+        self._generator.choose(first_gait)
         self._policy = policy
         self._machine = StateMachine(poses, self._generator, states, policy)
         self._shadow = Shadow(policy) if policy is not None and dry_run else None
@@ -119,6 +123,7 @@ class Controller:
         health, machine = self._health, self._machine
         return Status(
             state=machine.state,
+            arrived=machine.motion.finished,
             goal=machine.goal,
             gait=self._generator.gait,
             velocity=self._generator.velocity,
@@ -212,7 +217,7 @@ class Controller:
         if self._machine.state is State.FAULT:
             return f'{"; ".join(self._latch.texts)}; call ~/clear_fault when that is mended'
         if request.state is State.POLICY and self._policy is None:
-            return 'no policy is loaded (parameter policy_file)'
+            return 'no policy is loaded (parameter policy)'
         if request.state is State.POLICY and self._shadow is not None:
             return 'the policy is only watched in a dry run (parameter policy_dry_run)'
         gentle = request.state in {State.RELAX, State.LIE}

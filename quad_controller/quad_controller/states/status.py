@@ -18,6 +18,7 @@ class Status:
 
     Attributes:
         state: What it is doing.
+        arrived: Whether it is there, and not still standing up or lying down.
         goal: What it is on the way to.
         gait: The gait.
         velocity: Velocity that the gait walks.
@@ -32,6 +33,7 @@ class Status:
     """
 
     state: State
+    arrived: bool
     goal: State
     gait: Gait
     velocity: Velocity
@@ -43,6 +45,11 @@ class Status:
     refused: int
     limited: int
     unreachable: int
+
+    @property
+    def title(self) -> str:
+        """The state's name, with the way to it."""
+        return self.state.value if self.arrived else f'to {self.state.value}'
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,122 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The thread that steps the controller, on the arrival of feedback or else on its deadline."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import threading
+import time
+
+from ..states.controller import Controller
+from ..states.measurement import ImuSample, JointSample, Measurement
+from ..states.status import Output
+from ..timing.pacer import Pacer
+from ..timing.statistics import LoopFigures, LoopStatistics
+
+
+class ControlLoop:
+    """Owns the thread; everything else of the controller is used under :attr:`lock`.
+
+    Attributes:
+        lock: Hold it to call the controller between two steps.
+    """
+
+    def __init__(
+        self,
+        controller: Controller,
+        period: float,
+        publish: Callable[[Output], None],
+        fail: Callable[[Exception], None],
+    ) -> None:
+        """Prepare; the thread starts with :meth:`start`.
+
+        Args:
+            controller: What to step.
+            period: Nominal time between two steps in [s].
+            publish: Takes every output, in the thread.
+            fail: Takes what ended the thread, in the thread.
+        """
+        self.lock = threading.Lock()
+        self._controller, self._period = controller, period
+        self._publish, self._fail = publish, fail
+        self._statistics = LoopStatistics(period)
+        self._pacer = Pacer(period, time.monotonic())
+        self._arrived = threading.Condition()
+        self._joints: JointSample | None = None
+        self._imu: ImuSample | None = None
+        self._battery: float | None = None
+        self._arrival: float | None = None
+        self._stopping = False
+        self._thread = threading.Thread(target=self._guarded, name='control', daemon=True)
+
+    def start(self) -> None:
+        """Begin to step."""
+        self._pacer = Pacer(self._period, time.monotonic())
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End the thread; the last targets stay."""
+        with self._arrived:
+            self._stopping = True
+            self._arrived.notify()
+        if self._thread.is_alive():
+            self._thread.join()
+
+    def offer_joints(self, joints: JointSample) -> None:
+        """Hand in joint states; they may make a step at once."""
+        with self._arrived:
+            self._joints, self._arrival = joints, time.monotonic()
+            if self._pacer.takes(self._arrival):
+                self._arrived.notify()
+
+    def offer_imu(self, imu: ImuSample) -> None:
+        """Hand in an attitude for the next step."""
+        with self._arrived:
+            self._imu = imu
+
+    def offer_battery(self, battery: float | None) -> None:
+        """Hand in a charge for the next step."""
+        with self._arrived:
+            self._battery = battery
+
+    def figures(self) -> LoopFigures:
+        """Return how well the time is kept."""
+        with self._arrived:
+            return self._statistics.figures(self._pacer.overruns)
+
+    def _guarded(self) -> None:
+        try:
+            self._run()
+        except Exception as error:  # noqa: BLE001  # whatever it is, the node must hear of it
+            self._fail(error)
+
+    def _run(self) -> None:
+        last = time.monotonic()
+        while True:
+            with self._arrived:
+                self._wait()
+                if self._stopping:
+                    return
+                now = time.monotonic()
+                arrival = self._arrival
+                measurement = Measurement(self._joints, self._imu, self._battery)
+                self._joints = self._imu = self._battery = self._arrival = None
+                self._pacer.stepped(now, arrival)
+            with self.lock:
+                output = self._controller.step(measurement, now - last)
+            self._publish(output)
+            end = time.monotonic()
+            latency = end - arrival if arrival is not None else None
+            with self._arrived:
+                self._statistics.record(now - last, end - now, latency)
+            last = now
+
+    def _wait(self) -> None:
+        """Wait until a step is due, or feedback makes one."""
+        while not self._stopping:
+            now = time.monotonic()
+            left = self._pacer.deadline(self._arrival is not None) - now
+            if left <= 0.0 or (self._arrival is not None and self._pacer.takes(now)):
+                return
+            self._arrived.wait(left)

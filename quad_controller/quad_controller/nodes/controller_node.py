@@ -1,0 +1,228 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""``ros2 run quad_controller controller_node``: velocities in, joint commands out."""
+
+from __future__ import annotations
+
+import sys
+import threading
+
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import Pose, Twist, TwistStamped
+import rclpy
+from rclpy.node import Node
+from rclpy.qos import (
+    DurabilityPolicy,
+    HistoryPolicy,
+    qos_profile_sensor_data,
+    QoSProfile,
+    ReliabilityPolicy,
+)
+from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import try_shutdown
+from sensor_msgs.msg import BatteryState, Imu, JointState
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
+
+from quad_msgs.msg import JointCommand
+from quad_msgs.srv import SetMode
+
+from ..exceptions import QuadControllerError
+from ..states.controller import Controller
+from ..states.modes import Answer
+from ..states.status import Output, Status
+from . import messages
+from .control_loop import ControlLoop
+from .diagnostics import loop_diagnostic, state_diagnostic
+from .parameters import declare_parameters
+from .spinning import spin, stop_on_signals
+
+COMMAND_QOS = QoSProfile(
+    reliability=ReliabilityPolicy.RELIABLE, history=HistoryPolicy.KEEP_LAST, depth=1
+)
+LATCHED_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+REQUEST_QOS = 1  # only the newest velocity and pose count
+WARN_PERIOD = 2.0  # [s] between two warnings of the same kind
+
+
+class ControllerNode(Node):
+    """Subscribes the robot's state and what is asked of it, and publishes joint commands.
+
+    Attributes:
+        failure: Why the loop ended, empty as long as it runs.
+    """
+
+    def __init__(self, stop: threading.Event) -> None:
+        """Declare parameters, topics and services; :meth:`begin` starts the loop.
+
+        Args:
+            stop: Set when the loop has ended by a defect.
+
+        Raises:
+            QuadControllerError: A parameter, the robot description or the policy does not fit.
+        """
+        super().__init__('controller_node')
+        self._settings = settings = declare_parameters(self)
+        self._controller = Controller(
+            settings.robot,
+            settings.gait,
+            settings.states,
+            first_gait=settings.first_gait,
+            arm_pose=settings.arm_pose,
+        )
+        self._loop = ControlLoop(
+            self._controller, settings.states.period, self._publish, self._give_up
+        )
+        self._joints = messages.JointReader(settings.robot.names)
+        self._title = ''
+        self._ready = False
+        self._stop, self.failure = stop, ''
+        self._commands = self.create_publisher(JointCommand, 'joint_command', COMMAND_QOS)
+        self._shadow = self.create_publisher(JointCommand, 'joint_command_shadow', COMMAND_QOS)
+        self._state = self.create_publisher(String, '~/state', LATCHED_QOS)
+        self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
+        self._subscribe()
+        self.create_service(SetMode, 'set_mode', self._set_mode)
+        self.create_service(Trigger, '~/clear_fault', self._clear_fault)
+        self.create_timer(settings.diagnostics_period, self._diagnose)
+        robot = settings.robot
+        self.get_logger().info(
+            f'{len(robot.names)} joints, {robot.mass:.2f} kg; waiting for joint_states'
+        )
+
+    def begin(self) -> None:
+        """Start the control loop."""
+        self._loop.start()
+
+    def end(self) -> None:
+        """Stop sending; the servos hold their last targets."""
+        self._loop.stop()
+
+    def _subscribe(self) -> None:
+        sensor = qos_profile_sensor_data
+        self.create_subscription(JointState, 'joint_states', self._take_joints, sensor)
+        self.create_subscription(Imu, 'imu', self._take_imu, sensor)
+        self.create_subscription(BatteryState, 'battery_state', self._take_battery, sensor)
+        self.create_subscription(Twist, 'cmd_vel', self._take_twist, REQUEST_QOS)
+        self.create_subscription(
+            TwistStamped, 'cmd_vel_stamped', self._take_stamped_twist, REQUEST_QOS
+        )
+        self.create_subscription(Pose, 'body_pose', self._take_pose, REQUEST_QOS)
+
+    # --- in: callbacks of the executor
+
+    def _take_joints(self, message: JointState) -> None:
+        try:
+            self._loop.offer_joints(self._joints.read(message))
+        except ValueError as error:
+            self.get_logger().warning(str(error), throttle_duration_sec=WARN_PERIOD)
+
+    def _take_imu(self, message: Imu) -> None:
+        self._loop.offer_imu(messages.imu_sample(message))
+
+    def _take_battery(self, message: BatteryState) -> None:
+        self._loop.offer_battery(messages.charge(message))
+
+    def _take_twist(self, message: Twist) -> None:
+        with self._loop.lock:
+            answer = self._controller.set_velocity(messages.velocity(message))
+        self._complain(answer)
+
+    def _take_stamped_twist(self, message: TwistStamped) -> None:
+        # its age counts from its arrival: clocks of two machines need not agree
+        self._take_twist(message.twist)
+
+    def _take_pose(self, message: Pose) -> None:
+        with self._loop.lock:
+            answer = self._controller.set_body_pose(messages.body_pose(message))
+        self._complain(answer)
+
+    def _complain(self, answer: Answer) -> None:
+        if not answer.accepted:
+            self.get_logger().warning(answer.message, throttle_duration_sec=WARN_PERIOD)
+
+    def _set_mode(self, request: SetMode.Request, response: SetMode.Response) -> SetMode.Response:
+        with self._loop.lock:
+            answer = self._controller.set_mode(request.mode)
+        response.success, response.message = answer.accepted, answer.message
+        self.get_logger().info(f'mode {request.mode!r}: {answer.message}')
+        return response
+
+    def _clear_fault(
+        self, _request: Trigger.Request, response: Trigger.Response
+    ) -> Trigger.Response:
+        with self._loop.lock:
+            answer = self._controller.clear_fault()
+        response.success, response.message = answer.accepted, answer.message
+        self.get_logger().info(f'clear_fault: {answer.message}')
+        return response
+
+    def _diagnose(self) -> None:
+        self._publish_diagnostics(self._status())
+
+    def _status(self) -> Status:
+        with self._loop.lock:
+            return self._controller.status
+
+    # --- out: in the thread of the loop
+
+    def _publish(self, output: Output) -> None:
+        logger = self.get_logger()
+        if output.targets is not None:
+            stamp = self.get_clock().now().to_msg()
+            self._commands.publish(messages.joint_command(output.targets, stamp))
+            if output.shadow is not None:
+                self._shadow.publish(messages.joint_command(output.shadow, stamp))
+            if not self._ready:
+                self._ready = True
+                logger.info('ready: the joints are known; set_mode makes them move')
+        for event in output.events:
+            if event.error:
+                logger.error(event.text, throttle_duration_sec=WARN_PERIOD)
+            else:
+                logger.info(event.text)
+        status = self._status()
+        if status.title != self._title:
+            self._title = status.title
+            self._state.publish(String(data=status.title))
+            self._publish_diagnostics(status)
+
+    def _publish_diagnostics(self, status: Status) -> None:
+        name = self.get_name()
+        array = DiagnosticArray()
+        array.header.stamp = self.get_clock().now().to_msg()
+        array.status = [
+            state_diagnostic(name, status),
+            loop_diagnostic(name, self._loop.figures()),
+        ]
+        self._diagnostics.publish(array)
+
+    def _give_up(self, error: Exception) -> None:
+        """Say why the loop ended; the servos hold, and the process ends."""
+        self.failure = f'{type(error).__name__}: {error}'
+        self.get_logger().fatal(f'the control loop ended by a defect: {self.failure}')
+        self._stop.set()
+
+
+def main() -> None:
+    """Entry point."""
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    stop = stop_on_signals()
+    try:
+        node = ControllerNode(stop)
+    except QuadControllerError as error:
+        rclpy.logging.get_logger('controller_node').fatal(str(error))
+        try_shutdown()
+        sys.exit(2)
+    node.begin()
+    try:
+        spin(node, stop)
+    finally:
+        node.end()
+        node.destroy_node()
+        try_shutdown()
+    sys.exit(1 if node.failure else 0)
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,70 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The controller's status as /diagnostics messages (REP 107)."""
+
+from __future__ import annotations
+
+import math
+
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+
+from ..states.modes import State
+from ..states.status import Status
+from ..timing.statistics import LoopFigures
+
+
+def state_diagnostic(node: str, status: Status) -> DiagnosticStatus:
+    """Describe what the robot does."""
+    level, message = DiagnosticStatus.OK, status.title
+    if status.state is State.FAULT:
+        level, message = DiagnosticStatus.ERROR, '; '.join(status.faults)
+    elif math.isinf(status.joints_age):
+        level, message = DiagnosticStatus.STALE, 'waiting for /joint_states'
+    elif status.warnings:
+        level, message = DiagnosticStatus.WARN, '; '.join(status.warnings)
+    velocity = status.velocity
+    return DiagnosticStatus(
+        level=level,
+        name=f'{node}: state',
+        message=message,
+        values=_values(
+            {
+                'state': status.title,
+                'goal': status.goal.value,
+                'gait': status.gait.value,
+                'velocity': f'{velocity.x:.3f} {velocity.y:.3f} {velocity.yaw:.3f}',
+                'joint_states_age': f'{status.joints_age:.3f}',
+                'imu_age': f'{status.imu_age:.3f}',
+                'battery': '' if status.battery is None else f'{status.battery:.2f}',
+                'refused': str(status.refused),
+                'targets_slowed': str(status.limited),
+                'out_of_reach': str(status.unreachable),
+            }
+        ),
+    )
+
+
+def loop_diagnostic(node: str, figures: LoopFigures) -> DiagnosticStatus:
+    """Describe how well the loop keeps its time."""
+    return DiagnosticStatus(
+        level=DiagnosticStatus.OK,
+        name=f'{node}: loop',
+        message=f'{figures.rate:.1f} Hz, jitter p99 {figures.jitter_p99 * 1e3:.2f} ms',
+        values=_values(
+            {
+                'steps': str(figures.steps),
+                'overruns': str(figures.overruns),
+                'rate': f'{figures.rate:.2f}',
+                'jitter_p50': f'{figures.jitter_p50:.6f}',
+                'jitter_p99': f'{figures.jitter_p99:.6f}',
+                'jitter_max': f'{figures.jitter_max:.6f}',
+                'step_p99': f'{figures.duration_p99:.6f}',
+                'feedback_to_command_p50': f'{figures.latency_p50:.6f}',
+                'feedback_to_command_p99': f'{figures.latency_p99:.6f}',
+            }
+        ),
+    )
+
+
+def _values(values: dict[str, str]) -> list[KeyValue]:
+    return [KeyValue(key=key, value=value) for key, value in values.items()]

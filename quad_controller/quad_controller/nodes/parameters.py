@@ -1,0 +1,163 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The parameters of ``controller_node``: what they mean, their ranges, and what they make."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from rclpy.node import Node
+
+from quad_description import PRESETS, robot_urdf
+
+from ..gait.body import BodyLimits
+from ..gait.parameters import GaitParameters, RANGES
+from ..gait.schedule import Gait
+from ..gait.servo_compensation import ServoModel
+from ..model.quadruped import Quadruped, quadruped
+from ..states.parameters import STATE_RANGES, StateParameters
+from .parameter_reader import ParameterReader, refuse_misspelt
+
+GAIT_MEANINGS: Mapping[str, str] = {
+    'max_linear_velocity_x': 'forward and backward [m/s]',
+    'max_linear_velocity_y': 'to a side [m/s]',
+    'max_angular_velocity_z': 'turning [rad/s]',
+    'linear_acceleration': 'change of the linear velocity [m/s2]',
+    'angular_acceleration': 'change of the turning [rad/s2]',
+    'nominal_height': "hip axes above the feet's centres [m]",
+    'com_x_translation': "feet ahead of the URDF's centre of mass [m]",
+    'swing_height': 'lift of a foot [m]',
+    'stance_depth': 'how far a standing foot is pushed down [m]',
+    'stance_duration': 'how long a foot stands [s]; 0: that of the gait',
+    'duty': 'share of a cycle that a foot stands; 0: that of the gait',
+    'sway': 'body away from the lifted legs [m]; negative: that of the gait',
+    'level_gain': 'turns the body against its measured tilt; 0: off',
+}
+STATE_MEANINGS: Mapping[str, str] = {
+    'command_timeout': 'an older velocity counts as zero [s]',
+    'warn_age': 'older joint states and attitudes are reported [s]',
+    'hold_age': 'with older ones nothing moves on [s]',
+    'fault_age': 'older ones are a fault [s]',
+    'max_tilt': 'more is a fall [rad]',
+    'max_turn_rate': 'a faster body is falling [rad/s]',
+    'fall_time': 'how long it must be so [s]',
+    'low_battery': 'charge 0 to 1 below which the robot lies down; 0: never',
+    'battery_time': 'how long it must be so [s]',
+    'lie_height': "hip axes above the feet's centres when it lies [m]",
+    'blend_speed': 'fastest joint between two poses [rad/s]',
+    'blend_time': 'shortest time between two poses [s]',
+    'hold_band': 'a held joint that is further off is not pulled back [rad]',
+    'target_speed': 'speed of set-points per speed of joints; soft servos need 2',
+}
+SERVO_RANGES: Mapping[str, tuple[tuple[float, float], str]] = {
+    'kp': ((0.01, 1000.0), 'stiffness of a servo [N m/rad]'),
+    'damping': ((0.0, 10.0), 'velocity gain and friction of a servo [N m s/rad]'),
+    'inertia': ((0.0, 1.0), 'what a joint turns [kg m2]'),
+    'mass': ((0.0, 100.0), 'what the legs carry [kg]; 0: as in the URDF'),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class NodeSettings:
+    """Everything that the parameters say.
+
+    Attributes:
+        robot: The robot.
+        gait: Tuning of the gait.
+        first_gait: Gait to begin with.
+        states: Limits of states, watchdogs and protections.
+        arm_pose: Positions of the joints that are no legs' in [rad]; empty leaves them.
+        policy: Path of an ONNX file; empty for none.
+        policy_dry_run: Whether the policy is only watched.
+        diagnostics_period: In [s].
+    """
+
+    robot: Quadruped
+    gait: GaitParameters
+    first_gait: Gait
+    states: StateParameters
+    arm_pose: tuple[float, ...]
+    policy: str
+    policy_dry_run: bool
+    diagnostics_period: float
+
+
+def declare_parameters(node: Node) -> NodeSettings:
+    """Declare all parameters of the node and read them.
+
+    Raises:
+        ParameterError: One does not make sense; the message names it, its value and the remedy.
+        DescriptionError: The robot description is no quadruped's.
+    """
+    read = ParameterReader(node)
+    settings = NodeSettings(
+        robot=_robot(read),
+        gait=_gait(read),
+        first_gait=read.choice(
+            'gait', Gait.TROT.value, {gait.value: gait for gait in Gait}, 'gait to begin with'
+        ),
+        states=_states(read),
+        arm_pose=read.numbers(
+            'arm_pose', "positions of the joints that are no legs' when it stands [rad]"
+        ),
+        policy=read.text('policy', '', 'ONNX file that the mode policy follows'),
+        policy_dry_run=read.flag(
+            'policy_dry_run',
+            default=False,
+            meaning='the policy is asked, but only joint_command_shadow tells its answers',
+        ),
+        diagnostics_period=read.number('diagnostics_period', 1.0, (0.1, 60.0), 'period [s]'),
+    )
+    refuse_misspelt(node)
+    return settings
+
+
+def _robot(read: ParameterReader) -> Quadruped:
+    text = read.text('robot_description', '', 'URDF as XML text; empty: of quad_description')
+    presets = {name: name for name in PRESETS}
+    preset = read.choice('preset', 'lite', presets, 'robot of quad_description')
+    arm = read.flag('arm', default=False, meaning='the robot of quad_description has its arm')
+    return quadruped(text or robot_urdf(preset, arm=arm))
+
+
+def _gait(read: ParameterReader) -> GaitParameters:
+    default = GaitParameters()
+    values = {
+        name: read.number(name, getattr(default, name), RANGES[name], meaning)
+        for name, meaning in GAIT_MEANINGS.items()
+    }
+    return GaitParameters(**values, servo=_servo(read), body=BodyLimits())
+
+
+def _servo(read: ParameterReader) -> ServoModel | None:
+    default = ServoModel()
+    enabled = read.flag(
+        'servo_compensation.enabled', default=False, meaning='set-points ahead of soft servos'
+    )
+    values = {
+        name: read.number(f'servo_compensation.{name}', getattr(default, name), span, meaning)
+        for name, (span, meaning) in SERVO_RANGES.items()
+    }
+    return ServoModel(**values) if enabled else None
+
+
+def _states(read: ParameterReader) -> StateParameters:
+    default = StateParameters()
+    values = {
+        name: read.number(name, getattr(default, name), STATE_RANGES[name], meaning)
+        for name, meaning in STATE_MEANINGS.items()
+    }
+    rate = read.number('loop_rate', 1.0 / default.period, (10.0, 200.0), 'steps a second [Hz]')
+    return StateParameters(
+        **values,
+        period=1.0 / rate,
+        require_imu=read.flag(
+            'require_imu', default=True, meaning='no leg moves without a known attitude'
+        ),
+        policy_fallback_walks=read.flag(
+            'policy_fallback_walks',
+            default=False,
+            meaning='the gait walks on when a policy fails, instead of standing',
+        ),
+    )

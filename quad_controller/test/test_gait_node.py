@@ -1,0 +1,183 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The node over DDS: a robot that follows at once, and a person who asks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import ExitStack
+import math
+import sys
+import time
+from typing import Any, TYPE_CHECKING
+
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import Twist, TwistStamped
+from processes import RunningProcess
+import pytest
+from ros_client import RosClient
+from sensor_msgs.msg import Imu, JointState
+from std_msgs.msg import String
+
+from quad_controller.model.quadruped import quadruped
+from quad_controller.nodes.controller_node import LATCHED_QOS
+from quad_description import robot_urdf
+from quad_msgs.msg import JointCommand
+from quad_msgs.srv import SetMode
+
+if TYPE_CHECKING:
+    from isolation import Isolation
+
+NODE = [sys.executable, '-m', 'quad_controller.nodes.controller_node', '--ros-args']
+ROBOT = quadruped(robot_urdf())
+PERIOD = 0.02  # [s]
+FOLDED = [0.0, 1.4, -1.0] * 4
+
+
+class Robot:
+    """Joints that go where they are told, published as a hardware node does.
+
+    Attributes:
+        client: A ROS node of the test.
+        process: The controller's.
+        positions: Where the joints are.
+        names: Under which they are published.
+        largest_step: The largest change of a target so far.
+        commands: All joint commands so far.
+        states: All states that the node told.
+    """
+
+    def __init__(self, client: RosClient, process: RunningProcess) -> None:
+        """Join the graph of the node's process; joint states come with :meth:`begin`."""
+        self.client, self.process = client, process
+        node = client.node
+        self.positions = list(FOLDED)
+        self.names = list(ROBOT.names)
+        self.largest_step = 0.0
+        self._joints = node.create_publisher(JointState, 'joint_states', 10)
+        self._imu = node.create_publisher(Imu, 'imu', 10)
+        self.twist = node.create_publisher(Twist, 'cmd_vel', 1)
+        self.stamped = node.create_publisher(TwistStamped, 'cmd_vel_stamped', 1)
+        self.commands: list[Any] = []
+        node.create_subscription(JointCommand, 'joint_command', self._follow, 1)
+        self.states = client.listen(String, 'controller_node/state', LATCHED_QOS)
+        self.diagnostics = client.listen(DiagnosticArray, '/diagnostics', 50)
+
+    def begin(self) -> None:
+        """Publish joints and attitude at 50 Hz from now on."""
+        self.client.node.create_timer(PERIOD, self._publish)
+
+    def _publish(self) -> None:
+        imu = Imu()
+        imu.orientation.w = 1.0
+        imu.linear_acceleration.z = 9.81
+        self._imu.publish(imu)
+        self._joints.publish(JointState(name=self.names, position=self.positions))
+
+    def _follow(self, message: Any) -> None:
+        steps = [abs(a - b) for a, b in zip(message.position, self.positions, strict=True)]
+        self.largest_step = max(self.largest_step, *steps)
+        self.positions = list(message.position)
+        self.commands.append(message)
+
+    def mode(self, mode: str) -> Any:
+        """Ask for a mode."""
+        return self.client.call(SetMode, 'set_mode', SetMode.Request(mode=mode))
+
+    def until_state(self, state: str) -> None:
+        """Wait for a state."""
+        self.client.spin_until(
+            lambda: bool(self.states) and self.states[-1].data == state, 20.0, f'state {state}'
+        )
+
+    def rate(self, count: int) -> float:
+        """Return the rate of joint commands over some of them in [1/s]."""
+        begin, start = len(self.commands), time.monotonic()
+        self.client.spin_until(lambda: len(self.commands) >= begin + count, 20.0, 'commands')
+        return count / (time.monotonic() - start)
+
+
+@pytest.fixture
+def robot(isolation: Isolation) -> Iterator[Robot]:
+    """Start the node and a robot for it."""
+    with ExitStack() as stack:
+        process = stack.enter_context(RunningProcess(NODE, isolation.env))
+        client = stack.enter_context(RosClient(isolation.domain_id))
+        process.wait_for('waiting for joint_states')
+        yield Robot(client, process)
+
+
+def test_from_lying_to_walking_and_back(robot: Robot) -> None:
+    """Services and topics lead through the modes; commands come at 50 Hz and do not jump."""
+    answer = robot.mode('walk')
+    assert not answer.success
+    assert '/joint_states' in answer.message
+    robot.begin()
+    robot.client.spin_until(lambda: bool(robot.commands), 20.0, 'joint commands')
+    assert list(robot.commands[0].position) == pytest.approx(FOLDED, abs=1e-6)
+    assert 'gait:crawl' in robot.mode('dance').message
+    assert robot.mode('stand').success
+    robot.until_state('stand')
+    assert robot.mode('walk').success
+    robot.until_state('walk')
+    node = robot.client.node
+    message = TwistStamped()
+    message.twist.linear.x = 0.2
+    timer = node.create_timer(0.1, lambda: robot.stamped.publish(message))
+    before = list(robot.commands[-1].position)
+    robot.client.spin_until(
+        lambda: max(abs(a - b) for a, b in zip(robot.positions, before, strict=True)) > 0.2,
+        20.0,
+        'steps',
+    )
+    assert 35.0 < robot.rate(50) < 60.0
+    node.destroy_timer(timer)
+    bad = Twist()
+    bad.linear.x = math.nan
+    robot.twist.publish(bad)
+    robot.process.wait_for('it is no number')
+    assert robot.mode('lie').success
+    robot.until_state('lie')
+    assert robot.largest_step <= 10.0 * 1.5 * PERIOD + 1e-3
+    figures = {
+        value.key: value.value
+        for status in robot.diagnostics[-1].status
+        if status.name == 'controller_node: loop'
+        for value in status.values
+    }
+    assert float(figures['feedback_to_command_p50']) > 0.0
+
+
+def test_silence_is_a_fault_that_is_cleared_by_its_service(robot: Robot) -> None:
+    """A robot that falls silent is held, and told of; then the fault can be cleared."""
+    robot.begin()
+    robot.client.spin_until(lambda: bool(robot.commands), 20.0, 'joint commands')
+    assert robot.mode('stand').success
+    robot.until_state('stand')
+    robot.names[0] = 'somebody_else'
+    robot.until_state('fault')
+    robot.process.wait_for('joint states without fl_hip_joint')
+    assert not robot.client.trigger('controller_node/clear_fault').success
+    robot.names[0] = ROBOT.names[0]
+    robot.client.spin_until(
+        lambda: robot.client.trigger('controller_node/clear_fault').success, 20.0, 'clearing'
+    )
+    robot.until_state('relax')
+
+
+@pytest.mark.parametrize(
+    ('parameter', 'reason'),
+    [
+        ('swing_hight:=0.03', "did you mean 'swing_height'"),
+        ('gait:=gallop', "gait 'gallop' is none of trot, crawl, pace"),
+        ('nominal_height:=0.5', 'do not reach'),
+        ('loop_rate:=50', 'decimal point'),
+    ],
+)
+def test_odd_parameters_end_the_node_with_a_reason(
+    isolation: Isolation, parameter: str, reason: str
+) -> None:
+    """A parameter that makes no sense is told at the start, and nothing runs."""
+    with RunningProcess([*NODE, '-p', parameter], isolation.env) as process:
+        process.wait_for(reason)
+        assert process.wait() == 2
