@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import pytest
-from virtual_network import bus_config, drive_config, PERIOD, SCALE, VirtualNetwork
+from virtual_network import bus_config, drive_config, pdo, PERIOD, SCALE, VirtualNetwork
 
 from arm_canopen.can.frame import Frame
 from arm_canopen.cia402.position_modes import Move
@@ -158,3 +158,115 @@ def test_a_relative_move_after_a_halt_is_refused() -> None:
     net.commands[JOINT].move(Move(0.1, relative=True))
     net.run(3.0)
     assert motor(net) == pytest.approx(0.6, abs=2e-3)
+
+
+BRAKING_MAX = 0.15  # [rad] from 1 rad/s at 5 rad/s^2, with the time to see it
+
+
+class StuckMode:
+    """A drive that keeps the mode that it has, whatever 0x6060 says."""
+
+    def __init__(self, net: VirtualNetwork, mode: OperationMode) -> None:
+        """Alter the mode in each RPDO from now on."""
+        self._mode = mode
+        net.wire.alters = self
+
+    def __call__(self, sender: str, frame: Frame) -> Frame:
+        """Put the old mode into the frame."""
+        if frame.can_id != COMMAND_PDO:
+            return frame
+        return frame._replace(data=frame.data[:2] + bytes((self._mode,)))
+
+
+@pytest.mark.parametrize(
+    ('mode', 'target', 'other'),
+    [
+        (OperationMode.PROFILE_POSITION, 3.0, OperationMode.PROFILE_VELOCITY),
+        (OperationMode.PROFILE_VELOCITY, 1.0, OperationMode.PROFILE_POSITION),
+    ],
+)
+def test_a_refused_mode_switch_does_not_let_the_old_move_go_on(
+    mode: OperationMode, target: float, other: OperationMode
+) -> None:
+    """Braked for the switch, it stays braked when the switch fails; the next target goes on."""
+    net = running_in(mode)
+    net.commands[JOINT].set_target(target)
+    net.run(1.0)
+    begin = motor(net)
+    StuckMode(net, mode)
+    with pytest.raises(DriveError, match='did not reach mode'):
+        net.select(JOINT, other)
+    assert motor(net) - begin < BRAKING_MAX
+    assert_rests(net, 3.0)
+    assert 'halted' in net.drives[JOINT].describe()
+    net.commands[JOINT].set_target(-0.5)
+    net.run(1.0)
+    assert net.drives[JOINT].velocity < -0.3
+
+
+def test_a_mode_that_goes_by_sdo_and_gets_lost_does_not_let_the_old_move_go_on() -> None:
+    """However long 0x6060 takes, the halt lasts until 0x6061 shows the new mode."""
+    config = drive_config(JOINT, NODE_ID)
+    controlword = pdo(1, COMMAND_PDO, (0x6040, 0))
+    net = running_in(OperationMode.PROFILE_POSITION, rpdos=(controlword, *config.rpdos[1:]))
+    net.commands[JOINT].set_target(3.0)
+    net.run(0.5)
+    begin, position = net.now, motor(net)
+    net.wire.loses = lambda sender, frame: (
+        frame.can_id == 0x600 + NODE_ID
+        and frame.data[1:3] == b'\x60\x60'
+        and net.now < begin + 1.5
+    )
+    net.select(JOINT, OperationMode.PROFILE_VELOCITY)
+    assert net.now > begin + 1.5
+    assert motor(net) - position < BRAKING_MAX
+    assert_rests(net)
+
+
+def test_init_in_motion_does_not_let_the_old_move_go_on() -> None:
+    """Also for a drive that does not take mode 0."""
+    net = running_in(OperationMode.PROFILE_POSITION)
+    net.commands[JOINT].set_target(3.0)
+    net.run(0.5)
+    begin = motor(net)
+    StuckMode(net, OperationMode.PROFILE_POSITION)
+    net.do(JOINT, 'init')
+    net.run(1.0)
+    assert motor(net) - begin < BRAKING_MAX
+    assert_rests(net)
+
+
+@pytest.mark.parametrize('cycles', range(4, 60, 4))
+def test_homing_that_is_cancelled_leaves_the_axis_at_rest(cycles: int) -> None:
+    """While it brakes the move of before, while it switches, while it homes: it stops."""
+    net = running_in(OperationMode.PROFILE_POSITION)
+    net.commands[JOINT].set_target(2.0)
+    net.run(0.5)
+    begin = motor(net)
+    commands = net.commands[JOINT]
+    running = commands.run('home', commands.home(17))
+    net.run(cycles * PERIOD)
+    commands.cancel('cancelled')
+    assert running.done
+    net.run(0.5)
+    assert abs(motor(net) - begin) < BRAKING_MAX
+    assert_rests(net)
+    net.run_until(lambda: net.drives[JOINT].obeys)
+    net.commands[JOINT].set_target(begin)
+    net.run(2.0)
+    assert net.drives[JOINT].position == pytest.approx(begin, abs=2e-3)
+
+
+def test_a_switch_that_is_cancelled_stays_halted() -> None:
+    """A stop that ends it has the drive halted in the mode of before."""
+    net = running_in(OperationMode.PROFILE_POSITION)
+    net.commands[JOINT].set_target(3.0)
+    net.run(0.5)
+    StuckMode(net, OperationMode.PROFILE_POSITION)
+    commands = net.commands[JOINT]
+    running = commands.run('select', commands.select_mode(OperationMode.PROFILE_VELOCITY))
+    net.run(1.0)
+    assert not running.done
+    assert 'halted' in net.do(JOINT, 'halt', preempt=True)
+    assert_rests(net)
+    assert net.drives[JOINT].mode.number is OperationMode.PROFILE_POSITION

@@ -148,6 +148,14 @@ class Drive:
         return self.obeys and isinstance(mode, CyclicPosition) and not mode.goes_to_single_target
 
     @property
+    def holding_mode(self) -> Mode | None:
+        """Mode whose target acts on the drive: it is powered and displays that mode."""
+        if self.state is not DriveState.OPERATION_ENABLED:
+            return None
+        shown = self.objects.mode_display
+        return next((mode for mode in self.modes.values() if mode.number == shown), None)
+
+    @property
     def homes_at_init(self) -> bool:
         """Whether bus.yml asks for homing: it writes a method to 0x6098."""
         index = self.objects.at(Index.HOMING_METHOD)
@@ -156,17 +164,9 @@ class Drive:
         )
 
     @property
-    def _holding_mode(self) -> Mode | None:
-        """The mode whose target acts on the drive: it is powered and displays that mode."""
-        if self.state is not DriveState.OPERATION_ENABLED:
-            return None
-        shown = self.objects.mode_display
-        return next((mode for mode in self.modes.values() if mode.number == shown), None)
-
-    @property
     def _keeps_target(self) -> bool:
         """Whether the drive is powered by a target that must stay as it is."""
-        held = self._holding_mode
+        held = self.holding_mode
         return held is not None and (held is self.mode or held.cyclic)
 
     def feedback(self) -> AxisFeedback:
@@ -234,8 +234,8 @@ class Drive:
             command = self._command()
             if command is Command.ENABLE_OPERATION and self.obeys:
                 bits = self._step(now, period)
-            elif not self._keeps_target:
-                self._preload_all()
+            else:
+                bits = self._hold_without_target(command)
         self._controlword = int(command) | int(bits)
         self.objects.controlword.write(self._controlword)
         self.objects.mode.write(int(self.mode.number))
@@ -261,9 +261,11 @@ class Drive:
             self.mode.stream(setpoint)
 
     def select(self, mode: Mode) -> None:
-        """Command another mode, preloaded with where the drive is, or where it is held."""
-        held = self._holding_mode
-        self.halt.release()
+        """Command another mode, preloaded with where the drive is, or where it is held.
+
+        A halt goes on: until the drive shows the new mode, it may still have a target of the old.
+        """
+        held = self.holding_mode
         if held is not None and held is mode:
             self.mode = mode
             return
@@ -274,6 +276,14 @@ class Drive:
             actual = actual._replace(position_inc=position_inc, velocity=held.velocity)
         mode.preload(actual)
         self.mode = mode
+
+    def select_back(self, mode: Mode) -> None:
+        """Command the mode of before after a switch that failed; the drive is halted in it."""
+        if not self.node.online or self.mode is mode:
+            return
+        if self.state is DriveState.OPERATION_ENABLED:
+            self.hold()
+        self.select(mode)
 
     def check_target(self, target: float) -> None:
         """Refuse a target beyond the limits that the drive has in the selected mode.
@@ -312,6 +322,15 @@ class Drive:
         if halt and self.mode.cyclic:
             self.mode.preload(self._actual())  # from there it goes on
         return bits | halt
+
+    def _hold_without_target(self, command: Command) -> Controlword:
+        """Preload what may act on the drive later, and keep up a halt while modes change."""
+        held = self.holding_mode
+        if not self._keeps_target:
+            self._preload_all()
+        if held is None or command is not Command.ENABLE_OPERATION:
+            return NO_BITS
+        return self.halt.bits(held)
 
     def _actual(self) -> Actual:
         objects = self.objects

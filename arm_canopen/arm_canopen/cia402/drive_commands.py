@@ -131,6 +131,7 @@ class DriveCommands:
         finally:
             if drive.node.online and not steps.quirks.no_mode_zero:
                 drive.select(drive.modes[OperationMode.NO_MODE])
+                drive.halt.end_in(OperationMode.NO_MODE)
         return f'{drive.state.title}{homed}; select a mode before the first target'
 
     async def enable(self) -> str:
@@ -169,10 +170,7 @@ class DriveCommands:
             drive.goal = DriveState.SWITCH_ON_DISABLED  # nor shall it be enabled any more
             return f'nothing to halt: {drive.describe()}'
         self._end_stream()
-        drive.hold()
-        await steps.until(
-            lambda: drive.mode.braked and steps.is_slow(), BRAKED_TIMEOUT, 'standstill'
-        )
+        await steps.halt(BRAKED_TIMEOUT)
         return drive.describe()
 
     async def quick_stop(self) -> str:
@@ -213,8 +211,7 @@ class DriveCommands:
         try:
             answer = await home(steps, method, on_progress)
         except BaseException:  # also when it is cancelled, and there is no time to wait
-            if drive.node.online:
-                drive.select(before)
+            drive.select_back(before)
             raise
         if before is not drive.mode and not steps.quirks.no_mode_zero:
             await steps.switch(before)

@@ -69,19 +69,33 @@ class DriveSequences:
             raise
 
     async def come_to_rest(self) -> None:
-        """Brake what moves before another mode ends it with a jerk.
+        """Halt what moves before another mode ends it with a jerk; the drive stays halted.
 
         A torque is left alone: taking it away would drop a load.
         """
-        drive, mode = self.drive, self.drive.mode
-        if not drive.obeys or mode.number in (*TORQUE_MODES, OperationMode.NO_MODE):
+        drive, acting = self.drive, self.drive.holding_mode
+        enabled = drive.goal is drive.state is DriveState.OPERATION_ENABLED
+        if not enabled or acting is None:
             return
-        deceleration = drive.parameters.profile.deceleration
-        ramp = abs(drive.velocity) / deceleration  # [s]
-        mode.brake()
-        if mode.halts_by_bit and not self.is_slow():
-            drive.halt.hold()
-        await self.until(lambda: mode.braked and self.is_slow(), STOP_TIMEOUT + ramp, 'standstill')
+        if acting.number in (*TORQUE_MODES, OperationMode.NO_MODE):
+            return
+        await self.halt(STOP_TIMEOUT)
+
+    async def halt(self, timeout: float) -> None:
+        """Halt a drive that is enabled, and wait until it stands.
+
+        Args:
+            timeout: How long that may take in [s], beside the time of the ramp.
+
+        Raises:
+            DriveError: It does not come to rest; it stays halted.
+        """
+        drive = self.drive
+        ramp = abs(drive.velocity) / drive.parameters.profile.deceleration  # [s]
+        drive.hold()
+        await self.until(
+            lambda: drive.mode.braked and self.is_slow(), timeout + ramp, 'standstill'
+        )
 
     async def reset_fault(self) -> None:
         """Reset a fault if there is one."""
@@ -123,10 +137,10 @@ class DriveSequences:
                 self.quirks.mode_timeout,
                 f'mode {mode.number.title} in 0x6061',
             )
-        except DriveError:
-            if drive.node.online:
-                drive.select(before)
+        except BaseException:  # also when it is cancelled: it stays halted in either mode
+            drive.select_back(before)
             raise
+        drive.halt.release()
         if leave:
             await self.reach(DriveState.OPERATION_ENABLED)
 
