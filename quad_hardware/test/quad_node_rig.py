@@ -1,0 +1,155 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""hardware_node as a process, on a pseudo-terminal with a robot behind it."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any, TYPE_CHECKING
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from isolation import Isolation
+from nav_msgs.msg import Odometry
+from processes import executable, RunningProcess
+from rclpy.qos import qos_profile_sensor_data
+from ros_client import RosClient
+from sensor_msgs.msg import BatteryState, Imu, JointState
+from tf2_msgs.msg import TFMessage
+
+from quad_hardware.nodes.hardware_node import COMMAND_QOS
+from quad_hardware.protocol import NEW, Protocol
+from quad_msgs.msg import JointCommand
+from quad_pty_peer import Behaviour, PtyPeer
+
+if TYPE_CHECKING:
+    from types import TracebackType
+
+    from typing_extensions import Self
+
+TIMEOUT = 20.0  # [s]
+
+
+class NodeRig:
+    """The node, its robot and a client.
+
+    Attributes:
+        peer: The robot.
+        node: Process of the node.
+        client: A node of the test.
+        heard: Messages by topic.
+    """
+
+    def __init__(
+        self, isolation: Isolation, folder: Path, *arguments: str, protocol: Protocol = NEW
+    ) -> None:
+        """Plug the robot in, start the node and listen."""
+        self._stack = ExitStack()
+        try:
+            self.peer = self._stack.enter_context(PtyPeer(folder / 'port', protocol))
+            self.client = self._stack.enter_context(RosClient(isolation.domain_id))
+            sensor = qos_profile_sensor_data
+            self.heard: dict[str, list[Any]] = {
+                topic: self.client.listen(kind, topic, sensor)
+                for topic, kind in (
+                    ('/joint_states', JointState),
+                    ('/imu', Imu),
+                    ('/odom', Odometry),
+                    ('/battery_state', BatteryState),
+                    ('/diagnostics', DiagnosticArray),
+                    ('/tf', TFMessage),
+                )
+            }
+            self._commands = self.client.node.create_publisher(
+                JointCommand, '/joint_command', COMMAND_QOS
+            )
+            self._command = [
+                executable('quad_hardware', 'hardware_node'),
+                '--ros-args',
+                *('-p', f'port:={self.peer.link}'),
+                *('-p', 'diagnostics_period:=0.2'),
+                *arguments,
+            ]
+            self._env = isolation.env
+            self.node = self.start()
+            self._wait_until_ready()
+        except BaseException:
+            self._stack.close()
+            raise
+
+    def begin_anew(self) -> None:
+        """Put the robot to zero, without faults, and forget what was heard."""
+        self.peer.behaviour = Behaviour()
+        self.peer.angles.update(dict.fromkeys(self.peer.angles, 0.0))
+        self.peer.commands.clear()
+        for messages in self.heard.values():
+            messages.clear()
+        self._wait_until_ready()
+
+    def _wait_until_ready(self) -> None:
+        self.hear('/joint_states')
+        matched = self._commands.get_subscription_count
+        self.client.spin_until(lambda: matched() > 0, TIMEOUT, 'subscriber of commands')
+
+    def start(self) -> RunningProcess:
+        """Start the node; it ends with the rig."""
+        return self._stack.enter_context(RunningProcess(self._command, self._env))
+
+    def hear(self, topic: str, count: int = 1) -> Any:
+        """Wait for new messages of a topic; return the last."""
+        messages = self.heard[topic]
+        until = len(messages) + count
+        self.client.spin_until(lambda: len(messages) >= until, TIMEOUT, f'{topic} {count} times')
+        return messages[-1]
+
+    def command(self, positions: list[float], **others: list[float]) -> None:
+        """Publish a joint command."""
+        self._commands.publish(JointCommand(position=positions, **others))
+
+    def stream(self, positions: list[float], duration: float) -> None:
+        """Publish a joint command 50 times a second, as a controller does."""
+        count, sent = round(duration / 0.02), 0
+
+        def send() -> None:
+            nonlocal sent
+            sent += 1
+            self.command(positions)
+
+        timer = self.client.node.create_timer(0.02, send)
+        self.client.spin_until(lambda: sent >= count, TIMEOUT, 'stream of commands')
+        self.client.node.destroy_timer(timer)
+
+    def status(self, name: str) -> DiagnosticStatus:
+        """Return the newest diagnostic of a name."""
+        array = self.heard['/diagnostics'][-1] if self.heard['/diagnostics'] else None
+        found = [s for s in array.status if s.name.endswith(name)] if array else []
+        return found[0] if found else DiagnosticStatus()
+
+    def wait_for_status(self, name: str, level: bytes, text: str) -> DiagnosticStatus:
+        """Wait until a diagnostic has a level and says something."""
+        self.client.spin_until(
+            lambda: self.status(name).level == level and text in self.status(name).message,
+            TIMEOUT,
+            f'{text!r} of {name}; the last was {self.status(name).message!r}',
+        )
+        return self.status(name)
+
+    def largest_step(self) -> float:
+        """Farthest that a servo target moved between two commands [deg]."""
+        steps = [0.0]
+        for before, after in zip(self.peer.commands, self.peer.commands[1:], strict=False):
+            steps += [abs(after[motor] - before[motor]) for motor in after if motor in before]
+        return max(steps)
+
+    def __enter__(self) -> Self:
+        """Use it in a with statement."""
+        return self
+
+    def __exit__(
+        self,
+        exc_type: type[BaseException] | None,
+        exc: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """End everything."""
+        self._stack.close()

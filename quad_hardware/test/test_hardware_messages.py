@@ -1,0 +1,155 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Messages and diagnostics: frames that hang together, covariances that mean something."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+import math
+
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticStatus
+from geometry_msgs.msg import Transform
+from hypothesis import given
+from hypothesis import strategies as st
+import pytest
+
+from quad_hardware.estimation import Estimate, OdometryState
+from quad_hardware.estimation.rotation import (
+    from_roll_pitch_yaw,
+    IDENTITY,
+    multiply,
+    rotate,
+    Vector,
+    yaw_of,
+)
+from quad_hardware.estimation.rotation import Quaternion as Rotation
+from quad_hardware.link import DialectCounters, LinkState, LinkStatus, RobotState
+from quad_hardware.nodes import messages
+from quad_hardware.nodes.diagnostics import command_diagnostic, CommandCounters, link_diagnostic
+from quad_hardware.nodes.parameters import Deviations, Frames
+from quad_hardware.protocol import ParserCounters
+
+STAMP = Time(sec=1)
+FRAMES = Frames('odom', 'base_link', 'base_footprint', 'imu_link', False, True)
+PARENT = replace(FRAMES, footprint_is_parent=True)
+DEVIATIONS = Deviations(orientation=0.02, rate=0.15, gyro=0.02, acceleration=0.3)
+PLACE = OdometryState(1.0, 2.0, 0.11, IDENTITY, 0.2, 0.05, 3.0, (True,) * 4)
+ESTIMATE = Estimate(
+    time=0.0,
+    positions={'b': 0.1, 'a': 0.2},
+    velocities={'a': 2.0, 'b': 1.0},
+    attitude=IDENTITY,
+    angular_velocity=(0.1, 0.2, 0.3),
+    rate_measured=False,
+    acceleration=(0.0, 0.0, 9.8),
+    gravity_error=0.0,
+    odometry=PLACE,
+)
+ROTATIONS = st.builds(from_roll_pitch_yaw, *[st.floats(-1.2, 1.2)] * 3)
+
+
+@given(ROTATIONS, st.sampled_from([FRAMES, PARENT]))
+def test_both_trees_put_frames_at_the_same_place(rotation: Rotation, frames: Frames) -> None:
+    """base_link where odometry has it; base_footprint below it on the ground, level."""
+    estimate = replace(ESTIMATE, odometry=replace(PLACE, rotation=rotation))
+    first, second = messages.transforms(estimate, frames, STAMP).transforms
+    chain = {first.child_frame_id: pose(first.transform)}
+    (x, y, z), turn = pose(first.transform)
+    offset, further = pose(second.transform)
+    moved = rotate(turn, offset)
+    chain[second.child_frame_id] = (
+        (x + moved[0], y + moved[1], z + moved[2]),
+        multiply(turn, further),
+    )
+    assert second.header.frame_id == first.child_frame_id
+    place, attitude = chain['base_link']
+    assert place == pytest.approx((1.0, 2.0, 0.11))
+    assert rotate(attitude, (1.0, 2.0, 3.0)) == pytest.approx(rotate(rotation, (1.0, 2.0, 3.0)))
+    below, level = chain['base_footprint']
+    assert below == pytest.approx((1.0, 2.0, 0.0))
+    assert rotate(level, (0.0, 0.0, 1.0)) == pytest.approx((0.0, 0.0, 1.0))
+    assert yaw_of(level) == pytest.approx(yaw_of(rotation))
+
+
+def pose(transform: Transform) -> tuple[Vector, Rotation]:
+    """Translation and rotation as tuples."""
+    t, r = transform.translation, transform.rotation
+    return (t.x, t.y, t.z), (r.x, r.y, r.z, r.w)
+
+
+def test_joints_keep_their_order() -> None:
+    """Each velocity stands beside its name; efforts are left out."""
+    message = messages.joint_state(ESTIMATE, STAMP)
+    assert message.name == ['b', 'a']
+    assert list(message.velocity) == [1.0, 2.0]
+    assert list(message.effort) == []
+
+
+def test_a_differentiated_rate_says_so_by_its_covariance() -> None:
+    """Larger than a gyro's; and minus one when there is none (REP 145)."""
+    differentiated = messages.imu(ESTIMATE, DEVIATIONS, 'imu_link', STAMP)
+    gyro = messages.imu(replace(ESTIMATE, rate_measured=True), DEVIATIONS, 'imu_link', STAMP)
+    none = messages.imu(replace(ESTIMATE, angular_velocity=None), DEVIATIONS, 'imu_link', STAMP)
+    assert differentiated.angular_velocity_covariance[0] == pytest.approx(0.15**2)
+    assert gyro.angular_velocity_covariance[8] == pytest.approx(0.02**2)
+    assert none.angular_velocity_covariance[0] == -1.0
+    assert differentiated.linear_acceleration.z == 9.8
+
+
+def test_odometry_is_less_sure_the_farther_it_went() -> None:
+    """No covariance is all zeros; what nobody measures has a huge one."""
+    near = messages.odometry(ESTIMATE, DEVIATIONS, FRAMES, STAMP)
+    far = messages.odometry(
+        replace(ESTIMATE, odometry=replace(PLACE, distance=30.0)), DEVIATIONS, FRAMES, STAMP
+    )
+    assert 0.0 < near.pose.covariance[0] < far.pose.covariance[0]
+    assert near.twist.covariance[14] == messages.UNUSED
+    assert all(near.pose.covariance[::7] > 0.0)
+    level = messages.odometry(ESTIMATE, DEVIATIONS, PARENT, STAMP)
+    assert (level.child_frame_id, level.pose.pose.position.z) == ('base_footprint', 0.0)
+
+
+def test_an_unknown_charge_is_nan() -> None:
+    """As the message wants it; a known one is a share."""
+    state = RobotState(0.0, 0.0, (0, 0, 0), (0, 0, 9.8), {}, {})
+    assert math.isnan(messages.battery(state, STAMP).percentage)
+    known = messages.battery(replace(state, battery=80.0, voltage=7.4), STAMP)
+    assert known.percentage == pytest.approx(0.8)
+    assert known.voltage == pytest.approx(7.4)
+
+
+def link_status(**changes: object) -> LinkStatus:
+    """A link that runs, but for what is changed."""
+    status = LinkStatus(
+        LinkState.RUNNING, 'reports arrive', 'new', 2_000_000, 'L-2', 1, 0.01, 5, 0,
+        ParserCounters(frames=1000), DialectCounters(),
+    )  # fmt: skip
+    return replace(status, **changes)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ('status', 'level'),
+    [
+        (link_status(), DiagnosticStatus.OK),
+        (link_status(state=LinkState.STALE), DiagnosticStatus.STALE),
+        (link_status(state=LinkState.CONNECTING), DiagnosticStatus.ERROR),
+        (
+            link_status(parser=ParserCounters(frames=1000, bad_checksum=50)),
+            DiagnosticStatus.WARN,
+        ),
+    ],
+)
+def test_the_level_of_the_link(status: LinkStatus, level: bytes) -> None:
+    """A damaged line is a warning, a silent one stale, none an error."""
+    assert link_diagnostic('hardware_node', '/dev/x', status).level == level
+
+
+def test_a_trouble_is_shown_once() -> None:
+    """The next look is fine again, the counters stay."""
+    counters = CommandCounters(received=3, refused=1, reason='no', troubled=True)
+    first = command_diagnostic('hardware_node', '/dev/x', counters)
+    second = command_diagnostic('hardware_node', '/dev/x', counters)
+    assert (first.level, first.message) == (DiagnosticStatus.WARN, 'no')
+    assert second.level == DiagnosticStatus.OK
+    assert {pair.key: pair.value for pair in second.values}['refused'] == '1'

@@ -1,0 +1,168 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""hardware_node over DDS and a real pseudo-terminal: its topics, and the fault matrix."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import ExitStack
+import math
+from pathlib import Path
+
+from diagnostic_msgs.msg import DiagnosticStatus
+from isolation import Isolation, reserve
+from processes import executable, RunningProcess
+import pytest
+from rclpy.qos import ReliabilityPolicy
+
+from quad_description import movable_joints, robot_urdf
+from quad_hardware.joints import LimiterSettings
+from quad_hardware.joints.command import LONGEST_PERIOD
+from quad_hardware.protocol import NEW, OLD
+from quad_node_rig import NodeRig, TIMEOUT
+
+pytestmark = pytest.mark.scenario
+
+HOME = [0.0] * 12
+POSE = [0.0, 0.6, -0.3] * 4
+LARGEST_STEP = math.degrees(LimiterSettings().speed * LONGEST_PERIOD)  # [deg]
+LEGS_ORDER = [13, 12, 11, 23, 22, 21, 43, 42, 41, 33, 32, 31]
+
+
+@pytest.fixture(scope='module')
+def shared_rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[NodeRig]:
+    """The node with a robot of the new protocol, started once."""
+    with reserve() as isolation, NodeRig(isolation, tmp_path_factory.mktemp('port')) as rig:
+        yield rig
+
+
+@pytest.fixture
+def rig(shared_rig: NodeRig) -> NodeRig:
+    """The node with a robot that stands at zero and behaves."""
+    shared_rig.begin_anew()
+    return shared_rig
+
+
+@pytest.mark.parametrize('protocol', [NEW, OLD], ids=lambda protocol: protocol.name)
+def test_the_topics_of_the_article(isolation: Isolation, tmp_path: Path, protocol: object) -> None:
+    """Joints in radians in URDF order, IMU, odometry, battery, transforms; servos obey."""
+    chosen = NEW if protocol is NEW else OLD
+    with NodeRig(isolation, tmp_path, protocol=chosen) as rig:
+        rig.peer.behaviour.attitude = (0.0, 0.0, 90.0)
+        rig.stream(POSE, 1.0)
+        joints = rig.hear('/joint_states', 3)
+        assert list(joints.name) == [j.name for j in movable_joints(robot_urdf('lite'))]
+        assert list(joints.position) == pytest.approx(POSE, abs=0.01)
+        assert [rig.peer.angles[m] for m in LEGS_ORDER] == pytest.approx(
+            [math.degrees(p) for p in POSE], abs=0.5
+        )
+        imu = rig.hear('/imu')
+        assert imu.header.frame_id == 'imu_link'
+        assert (imu.orientation.z, imu.orientation.w) == pytest.approx((0.5**0.5, 0.5**0.5))
+        assert imu.linear_acceleration.z == pytest.approx(9.8, abs=0.01)
+        assert rig.hear('/odom').child_frame_id == 'base_link'
+        assert rig.hear('/battery_state').percentage == pytest.approx(0.8)
+        pairs = [(t.header.frame_id, t.child_frame_id) for t in rig.hear('/tf').transforms]
+        assert pairs == [('odom', 'base_link'), ('base_link', 'base_footprint')]
+        published = rig.client.node.get_publishers_info_by_topic('/joint_states')
+        assert published[0].qos_profile.reliability == ReliabilityPolicy.RELIABLE
+        rig.wait_for_status('serial link', DiagnosticStatus.OK, 'reports arrive')
+        assert rig.largest_step() <= LARGEST_STEP + 0.01
+
+
+def test_wrong_commands_move_nothing_and_are_told(rig: NodeRig) -> None:
+    """NaN, infinity, wrong lengths: refused with the reason, and not a byte is sent."""
+    for wrong, reason in (
+        ([math.nan, *HOME[1:]], 'fl_hip_joint'),
+        ([*HOME[:11], math.inf], 'br_calf_joint'),
+        (HOME[:5], '5 positions for 12 joints'),
+    ):
+        rig.command(wrong)
+        rig.wait_for_status('joint commands', DiagnosticStatus.WARN, reason)
+    rig.command(HOME, velocity=[1.0])
+    rig.wait_for_status('joint commands', DiagnosticStatus.WARN, '1 values of velocity')
+    assert rig.peer.commands == []
+    rig.command(HOME)
+    rig.client.spin_until(lambda: bool(rig.peer.commands), TIMEOUT, 'right command')
+
+
+def test_beyond_limits_is_taken_to_them_and_told(rig: NodeRig) -> None:
+    """The servo ends at the limit of the URDF."""
+    rig.stream([2.0, *HOME[1:]], 1.0)
+    rig.wait_for_status('joint commands', DiagnosticStatus.WARN, 'fl_hip_joint')
+    assert rig.peer.angles[13] == pytest.approx(math.degrees(0.5236), abs=0.02)
+
+
+def test_silence_holds_the_servos(rig: NodeRig) -> None:
+    """After half a second nothing is sent, diagnostics says so; then the stream begins anew."""
+    rig.stream(POSE, 0.8)
+    rig.peer.behaviour.silent = True
+    rig.wait_for_status('serial link', DiagnosticStatus.STALE, 'hold their last target')
+    sent = len(rig.peer.commands)
+    rig.stream(HOME, 0.4)
+    assert len(rig.peer.commands) == sent
+    rig.wait_for_status('joint commands', DiagnosticStatus.WARN, 'not sent')
+    rig.peer.behaviour.silent = False
+    rig.wait_for_status('serial link', DiagnosticStatus.OK, 'reports arrive')
+    rig.stream(HOME, 1.0)
+    assert rig.peer.angles[12] == pytest.approx(0.0, abs=0.1)
+    assert rig.largest_step() <= LARGEST_STEP + 0.01
+
+
+def test_a_cut_cable_is_survived_without_a_jump(rig: NodeRig) -> None:
+    """Two seconds without it, under a stream of commands; meanwhile the robot was bent by hand."""
+    rig.stream(POSE, 0.8)
+    rig.peer.unplug()
+    rig.stream(POSE, 2.0)
+    rig.wait_for_status('serial link', DiagnosticStatus.ERROR, 'no such device')
+    bent = {motor: angle + 30.0 for motor, angle in rig.peer.angles.items()}
+    rig.peer.angles.update(bent)
+    before = len(rig.peer.commands)
+    rig.peer.plug()
+    rig.wait_for_status('serial link', DiagnosticStatus.OK, 'reports arrive')
+    rig.stream(POSE, 1.5)
+    first = rig.peer.commands[before]
+    assert all(abs(first[motor] - bent[motor]) <= LARGEST_STEP for motor in LEGS_ORDER[1:])
+    assert rig.peer.angles[12] == pytest.approx(math.degrees(0.6), abs=0.1)
+
+
+def test_damaged_bytes_give_no_wild_reports(rig: NodeRig) -> None:
+    """1 % of the bytes wrong: what is published is right or small, and the line is blamed."""
+    rig.peer.behaviour.corrupt = 0.01
+    count = len(rig.heard['/joint_states'])
+    rig.wait_for_status('serial link', DiagnosticStatus.WARN, 'damaged frames')
+    later = rig.heard['/joint_states'][count:]
+    assert all(abs(p) < 1.1 for message in later for p in message.position)
+    rig.peer.behaviour.corrupt = 0.0
+    rig.hear('/joint_states', 5)
+
+
+def test_a_stop_is_clean(rig: NodeRig) -> None:
+    """SIGINT ends it with 0, and the port is free for the next program."""
+    assert rig.node.stop() == 0
+    rig.node = rig.start()
+    rig.node.wait_for('running: reports arrive', TIMEOUT)
+
+
+WRONG = {
+    'protokoll:=old': "did you mean 'protocol'",
+    'protocol:=newest': "protocol 'newest' is none of auto, new, old",
+    'joints.fl_hip_joint.sign:=0': 'sign 0 is neither 1 nor -1',
+    'robot_description:=<robot/>': 'no joint for motors 11',
+    'robot_description:=none': 'no XML',
+}
+
+
+def test_a_wrong_parameter_ends_the_node(isolation: Isolation) -> None:
+    """With exit code 2, and the message names the value and the remedy."""
+    node = executable('quad_hardware', 'hardware_node')
+    with ExitStack() as stack:
+        processes = [
+            stack.enter_context(
+                RunningProcess([node, '--ros-args', '-p', argument], isolation.env)
+            )
+            for argument in WRONG
+        ]
+        for process, reason in zip(processes, WRONG.values(), strict=True):
+            assert process.wait() == 2
+            assert reason in process.output
