@@ -106,6 +106,10 @@ def _error_control(master: MasterConfig, node: NodeConfig) -> Iterator[Expected]
         period = round(node.heartbeat_producer * MILLISECONDS)
         key = 'heartbeat_producer'
         yield _number(Index.PRODUCER_HEARTBEAT, 0, period, DataType.UNSIGNED16, key)
+    if node.guard_time > 0:
+        time, factor = round(node.guard_time * MILLISECONDS), node.life_time_factor
+        yield _number(Index.GUARD_TIME, 0, time, DataType.UNSIGNED16, 'guard_time')
+        yield _number(Index.LIFE_TIME_FACTOR, 0, factor, DataType.UNSIGNED8, 'life_time_factor')
     if _is_writable(node, Index.CONSUMER_HEARTBEAT, 1):
         timeout = round(master.heartbeat_timeout * MILLISECONDS)
         watched = master.node_id << 16 | timeout if node.heartbeat_consumer else 0
