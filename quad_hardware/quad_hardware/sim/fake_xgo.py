@@ -5,7 +5,8 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 import signal
 import sys
 from types import FrameType
@@ -27,13 +28,14 @@ def run(argv: Sequence[str] | None = None) -> int:
         simulation = build(options)
         with PseudoTerminal(options.link) as terminal:
             server = Server(simulation.plant, simulation.line, terminal)
-            _announce(options, terminal)
-            if options.no_ros:
-                _serve(server)
-            else:
-                from .fake_xgo_node import serve_with_ros
+            with _stopped_by_signals(server):
+                if options.no_ros:
+                    _announce(options, terminal)
+                    server.run()
+                else:
+                    from .fake_xgo_node import serve_with_ros
 
-                serve_with_ros(server, simulation, ros)
+                    serve_with_ros(server, simulation, ros, lambda: _announce(options, terminal))
             server.close()
     except HardwareError as error:
         sys.stderr.write(f'fake_xgo: {error}\n')
@@ -63,13 +65,16 @@ def split_ros_arguments(argv: Sequence[str]) -> tuple[list[str], list[str]]:
     return own, ros
 
 
-def _serve(server: Server) -> None:
+@contextmanager
+def _stopped_by_signals(server: Server) -> Iterator[None]:
+    """End the server at SIGINT and SIGTERM."""
+
     def stop(_number: int, _frame: FrameType | None) -> None:
         server.stop()
 
     previous = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
-        server.run()
+        yield
     finally:
         for number, handler in previous.items():
             signal.signal(number, handler)

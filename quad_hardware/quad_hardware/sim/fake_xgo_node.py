@@ -14,6 +14,7 @@ from nav_msgs.msg import Odometry
 import rclpy
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import ok, try_shutdown
 from std_srvs.srv import Trigger
 
@@ -117,28 +118,36 @@ class FakeXgoNode(Node):
         self._truth.publish(message)
 
 
-def serve_with_ros(server: Server, simulation: Simulation, ros_arguments: Sequence[str]) -> None:
+def serve_with_ros(
+    server: Server,
+    simulation: Simulation,
+    ros_arguments: Sequence[str],
+    announce: Callable[[], None],
+) -> None:
     """Run the robot in a thread and its node in this one, until one of them ends.
 
     Args:
         server: The loop in which the robot lives.
         simulation: The robot.
         ros_arguments: For rclpy.
+        announce: Called when the services are there.
 
     Raises:
         SimulationError: What ended the robot.
     """
-    rclpy.init(args=list(ros_arguments))
+    # the caller has signal handlers that end the server
+    rclpy.init(args=list(ros_arguments), signal_handler_options=SignalHandlerOptions.NO)
     ended: list[BaseException] = []
     thread = threading.Thread(target=_live, args=(server, ended), name='fake_xgo')
     executor = SingleThreadedExecutor()
     node = FakeXgoNode(server, simulation)
     executor.add_node(node)
     thread.start()
+    announce()
     try:
         while ok() and thread.is_alive():
             executor.spin_once(timeout_sec=0.2)
-    except (KeyboardInterrupt, ExternalShutdownException):
+    except ExternalShutdownException:
         pass
     finally:
         server.stop()

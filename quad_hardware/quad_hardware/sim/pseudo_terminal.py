@@ -7,6 +7,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 import pty
+import socket
 import termios
 import tty
 from typing import TYPE_CHECKING
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from typing_extensions import Self
 
 CHUNK = 4096  # [B]
+DEVICES = Path('/dev/pts')
 _OUTPUT_SPEED = 5  # index in what tcgetattr returns
 _BAUD_OF = {
     getattr(termios, name): int(name[1:])
@@ -38,18 +40,17 @@ class PseudoTerminal:
         """Make the device and the link.
 
         Args:
-            link: Where programs shall find it; a link that leads nowhere is replaced.
+            link: Where programs shall find it; what a killed robot left there is replaced.
 
         Raises:
             SetupError: Something else is there, or the link cannot be made.
         """
         self.link = link
         self._master = self._slave = -1
-        if os.path.lexists(link) and (not link.is_symlink() or link.exists()):
-            raise SetupError(
-                f'{link} is there already; is another simulated robot running? '
-                'end it, or choose another --link'
-            )
+        self._claim = _claim(link)
+        if os.path.lexists(link) and not _is_left_over(link):
+            self._claim.close()
+            raise SetupError(f'{link} is there already and is not ours; choose another --link')
         self.plug()
 
     @property
@@ -122,6 +123,7 @@ class PseudoTerminal:
     def close(self) -> None:
         """Take the device and the link away."""
         self.unplug()
+        self._claim.close()
 
     def __enter__(self) -> Self:
         """Use it in a with statement."""
@@ -135,3 +137,22 @@ class PseudoTerminal:
     ) -> None:
         """Take the device and the link away."""
         self.close()
+
+
+def _claim(link: Path) -> socket.socket:
+    """Claim a path for this process, in a way that ends with it even when it is killed."""
+    claim = socket.socket(socket.AF_UNIX)
+    try:
+        # a name that is no file: Linux gives it back by itself
+        claim.bind(f'\0fake_xgo:{link.absolute()}')
+    except OSError as error:
+        claim.close()
+        raise SetupError(
+            f'{link} belongs to another simulated robot; end it, or choose another --link'
+        ) from error
+    return claim
+
+
+def _is_left_over(link: Path) -> bool:
+    """Tell whether a link is what a simulated robot that was killed has left behind."""
+    return link.is_symlink() and link.readlink().parent == DEVICES

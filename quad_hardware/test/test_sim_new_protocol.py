@@ -1,0 +1,231 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The simulated robot in the new protocol: states pushed, functions carried out or refused."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+import math
+from pathlib import Path
+import struct
+
+import pytest
+from sim_serial import Listener, serve
+from sim_virtual import VirtualRobot
+
+from quad_hardware.protocol import (
+    Code,
+    decode_feedback,
+    Feedback,
+    Frame,
+    Kind,
+    MOTOR_ORDER,
+    NEW,
+    OLD,
+    Refusal,
+    Register,
+    slot_of,
+)
+
+KINEMATIC = ('--physics', 'none', '--noise', 'none')
+FEEDBACK_ON = Frame(Kind.WRITE, Code.FEEDBACK, b'\x01')
+FEEDBACK_OFF = Frame(Kind.WRITE, Code.FEEDBACK, b'\x00')
+
+
+def states(frames: list[Frame]) -> list[Feedback]:
+    """Decode the states among frames."""
+    return [decode_feedback(frame.payload) for frame in frames if frame.kind is Kind.PUSH]
+
+
+def last_state(robot: VirtualRobot) -> Feedback:
+    """Return a state that was measured from now on."""
+    robot.send(FEEDBACK_ON)
+    return states(robot.run(0.05))[-1]
+
+
+def test_version_and_battery_are_told() -> None:
+    """Both answers have the address of the question and the payload of the table."""
+    robot = VirtualRobot(*KINEMATIC, '--battery', '42', '--firmware', 'X-1.2')
+    (version,) = robot.ask(Frame(Kind.READ, Code.VERSION))
+    assert version == Frame(Kind.REPLY, Code.VERSION, b'X-1.2\0\0\0\0\0')
+    (battery,) = robot.ask(Frame(Kind.READ, Code.BATTERY))
+    assert battery == Frame(Kind.REPLY, Code.BATTERY, b'\x2a')
+
+
+def test_states_come_at_their_rate_and_in_sequence() -> None:
+    """50 a second of 254 bytes each; no gap in the sequence; device time in milliseconds."""
+    robot = VirtualRobot(*KINEMATIC)
+    assert robot.run(0.2) == []
+    robot.send(FEEDBACK_ON)
+    received = states(robot.run(2.0))
+    assert len(received) in {99, 100, 101}
+    assert len(robot.heard) == 254 * len(received)
+    assert [state.sequence for state in received] == list(range(len(received)))
+    steps = {b.device_time - a.device_time for a, b in pairwise(received)}
+    assert steps <= {19, 20, 21}
+
+
+@pytest.mark.parametrize('rate', [1, 20, 100])
+def test_the_rate_can_be_set(rate: int) -> None:
+    """From the next state on they come as often as was asked for."""
+    robot = VirtualRobot(*KINEMATIC)
+    robot.send(Frame(Kind.WRITE, Code.FEEDBACK_RATE, bytes((rate,))))
+    robot.send(FEEDBACK_ON)
+    assert len(states(robot.run(3.0))) == pytest.approx(3 * rate, abs=1)
+
+
+def test_feedback_ends_when_it_is_switched_off() -> None:
+    """After the frame nothing comes, and questions are still answered."""
+    robot = VirtualRobot(*KINEMATIC)
+    robot.send(FEEDBACK_ON)
+    robot.run(0.5)
+    robot.send(FEEDBACK_OFF)
+    robot.run(0.01)
+    assert robot.run(0.5) == []
+    assert len(robot.ask(Frame(Kind.READ, Code.VERSION))) == 1
+
+
+def test_many_servos_go_where_one_frame_sends_them() -> None:
+    """Angles in steps of 0.01 degrees arrive at the servos and come back in their slots."""
+    robot = VirtualRobot(*KINEMATIC, '--arm')
+    motors = MOTOR_ORDER
+    angles = [2.5 * (slot % 5) - 5.0 for slot in range(len(motors))]
+    payload = b''.join(
+        NEW.functions[Code.SERVOS].pack(motor=(motor,), angle=(angle,))
+        for motor, angle in zip(motors, angles, strict=True)
+    )
+    robot.send(Frame(Kind.WRITE, Code.SERVOS, payload))
+    robot.run(0.1)
+    assert last_state(robot).position == pytest.approx(angles, abs=0.006)
+
+
+def test_one_servo_goes_at_its_speed() -> None:
+    """Speed 255 is at once; a low speed takes time and shows in the velocities."""
+    robot = VirtualRobot(*KINEMATIC)
+    robot.send(FEEDBACK_ON)
+    move = NEW.functions[Code.SERVO]
+    robot.send(Frame(Kind.WRITE, Code.SERVO, move.pack(motor=(12,), angle=(20.0,))))
+    assert states(robot.run(0.1))[-1].position[slot_of(12)] == pytest.approx(20.0, abs=0.01)
+    robot.send(Frame(Kind.WRITE, Code.SPEED, bytes((12, 10))))
+    robot.send(Frame(Kind.WRITE, Code.SERVO, move.pack(motor=(12,), angle=(40.0,))))
+    under_way = states(robot.run(0.5))[-1]
+    assert 25.0 < under_way.position[slot_of(12)] < 35.0
+    assert under_way.velocity[slot_of(12)] == pytest.approx(10 / 255 * 527, rel=0.01)
+    assert states(robot.run(1.0))[-1].position[slot_of(12)] == pytest.approx(40.0, abs=0.01)
+
+
+def test_torque_is_switched_by_motor_and_for_all() -> None:
+    """0 lets go, 1 holds; FF means all."""
+    robot = VirtualRobot(*KINEMATIC)
+    servos = robot.simulation.board.servos
+    robot.ask(Frame(Kind.WRITE, Code.TORQUE, bytes((23, 0))))
+    assert [m for m in servos.fitted if not servos.torque_on(m)] == [23]
+    robot.ask(Frame(Kind.WRITE, Code.TORQUE, bytes((0xFF, 0))))
+    assert not any(map(servos.torque_on, servos.fitted))
+    robot.ask(Frame(Kind.WRITE, Code.TORQUE, bytes((0xFF, 1))))
+    assert all(map(servos.torque_on, servos.fitted))
+
+
+@pytest.mark.parametrize(
+    ('frame', 'reason'),
+    [
+        (Frame(Kind.READ, 0x0305), Refusal.UNKNOWN_FUNCTION),
+        (Frame(Kind.WRITE, 0x0305, b'\1'), Refusal.UNKNOWN_FUNCTION),
+        (Frame(Kind.READ, Code.SERVO), Refusal.WRONG_ACCESS),
+        (Frame(Kind.WRITE, Code.VERSION, b'\1'), Refusal.WRONG_ACCESS),
+        (Frame(Kind.WRITE, Code.STATE, bytes(245)), Refusal.WRONG_ACCESS),
+        (Frame(Kind.WRITE, Code.FEEDBACK, b'\1\1'), Refusal.WRONG_LENGTH),
+        (Frame(Kind.WRITE, Code.SERVOS, b'\x0b\0'), Refusal.WRONG_LENGTH),
+        (Frame(Kind.WRITE, Code.FEEDBACK, b'\7'), Refusal.WRONG_VALUE),
+        (Frame(Kind.WRITE, Code.FEEDBACK_RATE, b'\0'), Refusal.WRONG_VALUE),
+        (Frame(Kind.WRITE, Code.FEEDBACK_RATE, b'\xc8'), Refusal.WRONG_VALUE),
+        (Frame(Kind.WRITE, Code.SERVO, struct.pack('<Bf', 14, 0.0)), Refusal.WRONG_VALUE),
+        (Frame(Kind.WRITE, Code.SERVO, struct.pack('<Bf', 54, 0.0)), Refusal.WRONG_VALUE),
+        (Frame(Kind.WRITE, Code.SERVO, struct.pack('<Bf', 12, math.nan)), Refusal.WRONG_VALUE),
+        (Frame(Kind.WRITE, Code.SERVOS, b'\x0b\0\0\x63\0\0'), Refusal.WRONG_VALUE),
+        (Frame(Kind.WRITE, Code.TORQUE, b'\x63\1'), Refusal.WRONG_VALUE),
+    ],
+)
+def test_what_the_board_does_not_do_is_refused(frame: Frame, reason: Refusal) -> None:
+    """A NACK with the address and the reason, and nothing has moved."""
+    robot = VirtualRobot(*KINEMATIC)
+    before = last_state(robot).position
+    robot.ask(FEEDBACK_OFF)
+    assert robot.ask(frame) == [Frame(Kind.NACK, frame.address, bytes((reason,)))]
+    assert last_state(robot).position == before
+
+
+def test_a_standing_robots_state_is_that_of_the_physics() -> None:
+    """Attitude, specific force, servo angles, loads and battery have their sizes and units."""
+    robot = VirtualRobot('--start', 'stand', '--noise', 'none')
+    state = last_state(robot)
+    assert state.attitude == pytest.approx((0, 0, 0), abs=0.5)
+    assert state.acceleration == pytest.approx((0, 0, 9.81), abs=0.1)
+    for leg in (1, 2, 3, 4):
+        calf, thigh, hip = (state.position[slot_of(10 * leg + digit)] for digit in (1, 2, 3))
+        assert (hip, thigh, calf) == pytest.approx(
+            (0, math.degrees(1.0), math.degrees(-0.2792)), abs=1.0
+        )
+        # the knee carries the robot
+        assert 5.0 < abs(state.load[slot_of(10 * leg + 1)]) < 40.0
+    assert state.position[12:] == (0.0,) * 4
+    assert 7.5 < state.battery_voltage < 8.4
+    assert state.battery == 100
+
+
+def test_a_push_shows_in_the_states() -> None:
+    """A kick from the side is felt by the accelerometer and seen in the attitude."""
+    robot = VirtualRobot('--start', 'stand', '--noise', 'none')
+    robot.send(FEEDBACK_ON)
+    robot.run(0.1)
+    robot.simulation.plant.kick((0.0, 0.6, 0.0))
+    felt = states(robot.run(0.3))
+    assert max(abs(state.acceleration[1]) for state in felt) > 2.0
+    assert max(abs(state.attitude[0]) for state in felt) > 0.5
+
+
+def test_heavy_load_drains_the_battery_and_warms_the_servos() -> None:
+    """A minute of standing costs charge and warms the servos that carry the robot."""
+    robot = VirtualRobot('--start', 'stand', '--noise', 'none')
+    robot.simulation.board.advance(0.1)
+    for second in range(1, 61):
+        robot.simulation.board.advance(float(second))
+        robot.simulation.board.advance(second + 0.45)
+    robot.now = 61.0
+    state = last_state(robot)
+    assert robot.simulation.board.battery.charge < 99.9
+    assert state.temperature[slot_of(11)] > state.temperature[slot_of(13)]
+
+
+def test_a_robot_of_one_protocol_is_deaf_at_the_other_speed() -> None:
+    """At another baud rate nothing is understood, and at the right one everything again."""
+    robot = VirtualRobot(*KINEMATIC, '--protocol', 'old')
+    assert robot.ask(Frame(Kind.READ, Code.VERSION)) == []
+    assert robot.line.statistics.garbled > 0
+    other = VirtualRobot(*KINEMATIC, '--protocol', 'new', protocol=OLD)
+    assert other.ask(Frame(Kind.READ, Register.BATTERY, b'\1')) == []
+
+
+def test_states_stay_away_from_a_host_that_went_on_to_the_other_speed() -> None:
+    """After a probe of the new protocol no state disturbs the old one."""
+    robot = VirtualRobot(*KINEMATIC)
+    robot.send(FEEDBACK_ON)
+    robot.run(0.1)
+    robot.line.set_baud(OLD.baud)
+    robot.heard = b''
+    robot.run(0.2)
+    assert robot.heard == b''
+
+
+def test_states_over_a_real_pseudo_terminal(tmp_path: Path) -> None:
+    """A program that opens the port at 2 Mbaud gets whole frames, and none damaged."""
+    with serve(tmp_path / 'xgo', *KINEMATIC) as served:
+        listener = Listener(served.path)
+        listener.send(FEEDBACK_ON)
+        frames = listener.count(25)
+        listener.close()
+    assert [state.sequence for state in states(frames)] == list(range(25))
+    assert listener.parser.counters.damaged == 0
+    assert listener.parser.counters.skipped == 0
+    # never faster than the board sends, over the whole of them
+    assert listener.times[-1] - listener.times[0] > 0.8 * 24 * 0.02
