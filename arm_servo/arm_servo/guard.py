@@ -11,8 +11,8 @@ from .model import RobotModel
 from .otg import Generator, hard_brake, MotionState, Plan
 from .report import Cause, Limiter
 
-EXACT = 1e-9
-"""Rounding of positions that is let pass in [rad]."""
+EXACT = 1e-7
+"""Rounding of ruckig's positions that is let pass in [rad]."""
 
 
 class Guard:
@@ -37,7 +37,9 @@ class Guard:
         self._stop: Plan | None = None
         self._lower: Array = model.limits.lower
         self._upper: Array = model.limits.upper
+        self._anywhere: Array = np.full(len(model), np.inf)
         self._room = np.inf
+        self._fastest: Array = model.limits.velocity * (1.0 + 1e-6)
 
     def reset(self, state: MotionState) -> None:
         """Begin at a state.
@@ -46,6 +48,7 @@ class Guard:
             state: Where the arm is.
         """
         self._stop = self._generator.brake(state)
+        self._lower, self._upper = -self._anywhere, self._anywhere
         self._remember(self._stop, self._distance(self._stop, np.inf))
 
     def step(
@@ -64,13 +67,20 @@ class Guard:
         """
         stop = self._generator.brake(wanted)
         if stop is not None:
-            reason = self._refusal(stop, clearances)
+            reason = self._overspeed(wanted) or self._refusal(stop, clearances)
             if reason is None:
                 self._stop = stop
                 return wanted, None
         else:
             reason = 'no stop behind it'
         return self._brake(state, period), Limiter(Cause.STOP_CHECK, reason, 0.0, 0.0)
+
+    def _overspeed(self, wanted: MotionState) -> str | None:
+        """Return the joint that would overrun its speed before its acceleration is taken back."""
+        coasting = wanted.acceleration * np.abs(wanted.acceleration) / (2.0 * self._limits.jerk)
+        peak = np.maximum(np.abs(wanted.velocity + coasting), np.abs(wanted.velocity))
+        beyond = peak > self._fastest
+        return self._limits.names[int(np.argmax(beyond))] if beyond.any() else None
 
     def _refusal(self, stop: Plan, clearances: bool) -> str | None:
         """Return why a stop is not good enough; remember it when it is."""
@@ -90,8 +100,8 @@ class Guard:
         if stop is None:
             return
         lower, upper = stop.extremes
-        self._lower = np.minimum(self._limits.lower, lower)
-        self._upper = np.maximum(self._limits.upper, upper)
+        self._lower = np.minimum(self._limits.lower, np.maximum(self._lower, lower))
+        self._upper = np.maximum(self._limits.upper, np.minimum(self._upper, upper))
 
     def _distance(self, stop: Plan | None, default: float) -> float:
         """Return the least distance between links where a stop ends in [m]."""

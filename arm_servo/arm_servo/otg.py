@@ -125,7 +125,10 @@ class Generator:
         limits, demand = self._limits, self._to_velocity
         share = _shares(velocity - state.velocity, limits.acceleration)
         unwound = state.acceleration * np.abs(state.acceleration) / (2.0 * limits.jerk * share)
-        share = _shares(velocity - state.velocity - unwound, limits.acceleration)
+        change = velocity - state.velocity - unwound
+        share = _shares(change, limits.acceleration)
+        # no time to lose where the speed would overrun its limit
+        share[np.abs(state.velocity + unwound) > limits.velocity] = 1.0
         _start(demand, state)
         demand.max_acceleration = np.maximum(
             limits.acceleration * share, np.abs(state.acceleration)

@@ -154,13 +154,13 @@ class ServoSource:
             self._held, self._axes_of, self._free = pose, family, NO_AXES
         commanded = np.abs(command.twist) > 0.0
         self._free = self._still_moving(state, axes) & (self._free | commanded)
-        free = self._free | commanded | self._drift
+        moved = self._free | commanded
         error = _error(self._held, pose, axes)
-        error[free] = 0.0
+        error[moved | self._drift] = 0.0
         self._held = _moved(pose, axes, error)
         share = self._share = self._governor(error, period)
         task = TwistTask(
-            command.twist * share, axes, free, self._drift, self._settings.hold * error
+            command.twist * share, axes, moved, self._drift, self._settings.hold * error
         )
         answer = self._ik.cartesian(state, task)
         if share == 1.0:

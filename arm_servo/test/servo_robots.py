@@ -70,11 +70,14 @@ def chain_texts(kinds: str) -> tuple[str, str, dict[str, Any]]:
             f'<parent link="{parent}"/><child link="link_{number + 1}"/><axis xyz="{axis}"/>'
             f'<limit lower="-2" upper="2" velocity="2" effort="1"/></joint>'
         )
-    parts.append('</robot>')
+    parts.append(
+        '<link name="tip"/><joint name="end" type="fixed"><origin xyz="0.1 0 0.15"/>'
+        f'<parent link="link_{len(kinds)}"/><child link="tip"/></joint></robot>'
+    )
     names = [f'j{number + 1}' for number in range(len(kinds))]
     srdf = (
         '<robot name="chain"><group name="arm">'
-        f'<chain base_link="base" tip_link="link_{len(kinds)}"/></group></robot>'
+        '<chain base_link="base" tip_link="tip"/></group></robot>'
     )
     limits = {
         name: {'max_velocity': 2.0, 'max_acceleration': 5.0, 'max_jerk': 50.0} for name in names

@@ -153,7 +153,7 @@ BROKEN: dict[str, tuple[Broken, str]] = {
     'no group': (lambda u, s, t: (u, '<robot name="chain"/>', t), 'groups none'),
     'srdf no xml': (lambda u, s, t: (u, '<robot', t), 'SRDF is no XML'),
     'urdf no xml': (lambda u, s, t: ('<robot', s, t), 'description is no XML'),
-    'unknown tip': (lambda u, s, t: (u, s.replace('link_3', 'link_9'), t), "'link_9'"),
+    'unknown tip': (lambda u, s, t: (u, s.replace('"tip"', '"top"'), t), "'top'"),
     'no limit': (
         lambda u, s, t: (
             u.replace('<limit lower="-2" upper="2" velocity="2" effort="1"/>', ''),

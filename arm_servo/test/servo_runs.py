@@ -1,0 +1,71 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Running the servo in the tests: command in, motion out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from arm_servo.arrays import Array
+from arm_servo.guard import Guard
+from arm_servo.model import RobotModel
+from arm_servo.otg import Generator, MotionState
+from arm_servo.report import Limiter, MotionReport
+from arm_servo.servo import Command, ServoSource
+
+PERIOD = 0.01
+"""Cycle of the tests in [s]: slower than in use, so that they are quick."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Run:
+    """What came out of a run.
+
+    Attributes:
+        states: State after every cycle, the start first.
+        report: The last report.
+        held_up: What the guard held up, by any cycle.
+        moved: Twist from the first pose to the last, in the base.
+    """
+
+    states: list[MotionState]
+    report: MotionReport
+    held_up: list[Limiter]
+    moved: Array
+
+
+def twist_between(model: RobotModel, start: Array, end: Array) -> Array:
+    """Return the twist from one pose to another in unit time."""
+    before, after = model.pose(start), model.pose(end)
+    angular = pin.log3(after.rotation @ before.rotation.T)
+    return np.concatenate((after.position - before.position, angular))
+
+
+def run(
+    model: RobotModel,
+    start: Array | MotionState,
+    command: Command | Callable[[float], Command],
+    duration: float,
+    period: float = PERIOD,
+) -> Run:
+    """Carry out a command, or one that changes with time, for a time [s]."""
+    source, generator = ServoSource(model), Generator(model.limits)
+    guard = Guard(model, generator, clearance=0.005)
+    state = start if isinstance(start, MotionState) else MotionState.at_rest(start)
+    guard.reset(state)
+    states, held_up, report = [state], [], MotionReport()
+    for step in range(round(duration / period)):
+        now = command(step * period) if callable(command) else command
+        answer = source.step(state, now, period)
+        report = answer.report
+        plan = generator.to_velocity(state, answer.velocity)
+        assert plan is not None
+        state, limiter = guard.step(state, plan.at(period), period, clearances=True)
+        held_up += [limiter] if limiter is not None else []
+        states.append(state)
+    moved = twist_between(model, states[0].position, state.position)
+    return Run(states, report, held_up, moved)

@@ -1,0 +1,228 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Jogging: honest speed, held axes, limits that are kept, and never a trap."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+import numpy as np
+import pytest
+from servo_robots import chain, ready, robot, ROBOTS, STRAIGHT
+from servo_runs import PERIOD, Run, run
+
+from arm_servo.arrays import Array
+from arm_servo.model import RobotModel
+from arm_servo.report import Cause
+from arm_servo.servo import JointCommand, PoseCommand, TwistCommand
+
+SPEED = np.array([0.1] * 3 + [0.3] * 3)  # [m/s], [rad/s]
+
+TWISTS = [sign * SPEED * axis for axis in np.eye(6) for sign in (1.0, -1.0)]
+
+
+def kept(model: RobotModel, result: Run) -> None:
+    """Make sure that every limit was kept."""
+    limits = model.limits
+    for before, after in pairwise(result.states):
+        assert np.all(after.position <= np.maximum(limits.upper, before.position) + 1e-6)
+        assert np.all(after.position >= np.minimum(limits.lower, before.position) - 1e-6)
+        assert np.all(np.abs(after.velocity) <= limits.velocity * 1.0001)
+        assert np.all(np.abs(after.acceleration) <= limits.acceleration * 1.0001)
+        jerk = (after.acceleration - before.acceleration) / PERIOD
+        assert np.all(np.abs(jerk) <= limits.jerk * 1.0001)
+
+
+def moves_or_tells(result: Run, twist: Array) -> bool:
+    """Whether the tool moved as asked by a twentieth at least, or the report names a cause."""
+    axis = int(np.argmax(np.abs(twist)))
+    asked = twist[axis] * PERIOD * (len(result.states) - 1)
+    return bool(result.moved[axis] / asked > 0.05 or result.report.limiters or result.held_up)
+
+
+@pytest.mark.parametrize('name', ROBOTS)
+@pytest.mark.parametrize('twist', TWISTS, ids=str)
+def test_the_asked_speed_is_the_speed(name: str, twist: Array) -> None:
+    """Where nothing limits, the tool's speed is within one percent of what was asked."""
+    model, slow = robot(name), twist * 0.3
+    result = run(model, ready(name), TwistCommand(slow), 0.6)
+    state = result.states[-1]
+    achieved = model.jacobian(state.position) @ state.velocity
+    if result.report.factor > 0.999:
+        assert achieved == pytest.approx(slow, abs=0.01 * float(np.abs(slow).max()))
+    else:
+        assert result.report.limiters
+
+
+@pytest.mark.parametrize('name', ROBOTS)
+def test_a_minute_of_rotation_leaves_the_tool_in_place(name: str) -> None:
+    """In 60 s of turning to and fro about each axis the tool centre stays within 1 mm."""
+    model = robot(name)
+
+    def turning(time: float) -> TwistCommand:
+        twist = np.zeros(6)
+        twist[3 + int(time / 20)] = 0.2 if time % 6 < 3 else -0.2
+        return TwistCommand(twist)
+
+    result = run(model, ready(name), turning, 59.9, period=0.02)
+    home = model.pose(ready(name)).position
+    away = [
+        np.linalg.norm(model.pose(state.position).position - home) for state in result.states[::20]
+    ]
+    assert max(away) < 1e-3
+
+
+@pytest.mark.parametrize('name', ROBOTS)
+@pytest.mark.parametrize('twist', TWISTS, ids=str)
+def test_no_trap_in_the_straight_pose(name: str, twist: Array) -> None:
+    """From the singular pose each direction moves, or the report names what is lost."""
+    model = robot(name)
+    result = run(model, STRAIGHT[name], TwistCommand(twist), 1.0)
+    assert moves_or_tells(result, twist)
+    kept(model, result)
+
+
+@pytest.mark.parametrize('name', ROBOTS)
+def test_the_straight_pose_can_be_left(name: str) -> None:
+    """From the singular pose the tool gets away in more than half of the directions."""
+    model, gone = robot(name), 0
+    for twist in TWISTS:
+        result = run(model, STRAIGHT[name], TwistCommand(twist), 2.5)
+        axis = int(np.argmax(np.abs(twist)))
+        gone += int(result.moved[axis] / twist[axis] > 0.1)
+    assert gone > 6
+
+
+@pytest.mark.parametrize('name', ROBOTS)
+@pytest.mark.parametrize('twist', TWISTS, ids=str)
+def test_no_trap_at_a_joint_limit(name: str, twist: Array) -> None:
+    """At a limit each direction moves, or the report names what blocks it."""
+    model = robot(name)
+    start = np.array(ready(name))
+    start[4] = model.limits.upper[4]
+    result = run(model, start, TwistCommand(twist), 1.0)
+    assert moves_or_tells(result, twist)
+    kept(model, result)
+
+
+CONTACTS = {
+    'panda': [-1.49, 1.32, 0.5, -2.3, -0.74, 1.21, 1.08],
+    'prbt': [0.19, 1.58, -1.99, -1.55, -1.63, 0.08],
+    'gp110': [1.62, 1.63, -1.11, -0.74, -1.63, -1.73],
+}
+"""Poses with links in contact."""
+
+
+@pytest.mark.parametrize('name', ROBOTS)
+@pytest.mark.parametrize('twist', TWISTS, ids=str)
+def test_no_trap_in_contact(name: str, twist: Array) -> None:
+    """With links overlapping each direction moves, or the report names what blocks it."""
+    model = robot(name)
+    start = np.array(CONTACTS[name])
+    before = model.clearance(start)
+    assert before < 0.005
+    result = run(model, start, TwistCommand(twist), 1.0)
+    assert moves_or_tells(result, twist)
+    assert model.clearance(result.states[-1].position) > min(before, 0.004) - 1e-3
+    kept(model, result)
+
+
+@pytest.mark.parametrize('name', ROBOTS)
+def test_contact_can_be_left(name: str) -> None:
+    """With links overlapping there is a direction in which they come apart."""
+    model = robot(name)
+    start = np.array(CONTACTS[name])
+    ends = [run(model, start, TwistCommand(twist), 1.0).states[-1].position for twist in TWISTS]
+    assert max(map(model.clearance, ends)) > model.clearance(start) + 0.01
+
+
+@pytest.mark.parametrize('name', ROBOTS)
+@settings(max_examples=8, deadline=None)
+@given(seed=st.integers(0, 10**6))
+def test_limits_hold_over_random_commands(name: str, seed: int) -> None:
+    """Whatever is jogged from wherever, no limit is broken and no contact made."""
+    model, rng = robot(name), np.random.default_rng(seed)
+    state = run(model, ready(name), TwistCommand(np.zeros(6)), PERIOD).states[-1]
+    for _ in range(5):
+        twist = rng.normal(size=6) * SPEED * 3
+        command = TwistCommand(twist, link=model.tip if rng.random() < 0.5 else None)
+        result = run(model, state, command, 0.4)
+        kept(model, result)
+        assert model.clearance(result.states[-1].position) > 0.0
+        state = result.states[-1]
+
+
+@pytest.mark.parametrize('kinds', ['zyy', 'zyyz', 'zyyzy', 'cyyzyz', 'zyzyzyz', 'zyzyzyzy'])
+def test_three_to_eight_joints(kinds: str) -> None:
+    """Arms of 3 to 8 joints follow a twist that they can follow, without special cases."""
+    model = chain(kinds)
+    start = np.array([0.3, 0.2, 1.5, 0.9, 1.1, 0.8, 0.9, 0.4][: len(kinds)])
+    twist = np.array([0.0, 0.0, 0.02, 0.0, 0.0, 0.0])
+    result = run(model, start, TwistCommand(twist), 2.0)
+    assert result.moved[2] == pytest.approx(0.04, rel=0.15)
+    assert np.abs(result.moved[:2]).max() < 2e-3
+    kept(model, result)
+
+
+@pytest.mark.parametrize('name', ROBOTS)
+def test_a_blocked_axis_does_not_stop_the_other(name: str) -> None:
+    """Where one commanded axis is lost the other goes on: only the lost direction slows."""
+    model = robot(name)
+    start = np.array(ready(name))
+    result = run(model, start, TwistCommand(np.array([0.4, 0.1, 0, 0, 0, 0])), 4.0)
+    end = result.states[-1]
+    achieved = model.jacobian(end.position) @ end.velocity
+    assert result.moved[1] > 0.2 or result.report.limiters
+    assert achieved[0] < 0.4
+    kept(model, result)
+
+
+def test_commands_in_the_tools_frame_follow_it() -> None:
+    """A twist along a link's axes turns with the link."""
+    model = robot('gp110')
+    start = ready('gp110')
+    twist = np.array([0.0, 0.0, 0.05, 0.0, 0.0, 0.0])
+    result = run(model, start, TwistCommand(twist, link='tool0'), 1.0)
+    out = model.pose(start).rotation @ twist[:3]
+    assert result.moved[:3] @ out / 0.05 == pytest.approx(0.05, rel=0.1)
+
+
+def test_a_jogged_joint_moves_alone() -> None:
+    """Joints that are not commanded stay, and the commanded one has the asked speed."""
+    model = robot('panda')
+    velocity, commanded = np.zeros(7), np.zeros(7, dtype=np.bool_)
+    velocity[2], commanded[2] = 0.4, True
+    result = run(model, ready('panda'), JointCommand(velocity, commanded), 0.5)
+    assert result.states[-1].velocity == pytest.approx(velocity, abs=1e-5)
+
+
+def test_a_joint_is_braked_in_front_of_its_limit() -> None:
+    """A joint that is jogged to its end comes to rest there, and the report names it."""
+    model = robot('prbt')
+    velocity, commanded = np.zeros(6), np.zeros(6, dtype=np.bool_)
+    velocity[4], commanded[4] = 1.5, True
+    start = np.array(ready('prbt'))
+    result = run(model, start, JointCommand(velocity, commanded), 2.5)
+    assert result.states[-1].position[4] == pytest.approx(model.limits.upper[4], abs=2e-3)
+    assert any(
+        each.cause is Cause.JOINT_POSITION and each.name == 'prbt_joint_5'
+        for each in result.report.limiters
+    )
+    kept(model, result)
+
+
+@pytest.mark.parametrize('name', ROBOTS)
+def test_a_pose_is_reached_at_rest(name: str) -> None:
+    """A pose target is approached, reached within 0.1 mm, and not overrun."""
+    model = robot(name)
+    start = ready(name)
+    there = np.array(start) + np.linspace(-0.15, 0.15, len(model))
+    result = run(model, start, PoseCommand(model.pose(there)), 5.0)
+    end = model.pose(result.states[-1].position)
+    goal = model.pose(there)
+    assert end.position == pytest.approx(goal.position, abs=1e-4)
+    assert end.rotation == pytest.approx(goal.rotation, abs=1e-3)
+    assert np.abs(result.states[-1].velocity).max() < 1e-3
+    kept(model, result)
