@@ -20,6 +20,9 @@ Array = NDArray[np.float64]
 
 BASE = 'base_link'
 FEET = tuple(f'{leg}_foot' for leg in LEGS)
+_EYE = np.eye(3)
+_IDENTITIES: Array = np.stack([_EYE] * len(FEET))
+_ORIGINS: Array = np.zeros((len(FEET), 3))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,7 +45,8 @@ class _Stage:
     rotation: Array  # (4, 3, 3)
     position: Array  # (4, 3)
     cross: Array  # (4, 3, 3) cross product with the axis
-    joints: list[int]  # where their angles stand
+    cross_twice: Array  # (4, 3, 3)
+    joints: NDArray[np.intp]  # where their angles stand (4, 1, 1)
 
 
 class Feet:
@@ -83,20 +87,20 @@ class Feet:
             angles: Positions of the joints [rad].
         """
         values = np.asarray(angles, dtype=np.float64)
-        rotation = np.broadcast_to(np.eye(3), (len(FEET), 3, 3))
-        position: Array = np.zeros((len(FEET), 3))
+        rotation, position = _IDENTITIES, _ORIGINS
+        sines, versines = np.sin(values), 1.0 - np.cos(values)
         for stage in self._stages:
             position = position + _apply(rotation, stage.position)
-            angle = values[stage.joints][:, None, None]
-            sine, cosine = np.sin(angle), np.cos(angle)
-            turn = np.eye(3) + sine * stage.cross + (1 - cosine) * (stage.cross @ stage.cross)
+            sine, versine = sines[stage.joints], versines[stage.joints]
+            # Rodrigues: I + sin K + (1 - cos) K²
+            turn = _EYE + sine * stage.cross + versine * stage.cross_twice
             rotation = rotation @ stage.rotation @ turn
         tip = position + _apply(rotation, self._tip_position)
         return FootPoses(tip, rotation @ self._tip_rotation)
 
 
 def _apply(rotation: Array, vector: Array) -> Array:
-    result: Array = np.einsum('nij,nj->ni', rotation, vector)
+    result: Array = (rotation @ vector[:, :, None])[:, :, 0]
     return result
 
 
@@ -141,7 +145,8 @@ def _stage(
     rotation, position = _stack(fixed)
     axes = [_numbers(joint.find('axis'), 'xyz', '1 0 0') for joint in moving]
     cross = np.array([_cross(axis / np.linalg.norm(axis)) for axis in axes])
-    return _Stage(rotation, position, cross, [joints.index(j.get('name', '')) for j in moving])
+    indices = np.array([joints.index(j.get('name', '')) for j in moving], dtype=np.intp)
+    return _Stage(rotation, position, cross, cross @ cross, indices[:, None, None])
 
 
 def _stack(parts: Sequence[tuple[Array, Array]]) -> tuple[Array, Array]:

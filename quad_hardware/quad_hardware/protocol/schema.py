@@ -104,6 +104,7 @@ class Field:
         scale: Unit of one step on the wire, for integers.
         unit: Unit of the value.
         meaning: For the protocol page.
+        layout: Format of the run for :mod:`struct`.
     """
 
     name: str
@@ -113,16 +114,17 @@ class Field:
     scale: float = 1.0
     unit: str = ''
     meaning: str = ''
+    layout: str = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Make the format once: states are decoded 50 times a second."""
+        order, letter = self.scalar.value
+        object.__setattr__(self, 'layout', f'{order}{self.count}{letter}')
 
     @property
     def size(self) -> int:
         """Size of the whole run [B]."""
         return self.scalar.size * self.count
-
-    @property
-    def layout(self) -> str:
-        """Format of the run for :mod:`struct`."""
-        return f'{self.scalar.value[0]}{self.count}{self.scalar.value[1]}'
 
     def pack(self, values: Iterable[float]) -> bytes:
         """Encode a run.
@@ -159,12 +161,12 @@ class Function:
         access: Which kinds of frame carry it.
         fields: Payload, in the order of offsets.
         repeated: The fields describe one group of several; a payload holds one group or more.
-        size: Length of the payload [B] where it is longer than its fields (filled with zeros),
-            or where the fields are ``repeated``: of one group.
+        size: Length of the payload [B] where it is longer than its fields (filled with zeros).
         spans: What a byte 0 to 255 spreads over, for functions of one byte.
         unit: Unit of the spans.
         meaning: For the protocol page.
-        variable: Payloads may also be shorter than ``size``.
+        variable: Payloads may also be shorter.
+        length: Length of a payload, or of one group of it [B].
     """
 
     address: int
@@ -177,11 +179,12 @@ class Function:
     spans: Mapping[Model, Span] = field(default_factory=dict)
     unit: str = ''
     variable: bool = False
+    length: int = field(init=False)
 
-    @property
-    def length(self) -> int:
-        """Length of a payload, or of one group of it [B]."""
-        return max(self.size, max((f.offset + f.size for f in self.fields), default=0))
+    def __post_init__(self) -> None:
+        """Add up the length once."""
+        end = max((f.offset + f.size for f in self.fields), default=0)
+        object.__setattr__(self, 'length', max(self.size, end))
 
     def accepts(self, length: int) -> bool:
         """Tell whether a payload may have a length [B]."""
@@ -211,6 +214,8 @@ class Function:
         """
         if not self.accepts(len(payload)) or len(payload) % self.length:
             raise CodecError(f'{self.name}: payload of {len(payload)} bytes, not {self.length}')
+        if len(payload) == self.length:
+            return {part.name: part.unpack(payload) for part in self.fields}
         starts = range(0, len(payload), self.length)
         return {
             part.name: tuple(v for start in starts for v in part.unpack(payload, start))
