@@ -34,6 +34,7 @@ def decode(text: str, *, kitty: bool = False) -> list[tuple[str, KeyAction]]:
         ('\x7f', 'backspace'),
         ('\x03', 'ctrl+c'),
         ('\x1a', 'ctrl+z'),
+        ('\x1c', 'ctrl+\\'),
         ('\x1bi', 'alt+i'),
         ('\x1b[A', 'up'),
         ('\x1bOB', 'down'),

@@ -8,6 +8,8 @@ keyboard protocol, section "Functional key definitions".
 
 from __future__ import annotations
 
+ESCAPE = '\x1b'
+
 CONTROL_NAMES = {
     '\r': 'enter',
     '\n': 'enter',
@@ -85,5 +87,6 @@ def character_name(character: str) -> str:
     if character in CONTROL_NAMES:
         return CONTROL_NAMES[character]
     if character < ' ':
-        return f'ctrl+{chr(ord(character) + 0x60)}'
+        base = 0x60 if character < ESCAPE else 0x40  # letters are named by their small form
+        return f'ctrl+{chr(ord(character) + base)}'
     return character

@@ -12,7 +12,7 @@ import time
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
-from operator_input.devices import KernelDevices
+from operator_input.devices import InputDevices, KernelDevices
 from operator_input.gamepad import AUTO, Button, Deadman, Gamepad
 
 from ..command_stream import ZEROS
@@ -40,8 +40,11 @@ class TeleopGamepad(Node):
         gamepad: What is read.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, devices: InputDevices | None = None) -> None:
         """Declare the parameters and advertise the topics.
+
+        Args:
+            devices: Where gamepads are; those of this machine when it is None.
 
         Raises:
             SettingError: A parameter is misspelt or makes no sense.
@@ -65,7 +68,7 @@ class TeleopGamepad(Node):
         refuse_misspelt(self)
         say = self.get_logger().info
         self.gamepad = Gamepad(
-            KernelDevices(), preset=preset, device=device, dead_zone=dead_zone, say=say
+            devices or KernelDevices(), preset=preset, device=device, dead_zone=dead_zone, say=say
         )
 
     def _button(self, name: str, default: Button, meaning: str) -> Button | None:

@@ -92,7 +92,6 @@ class Session:
                 self._serve()
         finally:
             self._end()
-            self._line.end()
             self._executor.shutdown()
 
     def _serve(self) -> None:
@@ -149,7 +148,6 @@ class Session:
 
     def _suspend(self) -> None:
         self._end()
-        self._line.end()
         with self._keyboard.paused():
             os.killpg(0, signal.SIGTSTP)  # goes on here after the shell's fg
         self._line.say('going on')
@@ -163,6 +161,8 @@ class Session:
             if 0.0 < pause < LONGEST_WAIT:
                 time.sleep(pause)
         self._node.outputs.flush()
+        self._show(time.monotonic())
+        self._line.end()
 
 
 def main() -> None:

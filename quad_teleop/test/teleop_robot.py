@@ -1,0 +1,76 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The other end of the teleop nodes: hears velocities and poses, and answers set_mode."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from geometry_msgs.msg import Pose, Twist, TwistStamped
+from ros_client import RosClient
+
+from quad_msgs.srv import SetMode
+
+STILL = (0.0, 0.0, 0.0)
+PATIENCE = 30.0  # [s] of a test on a busy machine
+
+
+class Robot:
+    """Listens like a controller, in a domain of its own.
+
+    Attributes:
+        client: The node behind it.
+        twists: Velocities of /cmd_vel.
+        stamped: Velocities of /cmd_vel_stamped.
+        poses: Poses of /body_pose.
+        modes: What /set_mode was asked for.
+    """
+
+    def __init__(self, client: RosClient, *, answers: bool = True) -> None:
+        """Subscribe, and offer the service."""
+        self.client = client
+        self.twists: list[Twist] = client.listen(Twist, 'cmd_vel')
+        self.stamped: list[TwistStamped] = client.listen(TwistStamped, 'cmd_vel_stamped')
+        self.poses: list[Pose] = client.listen(Pose, 'body_pose')
+        self.modes: list[str] = []
+        if answers:
+            client.node.create_service(SetMode, 'set_mode', self._set_mode)
+
+    @property
+    def velocities(self) -> list[tuple[float, float, float]]:
+        """What was heard on /cmd_vel: x, y [m/s] and yaw [rad/s]."""
+        return [(each.linear.x, each.linear.y, each.angular.z) for each in self.twists]
+
+    def wait_for(self, velocity: tuple[float, float, float], *, after: int = 0) -> int:
+        """Wait until a velocity is heard; return how many messages there are then."""
+        wanted = tuple(round(part, 6) for part in velocity)
+
+        def heard() -> bool:
+            found = self.velocities[after:]
+            return any(tuple(round(part, 6) for part in each) == wanted for each in found)
+
+        self.client.spin_until(heard, PATIENCE, f'velocity {velocity} on /cmd_vel')
+        return len(self.twists)
+
+    def wait_until_stopped(self) -> None:
+        """Wait for a zero."""
+        self.client.spin_until(
+            lambda: bool(self.twists) and self.velocities[-1] == STILL, PATIENCE, 'zero'
+        )
+
+    def wait_until_linked(self) -> None:
+        """Wait until a teleop publishes here."""
+        count = self.client.node.count_publishers
+        self.client.spin_until(lambda: count('cmd_vel') > 0, PATIENCE, 'publisher of /cmd_vel')
+
+    def listen_for(self, duration: float) -> None:
+        """Listen for a time, for what must not come."""
+        clock = self.client.node.get_clock()
+        end = clock.now().nanoseconds + int(duration * 1e9)
+        self.client.spin_until(lambda: clock.now().nanoseconds > end, PATIENCE, 'end')
+
+    def _set_mode(self, request: Any, response: Any) -> Any:
+        self.modes.append(request.mode)
+        response.success = request.mode != 'lie'
+        response.message = request.mode if response.success else 'stays in stand: it is too high'
+        return response

@@ -1,0 +1,134 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+from hypothesis import given
+from hypothesis import strategies as st
+import pytest
+
+from operator_input.gamepad import AT_REST, Axis, Button, Deadman, GamepadState
+from quad_teleop import BodyPose, Mode, Speeds, Velocity
+from quad_teleop.body_pose import NEUTRAL, PoseSteps
+from quad_teleop.command_stream import CommandStream
+from quad_teleop.gamepad_teleop import GamepadTeleop, MODE_BUTTONS
+from quad_teleop.requests import ModeRequest, PoseRequest
+from quad_teleop.velocity import ZERO
+
+DEADMAN, TURBO = Button.LEFT_SHOULDER, Button.RIGHT_SHOULDER
+
+
+def teleop(deadman: Deadman | None = None) -> GamepadTeleop:
+    """Make one: normal speeds 0.15 and 0.6, turbo 0.3 and 1.2."""
+    return GamepadTeleop(
+        Speeds(0.15, 0.6),
+        Speeds(0.3, 1.2),
+        deadman or Deadman(),
+        PoseSteps(),
+        CommandStream(0.05),
+    )
+
+
+def state(*buttons: Button, **axes: float) -> GamepadState:
+    """Make a state of the gamepad."""
+    return GamepadState({Axis[name]: way for name, way in axes.items()}, frozenset(buttons))
+
+
+def test_sticks_move_only_with_the_deadman() -> None:
+    """Without it the sticks are dead; with it the left one walks and the right one turns."""
+    target = teleop()
+    target.feed(state(LEFT_Y=1.0))
+    assert target.step(0.0) is None
+    target.feed(state(DEADMAN, LEFT_Y=1.0, LEFT_X=-0.5, RIGHT_X=0.5))
+    assert target.step(0.1) == Velocity(0.15, -0.075, 0.3)
+
+
+def test_turbo_is_faster_and_a_deadman_too() -> None:
+    """The turbo button alone allows motion, at the turbo's speeds."""
+    target = teleop()
+    target.feed(state(TURBO, LEFT_Y=1.0, RIGHT_X=-1.0))
+    assert target.step(0.0) == Velocity(0.3, 0.0, -1.2)
+
+
+def test_deadman_release_says_zero_and_then_nothing() -> None:
+    """Let go with the stick still pushed: zeros, silence."""
+    target = teleop()
+    target.feed(state(DEADMAN, LEFT_Y=1.0))
+    target.step(0.0)
+    target.feed(state(LEFT_Y=1.0))
+    words = [target.step(0.01 * index) for index in range(100)]
+    assert [word for word in words if word is not None] == [ZERO] * 3
+
+
+def test_centred_stick_with_the_deadman_holds_the_robot() -> None:
+    """A held deadman keeps others away: it says zero as long as it is held."""
+    target = teleop()
+    target.feed(state(DEADMAN))
+    assert [target.step(0.05 * index) for index in range(10)] == [ZERO] * 10
+
+
+def test_without_a_deadman_button_rest_is_silence() -> None:
+    """Where no button is needed, an untouched or unplugged gamepad does not stream zeros."""
+    target = teleop(Deadman(enable=None, turbo=None))
+    target.feed(state(LEFT_Y=1.0))
+    assert target.step(0.0) == Velocity(0.15, 0.0, 0.0)
+    target.feed(AT_REST)
+    words = [target.step(0.1 + 0.1 * index) for index in range(20)]
+    assert [word for word in words if word is not None] == [ZERO] * 3
+
+
+@pytest.mark.parametrize(('button', 'mode'), MODE_BUTTONS.items())
+def test_modes_that_move_need_the_deadman(button: Button, mode: Mode) -> None:
+    """A button hit by accident does not make the robot stand up; lying down is always allowed."""
+    assert teleop().feed(state(DEADMAN, button)) == [ModeRequest(mode)]
+    assert teleop().feed(state(button)) == ([ModeRequest(mode)] if mode is Mode.LIE else [])
+
+
+def test_held_button_asks_once() -> None:
+    """A state that comes again, as the sticks move, asks nothing again."""
+    target = teleop()
+    assert target.feed(state(DEADMAN, Button.SOUTH)) != []
+    assert target.feed(state(DEADMAN, Button.SOUTH, LEFT_Y=0.5)) == []
+
+
+def test_d_pad_lifts_and_tilts_step_by_step() -> None:
+    """Each press is a step, as far as the limit; start is neutral."""
+    target = teleop()
+    assert target.feed(state(DEADMAN, DPAD_Y=1.0)) == [PoseRequest(BodyPose(height=0.005))]
+    assert target.feed(state(DEADMAN, DPAD_Y=1.0)) == []
+    target.feed(state(DEADMAN))
+    assert target.feed(state(DEADMAN, DPAD_X=-1.0)) == [PoseRequest(BodyPose(0.005, 0.05))]
+    assert target.feed(state(DEADMAN, Button.START, DPAD_X=-1.0)) == [PoseRequest(NEUTRAL)]
+    assert target.feed(state(DPAD_Y=-1.0)) == []
+
+
+STATES = st.builds(
+    GamepadState,
+    st.dictionaries(st.sampled_from(Axis), st.floats(-1, 1)),
+    st.frozensets(st.sampled_from(Button), max_size=4),
+)
+
+
+@given(st.lists(STATES, max_size=30))
+def test_speed_is_bounded_and_only_with_the_deadman(states: list[GamepadState]) -> None:
+    """Whatever the pad reports: no motion without the button, and none above the speeds."""
+    target = teleop()
+    for index, each in enumerate(states):
+        target.feed(each)
+        velocity = target.step(0.1 * index)
+        if not each.buttons & {DEADMAN, TURBO}:
+            assert velocity in {None, ZERO}
+        elif velocity is not None:
+            limit = 0.3 if TURBO in each.buttons else 0.15
+            assert max(abs(velocity.x), abs(velocity.y)) <= limit
+            assert abs(velocity.yaw) <= limit * 4
+
+
+@given(st.lists(STATES, max_size=10))
+def test_lost_gamepad_stops(states: list[GamepadState]) -> None:
+    """At rest, as after it was unplugged, the last word is zero and then there is none."""
+    target, last = teleop(), ZERO
+    for index, each in enumerate([*states, *[AT_REST] * 10]):
+        target.feed(each)
+        last = target.step(0.1 * index) or last
+    assert last == ZERO
+    assert target.step(100.0) is None

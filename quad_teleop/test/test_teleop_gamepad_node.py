@@ -1,0 +1,136 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+from collections.abc import Iterator
+import subprocess
+import threading
+
+from input_devices import HAT, InjectedDevice, InjectedDevices, STICK
+from isolation import Isolation
+from processes import executable
+import pytest
+import rclpy
+from ros_client import RosClient
+from teleop_robot import PATIENCE, Robot, STILL
+
+from quad_teleop.nodes.teleop_gamepad import Session, TeleopGamepad
+
+pytestmark = pytest.mark.scenario
+ABS_X, ABS_Y, ABS_RX, ABS_RY, ABS_HAT0Y = 0, 1, 3, 4, 0x11
+SOUTH, LEFT_SHOULDER, RIGHT_SHOULDER = 0x130, 0x136, 0x137
+FORWARD = (0.15, 0.0, 0.0)
+
+
+@pytest.fixture
+def pad() -> InjectedDevice:
+    """Make an Xbox pad."""
+    axes = dict.fromkeys((ABS_X, ABS_Y, ABS_RX, ABS_RY), STICK) | {ABS_HAT0Y: HAT}
+    return InjectedDevice('Xbox Wireless Controller', range(0x130, 0x13F), axes, vendor=0x045E)
+
+
+@pytest.fixture
+def context(isolation: Isolation) -> Iterator[None]:
+    """Start ROS in the test's domain."""
+    rclpy.init(domain_id=isolation.domain_id)
+    try:
+        yield
+    finally:
+        rclpy.shutdown()
+
+
+@pytest.fixture
+def robot(context: None, pad: InjectedDevice, isolation: Isolation) -> Iterator[Robot]:
+    """Run the node's own loop on the pad, and listen."""
+    stop = threading.Event()
+    node = TeleopGamepad(InjectedDevices(pad))
+    thread = threading.Thread(target=Session(node, stop).run)
+    thread.start()
+    try:
+        with RosClient(isolation.domain_id) as client:
+            robot = Robot(client)
+            robot.wait_until_linked()
+            client.spin_until(lambda: node.outputs.is_heard, PATIENCE, 'link')
+            yield robot
+    finally:
+        stop.set()
+        thread.join()
+        node.destroy_node()
+
+
+def test_deadman_stick_and_turbo(pad: InjectedDevice, robot: Robot) -> None:
+    """Stick alone: nothing. With the deadman it walks, with turbo faster; let go, it stops."""
+    pad.move(ABS_Y, -32768)
+    robot.listen_for(0.3)
+    assert robot.twists == []
+    pad.press(LEFT_SHOULDER)
+    robot.wait_for(FORWARD)
+    pad.press(RIGHT_SHOULDER)
+    robot.wait_for((0.3, 0.0, 0.0))
+    pad.release(RIGHT_SHOULDER)
+    pad.release(LEFT_SHOULDER)
+    robot.wait_until_stopped()
+    robot.listen_for(0.3)
+    count = len(robot.twists)
+    robot.listen_for(0.5)
+    assert len(robot.twists) == count, 'an idle gamepad is silent'
+    assert robot.velocities[-3:] == [STILL] * 3
+
+
+def test_unplugged_while_moving(pad: InjectedDevice, robot: Robot) -> None:
+    """The cable is pulled, or the battery is empty, with the deadman held: zeros leave."""
+    pad.press(LEFT_SHOULDER)
+    pad.move(ABS_Y, -32768)
+    robot.wait_for(FORWARD)
+    pad.unplug()
+    robot.wait_until_stopped()
+
+
+def test_modes_and_body(pad: InjectedDevice, robot: Robot) -> None:
+    """With the deadman, A asks to stand and the d-pad lifts the body."""
+    pad.press(LEFT_SHOULDER)
+    pad.press(SOUTH)
+    robot.client.spin_until(lambda: robot.modes == ['stand'], PATIENCE, 'set_mode')
+    pad.move(ABS_HAT0Y, -1)
+    robot.client.spin_until(lambda: bool(robot.poses), PATIENCE, 'body pose')
+    assert robot.poses[0].position.z == pytest.approx(0.005)
+
+
+def test_program_without_a_gamepad_waits_and_ends(isolation: Isolation) -> None:
+    """Started before the gamepad is there: it says so, waits, and ends by Ctrl-C with 0."""
+    process = subprocess.Popen(
+        [executable('quad_teleop', 'teleop_gamepad'), '--ros-args', '-p', 'device:=no such pad'],
+        env=isolation.env,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        assert process.stderr is not None
+        assert 'no gamepad yet: plug one in' in process.stderr.readline()
+        process.send_signal(2)
+        assert process.wait(PATIENCE) == 0
+    finally:
+        process.kill()
+        process.communicate()
+
+
+@pytest.mark.parametrize(
+    ('parameter', 'message'),
+    [
+        ('preset:=xbux', "did you mean 'xbox'"),
+        ('enable_button:=left_sholder', "which is no button; did you mean 'left_shoulder'"),
+    ],
+)
+def test_program_refuses_unknown_names(isolation: Isolation, parameter: str, message: str) -> None:
+    """A preset or button that does not exist ends the program with the one that was meant."""
+    result = subprocess.run(
+        [executable('quad_teleop', 'teleop_gamepad'), '--ros-args', '-p', parameter],
+        env=isolation.env,
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+        check=False,
+    )
+    assert result.returncode == 1
+    assert message in result.stderr
+    assert 'Traceback' not in result.stderr

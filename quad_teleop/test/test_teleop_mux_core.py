@@ -1,0 +1,190 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from hypothesis import given
+from hypothesis import strategies as st
+import pytest
+
+from quad_teleop import CommandError, SettingError
+from quad_teleop.mux import Input, Inputs, Multiplexer, read_inputs
+from quad_teleop.mux.sources import DEFAULTS
+
+FORWARD = (0.1, 0.0, 0.0, 0.0, 0.0, 0.0)
+STILL = (0.0,) * 6
+NAVIGATION, KEYBOARD = 'navigation', 'keyboard'
+
+
+def mux(*locks: Input) -> Multiplexer:
+    """Make one with a planner below a keyboard."""
+    sources = (Input(KEYBOARD, 'key_vel', 0.5, 90), Input(NAVIGATION, 'nav_vel', 0.5, 10))
+    return Multiplexer(Inputs(sources, locks))
+
+
+def test_higher_priority_is_heard() -> None:
+    """The keyboard takes over from the planner, which is heard again after its time-out."""
+    target = mux()
+    assert target.velocity(NAVIGATION, FORWARD, 0.0)
+    assert target.velocity(KEYBOARD, FORWARD, 0.1)
+    assert not target.velocity(NAVIGATION, FORWARD, 0.2)
+    assert not target.velocity(NAVIGATION, FORWARD, 0.6)
+    assert target.velocity(NAVIGATION, FORWARD, 0.61)
+
+
+def test_source_that_falls_silent_is_stopped_once() -> None:
+    """The robot does not go on until its own time-out: one zero, and no stream of them."""
+    target = mux()
+    target.velocity(KEYBOARD, FORWARD, 0.0)
+    assert not target.zero_due(0.5)
+    assert target.zero_due(0.51)
+    assert not target.zero_due(0.6)
+
+
+def test_source_that_stopped_itself_needs_no_zero() -> None:
+    """After its own zero, silence is silence."""
+    target = mux()
+    target.velocity(KEYBOARD, FORWARD, 0.0)
+    target.velocity(KEYBOARD, STILL, 0.1)
+    assert not target.zero_due(5.0)
+
+
+def test_lock_stops_what_is_below_it() -> None:
+    """A lock silences lower priorities at once, with a zero; equal and higher ones pass."""
+    target = mux(Input('pause', 'pause', 0.0, 90))
+    target.velocity(NAVIGATION, FORWARD, 0.0)
+    target.lock('pause', True, 0.1)
+    assert target.zero_due(0.1)
+    assert not target.velocity(NAVIGATION, FORWARD, 0.2)
+    assert target.velocity(KEYBOARD, FORWARD, 0.2)
+    target.lock('pause', False, 1.0)
+    assert target.velocity(NAVIGATION, FORWARD, 1.0)
+
+
+def test_lock_with_a_time_out_closes_by_silence() -> None:
+    """A heartbeat that stops locks, and so does one that was never heard."""
+    target = mux(Input('heartbeat', 'heartbeat', 1.0, 255))
+    assert not target.velocity(KEYBOARD, FORWARD, 0.0)
+    target.lock('heartbeat', False, 1.0)
+    assert target.velocity(KEYBOARD, FORWARD, 1.5)
+    assert not target.velocity(KEYBOARD, FORWARD, 2.1)
+    assert target.zero_due(2.1)
+
+
+def test_source_without_a_time_out_keeps_its_place() -> None:
+    """Time-out 0 never expires, but only once the source was heard at all."""
+    target = Multiplexer(Inputs((Input('a', 'a', 0.0, 50), Input('b', 'b', 0.5, 10)), locks=()))
+    assert target.velocity('b', FORWARD, 0.0)
+    assert target.velocity('a', FORWARD, 1.0)
+    assert not target.velocity('b', FORWARD, 1e6)
+    assert not target.zero_due(1e6)
+
+
+def test_equal_priorities_go_by_name() -> None:
+    """Of two the first by name is heard, so that it is always the same one."""
+    inputs = read_inputs(
+        {
+            f'{name}.{field}': value
+            for name in ('tablet', 'joystick')
+            for field, value in (('topic', name), ('timeout', 0.5), ('priority', 100))
+        },
+        {},
+    )
+    target = Multiplexer(inputs)
+    target.velocity('tablet', FORWARD, 0.0)
+    assert target.velocity('joystick', FORWARD, 0.1)
+    assert not target.velocity('tablet', FORWARD, 0.2)
+
+
+@pytest.mark.parametrize('number', [math.nan, math.inf, -math.inf])
+def test_no_number_is_refused(number: float) -> None:
+    """NaN is not forwarded, is told, and does not keep others from being heard."""
+    target = mux()
+    with pytest.raises(CommandError, match='keyboard sends'):
+        target.velocity(KEYBOARD, (number, *STILL[1:]), 0.0)
+    assert target.velocity(NAVIGATION, FORWARD, 0.1)
+
+
+STEPS = st.lists(
+    st.tuples(
+        st.sampled_from([KEYBOARD, NAVIGATION, 'pause', 'tick']),
+        st.booleans(),
+        st.sampled_from([0.0, 0.05, 0.2, 0.49, 0.51, 2.0]),
+    ),
+    max_size=60,
+)
+
+
+@given(STEPS)
+def test_robot_is_never_left_moving(steps: list[tuple[str, bool, float]]) -> None:
+    """Whatever comes: when all fall silent, the last word to the robot is zero."""
+    target, now, moving = mux(Input('pause', 'pause', 0.0, 50)), 0.0, False
+    for name, switch, gap in steps:
+        now += gap
+        if name == 'pause':
+            target.lock(name, switch, now)
+        elif name != 'tick' and target.velocity(name, FORWARD if switch else STILL, now):
+            moving = switch
+        if target.zero_due(now):
+            moving = False
+    if target.zero_due(now + 1.0):
+        moving = False
+    assert not moving
+
+
+@given(STEPS)
+def test_lower_priority_never_overrules(steps: list[tuple[str, bool, float]]) -> None:
+    """The planner is not forwarded while the keyboard spoke within its time-out, or locked."""
+    target, now, spoke, locked = mux(Input('pause', 'pause', 0.0, 50)), 0.0, -math.inf, False
+    for name, switch, gap in steps:
+        now += gap
+        if name == 'pause':
+            locked = switch
+            target.lock(name, switch, now)
+        elif name == KEYBOARD:
+            spoke = now
+            assert target.velocity(name, FORWARD, now)
+        elif name == NAVIGATION:
+            assert target.velocity(name, FORWARD, now) == (not locked and now - spoke > 0.5)
+
+
+ONE = {'keyboard.topic': 'key_vel', 'keyboard.timeout': 0.5, 'keyboard.priority': 90}
+
+
+def test_parameters_of_twist_mux_are_read() -> None:
+    """Names, and whole numbers as times, are as in its files."""
+    inputs = read_inputs(ONE | {'keyboard.timeout': 1}, {})
+    assert inputs.sources == (Input('keyboard', 'key_vel', 1.0, 90),)
+
+
+def test_defaults_without_parameters() -> None:
+    """Without a file there are the usual three sources and two locks."""
+    assert read_inputs({}, {}) == DEFAULTS
+
+
+@pytest.mark.parametrize(
+    ('topics', 'locks', 'message'),
+    [
+        (ONE | {'keyboard.priorty': 1}, {}, r"topics\.keyboard\.priorty; did you mean 'priority'"),
+        ({'keyboard.topic': 'a'}, {}, r'topics\.keyboard\.timeout is missing'),
+        (ONE | {'keyboard.priority': 256}, {}, r'keyboard\.priority is 256: it must be 0 to 255'),
+        (ONE | {'keyboard.priority': 1.5}, {}, r'priority is 1\.5: it must be a whole number'),
+        (ONE | {'keyboard.priority': True}, {}, 'priority is True'),
+        (ONE | {'keyboard.timeout': -1.0}, {}, r'timeout is -1\.0'),
+        (ONE | {'keyboard.timeout': math.nan}, {}, 'timeout is nan'),
+        (ONE | {'keyboard.timeout': 'soon'}, {}, "timeout is 'soon'"),
+        (ONE | {'keyboard.topic': ''}, {}, 'topic is empty'),
+        (ONE | {'keyboard.topic': 7}, {}, 'topic is 7'),
+        (ONE, {f'stop.{key[9:]}': value for key, value in ONE.items()}, 'keyboard and stop both'),
+        ({}, {f'stop.{key[9:]}': value for key, value in ONE.items()}, 'no topics'),
+        ({'keyboard': 'key_vel'}, {}, r'unknown parameter topics\.keyboard'),
+    ],
+)
+def test_wrong_parameters_are_refused_by_name(
+    topics: dict[str, Any], locks: dict[str, Any], message: str
+) -> None:
+    """A parameter that is misspelt, missing or senseless is named, with what it must be."""
+    with pytest.raises(SettingError, match=message):
+        read_inputs(topics, locks)

@@ -1,0 +1,146 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+import subprocess
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import Twist, TwistStamped
+from isolation import Isolation
+from processes import executable, RunningProcess
+import pytest
+from ros_client import RosClient
+from std_msgs.msg import Bool
+
+pytestmark = pytest.mark.scenario
+PATIENCE = 30.0  # [s] of a test on a busy machine
+CONFIG = Path(__file__).parents[1] / 'config' / 'twist_mux.yaml'
+
+
+@pytest.fixture
+def client(isolation: Isolation) -> Iterator[RosClient]:
+    """Join the test's domain."""
+    with RosClient(isolation.domain_id) as client:
+        yield client
+
+
+def mux(isolation: Isolation, *arguments: str) -> RunningProcess:
+    """Start the node."""
+    program = executable('quad_teleop', 'twist_mux')
+    return RunningProcess([program, '--ros-args', *arguments], isolation.env)
+
+
+def publisher(client: RosClient, message_type: Any, topic: str) -> Any:
+    """Publish to the node, as soon as it listens."""
+    publisher = client.node.create_publisher(message_type, topic, 1)
+    client.spin_until(lambda: publisher.get_subscription_count() > 0, PATIENCE, f'{topic} heard')
+    return publisher
+
+
+def wait_for(client: RosClient, heard: list[Any], x: float) -> None:
+    """Wait until the last velocity that came out is this one."""
+    client.spin_until(lambda: bool(heard) and heard[-1].linear.x == x, PATIENCE, f'x = {x}')
+
+
+def forward(x: float) -> Twist:
+    """Make a velocity."""
+    message = Twist()
+    message.linear.x = x
+    return message
+
+
+def test_priorities_locks_and_silence(isolation: Isolation, client: RosClient) -> None:
+    """The shipped file: keyboard over planner, a lock over both, and a zero after silence."""
+    with mux(isolation, '--params-file', str(CONFIG), '-r', 'cmd_vel_out:=cmd_vel') as process:
+        process.wait_for('lock e_stop')
+        heard = client.listen(Twist, 'cmd_vel')
+        navigation = publisher(client, Twist, 'nav_vel')
+        keyboard = publisher(client, Twist, 'key_vel')
+        stop = publisher(client, Bool, 'e_stop')
+        count = client.node.count_publishers
+        client.spin_until(lambda: count('cmd_vel') > 0, PATIENCE, 'output')
+
+        navigation.publish(forward(0.25))
+        wait_for(client, heard, 0.25)
+        keyboard.publish(forward(0.125))
+        wait_for(client, heard, 0.125)
+        wait_for(client, heard, 0.0)  # both fell silent
+        assert len(heard) == 3
+
+        keyboard.publish(forward(0.125))
+        wait_for(client, heard, 0.125)
+        stop.publish(Bool(data=True))
+        wait_for(client, heard, 0.0)
+        keyboard.publish(forward(0.5))
+        client.spin_until(lambda: bool(diagnostic(client)), PATIENCE, 'diagnostics')
+        assert heard[-1].linear.x == 0.0
+        stop.publish(Bool(data=False))
+        client.spin_until(
+            lambda: (keyboard.publish(forward(0.5)), heard[-1].linear.x == 0.5)[1],
+            PATIENCE,
+            'keyboard after the lock',
+        )
+        assert process.stop() == 0
+
+
+def diagnostic(client: RosClient) -> list[Any]:
+    """Listen to the diagnostics until the lock is in them."""
+    messages = client.listen(DiagnosticArray, '/diagnostics')
+    client.spin_until(lambda: bool(messages), PATIENCE, 'diagnostics')
+    values = {entry.key: entry.value for entry in messages[-1].status[0].values}
+    locked = values['lock e_stop'].startswith('locked') and values['current priority'] == '255'
+    return messages if locked else []
+
+
+def test_no_number_is_not_forwarded(isolation: Isolation, client: RosClient) -> None:
+    """NaN is dropped with a warning that names the source; what follows is forwarded."""
+    with mux(isolation) as process:
+        heard = client.listen(Twist, 'cmd_vel_out')
+        keyboard = publisher(client, Twist, 'key_vel')
+        count = client.node.count_publishers
+        client.spin_until(lambda: count('cmd_vel_out') > 0, PATIENCE, 'output')
+        keyboard.publish(forward(float('nan')))
+        process.wait_for('keyboard sends .*nan.* no velocity')
+        keyboard.publish(forward(0.5))
+        wait_for(client, heard, 0.5)
+        assert len(heard) == 1
+
+
+def test_stamped_in_and_out(isolation: Isolation, client: RosClient) -> None:
+    """With use_stamped the messages pass as they are, header too; the zero has a time."""
+    with mux(isolation, '-p', 'use_stamped:=true'):
+        heard = client.listen(TwistStamped, 'cmd_vel_out')
+        keyboard = publisher(client, TwistStamped, 'key_vel')
+        count = client.node.count_publishers
+        client.spin_until(lambda: count('cmd_vel_out') > 0, PATIENCE, 'output')
+        message = TwistStamped(twist=forward(0.5))
+        message.header.frame_id = 'base_link'
+        keyboard.publish(message)
+        client.spin_until(lambda: len(heard) > 1, PATIENCE, 'velocity and zero')
+    assert heard[0] == message
+    assert heard[1].twist == Twist()
+    assert heard[1].header.stamp.sec > 0
+
+
+@pytest.mark.parametrize(
+    ('parameter', 'message'),
+    [
+        ('use_stampd:=true', "unknown parameter 'use_stampd'; did you mean 'use_stamped'"),
+        ('topics.keyboard.topic:=key_vel', 'topics.keyboard.timeout is missing'),
+    ],
+)
+def test_wrong_parameter_ends_it(isolation: Isolation, parameter: str, message: str) -> None:
+    """A misspelt or missing parameter is named, and nothing is forwarded by half a set-up."""
+    result = subprocess.run(
+        [executable('quad_teleop', 'twist_mux'), '--ros-args', '-p', parameter],
+        env=isolation.env,
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+        check=False,
+    )
+    assert result.returncode == 1
+    assert message in result.stderr

@@ -1,0 +1,156 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+import os
+import shutil
+import signal
+import subprocess
+
+from input_terminal import ScriptedTerminal
+from isolation import Isolation
+from processes import executable
+import pytest
+from ros_client import RosClient
+from teleop_robot import PATIENCE, Robot, STILL
+
+pytestmark = [
+    pytest.mark.scenario,
+    pytest.mark.skipif(shutil.which('setsid') is None, reason='needs setsid of util-linux'),
+]
+FORWARD = (0.15, 0.0, 0.0)
+HANG_UP_OR_GONE = {1, -signal.SIGHUP}
+
+
+@contextmanager
+def teleop(
+    terminal: ScriptedTerminal, isolation: Isolation, *parameters: str
+) -> Iterator[subprocess.Popen[bytes]]:
+    """Run teleop_keyboard in a terminal, which is the controlling one of its session."""
+    settings = [word for parameter in parameters for word in ('-p', parameter)]
+    descriptor = os.open(terminal.path, os.O_RDWR | os.O_NOCTTY)
+    program = executable('quad_teleop', 'teleop_keyboard')
+    process = subprocess.Popen(
+        ['setsid', '--ctty', program, '--ros-args', *settings],
+        env=isolation.env,
+        stdin=descriptor,
+        stdout=descriptor,
+        stderr=descriptor,
+        start_new_session=False,
+    )
+    os.close(descriptor)
+    try:
+        terminal.wait_written(rb'idle', PATIENCE)
+        yield process
+    finally:
+        process.kill()
+        process.wait()
+
+
+@pytest.fixture
+def robot(isolation: Isolation) -> Iterator[Robot]:
+    """Listen in the test's domain."""
+    with RosClient(isolation.domain_id) as client:
+        yield Robot(client)
+
+
+def settle(robot: Robot, terminal: ScriptedTerminal) -> None:
+    """Wait until the robot hears, and the terminal has promised true releases."""
+    robot.wait_until_linked()
+    terminal.wait_written(rb'true releases', PATIENCE)
+
+
+def test_true_release(isolation: Isolation, robot: Robot) -> None:
+    """With the Kitty protocol a key may be silent for long and is held, until its release."""
+    with ScriptedTerminal(kitty=True) as terminal, teleop(terminal, isolation):
+        settle(robot, terminal)
+        terminal.key('i', 1)
+        robot.wait_for(FORWARD)
+        robot.listen_for(1.5)
+        assert set(robot.velocities) == {FORWARD}, 'no stutter without repeats'
+        terminal.key('i', 3)
+        robot.wait_until_stopped()
+        robot.listen_for(0.5)
+        assert robot.velocities[-4:] == [FORWARD, STILL, STILL, STILL]
+
+
+def test_two_keys_are_never_two_speeds(isolation: Isolation, robot: Robot) -> None:
+    """Rolling from one key to the next: the newest counts, then the older, then none."""
+    with ScriptedTerminal(kitty=True) as terminal, teleop(terminal, isolation):
+        settle(robot, terminal)
+        terminal.key('i', 1)
+        count = robot.wait_for(FORWARD)
+        terminal.key('j', 1)
+        count = robot.wait_for((0.0, 0.0, 0.6), after=count)
+        terminal.key('j', 3)
+        robot.wait_for(FORWARD, after=count)
+        terminal.key('i', 3)
+        robot.wait_until_stopped()
+        assert set(robot.velocities) == {FORWARD, (0.0, 0.0, 0.6), STILL}
+
+
+@pytest.mark.parametrize('number', [signal.SIGTERM, signal.SIGINT])
+def test_killed_while_moving(isolation: Isolation, robot: Robot, number: signal.Signals) -> None:
+    """Ended by a signal with a key held: zeros leave, and the terminal is as it was."""
+    with ScriptedTerminal(kitty=True) as terminal:
+        before = terminal.settings()
+        with teleop(terminal, isolation) as process:
+            settle(robot, terminal)
+            terminal.key('i', 1)
+            robot.wait_for(FORWARD)
+            process.send_signal(number)
+            robot.wait_until_stopped()
+            assert process.wait(PATIENCE) == 0
+        assert terminal.settings() == before
+        assert (terminal.flags, terminal.modes) == ([], set())
+
+
+def test_window_closed_while_moving(isolation: Isolation, robot: Robot) -> None:
+    """The window, or the SSH connection, is closed with a key held: zeros leave."""
+    with ScriptedTerminal(kitty=True) as terminal, teleop(terminal, isolation) as process:
+        settle(robot, terminal)
+        terminal.key('i', 1)
+        robot.wait_for(FORWARD)
+        terminal.hang_up()
+        robot.wait_until_stopped()
+        assert process.wait(PATIENCE) in {0, 1}
+
+
+def test_line_cut_while_moving(isolation: Isolation, robot: Robot) -> None:
+    """The network stalls with a key held, nothing is closed: zeros leave nevertheless."""
+    with ScriptedTerminal(kitty=True) as terminal, teleop(terminal, isolation):
+        settle(robot, terminal)
+        terminal.key('i', 1)
+        robot.wait_for(FORWARD)
+        terminal.stall()
+        robot.wait_until_stopped()
+
+
+def test_stamped_messages(isolation: Isolation, robot: Robot) -> None:
+    """With twist:=false stamped:=true only TwistStamped is published, with frame and time."""
+    with (
+        ScriptedTerminal(kitty=False) as terminal,
+        teleop(terminal, isolation, 'twist:=false', 'stamped:=true', 'frame_id:=body'),
+    ):
+        client = robot.client
+        count = client.node.count_publishers
+        client.spin_until(lambda: count('cmd_vel_stamped') > 0, PATIENCE, 'publisher')
+        terminal.send('i')
+        client.spin_until(lambda: bool(robot.stamped), PATIENCE, 'TwistStamped')
+    message = robot.stamped[0]
+    assert message.twist.linear.x == pytest.approx(0.15)
+    assert message.header.frame_id == 'body'
+    assert message.header.stamp.sec > 0
+    assert robot.twists == []
+
+
+def test_paste_moves_nothing(isolation: Isolation, robot: Robot) -> None:
+    """A text that is pasted by mistake is no command."""
+    with ScriptedTerminal(kitty=False) as terminal, teleop(terminal, isolation):
+        robot.wait_until_linked()
+        terminal.send('\x1b[200~ivory\n\x1b[201~')
+        robot.listen_for(0.7)
+        assert robot.twists == []
+        assert robot.modes == []

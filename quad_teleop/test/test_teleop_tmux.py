@@ -1,0 +1,197 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+import re
+import shutil
+import subprocess
+import time
+
+from isolation import Isolation
+import pytest
+from ros_client import RosClient
+from teleop_robot import PATIENCE, Robot, STILL
+
+pytestmark = [
+    pytest.mark.scenario,
+    pytest.mark.skipif(shutil.which('tmux') is None, reason='needs tmux, for real key presses'),
+]
+
+
+class Pane:
+    """One pane of a tmux server of its own."""
+
+    def __init__(self, folder: Path, environment: dict[str, str]) -> None:
+        """Start the server with a shell."""
+        self._socket = str(folder / 'tmux.socket')
+        self._environment = environment
+        self.tmux('-f', '/dev/null', 'new-session', '-d', '-x', '100', '-y', '30', 'sh')
+
+    def tmux(self, *arguments: str) -> str:
+        """Run a tmux command."""
+        return subprocess.run(
+            ['tmux', '-S', self._socket, *arguments],
+            env=self._environment,
+            capture_output=True,
+            text=True,
+            timeout=PATIENCE,
+            check=True,
+        ).stdout
+
+    def press(self, *keys: str) -> None:
+        """Press keys."""
+        self.tmux('send-keys', *keys)
+
+    def screen(self) -> str:
+        """Return what a person sees."""
+        return self.tmux('capture-pane', '-p')
+
+    def wait_for(self, pattern: str) -> str:
+        """Wait until something is on the screen."""
+        deadline = time.monotonic() + PATIENCE
+        while not re.search(pattern, screen := self.screen()):
+            assert time.monotonic() < deadline, f'no {pattern!r} in\n{screen}'
+            time.sleep(0.05)
+        return screen
+
+    def stop(self) -> None:
+        """End the server and what runs in it."""
+        self.tmux('kill-server')
+
+
+def wait_on_screen(client: RosClient, pane: Pane, text: str) -> None:
+    """Wait until something is on the screen, and serve the robot meanwhile."""
+    client.spin_until(lambda: text in pane.screen(), PATIENCE, text)
+
+
+@pytest.fixture
+def pane(tmp_path: Path, isolation: Isolation) -> Iterator[Pane]:
+    """Open a terminal."""
+    pane = Pane(tmp_path, dict(isolation.env))
+    try:
+        yield pane
+    finally:
+        pane.stop()
+
+
+def test_driving_with_real_key_presses(pane: Pane, isolation: Isolation) -> None:
+    """The article's command in tmux: move, stop by itself, modes, body, quit."""
+    with RosClient(isolation.domain_id) as client:
+        robot = Robot(client)
+        pane.press('ros2 run quad_teleop teleop_keyboard; echo ended with $?', 'Enter')
+        pane.wait_for(r'mode \? \| 0\.15 m/s 0\.60 rad/s \| idle')
+        robot.wait_until_linked()
+
+        pane.press('i')
+        count = robot.wait_for((0.15, 0.0, 0.0))
+        robot.wait_until_stopped()
+        robot.listen_for(0.5)
+        settled = len(robot.twists)
+        robot.listen_for(0.5)
+        assert len(robot.twists) == settled, 'an idle teleop is silent'
+        assert settled > count
+
+        pane.press('q', 'U')
+        robot.wait_for((0.165, 0.165, 0.0), after=settled)
+        pane.press('Space')
+        robot.wait_until_stopped()
+        pane.wait_for(r'0\.17 m/s 0\.66 rad/s \| idle')
+
+        pane.press('2')
+        wait_on_screen(client, pane, 'mode: walk')
+        pane.press('0')
+        wait_on_screen(client, pane, 'lie refused: stays in stand: it is too high')
+        assert robot.modes == ['walk', 'lie']
+        pane.press('t', 'Down')
+        client.spin_until(lambda: len(robot.poses) == 2, PATIENCE, 'two body poses')
+        assert robot.poses[-1].position.z == pytest.approx(0.005)
+        assert robot.poses[-1].orientation.y > 0.0, 'nose down'
+
+        pane.press('j')
+        robot.wait_for((0.0, 0.0, 0.66), after=settled)
+        pane.press('C-c')
+        robot.wait_until_stopped()
+        pane.wait_for('ended with 0')
+    assert set(robot.velocities) <= {
+        STILL,
+        (0.15, 0.0, 0.0),
+        (0.165, 0.165, 0.0),
+        (0.0, 0.0, 0.66),
+    }
+
+
+def test_held_key_over_a_terminal_without_releases(pane: Pane, isolation: Isolation) -> None:
+    """Repeats keep it moving; their end stops it, with three zeros."""
+    with RosClient(isolation.domain_id) as client:
+        robot = Robot(client)
+        pane.press('ros2 run quad_teleop teleop_keyboard', 'Enter')
+        pane.wait_for('idle')
+        robot.wait_until_linked()
+        for _ in range(12):
+            pane.press('i')
+            robot.listen_for(0.02)
+        robot.wait_until_stopped()
+        robot.listen_for(0.5)
+        words = robot.velocities
+    moving = [index for index, velocity in enumerate(words) if velocity != STILL]
+    assert len(words) - moving[-1] - 1 == 3, 'three zeros at the end'
+
+
+def test_nobody_there(pane: Pane) -> None:
+    """Without a controller the screen says so, for the velocities and for the modes."""
+    pane.press('ros2 run quad_teleop teleop_keyboard', 'Enter')
+    pane.wait_for('nobody listens')
+    pane.press('1')
+    pane.wait_for(r'stand: there is no service /set_mode; is controller_node running')
+
+
+def test_suspended_like_any_program(pane: Pane, isolation: Isolation) -> None:
+    """Ctrl-Z gives the shell its terminal, after a zero; fg goes on."""
+    with RosClient(isolation.domain_id) as client:
+        robot = Robot(client)
+        pane.press('ros2 run quad_teleop teleop_keyboard', 'Enter')
+        pane.wait_for('idle')
+        robot.wait_until_linked()
+        pane.press('i')
+        robot.wait_for((0.15, 0.0, 0.0))
+        pane.press('C-z')
+        robot.wait_until_stopped()
+        pane.wait_for('Stopped')
+        pane.press('echo shell $((6 * 7))', 'Enter')
+        pane.wait_for('shell 42')
+        count = len(robot.twists)
+        pane.press('fg', 'Enter')
+        pane.wait_for('going on')
+        pane.press('l')
+        robot.wait_for((0.0, 0.0, -0.6), after=count)
+        pane.press('C-c')
+        robot.wait_until_stopped()
+
+
+def test_narrow_pane(pane: Pane) -> None:
+    """In a pane of 40 columns the status line is cut and stays one line."""
+    pane.tmux('resize-window', '-x', '40', '-y', '24')
+    pane.press('ros2 run quad_teleop teleop_keyboard', 'Enter')
+    pane.wait_for('0.15 m/s')
+    for _ in range(3):
+        pane.press('q')
+    screen = pane.wait_for(r'0\.20 m/s')
+    assert screen.count('m/s') == 1
+
+
+@pytest.mark.parametrize(
+    ('parameter', 'message'),
+    [
+        ('speeed:=0.2', "unknown parameter 'speeed'; did you mean 'speed'"),
+        ('speed:=9', 'speed is 9: it must be'),
+        ('speed:=fast', "speed is 'fast': it must be a number"),
+    ],
+)
+def test_wrong_parameter_is_refused(pane: Pane, parameter: str, message: str) -> None:
+    """A misspelt or senseless parameter ends the program with words, not with a traceback."""
+    pane.tmux('resize-window', '-x', '200', '-y', '24')
+    pane.press(f'ros2 run quad_teleop teleop_keyboard --ros-args -p {parameter}', 'Enter')
+    screen = pane.wait_for(re.escape(message))
+    assert 'Traceback' not in screen
