@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from ..config.model import DriveConfig
-from ..exceptions import CodecError, SdoError
+from ..exceptions import CodecError, DriveError, SdoError
 from ..master.events import EventKind, Severity
 from ..master.remote_node import RemoteNode
 from ..master.scheduler import Scheduler, Task
@@ -30,7 +30,8 @@ from .motion import AxisFeedback
 from .parameters import DriveParameters, ParameterReader
 from .state_machine import Command, fault_reset, next_command
 from .target_limits import check_target
-from .units import Units
+from .units import clamp, INT16_MAX, INT32_MAX, Units
+from .velocity_estimate import VelocityEstimate
 
 ASK_AGAIN = 1.0  # [s] after which a drive is asked again for what it did not answer
 FAULTY = (DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE)
@@ -91,6 +92,9 @@ class Drive:
         self.mode: Mode = self.modes[OperationMode.NO_MODE]
         self._reader = ParameterReader(node, self.config, self.units)
         self._scheduler = scheduler
+        polled = self.objects.position_is_polled
+        self._estimate = VelocityEstimate(node.config.poll_period if polled else 0.0)
+        self._failure = ''
         self._controlword = 0
         self._asked = False
         self._answered = False
@@ -106,8 +110,14 @@ class Drive:
 
     @property
     def velocity(self) -> float:
-        """Actual velocity in user units per second."""
-        return self.units.velocity_from_device(self.objects.velocity)
+        """Actual velocity in user units per second; from the positions where no PDO tells it."""
+        told = self.objects.velocity
+        return self.rate if told is None else self.units.velocity_from_device(told)
+
+    @property
+    def rate(self) -> float:
+        """Rate of the actual position in user units per second, a few cycles late."""
+        return self.units.rate_from_device(self._estimate.rate)
 
     @property
     def effort(self) -> float:
@@ -215,7 +225,9 @@ class Drive:
                 self._background.append(self._scheduler.background(poll))
         if not self.node.operational or not self.objects.known:
             self.state = DriveState.UNKNOWN
+            self._estimate.clear()
             return
+        self._estimate.note(self._scheduler.now, self.objects.position)
         before, self.state = self.state, self.objects.state
         if self.state is not before:
             self._state_changed(before)
@@ -236,9 +248,26 @@ class Drive:
                 bits = self._step(now, period)
             else:
                 bits = self._hold_without_target(command)
-        self._controlword = int(command) | int(bits)
-        self.objects.controlword.write(self._controlword)
-        self.objects.mode.write(int(self.mode.number))
+        self._send(command, bits)
+
+    def fail(self, error: Exception) -> None:
+        """Stop the drive, because its cycle failed; the other drives of the bus go on.
+
+        Args:
+            error: Why; one that the drive itself could not have caused is a defect.
+        """
+        if self.state is DriveState.OPERATION_ENABLED:
+            self.goal = DriveState.QUICK_STOP_ACTIVE
+        elif self.goal is not None:
+            self.goal = DriveState.SWITCH_ON_DISABLED
+        self._send(self._command())
+        text = str(error)
+        if not isinstance(error, DriveError):
+            text = f'a defect in the CANopen master: {type(error).__name__}: {error}'
+        if text != self._failure:
+            self._failure = text
+            self.released('its cycle failed')
+            self.report(Severity.ERROR, f'stopped: {text}')
 
     def hold(self) -> None:
         """Brake, and stay halted until a new target is taken."""
@@ -333,8 +362,29 @@ class Drive:
         return self.halt.bits(held)
 
     def _actual(self) -> Actual:
+        """Return where the drive is, and the velocity from which it has to be braked.
+
+        The velocity is the lesser of what 0x606C tells and what 0x6064 shows: one that is told
+        wrong must not set an axis in motion that stands.
+        """
         objects = self.objects
-        return Actual(int(objects.position), self.velocity, int(objects.torque))
+        velocity, told = self.rate, objects.velocity
+        velocity_dev = self.units.velocity_raw(velocity)
+        if told is not None:
+            shown = self.units.velocity_from_device(told)
+            share = 0.0 if shown * velocity <= 0.0 else min(1.0, velocity / shown)
+            velocity, velocity_dev = share * shown, share * told
+        return Actual(
+            clamp(objects.position, INT32_MAX),
+            velocity,
+            clamp(velocity_dev, INT32_MAX),
+            clamp(objects.torque, INT16_MAX),
+        )
+
+    def _send(self, command: Command, bits: Controlword = NO_BITS) -> None:
+        self._controlword = int(command) | int(bits)
+        self.objects.controlword.write(self._controlword)
+        self.objects.mode.write(int(self.mode.number))
 
     def _preload_all(self) -> None:
         """Let every target be where the drive is, also those of modes that are not selected.
@@ -382,6 +432,8 @@ class Drive:
 
     def _state_changed(self, before: DriveState) -> None:
         left = before is DriveState.OPERATION_ENABLED
+        if self.state is DriveState.OPERATION_ENABLED:
+            self._failure = ''
         if left:
             self.halt.release()
         if self.state in FAULTY and before not in FAULTY:

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from ..master.process_image import Reader, Writer
+from ..master.process_image import Writer
 from ..master.remote_node import RemoteNode
 from ..standard.drive import drive_state, DriveState
 from ..standard.objects import Index
@@ -28,7 +28,7 @@ class DriveObjects:
         self._statusword = node.reader(self.at(Index.STATUSWORD))
         self._mode = node.reader(self.at(Index.MODE_OF_OPERATION_DISPLAY))
         self._position = node.reader(self.at(Index.POSITION_ACTUAL))
-        self._velocity = self._optional_reader(Index.VELOCITY_ACTUAL)
+        self._velocity = node.image.reader(self.at(Index.VELOCITY_ACTUAL))
         self._torque = node.image.reader(self.at(Index.TORQUE_ACTUAL))
         self.controlword = node.writer(self.at(Index.CONTROLWORD))
         self.mode = node.writer(self.at(Index.MODE_OF_OPERATION))
@@ -64,9 +64,14 @@ class DriveObjects:
         return self._position.value or 0
 
     @property
-    def velocity(self) -> float:
-        """0x606C in device units; 0 when unknown."""
-        return (self._velocity.value or 0) if self._velocity is not None else 0
+    def velocity(self) -> float | None:
+        """0x606C in device units; None when no PDO carries it, or it is unknown."""
+        return self._velocity.value if self._velocity is not None else None
+
+    @property
+    def position_is_polled(self) -> bool:
+        """Whether 0x6064 comes by SDO, because no PDO carries it."""
+        return self._node.image.reader(self.at(Index.POSITION_ACTUAL)) is None
 
     @property
     def torque(self) -> float:
@@ -83,9 +88,3 @@ class DriveObjects:
         if output is None or output is self._node.image.output_of(self.at(Index.CONTROLWORD)):
             return False
         return output.config.transmission <= SYNCHRONOUS_MAX
-
-    def _optional_reader(self, index: int) -> Reader | None:
-        mapped = self._node.image.reader(self.at(index))
-        if mapped is not None or (self.at(index), 0) not in self._node.config.dictionary:
-            return mapped
-        return self._node.reader(self.at(index))

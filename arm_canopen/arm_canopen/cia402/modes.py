@@ -26,11 +26,13 @@ class Actual(NamedTuple):
         position_inc: In [inc], as the drive says it itself, so that no factor in bus.yml can make
             the target another one.
         velocity: In user units per second; a moving drive is braked from it.
+        velocity_dev: The same in device units, as the drive says it itself.
         torque: 0x6077 in device units, 0 when it is unknown.
     """
 
     position_inc: int
     velocity: float = 0.0
+    velocity_dev: int = 0
     torque: int = 0
 
 

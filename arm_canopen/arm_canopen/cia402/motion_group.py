@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -85,11 +85,19 @@ class MotionGroup:
             period: Time to the next cycle in [s].
         """
         for drive in self.drives.values():
-            drive.read()
+            self._guard(drive, drive.read)
         for attachment in list(self._attachments):
             self._run(attachment, now, period)
         for drive in self.drives.values():
-            drive.write(now, period)
+            self._guard(drive, partial(drive.write, now, period))
+
+    @staticmethod
+    def _guard(drive: Drive, step: Callable[[], None]) -> None:
+        """Take a step of one drive; whatever is wrong with it, the others are served."""
+        try:
+            step()
+        except Exception as error:  # noqa: BLE001  # told, and the drive is stopped
+            drive.fail(error)
 
     def _run(self, attachment: Attachment, now: float, period: float) -> None:
         feedback = [drive.feedback() for drive in attachment.drives]
@@ -125,7 +133,17 @@ class MotionGroup:
             if drive in attachment.owned:
                 attachment.owned.remove(drive)
                 attachment.streaming.discard(drive.name)
-                attachment.source.released(drive.name, reason)
+                self._tell(attachment.source, drive.name, reason)
+
+    def _tell(self, source: MotionSource, axis: str, reason: str) -> None:
+        try:
+            source.released(axis, reason)
+        except Exception as error:  # noqa: BLE001  # whoever takes the drive away must not suffer
+            name = type(source).__name__
+            text = (
+                f'motion source {name} raised {type(error).__name__}: {error}, when it lost {axis}'
+            )
+            self._report(Event(EventKind.DRIVE, Severity.ERROR, '', text))
 
     def _fail(self, attachment: Attachment, reason: str) -> None:
         self.detach(attachment.source)

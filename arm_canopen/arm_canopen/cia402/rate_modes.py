@@ -144,8 +144,8 @@ class CyclicVelocity(MasterRamped):
 
     def preload(self, actual: Actual) -> None:
         """Begin at the actual velocity, and brake from it."""
-        self._value, self._goal = actual.velocity, 0.0
-        self._target.write(self._to_device(actual.velocity))
+        self._value, self._goal = self._units.velocity_commanded(actual.velocity_dev), 0.0
+        self._target.write(actual.velocity_dev)
 
     def _to_device(self, target: float) -> int:
         return self._units.velocity_to_device(target)

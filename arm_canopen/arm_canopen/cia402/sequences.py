@@ -22,6 +22,8 @@ BUFFER_ATTEMPTS = 4
 READY_TIMEOUT = 2.0  # [s] from operational to the first PDOs and parameters
 STOP_TIMEOUT = 2.0  # [s] to come to rest, beside the time of the ramp
 REST_SHARE = 0.01  # share of the profile velocity below which an axis counts as standing
+REST_MIN, REST_MAX = 0.002, 0.02  # [unit/s] between which that lies: noise, and what still moves
+SETTLE_CYCLES = 3  # of SYNC after which an answer shows what a command has done
 
 
 class DriveSequences:
@@ -93,6 +95,7 @@ class DriveSequences:
         drive = self.drive
         ramp = abs(drive.velocity) / drive.parameters.profile.deceleration  # [s]
         drive.hold()
+        await self.pause(SETTLE_CYCLES * drive.period)
         await self.until(
             lambda: drive.mode.braked and self.is_slow(), timeout + ramp, 'standstill'
         )
@@ -211,8 +214,13 @@ class DriveSequences:
             drive.report(Severity.ERROR, f'did not come to rest in time: {drive.describe()}')
 
     def is_slow(self) -> bool:
-        """Whether the axis stands; a real encoder is never quite still."""
-        return abs(self.drive.velocity) <= REST_SHARE * self.drive.parameters.profile.velocity
+        """Whether the axis stands; a real encoder is never quite still.
+
+        Both what 0x606C tells and what the position shows have to be slow.
+        """
+        drive = self.drive
+        rest = max(REST_MIN, min(REST_MAX, REST_SHARE * drive.parameters.profile.velocity))
+        return max(abs(drive.velocity), abs(drive.rate)) <= rest
 
     def require_no_fault(self) -> None:
         """Refuse to go on with a drive that is faulted."""

@@ -13,6 +13,16 @@ INT16_MAX = 2**15 - 1
 INT32_MAX = 2**31 - 1
 
 
+def clamp(value: float, largest: int) -> int:
+    """Return the nearest integer that a signed object holds.
+
+    Args:
+        value: A finite number.
+        largest: INT16_MAX or INT32_MAX.
+    """
+    return max(-largest - 1, min(largest, round(value)))
+
+
 class Units:
     """Converts positions, velocities and torques of one drive.
 
@@ -55,6 +65,18 @@ class Units:
         """Convert a velocity to the nearest device unit; errors as for positions."""
         return _to_integer(velocity, velocity * self._config.scale_vel_to_dev, INT32_MAX)
 
+    def velocity_commanded(self, velocity_dev: float) -> float:
+        """Return the target that :meth:`velocity_to_device` turns into these device units."""
+        return velocity_dev / self._config.scale_vel_to_dev
+
+    def velocity_raw(self, velocity: float) -> float:
+        """Convert a velocity to device units, whether or not an object can hold it."""
+        return velocity * self._config.scale_vel_to_dev
+
+    def rate_from_device(self, rate_inc: float) -> float:
+        """Convert the rate of a position in [inc/s] to user units per second."""
+        return rate_inc * self._config.scale_pos_from_dev
+
     def vl_velocity_to_device(self, velocity: float) -> int:
         """Convert a velocity for 0x6042, an INTEGER16; errors as for positions."""
         return _to_integer(velocity, velocity * self._config.scale_vel_to_dev, INT16_MAX)
@@ -84,7 +106,7 @@ def _to_integer(value: float, scaled: float, largest: int) -> int:
     if not math.isfinite(scaled):
         raise DriveError(f'target {value} is not a finite number')
     rounded = round(scaled)
-    if abs(rounded) > largest:
+    if not -largest - 1 <= rounded <= largest:
         raise DriveError(
             f'target {value:g} is {rounded} device units, more than the object can hold '
             f'({largest}); are the scale factors in bus.yml right?'
