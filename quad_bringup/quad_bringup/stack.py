@@ -21,7 +21,7 @@ SIMULATOR_READY = r'^fake_xgo: .* -> '
 """What fake_xgo writes when its serial port is there."""
 HARDWARE_READY = r'running: '
 """What hardware_node logs when the robot has answered and reports come in."""
-CONTROLLER_READY = r'ready'
+CONTROLLER_READY = r'ready: '
 """What controller_node logs when it has heard the joints and answers /set_mode."""
 PUBLISHER_READY = r'[Rr]obot'
 """What every robot_state_publisher logs when it has read the description."""

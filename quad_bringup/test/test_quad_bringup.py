@@ -20,10 +20,16 @@ PATIENCE = 30.0
 WORKSPACE = Path(__file__).parents[2]
 
 READY = {
-    ('quad_hardware', 'fake_xgo'): 'fake_xgo: lite (servos firm) at {link} -> /dev/pts/7, protocol both',
+    (
+        'quad_hardware',
+        'fake_xgo',
+    ): 'fake_xgo: lite at {link} -> /dev/pts/7',
     ('quad_hardware', 'hardware_node'): '[INFO] [hardware_node]: running: {port}',
-    ('quad_controller', 'controller_node'): '[INFO] [controller_node]: ready',
-    ('robot_viewer', 'robot_state_publisher'): '[INFO] [robot_state_publisher]: Robot initialized',
+    (
+        'quad_controller',
+        'controller_node',
+    ): '[INFO] [controller_node]: ready: joints known',
+    ('robot_viewer', 'robot_state_publisher'): '[INFO] [publisher]: Robot initialized',
 }
 
 PROGRAM = """#!{python} -IS

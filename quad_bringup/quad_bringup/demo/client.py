@@ -35,10 +35,16 @@ SPIN = 0.05
 """Longest time in [s] after which a wait looks whether it shall be given up."""
 COMMAND_PERIOD = 0.1
 """Time in [s] between two velocity commands; the controller's time-out is 0.5 s."""
+REFUSED_PATIENCE = 3.0
+"""Time in [s] for which a refused mode is asked for again."""
+ASK_AGAIN = 0.2
+"""Time in [s] between that."""
 LOOP_PERIOD = 0.02
 """Period of the controller in [s]."""
 CONTROLLER = 'controller_node'
 """Node whose status in /diagnostics has the state."""
+FAULT = 'fault'
+"""State in which its message says why."""
 COMMAND_QOS = QoSProfile(depth=1)
 """Of /joint_command: reliable, only the latest."""
 
@@ -133,7 +139,9 @@ class QuadClient:
         self._beat = Beat(LOOP_PERIOD)
 
     def set_mode(self, mode: str, timeout: float) -> str:
-        """Ask the controller for a mode.
+        """Ask the controller for a mode; again for a while when it refuses.
+
+        A controller that has just begun may not have heard of everything that it needs.
 
         Args:
             mode: One that it knows.
@@ -146,15 +154,23 @@ class QuadClient:
             CallError: It refused, or did not answer in time.
             GivenUpError: It is no longer wanted.
         """
+        patience = time.monotonic() + REFUSED_PATIENCE
+        while True:
+            answer = self._ask(mode, timeout)
+            if answer.success:
+                return str(answer.message)
+            if time.monotonic() > patience:
+                raise CallError(f'the mode {mode!r} was refused: {answer.message}')
+            self.listen(ASK_AGAIN)
+
+    def _ask(self, mode: str, timeout: float) -> SetMode.Response:
         end = time.monotonic() + timeout
         self.wait_until(self._modes.service_is_ready, timeout, 'the service /set_mode')
         future = self._modes.call_async(SetMode.Request(mode=mode))
         left = max(0.0, end - time.monotonic())
         self.wait_until(future.done, left, f'an answer of /set_mode to {mode!r}')
         answer: SetMode.Response = future.result()
-        if not answer.success:
-            raise CallError(f'the mode {mode!r} was refused: {answer.message}')
-        return str(answer.message)
+        return answer
 
     def listen(self, duration: float) -> None:
         """Hear what comes in.
@@ -218,10 +234,10 @@ class QuadClient:
 
     def _take_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
-            if CONTROLLER in status.name:
-                values = {each.key: each.value for each in status.values}
-                self._state = values.get('state', self._state)
-                self._fault = status.message if self._state == 'fault' else ''
+            values = {each.key: each.value for each in status.values}
+            if CONTROLLER in status.name and 'state' in values:
+                self._state = values['state']
+                self._fault = status.message if self._state.endswith(FAULT) else ''
 
 
 def _seconds(stamp: Time) -> float:

@@ -145,6 +145,7 @@ class Play:
             supervisor: About to be run in the main thread.
             make_client: Makes the demo's ROS client, here in this thread.
         """
+        self._enter('starting')
         ended = {Phase.STOPPING, Phase.STOPPED}
         client = make_client(lambda: supervisor.phase in ended)
         try:
@@ -162,7 +163,6 @@ class Play:
             client.close()
 
     def _course(self, client: Client, ready: Callable[[], bool]) -> None:
-        self._enter('starting')
         self._wait(client, ready, math.inf, 'the processes')
         self._reach(client, 'stand', 'standing up')
         self._up.set()

@@ -11,7 +11,7 @@ import math
 from .figures import Figures
 from .itinerary import Stretch, Velocity
 
-LINEAR_TOLERANCE = 0.05
+LINEAR_TOLERANCE = 0.04
 """Greatest difference of commanded and measured speed in [m/s]."""
 TURN_TOLERANCE = 0.2
 """Greatest difference of commanded and measured rate in [rad/s]."""
@@ -90,10 +90,10 @@ def summary_lines(figures: Figures, stretches: Sequence[Measured]) -> list[str]:
         figures: The last ones before it lay down.
         stretches: What was measured.
     """
-    head = f'{"":<7} {"time":>6}  {"commanded":<28} {"measured in physics":<28} by /odom'
+    head = f'{"":<7} {"time":>6}  {"commanded":<30} {"measured in physics":<30} by /odom'
     rows = [
-        f'{each.stretch.name:<7} {each.stretch.duration:5.1f}s  '
-        f'{velocity_text(each.stretch.velocity):<28} {velocity_text(each.measured):<28} '
+        f'{each.stretch.name:<7} {each.stretch.duration:4.1f} s  '
+        f'{velocity_text(each.stretch.velocity):<30} {velocity_text(each.measured):<30} '
         f'{velocity_text(each.odometry)}'
         for each in stretches
     ]

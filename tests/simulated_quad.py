@@ -1,0 +1,171 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The quadruped's processes one by one, so that a test can kill any of them."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack, suppress
+from pathlib import Path
+import time
+from typing import TYPE_CHECKING
+
+from geometry_msgs.msg import Twist
+from nav_msgs.msg import Odometry
+from processes import RunningProcess
+from rclpy.qos import DurabilityPolicy, qos_profile_sensor_data, QoSProfile
+from ros_client import RosClient
+from sensor_msgs.msg import JointState
+from serial_tap import SerialTap
+from std_msgs.msg import String
+
+from process_supervisor import find_executable, write_parameters
+from quad_bringup.demo.itinerary import Velocity
+from quad_bringup.demo.main import GROUND_TRUTH
+from quad_bringup.stack import (
+    CONTROLLER_READY,
+    HARDWARE_READY,
+    quad_processes,
+    SIMULATOR_READY,
+    Stack,
+)
+from quad_description import movable_joints, robot_urdf
+from quad_msgs.srv import SetMode
+
+if TYPE_CHECKING:
+    from types import TracebackType
+
+    from isolation import Isolation
+    from typing_extensions import Self
+
+READY = {
+    'fake_xgo': SIMULATOR_READY,
+    'hardware': HARDWARE_READY,
+    'controller': CONTROLLER_READY,
+}
+"""What each process logs when it is ready."""
+AHEAD = Velocity(forward=0.2)
+"""The demo's velocity."""
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+PATIENCE = 20.0
+"""Longest time in [s] for a mode to be accepted."""
+ANSWER = 1.0
+"""Longest time in [s] for one answer."""
+STARTING = 60.0
+"""Longest time in [s] for a process to be ready on a busy machine."""
+
+
+class SimulatedQuad:
+    """Simulated robot, serial tap, bridge, controller and a client.
+
+    Attributes:
+        client: A ROS node of the test.
+        tap: What is on the wire.
+        processes: The processes by name: fake_xgo, hardware, controller.
+        joints: Messages of /joint_states.
+        states: Messages of the controller on its state.
+        truth: Messages of the simulator on where the body is.
+    """
+
+    def __init__(self, isolation: Isolation, folder: Path) -> None:
+        """Start everything and wait until it is ready."""
+        urdf = robot_urdf()
+        self.names = [joint.name for joint in movable_joints(urdf)]
+        self._isolation = isolation
+        self._folder = folder
+        parameters = folder / 'parameters.yaml'
+        write_parameters(parameters, urdf)
+        robot = Stack(str(folder / 'robot'), simulate=True)
+        bridge = Stack(str(folder / 'tapped'))
+        specs = [
+            quad_processes(robot, parameters, find_executable)[0],
+            *quad_processes(bridge, parameters, find_executable)[:2],
+        ]
+        self._specs = {spec.name: spec for spec in specs}
+        self.processes: dict[str, RunningProcess] = {}
+        self._stack = ExitStack()
+        try:
+            self.client = self._stack.enter_context(RosClient(isolation.domain_id))
+            sensor = qos_profile_sensor_data
+            self.joints = self.client.listen(JointState, '/joint_states', sensor)
+            self._velocity = self.client.node.create_publisher(Twist, '/cmd_vel', 1)
+            self._modes = self.client.node.create_client(SetMode, '/set_mode')
+            self.states = self.client.listen(String, '/controller_node/state', LATCHED)
+            self.truth = self.client.listen(Odometry, GROUND_TRUTH, sensor)
+            self.start('fake_xgo')
+            self.tap = SerialTap(folder / 'tapped', folder / 'robot')
+            self._stack.enter_context(self.tap)
+            for name in ('hardware', 'controller'):
+                self.start(name)
+        except BaseException:
+            self._stack.close()
+            raise
+
+    def start(self, name: str) -> RunningProcess:
+        """Start a process, once more after it was killed, and wait until it is ready."""
+        spec = self._specs[name]
+        environment = {**self._isolation.env, **spec.environment}
+        process = self._stack.enter_context(RunningProcess(spec.argv, environment))
+        self.processes[name] = process
+        process.wait_for(READY[name], STARTING)
+        return process
+
+    def set_mode(self, mode: str) -> None:
+        """Ask for a mode until it is accepted: what it needs may not be heard yet."""
+        words = 'no answer'
+        deadline = time.monotonic() + PATIENCE
+        while time.monotonic() < deadline:
+            # a killed controller is in the graph for a while: the request may be for it
+            future = self._modes.call_async(SetMode.Request(mode=mode))
+            with suppress(AssertionError):
+                self.client.spin_until(future.done, ANSWER, 'answer')
+                if future.result().success:
+                    return
+                words = future.result().message
+        raise AssertionError(f'mode {mode}: {words}')
+
+    def clear_fault(self) -> None:
+        """Ask the controller to forget its fault, until what it misses is back."""
+        name = '/controller_node/clear_fault'
+        self.client.spin_until(lambda: self.client.trigger(name).success, PATIENCE, 'clear fault')
+
+    def spin(self, seconds: float) -> None:
+        """Serve callbacks until the robot's clock has gone on by so many seconds."""
+        self.client.spin_until(lambda: bool(self.truth), 20.0, 'ground truth')
+        begin = self._now()
+        self.client.spin_until(lambda: self._now() >= begin + seconds, 60.0, 'robot time')
+
+    def _now(self) -> float:
+        stamp = self.truth[-1].header.stamp
+        return float(stamp.sec + 1e-9 * stamp.nanosec)
+
+    @property
+    def state(self) -> str:
+        """State of the controller, as it says it."""
+        return str(self.states[-1].data) if self.states else ''
+
+    def stand(self) -> None:
+        """Let it stand up, and wait until it does."""
+        self.set_mode('stand')
+        self.client.spin_until(lambda: self.state == 'stand', 20.0, 'standing')
+
+    def walk(self, seconds: float, velocity: Velocity = AHEAD) -> None:
+        """Command a velocity, ten times a second, for so long."""
+        twist = Twist()
+        twist.linear.x, twist.linear.y = velocity.forward, velocity.left
+        twist.angular.z = velocity.turn
+        for _ in range(round(10 * seconds)):
+            self._velocity.publish(twist)
+            self.spin(0.1)
+
+    def __enter__(self) -> Self:
+        """Use it in a with statement."""
+        return self
+
+    def __exit__(
+        self,
+        exc_type: type[BaseException] | None,
+        exc: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """Stop all processes, the last started first."""
+        self._stack.close()

@@ -1,0 +1,106 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What a newcomer does with the quadruped: the article's commands, and the demo."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING
+
+from processes import RunningProcess
+import psutil
+import pytest
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from ros_client import RosClient
+from tf2_msgs.msg import TFMessage
+
+from quad_description import LEGS
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from isolation import Isolation
+
+pytestmark = pytest.mark.scenario
+
+STARTING = 60.0
+"""Longest time in [s] until all is ready on a busy machine."""
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+SET_MODE = ('service', 'call', '/set_mode', 'quad_msgs/srv/SetMode')
+
+
+def start(isolation: Isolation, *arguments: str) -> RunningProcess:
+    """Start an executable of quad_bringup by ``ros2 run``."""
+    return RunningProcess(['ros2', 'run', 'quad_bringup', *arguments], isolation.env)
+
+
+def ros2(isolation: Isolation, *arguments: str) -> str:
+    """Run a ros2 command to its end and return what it printed."""
+    with RunningProcess(['ros2', *arguments], isolation.env) as process:
+        assert process.wait(STARTING) == 0, process.output
+        return process.output
+
+
+def tree(messages: Sequence[TFMessage]) -> dict[str, str]:
+    """Return the parent of each frame."""
+    return {
+        each.child_frame_id: each.header.frame_id
+        for message in messages
+        for each in message.transforms
+    }
+
+
+def expected_tree() -> dict[str, str]:
+    """Return the article's frames: the parent of each."""
+    legs = {
+        f'{leg}_{part}': f'{leg}_{above}' if above else 'base_link'
+        for leg in LEGS
+        for part, above in (('hip', ''), ('thigh', 'hip'), ('calf', 'thigh'), ('foot', 'calf'))
+    }
+    body = {'base_link': 'odom', 'base_footprint': 'base_link', 'imu_link': 'base_link'}
+    return body | legs
+
+
+def test_the_articles_checks_pass_as_printed(isolation: Isolation) -> None:
+    """Nodes, topics, rate, SetMode from the command line, the whole tree of frames, Ctrl-C."""
+    with start(isolation, 'bringup', '--simulate') as bringup:
+        bringup.wait_for('all is ready', STARTING)
+        started = psutil.Process(bringup.pid).children(recursive=True)
+        nodes = ros2(isolation, 'node', 'list').split()
+        assert {'/hardware_node', '/controller_node', '/robot_state_publisher'} <= set(nodes)
+        info = ros2(isolation, 'node', 'info', '/controller_node')
+        for topic in ('/joint_command: quad_msgs/msg/JointCommand', '/cmd_vel: ', '/imu: '):
+            assert topic in info
+        echo = ros2(isolation, 'topic', 'echo', '--once', '/joint_states')
+        assert 'fl_hip_joint' in echo
+        refused = ros2(isolation, *SET_MODE, '{mode: fly}')
+        assert 'success=False' in refused
+        assert all(mode in refused for mode in ('stand', 'walk', 'turn', 'lie'))
+        assert 'success=True' in ros2(isolation, *SET_MODE, '{mode: stand}')
+        with RunningProcess(['ros2', 'topic', 'hz', '/joint_command'], isolation.env) as hz:
+            rate = hz.wait_for('average rate', STARTING, count=3)
+        assert float(rate.split()[-1]) == pytest.approx(50.0, abs=5.0)
+        check_frames(isolation)
+        assert bringup.stop() == 0, bringup.output
+    assert not psutil.wait_procs(started, timeout=5.0)[1]
+
+
+def check_frames(isolation: Isolation) -> None:
+    """Every frame of the article is there, below the right parent."""
+    with RosClient(isolation.domain_id) as client:
+        moving = client.listen(TFMessage, '/tf', 100)
+        static = client.listen(TFMessage, '/tf_static', LATCHED)
+        wanted = expected_tree().items()
+        client.spin_until(lambda: wanted <= tree([*moving, *static]).items(), 20.0, 'all frames')
+
+
+def test_the_demo_walks_and_says_what_it_measured(isolation: Isolation) -> None:
+    """It ends by itself, and nothing is left of it."""
+    with start(isolation, 'demo', '--duration', '8') as demo:
+        demo.wait_for('standing up', STARTING)
+        started = psutil.Process(demo.pid).children(recursive=True)
+        assert demo.wait(STARTING) == 0, demo.output
+    rows = re.findall(r'^(walk|turn|strafe|stop) .*m/s.*m/s.*m/s', demo.output, re.MULTILINE)
+    assert rows == ['walk', 'turn', 'strafe', 'stop'], demo.output
+    assert 'jitter' in demo.output
+    assert not psutil.wait_procs(started, timeout=5.0)[1]

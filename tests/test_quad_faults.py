@@ -1,0 +1,103 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Processes of the quadruped die or get nonsense while it walks: nothing jumps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import math
+import signal
+import time
+from typing import TYPE_CHECKING
+
+import pytest
+from simulated_quad import SimulatedQuad
+
+from quad_bringup.demo.track import tilt_of
+from quad_msgs.msg import JointCommand
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from isolation import Isolation
+
+pytestmark = pytest.mark.scenario
+
+LARGEST_STEP = 23.0
+"""Degrees between two commands to a servo; the trot needs half of it, a jump would be more."""
+HELD = 1.0
+"""Degrees by which the target of a servo that is held may change."""
+
+
+@pytest.fixture
+def quad(isolation: Isolation, tmp_path: Path) -> Iterator[SimulatedQuad]:
+    """Let a simulated quadruped stand, with a listener on its serial line."""
+    with SimulatedQuad(isolation, tmp_path) as quad:
+        quad.stand()
+        yield quad
+
+
+def tilt(quad: SimulatedQuad) -> float:
+    """Return how far the body is from upright in [rad]."""
+    rotation = quad.truth[-1].pose.pose.orientation
+    return tilt_of((rotation.x, rotation.y, rotation.z, rotation.w))
+
+
+def kill(quad: SimulatedQuad, name: str) -> float:
+    """Kill a process; return when, in steady time [s]."""
+    quad.processes[name].signal(signal.SIGKILL)
+    quad.processes[name].wait()
+    return time.monotonic()
+
+
+def check_upright(quad: SimulatedQuad) -> None:
+    """The robot stands, and no servo was ever told to jump."""
+    assert tilt(quad) < math.radians(15.0)
+    assert quad.tap.largest_step() < LARGEST_STEP
+
+
+def test_a_killed_controller_leaves_the_robot_standing(quad: SimulatedQuad) -> None:
+    """The servos hold; a new controller moves nothing until it is asked, and then smoothly."""
+    quad.set_mode('walk')
+    quad.walk(1.5)
+    killed = kill(quad, 'controller')
+    count = len(quad.tap.targets)
+    quad.spin(1.0)
+    assert len(quad.tap.targets) <= count + 2
+    check_upright(quad)
+    quad.start('controller')
+    quad.spin(0.5)
+    assert quad.tap.largest_step(since=killed) < HELD
+    quad.set_mode('stand')
+    quad.spin(3.0)
+    check_upright(quad)
+
+
+def test_a_killed_bridge_is_told_and_its_successor_goes_on_smoothly(quad: SimulatedQuad) -> None:
+    """The controller stops by itself; after the fault is cleared it walks again."""
+    quad.set_mode('walk')
+    quad.walk(1.5)
+    killed = kill(quad, 'hardware')
+    quad.processes['controller'].wait_for('no joint states')
+    quad.start('hardware')
+    quad.spin(1.0)
+    check_upright(quad)
+    quad.clear_fault()
+    quad.stand()
+    assert quad.tap.largest_step(since=killed) < LARGEST_STEP
+    quad.set_mode('walk')
+    quad.walk(1.0)
+    check_upright(quad)
+
+
+def test_nonsense_on_joint_command_reaches_no_servo(quad: SimulatedQuad) -> None:
+    """NaN and wrong lengths, beside the controller's own commands; each with its reason."""
+    publisher = quad.client.node.create_publisher(JointCommand, '/joint_command', 1)
+    quad.client.spin_until(lambda: publisher.get_subscription_count() > 0, 20.0, 'the bridge')
+    bridge = quad.processes['hardware']
+    for position in ([math.nan] * 12, [0.0] * 11, [0.0] * 13, [math.inf] + [0.0] * 11):
+        publisher.publish(JointCommand(position=position))
+        quad.spin(0.2)
+    bridge.wait_for('joint command refused')
+    assert quad.tap.largest_step() < LARGEST_STEP
+    check_upright(quad)
