@@ -65,9 +65,13 @@ class HeldKeys:
         """
         return tuple(key for key, until in self._until.items() if now < until)
 
-    def deadline(self) -> float:
-        """Return when a key is up unless it is heard of before [s]; may be infinite."""
-        return min(self._until.values(), default=math.inf)
+    def deadline(self, now: float) -> float:
+        """Return when a held key is up unless it is heard of before [s]; may be infinite.
+
+        Args:
+            now: Time [s]; the deadline is later.
+        """
+        return min((until for until in self._until.values() if now < until), default=math.inf)
 
     def clear(self) -> None:
         """Let go of all keys; one that is down must be pressed again to count."""

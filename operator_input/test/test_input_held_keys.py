@@ -49,8 +49,9 @@ def test_typed_keys_are_up_after_the_longest_time_out(
         keys.feed(KeyEvent(key, action, now))
     for key in KEYS:
         keys.feed(KeyEvent(key, KeyAction.RELEASED, now))
-    assert keys.current(now) is None or keys.deadline() < math.inf
+    assert keys.current(now) is None or now < keys.deadline(now) < math.inf
     assert keys.current(now + auto_repeat.longest) is None
+    assert keys.deadline(now + auto_repeat.longest) == math.inf
 
 
 @given(STEPS)

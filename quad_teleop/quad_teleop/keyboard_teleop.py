@@ -69,9 +69,13 @@ class KeyboardTeleop:
         """
         return self._stream.step(self.wanted(now), now)
 
-    def due(self) -> float:
-        """Return when step() has to be called at the latest [s]; may be infinite."""
-        return min(self._held.deadline(), self._stream.due())
+    def due(self, now: float) -> float:
+        """Return when step() has to be called at the latest [s]; may be infinite.
+
+        Args:
+            now: Time [s].
+        """
+        return min(self._held.deadline(now), self._stream.due())
 
     def end(self) -> None:
         """Let go of everything at the end of the program."""

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+import math
+
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
@@ -93,6 +95,7 @@ def test_after_release_and_time_out_always_stopped(
     words += published(target, now, now + LONGEST + 0.3)
     assert words[-1] == ZERO
     now += LONGEST + 0.3
+    assert target.due(now) == math.inf, 'an idle program sleeps'
     assert published(target, now, now + 1.0) == []
 
 
@@ -260,8 +263,6 @@ def test_help_fits_the_narrowest_terminal() -> None:
 @pytest.mark.parametrize('quaternion_of', [NEUTRAL, BodyPose(0.01, 0.3, -0.2, 0.1)])
 def test_quaternion_is_the_attitude(quaternion_of: BodyPose) -> None:
     """Roll, pitch and yaw come back from the quaternion by the textbook's formulas."""
-    import math
-
     x, y, z, w = quaternion_of.quaternion()
     assert math.hypot(x, y, z, w) == pytest.approx(1.0)
     assert math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)) == pytest.approx(

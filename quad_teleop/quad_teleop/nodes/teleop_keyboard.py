@@ -96,7 +96,7 @@ class Session:
 
     def _serve(self) -> None:
         now = time.monotonic()
-        wait = min(self._node.teleop.due() - now, LONGEST_WAIT)
+        wait = min(self._node.teleop.due(now) - now, LONGEST_WAIT)
         self._take(self._keyboard.wait(wait))
         now = time.monotonic()
         self._publish(now)
@@ -156,8 +156,9 @@ class Session:
         """Publish the last zeros, and see them off."""
         self._node.teleop.end()
         for _ in range(ZEROS):
-            self._publish(time.monotonic())
-            pause = self._node.teleop.due() - time.monotonic()
+            now = time.monotonic()
+            self._publish(now)
+            pause = self._node.teleop.due(now) - now
             if 0.0 < pause < LONGEST_WAIT:
                 time.sleep(pause)
         self._node.outputs.flush()
