@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from ..can.frame import Frame
 from ..standard.cob_id import CobId, NODE_ID_MAX, NODE_ID_MIN
 from ..standard.dictionary import ObjectDictionary
+from ..standard.lss import LSS_REQUEST, UNCONFIGURED
 from ..standard.nmt import NmtCommand, NmtState
 from ..standard.objects import Index
 from ..standard.sdo import Abort
@@ -20,7 +21,7 @@ from .fault_injector import FaultInjector
 from .fault_line import FaultLine, Service, Traffic
 from .guarding import GuardedNode
 from .heartbeat import HeartbeatConsumer, HeartbeatProducer
-from .lss_slave import LSS_REQUEST, LssSlave, UNCONFIGURED
+from .lss_slave import LssSlave
 from .nmt_slave import boot_up_frame, NmtSlave
 from .object_store import ObjectStore
 from .parameter_memory import ParameterMemory

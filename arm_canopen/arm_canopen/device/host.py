@@ -9,8 +9,8 @@ from collections.abc import Callable
 
 from ..can.frame import Frame
 from ..standard.dictionary import ObjectDictionary
+from ..standard.lss import UNCONFIGURED
 from .device import Device, Handler
-from .lss_slave import UNCONFIGURED
 from .parameter_memory import ParameterMemory
 from .servo import ServoModel
 from .timed import NEVER, Timed

@@ -5,59 +5,30 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from enum import Enum, IntEnum
-import struct
 
 from ..can.frame import Frame
 from ..standard.cob_id import NODE_ID_MAX, NODE_ID_MIN
+from ..standard.lss import (
+    ADDRESS_BITS,
+    BIT_RATES,
+    decode_lss,
+    fast_scan,
+    FastScan,
+    lss_bytes,
+    lss_number,
+    LSS_RESPONSE,
+    LssCommand,
+    LssMessage,
+    LssState,
+    STANDARD_TABLE,
+    UNCONFIGURED,
+    WHOLE_NUMBER,
+)
 from ..standard.objects import Index
 from .object_store import ObjectStore
 from .parameter_memory import ParameterMemory
 
-LSS_REQUEST = 0x7E5
-LSS_RESPONSE = 0x7E4
-FRAME_BYTES = 8  # [byte]
-UNCONFIGURED = 255  # the node id of a device that has none
-WHOLE_NUMBER = 0x80  # BitCheck of fast scan: all devices answer, and begin anew
-BIT_TIMINGS = frozenset({0, 1, 2, 3, 4, 6, 7, 8})
-"""Indices of 1000, 800, 500, 250, 125, 50, 20 and 10 kbit/s in the standard table."""
-
-
-class Command(IntEnum):
-    """Command specifiers (CiA 305, 6)."""
-
-    SWITCH_GLOBAL = 0x04
-    CONFIGURE_NODE_ID = 0x11
-    CONFIGURE_BIT_TIMING = 0x13
-    ACTIVATE_BIT_TIMING = 0x15
-    STORE = 0x17
-    SELECT_VENDOR = 0x40
-    SELECT_PRODUCT = 0x41
-    SELECT_REVISION = 0x42
-    SELECT_SERIAL = 0x43
-    SELECTED = 0x44
-    IDENTIFY_VENDOR = 0x46
-    IDENTIFY_PRODUCT = 0x47
-    IDENTIFY_REVISION_LOW = 0x48
-    IDENTIFY_REVISION_HIGH = 0x49
-    IDENTIFY_SERIAL_LOW = 0x4A
-    IDENTIFY_SERIAL_HIGH = 0x4B
-    IDENTIFY_UNCONFIGURED = 0x4C
-    IDENTIFIED = 0x4F
-    UNCONFIGURED_IDENTIFIED = 0x50
-    FAST_SCAN = 0x51
-    INQUIRE_VENDOR = 0x5A
-    INQUIRE_PRODUCT = 0x5B
-    INQUIRE_REVISION = 0x5C
-    INQUIRE_SERIAL = 0x5D
-    INQUIRE_NODE_ID = 0x5E
-
-
-class LssState(Enum):
-    """Whether a device takes configuration commands."""
-
-    WAITING = 0
-    CONFIGURATION = 1
+__all__ = ['UNCONFIGURED', 'LssSlave']
 
 
 class LssSlave:
@@ -104,51 +75,53 @@ class LssSlave:
 
     def receive(self, frame: Frame, now: float) -> None:
         """Take a request; what makes no sense is ignored."""
-        data = frame.data
-        if len(data) != FRAME_BYTES:
+        message = decode_lss(frame.data)
+        if message is None:
             return
-        command, word = data[0], int(struct.unpack_from('<I', data, 1)[0])
-        if command == Command.SWITCH_GLOBAL:
-            self._switch(data[1], now)
-        elif Command.SELECT_VENDOR <= command <= Command.SELECT_SERIAL:
-            self._select(command - Command.SELECT_VENDOR, word)
-        elif Command.IDENTIFY_VENDOR <= command <= Command.IDENTIFY_SERIAL_HIGH:
-            self._identify(command, word)
-        elif command == Command.IDENTIFY_UNCONFIGURED:
+        command, number = message.command, message.number
+        if command == LssCommand.SWITCH_GLOBAL:
+            self._switch(message.byte, now)
+        elif LssCommand.SELECT_VENDOR <= command <= LssCommand.SELECT_SERIAL:
+            self._select(command - LssCommand.SELECT_VENDOR, number)
+        elif LssCommand.IDENTIFY_VENDOR <= command <= LssCommand.IDENTIFY_SERIAL_HIGH:
+            self._identify(command, number)
+        elif command == LssCommand.IDENTIFY_UNCONFIGURED:
             if self.node_id == UNCONFIGURED:
-                self._answer(Command.UNCONFIGURED_IDENTIFIED)
-        elif command == Command.FAST_SCAN:
-            self._scan(word, *data[5:8])
+                self._answer(lss_bytes(LssCommand.UNCONFIGURED_IDENTIFIED))
+        elif command == LssCommand.FAST_SCAN:
+            self._scan(fast_scan(message))
         elif self.state is LssState.CONFIGURATION:
-            self._configure(command, data)
+            self._configure(message)
 
-    def _configure(self, command: int, data: bytes) -> None:
-        if command == Command.CONFIGURE_NODE_ID:
-            valid = NODE_ID_MIN <= data[1] <= NODE_ID_MAX or data[1] == UNCONFIGURED
+    def _configure(self, message: LssMessage) -> None:
+        command, value = message.command, message.byte
+        if command == LssCommand.CONFIGURE_NODE_ID:
+            valid = NODE_ID_MIN <= value <= NODE_ID_MAX or value == UNCONFIGURED
             if valid:
-                self.pending_id = data[1]
-            self._answer(command, bytes((not valid, 0)))
-        elif command == Command.CONFIGURE_BIT_TIMING:
-            valid = data[1] == 0 and data[2] in BIT_TIMINGS
+                self.pending_id = value
+            self._answer(lss_bytes(command, not valid))
+        elif command == LssCommand.CONFIGURE_BIT_TIMING:
+            rate = message.parameters[1]
+            valid = value == STANDARD_TABLE and rate in BIT_RATES
             if valid:
-                self._timing = data[2]
-            self._answer(command, bytes((not valid, 0)))
-        elif command == Command.STORE:
+                self._timing = rate
+            self._answer(lss_bytes(command, not valid))
+        elif command == LssCommand.STORE:
             self._memory.node_id = self.pending_id
             if self._timing is not None:
                 self._memory.bit_timing = self._timing
             self._memory.commit()
-            self._answer(command, bytes(2))
-        elif command == Command.INQUIRE_NODE_ID:
-            self._answer(command, bytes((self.node_id,)))
-        elif Command.INQUIRE_VENDOR <= command <= Command.INQUIRE_SERIAL:
-            number = self._number(command - Command.INQUIRE_VENDOR)
-            self._answer(command, struct.pack('<I', number))
+            self._answer(lss_bytes(command))
+        elif command == LssCommand.INQUIRE_NODE_ID:
+            self._answer(lss_bytes(command, self.node_id))
+        elif LssCommand.INQUIRE_VENDOR <= command <= LssCommand.INQUIRE_SERIAL:
+            number = self._number(command - LssCommand.INQUIRE_VENDOR)
+            self._answer(lss_number(command, number))
 
     def _switch(self, mode: int, now: float) -> None:
-        if mode == LssState.CONFIGURATION.value:
+        if mode == LssState.CONFIGURATION:
             self.state = LssState.CONFIGURATION
-        elif mode == LssState.WAITING.value:
+        elif mode == LssState.WAITING:
             was, self.state = self.state, LssState.WAITING
             leaves = was is LssState.CONFIGURATION and self.node_id == UNCONFIGURED
             if leaves and self.pending_id != UNCONFIGURED:
@@ -163,43 +136,45 @@ class LssSlave:
         if part == 3 and [self._matched.get(k) for k in range(4)] == [True] * 4:
             self._matched.clear()
             self.state = LssState.CONFIGURATION
-            self._answer(Command.SELECTED)
+            self._answer(lss_bytes(LssCommand.SELECTED))
 
     def _identify(self, command: int, number: int) -> None:
         tests = {
-            Command.IDENTIFY_VENDOR: self._number(0) == number,
-            Command.IDENTIFY_PRODUCT: self._number(1) == number,
-            Command.IDENTIFY_REVISION_LOW: self._number(2) >= number,
-            Command.IDENTIFY_REVISION_HIGH: self._number(2) <= number,
-            Command.IDENTIFY_SERIAL_LOW: self._number(3) >= number,
-            Command.IDENTIFY_SERIAL_HIGH: self._number(3) <= number,
+            LssCommand.IDENTIFY_VENDOR: self._number(0) == number,
+            LssCommand.IDENTIFY_PRODUCT: self._number(1) == number,
+            LssCommand.IDENTIFY_REVISION_LOW: self._number(2) >= number,
+            LssCommand.IDENTIFY_REVISION_HIGH: self._number(2) <= number,
+            LssCommand.IDENTIFY_SERIAL_LOW: self._number(3) >= number,
+            LssCommand.IDENTIFY_SERIAL_HIGH: self._number(3) <= number,
         }
-        if command == Command.IDENTIFY_VENDOR:
+        if command == LssCommand.IDENTIFY_VENDOR:
             self._matched.clear()
-        self._matched[command] = tests[Command(command)]
-        if command == Command.IDENTIFY_SERIAL_HIGH:
+        self._matched[command] = tests[LssCommand(command)]
+        if command == LssCommand.IDENTIFY_SERIAL_HIGH:
             found = all(self._matched.get(key, False) for key in tests)
             self._matched.clear()
             if found:
-                self._answer(Command.IDENTIFIED)
+                self._answer(lss_bytes(LssCommand.IDENTIFIED))
 
-    def _scan(self, number: int, bit: int, part: int, following: int) -> None:
+    def _scan(self, step: FastScan) -> None:
         """Take a step of fast scan, which only devices without a node id join (CiA 305, 6.6)."""
         if self.node_id != UNCONFIGURED or self.state is LssState.CONFIGURATION:
             return
-        if bit == WHOLE_NUMBER:
+        if step.bit == WHOLE_NUMBER:
             self._scan_position = 0
-            self._answer(Command.IDENTIFIED)
+            self._answer(lss_bytes(LssCommand.IDENTIFIED))
             return
-        if bit > 31 or part > 3 or following > 3 or part != self._scan_position:
+        parts = range(4)
+        if step.bit >= ADDRESS_BITS or step.part not in parts or step.following not in parts:
             return
-        if (number ^ self._number(part)) >> bit:
+        other = step.part != self._scan_position
+        if other or (step.number ^ self._number(step.part)) >> step.bit:
             return
-        if bit == 0:
-            self._scan_position = following
-            if following < part:
+        if step.bit == 0:
+            self._scan_position = step.following
+            if step.following < step.part:
                 self.state = LssState.CONFIGURATION
-        self._answer(Command.IDENTIFIED)
+        self._answer(lss_bytes(LssCommand.IDENTIFIED))
 
     def _number(self, part: int) -> int:
         """Return vendor, product, revision or serial number, as clients read it."""
@@ -209,5 +184,5 @@ class LssSlave:
             return int.from_bytes(shown, 'little')
         return self._store.integer(*address).value
 
-    def _answer(self, command: int, data: bytes = b'') -> None:
-        self._send(Frame(LSS_RESPONSE, (bytes((command,)) + data).ljust(FRAME_BYTES, b'\0')))
+    def _answer(self, message: LssMessage) -> None:
+        self._send(Frame(LSS_RESPONSE, message.encode()))

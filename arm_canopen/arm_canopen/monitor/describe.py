@@ -13,10 +13,11 @@ from ..config.model import BusConfig, NodeConfig
 from ..exceptions import CodecError
 from ..standard.cob_id import CAN_ID_MASK, COB_ID_INVALID, CobId, NODE_ID_MAX
 from ..standard.emcy import Emergency
+from ..standard.lss import LSS_REQUEST, LSS_RESPONSE
 from ..standard.nmt import ALL_NODES, NmtCommand, NmtState, parse_heartbeat
 from ..standard.objects import Index
 from .description import Description, FrameKind
-from .lss import LSS_MASTER, LSS_SLAVE, lss_text
+from .lss import lss_text
 from .object_names import ObjectNames
 from .pdo_text import PdoDescriber
 from .sdo_follower import SdoFollower
@@ -51,8 +52,8 @@ class FrameDescriber:
             CobId.NMT: self._nmt,
             CobId.SYNC: self._sync,
             CobId.TIME: self._time,
-            LSS_MASTER: lambda frame: _lss('LSS >', frame),
-            LSS_SLAVE: lambda frame: _lss('LSS <', frame),
+            LSS_REQUEST: lambda frame: _lss('LSS >', frame),
+            LSS_RESPONSE: lambda frame: _lss('LSS <', frame),
         }
         self._functions: dict[int, Callable[[int, Frame], Description]] = {
             CobId.EMCY: self._emcy,

@@ -1,0 +1,185 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Messages of the layer setting services (CiA 305, 6), for master, slave and monitor alike."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+import struct
+from typing import NamedTuple
+
+LSS_REQUEST = 0x7E5  # COB-ID from the master
+LSS_RESPONSE = 0x7E4  # COB-ID from the slaves
+MESSAGE_BYTES = 8  # [byte]
+UNCONFIGURED = 255  # node id of a device that has none
+
+BIT_RATES: dict[int, int] = {
+    0: 1_000_000,
+    1: 800_000,
+    2: 500_000,
+    3: 250_000,
+    4: 125_000,
+    6: 50_000,
+    7: 20_000,
+    8: 10_000,
+}
+"""Bit rates in [bit/s] by their index in the standard table (CiA 301, table 1)."""
+STANDARD_TABLE = 0  # the table selector of BIT_RATES
+
+WHOLE_NUMBER = 0x80  # BitCheck of fast scan: all unconfigured devices answer, and begin anew
+ADDRESS_BITS = 32  # of each of the four numbers
+
+
+class LssCommand(IntEnum):
+    """Command specifiers."""
+
+    SWITCH_GLOBAL = 0x04
+    CONFIGURE_NODE_ID = 0x11
+    CONFIGURE_BIT_TIMING = 0x13
+    ACTIVATE_BIT_TIMING = 0x15
+    STORE = 0x17
+    SELECT_VENDOR = 0x40
+    SELECT_PRODUCT = 0x41
+    SELECT_REVISION = 0x42
+    SELECT_SERIAL = 0x43
+    SELECTED = 0x44
+    IDENTIFY_VENDOR = 0x46
+    IDENTIFY_PRODUCT = 0x47
+    IDENTIFY_REVISION_LOW = 0x48
+    IDENTIFY_REVISION_HIGH = 0x49
+    IDENTIFY_SERIAL_LOW = 0x4A
+    IDENTIFY_SERIAL_HIGH = 0x4B
+    IDENTIFY_UNCONFIGURED = 0x4C
+    IDENTIFIED = 0x4F
+    UNCONFIGURED_IDENTIFIED = 0x50
+    FAST_SCAN = 0x51
+    INQUIRE_VENDOR = 0x5A
+    INQUIRE_PRODUCT = 0x5B
+    INQUIRE_REVISION = 0x5C
+    INQUIRE_SERIAL = 0x5D
+    INQUIRE_NODE_ID = 0x5E
+
+
+COMMAND_TEXTS: dict[int, str] = {
+    LssCommand.SWITCH_GLOBAL: 'switch state global',
+    LssCommand.CONFIGURE_NODE_ID: 'configure node id',
+    LssCommand.CONFIGURE_BIT_TIMING: 'configure bit timing',
+    LssCommand.ACTIVATE_BIT_TIMING: 'activate bit timing',
+    LssCommand.STORE: 'store configuration',
+    LssCommand.SELECT_VENDOR: 'switch state selective: vendor id',
+    LssCommand.SELECT_PRODUCT: 'switch state selective: product code',
+    LssCommand.SELECT_REVISION: 'switch state selective: revision number',
+    LssCommand.SELECT_SERIAL: 'switch state selective: serial number',
+    LssCommand.SELECTED: 'switch state selective: done',
+    LssCommand.IDENTIFY_VENDOR: 'identify remote slave: vendor id',
+    LssCommand.IDENTIFY_PRODUCT: 'identify remote slave: product code',
+    LssCommand.IDENTIFY_REVISION_LOW: 'identify remote slave: lowest revision number',
+    LssCommand.IDENTIFY_REVISION_HIGH: 'identify remote slave: highest revision number',
+    LssCommand.IDENTIFY_SERIAL_LOW: 'identify remote slave: lowest serial number',
+    LssCommand.IDENTIFY_SERIAL_HIGH: 'identify remote slave: highest serial number',
+    LssCommand.IDENTIFY_UNCONFIGURED: 'identify non-configured remote slave',
+    LssCommand.IDENTIFIED: 'identify slave',
+    LssCommand.UNCONFIGURED_IDENTIFIED: 'identify non-configured slave',
+    LssCommand.FAST_SCAN: 'fastscan',
+    LssCommand.INQUIRE_VENDOR: 'inquire vendor id',
+    LssCommand.INQUIRE_PRODUCT: 'inquire product code',
+    LssCommand.INQUIRE_REVISION: 'inquire revision number',
+    LssCommand.INQUIRE_SERIAL: 'inquire serial number',
+    LssCommand.INQUIRE_NODE_ID: 'inquire node id',
+}
+"""Services in words."""
+
+
+class LssState(IntEnum):
+    """Whether a device takes configuration commands."""
+
+    WAITING = 0
+    CONFIGURATION = 1
+
+
+class LssAddress(NamedTuple):
+    """What makes a device unique: its identity object (0x1018) with all four numbers."""
+
+    vendor: int
+    product: int
+    revision: int
+    serial: int
+
+    def __str__(self) -> str:
+        """Write it as the command line takes it."""
+        return ' '.join(f'0x{number:08X}' for number in self)
+
+
+@dataclass(frozen=True, slots=True)
+class LssMessage:
+    """A message of either direction.
+
+    Attributes:
+        command: Command specifier; others than those of :class:`LssCommand` are reserved.
+        parameters: The 7 bytes behind it.
+    """
+
+    command: int
+    parameters: bytes = bytes(MESSAGE_BYTES - 1)
+
+    @property
+    def byte(self) -> int:
+        """The first parameter as UNSIGNED8: a mode, a node id, an error code."""
+        return self.parameters[0]
+
+    @property
+    def number(self) -> int:
+        """The first parameter as UNSIGNED32: a part of an LSS address."""
+        return int.from_bytes(self.parameters[:4], 'little')
+
+    @property
+    def text(self) -> str:
+        """The service in words."""
+        return COMMAND_TEXTS.get(self.command, f'unknown command 0x{self.command:02X}')
+
+    def encode(self) -> bytes:
+        """Return the 8 bytes of the frame."""
+        return bytes((self.command,)) + self.parameters.ljust(MESSAGE_BYTES - 1, b'\0')
+
+
+def decode_lss(data: bytes) -> LssMessage | None:
+    """Read a message, None when it is none: each has 8 bytes."""
+    return LssMessage(data[0], data[1:]) if len(data) == MESSAGE_BYTES else None
+
+
+def lss_bytes(command: int, *parameters: int) -> LssMessage:
+    """Return a message whose parameters are bytes."""
+    return LssMessage(command, bytes(parameters).ljust(MESSAGE_BYTES - 1, b'\0'))
+
+
+def lss_number(command: int, number: int) -> LssMessage:
+    """Return a message whose parameter is an UNSIGNED32."""
+    return LssMessage(command, struct.pack('<I3x', number))
+
+
+@dataclass(frozen=True, slots=True)
+class FastScan:
+    """A step of fast scan: devices answer whose number agrees down to a bit (CiA 305, 6.6).
+
+    Attributes:
+        number: What is compared.
+        bit: Lowest bit that is compared, or WHOLE_NUMBER for all devices.
+        part: Which number of the address: 0 vendor to 3 serial.
+        following: Part that devices take next when all bits agree; below ``part`` they are found.
+    """
+
+    number: int = 0
+    bit: int = WHOLE_NUMBER
+    part: int = 0
+    following: int = 0
+
+    def message(self) -> LssMessage:
+        """Return the message."""
+        parameters = struct.pack('<IBBB', self.number, self.bit, self.part, self.following)
+        return LssMessage(LssCommand.FAST_SCAN, parameters)
+
+
+def fast_scan(message: LssMessage) -> FastScan:
+    """Read the parameters of a fast scan."""
+    return FastScan(*struct.unpack('<IBBB', message.parameters))
