@@ -59,18 +59,21 @@ def disturb(truth: Measurement, noise: Noise, random: np.random.Generator) -> Me
     if noise.silent:
         return truth
     count = len(truth.positions)
-    positions = truth.positions + noise.position * random.standard_normal(count)
+    # one draw for everything: the generator costs more than the numbers
+    drawn = random.standard_normal(2 * count + 9)
+    positions: Array = truth.positions + noise.position * drawn[:count]
+    velocities: Array = truth.velocities + noise.velocity * drawn[count : 2 * count]
     if noise.encoder_step:
         positions = np.round(positions / noise.encoder_step) * noise.encoder_step
+    vectors = drawn[2 * count :].tolist()
     imu = Imu(
-        _scatter(truth.imu.specific_force, noise.specific_force, random),
-        _scatter(truth.imu.angular_velocity, noise.angular_velocity, random),
-        _scatter(truth.imu.roll_pitch_yaw, noise.attitude, random),
+        _scatter(truth.imu.specific_force, noise.specific_force, vectors[:3]),
+        _scatter(truth.imu.angular_velocity, noise.angular_velocity, vectors[3:6]),
+        _scatter(truth.imu.roll_pitch_yaw, noise.attitude, vectors[6:]),
     )
-    velocities: Array = truth.velocities + noise.velocity * random.standard_normal(count)
     return replace(truth, imu=imu, positions=positions, velocities=velocities)
 
 
-def _scatter(vector: Vector, deviation: float, random: np.random.Generator) -> Vector:
-    x, y, z = (float(v) for v in deviation * random.standard_normal(3) + np.array(vector))
-    return x, y, z
+def _scatter(vector: Vector, deviation: float, drawn: list[float]) -> Vector:
+    (x, y, z), (dx, dy, dz) = vector, drawn
+    return x + deviation * dx, y + deviation * dy, z + deviation * dz

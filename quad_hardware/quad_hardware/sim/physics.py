@@ -73,12 +73,13 @@ class Robot:
         self.feet: Final = FEET
         self._qpos = [int(self._model.joint(name).qposadr[0]) for name in self.joint_names]
         self._qvel = [int(self._model.joint(name).dofadr[0]) for name in self.joint_names]
-        self._accelerometer = self._sensor(ACCELEROMETER)
+        # views: MuJoCo keeps its arrays where they are
+        self._accelerometer = self._data.sensordata[self._sensor(ACCELEROMETER)]
         self._gyro = self._sensor(GYRO)
         self._touch = [self._sensor(foot).start for foot in FEET]
         self._gains = self._model.actuator_gainprm.copy(), self._model.actuator_biasprm.copy()
         self._smoothing = 1.0 - math.exp(-2.0 * math.pi * IMU_BANDWIDTH * timestep)
-        self._ramp = TargetRamp(joints, timestep, np.zeros(len(joints)))
+        self._ramp = TargetRamp(joints, timestep, self._data.ctrl)
         self._random = np.random.default_rng(seed)
         self._specific_force: Array = np.zeros(3)
         self.reset(pose=pose, seed=seed)
@@ -100,7 +101,6 @@ class Robot:
         self.set_torque(True)
         start = start_positions(self.joint_names, pose or {})
         self._data.qpos[self._qpos] = start
-        self._data.ctrl[:] = start
         self._ramp.jump(start)
         place(self._model, self._data, self._terrain)
         mujoco.mj_forward(self._model, self._data)
@@ -302,15 +302,12 @@ class Robot:
 
     def _step_once(self) -> None:
         data = self._data
-        if self._ramp.advance():
-            data.ctrl[:] = self._ramp.values
+        self._ramp.advance()
         if self._push_until is not None and self._steps >= self._push_until:
             data.xfrc_applied[self._base] = 0.0
             self._push_until = None
         mujoco.mj_step(self._model, data)
-        self._specific_force += self._smoothing * (
-            data.sensordata[self._accelerometer] - self._specific_force
-        )
+        self._specific_force += self._smoothing * (self._accelerometer - self._specific_force)
         self._steps += 1
 
     def _base_rotation(self) -> Array:

@@ -186,9 +186,8 @@ class KinematicRobot:
         self._owed -= count
         self._steps += count
         for _ in range(count):
-            self._before = self._ramp.values.copy()
-            if not self._ramp.advance():
-                break
+            self._before[:] = self._ramp.values
+            self._ramp.advance()
 
     def measure(self) -> Measurement:
         """Return what the sensors say."""

@@ -74,6 +74,11 @@ class Servos:
             self._joint[motor] = joint.name
             self._scale[motor] = _scale(joint, motor, model)
         self._index = {motor: plant.joint_names.index(name) for motor, name in self._joint.items()}
+        # by joint, in the order of the robot's arrays
+        order = sorted(self._index, key=lambda motor: self._index[motor])
+        self._slots = [slot_of(motor) for motor in order]
+        self._gains = np.array([self._scale[motor].gain for motor in order])
+        self._offsets = np.array([self._scale[motor].offset for motor in order])
         self.fitted = tuple(motor for motor in MOTOR_ORDER if motor in self._joint)
         self._speed = dict.fromkeys(self.fitted, MAX_SPEED)
 
@@ -117,23 +122,14 @@ class Servos:
 
     def angles(self, measured: Measurement) -> tuple[float, ...]:
         """Return angles by slot [deg]; 0 for servos that the robot lacks."""
-        slots = [0.0] * len(MOTOR_ORDER)
-        for motor in self.fitted:
-            position = float(measured.positions[self._index[motor]])
-            slots[slot_of(motor)] = self._scale[motor].angle(position)
-        return tuple(slots)
+        return self.by_slot((measured.positions - self._offsets) / self._gains)
 
     def speeds(self, measured: Measurement) -> tuple[float, ...]:
         """Return velocities by slot [deg/s]; 0 for servos that the robot lacks."""
-        slots = [0.0] * len(MOTOR_ORDER)
-        for motor in self.fitted:
-            velocity = float(measured.velocities[self._index[motor]])
-            slots[slot_of(motor)] = velocity / self._scale[motor].gain
-        return tuple(slots)
+        return self.by_slot(measured.velocities / self._gains)
 
     def by_slot(self, values: Array) -> tuple[float, ...]:
         """Return values of the joints by slot."""
         slots = np.zeros(len(MOTOR_ORDER))
-        for motor in self.fitted:
-            slots[slot_of(motor)] = values[self._index[motor]]
+        slots[self._slots] = values
         return tuple(slots.tolist())

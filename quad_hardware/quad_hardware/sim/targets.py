@@ -24,23 +24,23 @@ class TargetRamp:
         values: The set-points now [rad]; changes in place with every step.
     """
 
-    def __init__(self, joints: Sequence[Joint], timestep: float, start: Array) -> None:
+    def __init__(self, joints: Sequence[Joint], timestep: float, values: Array) -> None:
         """Stand still.
 
         Args:
             joints: Names and limits, in the order of the values.
             timestep: Time between two calls of :meth:`advance` [s].
-            start: The first set-points [rad].
+            values: The first set-points [rad]; the array itself is changed from now on.
         """
         self._index = {joint.name: index for index, joint in enumerate(joints)}
         self._lower = np.array([joint.lower for joint in joints])
         self._upper = np.array([joint.upper for joint in joints])
         self._timestep = timestep
-        self.values: Array = start.copy()
-        self._goal: Array = start.copy()
-        self._slope: Array = np.zeros(len(joints))
-        self._left = np.zeros(len(joints), dtype=np.int64)
-        self._busy = 0  # steps until everything stands still
+        self.values: Array = values
+        self._goal: Array = values.copy()
+        self._slope: Array = np.zeros(len(joints))  # [rad] a step; 0 for those that stand still
+        self._arrival = np.zeros(len(joints), dtype=np.int64)  # step in which each arrives
+        self._step = self._next_arrival = self._last_arrival = 0
 
     @property
     def goal(self) -> Array:
@@ -51,8 +51,8 @@ class TargetRamp:
         """Be at other set-points at once."""
         self.values[:] = values
         self._goal[:] = values
-        self._left[:] = 0
-        self._busy = 0
+        self._slope[:] = 0.0
+        self._next_arrival = self._last_arrival = self._step
 
     def approach(self, targets: Targets, duration: float) -> None:
         """Begin to approach targets; joints that are not named go on with what they do.
@@ -69,8 +69,8 @@ class TargetRamp:
         steps = max(round(duration / self._timestep), 1)
         self._goal[indices] = goal
         self._slope[indices] = (goal - self.values[indices]) / steps
-        self._left[indices] = steps
-        self._busy = int(self._left.max())
+        self._arrival[indices] = self._step + steps
+        self._plan()
 
     def check(self, targets: Targets) -> None:
         """Refuse what :meth:`approach` would refuse, and change nothing.
@@ -80,17 +80,22 @@ class TargetRamp:
         """
         self._checked(targets)
 
-    def advance(self) -> bool:
-        """Go one time step on; tell whether anything changed."""
-        if not self._busy:
-            return False
-        moving = self._left > 0
-        self.values[moving] += self._slope[moving]
-        arrived = self._left == 1
-        self.values[arrived] = self._goal[arrived]
-        self._left[moving] -= 1
-        self._busy -= 1
-        return True
+    def advance(self) -> None:
+        """Go one time step on."""
+        if self._step == self._last_arrival:
+            return
+        self._step += 1
+        self.values += self._slope
+        if self._step == self._next_arrival:
+            arrived = self._arrival == self._step
+            self.values[arrived] = self._goal[arrived]
+            self._slope[arrived] = 0.0
+            self._plan()
+
+    def _plan(self) -> None:
+        coming = self._arrival[self._arrival > self._step]
+        self._next_arrival = int(coming.min()) if len(coming) else self._step
+        self._last_arrival = int(coming.max()) if len(coming) else self._step
 
     def _checked(self, targets: Targets) -> tuple[list[int], Array]:
         if isinstance(targets, Mapping):
