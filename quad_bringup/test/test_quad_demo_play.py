@@ -88,6 +88,7 @@ class Robot:
         self.given_up: Callable[[], bool] = lambda: False
         self.figures = Figures(state='lie', tilt_max=0.0, rhythm=Rhythm(50.0, 0.0, 0.0))
         self.milestones = Milestones(Milestone(0.0), None)
+        self.missing: list[str] = []
         self._clock, self._factor = clock, factor
 
     def command(self, velocity: Velocity | None) -> None:
@@ -162,6 +163,16 @@ def test_it_stands_up_walks_turns_strafes_stops_and_lies_down(clock: Clock) -> N
     assert play.result.problems == []
     rows = [line.split()[0] for line in play.result.summary[1:5]]
     assert rows == moves
+
+
+def test_a_topic_that_is_never_found_ends_it_by_name(clock: Clock) -> None:
+    """Before anything moves."""
+    supervisor, robot = Supervisor(), Robot(clock)
+    robot.missing = ['/odom', '/imu']
+    run(Play(Show(), 'walk', 20.0), supervisor, robot)
+    assert supervisor.outcome is not None
+    assert supervisor.outcome.reason == 'not found in 20 s: /odom, /imu'
+    assert robot.modes == []
 
 
 def test_a_robot_that_walks_too_slowly_is_a_problem(clock: Clock) -> None:

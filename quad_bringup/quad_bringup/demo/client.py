@@ -124,6 +124,19 @@ class QuadClient:
         """What the body has covered so far."""
         return Milestones(self._truth.milestone, self._odometry.milestone)
 
+    @property
+    def missing(self) -> list[str]:
+        """What is needed and not there yet: topics that nobody was heard on, or listens to."""
+        there = {
+            'ground truth of the simulator': self._truth.milestone is not None,
+            '/odom': self._odometry.milestone is not None,
+            '/imu': math.isfinite(self._tilt),
+            '/joint_states': bool(self._positions),
+            '/joint_command': bool(self._targets),
+            'somebody who listens to /cmd_vel': self._twist.get_subscription_count() > 0,
+        }
+        return [name for name, is_there in there.items() if not is_there]
+
     def command(self, velocity: Velocity | None) -> None:
         """Command a velocity from now on, ten times a second.
 

@@ -22,6 +22,8 @@ from .track import mean_velocity, Milestone
 
 REFRESH = 0.2
 """Time between two pictures in [s]."""
+FIND_TIMEOUT = 20.0
+"""Longest time in [s] for the demo's node and the others to find each other."""
 MODE_TIMEOUT = 15.0
 """Longest time in [s] for a mode to be reached."""
 KEPT_STRETCHES = 40
@@ -64,6 +66,10 @@ class Client(Protocol):
     @property
     def milestones(self) -> Milestones:
         """What the body has covered so far."""
+
+    @property
+    def missing(self) -> list[str]:
+        """What is needed and not there yet."""
 
     def command(self, velocity: Velocity | None) -> None:
         """Command a velocity from now on, again and again; None to be silent."""
@@ -164,6 +170,7 @@ class Play:
 
     def _course(self, client: Client, ready: Callable[[], bool]) -> None:
         self._wait(client, ready, math.inf, 'the processes')
+        self._find(client)
         self._reach(client, 'stand', 'standing up')
         self._up.set()
         client.watch_tilt()
@@ -176,6 +183,17 @@ class Play:
         client.command(STANDSTILL)
         self._reach(client, 'lie', 'lying down')
         client.command(None)
+
+    def _find(self, client: Client) -> None:
+        """Wait until the client and the processes have found each other."""
+        try:
+            self._wait(client, lambda: not client.missing, FIND_TIMEOUT, 'the topics')
+        except CallError as error:
+            if not client.missing:
+                raise
+            raise CallError(
+                f'not found in {FIND_TIMEOUT:g} s: {", ".join(client.missing)}'
+            ) from error
 
     def _reach(self, client: Client, mode: str, phase: str) -> None:
         """Ask for a mode and wait until it is there."""
