@@ -155,7 +155,9 @@ class Drive:
     def followable(self) -> bool:
         """Whether a stream of positions would be obeyed in this cycle."""
         mode = self.mode
-        return self.obeys and isinstance(mode, CyclicPosition) and not mode.goes_to_single_target
+        if not self.obeys or not isinstance(mode, CyclicPosition) or mode.goes_to_single_target:
+            return False
+        return mode.braked or not self.halted
 
     @property
     def holding_mode(self) -> Mode | None:

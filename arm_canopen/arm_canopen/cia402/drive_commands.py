@@ -19,6 +19,7 @@ from .mode_table import REQUIRED_OBJECTS
 from .modes import NoMode
 from .position_modes import Move, ProfilePosition
 from .sequences import DriveSequences
+from .streaming import TargetStream
 
 T = TypeVar('T')
 
@@ -39,8 +40,7 @@ class DriveCommands:
         self._scheduler = scheduler
         self._running = ''
         self._task: Task[str] | None = None
-        self._stream_ends = 0.0
-        self._watch: Task[None] | None = None
+        self._stream = TargetStream(drive, scheduler)
         drive.on_ready = self._recover_by_policy
 
     def run(
@@ -55,12 +55,13 @@ class DriveCommands:
         """
         if preempt:
             self.cancel(f'{self._running} was ended by {name}')
-        if self._task is not None and not self._task.done:
+        if self._busy:
             sequence.close()
             refused: Promise[str] = Promise()
             refused.reject(DriveError(f'{self.drive.name} is busy: {self._running} is running'))
             return refused
         self._running = name
+        self._stream.end(name)
         self._task = self._scheduler.spawn(sequence)
         return self._task
 
@@ -69,14 +70,20 @@ class DriveCommands:
         if self._task is not None:
             self._task.cancel(DriveError(reason))
 
+    @property
+    def _busy(self) -> bool:
+        """Whether a command runs."""
+        return self._task is not None and not self._task.done
+
     def set_target(self, target: float) -> str:
         """Move to a position, at a velocity or with a torque, in the mode that is selected.
 
         Raises:
             DriveError: The drive cannot take it; the message says why.
         """
-        self._end_stream()
-        return self._set(target)
+        answer = self._set(target)
+        self._stream.end('a single target')
+        return answer
 
     def stream_target(self, target: float) -> None:
         """Take one of a stream of targets; when the stream pauses for too long, the drive stops.
@@ -84,10 +91,9 @@ class DriveCommands:
         Raises:
             DriveError: The drive cannot take it; the message says why.
         """
+        self._stream.admit()
         self._set(target)
-        self._stream_ends = self._scheduler.now + self.drive.config.target_timeout
-        if self._watch is None or self._watch.done:
-            self._watch = self._scheduler.background(self._watch_stream())
+        self._stream.follow()
 
     def move(self, move: Move) -> str:
         """Hand a move to the drive in mode 1, with all that the mode offers.
@@ -104,7 +110,7 @@ class DriveCommands:
         destination = self._named(lambda: mode.destination(move))
         drive.check_target(destination)
         self._named(lambda: mode.move(move))
-        self._end_stream()
+        self._stream.end('a single move')
         self._resume()
         how = 'at once' if move.immediate and mode.waiting == 1 else 'after the moves before it'
         return f'to {destination:g}, {how}'
@@ -169,7 +175,6 @@ class DriveCommands:
         if drive.state is not DriveState.OPERATION_ENABLED:
             drive.goal = DriveState.SWITCH_ON_DISABLED  # nor shall it be enabled any more
             return f'nothing to halt: {drive.describe()}'
-        self._end_stream()
         await steps.halt(BRAKED_TIMEOUT)
         return drive.describe()
 
@@ -269,6 +274,8 @@ class DriveCommands:
 
     def _require_obedience(self) -> None:
         drive, steps = self.drive, self._steps
+        if self._busy:
+            raise steps.refused(f'takes no target while {self._running} is running')
         if not drive.node.online:
             raise steps.refused('takes no target')
         if drive.state is not DriveState.OPERATION_ENABLED:
@@ -281,24 +288,6 @@ class DriveCommands:
     def _resume(self) -> None:
         self.drive.resume()
         self.drive.released('a single target was commanded')
-
-    def _end_stream(self) -> None:
-        if self._watch is not None:
-            self._watch.cancel(DriveError('the stream was ended by a command'))
-
-    async def _watch_stream(self) -> None:
-        while self._scheduler.now < self._stream_ends:
-            await self._scheduler.timer(self._stream_ends - self._scheduler.now)
-        drive = self.drive
-        if not drive.obeys:
-            return  # what has taken it away has said so
-        if not drive.mode.halts_by_bit or drive.mode.setpoint is None:
-            drive.hold()  # in mode 1 it goes to the last target, and rests there
-        drive.report(
-            Severity.WARNING,
-            f'the stream of targets has paused for {drive.config.target_timeout * 1000:g} ms: '
-            'stopped; the next target goes on',
-        )
 
     def _recover_by_policy(self) -> None:
         """Go on after the device was lost in operation, if bus.yml wants that."""
