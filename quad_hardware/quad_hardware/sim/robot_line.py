@@ -15,6 +15,7 @@ from .functions import Functions
 from .line import Arrival, Wire
 from .registers import Registers
 
+LATE = 0.05  # [s] after which a state that was due is one of now
 QUIET = 0.05  # [s] of silence in a frame after which its rest is not waited for
 
 
@@ -115,7 +116,8 @@ class RobotLine:
         self._change_faults(now)
         while (arrival := min(self.to_robot.next_arrival, self._push_time)) <= now:
             if self._push_time <= self.to_robot.next_arrival:
-                self._push(arrival)
+                # a process that was held up does not send all that it owes in a burst
+                self._push(arrival if now - arrival < LATE else now)
             else:
                 for arrived in self.to_robot.take(arrival):
                     self._hear(arrived)
