@@ -100,7 +100,9 @@ def test_the_demo_walks_and_says_what_it_measured(isolation: Isolation) -> None:
         demo.wait_for('standing up', STARTING)
         started = psutil.Process(demo.pid).children(recursive=True)
         assert demo.wait(STARTING) == 0, demo.output
-    rows = re.findall(r'^(walk|turn|strafe|stop) .*m/s.*m/s.*m/s', demo.output, re.MULTILINE)
+    rows = re.findall(
+        r'^(walk|turn|strafe|stop) +\S+ s(?: +[+-]\d\S+){9}$', demo.output, re.MULTILINE
+    )
     assert rows == ['walk', 'turn', 'strafe', 'stop'], demo.output
     assert 'jitter' in demo.output
     assert not psutil.wait_procs(started, timeout=5.0)[1]

@@ -161,7 +161,7 @@ def test_it_stands_up_walks_turns_strafes_stops_and_lies_down(clock: Clock) -> N
     assert robot.commands[-1] is None
     assert supervisor.outcome == Outcome(0, 'the demo has ended')
     assert play.result.problems == []
-    rows = [line.split()[0] for line in play.result.summary[1:5]]
+    rows = [line.split()[0] for line in play.result.summary[2:6]]
     assert rows == moves
 
 
@@ -234,7 +234,7 @@ def test_ctrl_c_lets_it_lie_down_first(clock: Clock) -> None:
     assert robot.modes == ['stand', 'policy', 'lie']
     assert supervisor.outcome is not None
     assert supervisor.outcome.exit_code == 0
-    assert [line.split()[0] for line in play.result.summary[1:-1]].count('walk') == 2
+    assert [line.split()[0] for line in play.result.summary[2:-1]].count('walk') == 2
 
 
 def test_ctrl_c_before_it_stands_is_left_to_the_supervisor(clock: Clock) -> None:

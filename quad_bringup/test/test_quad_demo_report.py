@@ -49,8 +49,10 @@ MOMENT = Moment(12.34, 'walk', (), ('ros2 topic hz /joint_command',))
 def test_a_robot_that_moves_as_told_is_no_problem() -> None:
     """The summary has commanded, measured, odometry, tilt and jitter."""
     assert problems(GOOD, STRETCHES) == []
-    text = '\n'.join(summary_lines(GOOD, STRETCHES))
-    for words in ('+0.200', '+0.196', '+0.190', '+0.84 rad/s', '2.5°', '50.0 Hz', '0.10/0.90 ms'):
+    lines = summary_lines(GOOD, STRETCHES)
+    assert max(map(len, lines)) < 80
+    text = '\n'.join(lines)
+    for words in ('+0.200', '+0.196', '+0.190', '+0.84', '2.5°', '50.0 Hz', '0.10/0.90 ms'):
         assert words in text
 
 

@@ -63,11 +63,21 @@ def velocity_text(velocity: Velocity | None) -> str:
     """
     if velocity is None:
         return 'unknown'
-    # adding 0.0 turns a rounded -0.0 into 0.0
-    return (
-        f'{round(velocity.forward, 3) + 0.0:+.3f} {round(velocity.left, 3) + 0.0:+.3f} m/s '
-        f'{round(velocity.turn, 2) + 0.0:+.2f} rad/s'
-    )
+    forward, left, turn = _tidy(velocity)
+    return f'{forward:+.3f} {left:+.3f} m/s {turn:+.2f} rad/s'
+
+
+def _columns(velocity: Velocity | None) -> str:
+    if velocity is None:
+        return f'{"unknown":^19}'
+    forward, left, turn = _tidy(velocity)
+    return f'{forward:+6.3f} {left:+6.3f} {turn:+5.2f}'
+
+
+def _tidy(velocity: Velocity) -> tuple[float, float, float]:
+    """Round, and turn a negative zero into zero."""
+    forward, left, turn = velocity.forward, velocity.left, velocity.turn
+    return round(forward, 3) + 0.0, round(left, 3) + 0.0, round(turn, 2) + 0.0
 
 
 def rhythm_text(figures: Figures) -> str:
@@ -90,15 +100,17 @@ def summary_lines(figures: Figures, stretches: Sequence[Measured]) -> list[str]:
         figures: The last ones before it lay down.
         stretches: What was measured.
     """
-    head = f'{"":<7} {"time":>6}  {"commanded":<30} {"measured in physics":<30} by /odom'
+    head = f'{"":<14}  {"commanded":^19}  {"in physics":^19}  {"by /odom":^19}'
+    names = f'{"":<14}' + 3 * f'  {"ahead":>6} {"left":>6} {"turn":>5}'
     rows = [
-        f'{each.stretch.name:<7} {each.stretch.duration:4.1f} s  '
-        f'{velocity_text(each.stretch.velocity):<30} {velocity_text(each.measured):<30} '
-        f'{velocity_text(each.odometry)}'
+        f'{each.stretch.name:<7}{each.stretch.duration:5.1f} s  '
+        f'{_columns(each.stretch.velocity)}  {_columns(each.measured)}  {_columns(each.odometry)}'
         for each in stretches
     ]
-    body = f'tilt at most {math.degrees(figures.tilt_max):.1f}°, {rhythm_text(figures)}'
-    return [head, *rows, body]
+    body = (
+        f'[m/s, rad/s]  tilt at most {math.degrees(figures.tilt_max):.1f}°, {rhythm_text(figures)}'
+    )
+    return [head, names, *rows, body]
 
 
 def problems(figures: Figures, stretches: Sequence[Measured]) -> list[str]:
