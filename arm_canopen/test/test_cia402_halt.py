@@ -4,14 +4,26 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
-from virtual_network import bus_config, drive_config, pdo, PERIOD, SCALE, VirtualNetwork
+from virtual_network import (
+    bus_config,
+    drive_config,
+    MOTION_WRITES,
+    pdo,
+    PERIOD,
+    SCALE,
+    sdo_write,
+    VirtualNetwork,
+)
 
 from arm_canopen.can.frame import Frame
 from arm_canopen.cia402.position_modes import Move
+from arm_canopen.config.model import RecoveryPolicy
 from arm_canopen.exceptions import DriveError
 from arm_canopen.master.events import Severity
-from arm_canopen.standard.drive import OperationMode
+from arm_canopen.standard.drive import DriveState, OperationMode
 
 JOINT = 'joint1'
 NODE_ID = 2
@@ -270,3 +282,68 @@ def test_a_switch_that_is_cancelled_stays_halted() -> None:
     assert 'halted' in net.do(JOINT, 'halt', preempt=True)
     assert_rests(net)
     assert net.drives[JOINT].mode.number is OperationMode.PROFILE_POSITION
+
+
+@pytest.mark.parametrize('verb', ['halt', 'quick_stop', 'disable'])
+def test_a_stop_at_any_moment_of_init_is_answered_truly(verb: str) -> None:
+    """What the answer says of the state still holds later, whenever the stop came."""
+    for millisecond in range(0, 80, 1):
+        net = VirtualNetwork(bus_config(drive_config(JOINT, NODE_ID)))
+        net.boot()
+        net.begin(JOINT, 'init')
+        net.run(0.001 * millisecond)
+        answer = net.do(JOINT, verb, preempt=True)
+        net.run(0.3)
+        drive = net.drives[JOINT]
+        told = 'Operation enabled' in answer
+        assert told == (drive.state is DriveState.OPERATION_ENABLED), (millisecond, answer)
+        assert told == (verb == 'halt' and drive.halted), (millisecond, answer)
+
+
+@pytest.mark.parametrize('cycles', range(16))
+def test_a_halt_in_a_mode_switch_is_answered_truly(cycles: int) -> None:
+    """Where the switch disables the drive: it stays as it is said to be, and nothing is wrong."""
+    drive = drive_config(JOINT, NODE_ID)
+    axis = replace(drive.axes[0], switching_state=DriveState.SWITCHED_ON)
+    net = running_in(OperationMode.PROFILE_VELOCITY, axes=(axis,))
+    commands = net.commands[JOINT]
+    commands.run('select', commands.select_mode(OperationMode.PROFILE_POSITION))
+    net.run(cycles * PERIOD)
+    answer = net.do(JOINT, 'halt', preempt=True)
+    net.run(0.5)
+    enabled = net.drives[JOINT].state is DriveState.OPERATION_ENABLED
+    assert ('Operation enabled' in answer) == enabled, answer
+    assert not net.told(Severity.ERROR)
+
+
+@pytest.mark.parametrize('verb', ['halt', 'quick_stop'])
+def test_a_lesser_stop_does_not_end_a_quick_stop(verb: str) -> None:
+    """While its ramp runs the drive keeps its power, and so it does where 0x605A holds it."""
+    writes = (*MOTION_WRITES, sdo_write(0x6085, 0, 10_000), sdo_write(0x605A, 0, 6))
+    net = running_in(OperationMode.PROFILE_POSITION, sdo_writes=writes)
+    net.commands[JOINT].set_target(3.0)
+    net.run(0.8)
+    net.do(JOINT, 'quick_stop', preempt=True)
+    net.run(0.1)
+    assert 'nothing to' in net.do(JOINT, verb, preempt=True)
+    net.run(3.0)
+    assert net.drives[JOINT].state is DriveState.QUICK_STOP_ACTIVE
+
+
+@pytest.mark.parametrize('verb', ['', 'disable', 'quick_stop', 'halt', 'shutdown'])
+def test_recovery_does_not_undo_a_stop(verb: str) -> None:
+    """A drive that somebody told to stop while it was away is not enabled when it comes back."""
+    drive = drive_config(JOINT, NODE_ID)
+    axis = replace(drive.axes[0], recovery=RecoveryPolicy.AUTO)
+    net = running_in(OperationMode.CYCLIC_POSITION, axes=(axis,))
+    net.power_off(JOINT)
+    net.run(1.0)
+    if verb == 'shutdown':
+        net.do(JOINT, verb, preempt=True)
+    elif verb:
+        with pytest.raises(DriveError, match='will not be enabled when it comes back'):
+            net.do(JOINT, verb, preempt=True)
+    net.power_on(JOINT)
+    net.run(3.0)
+    enabled = net.drives[JOINT].state is DriveState.OPERATION_ENABLED
+    assert enabled is not bool(verb)

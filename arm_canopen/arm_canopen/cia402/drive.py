@@ -50,6 +50,7 @@ class Drive:
         units: Its units.
         objects: Its objects in the process image.
         state: State shown in the last cycle.
+        statusword: 0x6041 as it was then.
         mode: The mode that is commanded.
         modes: The modes that this bus.yml makes possible.
         parameters: What it told about itself.
@@ -79,6 +80,7 @@ class Drive:
         self.units = Units(self.config)
         self.objects = DriveObjects(node, self.config.channel)
         self.state = DriveState.UNKNOWN
+        self.statusword = 0
         self.parameters = DriveParameters()
         self.goal: DriveState | None = None
         self.error = ''
@@ -143,6 +145,13 @@ class Drive:
         return self.state is not DriveState.UNKNOWN and self._answered
 
     @property
+    def stays_enabled(self) -> bool:
+        """Whether it is enabled, and no command is on its way that changes that."""
+        enable = int(Command.ENABLE_OPERATION)
+        told = self._controlword & enable == enable
+        return self.state is DriveState.OPERATION_ENABLED and told
+
+    @property
     def obeys(self) -> bool:
         """Whether the drive follows targets of its mode in this cycle."""
         return (
@@ -202,9 +211,9 @@ class Drive:
             loss = f'; lost before: {self.node.loss}' if self.node.loss else ''
             return f'offline: {phase}{detail}{loss}'
         parts = ['no statusword yet']
-        if self.objects.known:
+        if self.state is not DriveState.UNKNOWN:
             parts = [
-                statusword_text(self.objects.statusword),
+                statusword_text(self.statusword),
                 f'mode {mode_title(self.objects.mode_display)}',
             ]
         if self.halted:
@@ -226,11 +235,12 @@ class Drive:
                 poll = self.node.poll(self.node.config.poll_period)
                 self._background.append(self._scheduler.background(poll))
         if not self.node.operational or not self.objects.known:
-            self.state = DriveState.UNKNOWN
+            self.state, self.statusword = DriveState.UNKNOWN, 0
             self._estimate.clear()
             return
         self._estimate.note(self._scheduler.now, self.objects.position)
         before, self.state = self.state, self.objects.state
+        self.statusword = self.objects.statusword
         if self.state is not before:
             self._state_changed(before)
         self._watch_following()
@@ -469,7 +479,7 @@ class Drive:
         self.halt.release()
         self._asked = self._answered = self._announced = False
         self.error = ''
-        self.state = DriveState.UNKNOWN
+        self.state, self.statusword = DriveState.UNKNOWN, 0
         self.mode = self.modes[OperationMode.NO_MODE]
         self.released(reason)
 

@@ -8,25 +8,22 @@ from collections.abc import Callable, Coroutine
 from dataclasses import replace
 from typing import Any, TypeVar
 
-from ..config.model import RecoveryPolicy
 from ..exceptions import DriveError
-from ..master.events import Severity
 from ..master.scheduler import Promise, Scheduler, Task
 from ..standard.drive import DriveState, OperationMode
-from .drive import Drive, FAULTY
+from .drive import Drive
 from .homing import home, HomingProgress
 from .mode_table import REQUIRED_OBJECTS
 from .modes import NoMode
 from .position_modes import Move, ProfilePosition
-from .sequences import DriveSequences
+from .recovery import Recovery
+from .stop_commands import StopCommands
 from .streaming import TargetStream
 
 T = TypeVar('T')
 
-BRAKED_TIMEOUT = 10.0  # [s] for a halt to end in standstill
 
-
-class DriveCommands:
+class DriveCommands(StopCommands):
     """The commands of one drive. Each returns what was reached, or raises DriveError.
 
     Attributes:
@@ -35,13 +32,14 @@ class DriveCommands:
 
     def __init__(self, drive: Drive, scheduler: Scheduler) -> None:
         """Take the drive and the time."""
-        self.drive = drive
-        self._steps = DriveSequences(drive, scheduler)
+        super().__init__(drive, scheduler)
         self._scheduler = scheduler
         self._running = ''
         self._task: Task[str] | None = None
         self._stream = TargetStream(drive, scheduler)
-        drive.on_ready = self._recover_by_policy
+        self._recovery = Recovery(
+            drive, scheduler, lambda mode: self.run('recovery', self._enable_in(mode))
+        )
 
     def run(
         self, name: str, sequence: Coroutine[Promise[Any], None, str], *, preempt: bool = False
@@ -154,47 +152,6 @@ class DriveCommands:
         await self._steps.reach(DriveState.OPERATION_ENABLED)
         return self.drive.describe()
 
-    async def disable(self) -> str:
-        """Lead to Switched On, as ros2_canopen's service does; the motor is without torque."""
-        drive = self.drive
-        await self._steps.ready()
-        self._steps.require_no_fault()
-        drive.released('disabled')
-        if drive.state is DriveState.OPERATION_ENABLED:
-            await self._steps.reach(DriveState.SWITCHED_ON)
-        else:
-            drive.goal = DriveState.SWITCH_ON_DISABLED
-        return drive.describe()
-
-    async def halt(self) -> str:
-        """Brake and stay enabled (bit 8, option code 0x605D); the next target goes on."""
-        drive, steps = self.drive, self._steps
-        await steps.ready()
-        steps.require_no_fault()
-        drive.released('halted')
-        if drive.state is not DriveState.OPERATION_ENABLED:
-            drive.goal = DriveState.SWITCH_ON_DISABLED  # nor shall it be enabled any more
-            return f'nothing to halt: {drive.describe()}'
-        await steps.halt(BRAKED_TIMEOUT)
-        return drive.describe()
-
-    async def quick_stop(self) -> str:
-        """Quick stop; what follows depends on the drive's option code 0x605A."""
-        drive, steps = self.drive, self._steps
-        await steps.ready()
-        steps.require_no_fault()
-        drive.released('quick stop')
-        if drive.state is not DriveState.OPERATION_ENABLED:
-            drive.goal = DriveState.SWITCH_ON_DISABLED
-            return f'nothing to stop: {drive.describe()}'
-        drive.goal = DriveState.QUICK_STOP_ACTIVE
-        await steps.until(
-            lambda: drive.state is not DriveState.OPERATION_ENABLED,
-            steps.quirks.state_timeout,
-            'the quick stop',
-        )
-        return drive.describe()
-
     async def home(
         self,
         method: int | None = None,
@@ -241,22 +198,6 @@ class DriveCommands:
         hint = '' if enabled else f'; not enabled, call {self._steps.way_to_enable()}'
         return f'{drive.describe()}{hint}'
 
-    async def shutdown(self) -> str:
-        """Bring the drive to rest and take its power away; never raises."""
-        drive, steps = self.drive, self._steps
-        drive.interrupted = None
-        drive.released('shutting down')
-        if drive.state is DriveState.OPERATION_ENABLED:
-            drive.goal = DriveState.QUICK_STOP_ACTIVE
-            await steps.settled(lambda: drive.state is not DriveState.OPERATION_ENABLED)
-        # option codes 5 to 8 hold in Quick Stop Active: wait for rest, then let go
-        await steps.settled(
-            lambda: drive.state is not DriveState.QUICK_STOP_ACTIVE or steps.is_slow()
-        )
-        drive.goal = DriveState.SWITCH_ON_DISABLED
-        await steps.settled(lambda: drive.state is DriveState.SWITCH_ON_DISABLED)
-        return drive.describe()
-
     def _set(self, target: float) -> str:
         drive = self.drive
         self._require_obedience()
@@ -288,29 +229,6 @@ class DriveCommands:
     def _resume(self) -> None:
         self.drive.resume()
         self.drive.released('a single target was commanded')
-
-    def _recover_by_policy(self) -> None:
-        """Go on after the device was lost in operation, if bus.yml wants that."""
-        drive = self.drive
-        mode, drive.interrupted = drive.interrupted, None
-        if mode is None or drive.config.recovery is not RecoveryPolicy.AUTO:
-            return
-        self._scheduler.background(self._resume_in(mode))
-
-    async def _resume_in(self, mode: OperationMode) -> None:
-        drive = self.drive
-        if drive.state in FAULTY:
-            await drive.know_error()
-            drive.report(
-                Severity.WARNING, f'not enabled again: {drive.describe()}; call ~/recover'
-            )
-            return
-        try:
-            await self.run('recovery', self._enable_in(mode))
-        except DriveError as error:
-            drive.report(Severity.ERROR, f'not enabled again: {error}')
-        else:
-            drive.report(Severity.INFO, f'enabled again (recovery: auto): {drive.describe()}')
 
     async def _enable_in(self, mode: OperationMode) -> str:
         await self._steps.ready()

@@ -95,7 +95,7 @@ class DriveSequences:
         drive = self.drive
         ramp = abs(drive.velocity) / drive.parameters.profile.deceleration  # [s]
         drive.hold()
-        await self.pause(SETTLE_CYCLES * drive.period)
+        await self.settle()
         await self.until(
             lambda: drive.mode.braked and self.is_slow(), timeout + ramp, 'standstill'
         )
@@ -177,6 +177,10 @@ class DriveSequences:
         except SdoError as error:
             return error
         return None
+
+    async def settle(self) -> None:
+        """Wait until the drive has shown what it makes of the command that was sent last."""
+        await self.pause(SETTLE_CYCLES * self.drive.period)
 
     async def pause(self, duration: float) -> None:
         """Let time pass in [s]."""

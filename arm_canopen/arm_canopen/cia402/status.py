@@ -59,7 +59,7 @@ def drive_status(drive: Drive, now: float) -> DriveStatus:
         drive: The drive.
         now: Steady time in [s].
     """
-    word = drive.objects.statusword
+    word = drive.statusword
     return DriveStatus(
         name=drive.name,
         node=node_status(drive.node, now),

@@ -1,0 +1,120 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What stops a drive: sequences that end whatever else runs, and are never undone by it."""
+
+from __future__ import annotations
+
+from ..config.model import RecoveryPolicy
+from ..exceptions import DriveError
+from ..master.scheduler import Scheduler
+from ..standard.drive import DriveState
+from .drive import Drive
+from .sequences import DriveSequences
+
+BRAKED_TIMEOUT = 10.0  # [s] for a halt to end in standstill, beside the time of the ramp
+
+
+class StopCommands:
+    """Disable, halt, quick stop and shutdown of one drive.
+
+    Attributes:
+        drive: The drive.
+    """
+
+    def __init__(self, drive: Drive, scheduler: Scheduler) -> None:
+        """Take the drive and the time."""
+        self.drive = drive
+        self._steps = DriveSequences(drive, scheduler)
+
+    async def disable(self) -> str:
+        """Lead to Switched On, as ros2_canopen's service does; the motor is without torque."""
+        drive = self.drive
+        await self._ready_to_stop('disabled')
+        if drive.state is DriveState.OPERATION_ENABLED:
+            await self._steps.reach(DriveState.SWITCHED_ON)
+        else:
+            await self._stay_disabled()
+        return drive.describe()
+
+    async def halt(self) -> str:
+        """Brake and stay enabled (bit 8, option code 0x605D); the next target goes on."""
+        drive = self.drive
+        await self._ready_to_stop('halted')
+        if self._is_quick_stopped():
+            return f'nothing to halt: {drive.describe()}'
+        if not drive.stays_enabled:
+            await self._stay_disabled()
+            return f'nothing to halt: {drive.describe()}'
+        drive.goal = DriveState.OPERATION_ENABLED  # whatever was about to lead it elsewhere
+        await self._steps.halt(BRAKED_TIMEOUT)
+        return drive.describe()
+
+    async def quick_stop(self) -> str:
+        """Quick stop; what follows depends on the drive's option code 0x605A."""
+        drive, steps = self.drive, self._steps
+        await self._ready_to_stop('quick stop')
+        if drive.state is DriveState.OPERATION_ENABLED:
+            drive.goal = DriveState.QUICK_STOP_ACTIVE
+            await steps.until(
+                lambda: drive.state is not DriveState.OPERATION_ENABLED,
+                steps.quirks.state_timeout,
+                'the quick stop',
+            )
+            return drive.describe()
+        if not self._is_quick_stopped():
+            await self._stay_disabled()
+        return f'nothing to stop: {drive.describe()}'
+
+    async def shutdown(self) -> str:
+        """Bring the drive to rest and take its power away; never raises."""
+        drive, steps = self.drive, self._steps
+        drive.interrupted = None
+        drive.released('shutting down')
+        if drive.state is DriveState.OPERATION_ENABLED:
+            drive.goal = DriveState.QUICK_STOP_ACTIVE
+            await steps.settled(lambda: drive.state is not DriveState.OPERATION_ENABLED)
+        # option codes 5 to 8 hold in Quick Stop Active: wait for rest, then let go
+        await steps.settled(
+            lambda: drive.state is not DriveState.QUICK_STOP_ACTIVE or steps.is_slow()
+        )
+        drive.goal = DriveState.SWITCH_ON_DISABLED
+        await steps.settled(lambda: drive.state is DriveState.SWITCH_ON_DISABLED)
+        return drive.describe()
+
+    async def _ready_to_stop(self, reason: str) -> None:
+        """Take the drive from whatever moves it, or would do so when it comes back.
+
+        Raises:
+            DriveError: It is offline or faulted.
+        """
+        drive = self.drive
+        returning = drive.interrupted is not None and drive.config.recovery is RecoveryPolicy.AUTO
+        drive.interrupted = None
+        try:
+            await self._steps.ready()
+        except DriveError as error:
+            if not returning:
+                raise
+            raise DriveError(f'{error}; it will not be enabled when it comes back') from error
+        self._steps.require_no_fault()
+        drive.released(reason)
+
+    async def _stay_disabled(self) -> None:
+        """Have it enabled no more, also where the command for that is on its way already."""
+        drive, steps = self.drive, self._steps
+        drive.goal = DriveState.SWITCH_ON_DISABLED
+        await steps.settle()
+        await steps.until(
+            lambda: drive.state is not DriveState.OPERATION_ENABLED,
+            steps.quirks.state_timeout,
+            drive.goal.title,
+        )
+
+    def _is_quick_stopped(self) -> bool:
+        """Whether a quick stop runs or has ended; then no lesser stop takes its place."""
+        drive = self.drive
+        quick_stop = DriveState.QUICK_STOP_ACTIVE
+        if drive.state is not quick_stop and drive.goal is not quick_stop:
+            return False
+        drive.goal = quick_stop
+        return True
