@@ -36,6 +36,8 @@ class ScriptedDevice:
         announces: It sends a boot-up message after a reset.
         answers: It answers SDOs.
         beats: It sends heartbeats when 0x1017 says so.
+        deaf_to_reset: It misses the resets.
+        guarded: It answers node guarding.
         answer_time: How long it thinks about an SDO in [s].
         state: Its NMT state.
         commands: NMT commands that it got.
@@ -55,6 +57,9 @@ class ScriptedDevice:
     commands: list[int] = field(default_factory=list)
     writes: list[tuple[int, int, int]] = field(default_factory=list)
     on_request: Callable[[bytes], None] = lambda request: None
+    guarded: bool = False
+    deaf_to_reset: bool = False
+    _toggle: int = 0
     _answers_due: list[tuple[float, bytes]] = field(default_factory=list)
     _beat_due: float | None = None
 
@@ -64,7 +69,7 @@ class ScriptedDevice:
 
     def restart(self, now: float) -> None:
         """Start anew, as after a reset or a power cut."""
-        self.state = NmtState.PRE_OPERATIONAL
+        self.state, self._toggle = NmtState.PRE_OPERATIONAL, 0
         self._answers_due.clear()
         self._beat_due = None
         self.writes.clear()
@@ -77,8 +82,12 @@ class ScriptedDevice:
             self.commands.append(frame.data[0])
             if frame.data[0] in STATES:
                 self.state = STATES[frame.data[0]]
-            else:
+            elif not self.deaf_to_reset:
                 self.restart(now)
+        elif frame.can_id == 0x700 + self.node_id and frame.is_remote:
+            if self.guarded:
+                self.send(Frame(frame.can_id, bytes((self._toggle | self.state,))))
+                self._toggle ^= 0x80
         elif frame.can_id == 0x600 + self.node_id and self.answers:
             self.on_request(frame.data)
             self._note_write(frame.data, now)

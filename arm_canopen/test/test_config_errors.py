@@ -117,16 +117,14 @@ REFUSED = [
         'is a lifecycle driver, but the master has a plain one',
         'for all or for none',
     ),
-    Case('joint1', 'guard_time: 100 # <-', 'guard_time', 'heartbeat_producer', 'remove'),
-    Case('joint1', 'boot: false # <-', 'boot', 'configures every', 'remove'),
     Case('joint1', 'software_file: x # <-', 'software_file', 'vendor', 'remove'),
     Case('joint1', 'software_version: 1 # <-', 'software_version', 'not chec', 'remove'),
     Case(
         'joint1',
-        'restore_configuration: 1 # <-',
+        'restore_configuration: 128 # <-',
         'restore_configuration',
-        'restore them once by hand',
-        'remove',
+        'out of range',
+        '0 to 127',
     ),
     Case(
         'joint1',
@@ -135,9 +133,6 @@ REFUSED = [
         'sdo list',
         'remove',
     ),
-    Case('master', 'start: false # <-', 'start', 'start_nodes: false', 'remove'),
-    Case('master', 'stop_all_nodes: true # <-', 'stop_all_nodes', 'not stop', 'remove'),
-    Case('master', 'reset_all_nodes: true # <-', 'reset_all_nodes', 'not reset', 'remove'),
 ]
 
 

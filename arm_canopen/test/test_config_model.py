@@ -9,7 +9,7 @@ from operator import attrgetter
 from pathlib import Path
 
 from config_cases import added
-from config_samples import BUS, eds_text, errors_of, load_text, write_bus
+from config_samples import BUS, DRIVE_ROWS, eds_text, errors_of, load_text, Row, write_bus
 import pytest
 
 from arm_canopen.config import DriveConfig, Identity, NodeConfig, PdoConfig
@@ -19,6 +19,7 @@ from arm_canopen.config.master_keys import MASTER_KEYS, OPTION_KEYS
 from arm_canopen.config.model import RecoveryPolicy
 from arm_canopen.config.schema import Key, Kind, Use
 from arm_canopen.config.settings import DeviceSettings, MasterSettings, Options
+from arm_canopen.exceptions import ConfigError
 from arm_canopen.standard.datatypes import DataType
 from arm_canopen.standard.drive import DriveState
 
@@ -31,6 +32,11 @@ TWO_AXES_EDS = Path(__file__).parents[1] / 'eds' / 'cia402_two_axes.eds'
         ('namespace: left/arm', 'namespace', 'left/arm'),
         ('remappings: {joint_states: js}', 'remappings', {'joint_states': 'js'}),
         ('mandatory: true', 'mandatory', True),
+        ('boot: false', 'boot', False),
+        ('restore_configuration: 1', 'restore_configuration', 1),
+        ('retry_factor: 5', 'retry_factor', 5),
+        ('life_time_factor: 4', 'life_time_factor', 4),
+        ('heartbeat_producer: 50', 'guarded', False),
         ('reset_communication: false', 'reset_communication', False),
         ('sdo_timeout_ms: 50', 'sdo_timeout', 0.05),
         ('boot_timeout_ms: 2500', 'boot_timeout', 2.5),
@@ -73,6 +79,17 @@ def test_keys_of_a_device(tmp_path: Path, piece: str, attribute: str, value: obj
         ('remappings: {a: b}', 'remappings', {'a': 'b'}),
         ('baudrate: 125', 'bitrate', 125_000),
         ('sync_period: 5000', 'sync_period', 0.005),
+        ('sync_window: 2000', 'sync_window', 0.002),
+        ('start: false', 'start', False),
+        ('start_all_nodes: true', 'start_all_nodes', True),
+        ('reset_all_nodes: true', 'reset_all_nodes', True),
+        ('stop_all_nodes: true', 'stop_all_nodes', True),
+        ('boot_time: 2000', 'boot_time', 2.0),
+        ('nmt_inhibit_time: 50', 'nmt_inhibit_time', 0.005),
+        ('time_cob_id: 0x40000100', 'time_period', 1.0),
+        ('time_cob_id: 0x80000100', 'time_period', 0.0),
+        ('time_period_ms: 500', 'time_period', 0.5),
+        ('time_period_ms: 500', 'time_cob_id', 0x40000100),
         ('sync_period: 5000', 'cycle_period', 0.005),
         ('sync_overflow: 240', 'sync_overflow', 240),
         ('sync_overflow: 0', 'sync_overflow', 0),
@@ -318,3 +335,25 @@ def test_the_line_of_a_device_is_that_of_its_name(tmp_path: Path) -> None:
     (node,) = load_text(tmp_path).nodes
     assert isinstance(node, NodeConfig)
     assert path.read_text('utf-8').splitlines()[node.line - 1] == '  joint1:'
+
+
+def test_a_device_without_heartbeat_is_guarded(tmp_path: Path) -> None:
+    """bus.yml says how often, else the EDS does; an EDS without 0x100C refuses it."""
+    rows = [*DRIVE_ROWS, Row(0x100C, 0, 'Guard time', 6, 'rw', '50')]
+    text = added('joint1', 'heartbeat_producer: 0\nguard_time: 150')
+    (node,) = load_text(tmp_path, text, eds=eds_text(rows)).nodes
+    assert (node.guard_time, node.guarded) == (0.15, True)
+    text = added('joint1', 'heartbeat_producer: 0')
+    (node,) = load_text(tmp_path, text, eds=eds_text(rows)).nodes
+    assert (node.guard_time, node.guarded) == (0.05, True)
+    with pytest.raises(ConfigError, match='no writable 0x100C'):
+        load_text(
+            tmp_path, added('joint1', 'heartbeat_producer: 0\nguard_time: 150'), eds=eds_text()
+        )
+
+
+def test_a_heartbeat_replaces_guarding(tmp_path: Path) -> None:
+    """Both at a time are forbidden by CiA 301; the heartbeat wins, and it is told."""
+    config = load_text(tmp_path, added('joint1', 'heartbeat_producer: 100\nguard_time: 150'))
+    assert (config.nodes[0].guard_time, config.nodes[0].guarded) == (0.0, False)
+    assert any('sends a heartbeat every 100 ms' in str(warning) for warning in config.warnings)

@@ -15,20 +15,12 @@ import pytest
 @pytest.mark.parametrize(
     ('section', 'piece', 'key', 'message'),
     [
-        ('joint1', 'mandatory: true', 'mandatory', 'does not stop the others'),
-        ('joint1', 'reset_communication: false', 'reset_communication', 'but it is disabled'),
-        ('joint1', 'life_time_factor: 3', 'life_time_factor', 'no node guarding'),
-        ('joint1', 'retry_factor: 5', 'retry_factor', 'no node guarding'),
-        ('joint1', 'time_cob_id: 0x200', 'time_cob_id', 'no TIME'),
         ('joint1', 'period: 20', 'period', 'every 10 ms, not every 20 ms'),
         ('joint1', 'package: wrong', 'package', "is in the package 'canopen_402_driver'"),
         ('joint1', 'scale_pos_to_dev: 57.3', 'scale_pos_to_dev', 'is 0.0573, not 1'),
         ('joint1', 'scale_vel_from_dev: 2', 'scale_vel_from_dev', 'is 2000, not 1'),
-        ('master', 'sync_window: 5000', 'sync_window', 'known, not used yet'),
         ('master', 'vendor_id: 0x360', 'vendor_id', 'known, not used yet'),
         ('master', 'error_behavior: {1: 1}', 'error_behavior', 'known, not used yet'),
-        ('master', 'boot_time: 100', 'boot_time', 'waited for for ever'),
-        ('master', 'start_all_nodes: true', 'start_all_nodes', 'when it is ready'),
     ],
 )
 def test_told_with_line_and_key(

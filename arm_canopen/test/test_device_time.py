@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from datetime import datetime, timedelta
+from datetime import datetime, timedelta, timezone
 import struct
 
 from device_rig import drive_dictionary, NODE_ID, Rig
@@ -14,7 +14,7 @@ from arm_canopen.standard.datatypes import DataType
 from arm_canopen.standard.dictionary import ObjectDictionary, ObjectEntry
 from arm_canopen.standard.nmt import NmtCommand
 
-NOON = datetime(2026, 11, 21, 12, 0, 0, 500_000)  # noqa: DTZ001  # TIME_OF_DAY knows no zone
+NOON = datetime(2026, 11, 21, 12, 0, 0, 500_000, tzinfo=timezone.utc)
 
 
 @pytest.fixture
@@ -36,7 +36,7 @@ def rig() -> Rig:
 
 def time_message(time: datetime) -> bytes:
     """Return a TIME message (CiA 301: milliseconds of the day, days since 1984)."""
-    elapsed = time - datetime(1984, 1, 1)  # noqa: DTZ001
+    elapsed = time - datetime(1984, 1, 1, tzinfo=timezone.utc)
     milliseconds = (elapsed - timedelta(days=elapsed.days)) // timedelta(milliseconds=1)
     return struct.pack('<IH', milliseconds, elapsed.days)
 

@@ -12,7 +12,7 @@ from scripted_device import PRE_OPERATIONAL, RESET_COMMUNICATION, ScriptedDevice
 from virtual_network import bus_config, drive_config, pdo, sdo_write, VirtualNetwork
 
 from arm_canopen.config.model import Identity, NodeConfig
-from arm_canopen.master.boot import pdo_writes
+from arm_canopen.master.configuration import pdo_writes
 from arm_canopen.master.events import EventKind, Severity
 from arm_canopen.master.remote_node import BootPhase, RemoteNode
 from arm_canopen.standard.dictionary import AccessType, ObjectDictionary
@@ -44,6 +44,7 @@ DEFAULT_COB_IDS = {
 DEVICE_VALUES = {
     **{place: getattr(IDENTITY, name) for name, place in IDENTITY_PLACES.items()},
     **DEFAULT_COB_IDS,
+    (0x1016, 1): 0,
 }
 
 
@@ -110,7 +111,6 @@ def test_the_whole_configuration_in_its_order() -> None:
     scene.boot()
     assert scene.device.writes == [
         (0x1017, 0, 100),
-        (0x1016, 1, 0),
         # RPDO 1 was valid
         (0x1400, 1, INVALID | 0x200 + NODE_ID),
         (0x1400, 2, 255),
@@ -143,10 +143,10 @@ def test_the_whole_configuration_in_its_order() -> None:
 
 
 def test_nothing_is_written_before_pre_operational_and_after_start() -> None:
-    """The device is configured while it processes no PDOs."""
-    scene = Scene(io_config(reset_communication=False))
+    """The device is configured while it processes no PDOs, also when it heard no reset."""
+    scene = Scene()
     scene.device.state = NmtState.OPERATIONAL
-    scene.device.announces = False
+    scene.device.deaf_to_reset = True
     states: set[NmtState] = set()
 
     def note(request: bytes) -> None:
@@ -156,7 +156,6 @@ def test_nothing_is_written_before_pre_operational_and_after_start() -> None:
     scene.device.on_request = note
     scene.boot()
     assert states == {NmtState.PRE_OPERATIONAL}
-    assert RESET_COMMUNICATION not in scene.device.commands
 
 
 def test_what_bus_yml_does_not_name_is_left_alone() -> None:

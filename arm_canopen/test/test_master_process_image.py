@@ -160,7 +160,7 @@ def test_a_round_is_complete_when_its_last_answer_comes(
     known: set[int] = set()
     for third_asked, arrivals in rounds:
         complete.clear()
-        sync.start()
+        sync.start(0.0)
         asked = [n for n in range(4) if n != 2 or third_asked]
         for n in asked:
             entries[n].expect()

@@ -4,7 +4,7 @@
 
 Names, units and defaults are theirs, so that their files can be read unchanged. Where a default
 differs, ``why`` says the reason. Four keys are our own: ``scale_eff_to_dev``,
-``target_timeout_ms``, ``recovery`` and ``quirks``.
+``target_timeout_ms``, ``recovery`` and ``quirks``; of the master ``time_period_ms``.
 """
 
 from __future__ import annotations
@@ -21,7 +21,6 @@ from .shared_keys import (
     PACKAGE,
     REMAPPINGS,
     RETRY_FACTOR,
-    TIME_COB_ID,
     U8_MAX,
     U16_MAX,
     U32_MAX,
@@ -90,35 +89,15 @@ DEVICE_KEYS: tuple[Key, ...] = (
     ),
     Key('heartbeat_consumer', Kind.BOOLEAN, 'heartbeat_consumer'),
     MULTIPLIER,
-    Key(
-        'guard_time',
-        Kind.INTEGER,
-        default=0,
-        use=Use.REFUSED,
-        why='there is no node guarding; set heartbeat_producer instead',
-    ),
-    Key(
-        'life_time_factor', Kind.INTEGER, default=0, use=Use.LATER, why='there is no node guarding'
-    ),
+    Key('guard_time', Kind.INTEGER, 'guard_time', per_unit=MILLISECONDS, low=0, high=U16_MAX),
+    Key('life_time_factor', Kind.INTEGER, 'life_time_factor', low=0, high=U8_MAX),
     RETRY_FACTOR,
-    TIME_COB_ID,
+    Key('time_cob_id', Kind.BLOCK),
     Key('error_behavior', Kind.BLOCK),
-    Key(
-        'boot',
-        Kind.BOOLEAN,
-        default=True,
-        use=Use.REFUSED,
-        why='the master configures every device that is named; leave the device out instead',
-    ),
+    Key('boot', Kind.BOOLEAN, 'boot'),
     Key('mandatory', Kind.BOOLEAN, 'mandatory'),
     Key('reset_communication', Kind.BOOLEAN, 'reset_communication'),
-    Key(
-        'restore_configuration',
-        Kind.INTEGER,
-        default=0,
-        use=Use.REFUSED,
-        why='defaults are not restored in this version; restore them once by hand (0x1011)',
-    ),
+    Key('restore_configuration', Kind.INTEGER, 'restore_configuration', low=0, high=127),
     Key(
         'software_file',
         Kind.TEXT,

@@ -74,11 +74,11 @@ def read_device(
         namespace=settings.namespace,
         remappings=names,
         identity=_identity(settings, eds.dictionary),
+        boot=settings.boot,
         mandatory=settings.mandatory,
         reset_communication=settings.reset_communication,
-        retry_factor=(
-            settings.retry_factor if 'retry_factor' in section.entries else options.retry_factor
-        ),
+        retry_factor=settings.retry_factor or options.retry_factor,
+        restore_configuration=settings.restore_configuration,
         sdo_timeout=settings.sdo_timeout,
         boot_timeout=settings.boot_timeout,
         sdo_writes=SdoReader(eds.dictionary, findings).read(section),

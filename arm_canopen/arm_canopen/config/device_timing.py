@@ -51,7 +51,6 @@ def finish_device(
     master = around.master
     _check_period(draft, master, findings)
     _check_sync(draft.pdos, master, findings)
-    _check_boot_keys(draft, config, findings)
     if config.is_drive:
         _check_drive_pdos(draft, findings)
     producer = _heartbeat_producer(draft, config.dictionary, findings)
@@ -60,26 +59,12 @@ def finish_device(
         config,
         heartbeat_producer=producer,
         heartbeat_timeout=producer * multiplier if around.settings.watch_devices else 0.0,
+        guard_time=_guard_time(draft, config.dictionary, producer, findings),
+        life_time_factor=_life_time_factor(draft, config.dictionary),
         heartbeat_consumer=_heartbeat_consumer(draft, config.dictionary, master, findings),
         tpdos=tuple(pdo.config for pdo in draft.pdos if pdo.direction is TPDO),
         rpdos=tuple(pdo.config for pdo in draft.pdos if pdo.direction is RPDO),
     )
-
-
-def _check_boot_keys(draft: DeviceDraft, config: NodeConfig, findings: Findings) -> None:
-    """Say what two keys do not do yet."""
-    if config.mandatory:
-        findings.warning(
-            draft.place_of('mandatory'),
-            'known, not used yet: the loss of a mandatory device does not stop the others',
-            'it may stay',
-        )
-    if config.is_drive and not config.reset_communication:
-        findings.warning(
-            draft.place_of('reset_communication'),
-            'a drive that is in operation when the master starts is not reset, but it is disabled',
-            'have the axis at rest and held before the master starts',
-        )
 
 
 def _heartbeat_producer(
@@ -106,6 +91,37 @@ def _heartbeat_producer(
             'remove the key, the period of the EDS counts',
         )
     return wanted
+
+
+def _guard_time(
+    draft: DeviceDraft, dictionary: ObjectDictionary, producer: float, findings: Findings
+) -> float:
+    """Return the period of node guarding in [s]; a heartbeat replaces it (CiA 301, 7.2.8.2.2)."""
+    entry = dictionary.get(Index.GUARD_TIME)
+    wanted = draft.settings.guard_time
+    if wanted and producer:
+        findings.warning(
+            draft.place_of('guard_time'),
+            f'not used: the device sends a heartbeat every {producer * 1e3:g} ms',
+            "remove the key, or write 'heartbeat_producer: 0'",
+        )
+        return 0.0
+    if wanted and (entry is None or not entry.access.writable):
+        findings.error(
+            draft.place_of('guard_time'),
+            'the device cannot be guarded: no writable 0x100C in its EDS',
+            'remove the key, and set heartbeat_producer',
+        )
+    if wanted is None and entry is not None and isinstance(entry.default, int) and not producer:
+        return entry.default / MILLISECONDS
+    return wanted or 0.0
+
+
+def _life_time_factor(draft: DeviceDraft, dictionary: ObjectDictionary) -> int:
+    entry = dictionary.get(Index.LIFE_TIME_FACTOR)
+    given = entry.default if entry is not None and isinstance(entry.default, int) else 0
+    wanted = draft.settings.life_time_factor
+    return given if wanted is None else wanted
 
 
 def _heartbeat_consumer(

@@ -12,6 +12,8 @@ from .section import block
 from .settings import MasterSettings, Options, remappings
 from .shared_keys import MILLISECONDS, U8_MAX, U16_MAX
 
+TIME_PRODUCER = 0x4000_0000  # bit 30 of 0x1012
+TIME_PERIOD = 1.0  # [s] when only that bit asks for it
 HEARTBEAT_TIME_MAX = U16_MAX / MILLISECONDS  # [s] 0x1016 holds 16 bits
 
 
@@ -41,6 +43,7 @@ def build_master(
             f'most {HEARTBEAT_TIME_MAX} s',
             'make one of them smaller',
         )
+    time_period = _time_period(settings)
     return MasterConfig(
         node_id=settings.node_id or 0,
         driver=settings.driver,
@@ -50,12 +53,16 @@ def build_master(
         sync_period=settings.sync_period,
         sync_window=settings.sync_window,
         sync_overflow=settings.sync_overflow,
-        time_cob_id=settings.time_cob_id,
+        time_cob_id=settings.time_cob_id | (TIME_PRODUCER if time_period else 0),
+        time_period=time_period,
         cycle_period=settings.sync_period or min(device_periods, default=0.01),
         heartbeat_producer=settings.heartbeat_producer,
         heartbeat_timeout=timeout,
+        start=settings.start,
         start_nodes=settings.start_nodes,
         start_all_nodes=settings.start_all_nodes,
+        reset_all_nodes=settings.reset_all_nodes,
+        stop_all_nodes=settings.stop_all_nodes,
         nmt_inhibit_time=settings.nmt_inhibit_time,
         emcy_inhibit_time=settings.emcy_inhibit_time,
         error_behavior=_error_behaviour(section, findings),
@@ -69,6 +76,13 @@ def build_master(
         boot_time=settings.boot_time,
         boot_timeout=settings.boot_timeout,
     )
+
+
+def _time_period(settings: MasterSettings) -> float:
+    """Return how often TIME is sent in [s]; bit 30 of its COB-ID asks for it, too."""
+    if settings.time_period is not None:
+        return settings.time_period
+    return TIME_PERIOD if settings.time_cob_id & TIME_PRODUCER else 0.0
 
 
 def _error_behaviour(section: Mapping, findings: Findings) -> dict[int, int]:

@@ -8,8 +8,6 @@ differs, ``why`` says the reason.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from .schema import Key, Kind, Use
 from .shared_keys import (
     DRIVER,
@@ -23,7 +21,6 @@ from .shared_keys import (
     PACKAGE,
     REMAPPINGS,
     RETRY_FACTOR,
-    TIME_COB_ID,
     U16_MAX,
     U32_MAX,
 )
@@ -115,12 +112,18 @@ MASTER_KEYS: tuple[Key, ...] = (
         per_unit=MICROSECONDS,
         low=0,
         high=U32_MAX,
-        default=0,
-        use=Use.LATER,
-        why='its length is not supervised',
     ),
     Key('sync_overflow', Kind.INTEGER, 'sync_overflow', low=2, high=240, zero=True),
-    replace(TIME_COB_ID, field='time_cob_id', low=0),
+    Key('time_cob_id', Kind.INTEGER, 'time_cob_id', low=0, high=U32_MAX),
+    Key(
+        'time_period_ms',
+        Kind.NUMBER,
+        'time_period',
+        per_unit=MILLISECONDS,
+        low=1,
+        high=86_400_000,
+        zero=True,
+    ),
     Key(
         'emcy_inhibit_time',
         Kind.INTEGER,
@@ -139,41 +142,13 @@ MASTER_KEYS: tuple[Key, ...] = (
         per_unit=HUNDRED_MICROSECONDS,
         low=0,
         high=U16_MAX,
-        default=0,
-        use=Use.LATER,
-        why='NMT is sent at once',
     ),
     Key('error_behavior', Kind.BLOCK, use=Use.LATER, why='the master has no NMT state'),
-    Key(
-        'start',
-        Kind.BOOLEAN,
-        default=True,
-        use=Use.REFUSED,
-        why='the master always runs its cycle; set start_nodes: false to keep devices stopped',
-    ),
+    Key('start', Kind.BOOLEAN, 'start'),
     Key('start_nodes', Kind.BOOLEAN, 'start_nodes'),
-    Key(
-        'start_all_nodes',
-        Kind.BOOLEAN,
-        'start_all_nodes',
-        default=False,
-        use=Use.LATER,
-        why='each device is started when it is ready',
-    ),
-    Key(
-        'reset_all_nodes',
-        Kind.BOOLEAN,
-        default=False,
-        use=Use.REFUSED,
-        why='an error of a mandatory device does not reset the others in this version',
-    ),
-    Key(
-        'stop_all_nodes',
-        Kind.BOOLEAN,
-        default=False,
-        use=Use.REFUSED,
-        why='an error of a mandatory device does not stop the others in this version',
-    ),
+    Key('start_all_nodes', Kind.BOOLEAN, 'start_all_nodes'),
+    Key('reset_all_nodes', Kind.BOOLEAN, 'reset_all_nodes'),
+    Key('stop_all_nodes', Kind.BOOLEAN, 'stop_all_nodes'),
     Key(
         'boot_time',
         Kind.INTEGER,
@@ -181,9 +156,6 @@ MASTER_KEYS: tuple[Key, ...] = (
         per_unit=MILLISECONDS,
         low=0,
         high=U32_MAX,
-        default=0,
-        use=Use.LATER,
-        why='devices are waited for for ever',
     ),
     Key('boot_timeout', Kind.NUMBER, 'boot_timeout', per_unit=MILLISECONDS, low=1, high=60_000),
 )

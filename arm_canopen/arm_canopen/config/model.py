@@ -213,6 +213,11 @@ class NodeConfig:
     line: int = 0
 
     @property
+    def guarded(self) -> bool:
+        """The master asks for its NMT state; never together with a heartbeat (CiA 301)."""
+        return self.guard_time > 0.0 and not self.heartbeat_producer
+
+    @property
     def drive(self) -> DriveConfig:
         """The first axis, which is the only one of most drives."""
         return self.axes[0]
@@ -242,7 +247,7 @@ class MasterConfig:
         sync_period: SYNC period in [s]; 0 sends none.
         sync_window: Time after SYNC within which synchronous PDOs are sent in [s]; 0 for no limit.
         sync_overflow: Highest SYNC counter value, 0 for a SYNC without counter.
-        time_cob_id: CAN identifier of TIME.
+        time_cob_id: 0x1012 of the master: CAN identifier of TIME, with bit 30 when it sends it.
         time_period: Period of TIME in [s]; 0 sends none.
         cycle_period: Period of the control cycle in [s]: that of SYNC, without one the shortest
             ``period`` of a device.

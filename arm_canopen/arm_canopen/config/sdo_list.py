@@ -56,8 +56,17 @@ class SdoReader:
 
     def read(self, device: Mapping) -> tuple[SdoWrite, ...]:
         """Return the writes of a section (defaults merged) in their order."""
-        writes = [*self._error_behaviour(device), *self._sdo_list(device)]
+        writes = [
+            *self._time_cob_id(device),
+            *self._error_behaviour(device),
+            *self._sdo_list(device),
+        ]
         return tuple(write for write in writes if write is not None)
+
+    def _time_cob_id(self, device: Mapping) -> Iterator[SdoWrite | None]:
+        item = device.entries.get('time_cob_id')
+        if item is not None:
+            yield self._write((Index.TIME_COB_ID, 0), item, item.place)
 
     def _error_behaviour(self, device: Mapping) -> Iterator[SdoWrite | None]:
         section = block(device, 'error_behavior', self._findings)

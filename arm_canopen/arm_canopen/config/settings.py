@@ -58,8 +58,12 @@ class MasterSettings:
     sync_window: float = 0.0
     sync_overflow: int = 0
     time_cob_id: int = 0x100
+    time_period: float | None = None
+    start: bool = True
     start_nodes: bool = True
     start_all_nodes: bool = False
+    reset_all_nodes: bool = False
+    stop_all_nodes: bool = False
     nmt_inhibit_time: float = 0.0
     emcy_inhibit_time: float = 0.0
     vendor_id: int = 0
@@ -94,10 +98,14 @@ class DeviceSettings:
     heartbeat_producer: float | None = None
     heartbeat_consumer: bool | None = None
     heartbeat_multiplier: float | None = None
+    guard_time: float | None = None
+    life_time_factor: int | None = None
+    retry_factor: int | None = None
+    boot: bool = True
     mandatory: bool = False
     reset_communication: bool = True
+    restore_configuration: int = 0
     num_channels: int = 1
-    retry_factor: int = 3
 
 
 def read_options(section: Mapping, findings: Findings) -> Options:

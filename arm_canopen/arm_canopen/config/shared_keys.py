@@ -40,12 +40,7 @@ RETRY_FACTOR = Key(
     'retry_factor',
     Kind.INTEGER,
     'retry_factor',
-    low=0,
+    low=1,
     high=U8_MAX,
-    default=3,
-    use=Use.LATER,
-    why='there is no node guarding',
-)
-TIME_COB_ID = Key(
-    'time_cob_id', Kind.INTEGER, default=0x100, use=Use.LATER, why='no TIME is sent or read'
+    why='a device is lost after so many missing answers to node guarding',
 )

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from ..can.frame import PAYLOAD_MAX
 from ..can.load import frame_bits, stuff_bits_mean, stuff_bits_worst
-from ..standard.cob_id import CobId
+from ..standard.cob_id import CAN_ID_MASK, CobId
 from ..standard.pdo import SYNCHRONOUS_MAX
 from .check_subject import Subject
 from .findings import Findings
@@ -111,7 +111,8 @@ def _master_traffic(config: BusConfig) -> Iterator[Traffic]:
         yield Traffic(master.name, 'heartbeat', cob_id, 1, 1 / period, reason)
     if master.time_period > 0:
         reason = f'every {master.time_period * 1e3:g} ms'
-        yield Traffic(master.name, 'TIME', master.time_cob_id, 6, 1 / master.time_period, reason)
+        cob_id = master.time_cob_id & CAN_ID_MASK
+        yield Traffic(master.name, 'TIME', cob_id, 6, 1 / master.time_period, reason)
 
 
 def _pdo_traffic(subject: Subject, direction: Direction, pdo: PdoConfig) -> Traffic:

@@ -5,20 +5,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import contextlib
 from datetime import datetime, timedelta
-import struct
 
 from ..can.frame import Frame
+from ..exceptions import CodecError
 from ..standard.cob_id import CAN_ID_MASK
 from ..standard.datatypes import Value
 from ..standard.objects import Index
+from ..standard.time_of_day import decode_time_of_day
 from .cob_id_rules import check_can_id
 from .object_store import ObjectStore
 
-EPOCH = datetime(1984, 1, 1)  # noqa: DTZ001  # TIME_OF_DAY knows no zone
 CONSUMES = 0x8000_0000  # bit 31 of 0x1012
-TIME_BYTES = 6  # [byte]
-MILLISECONDS_MASK = 0x0FFF_FFFF  # the upper four bits are reserved
 
 
 class TimeConsumer:
@@ -55,11 +54,8 @@ class TimeConsumer:
 
     def receive(self, frame: Frame, now: float) -> None:
         """Take a TIME message; one of another length is none."""
-        if len(frame.data) != TIME_BYTES:
-            return
-        milliseconds, days = struct.unpack('<IH', frame.data)
-        elapsed = timedelta(days=days, milliseconds=milliseconds & MILLISECONDS_MASK)
-        self._received = EPOCH + elapsed, now
+        with contextlib.suppress(CodecError):
+            self._received = decode_time_of_day(frame.data), now
 
     def _check(self, value: Value) -> None:
         check_can_id(self._cob_id.entry, int(value) & CAN_ID_MASK if isinstance(value, int) else 0)

@@ -9,20 +9,26 @@ a function. See ``runner.py`` for the thread that does so on a real bus.
 from __future__ import annotations
 
 from collections.abc import Callable
+import itertools
 from typing import TypeAlias
 
 from ..can.frame import Frame
 from ..config.model import BusConfig
 from ..exceptions import BusError, SdoError
-from ..standard.cob_id import CobId
-from ..standard.nmt import ALL_NODES, nmt_frame, NmtCommand, NmtState, parse_nmt
+from ..standard.cob_id import CAN_ID_MASK, CobId
+from ..standard.nmt import ALL_NODES, COMMANDED_STATES, NmtCommand, NmtState, parse_nmt
 from .boot import BootProcess
 from .controller_watch import ControllerWatch
+from .emergency_id import emergency_can_id
 from .events import Event, EventKind, Report, Severity
+from .guarding import guarding_request
+from .nmt_sender import NmtSender
 from .process_image import SyncRound
+from .producers import HeartbeatProducer, SyncCounter, TimeProducer, utc_now, WallClock
 from .remote_node import RemoteNode
 from .scheduler import Scheduler, Task
 from .sdo_client import SdoClient
+from .startup import Startup
 
 DROP_PAUSE = 0.5  # [s] before a device that left Operational by itself is booted again
 
@@ -43,16 +49,25 @@ class Network:
         missed_pdos: TPDOs that did not answer a SYNC, over all devices.
         controller: The CAN controller as its error frames show it.
         unknown_frames: Frames with an identifier that nobody on this bus should use.
+        state: NMT state of the master; only in Operational it sends SYNC and RPDOs.
     """
 
-    def __init__(self, config: BusConfig, send: Callable[[Frame], None], report: Report) -> None:
+    def __init__(
+        self,
+        config: BusConfig,
+        send: Callable[[Frame], None],
+        report: Report,
+        wall_clock: WallClock = utc_now,
+    ) -> None:
         """Build the network; nothing is sent before :meth:`start`.
 
         Args:
             config: The bus.
             send: Hands a frame to the bus; may raise BusError.
             report: Takes events.
+            wall_clock: Time of day for TIME.
         """
+        master = config.master
         self.config = config
         self.scheduler = Scheduler()
         self.scheduler.on_defect = self._report_defect
@@ -65,22 +80,29 @@ class Network:
         self._send_raw = send
         self._report = report
         self._send_failed = False
-        self._sync = SyncRound(self._feedback_complete)
+        self.state = NmtState.OPERATIONAL if master.start else NmtState.PRE_OPERATIONAL
+        self._sync = SyncRound(self._feedback_complete, master.sync_window)
         self._sync_time = 0.0
         self._feedback_due = False
-        self._sync_counter = 0
-        self._next_heartbeat = 0.0
+        self._sync_counter = SyncCounter(master.sync_overflow)
+        self._heartbeat = HeartbeatProducer(master.node_id, master.heartbeat_producer, self.send)
+        self._time = TimeProducer(
+            master.time_cob_id & CAN_ID_MASK, master.time_period, wall_clock, self.send
+        )
+        self._nmt = NmtSender(self.scheduler, self.send, master.nmt_inhibit_time)
         self.nodes = {
             node.name: RemoteNode(node, self.scheduler, self._sync, self.send, report)
             for node in config.nodes
         }
+        nodes = list(self.nodes.values())
+        self._startup = Startup(master, nodes, self.scheduler, self.send_nmt, report)
         self._boots = {name: self._boot_process(node) for name, node in self.nodes.items()}
         self._boot_tasks: dict[str, Task[None]] = {}
         self._handlers: dict[int, Callable[[Frame], None]] = {}
         self._handlers[CobId.NMT] = self._hear_nmt
         self._rivals: set[int] = set()
-        self._handlers[CobId.HEARTBEAT + config.master.node_id] = self._hear_rival
-        if config.master.sync_period > 0:
+        self._handlers[CobId.HEARTBEAT + master.node_id] = self._hear_rival
+        if master.sync_period > 0:
             self._handlers[CobId.SYNC] = self._hear_rival
         self._strangers: dict[int, SdoClient] = {}
         for node in self.nodes.values():
@@ -89,13 +111,14 @@ class Network:
     def start(self, now: float) -> None:
         """Reset the devices and begin to boot them, all at the same time."""
         self.scheduler.advance(now)
-        self._next_heartbeat = now
-        if all(node.config.reset_communication for node in self.nodes.values()):
+        nodes = list(self.nodes.values())
+        self.scheduler.background(self._startup.watch())
+        resets = [node.config.reset_communication and node.config.boot for node in nodes]
+        if all(resets):
             self.send_nmt(NmtCommand.RESET_COMMUNICATION, ALL_NODES)
         else:
-            for node in self.nodes.values():
-                if node.config.reset_communication:
-                    self.send_nmt(NmtCommand.RESET_COMMUNICATION, node.config.node_id)
+            for node in itertools.compress(nodes, resets):
+                self.send_nmt(NmtCommand.RESET_COMMUNICATION, node.config.node_id)
         for node in self.nodes.values():
             self._start_boot(node, announced=False)
 
@@ -116,8 +139,7 @@ class Network:
         """Let time pass: timers, conditions, heartbeats that are overdue."""
         self.scheduler.advance(now)
         for node in self.nodes.values():
-            if node.heartbeat_overdue(now):
-                node.heartbeat_lost()
+            if node.watch(now):
                 self._start_boot(node, announced=False)
 
     def cycle(self, now: float, period: float) -> None:
@@ -132,7 +154,10 @@ class Network:
             self.missed_pdos += sum(node.count_missed() for node in self.nodes.values())
             self._feedback_complete()
         self.on_cycle(now, period)
-        self._send_heartbeat(now)
+        self._heartbeat.advance(now, self.state)
+        self._time.advance(now)
+        if self.state is not NmtState.OPERATIONAL:
+            return
         for node in self.nodes.values():
             if node.online:
                 for output in node.image.outputs:
@@ -154,9 +179,23 @@ class Network:
                 self._report(Event(EventKind.BUS, Severity.INFO, '', 'the bus takes frames again'))
 
     def send_nmt(self, command: NmtCommand, node_id: int) -> None:
-        """Send an NMT command to one device, or to all with id 0."""
+        """Send an NMT command to one device, or to all with id 0; our own id commands the master.
+
+        A master that is not operational sends neither SYNC nor RPDOs.
+        """
+        if node_id == self.config.master.node_id:
+            self._set_state(command)
+            return
         self._note_nmt(command, node_id)
-        self.send(Frame(CobId.NMT, nmt_frame(command, node_id)))
+        self._nmt.send(command, node_id)
+
+    def _set_state(self, command: NmtCommand) -> None:
+        before = self.state
+        self.state = COMMANDED_STATES.get(command, NmtState.OPERATIONAL)
+        if self.state is not before:
+            sends = 'sends' if self.state is NmtState.OPERATIONAL else 'sends no'
+            text = f'the master is in NMT state {self.state.name}: it {sends} SYNC and RPDOs'
+            self._report(Event(EventKind.BUS, Severity.INFO, '', text))
 
     def sdo_client(self, node_id: int) -> SdoClient:
         """Return the SDO client of any node id, also of one that bus.yml does not name."""
@@ -170,6 +209,11 @@ class Network:
             self._handlers[CobId.SDO_RESPONSE + node_id] = client.receive
         return client
 
+    @property
+    def late_pdos(self) -> int:
+        """TPDOs that answered a SYNC after the synchronous window was over."""
+        return self._sync.late
+
     def _report_defect(self, error: BaseException) -> None:
         text = f'a defect in the CANopen master: {type(error).__name__}: {error}'
         self._report(Event(EventKind.BUS, Severity.ERROR, '', text))
@@ -180,6 +224,8 @@ class Network:
             node,
             self.scheduler,
             self.send_nmt,
+            self._startup,
+            ask_state=lambda node_id: self.send(guarding_request(node_id)),
             sdo_timeout=master.boot_timeout,
             start=master.start_nodes,
             master_id=master.node_id,
@@ -189,7 +235,9 @@ class Network:
     def _connect(self, node: RemoteNode) -> None:
         node_id = node.config.node_id
         self._handlers[CobId.HEARTBEAT + node_id] = node.receive_heartbeat
-        self._handlers[CobId.EMCY + node_id] = node.receive_emergency
+        emergency_id = emergency_can_id(node.config)
+        if emergency_id is not None:
+            self._handlers[emergency_id] = node.receive_emergency
         self._handlers[CobId.SDO_RESPONSE + node_id] = node.sdo.receive
         for entry in node.image.inputs:
             self._handlers[entry.config.cob_id] = entry.receive
@@ -250,27 +298,13 @@ class Network:
         task = self.scheduler.background(boot)
         self._boot_tasks[node.name] = task
 
-    def _send_heartbeat(self, now: float) -> None:
-        """Send the master's heartbeat from the cycle, so that a hung cycle stops it."""
-        period = self.config.master.heartbeat_producer
-        if period > 0 and now >= self._next_heartbeat:
-            # after a pause the series begins anew, so that no heartbeats crowd
-            due = self._next_heartbeat + period
-            self._next_heartbeat = due if due > now else now + period
-            node_id = self.config.master.node_id
-            self.send(Frame(CobId.HEARTBEAT + node_id, bytes((NmtState.OPERATIONAL,))))
-
     def _send_sync(self, now: float) -> None:
-        data = b''
-        if self.config.master.sync_overflow:
-            self._sync_counter = self._sync_counter % self.config.master.sync_overflow + 1
-            data = bytes((self._sync_counter,))
-        self._sync.start()
+        self._sync.start(now)
         for node in self.nodes.values():
             node.expect_answers()
         self._sync_time = now
         self._feedback_due = True
-        self.send(Frame(CobId.SYNC, data))
+        self.send(Frame(CobId.SYNC, self._sync_counter.next()))
 
     def _feedback_complete(self) -> None:
         if self._feedback_due:

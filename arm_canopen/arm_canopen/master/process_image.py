@@ -16,6 +16,9 @@ from ..config.model import PdoConfig
 from ..exceptions import CodecError
 from ..standard.pdo import MappedObject, Number, PdoCodec
 
+EVENT_DRIVEN = 254  # transmission types from which on a PDO has an event timer (CiA 301, table 72)
+EVENT_TIMES = 3  # event times without a PDO after which it counts as stopped
+
 StartValue: TypeAlias = Callable[[MappedObject], Number]
 
 
@@ -24,20 +27,35 @@ class SyncRound:
 
     Attributes:
         pending: How many expected TPDOs have not yet come.
+        late: How many have come after the synchronous window was over.
         complete: Called when the last one has come.
     """
 
-    def __init__(self, complete: Callable[[], None]) -> None:
-        """Start before the first SYNC."""
+    def __init__(self, complete: Callable[[], None], window: float = 0.0) -> None:
+        """Start before the first SYNC.
+
+        Args:
+            complete: Called when the last expected TPDO has come.
+            window: Time after SYNC in which they should come in [s] (0x1007); 0 for no limit.
+        """
         self.pending = 0
+        self.late = 0
         self.complete = complete
+        self._window = window
+        self._sync_time = 0.0
 
-    def start(self) -> None:
-        """A SYNC is about to be sent; each :class:`Input` says whether it is expected."""
+    def start(self, now: float) -> None:
+        """A SYNC is about to be sent; each :class:`Input` says whether it is expected.
+
+        Args:
+            now: Steady time in [s].
+        """
         self.pending = 0
+        self._sync_time = now
 
-    def answer(self) -> None:
-        """An expected TPDO has come."""
+    def answer(self, timestamp: float) -> None:
+        """An expected TPDO has come, at a steady time in [s]."""
+        self.late += 0.0 < self._window < timestamp - self._sync_time
         self.pending -= 1
         if self.pending == 0:
             self.complete()
@@ -53,6 +71,7 @@ class Input:
         timestamp: Steady time of arrival of the last in [s].
         count: Number of PDOs received.
         length_errors: Number of PDOs that were too short.
+        on_short: Called with this input and the length when one is too short.
         awaited: It was expected after the last SYNC and has not come.
     """
 
@@ -65,6 +84,7 @@ class Input:
         self.count = 0
         self.length_errors = 0
         self.listener: Callable[[Input], None] | None = None
+        self.on_short: Callable[[Input, int], None] = lambda entry, length: None
         self.awaited = False
         self._sync = sync
         self._unpack = self.codec.unpack
@@ -73,6 +93,12 @@ class Input:
     def every_sync(self) -> bool:
         """The device sends it after each SYNC."""
         return self.config.transmission == 1
+
+    @property
+    def deadline(self) -> float:
+        """Time in [s] after which it has stopped, by its event timer; 0 when it has none."""
+        event_time = self.config.event_time or 0.0
+        return EVENT_TIMES * event_time if self.config.transmission >= EVENT_DRIVEN else 0.0
 
     def clear(self) -> None:
         """Forget the values, because the device restarted or went away."""
@@ -90,6 +116,7 @@ class Input:
             self.values = self._unpack(frame.data)
         except CodecError:
             self.length_errors += 1
+            self.on_short(self, len(frame.data))
             return
         self.timestamp = frame.timestamp
         self.count += 1
@@ -97,7 +124,7 @@ class Input:
             self.listener(self)
         if self.awaited:
             self.awaited = False
-            self._sync.answer()
+            self._sync.answer(frame.timestamp)
 
 
 class Output:

@@ -4,26 +4,29 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 from enum import Enum
 from functools import partial
 
 from ..can.frame import Frame
 from ..config.model import NodeConfig
-from ..exceptions import CodecError, SdoAbortError, SdoError
+from ..exceptions import CodecError, SdoError
 from ..standard.datatypes import decode, encode, Value
 from ..standard.dictionary import ObjectEntry
 from ..standard.emcy import Emergency
 from ..standard.nmt import COMMANDED_STATES, NmtCommand, NmtState, parse_heartbeat
 from ..standard.objects import Index
-from ..standard.pdo import Number
+from .background_objects import BackgroundReader, BackgroundWriter
 from .events import Event, EventKind, Report, Severity
-from .process_image import ProcessImage, Reader, SyncRound, Writer
+from .guarding import Guarding
+from .process_image import Input, ProcessImage, Reader, SyncRound, Writer
 from .scheduler import Promise, Scheduler
 from .sdo_client import SdoClient
 from .start_values import start_value
 
 SILENCE_MAX = 0.5  # [s] without an answer to SYNC after which a device takes no targets
+HISTORY = 16  # EMCYs that are remembered
 START_TIME = 0.25  # [s] in which a device follows the command to start
 
 
@@ -31,52 +34,14 @@ class BootPhase(Enum):
     """How far a device has come; the value is how a person reads it."""
 
     WAITING = 'waiting for the device'
+    STATE = 'asking for its NMT state'
     IDENTITY = 'checking its identity'
     CONFIGURING = 'configuring'
     ERROR_CONTROL = 'waiting for its heartbeat'
+    HELD = 'waiting for mandatory devices'
     STARTING = 'starting'
     OPERATIONAL = 'operational'
     FAILED = 'failed'
-
-
-class BackgroundReader:
-    """An object that no TPDO carries; it is polled by SDO."""
-
-    def __init__(self) -> None:
-        """Start unknown."""
-        self.value: Number | None = None
-
-
-class BackgroundWriter:
-    """An object that no RPDO carries; it is written by SDO when it changes."""
-
-    def __init__(self, node: RemoteNode, index: int, subindex: int) -> None:
-        """Remember nothing written yet."""
-        self._node = node
-        self._address = (index, subindex)
-        self._written: Number | None = None
-        self._failing = False
-
-    def write(self, value: Number) -> None:
-        """Queue the write unless this is the value that was written last."""
-        if value == self._written or not self._node.online:
-            return
-        self._written = value
-        self._node.write_object(*self._address, value).when_done(self._check)
-
-    def forget(self) -> None:
-        """The device restarted: write again whatever comes."""
-        self._written = None
-        self._failing = False
-
-    def _check(self, promise: Promise[None]) -> None:
-        failing, self._failing = self._failing, promise.error is not None
-        if promise.error is None or not self._node.online:
-            return
-        if not isinstance(promise.error, SdoAbortError):
-            self._written = None  # it did not arrive; a value that was refused is not repeated
-        if not failing:
-            self._node.report(EventKind.PDO, Severity.WARNING, str(promise.error))
 
 
 class RemoteNode:
@@ -95,6 +60,9 @@ class RemoteNode:
         last_heartbeat: Steady time of the last heartbeat in [s].
         owes_heartbeat: It was started and never sent a heartbeat, though it is supervised; it has
             to show one before it is started again.
+        taken_over: It was in operation already when it came online, and was not disturbed.
+        watch_slot: Entry of its 0x1016 by which it watches the master, 0 for none.
+        emergencies: The last EMCYs, the newest at the end, with the steady time of each in [s].
         last_emergency: Last EMCY that was no reset, None when the device reported its end.
         loss: Why it was lost last, empty while it is online.
         missed_pdos: TPDOs that did not answer a SYNC.
@@ -134,6 +102,9 @@ class RemoteNode:
         self.wanted: NmtState | None = None
         self.last_heartbeat = 0.0
         self.owes_heartbeat = False
+        self.taken_over = False
+        self.watch_slot = 0
+        self.emergencies: deque[tuple[float, Emergency]] = deque(maxlen=HISTORY)
         self.last_emergency: Emergency | None = None
         self.loss = ''
         self.missed_pdos = 0
@@ -150,6 +121,14 @@ class RemoteNode:
         self._polled: dict[tuple[int, int], BackgroundReader] = {}
         self._background_writers: list[BackgroundWriter] = []
         self._every_sync = [entry for entry in self.image.inputs if entry.every_sync]
+        self._timed = [entry for entry in self.image.inputs if entry.deadline > 0.0]
+        self._stopped_pdos: set[int] = set()
+        self._guarding: Guarding | None = None
+        if config.guarded:
+            timing = (config.guard_time, config.retry_factor)
+            self._guarding = Guarding(config.node_id, *timing, send)
+        for entry in self.image.inputs:
+            entry.on_short = self._tell_short
 
     @property
     def operational(self) -> bool:
@@ -158,8 +137,14 @@ class RemoteNode:
 
     @property
     def answers(self) -> bool:
-        """Whether it answers SYNC, as far as any TPDO of it does that."""
-        return self._scheduler.now - self._answered_at < SILENCE_MAX or not self._every_sync
+        """Whether its TPDOs come: those that answer SYNC, and those with an event time."""
+        silent = self._scheduler.now - self._answered_at >= SILENCE_MAX
+        return not (silent and self._every_sync) and not self._stopped_pdos
+
+    @property
+    def phase_text(self) -> str:
+        """How far it has booted, in words."""
+        return f'{self.phase.value} {self.phase_detail}'.rstrip()
 
     @property
     def name(self) -> str:
@@ -197,6 +182,9 @@ class RemoteNode:
         """Take a heartbeat or boot-up message."""
         state = parse_heartbeat(frame.data)
         if state is None:
+            return
+        guarding = self._guarding if state is not NmtState.BOOT_UP else None
+        if guarding is not None and self.online and not guarding.receive(frame.data):
             return
         self.last_heartbeat = frame.timestamp
         if state is not self.nmt_state:
@@ -246,6 +234,7 @@ class RemoteNode:
         except CodecError as error:
             self.report(EventKind.EMERGENCY, Severity.WARNING, f'odd EMCY: {error}')
             return
+        self.emergencies.append((frame.timestamp, emergency))
         if emergency.is_reset:
             self.last_emergency = None
             self.report(EventKind.EMERGENCY, Severity.INFO, f'EMCY: {emergency}')
@@ -253,12 +242,14 @@ class RemoteNode:
             self.last_emergency = emergency
             self.report(EventKind.EMERGENCY, Severity.ERROR, f'EMCY: {emergency}')
 
-    def go_online(self, now: float) -> None:
-        """The device is booted: talk to it, and watch its heartbeat when it is configured.
+    def go_online(self, now: float, *, taken_over: bool = False) -> None:
+        """The device is booted: talk to it, and watch its life signs when it is configured.
 
         Args:
             now: Steady time in [s], from which the first heartbeat is awaited.
+            taken_over: It was in operation already, and was not disturbed.
         """
+        self.taken_over = taken_over
         self.image.clear()  # what it sent before it was configured says nothing about now
         self.online = True
         self._supervised = self.config.heartbeat_timeout > 0
@@ -267,13 +258,53 @@ class RemoteNode:
         self._online_since = self._answered_at = now
         self._silent = False
         self.loss = ''
+        if self._guarding is not None:
+            self._guarding.start(now)
 
-    def heartbeat_overdue(self, now: float) -> bool:
-        """Tell whether a supervised heartbeat did not come within its consumer time."""
-        return self._supervised and now - self.last_heartbeat > self.config.heartbeat_timeout
+    def watch(self, now: float) -> bool:
+        """Look for life signs and PDOs that are overdue; tells whether the device was lost now.
 
-    def heartbeat_lost(self) -> None:
-        """Its heartbeat is overdue: it counts as gone."""
+        Args:
+            now: Steady time in [s].
+        """
+        if self._supervised and now - self.last_heartbeat > self.config.heartbeat_timeout:
+            self._heartbeat_lost()
+            return True
+        if self._guarding is not None and self._guarding.advance(now):
+            self.lost(
+                f'lost: no answer to node guarding {self.config.retry_factor} times in a row, '
+                f'each {self.config.guard_time * 1000:g} ms apart'
+            )
+            return True
+        if self._timed and self.operational:
+            self._watch_timed(now)
+        return False
+
+    def _watch_timed(self, now: float) -> None:
+        for entry in self._timed:
+            number = entry.config.number
+            if entry.values is None or now - entry.timestamp <= entry.deadline:
+                self._stopped_pdos.discard(number)
+            elif number not in self._stopped_pdos:
+                self._stopped_pdos.add(number)
+                self.report(
+                    EventKind.PDO,
+                    Severity.WARNING,
+                    f'TPDO {number} has stopped: none for {entry.deadline * 1000:g} ms, though '
+                    'its event timer says so; the device takes no targets until it comes again',
+                )
+
+    def _tell_short(self, entry: Input, length: int) -> None:
+        if entry.length_errors == 1:
+            self.report(
+                EventKind.PDO,
+                Severity.WARNING,
+                f'TPDO {entry.config.number} (0x{entry.config.cob_id:03X}) has {length} bytes, '
+                f'its mapping {entry.codec.size}; it is not used. Does the device have another '
+                'mapping than bus.yml, or does somebody else send with this identifier?',
+            )
+
+    def _heartbeat_lost(self) -> None:
         timeout = self.config.heartbeat_timeout * 1000  # [ms]
         self.owes_heartbeat = self.last_heartbeat <= self._online_since
         self.lost(f'heartbeat lost: none within its consumer time of {timeout:g} ms')
@@ -296,6 +327,9 @@ class RemoteNode:
         self.online = False
         self.left_operational = False
         self._supervised = False
+        self._stopped_pdos.clear()
+        if self._guarding is not None:
+            self._guarding.stop()
         self.image.clear()
         self.sdo.cancel_all(reason)
         for entry in self._polled.values():
@@ -334,10 +368,10 @@ class RemoteNode:
 
     async def unwatch(self) -> None:
         """Have the device watch the master no longer, before the master ends; never raises."""
-        if not self.online or not self.config.heartbeat_consumer:
+        if not self.online or not self.watch_slot:
             return
         try:
-            await self.write_object(Index.CONSUMER_HEARTBEAT, 1, 0)
+            await self.write_object(Index.CONSUMER_HEARTBEAT, self.watch_slot, 0)
         except (SdoError, CodecError) as error:
             self.report(EventKind.BOOT, Severity.WARNING, f'goes on to watch the master: {error}')
 

@@ -26,6 +26,7 @@ class NodeStatus:
         heartbeat_age: Time since the last heartbeat in [s]; None when there was none or none is
             supervised.
         emergency: Last EMCY that the device did not take back.
+        emergencies: The last EMCYs with their age, the newest first, in words.
         missed_pdos: TPDOs that did not answer a SYNC.
         sdo: What became of the SDO transfers.
     """
@@ -38,6 +39,7 @@ class NodeStatus:
     phase_detail: str
     heartbeat_age: float | None
     emergency: Emergency | None
+    emergencies: tuple[str, ...]
     missed_pdos: int
     sdo: SdoCounters
 
@@ -59,6 +61,9 @@ def node_status(node: RemoteNode, now: float) -> NodeStatus:
         phase_detail=node.phase_detail,
         heartbeat_age=now - node.last_heartbeat if heard else None,
         emergency=node.last_emergency,
+        emergencies=tuple(
+            f'{now - time:.1f} s ago {emergency}' for time, emergency in reversed(node.emergencies)
+        ),
         missed_pdos=node.missed_pdos,
         sdo=replace(node.sdo.counters),
     )

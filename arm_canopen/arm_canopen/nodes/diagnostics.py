@@ -29,6 +29,7 @@ class BusStatus:
         load: Frames per second and load.
         cycle: Figures of the SYNC cycle.
         missed_pdos: TPDOs that did not answer a SYNC, over all devices.
+        late_pdos: TPDOs that came after the synchronous window.
         unknown_frames: Frames with an identifier that nobody on this bus should use.
         controller: State of the CAN controller.
         transmit_errors: Its transmit error counter.
@@ -42,6 +43,7 @@ class BusStatus:
     load: LoadFigures
     cycle: CycleFigures
     missed_pdos: int
+    late_pdos: int = 0
     unknown_frames: int = 0
     controller: ControllerState = ControllerState.ACTIVE
     transmit_errors: int = 0
@@ -117,6 +119,7 @@ def bus_diagnostic(master: str, status: BusStatus) -> DiagnosticStatus:
                 'jitter_p99': f'{cycle.jitter_p99:.6f}',
                 'jitter_max': f'{cycle.jitter_max:.6f}',
                 'missed_pdos': str(status.missed_pdos),
+                'late_pdos': str(status.late_pdos),
                 'unknown_frames': str(status.unknown_frames),
                 'controller': status.controller.value,
                 'transmit_errors': str(status.transmit_errors),
@@ -158,10 +161,12 @@ def _device_values(status: NodeStatus) -> dict[str, str]:
         'boot_phase': f'{status.phase.value} {status.phase_detail}'.strip(),
         'heartbeat_age': '' if status.heartbeat_age is None else f'{status.heartbeat_age:.3f}',
         'emergency': '' if status.emergency is None else str(status.emergency),
+        'emergencies': '; '.join(status.emergencies),
         'missed_pdos': str(status.missed_pdos),
         'sdo_done': str(status.sdo.done),
         'sdo_aborted': str(status.sdo.aborted),
         'sdo_timed_out': str(status.sdo.timed_out),
+        'sdo_repeated': str(status.sdo.repeated),
     }
 
 

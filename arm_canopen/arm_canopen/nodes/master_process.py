@@ -181,6 +181,7 @@ class MasterProcess:
             self._load.figures(now),
             self._thread.figures(),
             self._network.missed_pdos,
+            self._network.late_pdos,
             self._network.unknown_frames,
             controller.state,
             controller.transmit_errors,

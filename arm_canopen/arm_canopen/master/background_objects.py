@@ -1,0 +1,55 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Objects that no PDO carries: polled, or written when they change, by SDO outside the cycle."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ..exceptions import SdoAbortError
+from ..standard.pdo import Number
+from .events import EventKind, Severity
+from .scheduler import Promise
+
+if TYPE_CHECKING:
+    from .remote_node import RemoteNode
+
+
+class BackgroundReader:
+    """An object that no TPDO carries; it is polled by SDO."""
+
+    def __init__(self) -> None:
+        """Start unknown."""
+        self.value: Number | None = None
+
+
+class BackgroundWriter:
+    """An object that no RPDO carries; it is written by SDO when it changes."""
+
+    def __init__(self, node: RemoteNode, index: int, subindex: int) -> None:
+        """Remember nothing written yet."""
+        self._node = node
+        self._address = (index, subindex)
+        self._written: Number | None = None
+        self._failing = False
+
+    def write(self, value: Number) -> None:
+        """Queue the write unless this is the value that was written last."""
+        if value == self._written or not self._node.online:
+            return
+        self._written = value
+        self._node.write_object(*self._address, value).when_done(self._check)
+
+    def forget(self) -> None:
+        """The device restarted: write again whatever comes."""
+        self._written = None
+        self._failing = False
+
+    def _check(self, promise: Promise[None]) -> None:
+        failing, self._failing = self._failing, promise.error is not None
+        if promise.error is None or not self._node.online:
+            return
+        if not isinstance(promise.error, SdoAbortError):
+            self._written = None  # it did not arrive; a value that was refused is not repeated
+        if not failing:
+            self._node.report(EventKind.PDO, Severity.WARNING, str(promise.error))

@@ -1,0 +1,124 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""When devices are started, and what the loss of a mandatory one means (CiA 302-2, 0x1F80)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from ..config.model import MasterConfig
+from ..standard.nmt import ALL_NODES, NmtCommand
+from .events import Event, EventKind, Report, Severity
+from .remote_node import RemoteNode
+from .scheduler import Promise, Scheduler
+
+SendNmt = Callable[[NmtCommand, int], None]
+
+
+class Startup:
+    """Holds configured devices back until all mandatory ones are configured.
+
+    Without a mandatory device each one is started as soon as it is ready.
+
+    Attributes:
+        complete: All mandatory devices were configured, so nobody is held back any more.
+    """
+
+    def __init__(
+        self,
+        config: MasterConfig,
+        nodes: Sequence[RemoteNode],
+        scheduler: Scheduler,
+        send_nmt: SendNmt,
+        report: Report,
+    ) -> None:
+        """Begin with nobody configured.
+
+        Args:
+            config: The master.
+            nodes: All devices.
+            scheduler: Time.
+            send_nmt: Sends an NMT command to a node id.
+            report: Takes events.
+        """
+        self._config = config
+        self._nodes = list(nodes)
+        self._scheduler = scheduler
+        self._send_nmt = send_nmt
+        self._report = report
+        self._waiting: dict[RemoteNode, Promise[bool]] = {}
+        self.complete = not self._missing()
+        for node in nodes:
+            if node.config.mandatory:
+                node.on_lost.append(lambda reason, node=node: self._lost(node))  # type: ignore[misc]
+
+    async def watch(self) -> None:
+        """Say it when mandatory devices are not there within `boot_time`."""
+        if self._config.boot_time <= 0.0 or self.complete:
+            return
+        await self._scheduler.timer(self._config.boot_time)
+        missing = self._missing()
+        if missing and not self.complete:
+            names = '; '.join(f'{node.name}: {node.phase_text}' for node in missing)
+            self._tell(
+                f'mandatory devices have not booted within {self._config.boot_time:g} s, so no '
+                f'device is started: {names}'
+            )
+
+    def missing_text(self) -> str:
+        """Name the mandatory devices that are waited for."""
+        return ', '.join(node.name for node in self._missing())
+
+    async def admit(self, node: RemoteNode) -> bool:
+        """Wait until a configured device may be started.
+
+        Returns:
+            True when it has been started together with the others, by one frame.
+        """
+        if self.complete:
+            return False
+        promise: Promise[bool] = Promise()
+        self._waiting[node] = promise
+        if not self._missing():
+            self._release()
+        return await promise
+
+    def forget(self, node: RemoteNode) -> None:
+        """The boot of a device begins anew, so it waits for nothing any more."""
+        self._waiting.pop(node, None)
+
+    def _missing(self) -> list[RemoteNode]:
+        return [
+            node
+            for node in self._nodes
+            if node.config.mandatory and not node.online and node not in self._waiting
+        ]
+
+    def _release(self) -> None:
+        self.complete = True
+        # one frame starts who is there: a device that is still being configured must not hear it
+        together = self._config.start_all_nodes and len(self._waiting) == len(self._nodes)
+        if together and self._config.start_nodes:
+            self._send_nmt(NmtCommand.START, ALL_NODES)
+        waiting, self._waiting = self._waiting, {}
+        for promise in waiting.values():
+            promise.resolve(together)
+
+    def _lost(self, node: RemoteNode) -> None:
+        if not self.complete:
+            return
+        if self._config.reset_all_nodes:
+            self.complete = False
+            self._tell(f'{node.name} is mandatory and lost: all devices are reset')
+            self._send_nmt(NmtCommand.RESET_NODE, ALL_NODES)
+        elif self._config.stop_all_nodes:
+            self._tell(
+                f'{node.name} is mandatory and lost: all devices are stopped; start them by '
+                '~/nmt_start_node when it is back'
+            )
+            self._send_nmt(NmtCommand.STOP, ALL_NODES)
+        else:
+            self._tell(f'{node.name} is mandatory and lost; the others go on without it')
+
+    def _tell(self, text: str) -> None:
+        self._report(Event(EventKind.BOOT_FAILED, Severity.ERROR, '', text))
