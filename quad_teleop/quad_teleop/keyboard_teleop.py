@@ -9,6 +9,7 @@ from operator_input import HeldKeys, KeyAction, KeyEvent
 from .body_pose import BodyPose, NEUTRAL, PoseSteps
 from .command_stream import CommandStream
 from .key_map import (
+    CLEAR_KEY,
     HELP,
     HELP_KEY,
     MODES,
@@ -20,7 +21,7 @@ from .key_map import (
     STOP_KEYS,
     SUSPEND_KEY,
 )
-from .requests import ModeRequest, Note, PoseRequest, Quit, Request, Suspend
+from .requests import ClearFault, ModeRequest, Note, PoseRequest, Quit, Request, Suspend
 from .speeds import Speeds
 from .velocity import Velocity
 
@@ -113,6 +114,8 @@ class KeyboardTeleop:
         if key == HELP_KEY:
             return [Note(HELP)]
         self._held.clear()
+        if key == CLEAR_KEY:
+            return [ClearFault()]
         if key in QUIT_KEYS:
             return [Quit()]
         if key == SUSPEND_KEY:

@@ -33,6 +33,11 @@ class PoseRequest:
 
 
 @dataclass(frozen=True, slots=True)
+class ClearFault:
+    """Ask the controller to forget its latched faults."""
+
+
+@dataclass(frozen=True, slots=True)
 class Note:
     """Tell the person something.
 
@@ -53,4 +58,4 @@ class Suspend:
     """Give the terminal back to the shell for a while."""
 
 
-Request = ModeRequest | PoseRequest | Note | Quit | Suspend
+Request = ModeRequest | PoseRequest | ClearFault | Note | Quit | Suspend

@@ -6,8 +6,10 @@ from __future__ import annotations
 
 from typing import Any
 
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import Pose, Twist, TwistStamped
 from ros_client import RosClient
+from std_srvs.srv import Trigger
 
 from quad_msgs.srv import SetMode
 
@@ -26,15 +28,16 @@ class Robot:
         modes: What /set_mode was asked for.
     """
 
-    def __init__(self, client: RosClient, *, answers: bool = True) -> None:
-        """Subscribe, and offer the service."""
+    def __init__(self, client: RosClient) -> None:
+        """Subscribe, and offer the services."""
         self.client = client
         self.twists: list[Twist] = client.listen(Twist, 'cmd_vel')
         self.stamped: list[TwistStamped] = client.listen(TwistStamped, 'cmd_vel_stamped')
         self.poses: list[Pose] = client.listen(Pose, 'body_pose')
         self.modes: list[str] = []
-        if answers:
-            client.node.create_service(SetMode, 'set_mode', self._set_mode)
+        client.node.create_service(SetMode, 'set_mode', self._set_mode)
+        client.node.create_service(Trigger, 'controller_node/clear_fault', self._clear)
+        self._diagnostics = client.node.create_publisher(DiagnosticArray, '/diagnostics', 10)
 
     @property
     def velocities(self) -> list[tuple[float, float, float]]:
@@ -68,6 +71,20 @@ class Robot:
         clock = self.client.node.get_clock()
         end = clock.now().nanoseconds + int(duration * 1e9)
         self.client.spin_until(lambda: clock.now().nanoseconds > end, PATIENCE, 'end')
+
+    def fall_over(self) -> None:
+        """Report a fault, as the controller does."""
+        status = DiagnosticStatus(
+            level=DiagnosticStatus.ERROR,
+            name='controller_node: state',
+            message='it fell over',
+            values=[KeyValue(key='state', value='fault')],
+        )
+        self._diagnostics.publish(DiagnosticArray(status=[status]))
+
+    def _clear(self, _request: Any, response: Any) -> Any:
+        response.success, response.message = True, 'all is well'
+        return response
 
     def _set_mode(self, request: Any, response: Any) -> Any:
         self.modes.append(request.mode)

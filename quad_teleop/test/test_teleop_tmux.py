@@ -100,10 +100,14 @@ def test_driving_with_real_key_presses(pane: Pane, isolation: Isolation) -> None
         pane.wait_for(r'0\.17 m/s 0\.66 rad/s \| idle')
 
         pane.press('2')
-        wait_on_screen(client, pane, 'mode: walk')
+        wait_on_screen(client, pane, 'walk: walk')
         pane.press('0')
         wait_on_screen(client, pane, 'lie refused: stays in stand: it is too high')
         assert robot.modes == ['walk', 'lie']
+        robot.fall_over()
+        wait_on_screen(client, pane, 'fault: it fell over; Backspace clears it')
+        pane.press('BSpace')
+        wait_on_screen(client, pane, 'clear fault: all is well')
         pane.press('t', 'Down')
         client.spin_until(lambda: len(robot.poses) == 2, PATIENCE, 'two body poses')
         assert robot.poses[-1].position.z == pytest.approx(0.005)

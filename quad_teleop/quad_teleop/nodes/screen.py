@@ -10,11 +10,13 @@ import math
 from operator_input import ReleaseSource
 
 from ..body_pose import BodyPose, NEUTRAL
+from ..controller_report import ControllerReport
 from ..modes import Mode
 from ..speeds import Speeds
 from ..velocity import Velocity
 
-BOLD, DIM, GREEN, YELLOW, RESET = '\x1b[1m', '\x1b[2m', '\x1b[32m', '\x1b[33m', '\x1b[0m'
+BOLD, DIM, GREEN, YELLOW = '\x1b[1m', '\x1b[2m', '\x1b[32m', '\x1b[33m'
+RED, RESET = '\x1b[1;31m', '\x1b[0m'
 
 SOURCES = {
     ReleaseSource.TERMINAL: 'true releases',
@@ -29,6 +31,7 @@ class View:
 
     Attributes:
         mode: Mode that was granted last.
+        report: What the controller says of itself; None when it says nothing.
         speeds: The speeds that are set.
         velocity: What is wanted now.
         pose: How the body shall stand.
@@ -37,6 +40,7 @@ class View:
     """
 
     mode: Mode | None
+    report: ControllerReport | None
     speeds: Speeds
     velocity: Velocity | None
     pose: BodyPose
@@ -52,7 +56,7 @@ def status(view: View, colour: bool) -> str:
         colour: Use colours.
     """
     parts = [
-        (view.mode.value if view.mode else 'mode ?', BOLD),
+        _state(view),
         (f'{view.speeds.linear:.2f} m/s {view.speeds.angular:.2f} rad/s', BOLD),
         (_motion(view.velocity), GREEN if view.velocity else DIM),
     ]
@@ -70,11 +74,21 @@ def hint(view: View) -> str:
     Args:
         view: What is shown.
     """
+    report = view.report
+    if report is not None and report.has_fault:
+        return f'fault: {report.message}; Backspace clears it'
     if view.velocity is None or not view.is_heard:
         return ''
-    if view.mode is not None and not view.mode.moves:
-        return f'the mode is {view.mode.value}: press 2 to walk, or 3 to turn on the spot'
-    return ''
+    moves = report.follows_velocities if report else view.mode is None or view.mode.moves
+    if moves:
+        return ''
+    return f'the robot does not walk now ({_state(view)[0]}): press 2 to walk, 3 to turn'
+
+
+def _state(view: View) -> tuple[str, str]:
+    if view.report is not None:
+        return view.report.state, RED if view.report.has_fault else BOLD
+    return view.mode.value if view.mode else 'mode ?', BOLD
 
 
 def _motion(velocity: Velocity | None) -> str:

@@ -20,7 +20,7 @@ from ..exceptions import SettingError
 from ..gamepad_teleop import GamepadTeleop
 from ..requests import ModeRequest, PoseRequest, Request
 from ..speeds import Speeds
-from .mode_client import ModeClient
+from .controller import Controller
 from .outputs import Outputs
 from .parameters import number, refuse_misspelt, text
 from .program import run
@@ -95,7 +95,7 @@ class Session:
         """
         self._node = node
         self._stop = stop
-        self._modes = ModeClient(node, node.get_logger().info)
+        self._controller = Controller(node, node.get_logger().info)
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(node)
 
@@ -127,12 +127,12 @@ class Session:
             self._publish()
         self._publish()
         self._executor.spin_once(timeout_sec=0)
-        self._modes.check(time.monotonic())
+        self._controller.check(time.monotonic())
 
     def _obey(self, request: Request) -> None:
         match request:
             case ModeRequest(mode):
-                self._modes.ask(mode, time.monotonic())
+                self._controller.ask_mode(mode, time.monotonic())
             case PoseRequest(pose):
                 self._node.outputs.publish_pose(pose)
             case _:

@@ -18,9 +18,9 @@ from operator_input import AutoRepeat, HeldKeys, Keyboard, KeyEvent, StatusLine
 from ..command_stream import ZEROS
 from ..key_map import HELP
 from ..keyboard_teleop import KeyboardTeleop
-from ..requests import ModeRequest, Note, PoseRequest, Quit, Request, Suspend
+from ..requests import ClearFault, ModeRequest, Note, PoseRequest, Quit, Request, Suspend
 from ..speeds import Speeds
-from .mode_client import ModeClient
+from .controller import Controller
 from .outputs import Outputs
 from .parameters import flag, number, refuse_misspelt
 from .program import run
@@ -74,7 +74,7 @@ class Session:
         self._keyboard = keyboard
         self._stop = stop
         self._line: StatusLine = keyboard.status_line()
-        self._modes = ModeClient(node, self._line.say)
+        self._controller = Controller(node, self._line.say)
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(node)
         self._colour = not os.environ.get('NO_COLOR')
@@ -101,7 +101,7 @@ class Session:
         now = time.monotonic()
         self._publish(now)
         self._executor.spin_once(timeout_sec=0)
-        self._modes.check(now)
+        self._controller.check(now)
         self._show(now)
 
     def _take(self, events: Iterable[KeyEvent]) -> None:
@@ -115,7 +115,9 @@ class Session:
     def _obey(self, request: Request) -> None:
         match request:
             case ModeRequest(mode):
-                self._modes.ask(mode, time.monotonic())
+                self._controller.ask_mode(mode, time.monotonic())
+            case ClearFault():
+                self._controller.clear_fault(time.monotonic())
             case PoseRequest(pose):
                 self._node.outputs.publish_pose(pose)
             case Note(text):
@@ -133,7 +135,8 @@ class Session:
     def _show(self, now: float) -> None:
         teleop = self._node.teleop
         view = View(
-            self._modes.mode,
+            self._controller.mode,
+            self._controller.report(now),
             teleop.speeds,
             teleop.wanted(now),
             teleop.pose,
@@ -143,7 +146,8 @@ class Session:
         text = hint(view)
         if text and text != self._hint:
             self._line.say(text)
-        self._hint = text if view.velocity else self._hint
+        if text or view.velocity:  # said once for each reason, and again after the next motion
+            self._hint = text
         self._line.show(status(view, self._colour))
 
     def _suspend(self) -> None:

@@ -1,0 +1,114 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Asks the controller for something, and never waits for the answer."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+from rclpy.node import Node
+from rclpy.task import Future
+
+ANSWER_PATIENCE = 3.0  # [s]
+DISCOVERY_PATIENCE = 2.0  # [s] that DDS may need to find a service after the start
+SAME_AGAIN = 0.7  # [s] within which the same question is the keyboard repeating a key
+
+
+@dataclass(frozen=True, slots=True)
+class _Question:
+    what: str  # in words
+    request: Any
+    asked: float  # [s]
+
+
+class CommandClient:
+    """Client of a service that answers ``success`` and ``message``."""
+
+    def __init__(
+        self,
+        node: Node,
+        service_type: Any,  # noqa: ANN401
+        service: str,
+        say: Callable[[str], None],
+        granted: Callable[[str], None] = lambda _: None,
+    ) -> None:
+        """Make the client.
+
+        Args:
+            node: The node; somebody has to spin it for answers to arrive.
+            service_type: Type of the service.
+            service: Its name.
+            say: Is told the answers, and why there is none.
+            granted: Is told what was asked for, when it was granted.
+        """
+        self._client = node.create_client(service_type, service)
+        self._name = node.resolve_service_name(service)
+        self._say = say
+        self._granted = granted
+        self._question: _Question | None = None  # the last one
+        self._future: Future | None = None
+        self._is_waiting = False  # for the service to be found
+
+    def ask(self, what: str, request: Any, now: float) -> None:  # noqa: ANN401
+        """Ask; a question that is still open is dropped.
+
+        Args:
+            what: What is asked for, in a word.
+            request: The request.
+            now: Time [s].
+        """
+        last = self._question
+        if last is not None and last.what == what and now - last.asked < SAME_AGAIN:
+            return
+        self._question = _Question(what, request, now)
+        self._forget()
+        self._is_waiting = True
+        self.check(now)
+
+    def check(self, now: float) -> None:
+        """Send what waits for the service; give up what is overdue.
+
+        Args:
+            now: Time [s].
+        """
+        question = self._question
+        if question is None:
+            return
+        age = now - question.asked
+        if self._is_waiting and self._client.service_is_ready():
+            self._is_waiting = False
+            self._future = self._client.call_async(question.request)
+            self._future.add_done_callback(partial(self._answered, question.what))
+        elif self._is_waiting and age > DISCOVERY_PATIENCE:
+            self._is_waiting = False
+            self._say(
+                f'{question.what}: there is no service {self._name}; is controller_node '
+                'running, with this ROS_DOMAIN_ID and namespace?'
+            )
+        elif self._future is not None and age > ANSWER_PATIENCE:
+            self._forget()
+            self._say(
+                f'{question.what}: no answer of {self._name} within {ANSWER_PATIENCE:.0f} s; '
+                'does controller_node still run?'
+            )
+
+    def _forget(self) -> None:
+        if self._future is not None:
+            self._client.remove_pending_request(self._future)
+            self._future = None
+
+    def _answered(self, what: str, future: Future) -> None:
+        if future is not self._future:
+            return
+        self._future = None
+        response = future.result()
+        if response is None:
+            return
+        if response.success:
+            self._granted(what)
+            self._say(f'{what}: {response.message or "done"}')
+        else:
+            self._say(f'{what} refused: {response.message}')

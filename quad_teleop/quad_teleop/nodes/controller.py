@@ -1,0 +1,84 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The controller as the person's programs see it: what it is asked for, and what it says."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import time
+
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.node import Node
+from std_srvs.srv import Trigger
+
+from quad_msgs.srv import SetMode
+
+from ..controller_report import ControllerReport, read_report
+from ..modes import Mode
+from .command_client import CommandClient
+
+
+class Controller:
+    """Client of ``set_mode`` and ``controller_node/clear_fault``, and listener to /diagnostics.
+
+    Attributes:
+        mode: The mode that was granted last; None before.
+    """
+
+    def __init__(self, node: Node, say: Callable[[str], None]) -> None:
+        """Make the clients.
+
+        Args:
+            node: The node; somebody has to spin it for answers to arrive.
+            say: Is told the answers, and why there is none.
+        """
+        self.mode: Mode | None = None
+        self._report: ControllerReport | None = None
+        self._modes = CommandClient(node, SetMode, 'set_mode', say, self._granted)
+        self._faults = CommandClient(node, Trigger, 'controller_node/clear_fault', say)
+        node.create_subscription(DiagnosticArray, '/diagnostics', self._take, 10)
+
+    def ask_mode(self, mode: Mode, now: float) -> None:
+        """Ask for a mode.
+
+        Args:
+            mode: Which.
+            now: Time [s].
+        """
+        self._modes.ask(mode.value, SetMode.Request(mode=mode.value), now)
+
+    def clear_fault(self, now: float) -> None:
+        """Ask to forget the latched faults.
+
+        Args:
+            now: Time [s].
+        """
+        self._faults.ask('clear fault', Trigger.Request(), now)
+
+    def report(self, now: float) -> ControllerReport | None:
+        """Return what the controller said last; None when that is long ago.
+
+        Args:
+            now: Time [s].
+        """
+        report = self._report
+        return report if report is not None and report.is_fresh(now) else None
+
+    def check(self, now: float) -> None:
+        """Send and give up what is due.
+
+        Args:
+            now: Time [s].
+        """
+        self._modes.check(now)
+        self._faults.check(now)
+
+    def _granted(self, mode: str) -> None:
+        self.mode = Mode(mode)
+
+    def _take(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            values = {entry.key: entry.value for entry in status.values}
+            level = int.from_bytes(status.level, 'little')
+            report = read_report(status.name, level, status.message, values, time.monotonic())
+            self._report = report or self._report
