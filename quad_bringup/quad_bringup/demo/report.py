@@ -100,7 +100,7 @@ def summary_lines(figures: Figures, stretches: Sequence[Measured]) -> list[str]:
         figures: The last ones before it lay down.
         stretches: What was measured.
     """
-    head = f'{"":<14}  {"commanded":^19}  {"in physics":^19}  {"by /odom":^19}'
+    head = f'{"[m/s, rad/s]":<14}  {"commanded":^19}  {"in physics":^19}  {"by /odom":^19}'
     names = f'{"":<14}' + 3 * f'  {"ahead":>6} {"left":>6} {"turn":>5}'
     rows = [
         f'{each.stretch.name:<7}{each.stretch.duration:5.1f} s  '
