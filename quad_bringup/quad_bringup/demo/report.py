@@ -107,9 +107,7 @@ def summary_lines(figures: Figures, stretches: Sequence[Measured]) -> list[str]:
         f'{_columns(each.stretch.velocity)}  {_columns(each.measured)}  {_columns(each.odometry)}'
         for each in stretches
     ]
-    body = (
-        f'[m/s, rad/s]  tilt at most {math.degrees(figures.tilt_max):.1f}°, {rhythm_text(figures)}'
-    )
+    body = f'tilt at most {math.degrees(figures.tilt_max):.1f}°, {rhythm_text(figures)}'
     return [head, names, *rows, body]
 
 
