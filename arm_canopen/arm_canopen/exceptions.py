@@ -12,6 +12,7 @@
     ├── SdoError                     a device did not do what an SDO asked
     │   ├── SdoAbortError            the device (or we) aborted the transfer with a code
     │   └── SdoTimeoutError (TimeoutError)   the device did not answer
+    ├── LssError                     a device did not do what LSS asked of it
     ├── BootError                    a device did not come up; names the phase
     ├── DriveError                   a drive refused a command or did not reach a state in time
     └── LifecycleError               a managed node cannot make this transition now
@@ -81,6 +82,13 @@ class SdoAbortError(SdoError):
         """Keep the code beside the message."""
         super().__init__(message)
         self.code = code
+
+
+class LssError(CanopenError):
+    """A device did not do what layer setting services asked of it.
+
+    Scenarios: no device answers, several do, a node id or bit rate is refused.
+    """
 
 
 class BootError(CanopenError):

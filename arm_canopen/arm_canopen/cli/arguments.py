@@ -68,14 +68,19 @@ def seconds(text: str) -> float:
     return number
 
 
-def add_bus_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add what names a bus and its devices."""
+def add_bus_argument(parser: argparse.ArgumentParser) -> None:
+    """Add what names a bus."""
     parser.add_argument(
         '--can',
         metavar='BUS',
         help='can0, vcan0, udp_multicast:239.x.y.z, ... (default: parameter can_interface_name, '
         'else auto)',
     )
+
+
+def add_bus_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add what names a bus and its devices."""
+    add_bus_argument(parser)
     parser.add_argument(
         '--bus-config',
         metavar='BUS.yml',

@@ -16,11 +16,11 @@ import sys
 
 from ..exceptions import CanopenError
 from ..nodes.ros_arguments import split_ros_arguments
-from . import check, dcf, diff, eds, objects, scan
+from . import check, dcf, diff, eds, lss, objects, scan
 from .arguments import take_parameters, UsageError
 from .output import remark
 
-VERBS = (check, eds, scan, objects, diff, dcf)
+VERBS = (check, eds, scan, objects, diff, dcf, lss)
 INTERRUPTED = 130  # exit code of a program that Ctrl-C ended
 
 
