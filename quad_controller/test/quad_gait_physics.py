@@ -104,6 +104,11 @@ class PhysicsRig:
         return Travel(x / duration, y / duration, turned / duration, self.tilt)
 
     @property
+    def state(self) -> str:
+        """The controller's state."""
+        return self.controller.status.title
+
+    @property
     def faulted(self) -> bool:
         """Whether the controller has given up."""
         return self.controller.status.state is State.FAULT

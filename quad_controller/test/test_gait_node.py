@@ -7,12 +7,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import ExitStack
 import math
+from pathlib import Path
 import sys
 import time
 from typing import Any, TYPE_CHECKING
 
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Twist, TwistStamped
+from policy_export import joined
 from processes import RunningProcess
 import pytest
 from ros_client import RosClient
@@ -22,6 +24,7 @@ from std_msgs.msg import String
 from quad_controller.model.quadruped import quadruped
 from quad_controller.nodes.controller_node import LATCHED_QOS
 from quad_description import robot_urdf
+from quad_gait_policies import metadata, write_policy
 from quad_msgs.msg import JointCommand
 from quad_msgs.srv import SetMode
 
@@ -146,6 +149,39 @@ def test_from_lying_to_walking_and_back(robot: Robot) -> None:
         for value in status.values
     }
     assert float(figures['feedback_to_command_p50']) > 0.0
+
+
+def test_a_shipped_policy_is_found_checked_and_watched(isolation: Isolation) -> None:
+    """By its name it is loaded; in a dry run its answers are told beside the commands."""
+    with ExitStack() as stack:
+        words = ['-p', 'policy:=trot_imitation', '-p', 'policy_dry_run:=true']
+        process = stack.enter_context(RunningProcess([*NODE, *words], isolation.env))
+        client = stack.enter_context(RosClient(isolation.domain_id))
+        process.wait_for('waiting for joint_states')
+        robot = Robot(client, process)
+        reports = client.listen(String, 'controller_node/policy', LATCHED_QOS)
+        shadows = client.listen(JointCommand, 'joint_command_shadow', 1)
+        robot.begin()
+        client.spin_until(lambda: bool(shadows and reports), 20.0, 'shadow commands')
+        assert 'sha256' in reports[0].data
+        assert 'dry run' in robot.mode('policy').message
+
+
+def test_a_policy_that_does_not_fit_leaves_the_gait(isolation: Isolation, tmp_path: Path) -> None:
+    """A renamed joint is told in the table and in the answer; the robot walks all the same."""
+    names = joined(['fl_hip', *ROBOT.names[1:]])
+    path = write_policy(tmp_path / 'renamed.onnx', metadata(joint_names=names))
+    with ExitStack() as stack:
+        words = ['-p', f'policy:={path}']
+        process = stack.enter_context(RunningProcess([*NODE, *words], isolation.env))
+        client = stack.enter_context(RosClient(isolation.domain_id))
+        process.wait_for('not in the robot: fl_hip')
+        robot = Robot(client, process)
+        robot.begin()
+        client.spin_until(lambda: bool(robot.commands), 20.0, 'joint commands')
+        assert 'not in the robot: fl_hip' in robot.mode('policy').message
+        assert robot.mode('stand').success
+        robot.until_state('stand')
 
 
 def test_silence_is_a_fault_that_is_cleared_by_its_service(robot: Robot) -> None:

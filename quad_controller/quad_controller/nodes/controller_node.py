@@ -27,7 +27,10 @@ from std_srvs.srv import Trigger
 from quad_msgs.msg import JointCommand
 from quad_msgs.srv import SetMode
 
-from ..exceptions import QuadControllerError
+from ..exceptions import PolicyError, QuadControllerError
+from ..gait.generator import GaitGenerator
+from ..policy.interface import Policy
+from ..policy.load import load_policy
 from ..states.controller import Controller
 from ..states.modes import Answer
 from ..states.status import Output, Status
@@ -35,6 +38,7 @@ from . import messages
 from .control_loop import ControlLoop
 from .diagnostics import loop_diagnostic, state_diagnostic
 from .parameters import declare_parameters
+from .policies import find_policy
 from .spinning import spin, stop_on_signals
 
 COMMAND_QOS = QoSProfile(
@@ -59,14 +63,19 @@ class ControllerNode(Node):
             stop: Set when the loop has ended by a defect.
 
         Raises:
-            QuadControllerError: A parameter, the robot description or the policy does not fit.
+            QuadControllerError: A parameter or the robot description does not fit.
         """
         super().__init__('controller_node')
         self._settings = settings = declare_parameters(self)
+        self._report = self.create_publisher(String, '~/policy', LATCHED_QOS)
+        policy, refusal = self._load_policy()
         self._controller = Controller(
             settings.robot,
             settings.gait,
             settings.states,
+            policy=policy,
+            policy_refusal=refusal,
+            dry_run=settings.policy_dry_run,
             first_gait=settings.first_gait,
             arm_pose=settings.arm_pose,
         )
@@ -97,6 +106,28 @@ class ControllerNode(Node):
     def end(self) -> None:
         """Stop sending; the servos hold their last targets."""
         self._loop.stop()
+
+    def _load_policy(self) -> tuple[Policy | None, str]:
+        """Return the policy, or None and why there is none; the gait does not need it."""
+        settings = self._settings
+        if not settings.policy:
+            return None, 'no policy is loaded (parameter policy)'
+        gait = GaitGenerator(settings.robot, settings.gait)
+        try:
+            loaded = load_policy(
+                find_policy(settings.policy),
+                settings.robot,
+                gait.stand_targets,
+                settings.policy_options,
+                settings.states.period,
+            )
+        except PolicyError as error:
+            self.get_logger().error(str(error))
+            self._report.publish(String(data=str(error)))
+            return None, f'the policy was refused at the start: {error.reason}'
+        self.get_logger().info(str(loaded))
+        self._report.publish(String(data=str(loaded)))
+        return loaded.runner, ''
 
     def _subscribe(self) -> None:
         sensor = qos_profile_sensor_data

@@ -16,6 +16,7 @@ from ..gait.parameters import GaitParameters, RANGES
 from ..gait.schedule import Gait
 from ..gait.servo_compensation import ServoModel
 from ..model.quadruped import Quadruped, quadruped
+from ..policy.options import GravitySource, ImuFrame, OPTION_RANGES, PolicyOptions
 from ..states.parameters import STATE_RANGES, StateParameters
 from .parameter_reader import ParameterReader, refuse_misspelt
 
@@ -56,6 +57,11 @@ SERVO_RANGES: Mapping[str, tuple[tuple[float, float], str]] = {
     'inertia': ((0.0, 1.0), 'what a joint turns [kg m2]'),
     'mass': ((0.0, 100.0), 'what the legs carry [kg]; 0: as in the URDF'),
 }
+POLICY_MEANINGS: Mapping[str, str] = {
+    'phase_period': "[s]; 0: what the file says, or else the vendor's 0.4",
+    'soft_limits': "share of a joint's range that its targets may use",
+    'low_pass': 'cut-off of a filter of its targets [Hz]; 0: none',
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +74,8 @@ class NodeSettings:
         first_gait: Gait to begin with.
         states: Limits of states, watchdogs and protections.
         arm_pose: Positions of the joints that are no legs' in [rad]; empty leaves them.
-        policy: Path of an ONNX file; empty for none.
+        policy: Path of an ONNX file, or name of one of :func:`shipped_policies`; empty for none.
+        policy_options: How it is run.
         policy_dry_run: Whether the policy is only watched.
         diagnostics_period: In [s].
     """
@@ -79,6 +86,7 @@ class NodeSettings:
     states: StateParameters
     arm_pose: tuple[float, ...]
     policy: str
+    policy_options: PolicyOptions
     policy_dry_run: bool
     diagnostics_period: float
 
@@ -101,7 +109,10 @@ def declare_parameters(node: Node) -> NodeSettings:
         arm_pose=read.numbers(
             'arm_pose', "positions of the joints that are no legs' when it stands [rad]"
         ),
-        policy=read.text('policy', '', 'ONNX file that the mode policy follows'),
+        policy=read.text(
+            'policy', '', 'ONNX file that the mode policy follows, or name of one that is shipped'
+        ),
+        policy_options=_policy_options(read),
         policy_dry_run=read.flag(
             'policy_dry_run',
             default=False,
@@ -140,6 +151,34 @@ def _servo(read: ParameterReader) -> ServoModel | None:
         for name, (span, meaning) in SERVO_RANGES.items()
     }
     return ServoModel(**values) if enabled else None
+
+
+def _policy_options(read: ParameterReader) -> PolicyOptions:
+    default = PolicyOptions()
+    values = {
+        name: read.number(f'policy_{name}', getattr(default, name), OPTION_RANGES[name], meaning)
+        for name, meaning in POLICY_MEANINGS.items()
+    }
+    return PolicyOptions(
+        **values,
+        imu_frame=read.choice(
+            'policy_imu_frame',
+            default.imu_frame.value,
+            {frame.value: frame for frame in ImuFrame},
+            'frame of the angular velocity; yawed: turned by 180 degrees',
+        ),
+        gravity_source=read.choice(
+            'policy_gravity_source',
+            default.gravity_source.value,
+            {source.value: source for source in GravitySource},
+            'of the direction of gravity',
+        ),
+        hold_missing=read.flag(
+            'policy_hold_missing',
+            default=False,
+            meaning='joints of the policy that the robot lacks count as being at their default',
+        ),
+    )
 
 
 def _states(read: ParameterReader) -> StateParameters:

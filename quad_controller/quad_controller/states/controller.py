@@ -47,6 +47,7 @@ class Controller:
         states: StateParameters,
         *,
         policy: Policy | None = None,
+        policy_refusal: str = 'no policy is loaded (parameter policy)',
         dry_run: bool = False,
         arm_pose: Sequence[float] = (),
         first_gait: Gait = Gait.TROT,
@@ -58,6 +59,7 @@ class Controller:
             gait: Tuning of the gait.
             states: Limits of states, watchdogs and protections.
             policy: What the mode ``policy`` follows.
+            policy_refusal: Why there is none.
             dry_run: Whether the policy is only asked, and never followed.
             arm_pose: Positions of the joints that belong to no leg when the robot stands, in
                 [rad]; empty leaves them where they are.
@@ -70,7 +72,7 @@ class Controller:
         poses = Poses(robot, states.lie_height, arm_pose)
         self._generator = GaitGenerator(robot, gait, poses.typical)
         self._generator.choose(first_gait)
-        self._policy = policy
+        self._policy, self._policy_refusal = policy, policy_refusal
         self._machine = StateMachine(poses, self._generator, states, policy)
         self._shadow = Shadow(policy) if policy is not None and dry_run else None
         self._commands = Commands(states.command_timeout)
@@ -217,7 +219,7 @@ class Controller:
         if self._machine.state is State.FAULT:
             return f'{"; ".join(self._latch.texts)}; call ~/clear_fault when that is mended'
         if request.state is State.POLICY and self._policy is None:
-            return 'no policy is loaded (parameter policy)'
+            return self._policy_refusal
         if request.state is State.POLICY and self._shadow is not None:
             return 'the policy is only watched in a dry run (parameter policy_dry_run)'
         gentle = request.state in {State.RELAX, State.LIE}

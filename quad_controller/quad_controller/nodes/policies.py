@@ -1,0 +1,34 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The policies that are installed with this package."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ament_index_python.packages import get_package_share_directory
+
+from ..exceptions import PolicyError
+
+
+def shipped_policies() -> dict[str, Path]:
+    """Return the files of all shipped policies by their names."""
+    folder = Path(get_package_share_directory('quad_controller')) / 'policies'
+    return {path.stem: path for path in sorted(folder.glob('*.onnx'))}
+
+
+def find_policy(text: str) -> Path:
+    """Return the file of a path, or of a shipped policy's name.
+
+    Raises:
+        PolicyError: It is neither.
+    """
+    path = Path(text).expanduser()
+    if path.is_file():
+        return path
+    shipped = shipped_policies()
+    if text in shipped:
+        return shipped[text]
+    raise PolicyError(
+        f'policy {text!r} is no file and none that is shipped ({", ".join(shipped) or "none"})'
+    )

@@ -1,0 +1,78 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""How a policy is run, where its file leaves that open."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+import math
+
+from ..exceptions import ParameterError
+
+
+class GravitySource(Enum):
+    """Where the direction of gravity is taken from.
+
+    ``BLEND`` is the orientation, drawn a little to the accelerometer while that feels about 1 g.
+    """
+
+    ACCEL = 'accel'
+    EULER = 'euler'
+    BLEND = 'blend'
+
+
+class ImuFrame(Enum):
+    """Frame in which the policy expects the angular velocity.
+
+    ``YAWED`` is turned by 180 degrees about z: in the vendor's training environment (luwu_mjlab)
+    the IMU sits so on the body. ``AUTO`` is what the file says, and the vendor's when it does not.
+    """
+
+    AUTO = 'auto'
+    BASE = 'base'
+    YAWED = 'yawed'
+
+
+VENDOR_PHASE_PERIOD = 0.4  # [s] luwu_mjlab, XGOMini velocity task; no exporter writes it
+VENDOR_PHASE_THRESHOLD = 0.1  # luwu_mjlab, norm of (vx, vy, yaw rate)
+
+
+@dataclass(frozen=True, slots=True)
+class PolicyOptions:
+    """Options of the runner.
+
+    Attributes:
+        phase_period: In [s]; 0 takes what the file says, and the vendor's when it does not.
+        imu_frame: Of the angular velocity.
+        gravity_source: Of the direction of gravity.
+        hold_missing: Joints of the policy that the robot lacks count as being at their default.
+        soft_limits: Share of a joint's range that targets may use.
+        low_pass: Cut-off of a filter of the targets in [Hz]; 0 for none.
+    """
+
+    phase_period: float = 0.0
+    imu_frame: ImuFrame = ImuFrame.AUTO
+    gravity_source: GravitySource = GravitySource.BLEND
+    hold_missing: bool = False
+    soft_limits: float = 0.9
+    low_pass: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Refuse what makes no sense.
+
+        Raises:
+            ParameterError: A value is outside of its range.
+        """
+        for name, (least, most) in OPTION_RANGES.items():
+            value = getattr(self, name)
+            if not (math.isfinite(value) and least <= value <= most):
+                raise ParameterError(f'policy_{name} {value} is not within {least} to {most}')
+
+
+OPTION_RANGES: dict[str, tuple[float, float]] = {
+    'phase_period': (0.0, 10.0),
+    'soft_limits': (0.1, 1.0),
+    'low_pass': (0.0, 100.0),
+}
+"""Range of each number, both ends included; units as in :class:`PolicyOptions`."""

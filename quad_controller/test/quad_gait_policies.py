@@ -1,0 +1,60 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Policies for tests: small networks whose answers are known, and faults of each kind."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from policy_export import export, joined
+from policy_mlp import Mlp
+
+from quad_controller.gait.generator import GaitGenerator
+from quad_controller.gait.parameters import GaitParameters
+from quad_controller.policy.network import FLOAT, Floats, Port
+from quad_gait_rig import ROBOT
+
+STAND = GaitGenerator(ROBOT, GaitParameters()).stand_targets
+TERMS = 'ang_vel,gravity,cmd,phase,joint_pos,joint_vel,prev_action'
+
+
+def metadata(**changes: str | None) -> dict[str, str]:
+    """Return what a fitting file says; a change to None leaves a key out."""
+    fitting: dict[str, str | None] = {
+        'joint_names': joined(ROBOT.names),
+        'default_joint_pos': joined([round(angle, 3) for angle in STAND]),
+        'action_scale': '0.25',
+        'observation_names': TERMS,
+        'command_names': 'twist',
+        'phase_period': '0.28',
+        'imu_frame': 'base',
+    }
+    return {key: value for key, value in (fitting | changes).items() if value is not None}
+
+
+class FakeNetwork:
+    """Answers as it is told, and keeps what it was asked."""
+
+    def __init__(self, values: Mapping[str, str], joints: int = 12) -> None:
+        """Have some metadata."""
+        self.metadata = values
+        self.inputs: tuple[Port, ...] = (('obs', FLOAT, (1, 11 + 3 * joints)),)
+        self.outputs: tuple[Port, ...] = (('actions', FLOAT, (1, joints)),)
+        self.digest = 'abc'
+        self.action: Floats = np.zeros((1, joints), np.float32)
+        self.asked: list[Floats] = []
+
+    def run(self, observation: Floats) -> Floats:
+        """Answer."""
+        self.asked.append(observation.copy())
+        return self.action
+
+
+def write_policy(path: Path, values: Mapping[str, str], width: int = 47) -> Path:
+    """Write an ONNX file whose network answers nearly nothing."""
+    network = Mlp((width, 8, 12), np.random.default_rng(0))
+    network.weights[-1] *= np.float32(1e-3)
+    export(network, path, values)
+    return path

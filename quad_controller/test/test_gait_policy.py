@@ -1,0 +1,328 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Policies: what is refused and why, what they are asked, and what becomes of their answers."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+import math
+from pathlib import Path
+
+from hypothesis import given
+from hypothesis import strategies as st
+import numpy as np
+from policy_export import export, joined
+from policy_mlp import Mlp
+import pytest
+
+from quad_controller.exceptions import ParameterError, PolicyError
+from quad_controller.gait.generator import GaitGenerator
+from quad_controller.gait.parameters import GaitParameters
+from quad_controller.gait.velocity import REST, Velocity
+from quad_controller.policy.load import admit, load_policy, LoadedPolicy
+from quad_controller.policy.network import OnnxNetwork
+from quad_controller.policy.observation import gravity
+from quad_controller.policy.options import GravitySource, ImuFrame, PolicyOptions
+from quad_controller.states.measurement import ImuSample, JointSample
+from quad_gait_physics import MODEL, PhysicsRig
+from quad_gait_policies import FakeNetwork, metadata, STAND, write_policy
+from quad_gait_rig import ARM_ROBOT, ROBOT, tilted, UPRIGHT
+
+SHIPPED = Path(__file__).parents[1] / 'policies' / 'trot_imitation.onnx'
+PERIOD = 0.02  # [s]
+STILL = JointSample(STAND, (0.0,) * 12)
+JOINTS = list(ROBOT.names)
+MJLAB_TERMS = 'base_ang_vel,projected_gravity,command,phase,joint_pos,joint_vel,actions'
+
+
+def check(network: FakeNetwork, options: PolicyOptions | None = None) -> LoadedPolicy:
+    """Check a network as a policy of the test's robot."""
+    return admit(
+        'test', network, ROBOT, STAND,
+        options=options or PolicyOptions(), period=PERIOD, clock=lambda: 0.0,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ('changes', 'reason'),
+    [
+        ({'joint_names': joined(['knee', *JOINTS[1:]])}, 'not in the robot: knee'),
+        ({'joint_names': joined([JOINTS[1], *JOINTS[1:]])}, 'twice: fl_thigh_joint'),
+        ({'joint_names': None}, "no metadata 'joint_names'"),
+        ({'default_joint_pos': joined([3.0] * 12)}, 'default pose: fl_hip_joint 3'),
+        ({'default_joint_pos': joined([0.0] * 12)}, 'rad from our stand'),
+        ({'default_joint_pos': '0.0,1.0'}, 'length of default_joint_pos: 2'),
+        ({'default_joint_pos': 'a,b'}, 'no list of numbers'),
+        ({'action_scale': '0.0'}, 'action_scale: 0'),
+        ({'action_scale': 'nan'}, 'no finite number'),
+        ({'observation_names': 'gravity,ang_vel,cmd,phase,joint_pos,joint_vel,prev_action'},
+         'observation_names'),
+        ({'observation_terms_history_length': '[1, 3, 1]'}, 'history, scale, clip'),
+        ({'observation_terms_scale': '0.25,1.0'}, 'history, scale, clip'),
+        ({'imu_frame': 'sideways'}, 'imu frame'),
+        ({'phase_period': '-1.0'}, 'phase period'),
+    ],
+)  # fmt: skip
+def test_what_disagrees_is_refused_and_named(changes: dict[str, str | None], reason: str) -> None:
+    """A file that says something else than the robot needs is refused with the difference."""
+    with pytest.raises(PolicyError) as refusal:
+        check(FakeNetwork(metadata(**changes)))
+    assert reason in refusal.value.reason
+
+
+def test_shapes_and_answers_are_looked_at() -> None:
+    """Another width, numbers that are none, and wild answers are refused."""
+    wide = FakeNetwork(metadata())
+    wide.inputs = (('obs', 'tensor(float)', (1, 56)),)
+    two = FakeNetwork(metadata())
+    two.inputs = (*two.inputs, ('time_step', 'tensor(float)', (1, 1)))
+    wild, bad = FakeNetwork(metadata()), FakeNetwork(metadata())
+    wild.action, bad.action = wild.action + 9.0, bad.action * np.float32(np.nan)
+    for network, reason in ((wide, 'input'), (two, 'input'), (wild, 'standing'), (bad, 'NaN')):
+        with pytest.raises(PolicyError) as refusal:
+            check(network)
+        assert reason in refusal.value.reason
+
+
+def test_what_the_file_leaves_open_is_told() -> None:
+    """Without phase period and frame the vendor's are taken, with a warning in the table."""
+    report = str(check(FakeNetwork(metadata(phase_period=None, imu_frame=None))).report)
+    assert "0.4 s, the vendor's" in report
+    assert "yawed, the vendor's" in report
+    assert 'warn' in report
+
+
+@pytest.mark.parametrize(
+    'changes',
+    [
+        {'joint_names': joined([f'robot/{name}' for name in JOINTS])},
+        {'action_scale': joined([0.25] * 12)},
+        {'observation_names': MJLAB_TERMS},
+        {'observation_terms_scale': '[None, 1.0]', 'observation_terms_history_length': '1,1'},
+    ],
+)  # fmt: skip
+def test_other_spellings_are_understood(changes: dict[str, str]) -> None:
+    """Prefixes, lists for numbers, mjlab's names and neutral extras are no difference."""
+    assert not check(FakeNetwork(metadata(**changes))).report.refused
+
+
+@given(st.permutations(range(12)), st.integers(0, 11))
+def test_joints_are_permuted_by_name(order: list[int], moved: int) -> None:
+    """Whatever the file's order, an action moves the joint of its name, and sees it too."""
+    names = joined([JOINTS[index] for index in order])
+    defaults = joined([round(STAND[index], 3) for index in order])
+    network = FakeNetwork(metadata(joint_names=names, default_joint_pos=defaults))
+    runner = check(network).runner
+    network.action[0, order.index(moved)] = 0.4
+    positions = tuple(
+        angle + (0.05 if index == moved else 0.0) for index, angle in enumerate(STAND)
+    )
+    velocities = tuple(1.0 if index == moved else 0.0 for index in range(12))
+    targets = runner.step(JointSample(positions, velocities), UPRIGHT, REST, PERIOD).targets
+    assert targets is not None
+    for index, target in enumerate(targets):
+        assert target == pytest.approx(STAND[index] + (0.1 if index == moved else 0.0), abs=1e-3)
+    place = order.index(moved)
+    observed = network.asked[-1][0]
+    assert observed[11 + place] == pytest.approx(0.05, abs=1e-3)
+    assert observed[23 + place] == 1.0
+
+
+def test_the_observation_is_as_agreed() -> None:
+    """ang_vel, gravity, cmd, phase, joint_pos, joint_vel, prev_action, in this order."""
+    network = FakeNetwork(metadata())
+    runner = check(network).runner
+    network.action[0] = np.arange(12) * 0.01
+    imu = ImuSample(tilted(0.1).orientation, (0.1, 0.2, 0.3), (0.0, 0.0, 20.0))
+    for _ in range(2):
+        runner.step(STILL, imu, Velocity(0.2, -0.1, 0.3), 0.07)  # a quarter of the period
+    observed = network.asked[-1][0]
+    assert observed[:3] == pytest.approx([0.1, 0.2, 0.3])
+    # the body is rolled to the right: gravity points to its right side
+    assert observed[3:6] == pytest.approx([0.0, -math.sin(0.1), -math.cos(0.1)], abs=1e-6)
+    assert observed[6:9] == pytest.approx([0.2, -0.1, 0.3])
+    assert observed[9:11] == pytest.approx([0.0, -1.0], abs=1e-6)
+    assert observed[35:] == pytest.approx(np.arange(12) * 0.01)
+
+
+def test_the_vendors_imu_is_turned_around() -> None:
+    """In the vendor's frame the rates about x and y change their sign; gravity does not."""
+    network = FakeNetwork(metadata())
+    runner = check(network, PolicyOptions(imu_frame=ImuFrame.YAWED)).runner
+    imu = replace(UPRIGHT, angular_velocity=(1.0, 0.5, 0.25))
+    runner.step(STILL, imu, REST, PERIOD)
+    assert network.asked[-1][0][:3] == pytest.approx([-1.0, -0.5, 0.25])
+    assert network.asked[-1][0][3:6] == pytest.approx([0.0, 0.0, -1.0])
+
+
+def test_a_slow_command_has_no_phase() -> None:
+    """Below the threshold the phase is (0, 0), and above it goes on as if it never was."""
+    network = FakeNetwork(metadata())
+    runner = check(network).runner
+    runner.step(STILL, UPRIGHT, Velocity(0.05), 0.07)
+    assert network.asked[-1][0][9:11].tolist() == [0.0, 0.0]
+    runner.step(STILL, UPRIGHT, Velocity(0.2), 0.07)
+    assert network.asked[-1][0][9:11] == pytest.approx([0.0, -1.0], abs=1e-6)
+
+
+@pytest.mark.parametrize('source', GravitySource)
+def test_gravity_at_rest_is_the_same_from_all_sources(source: GravitySource) -> None:
+    """At rest accelerometer and orientation agree; a jolt does not turn the blend or vanish."""
+    leaning = tilted(0.3)
+    x, y, z = leaning.down
+    at_rest = replace(leaning, acceleration=(-9.81 * x, -9.81 * y, -9.81 * z))
+    assert gravity(at_rest, source) == pytest.approx(leaning.down)
+    jolted = replace(leaning, acceleration=(15.0, 0.0, 0.0))
+    assert gravity(jolted, source) == pytest.approx(leaning.down)
+    assert gravity(replace(leaning, acceleration=(0.0, 0.0, 0.0)), source) == leaning.down
+
+
+def test_targets_stay_within_soft_limits() -> None:
+    """The wildest action ends at nine tenths of the range, and is remembered as it was."""
+    network = FakeNetwork(metadata())
+    runner = check(network).runner
+    network.action[0] = 50.0
+    targets = runner.step(STILL, UPRIGHT, REST, PERIOD).targets
+    assert targets is not None
+    for target, limits in zip(targets, ROBOT.limits, strict=True):
+        middle = (limits.lower + limits.upper) / 2
+        assert abs(target - middle) <= 0.9 * (limits.upper - limits.lower) / 2 + 1e-6
+    runner.step(STILL, UPRIGHT, REST, PERIOD)
+    assert network.asked[-1][0][35:].tolist() == [50.0] * 12
+    runner.reset(STAND)
+    runner.step(STILL, UPRIGHT, REST, PERIOD)
+    assert not network.asked[-1][0][35:].any()
+
+
+def test_numbers_that_are_none_are_no_targets() -> None:
+    """A NaN answer, and a network that raises, are told and give no targets."""
+    network = FakeNetwork(metadata())
+    runner = check(network).runner
+    network.action[0, 3] = np.nan
+    step = runner.step(STILL, UPRIGHT, REST, PERIOD)
+    assert step.targets is None
+    assert 'no number' in step.reason
+
+    def broken(_observation: object) -> None:
+        raise RuntimeError('out of order')
+
+    network.run = broken  # type: ignore[method-assign, assignment]
+    assert 'out of order' in runner.step(STILL, UPRIGHT, REST, PERIOD).reason
+
+
+def test_joints_that_the_robot_lacks_may_be_held() -> None:
+    """A policy with an arm runs without one only when that was asked for."""
+    values = metadata(
+        joint_names=joined([*JOINTS, 'arm_yaw_joint']),
+        default_joint_pos=joined([*(round(angle, 3) for angle in STAND), 0.5]),
+    )
+    with pytest.raises(PolicyError, match='arm_yaw_joint'):
+        check(FakeNetwork(values, 13))
+    network = FakeNetwork(values, 13)
+    runner = check(network, PolicyOptions(hold_missing=True)).runner
+    targets = runner.step(STILL, UPRIGHT, REST, PERIOD).targets
+    assert targets == pytest.approx(STAND, abs=1e-3)
+    assert network.asked[-1][0][11 + 12] == 0.0
+
+
+def test_joints_that_the_policy_lacks_stay() -> None:
+    """An arm that the policy does not know keeps the targets that it had."""
+    network = FakeNetwork(metadata())
+    loaded = admit(
+        'test', network, ARM_ROBOT, (*STAND, 0.7),
+        options=PolicyOptions(), period=PERIOD, clock=lambda: 0.0,
+    )  # fmt: skip
+    loaded.runner.reset((*STAND, 0.7))
+    joints = JointSample((*STAND, 0.1), (0.0,) * 13)
+    targets = loaded.runner.step(joints, UPRIGHT, REST, PERIOD).targets
+    assert targets is not None
+    assert targets[12] == 0.7
+
+
+def test_a_low_pass_smooths_the_targets() -> None:
+    """A step of the action comes through in part first."""
+    network = FakeNetwork(metadata())
+    runner = check(network, PolicyOptions(low_pass=5.0)).runner
+    runner.step(STILL, UPRIGHT, REST, PERIOD)
+    network.action[0] = 1.0
+    first = runner.step(STILL, UPRIGHT, REST, PERIOD).targets
+    assert first is not None
+    assert 0.05 < first[0] - STAND[0] < 0.2
+
+
+@pytest.mark.parametrize('values', [{'phase_period': math.nan}, {'soft_limits': 0.0}])
+def test_odd_options_are_refused(values: dict[str, float]) -> None:
+    """An option that makes no sense is named."""
+    with pytest.raises(ParameterError, match=next(iter(values))):
+        PolicyOptions(**values)  # type: ignore[arg-type]
+
+
+def test_an_exported_network_answers_as_in_numpy(tmp_path: Path) -> None:
+    """ONNX Runtime and numpy agree on the same network, normalisation included."""
+    random = np.random.default_rng(3)
+    network = Mlp((47, 16, 8, 12), random)
+    network.mean = random.standard_normal(47).astype(np.float32)
+    network.deviation = random.uniform(0.1, 2.0, 47).astype(np.float32)
+    export(network, tmp_path / 'net.onnx', metadata())
+    loaded = OnnxNetwork(tmp_path / 'net.onnx')
+    rows = random.standard_normal((5, 1, 47)).astype(np.float32)
+    for row in rows:
+        assert loaded.run(row) == pytest.approx(network(row), abs=1e-5)
+    assert loaded.metadata['joint_names'] == joined(JOINTS)
+
+
+def test_gradients_are_derivatives() -> None:
+    """The gradients that the training follows agree with differences of the error."""
+    random = np.random.default_rng(5)
+    network = Mlp((4, 6, 3), random)
+    inputs = random.standard_normal((20, 4)).astype(np.float32)
+    wanted = random.standard_normal((20, 3)).astype(np.float32)
+    _, gradients = network.gradients(inputs, wanted)
+    for parameter, gradient in zip(network.parameters, gradients, strict=True):
+        place = tuple(random.integers(size) for size in parameter.shape)
+        errors = []
+        for step in (-1e-2, 1e-2):
+            parameter[place] += np.float32(step)
+            errors.append(network.gradients(inputs, wanted)[0])
+            parameter[place] -= np.float32(step)
+        assert (errors[1] - errors[0]) / 2e-2 == pytest.approx(gradient[place], abs=2e-3)
+
+
+def test_files_that_are_none_are_refused(tmp_path: Path) -> None:
+    """A missing file and one that is no ONNX are told apart."""
+    options = PolicyOptions()
+    with pytest.raises(PolicyError, match='No such file'):
+        load_policy(tmp_path / 'missing.onnx', ROBOT, STAND, options, PERIOD)
+    (tmp_path / 'text.onnx').write_text('not a network')
+    with pytest.raises(PolicyError, match='no ONNX model'):
+        load_policy(tmp_path / 'text.onnx', ROBOT, STAND, options, PERIOD)
+    narrow = write_policy(tmp_path / 'narrow.onnx', metadata(), width=45)
+    with pytest.raises(PolicyError, match='input'):
+        load_policy(narrow, ROBOT, STAND, options, PERIOD)
+
+
+@pytest.mark.parametrize(
+    'velocity', [Velocity(0.2), Velocity(-0.15), Velocity(0.0, 0.1), Velocity(0.0, 0.0, 1.0)]
+)
+def test_the_shipped_policy_walks(velocity: Velocity) -> None:
+    """The imitation of the gait goes where it is told to in physics, and does not fall."""
+    stand = GaitGenerator(MODEL, GaitParameters()).stand_targets
+    policy = load_policy(SHIPPED, MODEL, stand, PolicyOptions(), PERIOD)
+    rig = PhysicsRig(policy=policy.runner)
+    rig.mode('policy')
+    rig.run(1.5, velocity)
+    travel = rig.travel(10.0, velocity)
+    assert rig.state == 'policy'
+    assert travel.x == pytest.approx(velocity.x, abs=0.03)
+    assert travel.y == pytest.approx(velocity.y, abs=0.02)
+    assert travel.yaw == pytest.approx(velocity.yaw, abs=max(0.1 * abs(velocity.yaw), 0.06))
+    assert travel.tilt < math.radians(5.0)
+    rig.mode('lie')
+    rig.run(4.0)
+    assert rig.state == 'lie'
+
+
+def test_the_shipped_policy_says_what_it_is() -> None:
+    """It is small, and named as an imitation."""
+    assert SHIPPED.stat().st_size < 1_000_000
+    assert 'imitation' in OnnxNetwork(SHIPPED).metadata['kind']
