@@ -114,6 +114,23 @@ def test_one_servo_goes_at_its_speed() -> None:
     assert states(robot.run(1.0))[-1].position[slot_of(12)] == pytest.approx(40.0, abs=0.01)
 
 
+def test_a_servo_that_is_mounted_otherwise_reads_otherwise() -> None:
+    """Sign and offset act on angles, velocities and commands; the joint is where it was."""
+    plain = last_state(VirtualRobot(*KINEMATIC, '--start', 'stand'))
+    robot = VirtualRobot(*KINEMATIC, '--start', 'stand', '--mount', '12=-1,4.5')
+    state = last_state(robot)
+    slot = slot_of(12)
+    assert state.position[slot] == pytest.approx(4.5 - plain.position[slot], abs=1e-3)
+    assert state.position[slot + 1 :] == plain.position[slot + 1 :]
+    move = NEW.functions[Code.SERVO].pack(motor=(12,), angle=(4.5 - 30.0,))
+    robot.send(Frame(Kind.WRITE, Code.SERVO, move))
+    under_way = states(robot.run(0.02))
+    assert all(state.velocity[slot] >= 0.0 for state in under_way)
+    robot.run(0.1)
+    thigh = robot.simulation.plant.joint_targets[1]
+    assert math.degrees(thigh) == pytest.approx(30.0, abs=1e-3)
+
+
 def test_torque_is_switched_by_motor_and_for_all() -> None:
     """0 lets go, 1 holds; FF means all."""
     robot = VirtualRobot(*KINEMATIC)

@@ -107,6 +107,9 @@ def test_a_path_in_use_is_refused_and_a_dead_one_replaced(tmp_path: Path) -> Non
         (['--fault', 'fire'], 'there are drop'),
         (['--trunk-mass', '0'], 'trunk_mass'),
         (['--command-gap', '-1'], 'command-gap'),
+        (['--mount', '12'], 'give ID=SIGN,DEGREES'),
+        (['--mount', '12=2'], 'sign 2'),
+        (['--mount', '14=1'], 'no servo has id 14'),
     ],
 )
 def test_an_option_without_sense_is_told(

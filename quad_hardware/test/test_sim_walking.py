@@ -14,6 +14,7 @@ from sim_virtual import VirtualRobot
 
 from quad_description import robot_urdf
 from quad_hardware.protocol import Frame, Kind, OLD, Register
+from quad_hardware.sim.turning import Turn
 from quad_hardware.sim.walking import measure_legs, Walker
 from quad_kinematics import link_pose, parse
 
@@ -84,3 +85,44 @@ def test_it_walks_as_fast_as_the_register_says(
     turning = float(yaw[-1] - yaw[0]) / (0.02 * (len(yaw) - 1))
     assert (ahead, aside) == pytest.approx(expected[:2], abs=0.03)
     assert turning == pytest.approx(expected[2], abs=0.1)
+
+
+@given(
+    angle=st.floats(-8.0, 8.0),
+    yaw=st.floats(-math.pi, math.pi),
+    grip=st.floats(0.3, 1.1),
+)
+def test_a_turn_ends_at_its_angle(angle: float, yaw: float, grip: float) -> None:
+    """Whatever part of the rate the robot manages, and wherever the heading wraps around."""
+    turn, now, turned = Turn(angle, yaw, 0.0), 0.0, 0.0
+    while rate := turn.rate(math.remainder(yaw + turned, 2 * math.pi), now):
+        turned += grip * rate * 0.02
+        now += 0.02
+        assert now < 60.0
+    given_up = now > 1.0 + 3.0 * abs(angle) / math.radians(60.0)
+    assert given_up or turned == pytest.approx(angle, abs=math.radians(2.5))
+    assert not given_up or grip < 0.5
+
+
+def test_a_robot_that_cannot_turn_gives_up() -> None:
+    """A turn without any motion ends."""
+    turn, now = Turn(1.0, 0.0, 0.0), 0.0
+    while turn.rate(0.0, now):
+        now += 0.02
+    assert 3.0 < now < 5.0
+
+
+def test_it_turns_by_an_angle_and_says_when_it_is_done() -> None:
+    """Register 3F takes whole degrees, the most significant byte first."""
+    robot = VirtualRobot('--start', 'stand', '--noise', 'none', protocol=OLD)
+    robot.send(Frame(Kind.WRITE, 0x3F, (-90).to_bytes(2, 'big', signed=True)))
+    done = Frame(Kind.READ, 0x3F, b'\x01')
+    robot.run(1.5)
+    (answer,) = robot.ask(done)
+    assert answer.payload == b'\x00'
+    robot.run(3.0)
+    (answer,) = robot.ask(done)
+    assert answer.payload == b'\x01'
+    yaw = robot.simulation.plant.base_pose.roll_pitch_yaw[2]
+    assert yaw == pytest.approx(-math.pi / 2, abs=0.12)
+    assert not robot.simulation.board.walker.walking

@@ -13,8 +13,9 @@ from quad_description import movable_joints, Pose, pose_positions
 from ..protocol import Fault, Model, MOTOR_ORDER
 from .plant import Plant
 from .power import Battery, FULL_LOAD, HOT, LOW_BATTERY, Warmth
-from .servos import Servos
+from .servos import Mount, Servos
 from .state import Measurement, Vector
+from .turning import Turn
 from .walking import Walker
 
 GAIT_PERIOD = 0.02  # [s] between two sets of targets of the board's own gait
@@ -57,6 +58,7 @@ class Board:
         *,
         firmware: str = '',
         charge: float = 100.0,
+        mounts: Mapping[int, Mount] | None = None,
         now: float = 0.0,
     ) -> None:
         """Switch the board on; the robot stays as it is.
@@ -67,13 +69,14 @@ class Board:
             model: Which one it is.
             firmware: Version to tell; empty for one of the model.
             charge: Of the battery [%].
+            mounts: How servos are mounted that are not as the driver expects, by motor id.
             now: Time [s].
 
         Raises:
             SetupError: The robot has a joint for which the board has no servo.
         """
         joints = movable_joints(urdf)
-        self.servos = Servos(plant, joints, model)
+        self.servos = Servos(plant, joints, model, mounts or {})
         self.battery = Battery(charge)
         self.walker = Walker(urdf)
         self.model = model
@@ -94,6 +97,7 @@ class Board:
         self._yaw_origin = 0.0
         self._mode = Mode.SERVOS
         self._gait_at = math.inf
+        self._turn: Turn | None = None
         self.walker.reset()
 
     # -- time and power
@@ -108,7 +112,7 @@ class Board:
             self._plant.step(until - self._now)
             self._now = until
             if until >= self._gait_at:
-                self._plant.set_targets(self.walker.step(GAIT_PERIOD))
+                self._go_on()
                 self._gait_at += GAIT_PERIOD
             if until >= self._power_at:
                 self._look_after_power()
@@ -184,6 +188,7 @@ class Board:
         """Give the servos to the host; a gait of the board ends where it is."""
         self._mode = Mode.SERVOS
         self._gait_at = math.inf
+        self._turn = None
         self.walker.command = (0.0, 0.0, 0.0)
         self.walker.marking_time = False
 
@@ -194,6 +199,22 @@ class Board:
         self._mode = Mode.GAIT
         self._plant.set_targets(self.walker.step(0.0), POSE_TIME)
         self._gait_at = self._now + POSE_TIME
+
+    def walk(self, command: Vector) -> None:
+        """Walk ahead [m/s], to the left [m/s] and turn [rad/s] until something else is told."""
+        self._turn = None
+        self.walker.command = command
+        self.start_gait()
+
+    def turn_by(self, angle: float) -> None:
+        """Turn on the spot by an angle [rad]."""
+        self.walk((0.0, 0.0, 0.0))
+        self._turn = Turn(angle, self.measure().imu.roll_pitch_yaw[2], self._now)
+
+    @property
+    def turning(self) -> bool:
+        """Whether a turn by an angle is under way."""
+        return self._turn is not None
 
     def stand(self) -> None:
         """Go to the default pose and stay in it."""
@@ -211,6 +232,14 @@ class Board:
         """Bring all servos to zero."""
         self.take_servos()
         self.servos.command(dict.fromkeys(MOTOR_ORDER, 0.0), POSE_TIME)
+
+    def _go_on(self) -> None:
+        if self._turn is not None:
+            rate = self._turn.rate(self.measure().imu.roll_pitch_yaw[2], self._now)
+            self.walker.command = (0.0, 0.0, rate)
+            if rate == 0.0:
+                self._turn = None
+        self._plant.set_targets(self.walker.step(GAIT_PERIOD))
 
     def _look_after_power(self) -> None:
         self._power_at = self._now + POWER_PERIOD

@@ -20,6 +20,7 @@ from .noise import BOARD, NONE
 from .plant import KinematicRobot, Plant
 from .robot_line import RobotLine
 from .servo import ServoModel, ServoParameters
+from .servos import Mount
 from .terrain import Terrain
 
 DEFAULT_LINK = Path('/tmp/xgo')  # noqa: S108  the path that the documentation names
@@ -75,6 +76,13 @@ def parse_arguments(argv: Sequence[str]) -> argparse.Namespace:
     )
     add('--fault', action='append', default=[], metavar='KIND,name=value', help=_fault_help())
     add('--seed', type=int, default=0, help='of noise and damage (%(default)s)')
+    add(
+        '--mount',
+        action='append',
+        default=[],
+        metavar='ID=SIGN,DEGREES',
+        help='a servo that is mounted otherwise, to practise calibration: 12=-1,4.5',
+    )
     add('--no-ros', action='store_true', help='without node, services and topics')
     return parser.parse_args(argv)
 
@@ -106,6 +114,7 @@ def build(options: argparse.Namespace) -> Simulation:
         Model(options.preset),
         firmware=options.firmware,
         charge=options.battery,
+        mounts=dict(map(parse_mount, options.mount)),
     )
     line = RobotLine(
         board,
@@ -142,6 +151,22 @@ def parse_servo(text: str) -> ServoModel | ServoParameters:
     if 'stiffness' not in values:
         raise SetupError(f'--servo {text!r} needs kp, in [N m/rad]')
     return ServoParameters(**values)
+
+
+def parse_mount(text: str) -> tuple[int, Mount]:
+    """Return a motor id and how its servo sits, from ``ID=SIGN[,DEGREES]``.
+
+    Raises:
+        SetupError: The text has no sense; the message says what has.
+    """
+    motor, _, rest = text.partition('=')
+    sign, _, offset = rest.partition(',')
+    try:
+        return int(motor), Mount(int(sign), float(offset or '0'))
+    except SetupError:
+        raise
+    except ValueError:
+        raise SetupError(f'--mount {text!r}: give ID=SIGN,DEGREES, such as 12=-1,4.5') from None
 
 
 def _choose_protocols(name: str, baud: int) -> Collection[Protocol]:

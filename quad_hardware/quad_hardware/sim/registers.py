@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The board's side of the old protocol: registers that are read and written.
 
-Every register of the table is taken; those that move nothing here (teaching, LED, sounds of the
-outside world, actions other than 1, 2 and 255) are kept as bytes and otherwise mean nothing.
+Every register of the table is taken; those that move nothing here (teaching, LED, swinging of the
+body, actions other than 1, 2 and 255) are kept as bytes and otherwise mean nothing.
 """
 
 from __future__ import annotations
@@ -53,16 +53,17 @@ class Registers:
         """
         self._board = board
         self._spans = ANGLE_SPANS[board.model]
-        self._writers: dict[int, Callable[[int], None]] = {
+        self._writers: dict[int, Callable[[bytes], None]] = {
             Register.TORQUE: self._switch_torque,
             Register.VX: self._walk,
             Register.VY: self._walk,
             Register.VYAW: self._walk,
             Register.ACTION: self._act,
-            Register.MOTOR_SPEED: lambda speed: board.servos.set_speed(board.servos.fitted, speed),
-            _ORIGIN: lambda value: board.set_origin() if value == 1 else None,
+            Register.MOTOR_SPEED: self._set_speed,
+            _ORIGIN: lambda data: board.set_origin() if data == b'\x01' else None,
             _MARK_TIME: self._mark_time,
-            _MIDDLE: lambda value: board.go_to_middle() if value == 1 else None,
+            _TURN: self._turn,
+            _MIDDLE: lambda data: board.go_to_middle() if data == b'\x01' else None,
             **dict.fromkeys(_BODY, self._pose_body),
             **dict.fromkeys(_FEET, self._pose_body),
         }
@@ -121,7 +122,7 @@ class Registers:
             degrees = board.attitude(board.measure())[_WHOLE_DEGREES[address]]
             return function.pack(value=(round(degrees),))
         if address == _TURN:
-            return b'\x01'  # not walked: it is done at once
+            return b'\x00' if board.turning else b'\x01'  # 1: done
         return bytes(function.length)
 
     def _imu(self) -> bytes:
@@ -152,7 +153,7 @@ class Registers:
             if motor is not None:
                 motors[motor] = self._spans[motor].decode(data[0])
             elif address in self._writers:
-                self._writers[address](data[0])
+                self._writers[address](data)
         if motors:
             self._move(motors)
 
@@ -164,8 +165,12 @@ class Registers:
         else:
             self._board.servos.command(angles)
 
-    def _switch_torque(self, value: int) -> None:
+    def _set_speed(self, data: bytes) -> None:
         servos = self._board.servos
+        servos.set_speed(servos.fitted, data[0])
+
+    def _switch_torque(self, data: bytes) -> None:
+        servos, value = self._board.servos, data[0]
         if value in {Torque.UNLOAD_ALL, Torque.LOAD_ALL}:
             servos.set_torque(servos.fitted, value == Torque.LOAD_ALL)
             return
@@ -174,28 +179,31 @@ class Registers:
             motors = [motor for motor in servos.fitted if motor // 10 == leg]
             servos.set_torque(motors, kind == Torque.LOAD_LEG)
 
-    def _act(self, action: int) -> None:
-        if action in {ACTION_RESET, STAND_UP}:
+    def _act(self, data: bytes) -> None:
+        if data[0] in {ACTION_RESET, STAND_UP}:
             self._memory.clear()
             self._board.stand()
-        elif action == LIE_DOWN:
+        elif data[0] == LIE_DOWN:
             self._board.lie_down()
 
-    def _walk(self, _: int) -> None:
+    def _walk(self, _: bytes) -> None:
         # a step that is so long [mm] takes as long as a foot is on the ground
         step_time = 1000.0 * DUTY * PERIOD
         ahead, aside = self._signed(Register.VX), self._signed(Register.VY)
         turn = math.radians(self._signed(Register.VYAW))
-        self._board.walker.command = (ahead / step_time, aside / step_time, turn)
-        self._board.start_gait()
+        self._board.walk((ahead / step_time, aside / step_time, turn))
 
-    def _mark_time(self, _: int) -> None:
+    def _turn(self, data: bytes) -> None:
+        if len(data) == 2:
+            self._board.turn_by(math.radians(int.from_bytes(data, 'big', signed=True)))
+
+    def _mark_time(self, _: bytes) -> None:
         walker = self._board.walker
         walker.marking_time = self._memory[_MARK_TIME] != b'\0'
         walker.lift = self._decoded(_MARK_TIME) / 1000.0 if walker.marking_time else LIFT
         self._board.start_gait()
 
-    def _pose_body(self, _: int) -> None:
+    def _pose_body(self, _: bytes) -> None:
         walker = self._board.walker
         body = {name: self._signed(address) for address, name in _BODY.items()}
         walker.stance = replace(

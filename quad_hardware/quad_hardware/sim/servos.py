@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The robot's servos as the board sees them: ids and degrees instead of joints and radians.
 
-A servo's angle is the joint's position in degrees, sign +1 and offset 0. The gripper's servo
-spreads the travel of the jaw over its whole range.
+A servo's angle is the joint's position in degrees, sign +1 and offset 0, unless it is mounted
+otherwise. The gripper's servo spreads the travel of the jaw over its whole range.
 """
 
 from __future__ import annotations
@@ -38,12 +38,42 @@ class _Scale:
         return (position - self.offset) / self.gain
 
 
-def _scale(joint: Joint, motor: int, model: Model) -> _Scale:
-    if motor != GRIPPER:
-        return _Scale(math.pi / 180.0, 0.0)
-    span = ANGLE_SPANS[model][motor]
-    gain = (joint.upper - joint.lower) / (span.high - span.low)
-    return _Scale(gain, joint.lower - gain * span.low)
+@dataclass(frozen=True, slots=True)
+class Mount:
+    """How a servo sits on its joint.
+
+    Attributes:
+        sign: 1, or -1 for one that turns the other way.
+        offset: What the servo reads where the joint is at zero [deg].
+    """
+
+    sign: int = 1
+    offset: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Refuse what is no mounting.
+
+        Raises:
+            SetupError: The message says what is.
+        """
+        if self.sign not in {1, -1} or not abs(self.offset) <= 180.0:
+            raise SetupError(
+                f'servo mounted with sign {self.sign} and offset {self.offset}: '
+                'give 1 or -1, and -180 to 180 degrees'
+            )
+
+
+AS_EXPECTED = Mount()
+
+
+def _scale(joint: Joint, motor: int, model: Model, mount: Mount) -> _Scale:
+    gain, offset = math.pi / 180.0, 0.0
+    if motor == GRIPPER:
+        span = ANGLE_SPANS[model][motor]
+        gain = (joint.upper - joint.lower) / (span.high - span.low)
+        offset = joint.lower - gain * span.low
+    gain *= mount.sign
+    return _Scale(gain, offset - gain * mount.offset)
 
 
 class Servos:
@@ -53,16 +83,23 @@ class Servos:
         fitted: Ids of the servos that the robot has, in the order of the wire.
     """
 
-    def __init__(self, plant: Plant, joints: Iterable[Joint], model: Model) -> None:
+    def __init__(
+        self,
+        plant: Plant,
+        joints: Iterable[Joint],
+        model: Model,
+        mounts: Mapping[int, Mount],
+    ) -> None:
         """Connect to a robot.
 
         Args:
             plant: The robot.
             joints: Its joints.
             model: Whose ranges the gripper has.
+            mounts: Servos that are not mounted as a driver expects, by motor id.
 
         Raises:
-            SetupError: A joint has no motor on this board.
+            SetupError: A joint has no motor on this board, or a mounted servo no joint.
         """
         self._plant = plant
         self._joint: dict[int, str] = {}
@@ -72,7 +109,9 @@ class Servos:
             if motor is None:
                 raise SetupError(f'the board has no servo for joint {joint.name}')
             self._joint[motor] = joint.name
-            self._scale[motor] = _scale(joint, motor, model)
+            self._scale[motor] = _scale(joint, motor, model, mounts.get(motor, AS_EXPECTED))
+        if unknown := sorted(mounts.keys() - self._joint.keys()):
+            raise SetupError(f'no servo has id {unknown[0]}; there are {sorted(self._joint)}')
         self._index = {motor: plant.joint_names.index(name) for motor, name in self._joint.items()}
         # by joint, in the order of the robot's arrays
         order = sorted(self._index, key=lambda motor: self._index[motor])
