@@ -10,7 +10,7 @@ setup(
     name='arm_canopen',
     version='0.1.0',
     packages=find_packages(include=['arm_canopen', 'arm_canopen.*']),
-    package_data={'arm_canopen': ['py.typed']},
+    package_data={'arm_canopen': ['py.typed', 'config/default_drive.eds']},
     data_files=[
         ('share/ament_index/resource_index/packages', ['resource/arm_canopen']),
         ('share/arm_canopen', ['package.xml']),

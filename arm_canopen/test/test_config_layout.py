@@ -61,7 +61,6 @@ NODES_LIST = BUS.replace('nodes:\n  joint1:\n    node_id: 2', 'nodes:\n  - joint
         (OLD.replace('master:', 'mastr:'), 2, "unknown section 'mastr'", "mean 'master'"),
         (OLD.replace('master:', 'mastr:'), 0, "no section 'master'", 'node_id below'),
         (OLD.replace('  node_id: 2\n', ''), 4, "no 'node_id'", '1 to 127'),
-        (OLD.replace('  dcf: drive.eds\n', ''), 4, "no 'dcf'", 'EDS or DCF of the device'),
         (BUS.replace('  node_id: 1\n', ''), 1, "no 'node_id'", 'node_id: 1'),
         (BUS.replace('joint1', 'joint-1'), 21, "'joint-1' is no name", 'underscores'),
         (

@@ -19,6 +19,7 @@ from .sdo_list import SdoReader
 from .settings import DeviceSettings, Options, read_device_settings, remappings
 
 AXIS_OFFSET = 0x800  # between the objects of two axes (CiA 402-2, 7.2)
+DRIVE_PROFILE = 'Cia402'  # in the names of the drivers of drives
 DRIVE_OBJECTS = (Index.CONTROLWORD, Index.STATUSWORD)
 
 
@@ -100,6 +101,8 @@ def _find_eds(
     findings: Findings,
 ) -> Eds | None:
     item = section.entries.get('dcf')
+    if item is None and DRIVE_PROFILE in settings.driver:
+        return eds_files.default_drive(section, findings)
     if item is None:
         findings.error(section.place, "no 'dcf'", 'write dcf: with the EDS or DCF of the device')
         return None

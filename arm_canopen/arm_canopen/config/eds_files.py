@@ -12,6 +12,7 @@ from .document import Item
 from .eds import Eds, load_eds
 from .findings import Findings
 
+DEFAULT_DRIVE = Path(__file__).with_name('default_drive.eds')
 PATH_VARIABLE = '@BUS_CONFIG_PATH@'
 
 
@@ -52,6 +53,21 @@ class EdsFiles:
             _remedy(tried, candidates),
         )
         return None
+
+    def default_drive(self, item: Item, findings: Findings) -> Eds | None:
+        """Return what any CiA 402 drive has, for a drive without a file of its own.
+
+        Args:
+            item: The section of the device, for messages.
+            findings: Gets a warning.
+        """
+        findings.warning(
+            item.place,
+            "no 'dcf': it is taken for a CiA 402 drive as the standard has it; which device "
+            'it is, is not checked, and of its PDOs only those exist that bus.yml names',
+            'write dcf: with the EDS of the drive',
+        )
+        return self._load(DEFAULT_DRIVE, findings)
 
     def _candidates(self, dcf: str, dcf_path: str) -> list[Path]:
         name = self._expand(dcf)
