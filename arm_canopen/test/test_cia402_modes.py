@@ -344,10 +344,10 @@ def test_a_second_homing_is_a_new_one() -> None:
 def test_a_homing_method_that_fails_says_so() -> None:
     """A method that the drive does not have, and one that ends in a homing error."""
     net = booted()
-    with pytest.raises(DriveError, match=r'homing method 36|method 36'):
-        net.result(net.commands[JOINT].run('home', net.commands[JOINT].home(36)))
     with pytest.raises(DriveError, match='no homing method'):
         net.do(JOINT, 'home')
+    with pytest.raises(DriveError, match=r'homing method 36|method 36'):
+        net.result(net.commands[JOINT].run('home', net.commands[JOINT].home(36)))
 
 
 def test_homing_is_cancelled_by_a_halt() -> None:
@@ -375,6 +375,18 @@ def test_init_homes_only_where_bus_yml_asks(asked: bool) -> None:
     answer = net.do(JOINT, 'init')
     assert ('homed by method 37' in answer) is asked
     assert ('call ~/home' in answer) is not asked
+
+
+def test_init_homes_by_the_method_of_bus_yml_whatever_was_tried_before() -> None:
+    """The method of a goal stays in the drive; the one that is said is the one that is made."""
+    net = booted(sdo_writes=(*MOTION_WRITES, sdo_write(0x6098, 0, 37)))
+    commands = net.commands[JOINT]
+    net.result(commands.run('home', commands.home(35)))
+    net.run(0.1)
+    assert 'homed by method 35' in net.do(JOINT, 'home')
+    assert 'homed by method 37' in net.do(JOINT, 'init')
+    writes = [data[4] for data in net.frames(0x600 + NODE_ID) if data[:3] == b'\x2f\x98\x60']
+    assert writes[-1] == 37
 
 
 @pytest.mark.parametrize('policy', list(RecoveryPolicy), ids=lambda policy: policy.value)

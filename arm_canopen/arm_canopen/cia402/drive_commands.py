@@ -121,17 +121,10 @@ class DriveCommands(StopCommands):
         await steps.reset_fault()
         await steps.reach(DriveState.OPERATION_ENABLED)
         await steps.come_to_rest()
-        method = drive.parameters.homing_method
         homed = ''
         try:
-            if method and drive.parameters.supports(OperationMode.HOMING):
-                if drive.homes_at_init:
-                    homed = f', {await home(steps)}'
-                else:
-                    homed = (
-                        f', not homed: method {method} is set in the drive (0x6098), but not in '
-                        'bus.yml; call ~/home if it shall be'
-                    )
+            if drive.parameters.supports(OperationMode.HOMING):
+                homed = await self._home_at_init()
         finally:
             if drive.node.online and not steps.quirks.no_mode_zero:
                 drive.select(drive.modes[OperationMode.NO_MODE])
@@ -197,6 +190,19 @@ class DriveCommands(StopCommands):
         enabled = drive.state is DriveState.OPERATION_ENABLED
         hint = '' if enabled else f'; not enabled, call {self._steps.way_to_enable()}'
         return f'{drive.describe()}{hint}'
+
+    async def _home_at_init(self) -> str:
+        """Home where bus.yml asks for it; return what was done, or what could be."""
+        drive = self.drive
+        if drive.homing_at_init:
+            return f', {await home(self._steps, drive.homing_at_init)}'
+        stored = drive.parameters.homing_method
+        if not stored:
+            return ''
+        return (
+            f', not homed: method {stored} is set in the drive (0x6098), but not in bus.yml; call '
+            '~/home if it shall be'
+        )
 
     def _set(self, target: float) -> str:
         drive = self.drive

@@ -23,6 +23,21 @@ DEFAULT_PROFILE = ProfileLimits(DEFAULT_VELOCITY, DEFAULT_ACCELERATION, DEFAULT_
 DEFAULT_TORQUE_SLOPE_DEV = 1000.0  # [device units/s]: from 0 to the rated torque in a second
 REVOLUTION = 2.0 * math.pi  # [rad]
 
+REFRESHED = frozenset(
+    {
+        Index.HOMING_METHOD,
+        Index.SOFTWARE_POSITION_LIMIT,
+        Index.MAX_PROFILE_VELOCITY,
+        Index.MAX_TORQUE,
+        Index.PROFILE_VELOCITY,
+        Index.PROFILE_ACCELERATION,
+        Index.PROFILE_DECELERATION,
+        Index.QUICK_STOP_DECELERATION,
+        Index.TORQUE_SLOPE,
+    }
+)
+"""Objects of the first axis that are read again when this master has written one of them."""
+
 
 @dataclass(frozen=True, slots=True)
 class DriveParameters:
@@ -35,6 +50,7 @@ class DriveParameters:
         speed_limit: 0x607F in user units per second.
         effort_limit: 0x6072 in user units.
         profile: Limits for profiles of the master's own, from 0x6081, 0x6083 and 0x6084.
+        quick_stop_deceleration: 0x6085 in user units per second squared.
         torque_slope: Greatest change of a torque that the master ramps, in user units per second,
             from 0x6087.
         units: In words, where the units come from.
@@ -46,6 +62,7 @@ class DriveParameters:
     speed_limit: float | None = None
     effort_limit: float | None = None
     profile: ProfileLimits = DEFAULT_PROFILE
+    quick_stop_deceleration: float = DEFAULT_ACCELERATION
     torque_slope: float = DEFAULT_TORQUE_SLOPE_DEV
     units: str = 'bus.yml'
 
@@ -69,6 +86,11 @@ class ParameterReader:
         self._config = config
         self._units = units
         self._offset = AXIS_OFFSET * config.channel
+        self._units_from = '' if config.units_from_device else 'bus.yml'
+
+    def forget(self) -> None:
+        """Ask for the units again; they do not change while a device runs."""
+        self._units_from = '' if self._config.units_from_device else 'bus.yml'
 
     async def read(self) -> DriveParameters:
         """Read all of them.
@@ -77,20 +99,23 @@ class ParameterReader:
             SdoError: The drive does not answer. Its limits are then unknown, which is not the same
                 as that it has none.
         """
-        source = await self._read_units() if self._config.units_from_device else 'bus.yml'
+        self._units_from = self._units_from or await self._read_units()
         units = self._units
         slope = await self._read(Index.TORQUE_SLOPE)
         effort = await self._read(Index.MAX_TORQUE)
         speed = await self._read(Index.MAX_PROFILE_VELOCITY)
+        profile = await self._profile()
+        quick_stop = await self._read(Index.QUICK_STOP_DECELERATION)
         return DriveParameters(
             supported_modes=await self._read(Index.SUPPORTED_MODES),
             homing_method=await self._read(Index.HOMING_METHOD) or 0,
             position_limits=await self._position_limits(),
-            speed_limit=abs(units.velocity_from_device(speed)) if speed else None,
+            speed_limit=abs(units.velocity_commanded(speed)) if speed else None,
             effort_limit=abs(units.effort_commanded(effort)) if effort else None,
-            profile=await self._profile(),
+            profile=profile,
+            quick_stop_deceleration=self._in_units(quick_stop, profile.deceleration),
             torque_slope=abs(units.effort_commanded(slope or DEFAULT_TORQUE_SLOPE_DEV)),
-            units=source,
+            units=self._units_from,
         )
 
     async def _position_limits(self) -> tuple[float, float] | None:
@@ -98,7 +123,7 @@ class ParameterReader:
         upper = await self._read(Index.SOFTWARE_POSITION_LIMIT, 2)
         if lower is None or upper is None or lower >= upper:
             return None
-        convert = self._units.position_from_device
+        convert = self._units.position_commanded  # as targets go, which they are limits of
         ends = sorted((convert(lower), convert(upper)))
         return ends[0], ends[1]
 
@@ -107,14 +132,15 @@ class ParameterReader:
         acceleration = await self._read(Index.PROFILE_ACCELERATION)
         deceleration = await self._read(Index.PROFILE_DECELERATION)
 
-        def in_units(value: int | None, default: float) -> float:
-            return abs(self._units.velocity_from_device(value)) if value else default
-
         return ProfileLimits(
-            velocity=in_units(velocity, DEFAULT_VELOCITY),
-            acceleration=in_units(acceleration, DEFAULT_ACCELERATION),
-            deceleration=in_units(deceleration or acceleration, DEFAULT_ACCELERATION),
+            velocity=self._in_units(velocity, DEFAULT_VELOCITY),
+            acceleration=self._in_units(acceleration, DEFAULT_ACCELERATION),
+            deceleration=self._in_units(deceleration or acceleration, DEFAULT_ACCELERATION),
         )
+
+    def _in_units(self, value: int | None, default: float) -> float:
+        """Convert a rate or its change to user units; a drive without it has the default."""
+        return abs(self._units.velocity_commanded(value)) if value else default
 
     async def _read_units(self) -> str:
         """Take the units of the factor group (CiA 402-2, clause 8); say where they are from."""

@@ -11,7 +11,8 @@ from ..exceptions import DriveError
 from ..master.events import Severity
 from ..master.scheduler import Promise, Scheduler
 from ..standard.drive import OperationMode
-from .drive import Drive, FAULTY
+from .drive import Drive
+from .observed_drive import FAULTY
 
 
 class Recovery:

@@ -11,8 +11,9 @@ from ..master.events import Severity
 from ..master.scheduler import Scheduler
 from ..standard.drive import DriveState, OperationMode, Statusword
 from ..standard.objects import Index
-from .drive import Drive, FAULTY
+from .drive import Drive
 from .modes import Mode
+from .observed_drive import FAULTY
 from .quirks import quirks_of
 from .target_limits import TORQUE_MODES
 
@@ -21,6 +22,9 @@ BUFFER_EMPTY, BUFFER_OPEN = 0, 1
 BUFFER_ATTEMPTS = 4
 READY_TIMEOUT = 2.0  # [s] from operational to the first PDOs and parameters
 STOP_TIMEOUT = 2.0  # [s] to come to rest, beside the time of the ramp
+RAMP_MAX = 10.0  # [s] that a ramp may take on the way out; then the power goes all the same
+SHUTDOWN_MAX = STOP_TIMEOUT + (STOP_TIMEOUT + RAMP_MAX) + STOP_TIMEOUT
+"""Longest time of a shutdown in [s]: to begin the stop, to come to rest, to lose the power."""
 REST_SHARE = 0.01  # share of the profile velocity below which an axis counts as standing
 REST_MIN, REST_MAX = 0.002, 0.02  # [unit/s] between which that lies: noise, and what still moves
 SETTLE_CYCLES = 3  # of SYNC after which an answer shows what a command has done
@@ -93,7 +97,7 @@ class DriveSequences:
             DriveError: It does not come to rest; it stays halted.
         """
         drive = self.drive
-        ramp = abs(drive.velocity) / drive.parameters.profile.deceleration  # [s]
+        ramp = drive.speed / drive.parameters.profile.deceleration  # [s]
         drive.hold()
         await self.settle()
         await self.until(
@@ -205,15 +209,26 @@ class DriveSequences:
             await drive.know_error()
             raise self.refused(f'did not reach {what}')
 
-    async def settled(self, condition: Callable[[], bool]) -> None:
-        """Wait for a condition on the way out; there is nobody to raise an error to."""
+    def ramp_time(self) -> float:
+        """Return how long the drive brakes on its way out in [s], by the slower of its ramps."""
+        told = self.drive.parameters
+        ramp = min(told.quick_stop_deceleration, told.profile.deceleration)
+        return min(RAMP_MAX, self.drive.speed / ramp)
+
+    async def settled(self, condition: Callable[[], bool], ramp: float = 0.0) -> None:
+        """Wait for a condition on the way out; there is nobody to raise an error to.
+
+        Args:
+            condition: What is waited for.
+            ramp: Time that the drive takes to brake in [s].
+        """
         drive = self.drive
 
         def settled() -> bool:
             return condition() or drive.state in (*FAULTY, DriveState.UNKNOWN)
 
         try:
-            await self._scheduler.until(settled, STOP_TIMEOUT)
+            await self._scheduler.until(settled, STOP_TIMEOUT + ramp)
         except TimeoutError:
             drive.report(Severity.ERROR, f'did not come to rest in time: {drive.describe()}')
 
@@ -224,7 +239,7 @@ class DriveSequences:
         """
         drive = self.drive
         rest = max(REST_MIN, min(REST_MAX, REST_SHARE * drive.parameters.profile.velocity))
-        return max(abs(drive.velocity), abs(drive.rate)) <= rest
+        return drive.speed <= rest
 
     def require_no_fault(self) -> None:
         """Refuse to go on with a drive that is faulted."""

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 from ..master.status import node_status, NodeStatus
 from ..standard.drive import DriveState, mode_title, Statusword, statusword_text
-from .drive import Drive, FAULTY
+from .drive import Drive
+from .observed_drive import FAULTY
 
 
 @dataclass(frozen=True, slots=True)

@@ -70,12 +70,13 @@ class StopCommands:
         drive, steps = self.drive, self._steps
         drive.interrupted = None
         drive.released('shutting down')
+        ramp = steps.ramp_time()
         if drive.state is DriveState.OPERATION_ENABLED:
             drive.goal = DriveState.QUICK_STOP_ACTIVE
             await steps.settled(lambda: drive.state is not DriveState.OPERATION_ENABLED)
         # option codes 5 to 8 hold in Quick Stop Active: wait for rest, then let go
         await steps.settled(
-            lambda: drive.state is not DriveState.QUICK_STOP_ACTIVE or steps.is_slow()
+            lambda: drive.state is not DriveState.QUICK_STOP_ACTIVE or steps.is_slow(), ramp
         )
         drive.goal = DriveState.SWITCH_ON_DISABLED
         await steps.settled(lambda: drive.state is DriveState.SWITCH_ON_DISABLED)

@@ -39,6 +39,7 @@ class SdoClient:
 
     Attributes:
         node_id: The device.
+        on_written: Called with index and sub-index after each download that succeeded.
     """
 
     def __init__(
@@ -46,6 +47,7 @@ class SdoClient:
     ) -> None:
         """Take the way to the bus; arguments as of :class:`SdoChannel`."""
         self.node_id = node_id
+        self.on_written: list[Callable[[int, int], None]] = []
         self._name = name
         self._scheduler = scheduler
         self._channel = SdoChannel(node_id, name, scheduler, send)
@@ -90,7 +92,9 @@ class SdoClient:
         Returns:
             Promise of the end; rejected with SdoAbortError or SdoTimeoutError.
         """
-        return self._enqueue(self._download(index, subindex, data, timeout, repeat=repeat))
+        promise = self._enqueue(self._download(index, subindex, data, timeout, repeat=repeat))
+        promise.when_done(lambda done: self._note_write(index, subindex, done))
+        return promise
 
     def cancel_all(self, reason: str) -> None:
         """Reject every transfer, because the device restarted or went away."""
@@ -107,6 +111,11 @@ class SdoClient:
     def receive(self, frame: Frame) -> None:
         """Take an answer of the device."""
         self._channel.receive(frame.data)
+
+    def _note_write(self, index: int, subindex: int, done: Promise[None]) -> None:
+        if done.error is None:
+            for callback in self.on_written:
+                callback(index, subindex)
 
     def _enqueue(self, transfer: Transfer[T]) -> Promise[T]:
         promise: Promise[T] = Promise()

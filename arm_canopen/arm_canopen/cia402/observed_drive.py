@@ -1,0 +1,184 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""One axis of a CiA 402 drive as it shows itself: state, position, parameters, and in words."""
+
+from __future__ import annotations
+
+from ..config.model import DriveConfig
+from ..exceptions import CodecError, SdoError
+from ..master.events import EventKind, Severity
+from ..master.remote_node import RemoteNode
+from ..master.scheduler import Scheduler
+from ..standard.drive import DriveState, mode_title, statusword_text
+from ..standard.emcy import error_code_text
+from ..standard.objects import Index
+from .drive_objects import DriveObjects
+from .halt import Halt
+from .modes import Actual
+from .parameter_upkeep import ParameterUpkeep
+from .parameters import DriveParameters
+from .units import clamp, INT16_MAX, INT32_MAX, Units
+from .velocity_estimate import VelocityEstimate
+
+FAULTY = (DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE)
+
+
+class ObservedDrive:
+    """What the master knows of an axis.
+
+    Attributes:
+        node: The device.
+        config: Settings of the axis.
+        name: Its name: that of the device, of its channel for one with several axes.
+        units: Its units.
+        objects: Its objects in the process image.
+        state: State shown in the last cycle.
+        statusword: 0x6041 as it was then.
+        halt: What keeps it halted.
+        error: 0x603F in words when it was faulted last, else empty.
+    """
+
+    def __init__(self, node: RemoteNode, scheduler: Scheduler, config: DriveConfig) -> None:
+        """Bind the axis to its device.
+
+        Args:
+            node: The device.
+            scheduler: Time.
+            config: Settings of the axis.
+        """
+        self.node = node
+        self.config = config
+        self.name = config.name or node.name
+        self.units = Units(config)
+        self.objects = DriveObjects(node, config.channel)
+        self.state = DriveState.UNKNOWN
+        self.statusword = 0
+        self.halt = Halt()
+        self.error = ''
+        self._scheduler = scheduler
+        self._upkeep = ParameterUpkeep(node, config, self.units, scheduler, self.warn)
+        polled = self.objects.position_is_polled
+        self._estimate = VelocityEstimate(node.config.poll_period if polled else 0.0)
+
+    @property
+    def parameters(self) -> DriveParameters:
+        """What it told about itself."""
+        return self._upkeep.told
+
+    @property
+    def position(self) -> float:
+        """Actual position in user units."""
+        return self.units.position_from_device(self.objects.position)
+
+    @property
+    def velocity(self) -> float:
+        """Actual velocity in user units per second; from the positions where no PDO tells it."""
+        told = self.objects.velocity
+        return self.rate if told is None else self.units.velocity_from_device(told)
+
+    @property
+    def rate(self) -> float:
+        """Rate of the actual position in user units per second, a few cycles late."""
+        return self.units.rate_from_device(self._estimate.rate)
+
+    @property
+    def speed(self) -> float:
+        """Greatest speed that anything shows, in user units per second."""
+        return max(abs(self.velocity), abs(self.rate))
+
+    @property
+    def effort(self) -> float:
+        """Actual torque in user units."""
+        return self.units.effort_from_device(self.objects.torque)
+
+    @property
+    def halted(self) -> bool:
+        """Whether it is stopped by a halt; the next target ends it."""
+        return self.halt.held
+
+    @property
+    def ready(self) -> bool:
+        """Whether its state and its parameters are known."""
+        return self.state is not DriveState.UNKNOWN and self._upkeep.known
+
+    @property
+    def homing_at_init(self) -> int:
+        """Homing method that bus.yml writes to 0x6098; 0 where it asks for no homing."""
+        index = self.objects.at(Index.HOMING_METHOD)
+        written = [w.data for w in self.node.config.sdo_writes if w.index == index]
+        return int.from_bytes(written[-1], 'little', signed=True) if written else 0
+
+    def describe(self) -> str:
+        """Say in a sentence how the drive is."""
+        if not self.node.online:
+            phase = self.node.phase.value
+            detail = f' ({self.node.phase_detail})' if self.node.phase_detail else ''
+            loss = f'; lost before: {self.node.loss}' if self.node.loss else ''
+            return f'offline: {phase}{detail}{loss}'
+        parts = ['no statusword yet']
+        if self.state is not DriveState.UNKNOWN:
+            parts = [
+                statusword_text(self.statusword),
+                f'mode {mode_title(self.objects.mode_display)}',
+            ]
+        if self.halted:
+            parts.append('halted')
+        if self.error:
+            parts.append(f'error {self.error}')
+        if self.node.last_emergency is not None:
+            parts.append(f'EMCY {self.node.last_emergency}')
+        if self.node.left_operational and self.node.nmt_state is not None:
+            parts.append(f'NMT state {self.node.nmt_state.name}: call ~/nmt_start_node')
+        return '; '.join(parts)
+
+    async def know_error(self) -> None:
+        """Read 0x603F, so that the answer can say what is wrong."""
+        index = self.objects.at(Index.ERROR_CODE)
+        if self.state not in FAULTY or (index, 0) not in self.node.config.dictionary:
+            return
+        try:
+            code = await self.node.read_object(index)
+        except (SdoError, CodecError):
+            return  # the statusword says that there is a fault, only its code stays unknown
+        self.error = error_code_text(int(code)) if isinstance(code, int) else ''
+
+    def report(self, severity: Severity, text: str) -> None:
+        """Tell the owner of the network something about this drive."""
+        about = text if self.name == self.node.name else f'{self.name}: {text}'
+        self.node.report(EventKind.DRIVE, severity, about)
+
+    def warn(self, text: str) -> None:
+        """Tell the owner of the network what goes wrong with this drive."""
+        self.report(Severity.WARNING, text)
+
+    def _observe(self) -> None:
+        """Take state and position from the process image."""
+        if not self.node.operational or not self.objects.known:
+            self._lose_sight()
+            return
+        self._estimate.note(self._scheduler.now, self.objects.position)
+        self.state, self.statusword = self.objects.state, self.objects.statusword
+
+    def _lose_sight(self) -> None:
+        self.state, self.statusword = DriveState.UNKNOWN, 0
+        self._estimate.clear()
+
+    def _actual(self) -> Actual:
+        """Return where the drive is, and the velocity from which it has to be braked.
+
+        The velocity is the lesser of what 0x606C tells and what 0x6064 shows: one that is told
+        wrong must not set an axis in motion that stands.
+        """
+        objects = self.objects
+        velocity, told = self.rate, objects.velocity
+        velocity_dev = self.units.velocity_raw(velocity)
+        if told is not None:
+            shown = self.units.velocity_from_device(told)
+            share = 0.0 if shown * velocity <= 0.0 else min(1.0, velocity / shown)
+            velocity, velocity_dev = share * shown, share * told
+        return Actual(
+            clamp(objects.position, INT32_MAX),
+            velocity,
+            clamp(velocity_dev, INT32_MAX),
+            clamp(objects.torque, INT16_MAX),
+        )

@@ -1,0 +1,93 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Keeps what a drive told about itself true: asked after each boot, and after each change."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from ..config.model import DriveConfig
+from ..exceptions import SdoError
+from ..master.remote_node import RemoteNode
+from ..master.scheduler import Scheduler, Task
+from .drive_objects import AXIS_OFFSET
+from .parameters import DriveParameters, ParameterReader, REFRESHED
+from .units import Units
+
+ASK_AGAIN = 1.0  # [s] after which a drive is asked again for what it did not answer
+
+
+class ParameterUpkeep:
+    """The parameters of one axis.
+
+    Attributes:
+        told: What the drive told last.
+        known: It has told them since its device was booted.
+    """
+
+    def __init__(
+        self,
+        node: RemoteNode,
+        config: DriveConfig,
+        units: Units,
+        scheduler: Scheduler,
+        warn: Callable[[str], None],
+    ) -> None:
+        """Take the axis.
+
+        Args:
+            node: The device.
+            config: Settings of the axis.
+            units: Its units.
+            scheduler: Time.
+            warn: Takes a warning in words.
+        """
+        self.told = DriveParameters()
+        self.known = False
+        self._offset = AXIS_OFFSET * config.channel
+        self._reader = ParameterReader(node, config, units)
+        self._scheduler = scheduler
+        self._warn = warn
+        self._asking: Task[None] | None = None
+        self._outdated = False
+        node.sdo.on_written.append(self._object_written)
+
+    def begin(self) -> None:
+        """Ask a device that was booted."""
+        self._asking = self._scheduler.background(self._ask())
+
+    def forget(self, reason: str) -> None:
+        """The device is lost; what comes back may be another one."""
+        self.known = self._outdated = False
+        self._reader.forget()
+        if self._asking is not None:
+            self._asking.cancel(SdoError(reason))
+
+    def _object_written(self, index: int, subindex: int) -> None:
+        """One of the objects may have been changed through this master, by whomever."""
+        if not self.known or index - self._offset not in REFRESHED:
+            return
+        self._outdated = True
+        if self._asking is None or self._asking.done:
+            self._asking = self._scheduler.background(self._ask())
+
+    async def _ask(self) -> None:
+        reason = await self._unread()
+        if reason and self.known:
+            self._warn(f'its limits were changed, and it does not tell the new ones: {reason}')
+        elif reason:
+            self._warn(f'its parameters are unknown, so it takes no commands: {reason}')
+        while reason or self._outdated:
+            if reason:
+                await self._scheduler.timer(ASK_AGAIN)
+            reason = await self._unread()
+
+    async def _unread(self) -> str:
+        """Read the parameters; return why that could not be done, or nothing."""
+        self._outdated = False
+        try:
+            self.told = await self._reader.read()
+        except SdoError as error:
+            return str(error)
+        self.known = True
+        return ''
