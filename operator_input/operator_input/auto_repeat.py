@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections import deque
 
-FASTEST_DELAY, SLOWEST_DELAY = 0.18, 0.85  # [s] settings of desktops, with a margin
+FASTEST_DELAY, SLOWEST_DELAY = 0.18, 0.7  # [s] settings of desktops, with a margin
 SLOWEST_INTERVAL = 0.1  # [s] between two repeats; what is slower may be a finger
 MARGIN = 1.2  # a repeat may come later by this factor
 

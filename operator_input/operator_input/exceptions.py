@@ -7,7 +7,7 @@
     OperatorInputError
     ├── TerminalError (OSError)     there is no terminal to read keys from, or it is gone
     ├── DeviceError (OSError)       an input device cannot be opened or read
-    └── PresetError (ValueError)    there is no gamepad preset of that name; lists what there is
+    └── PresetError (ValueError)    no gamepad can be chosen by that preset or expression
 
 Arguments of the wrong kind from a *programmer* stay ``ValueError``/``TypeError``.
 """
@@ -34,7 +34,7 @@ class DeviceError(OperatorInputError, OSError):
 
 
 class PresetError(OperatorInputError, ValueError):
-    """There is no gamepad preset of that name.
+    """No gamepad can be chosen by what was asked for.
 
-    Scenarios: a name misspelt.
+    Scenarios: a preset misspelt (the message lists what there is), a malformed expression.
     """

@@ -27,7 +27,7 @@ def main() -> None:
         gamepad = Gamepad(
             KernelDevices(), preset=options.preset, device=options.device, say=_print
         )
-    except (PresetError, ValueError) as error:
+    except PresetError as error:
         sys.exit(f'error: {error}')
     with contextlib.suppress(KeyboardInterrupt):
         _show(gamepad)

@@ -230,7 +230,7 @@ def test_device_by_path_and_by_name() -> None:
         gamepad = Gamepad(InjectedDevices(first, second), device=wanted)
         gamepad.scan(0.0)
         assert gamepad.name.endswith('(ps)')
-    with pytest.raises(ValueError, match='neither a path nor an expression'):
+    with pytest.raises(PresetError, match='neither a path nor an expression'):
         Gamepad(InjectedDevices(), device='(')
 
 

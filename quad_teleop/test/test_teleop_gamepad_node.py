@@ -112,25 +112,3 @@ def test_program_without_a_gamepad_waits_and_ends(isolation: Isolation) -> None:
     finally:
         process.kill()
         process.communicate()
-
-
-@pytest.mark.parametrize(
-    ('parameter', 'message'),
-    [
-        ('preset:=xbux', "did you mean 'xbox'"),
-        ('enable_button:=left_sholder', "which is no button; did you mean 'left_shoulder'"),
-    ],
-)
-def test_program_refuses_unknown_names(isolation: Isolation, parameter: str, message: str) -> None:
-    """A preset or button that does not exist ends the program with the one that was meant."""
-    result = subprocess.run(
-        [executable('quad_teleop', 'teleop_gamepad'), '--ros-args', '-p', parameter],
-        env=isolation.env,
-        capture_output=True,
-        text=True,
-        timeout=PATIENCE,
-        check=False,
-    )
-    assert result.returncode == 1
-    assert message in result.stderr
-    assert 'Traceback' not in result.stderr

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-import subprocess
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -123,24 +122,3 @@ def test_stamped_in_and_out(isolation: Isolation, client: RosClient) -> None:
     assert heard[0] == message
     assert heard[1].twist == Twist()
     assert heard[1].header.stamp.sec > 0
-
-
-@pytest.mark.parametrize(
-    ('parameter', 'message'),
-    [
-        ('use_stampd:=true', "unknown parameter 'use_stampd'; did you mean 'use_stamped'"),
-        ('topics.keyboard.topic:=key_vel', 'topics.keyboard.timeout is missing'),
-    ],
-)
-def test_wrong_parameter_ends_it(isolation: Isolation, parameter: str, message: str) -> None:
-    """A misspelt or missing parameter is named, and nothing is forwarded by half a set-up."""
-    result = subprocess.run(
-        [executable('quad_teleop', 'twist_mux'), '--ros-args', '-p', parameter],
-        env=isolation.env,
-        capture_output=True,
-        text=True,
-        timeout=PATIENCE,
-        check=False,
-    )
-    assert result.returncode == 1
-    assert message in result.stderr

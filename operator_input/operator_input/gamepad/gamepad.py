@@ -9,7 +9,7 @@ import contextlib
 import re
 
 from ..devices.events import EV_SYN, InputDevice, InputDevices, SYN_DROPPED
-from ..exceptions import DeviceError
+from ..exceptions import DeviceError, PresetError
 from .controls import AT_REST, GamepadState
 from .presets import AUTO, check_preset, choose_preset, is_gamepad
 from .reading import GamepadReading
@@ -43,8 +43,8 @@ class Gamepad:
             say: Is told when a gamepad comes and goes.
 
         Raises:
-            PresetError: There is no preset of that name.
-            ValueError: The expression is none, or the dead zone is no share.
+            PresetError: There is no preset of that name, or the expression is none.
+            ValueError: The dead zone is no share.
         """
         check_preset(preset)
         if not 0 <= dead_zone < 1:
@@ -52,7 +52,7 @@ class Gamepad:
         try:
             self._wanted = re.compile(device)
         except re.error as error:
-            raise ValueError(
+            raise PresetError(
                 f'device {device!r} is neither a path nor an expression: {error}'
             ) from None
         self.name = ''

@@ -1,0 +1,98 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+from collections.abc import Callable
+import re
+
+from input_devices import InjectedDevices
+from isolation import Isolation
+import pytest
+import rclpy
+from rclpy.node import Node
+
+from operator_input import OperatorInputError
+from quad_teleop import TeleopError
+from quad_teleop.nodes.program import run
+from quad_teleop.nodes.teleop_gamepad import TeleopGamepad
+from quad_teleop.nodes.teleop_keyboard import TeleopKeyboard
+from quad_teleop.nodes.twist_mux import TwistMux
+
+
+def gamepad() -> TeleopGamepad:
+    """Make the node without this machine's devices."""
+    return TeleopGamepad(InjectedDevices())
+
+
+def make(isolation: Isolation, node: Callable[[], Node], *parameters: str) -> set[str]:
+    """Make a node from a command line, and return the names of its parameters."""
+    words = [word for parameter in parameters for word in ('-p', parameter)]
+    rclpy.init(args=['test', '--ros-args', *words], domain_id=isolation.domain_id)
+    try:
+        made = node()
+        names = set(made.get_parameters_by_prefix(''))
+        made.destroy_node()
+        return names
+    finally:
+        rclpy.shutdown()
+
+
+@pytest.mark.parametrize(
+    ('node', 'parameter', 'message'),
+    [
+        (TeleopKeyboard, 'speeed:=0.2', "unknown parameter 'speeed'; did you mean 'speed'?"),
+        (TeleopKeyboard, 'speed:=9', 'speed is 9: it must be 0.01 to 3.0'),
+        (TeleopKeyboard, 'speed:=1.0', 'speed is 1.0: it must be between 0.01 and its limit 0.4'),
+        (TeleopKeyboard, 'speed:=.nan', 'speed is nan'),
+        (TeleopKeyboard, 'speed:=fast', "speed is 'fast': it must be a number"),
+        (TeleopKeyboard, 'speed:=true', 'speed is True: it must be a number'),
+        (TeleopKeyboard, 'twist:=false', 'nothing would be published'),
+        (TeleopKeyboard, 'stamped:=1', 'stamped is 1: it must be true or false'),
+        (TeleopKeyboard, 'frame_id:=7', 'frame_id is 7: it must be a text'),
+        (TeleopKeyboard, 'angle_step:=0.4', 'angle_step is 0.4: it must be above 0 and at most'),
+        (TeleopKeyboard, 'repeat_timeout:=0.0', 'repeat_timeout is 0.0'),
+        (gamepad, 'preset:=xbux', "did you mean 'xbox'? There are: auto, xbox, ps, generic"),
+        (gamepad, 'enable_button:=left_sholder', "no button; did you mean 'left_shoulder'?"),
+        (gamepad, 'device:="["', "device '[' is neither a path nor an expression"),
+        (gamepad, 'turbo_spede:=1.0', "did you mean 'turbo_speed'?"),
+        (TwistMux, 'use_stampd:=true', "'use_stampd'; did you mean 'use_stamped'?"),
+        (TwistMux, 'use_stamped:=1', 'use_stamped is 1: it must be true or false'),
+        (TwistMux, 'topics.keyboard.topic:=key_vel', 'topics.keyboard.timeout is missing'),
+    ],
+)
+def test_wrong_parameter_is_refused(
+    isolation: Isolation, node: Callable[[], Node], parameter: str, message: str
+) -> None:
+    """A misspelt or senseless parameter is refused, with what it must be or what was meant."""
+    with pytest.raises((TeleopError, OperatorInputError), match=re.escape(message)):
+        make(isolation, node, parameter)
+
+
+@pytest.mark.parametrize(
+    ('node', 'parameters'),
+    [
+        (TeleopKeyboard, ['speed:=0.3', 'turn:=1', 'stamped:=true', 'twist:=false']),
+        (gamepad, ['preset:=ps', 'enable_button:=right_trigger', 'turbo_button:=none']),
+        (TwistMux, ['topics.a.topic:=a', 'topics.a.timeout:=1', 'topics.a.priority:=3']),
+        (TwistMux, []),
+    ],
+)
+def test_good_parameters_are_taken(
+    isolation: Isolation, node: Callable[[], Node], parameters: list[str]
+) -> None:
+    """What the READMEs name is accepted, whole numbers as times and speeds too."""
+    names = make(isolation, node, *parameters)
+    assert {parameter.partition(':=')[0] for parameter in parameters} <= names
+
+
+def test_wrong_parameter_ends_the_program_with_words(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], isolation: Isolation
+) -> None:
+    """Exit code 1 and one line, no traceback."""
+    monkeypatch.setenv('ROS_DOMAIN_ID', str(isolation.domain_id))
+    monkeypatch.setattr('sys.argv', ['teleop', '--ros-args', '-p', 'speeed:=1.0'])
+    monkeypatch.setattr('signal.signal', lambda *_: None)
+    with pytest.raises(SystemExit) as ended:
+        run(lambda _: TeleopKeyboard().destroy_node())
+    assert ended.value.code == 1
+    assert capsys.readouterr().err == "error: unknown parameter 'speeed'; did you mean 'speed'?\n"
