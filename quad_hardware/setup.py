@@ -22,6 +22,8 @@ setup(
     entry_points={
         'console_scripts': [
             'fake_xgo = quad_hardware.sim.fake_xgo:main',
+            'calibrate = quad_hardware.calibration.main:main',
+            'doctor = quad_hardware.doctor.main:main',
             'hardware_node = quad_hardware.nodes.hardware_node:main',
             'protocol = quad_hardware.protocol.page:main',
         ],

@@ -32,6 +32,7 @@ from quad_hardware.protocol import (
     Register,
     scatter,
     StreamParser,
+    Torque,
 )
 
 if TYPE_CHECKING:
@@ -68,7 +69,7 @@ class PtyPeer:
         behaviour: How it behaves.
         angles: Servo angles by motor id [deg].
         commands: Angles of each servo command, in order of arrival.
-        gaps: Time between two host frames [s].
+        torque: Servos hold.
     """
 
     link: Path
@@ -77,6 +78,7 @@ class PtyPeer:
     behaviour: Behaviour = field(default_factory=Behaviour)
     angles: dict[int, float] = field(default_factory=lambda: dict.fromkeys(MOTOR_ORDER, 0.0))
     commands: list[dict[int, float]] = field(default_factory=list)
+    torque: bool = True
     _pushing: bool = False
     _sequence: int = 0
 
@@ -154,13 +156,17 @@ class PtyPeer:
             self._say(Frame(Kind.REPLY, Code.BATTERY, bytes((80,))))
         elif frame.address == Code.FEEDBACK:
             self._pushing = bool(frame.payload[0])
+        elif frame.address == Code.TORQUE:
+            self.torque = bool(frame.payload[1])
         elif frame.address == Code.SERVOS:
             values = NEW.functions[Code.SERVOS].unpack(frame.payload)
             self._set({int(m): a for m, a in zip(values['motor'], values['angle'], strict=True)})
 
     def _old(self, frame: Frame) -> None:
         spans = ANGLE_SPANS[Model.LITE]
-        if frame.kind is Kind.WRITE:
+        if frame.kind is Kind.WRITE and frame.address == Register.TORQUE:
+            self.torque = frame.payload[0] == Torque.LOAD_ALL
+        elif frame.kind is Kind.WRITE:
             self._set(
                 {
                     MOTOR_OF_REGISTER[r]: spans[MOTOR_OF_REGISTER[r]].decode(data[0])

@@ -14,6 +14,7 @@ from isolation import Isolation, reserve
 from processes import executable, RunningProcess
 import pytest
 from rclpy.qos import ReliabilityPolicy
+from std_srvs.srv import SetBool
 
 from quad_description import movable_joints, robot_urdf
 from quad_hardware.joints import LimiterSettings
@@ -135,6 +136,21 @@ def test_damaged_bytes_give_no_wild_reports(rig: NodeRig) -> None:
     assert all(abs(p) < 1.1 for message in later for p in message.position)
     rig.peer.behaviour.corrupt = 0.0
     rig.hear('/joint_states', 5)
+
+
+def test_torque_is_taken_and_given_by_service(rig: NodeRig) -> None:
+    """Without torque no command is sent; with it, the servos hold where they were put."""
+    answer = rig.client.call(SetBool, '/hardware_node/torque', SetBool.Request(data=False))
+    assert (answer.success, answer.message) == (True, 'the servos are without torque')
+    rig.client.spin_until(lambda: not rig.peer.torque, TIMEOUT, 'torque off')
+    rig.command(HOME)
+    rig.wait_for_status('joint commands', DiagnosticStatus.WARN, 'without torque')
+    assert rig.peer.commands == []
+    rig.peer.angles.update(dict.fromkeys(rig.peer.angles, 20.0))
+    rig.hear('/joint_states', 5)
+    assert rig.client.call(SetBool, '/hardware_node/torque', SetBool.Request(data=True)).success
+    rig.client.spin_until(lambda: rig.peer.torque, TIMEOUT, 'torque on')
+    assert rig.peer.commands[-1][11] == pytest.approx(20.0, abs=0.01)
 
 
 def test_a_stop_is_clean(rig: NodeRig) -> None:

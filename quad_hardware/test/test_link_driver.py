@@ -82,6 +82,19 @@ def test_a_command_reaches_the_servos(rig: Rig) -> None:
     assert rig.states[-1].positions[42] == pytest.approx(12.0, abs=0.4)
 
 
+def test_servos_let_go_and_hold_again(rig: Rig) -> None:
+    """Torque off and on, each once, in either protocol; not without a robot."""
+    rig.reports(1)
+    assert rig.driver.torque(on=False)
+    wait_for(lambda: not rig.peer.torque, 'torque off')
+    assert rig.driver.torque(on=True)
+    wait_for(lambda: rig.peer.torque, 'torque on')
+    assert rig.peer.commands == []
+    rig.peer.unplug()
+    rig.reach(LinkState.CONNECTING)
+    assert not rig.driver.torque(on=False)
+
+
 def test_silence_stops_the_commands(rig: Rig) -> None:
     """Stale is said once, nothing is sent while it lasts, and it ends by itself."""
     rig.reports(1)

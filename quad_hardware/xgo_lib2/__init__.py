@@ -8,4 +8,6 @@ Modules as in the vendor's: ``client`` (XgoDog), ``feedback`` (SendStateParser),
 
 from ._vendor import take_over as _take_over
 
+IS_STAND_IN = True  # the vendor's has no such name
+
 _take_over(__name__)

@@ -84,6 +84,10 @@ class Dialect(ABC):
         """
 
     @abstractmethod
+    def torque(self, *, on: bool) -> None:
+        """Have all servos hold their place, or let go, at the next possible moment."""
+
+    @abstractmethod
     def withdraw(self) -> None:
         """Forget a command that has not been sent yet."""
 

@@ -119,6 +119,7 @@ class Driver:
         self._stopping = threading.Event()
         self._wake_read, self._wake_write = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
         self._mailbox: Mapping[int, float] | None = None
+        self._torque: bool | None = None
         self._state = LinkState.CONNECTING
         self._detail = 'not started'
         self._connection: Connection | None = None
@@ -155,6 +156,18 @@ class Driver:
             self._dropped += 1
             return False
         self._mailbox = angles
+        self._wake()
+        return True
+
+    def torque(self, *, on: bool) -> bool:
+        """Have all servos hold their place, or let go: the robot drops then.
+
+        Returns:
+            False when the link is not running, and nothing will be sent.
+        """
+        if self._state is not LinkState.RUNNING:
+            return False
+        self._torque = on
         self._wake()
         return True
 
@@ -235,7 +248,7 @@ class Driver:
 
     def _fall_silent(self, dialect: Dialect) -> None:
         dialect.withdraw()
-        self._mailbox = None
+        self._mailbox = self._torque = None
         self._enter(
             LinkState.STALE,
             f'no report for {STALE_TIME} s: the servos hold their last target, nothing is sent',
@@ -246,6 +259,9 @@ class Driver:
         if angles is not None:
             dialect.command(angles)
             self._commands += 1
+        on, self._torque = self._torque, None
+        if on is not None:
+            dialect.torque(on=on)
 
     def _listen(self, port: SerialPort, timeout: float, heard_at: float) -> float:
         """Wait for bytes or a command; return when bytes last came [s]."""

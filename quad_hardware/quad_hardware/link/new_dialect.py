@@ -8,6 +8,7 @@ from collections.abc import Mapping
 
 from ..exceptions import CodecError
 from ..protocol import (
+    ALL_MOTORS,
     Code,
     decode_feedback,
     Feedback,
@@ -43,7 +44,7 @@ class NewDialect(Dialect):
         )
         self._ask = b''.join(frame.encode(NEW) for frame in asking)
         self._ask_at = now
-        self._pending = b''
+        self._pending = self._torque = b''
         self._sequence: int | None = None
 
     @property
@@ -56,13 +57,18 @@ class NewDialect(Dialect):
         groups = (_SERVOS.pack(motor=(m,), angle=(a,)) for m, a in angles.items())
         self._pending = Frame(Kind.WRITE, Code.SERVOS, b''.join(groups)).encode(NEW)
 
+    def torque(self, *, on: bool) -> None:
+        """Have all servos hold their place, or let go, behind a pending command."""
+        payload = NEW.functions[Code.TORQUE].pack(motor=(ALL_MOTORS,), on=(on,))
+        self._torque = Frame(Kind.WRITE, Code.TORQUE, payload).encode(NEW)
+
     def withdraw(self) -> None:
         """Forget a command that has not been sent yet."""
         self._pending = b''
 
     def step(self, now: float) -> Step:
         """Return a pending command, and the request for states where they are missing."""
-        send, self._pending = self._pending, b''
+        send, self._pending, self._torque = self._pending + self._torque, b'', b''
         if now >= self._ask_at:
             self._ask_at = now + ASK_AGAIN
             send = self._ask + send

@@ -23,6 +23,7 @@ from ..protocol import (
     OLD,
     Register,
     REGISTER_OF_MOTOR,
+    Torque,
 )
 from .dialect import Dialect, Step
 from .state import RobotState, Vector
@@ -73,7 +74,7 @@ class OldDialect(Dialect):
         self._waiting: _Request | None = None
         self._deadline = math.inf
         self._free_at = now
-        self._legs = b''
+        self._legs = self._torque = b''
         self._arm: dict[int, bytes] = {}
         self._arm_sent: dict[int, bytes] = {}
         self._angles: bytes | None = None
@@ -93,6 +94,10 @@ class OldDialect(Dialect):
         for motor in angles.keys() - set(LEG_MOTORS):
             self._arm[motor] = bytes((self._spans[motor].encode(angles[motor]),))
 
+    def torque(self, *, on: bool) -> None:
+        """Have all servos hold their place, or let go, behind a pending command."""
+        self._torque = bytes((Torque.LOAD_ALL if on else Torque.UNLOAD_ALL,))
+
     def withdraw(self) -> None:
         """Forget a command that has not been sent yet."""
         self._legs = b''
@@ -110,7 +115,7 @@ class OldDialect(Dialect):
         wake = self._cycle_at
         if self._waiting is not None:
             wake = min(wake, self._deadline)
-        if self._legs or self._arm or (self._queue and self._waiting is None):
+        if self._legs or self._arm or self._torque or (self._queue and self._waiting is None):
             wake = min(wake, self._free_at)
         return Step(send, wake)
 
@@ -154,6 +159,9 @@ class OldDialect(Dialect):
             if self._arm_sent.get(motor) != payload:
                 self._arm_sent[motor] = payload
                 return Frame(Kind.WRITE, REGISTER_OF_MOTOR[motor], payload).encode(OLD)
+        if self._torque:
+            payload, self._torque = self._torque, b''
+            return Frame(Kind.WRITE, Register.TORQUE, payload).encode(OLD)
         if self._waiting is None and self._queue:
             self._waiting = self._queue.popleft()
             self._deadline = now + self._waiting.wire_time + BOARD_LATENCY

@@ -18,6 +18,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.time import Time
 from rclpy.utilities import try_shutdown
 from sensor_msgs.msg import BatteryState, Imu, JointState
+from std_srvs.srv import SetBool
 from tf2_msgs.msg import TFMessage
 
 from quad_msgs.msg import JointCommand
@@ -66,6 +67,7 @@ class HardwareNode(Node):
         self._estimate: Estimate | None = None
         self._counters = CommandCounters()
         self._last_targets: tuple[float, ...] = ()
+        self._limp = False
         self._joint_states = self.create_publisher(JointState, 'joint_states', SENSOR_DEPTH)
         self._imu = self.create_publisher(Imu, 'imu', SENSOR_DEPTH)
         self._odom = self.create_publisher(Odometry, 'odom', SENSOR_DEPTH)
@@ -73,6 +75,7 @@ class HardwareNode(Node):
         self._tf = self.create_publisher(TFMessage, '/tf', 100)
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', SENSOR_DEPTH)
         self.create_subscription(JointCommand, 'joint_command', self._take, COMMAND_QOS)
+        self.create_service(SetBool, '~/torque', self._set_torque)
         self.create_timer(settings.diagnostics_period, self._diagnose)
         count = len(self._joints.names)
         self.get_logger().info(f'{count} joints; looking for the robot on {settings.link.path}')
@@ -132,14 +135,39 @@ class HardwareNode(Node):
             self._counters.refused += 1
             self._trouble(f'joint command refused: {error}')
             return
-        if self._driver.command(self._joints.angles(command.targets)):
+        if self._limp:
+            self._drop('the servos are without torque; call ~/torque with true')
+        elif self._driver.command(self._joints.angles(command.targets)):
             self._estimator.command(now, command.targets)
             self._count(command)
         else:
-            self._limiter.reset()
-            self._last_targets = ()
-            self._counters.unsent += 1
-            self._trouble(f'joint command not sent: {self._driver.status().detail}')
+            self._drop(self._driver.status().detail)
+
+    def _drop(self, reason: str) -> None:
+        self._limiter.reset()
+        self._last_targets = ()
+        self._counters.unsent += 1
+        self._trouble(f'joint command not sent: {reason}')
+
+    def _set_torque(
+        self, request: SetBool.Request, response: SetBool.Response
+    ) -> SetBool.Response:
+        """Let the servos go, or have them hold where they are."""
+        estimate, on = self._estimate, bool(request.data)
+        if on and estimate is not None:  # a servo that wakes goes to its last target
+            place = [
+                estimate.positions[name] for name in self._joints.names[: self._joints.leg_count]
+            ]
+            self._driver.command(self._joints.angles(place))
+        response.success = self._driver.torque(on=on)
+        if not response.success:
+            response.message = self._driver.status().detail
+            return response
+        self._limp = not on
+        self._limiter.reset()
+        response.message = 'the servos hold' if on else 'the servos are without torque'
+        self.get_logger().info(response.message)
+        return response
 
     def _check_rest(self, message: JointCommand) -> None:
         """Refuse velocities and efforts that do not fit the positions; servos take neither."""

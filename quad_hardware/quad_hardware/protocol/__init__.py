@@ -12,7 +12,7 @@ The driver, the simulated robot, ``xgo_lib2`` and the protocol page all read the
 
 from .feedback import decode_feedback, Feedback
 from .frame import checksum, Frame
-from .function_table import Code, Fault, NEW, Refusal, STATE
+from .function_table import ALL_MOTORS, Code, Fault, NEW, Refusal, STATE
 from .motors import (
     ANGLE_SPANS,
     ARM_MOTORS,
@@ -50,6 +50,7 @@ PROTOCOLS = (NEW, OLD)  # in the order of probing
 
 __all__ = [
     'ACTION_RESET',
+    'ALL_MOTORS',
     'ANGLE_SPANS',
     'ARM_MOTORS',
     'BULK_READ_ORDER',

@@ -1,0 +1,98 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""``ros2 run quad_hardware calibrate``: joints or odometry, into a parameter file."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+import sys
+
+from quad_description import movable_joints, PRESETS, robot_urdf
+
+from ..exceptions import HardwareError
+from ..joints import servo_of
+from ..link import LinkOptions
+from .console import CancelledError, Console, TerminalConsole
+from .parameter_file import servo_parameters, write_parameters
+from .robot import HandheldRobot
+from .wizard import calibrate_joints, zero_all
+
+DEFAULT_FILE = Path('quad_calibration.yaml')
+
+
+def run_calibrate(argv: Sequence[str], console: Console) -> int:
+    """Calibrate as the command line says; return the exit code."""
+    options = _parser().parse_args(argv)
+    try:
+        if options.what == 'joints':
+            _joints(options, console)
+        else:
+            _odometry(options, console)
+    except (HardwareError, CancelledError) as error:
+        console.say(str(error))
+        return 1
+    console.say(f'written to {options.output}; use it with:')
+    console.say(
+        f'  ros2 run quad_hardware hardware_node --ros-args --params-file {options.output}'
+    )
+    return 0
+
+
+def main() -> None:
+    """Entry point."""
+    sys.exit(run_calibrate(sys.argv[1:], TerminalConsole()))
+
+
+def _joints(options: argparse.Namespace, console: Console) -> None:
+    servos = [servo_of(joint) for joint in movable_joints(robot_urdf(options.preset, options.arm))]
+    chosen = [servo for servo in servos if not options.joint or servo.joint in options.joint]
+    console.say(f'{len(chosen)} joints. The servos will let go: support the robot.')
+    with HandheldRobot(LinkOptions(options.port)) as robot:
+        console.ask('Enter takes their torque away; Ctrl-C leaves')
+        with robot.limp():
+            if options.zero_only:
+                console.ask('Put all joints to zero, and hold them there. Enter')
+                found = zero_all(chosen, robot.angles())
+            else:
+                found = calibrate_joints(console, robot, chosen, limits=options.limits)
+        console.say('the servos hold again, where they are')
+    write_parameters(options.output, servo_parameters(found))
+
+
+def _odometry(options: argparse.Namespace, console: Console) -> None:
+    from .odometry import Axis, calibrate_odometry, Walker
+
+    key, axis = f'scale_{options.axis}', Axis(options.axis)
+    with Walker() as walker:
+        before = walker.scale(axis)
+        factor = calibrate_odometry(console, walker, axis, options.distance, options.speed)
+    scale = round(before * factor, 4)
+    console.say(f'odometry.{key}: {before:.4f} -> {scale:.4f}')
+    write_parameters(options.output, {'odometry': {key: scale}})
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog='calibrate', description=__doc__)
+    kinds = parser.add_subparsers(dest='what', required=True)
+    joints = kinds.add_parser('joints', help='signs, offsets and limits; moves joints by hand')
+    joints.add_argument('--port', default='/dev/ttyAMA0', help='of the robot (%(default)s)')
+    joints.add_argument('--preset', choices=PRESETS, default='lite', help='(%(default)s)')
+    joints.add_argument('--arm', action='store_true', help='with the arm on its back')
+    joints.add_argument('--joint', action='append', default=[], help='only this one; repeatable')
+    joints.add_argument('--limits', action='store_true', help='ask for the ends of the travel')
+    joints.add_argument('--zero-only', action='store_true', help='all offsets at once, in a jig')
+    odometry = kinds.add_parser('odometry', help='scale; walks while bringup runs')
+    odometry.add_argument('--axis', choices=('x', 'y'), default='x', help='(%(default)s)')
+    odometry.add_argument('--distance', type=float, default=1.0, help='[m] (%(default)s)')
+    odometry.add_argument('--speed', type=float, default=0.15, help='[m/s] (%(default)s)')
+    for kind in (joints, odometry):
+        kind.add_argument(
+            '--output', type=Path, default=DEFAULT_FILE, help='parameter file (%(default)s)'
+        )
+    return parser
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,111 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Leads a person through the joints of a robot, one after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+import math
+
+from ..exceptions import CommandError
+from ..joints import JointServo
+from .console import ask_yes, Console
+from .joints import moved_motor, with_direction, with_limits, with_zero
+from .robot import HandheldRobot
+
+# what zero and the positive direction look like (quad_description)
+_PLACES = {
+    'hip': ('the leg hangs straight down, seen from the front', 'move the foot inward'),
+    'thigh': ('the upper leg hangs straight down, seen from the side', 'move the knee backward'),
+    'calf': (
+        'the lower leg points forward, 72 degrees from straight down',
+        'move the foot backward and up',
+    ),
+    'yaw': ('the arm points forward', 'turn it to the left'),
+}
+_ARM_PLACE = ('the joint is where the URDF draws it at zero', 'turn it the way of the URDF')
+
+
+def calibrate_joints(
+    console: Console, robot: HandheldRobot, servos: Iterable[JointServo], *, limits: bool
+) -> list[JointServo]:
+    """Ask for zero, direction and, if wanted, both ends of each joint.
+
+    Args:
+        console: The person.
+        robot: The robot, limp.
+        servos: What is known so far.
+        limits: Ask for the ends of the travel as well.
+
+    Returns:
+        The servos with what was found.
+    """
+    return [_calibrate(console, robot, servo, limits=limits) for servo in servos]
+
+
+def _calibrate(
+    console: Console, robot: HandheldRobot, servo: JointServo, *, limits: bool
+) -> JointServo:
+    zero_place, direction = _place_of(servo.joint)
+    while True:
+        console.say(f'\n{servo.joint} (motor {servo.motor})')
+        answer = console.ask(f'  hold it at zero: {zero_place}. Enter; s skips it')
+        if answer.lower() == 's':
+            return servo
+        try:
+            before = robot.angles()
+            console.ask(f'  now {direction}, and hold it there. Enter')
+            after = robot.angles()
+            found = _found(console, servo, before, after)
+            if limits:
+                found = _ends(console, robot, found)
+        except CommandError as error:
+            console.say(f'  {error}')
+            continue
+        console.say(f'  {describe(found)}')
+        if ask_yes(console, '  keep it?', default=True):
+            return found
+
+
+def describe(servo: JointServo) -> str:
+    """Return what is known of a servo in words."""
+    return (
+        f'motor {servo.motor}, sign {servo.sign:+d}, offset {servo.offset:+.3f} rad, '
+        f'{servo.lower:+.2f} to {servo.upper:+.2f} rad'
+    )
+
+
+def _found(
+    console: Console, servo: JointServo, before: dict[int, float], after: dict[int, float]
+) -> JointServo:
+    moved = moved_motor(before, after)
+    if moved is not None and moved != servo.motor:
+        turned = math.fabs(after[moved] - before[moved])
+        question = f'  motor {moved} turned by {turned:.0f} degrees, not {servo.motor}; take it?'
+        if ask_yes(console, question):
+            servo = replace(servo, motor=moved)
+    if servo.motor not in before or servo.motor not in after:
+        raise CommandError(f'motor {servo.motor} does not report its angle; skip this joint')
+    return with_direction(servo, before[servo.motor], after[servo.motor])
+
+
+def _ends(console: Console, robot: HandheldRobot, servo: JointServo) -> JointServo:
+    console.ask('  move it to one end of its travel. Enter')
+    one = robot.angles()[servo.motor]
+    console.ask('  move it to the other end. Enter')
+    return with_limits(servo, one, robot.angles()[servo.motor])
+
+
+def _place_of(joint: str) -> tuple[str, str]:
+    if joint.startswith('arm') and 'yaw' not in joint:
+        return _ARM_PLACE
+    return next((place for word, place in _PLACES.items() if word in joint), _ARM_PLACE)
+
+
+def zero_all(servos: Iterable[JointServo], angles: dict[int, float]) -> list[JointServo]:
+    """Return all servos with their zero where they are now, signs as they were.
+
+    For a robot that was put into its zero pose as a whole, in a jig.
+    """
+    return [with_zero(s, angles[s.motor]) if s.motor in angles else s for s in servos]

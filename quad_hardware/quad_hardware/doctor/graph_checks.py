@@ -1,0 +1,136 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What is heard on ROS topics, judged: nodes, rates, joint names, transforms."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from xml.etree.ElementTree import ParseError
+
+from quad_description import DescriptionError, movable_joints
+
+from .finding import error, Finding, good, note, warning
+from .tree import links_without_place
+
+NODES = ('hardware_node', 'controller_node', 'robot_state_publisher')
+RATE, RATE_SHARE = 50.0, 0.9  # [Hz], and the share of it that is still well
+_SOURCES = {
+    '/joint_states': 'hardware_node',
+    '/imu': 'hardware_node',
+    '/odom': 'hardware_node',
+    '/joint_command': 'controller_node',
+}
+
+
+@dataclass(slots=True)
+class Observation:
+    """What was heard in a while.
+
+    Attributes:
+        duration: How long was listened [s].
+        nodes: Names of nodes.
+        publishers: Names of nodes by topic.
+        counts: Messages by topic.
+        joints: Names in the last /joint_states.
+        urdf: The robot, from /robot_description; empty when there is none.
+        parents: Parent by child of all transforms, static ones included.
+        diagnostics: Level and text of each status that is not well.
+    """
+
+    duration: float
+    nodes: set[str] = field(default_factory=set)
+    publishers: dict[str, list[str]] = field(default_factory=dict)
+    counts: dict[str, int] = field(default_factory=dict)
+    joints: tuple[str, ...] = ()
+    urdf: str = ''
+    parents: dict[str, str] = field(default_factory=dict)
+    diagnostics: list[tuple[int, str]] = field(default_factory=list)
+
+
+def check_graph(seen: Observation) -> Iterator[Finding]:
+    """Judge everything that was heard."""
+    running = [name for name in NODES if name in seen.nodes]
+    if not running:
+        yield note(
+            'nodes',
+            'nothing of the robot runs in this domain',
+            'ros2 run quad_bringup bringup; if it does run, compare ROS_DOMAIN_ID on both sides',
+        )
+        return
+    yield from _check_nodes(seen)
+    for topic in _SOURCES:
+        yield from _check_rate(seen, topic)
+    yield from _check_joints(seen)
+    yield from _check_transforms(seen)
+    for level, text in seen.diagnostics:
+        remedy = 'see /diagnostics'
+        yield (warning if level == 1 else error)('diagnostics', text, remedy)
+
+
+def _check_nodes(seen: Observation) -> Iterator[Finding]:
+    missing = [name for name in NODES if name not in seen.nodes]
+    if missing:
+        remedy = 'ros2 run quad_bringup bringup starts all of them'
+        yield warning('nodes', f'{", ".join(missing)} not running', remedy)
+    else:
+        yield good('nodes', ', '.join(NODES))
+    for topic, names in seen.publishers.items():
+        if len(names) > 1 and topic in _SOURCES:
+            remedy = 'end all but one: they contradict each other'
+            yield error(topic, f'{len(names)} publishers: {", ".join(names)}', remedy)
+
+
+def _check_rate(seen: Observation, topic: str) -> Iterator[Finding]:
+    source = _SOURCES[topic]
+    rate = seen.counts.get(topic, 0) / seen.duration
+    if rate >= RATE * RATE_SHARE:
+        yield good(topic, f'{rate:.1f} Hz')
+    elif rate > 0:
+        remedy = 'free -h; no parallel build while it walks; see the counters in /diagnostics'
+        yield warning(topic, f'{rate:.1f} Hz instead of {RATE:.0f}', remedy)
+    elif source not in seen.nodes:
+        yield note(topic, f'silent, for {source} is not running')
+    elif topic == '/joint_command':
+        yield note(
+            topic, 'silent', "ros2 service call /set_mode quad_msgs/srv/SetMode '{mode: stand}'"
+        )
+    else:
+        yield error(topic, 'silent', f'see what {source} says; is the robot connected?')
+
+
+def _check_joints(seen: Observation) -> Iterator[Finding]:
+    if not seen.urdf:
+        remedy = 'run robot_state_publisher, which publishes it'
+        yield warning('/robot_description', 'nobody publishes it', remedy)
+        return
+    try:
+        wanted = [joint.name for joint in movable_joints(seen.urdf)]
+    except DescriptionError as problem:
+        yield error('/robot_description', str(problem), 'mend the URDF')
+        return
+    if not seen.joints:
+        return
+    missing = [name for name in wanted if name not in seen.joints]
+    unknown = [name for name in seen.joints if name not in wanted]
+    remedy = 'give hardware_node and robot_state_publisher the same URDF'
+    if missing:
+        yield error('joints', f'in the URDF, not in /joint_states: {", ".join(missing)}', remedy)
+    if unknown:
+        yield error('joints', f'in /joint_states, not in the URDF: {", ".join(unknown)}', remedy)
+    if not missing and not unknown:
+        yield good('joints', f'{len(wanted)}, as in the URDF')
+
+
+def _check_transforms(seen: Observation) -> Iterator[Finding]:
+    if not seen.urdf:
+        return
+    try:
+        lost = links_without_place(seen.urdf, seen.parents)
+    except ParseError:
+        return  # said above
+    if lost:
+        remedy = 'robot_state_publisher and hardware_node publish them; compare joint names above'
+        yield error('tf', f'no way from odom to {", ".join(lost)}', remedy)
+    else:
+        yield good('tf', f'{len(seen.parents)} transforms, complete from odom')

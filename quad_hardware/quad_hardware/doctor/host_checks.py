@@ -1,0 +1,65 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The machine: is ROS sourced, which domain, is there memory."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+import importlib.util
+
+from .finding import error, Finding, good, note, warning
+
+LEAST_MEMORY = 300e6  # [B] below that, processes are soon ended
+_LOCAL = 'LOCALHOST'
+
+
+def check_environment(environment: Mapping[str, str]) -> Iterator[Finding]:
+    """Look at the variables that ROS reads."""
+    if 'AMENT_PREFIX_PATH' not in environment:
+        remedy = (
+            'source the workspace first: `source env.sh`, or `source /opt/ros/<distro>/setup.bash`'
+            ' and install/setup.bash (scripts, cron and systemd do not do it for you)'
+        )
+        yield error('environment', 'no ROS workspace is sourced', remedy)
+    else:
+        yield good(
+            'environment', f'ROS {environment.get("ROS_DISTRO", "of unknown distribution")}'
+        )
+    domain = environment.get('ROS_DOMAIN_ID', '0')
+    reach = environment.get('ROS_AUTOMATIC_DISCOVERY_RANGE', 'SUBNET')
+    if environment.get('ROS_LOCALHOST_ONLY') == '1':
+        reach = _LOCAL
+    if not domain.isdigit() or not 0 <= int(domain) <= 232:
+        yield error('domain', f'ROS_DOMAIN_ID is {domain!r}', 'export ROS_DOMAIN_ID=0')
+    elif reach == _LOCAL:
+        yield note(
+            'domain',
+            f'{domain}, on this machine only',
+            'to reach other machines: export ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET, and the same '
+            'ROS_DOMAIN_ID on each',
+        )
+    else:
+        yield good('domain', f'{domain}, reaching {reach.lower()}; it must be the same everywhere')
+
+
+def check_memory(meminfo: str) -> Iterator[Finding]:
+    """Look at the text of /proc/meminfo."""
+    rows = dict(line.split(':', 1) for line in meminfo.splitlines() if ':' in line)
+    available = float(rows.get('MemAvailable', '0 kB').split()[0]) * 1024
+    if available < LEAST_MEMORY:
+        remedy = 'end other programs (free -h), build with --parallel-workers 1'
+        yield warning('memory', f'{available / 1e6:.0f} MB available', remedy)
+    else:
+        yield good('memory', f'{available / 1e6:.0f} MB available')
+
+
+def check_library() -> Finding:
+    """Tell whose xgo_lib2 Python finds."""
+    spec = importlib.util.find_spec('xgo_lib2')
+    if spec is None:
+        return warning('xgo_lib2', 'not found', 'build the workspace: it brings one of its own')
+    import xgo_lib2
+
+    own = hasattr(xgo_lib2, 'IS_STAND_IN')
+    whose = 'the stand-in of this workspace' if own else f'the vendor’s, {xgo_lib2.__file__}'
+    return good('xgo_lib2', whose)

@@ -1,0 +1,62 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""``ros2 run quad_hardware doctor``: finds what is wrong with port, robot, machine and ROS."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator, Sequence
+import os
+from pathlib import Path
+import sys
+
+from .finding import error, Finding, Severity
+from .host_checks import check_environment, check_library, check_memory
+from .port_checks import check_port
+
+DEFAULT_PORT = '/dev/ttyAMA0'
+
+
+def run_doctor(argv: Sequence[str]) -> int:
+    """Print all findings; return 1 when one of them is an error, else 0."""
+    options = _parser().parse_args(argv)
+    worst = Severity.GOOD
+    order = list(Severity)
+    for finding in _findings(options.port, options.duration):
+        print(finding, flush=True)  # noqa: T201  # what the program is for
+        worst = max(worst, finding.severity, key=order.index)
+    return 1 if worst is Severity.ERROR else 0
+
+
+def main() -> None:
+    """Entry point."""
+    sys.exit(run_doctor(sys.argv[1:]))
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog='doctor', description=__doc__)
+    parser.add_argument('--port', default=DEFAULT_PORT, help='of the robot (%(default)s)')
+    parser.add_argument(
+        '--duration', type=float, default=3.0, help='of listening to topics [s] (%(default)s)'
+    )
+    return parser
+
+
+def _findings(port: str, duration: float) -> Iterator[Finding]:
+    yield from check_environment(os.environ)
+    meminfo = Path('/proc/meminfo')
+    if meminfo.exists():
+        yield from check_memory(meminfo.read_text(encoding='ascii'))
+    yield check_library()
+    yield from check_port(port)
+    try:
+        from .graph_checks import check_graph
+        from .listening import observe
+    except ImportError as problem:
+        yield error('ROS', str(problem), 'source the workspace first: source env.sh')
+        return
+    yield from check_graph(observe(duration))
+
+
+if __name__ == '__main__':
+    main()

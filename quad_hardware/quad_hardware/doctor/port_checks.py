@@ -1,0 +1,88 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The serial port: is it there, may we, who has it, and what answers on it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import os
+from pathlib import Path
+import stat
+
+from serial.tools import list_ports
+
+from ..exceptions import LinkError, NoAnswerError
+from ..link import connect
+from ..protocol import model_of_firmware, OLD
+from .finding import error, Finding, good, note, warning
+
+GROUP = 'dialout'
+
+
+def check_port(path: str) -> Iterator[Finding]:
+    """Look at a port, and talk to the robot when nobody else does."""
+    if not Path(path).exists():
+        ports = [port.device for port in list_ports.comports()]
+        there = f'there are {", ".join(ports)}; ' if ports else 'there is no serial port at all; '
+        remedy = f'{there}choose with --port, or see that the robot is plugged in and switched on'
+        yield error('port', f'{path} does not exist', remedy)
+        return
+    if not stat.S_ISCHR(Path(path).stat().st_mode):
+        yield error('port', f'{path} is no device', 'choose the serial port with --port')
+        return
+    real = os.path.realpath(path)
+    yield good('port', path if real == path else f'{path} -> {real}')
+    if not os.access(path, os.R_OK | os.W_OK):
+        remedy = f'sudo usermod -aG {GROUP} $USER, then log in again'
+        yield error('permission', f'{path} may not be read and written by this user', remedy)
+        return
+    yield good('permission', 'may be read and written')
+    users = list(port_users(real))
+    if users:
+        yield note('port user', f'in use by {", ".join(users)}; the robot was not asked')
+        return
+    yield from _ask(path)
+
+
+def port_users(device: str) -> Iterator[str]:
+    """Yield the programs that have a device open, as far as we may see them."""
+    for process in Path('/proc').glob('[0-9]*'):
+        if int(process.name) == os.getpid():
+            continue
+        try:
+            files = {os.path.realpath(entry) for entry in (process / 'fd').iterdir()}
+            words = (process / 'cmdline').read_bytes().split(b'\0')
+        except OSError:  # it ended, or is another user's
+            continue
+        if device in files:
+            yield f'{_program(words)} (process {process.name})'
+
+
+def _program(words: list[bytes]) -> str:
+    """Return the name of a program; of a script its own, not the interpreter's."""
+    names = [Path(word.decode(errors='replace')).name for word in words if word]
+    scripts = [name for name in names[:2] if not name.startswith('python')]
+    return (scripts or names or ['?'])[0]
+
+
+def _ask(path: str) -> Iterator[Finding]:
+    try:
+        connection = connect(path)
+    except NoAnswerError as problem:
+        yield error(
+            'robot',
+            str(problem),
+            'switch the robot on; on a Raspberry Pi, free the port from the serial console '
+            '(raspi-config, Interface Options, Serial Port)',
+        )
+        return
+    except LinkError as problem:
+        yield error('robot', str(problem), 'see the message')
+        return
+    protocol, port = connection.protocol, connection.port
+    port.close()
+    yield good('robot', f'{connection.firmware}, {protocol.name} protocol at {port.baud} baud')
+    model = model_of_firmware(connection.firmware)
+    if model is None and protocol is OLD:
+        remedy = 'set the parameter model of hardware_node to mini, lite or wheeled'
+        yield warning('firmware', 'its first letter names no quadruped', remedy)

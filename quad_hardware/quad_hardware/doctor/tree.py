@@ -1,0 +1,32 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Which links of a URDF the transforms reach."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from xml.etree import ElementTree as ET
+
+ROOT = 'odom'
+
+
+def links_without_place(urdf: str, parents: Mapping[str, str]) -> list[str]:
+    """Return the links that have no chain of transforms from odom.
+
+    Args:
+        urdf: The robot.
+        parents: Parent by child of all transforms.
+    """
+    root = ET.fromstring(urdf)  # noqa: S314  # what robot_state_publisher has read already
+    links = [link.get('name', '') for link in root.iter('link')]
+    return [link for link in links if not _reaches(link, parents)]
+
+
+def _reaches(link: str, parents: Mapping[str, str]) -> bool:
+    seen: set[str] = set()
+    while link != ROOT:
+        if link in seen or link not in parents:  # a loop is no way either
+            return False
+        seen.add(link)
+        link = parents[link]
+    return True

@@ -1,0 +1,190 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Calibration of joints: a robot with turned and shifted servos gets its true parameters back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+import math
+from pathlib import Path
+
+from hypothesis import given
+from hypothesis import strategies as st
+import pytest
+import yaml
+
+from quad_hardware.calibration.console import ask_number, CancelledError
+from quad_hardware.calibration.joints import (
+    LEAST_TURN,
+    moved_motor,
+    with_direction,
+    with_limits,
+)
+from quad_hardware.calibration.main import run_calibrate
+from quad_hardware.calibration.parameter_file import read_parameters, write_parameters
+from quad_hardware.exceptions import CommandError
+from quad_hardware.joints import JointServo
+from quad_hardware.protocol import NEW, OLD, Protocol
+from quad_pty_peer import PtyPeer
+
+KNEE = JointServo('fl_calf_joint', 11, lower=-1.134, upper=0.8727)
+
+
+class Script:
+    """Someone who answers in order, moves the robot before, and remembers what was said."""
+
+    def __init__(self, *answers: str | tuple[Callable[[], None], str]) -> None:
+        """Prepare the answers."""
+        self._answers = list(answers)
+        self.said: list[str] = []
+
+    def say(self, text: str) -> None:
+        """Listen."""
+        self.said.append(text)
+
+    def ask(self, question: str) -> str:
+        """Answer; leave when there is no answer left."""
+        self.said.append(question)
+        if not self._answers:
+            raise CancelledError('cancelled; nothing was written')
+        answer = self._answers.pop(0)
+        if isinstance(answer, tuple):
+            move, answer = answer
+            move()
+        return answer
+
+
+@given(
+    st.sampled_from([1, -1]),
+    st.floats(-1.0, 1.0),
+    st.floats(math.radians(LEAST_TURN) + 0.01, 1.5),
+)
+def test_sign_and_offset_are_found(sign: int, offset: float, turn: float) -> None:
+    """From two angles of a servo that is mounted in any way."""
+    true = replace(KNEE, sign=sign, offset=offset)
+    found = with_direction(KNEE, true.angle(0.0), true.angle(turn))
+    assert found.sign == sign
+    assert found.offset == pytest.approx(offset)
+    assert found.position(true.angle(0.7)) == pytest.approx(0.7)
+
+
+def test_a_turn_that_tells_nothing_is_refused() -> None:
+    """A hand that shakes is no direction."""
+    with pytest.raises(CommandError, match=r'motor 11 turned by 3.0 degrees'):
+        with_direction(KNEE, 10.0, 13.0)
+    assert moved_motor({11: 0.0, 12: 0.0}, {11: 1.0, 12: -20.0}) == 12
+    assert moved_motor({11: 0.0}, {11: 1.0}) is None
+
+
+def test_limits_are_measured_within_those_of_the_urdf() -> None:
+    """With a margin to the stop, in either order of the ends."""
+    found = with_limits(KNEE, 40.0, -90.0)
+    assert found.lower == KNEE.lower
+    assert found.upper == pytest.approx(math.radians(38.0))
+    assert with_limits(KNEE, -90.0, 40.0) == found
+    with pytest.raises(CommandError, match='nothing is left'):
+        with_limits(KNEE, 1.0, 2.0)
+
+
+@pytest.mark.parametrize('protocol', [NEW, OLD], ids=lambda protocol: protocol.name)
+def test_a_joint_is_calibrated_by_hand(tmp_path: Path, protocol: Protocol) -> None:
+    """Torque off, two places, torque on where it is, and the file has what was found."""
+    output = tmp_path / 'found.yaml'
+    with PtyPeer(tmp_path / 'port', protocol) as peer:
+        limp: list[bool] = []
+
+        def put(angle: float) -> Callable[[], None]:
+            def move() -> None:
+                limp.append(not peer.torque)
+                peer.angles[11] = angle
+
+            return move
+
+        script = Script('', (put(10.0), ''), (put(-15.0), ''), 'y')
+        command = ['joints', '--joint', 'fl_calf_joint', '--output', str(output)]
+        assert run_calibrate([*command, '--port', str(peer.link)], script) == 0, script.said
+        assert limp == [True, True]
+        assert peer.torque
+        legs = [command for command in peer.commands if 11 in command]
+        assert legs[-1][11] == pytest.approx(-15.0, abs=0.5)
+    joint = read_parameters(output)['joints']
+    assert joint['fl_calf_joint']['sign'] == -1  # type: ignore[index]
+    assert joint['fl_calf_joint']['offset'] == pytest.approx(math.radians(10.0), abs=0.01)  # type: ignore[index]
+
+
+def test_who_leaves_gets_torque_back_and_no_file(tmp_path: Path) -> None:
+    """In the middle of a joint; the robot holds where it was put."""
+    output = tmp_path / 'found.yaml'
+    with PtyPeer(tmp_path / 'port') as peer:
+        script = Script('', '')
+        command = ['joints', '--port', str(peer.link), '--output', str(output)]
+        assert run_calibrate(command, script) == 1
+        assert peer.torque
+        assert script.said[-1] == 'cancelled; nothing was written'
+    assert not output.exists()
+
+
+def test_a_wrong_motor_is_noticed(tmp_path: Path) -> None:
+    """Someone moves another joint than asked: it is said which motor turned, and asked again."""
+    output = tmp_path / 'found.yaml'
+    with PtyPeer(tmp_path / 'port') as peer:
+
+        def turn(motor: int) -> Callable[[], None]:
+            def move() -> None:
+                peer.angles[motor] = 30.0
+
+            return move
+
+        answers = ('', '', (turn(21), ''), 'n', 's')
+        script = Script(*answers)
+        command = ['joints', '--joint', 'fl_calf_joint', '--output', str(output)]
+        assert run_calibrate([*command, '--port', str(peer.link)], script) == 0
+    text = '\n'.join(script.said)
+    assert 'motor 21 turned by 30 degrees, not 11' in text
+    assert 'Is this the right joint?' in text
+
+
+def test_all_zeros_at_once(tmp_path: Path) -> None:
+    """In a jig: every offset is where the servo is, every sign stays."""
+    output = tmp_path / 'found.yaml'
+    with PtyPeer(tmp_path / 'port') as peer:
+        peer.angles.update(dict.fromkeys(peer.angles, 5.0))
+        command = ['joints', '--zero-only', '--port', str(peer.link), '--output', str(output)]
+        assert run_calibrate(command, Script('', '')) == 0
+    joints = read_parameters(output)['joints']
+    assert len(joints) == 12  # type: ignore[arg-type]
+    assert {j['offset'] for j in joints.values()} == {round(-math.radians(5.0), 5)}  # type: ignore[attr-defined]
+
+
+def test_no_robot_is_said(tmp_path: Path) -> None:
+    """With the remedy, and nothing is written."""
+    script = Script('')
+    command = ['joints', '--port', str(tmp_path / 'none'), '--output', str(tmp_path / 'x')]
+    assert run_calibrate(command, script) == 1
+    assert 'no such device' in script.said[-1]
+
+
+def test_a_file_keeps_what_it_had(tmp_path: Path) -> None:
+    """New values go beside old ones, also within a joint; other files are refused."""
+    path = tmp_path / 'p.yaml'
+    write_parameters(path, {'joints': {'a': {'sign': 1, 'offset': 0.1}}})
+    write_parameters(path, {'joints': {'a': {'sign': -1}, 'b': {'sign': 1}}, 'port': 'x'})
+    assert yaml.safe_load(path.read_text()) == {
+        'hardware_node': {
+            'ros__parameters': {
+                'joints': {'a': {'sign': -1, 'offset': 0.1}, 'b': {'sign': 1}},
+                'port': 'x',
+            }
+        }
+    }
+    path.write_text('- a list')
+    with pytest.raises(CommandError, match='holds no parameters of hardware_node'):
+        write_parameters(path, {})
+
+
+def test_a_number_is_asked_for_until_there_is_one() -> None:
+    """A comma is a point; words, nothing and zero are not."""
+    script = Script('far', '', '-1', 'inf', '0,95')
+    assert ask_number(script, 'How far?') == 0.95
+    assert len(script.said) == 9

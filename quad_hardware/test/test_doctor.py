@@ -1,0 +1,162 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The doctor: every row of the article's table of troubles is found, with its remedy."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+import os
+from pathlib import Path
+
+from isolation import Isolation
+from processes import executable, RunningProcess
+import pytest
+
+from quad_description import movable_joints, robot_urdf
+from quad_hardware.doctor import Finding, Severity
+from quad_hardware.doctor.graph_checks import check_graph, Observation
+from quad_hardware.doctor.host_checks import check_environment, check_memory
+from quad_hardware.doctor.port_checks import check_port
+from quad_hardware.doctor.tree import links_without_place
+from quad_hardware.link import SerialPort
+from quad_hardware.protocol import OLD
+from quad_pty_peer import PtyPeer
+
+URDF = robot_urdf('lite')
+NAMES = tuple(joint.name for joint in movable_joints(URDF))
+LINKS = [word.split('"')[1] for word in URDF.split('<link ')[1:]]
+WELL = Observation(
+    duration=2.0,
+    nodes={'hardware_node', 'controller_node', 'robot_state_publisher'},
+    publishers={'/joint_states': ['hardware_node'], '/joint_command': ['controller_node']},
+    counts=dict.fromkeys(('/joint_states', '/imu', '/odom', '/joint_command'), 100),
+    joints=NAMES,
+    urdf=URDF,
+    parents=dict.fromkeys(LINKS, 'base_link') | {'base_link': 'odom'},
+)
+
+
+def found(findings: Iterable[Finding], subject: str) -> Finding:
+    """The worst finding about something."""
+    about = [f for f in findings if f.subject == subject]
+    order = list(Severity)
+    return max(about, key=lambda finding: order.index(finding.severity))
+
+
+def test_a_robot_that_is_well_gets_no_remedy() -> None:
+    """Nothing but good news."""
+    assert {finding.severity for finding in check_graph(WELL)} == {Severity.GOOD}
+
+
+@pytest.mark.parametrize(
+    ('change', 'subject', 'severity', 'words'),
+    [
+        ({'nodes': set()}, 'nodes', Severity.NOTE, 'ROS_DOMAIN_ID'),
+        ({'nodes': {'hardware_node'}}, 'nodes', Severity.WARNING, 'controller_node'),
+        ({'counts': {}}, '/joint_states', Severity.ERROR, 'is the robot connected'),
+        ({'counts': {'/joint_states': 50}}, '/joint_states', Severity.WARNING, 'free -h'),
+        ({'joints': NAMES[1:]}, 'joints', Severity.ERROR, 'fl_hip_joint'),
+        ({'joints': (*NAMES, 'tail')}, 'joints', Severity.ERROR, 'tail'),
+        ({'urdf': ''}, '/robot_description', Severity.WARNING, 'robot_state_publisher'),
+        ({'urdf': '<robot'}, '/robot_description', Severity.ERROR, 'no XML'),
+        ({'parents': {'base_link': 'odom'}}, 'tf', Severity.ERROR, 'fl_foot'),
+        (
+            {'publishers': {'/joint_command': ['controller_node', 'other']}},
+            '/joint_command',
+            Severity.ERROR,
+            'other',
+        ),
+        ({'diagnostics': [(2, 'hardware_node: robot')]}, 'diagnostics', Severity.ERROR, 'robot'),
+    ],
+)
+def test_what_is_wrong_with_the_graph_is_found(
+    change: dict[str, object], subject: str, severity: Severity, words: str
+) -> None:
+    """Each by one thing that is different from a robot that is well."""
+    finding = found(check_graph(replace(WELL, **change)), subject)  # type: ignore[arg-type]
+    assert finding.severity is severity
+    assert words in str(finding)
+
+
+def test_a_tree_with_a_loop_or_a_gap_reaches_nothing() -> None:
+    """Only a way up to odom counts."""
+    urdf = '<robot name="r"><link name="a"/><link name="b"/><link name="c"/></robot>'
+    assert links_without_place(urdf, {'a': 'b', 'b': 'a', 'c': 'odom'}) == ['a', 'b']
+
+
+@pytest.mark.parametrize(
+    ('environment', 'subject', 'severity', 'words'),
+    [
+        ({}, 'environment', Severity.ERROR, 'source'),
+        (
+            {'AMENT_PREFIX_PATH': '/x', 'ROS_DISTRO': 'jazzy'},
+            'environment',
+            Severity.GOOD,
+            'jazzy',
+        ),
+        ({'ROS_DOMAIN_ID': 'robot'}, 'domain', Severity.ERROR, "'robot'"),
+        ({'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}, 'domain', Severity.NOTE, 'SUBNET'),
+        ({'ROS_DOMAIN_ID': '7'}, 'domain', Severity.GOOD, '7, reaching subnet'),
+    ],
+)
+def test_the_environment(
+    environment: dict[str, str], subject: str, severity: Severity, words: str
+) -> None:
+    """Unsourced shells, domains that are none, and domains that nobody else hears."""
+    finding = found(check_environment(environment), subject)
+    assert finding.severity is severity
+    assert words in str(finding)
+
+
+def test_scarce_memory_is_told() -> None:
+    """Before the kernel tells it."""
+    (little,) = check_memory('MemTotal: 1700000 kB\nMemAvailable: 100000 kB\n')
+    (much,) = check_memory('MemTotal: 1700000 kB\nMemAvailable: 900000 kB\n')
+    assert (little.severity, much.severity) == (Severity.WARNING, Severity.GOOD)
+
+
+def test_a_port_is_judged_by_what_answers(tmp_path: Path) -> None:
+    """The robot and its protocol; who else has the port; silence; no port; no device."""
+    with PtyPeer(tmp_path / 'port', OLD) as peer:
+        path = str(peer.link)
+        assert 'L-2.0.0, old protocol at 115200' in str(found(check_port(path), 'robot'))
+        peer.behaviour.silent = True
+        assert found(check_port(path), 'robot').severity is Severity.ERROR
+        peer.behaviour.silent = False
+        peer.firmware = '?'
+        assert found(check_port(path), 'firmware').severity is Severity.WARNING
+    assert found(check_port(path), 'port').severity is Severity.ERROR
+    plain = tmp_path / 'plain'
+    plain.touch()
+    assert 'is no device' in str(found(check_port(str(plain)), 'port'))
+
+
+def test_a_port_in_use_is_left_alone(isolation: Isolation, tmp_path: Path) -> None:
+    """The program that has it is named, and no byte is taken from it; exit code 0."""
+    with PtyPeer(tmp_path / 'port') as peer:
+        node = [executable('quad_hardware', 'hardware_node'), '--ros-args']
+        doctor = [executable('quad_hardware', 'doctor'), '--duration', '1.5']
+        with RunningProcess([*node, '-p', f'port:={peer.link}'], isolation.env) as running:
+            running.wait_for('running: reports arrive')
+            with RunningProcess([*doctor, '--port', str(peer.link)], isolation.env) as process:
+                process.wait()
+                assert 'hardware_node (process' in process.output
+                assert '/joint_states: ' in process.output
+                assert 'controller_node, robot_state_publisher not running' in process.output
+            assert running.is_running()
+
+
+def test_a_port_that_may_not_be_used(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The article's row: not in dialout."""
+    with PtyPeer(tmp_path / 'port') as peer:
+        monkeypatch.setattr(os, 'access', lambda *_: False)
+        finding = found(check_port(str(peer.link)), 'permission')
+    assert finding.severity is Severity.ERROR
+    assert 'usermod -aG dialout' in finding.remedy
+
+
+def test_a_second_user_of_a_port_is_refused(tmp_path: Path) -> None:
+    """By the port itself."""
+    with PtyPeer(tmp_path / 'port') as peer, SerialPort(str(peer.link), 115200):
+        assert 'another program' in str(found(check_port(str(peer.link)), 'robot'))
