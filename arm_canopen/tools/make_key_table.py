@@ -31,9 +31,10 @@ UNITS = {1000.0: 'ms', 1_000_000.0: 'µs', 10_000.0: '100 µs', 0.001: 'kbit/s'}
 
 HEAD = """# The keys of bus.yml
 
-Made by `tools/make_key_table.py` from the tables by which bus.yml is read. Names, units and defaults are those of ros2_canopen
-and of Lely's dcfgen; both formats of the file are read, with `options`, `master`, `defaults` and `nodes`, or with the devices at
-the top level. A device's own value beats that of `defaults`. An unknown key is refused with its line and the key that was
+Made by `tools/make_key_table.py` from the tables by which bus.yml is read. Names, units and
+defaults are those of ros2_canopen and of Lely's dcfgen; both formats of the file are read, with
+`options`, `master`, `defaults` and `nodes`, or with the devices at the top level. A device's own
+value beats that of `defaults`. An unknown key is refused with its line and the key that was
 probably meant; `canopen check` tells all that is wrong at once.
 """
 
@@ -61,7 +62,7 @@ TEXTS: dict[str, str] = {
     'emcy_inhibit_time': 'for `canopen dcf` only: the master sends no EMCY',
     'nmt_inhibit_time': 'shortest time between two NMT commands',
     'master.error_behavior': 'for `canopen dcf` only',
-    'start': 'false: SYNC and RPDOs wait for NMT start to the id of the master (`/master/set_nmt`)',
+    'start': 'false: SYNC and RPDOs wait for NMT start to the id of the master',
     'start_nodes': 'the master starts each device when it is configured',
     'start_all_nodes': 'the first start is one frame to all, when all are configured',
     'reset_all_nodes': 'the loss of a mandatory device resets all devices',
@@ -85,7 +86,7 @@ TEXTS: dict[str, str] = {
     'device.serial_number': 'expected 0x1018:04, 0 is not checked',
     'device.heartbeat_producer': 'period of its heartbeat (0x1017); without: that of the EDS',
     'device.heartbeat_consumer': 'it watches the master (0x1016); without: if it can',
-    'guard_time': 'period of node guarding, for a device without heartbeat; without: that of the EDS',
+    'guard_time': 'period of node guarding, without a heartbeat; without: that of the EDS',
     'life_time_factor': 'guard times after which the device misses the master (0x100D)',
     'device.time_cob_id': '0x1012, bit 31 has the device take TIME',
     'device.error_behavior': '0x1029 by sub-index',
