@@ -184,3 +184,58 @@ def test_a_source_that_fails_when_it_loses_its_axis_harms_nobody() -> None:
     assert_served(net)
     assert not net.network.nodes[ODD].online
     assert any('Careless raised ZeroDivisionError' in text for text in net.told(Severity.ERROR))
+
+
+class Script:
+    """A motion source that holds its axis for a while and then does something else."""
+
+    axes = (GOOD,)
+
+    def __init__(self, *answers: float) -> None:
+        """Take what it answers beyond the set-point of before, from its tenth cycle on."""
+        self.losses: list[str] = []
+        self._answers = answers
+        self._position: float | None = None
+        self._cycle = 0
+
+    def update(
+        self, now: float, period: float, feedback: Sequence[AxisFeedback]
+    ) -> Sequence[float | None]:
+        """Hold, then answer what was asked for."""
+        self._cycle += 1
+        if self._position is None:
+            self._position = feedback[0].setpoint
+        if self._cycle < 10:
+            return [self._position]
+        return [self._position + answer for answer in self._answers]
+
+    def released(self, axis: str, reason: str) -> None:
+        """Keep the reason."""
+        self.losses.append(reason)
+
+
+@pytest.mark.parametrize('jump', [5.0, -0.2])
+def test_a_stream_that_jumps_on_its_way_is_refused(jump: float) -> None:
+    """Not only its start is checked: the axis is braked and released, and nothing jumps."""
+    net = pair(OperationMode.CYCLIC_POSITION)
+    source = Script(jump)
+    net.group.attach(source)
+    begin = motor(net, GOOD)
+    net.run(0.5)
+    assert motor(net, GOOD) == pytest.approx(begin, abs=1e-3)
+    assert len(source.losses) == 1
+    assert 'jumps' in source.losses[0]
+    assert_served(net)
+
+
+@pytest.mark.parametrize('answers', [(), (0.0, 0.0)])
+def test_a_source_that_answers_for_another_number_of_axes_is_detached(
+    answers: tuple[float, ...],
+) -> None:
+    """Nobody could say which set-point is whose."""
+    net = pair(OperationMode.CYCLIC_POSITION)
+    net.group.attach(Script(*answers))
+    net.run(0.5)
+    told = f'answered {len(answers)} set-points for 1 axes'
+    assert any(told in text for text in net.told(Severity.ERROR))
+    assert_served(net)

@@ -13,24 +13,20 @@ from ..master.remote_node import RemoteNode
 from ..master.scheduler import Scheduler, Task
 from ..standard.drive import Controlword, DriveState, OperationMode, Statusword
 from .cyclic_position import CyclicPosition
-from .mode_table import build_modes
-from .modes import Mode, NO_BITS
+from .moded_drive import ModedDrive
+from .modes import NO_BITS
 from .motion import AxisFeedback
-from .observed_drive import FAULTY, ObservedDrive
+from .observed_drive import FAULTY
 from .state_machine import Command, fault_reset, next_command
-from .target_limits import check_target
 
 
-class Drive(ObservedDrive):
+class Drive(ModedDrive):
     """An axis of a drive of the bus; most drives have one.
 
     ``read`` and ``write`` run in each cycle. What leads it somewhere sets its goal, mode and
     targets from coroutines in the same thread (``drive_commands.py``).
 
     Attributes:
-        mode: The mode that is commanded.
-        modes: The modes that this bus.yml makes possible.
-        goal: State that the cycle leads to, None while nobody asked for one.
         resetting: Send fault resets while the drive is faulted.
         period: Length of the last cycle in [s].
         interrupted: Mode in which it was enabled when its device was lost, None otherwise.
@@ -49,14 +45,11 @@ class Drive(ObservedDrive):
             config: Settings of the axis; None for the first one.
         """
         super().__init__(node, scheduler, config or node.config.drive)
-        self.goal: DriveState | None = None
         self.released: Callable[[str], None] = lambda reason: None
         self.on_ready: Callable[[], None] = lambda: None
         self.resetting = False
         self.period = 0.0
         self.interrupted: OperationMode | None = None
-        self.modes = build_modes(self.objects, self.units, lambda: self.parameters, self.warn)
-        self.mode: Mode = self.modes[OperationMode.NO_MODE]
         self._failure = ''
         self._controlword = 0
         self._begun = False
@@ -81,35 +74,12 @@ class Drive(ObservedDrive):
         return self.state is DriveState.OPERATION_ENABLED and told
 
     @property
-    def obeys(self) -> bool:
-        """Whether the drive follows targets of its mode in this cycle."""
-        return (
-            self.goal is DriveState.OPERATION_ENABLED
-            and self.state is DriveState.OPERATION_ENABLED
-            and self.objects.mode_display == self.mode.number
-        )
-
-    @property
     def followable(self) -> bool:
         """Whether a stream of positions would be obeyed in this cycle."""
         mode = self.mode
         if not self.obeys or not isinstance(mode, CyclicPosition) or mode.goes_to_single_target:
             return False
         return mode.braked or not self.halted
-
-    @property
-    def holding_mode(self) -> Mode | None:
-        """Mode whose target acts on the drive: it is powered and displays that mode."""
-        if self.state is not DriveState.OPERATION_ENABLED:
-            return None
-        shown = self.objects.mode_display
-        return next((mode for mode in self.modes.values() if mode.number == shown), None)
-
-    @property
-    def _keeps_target(self) -> bool:
-        """Whether the drive is powered by a target that must stay as it is."""
-        held = self.holding_mode
-        return held is not None and (held is self.mode or held.cyclic)
 
     def feedback(self) -> AxisFeedback:
         """Return the state for motion sources."""
@@ -152,9 +122,9 @@ class Drive(ObservedDrive):
         else:
             command = self._command()
             if command is Command.ENABLE_OPERATION and self.obeys:
-                bits = self._step(now, period)
+                bits = self._step_mode(now, period)
             else:
-                bits = self._hold_without_target(command)
+                bits = self._hold_without_target()
         self._send(command, bits)
 
     def fail(self, error: Exception) -> None:
@@ -176,11 +146,6 @@ class Drive(ObservedDrive):
             self.released('its cycle failed')
             self.report(Severity.ERROR, f'stopped: {text}')
 
-    def hold(self) -> None:
-        """Brake, and stay halted until a new target is taken."""
-        self.mode.brake()
-        self.halt.hold()
-
     def resume(self) -> None:
         """End a halt as soon as the drive has the new target, so that no old one revives."""
         self.halt.leave(self._scheduler.now)
@@ -196,77 +161,10 @@ class Drive(ObservedDrive):
             self.halt.release()
             self.mode.stream(setpoint)
 
-    def select(self, mode: Mode) -> None:
-        """Command another mode, preloaded with where the drive is, or where it is held.
-
-        A halt goes on: until the drive shows the new mode, it may still have a target of the old.
-        """
-        held = self.holding_mode
-        if held is not None and held is mode:
-            self.mode = mode
-            return
-        actual = self._actual()
-        if isinstance(held, CyclicPosition):
-            # under load the drive is not quite where it is held, and would sag to where it is
-            position_inc = self.units.position_to_device(held.setpoint)
-            actual = actual._replace(position_inc=position_inc, velocity=held.velocity)
-        mode.preload(actual)
-        self.mode = mode
-
-    def select_back(self, mode: Mode) -> None:
-        """Command the mode of before after a switch that failed; the drive is halted in it."""
-        if not self.node.online or self.mode is mode:
-            return
-        if self.state is DriveState.OPERATION_ENABLED:
-            self.hold()
-        self.select(mode)
-
-    def check_target(self, target: float) -> None:
-        """Refuse a target beyond the limits that the drive has in the selected mode.
-
-        Raises:
-            DriveError: It is beyond; the message names the limits.
-        """
-        check_target(self.name, self.mode, self.parameters, target)
-
-    def _step(self, now: float, period: float) -> Controlword:
-        """Advance the mode by a cycle, and the halt; return their bits of the controlword."""
-        bits = self.mode.step(now, period, self.objects.statusword)
-        if not self.halt.advance(now, self.mode):
-            self.mode.brake()
-            self.warn(
-                'stays halted: it has not taken its new target (bit 12); ~/disable and ~/enable '
-                'make it forget the moves that it holds'
-            )
-        halt = self.halt.bits(self.mode)
-        if halt and self.mode.cyclic:
-            self.mode.preload(self._actual())  # from there it goes on
-        return bits | halt
-
-    def _hold_without_target(self, command: Command) -> Controlword:
-        """Preload what may act on the drive later, and keep up a halt while modes change."""
-        held = self.holding_mode
-        if not self._keeps_target:
-            self._preload_all()
-        if held is None or command is not Command.ENABLE_OPERATION:
-            return NO_BITS
-        return self.halt.bits(held)
-
     def _send(self, command: Command, bits: Controlword = NO_BITS) -> None:
         self._controlword = int(command) | int(bits)
         self.objects.controlword.write(self._controlword)
         self.objects.mode.write(int(self.mode.number))
-
-    def _preload_all(self) -> None:
-        """Let every target be where the drive is, also those of modes that are not selected.
-
-        A drive may stay in the mode that it had, whatever was selected; of two modes with one
-        target object the selected one writes last.
-        """
-        actual = self._actual()
-        for mode in self.modes.values():
-            mode.preload(actual)
-        self.mode.preload(actual)
 
     def _watch_following(self) -> None:
         """Bit 12 of the cyclic modes: a drive that has followed and does not any more is said."""

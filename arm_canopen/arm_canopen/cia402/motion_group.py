@@ -13,9 +13,9 @@ from ..master.events import Event, EventKind, Report, Severity
 from .drive import Drive
 from .motion import MotionSource
 
-HAND_OVER_MARGIN = (
-    2.0  # a stream may start this many cycles of profile velocity from the set-point
-)
+HAND_OVER_MARGIN = 2.0  # cycles of profile velocity from the set-point that a stream may start
+SPEED_MARGIN = 1.5  # share of the greatest speed (0x607F) above which a step is a jump
+UNTOLD_MARGIN = 10.0  # the same of the profile velocity, for drives that tell no greatest speed
 
 
 @dataclass(slots=True)
@@ -102,11 +102,15 @@ class MotionGroup:
     def _run(self, attachment: Attachment, now: float, period: float) -> None:
         feedback = [drive.feedback() for drive in attachment.drives]
         try:
-            setpoints = attachment.source.update(now, period, feedback)
+            setpoints = list(attachment.source.update(now, period, feedback))
         except Exception as error:  # noqa: BLE001  # a source must not stop the cycle of the others
             self._fail(attachment, f'raised {type(error).__name__}: {error}')
             return
-        for drive, axis, setpoint in zip(attachment.drives, feedback, setpoints, strict=False):
+        if len(setpoints) != len(feedback):
+            told = f'answered {len(setpoints)} set-points for {len(feedback)} axes'
+            self._fail(attachment, told)
+            return
+        for drive, axis, setpoint in zip(attachment.drives, feedback, setpoints, strict=True):
             if setpoint is None or not axis.followable or drive not in attachment.owned:
                 attachment.streaming.discard(drive.name)
                 continue
@@ -126,6 +130,11 @@ class MotionGroup:
                     'a stream must start where the drive is'
                 )
             attachment.streaming.add(drive.name)
+        elif abs(setpoint - drive.setpoint) > _greatest_speed(drive) * period:
+            raise DriveError(
+                f'the stream jumps from {drive.setpoint:g} to {setpoint:g} within a cycle; the '
+                f'axis takes up to {_greatest_speed(drive):g} per second'
+            )
         drive.stream(setpoint)
 
     def _release(self, drive: Drive, reason: str) -> None:
@@ -150,3 +159,11 @@ class MotionGroup:
         name = type(attachment.source).__name__
         text = f'motion source {name} {reason}; it is detached and its drives are braked'
         self._report(Event(EventKind.DRIVE, Severity.ERROR, '', text))
+
+
+def _greatest_speed(drive: Drive) -> float:
+    """Return the speed in user units per second above which a stream is no motion any more."""
+    told = drive.parameters
+    if told.speed_limit is not None:
+        return SPEED_MARGIN * told.speed_limit
+    return UNTOLD_MARGIN * told.profile.velocity

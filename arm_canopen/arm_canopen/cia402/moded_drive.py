@@ -1,0 +1,127 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""One axis with its modes: which is commanded, which one acts, and what each would do next."""
+
+from __future__ import annotations
+
+from ..config.model import DriveConfig
+from ..master.remote_node import RemoteNode
+from ..master.scheduler import Scheduler
+from ..standard.drive import Controlword, DriveState, OperationMode
+from .cyclic_position import CyclicPosition
+from .mode_table import build_modes
+from .modes import Mode, NO_BITS
+from .observed_drive import ObservedDrive
+from .target_limits import check_target
+
+
+class ModedDrive(ObservedDrive):
+    """An axis and its modes of operation.
+
+    Attributes:
+        modes: The modes that this bus.yml makes possible.
+        mode: The mode that is commanded.
+        goal: State that the cycle leads to, None while nobody asked for one.
+    """
+
+    def __init__(self, node: RemoteNode, scheduler: Scheduler, config: DriveConfig) -> None:
+        """Build the modes; arguments as of :class:`ObservedDrive`."""
+        super().__init__(node, scheduler, config)
+        self.goal: DriveState | None = None
+        self.modes = build_modes(self.objects, self.units, lambda: self.parameters, self.warn)
+        self.mode: Mode = self.modes[OperationMode.NO_MODE]
+
+    @property
+    def obeys(self) -> bool:
+        """Whether the drive follows targets of its mode in this cycle."""
+        return (
+            self.goal is DriveState.OPERATION_ENABLED
+            and self.state is DriveState.OPERATION_ENABLED
+            and self.objects.mode_display == self.mode.number
+        )
+
+    @property
+    def holding_mode(self) -> Mode | None:
+        """Mode whose target acts on the drive: it is powered and displays that mode."""
+        if self.state is not DriveState.OPERATION_ENABLED:
+            return None
+        shown = self.objects.mode_display
+        return next((mode for mode in self.modes.values() if mode.number == shown), None)
+
+    @property
+    def _keeps_target(self) -> bool:
+        """Whether the drive is powered by a target that must stay as it is."""
+        held = self.holding_mode
+        return held is not None and (held is self.mode or held.cyclic)
+
+    def select(self, mode: Mode) -> None:
+        """Command another mode, preloaded with where the drive is, or where it is held.
+
+        A halt goes on: until the drive shows the new mode, it may still have a target of the old.
+        """
+        held = self.holding_mode
+        if held is not None and held is mode:
+            self.mode = mode
+            return
+        actual = self._actual()
+        if isinstance(held, CyclicPosition):
+            # under load the drive is not quite where it is held, and would sag to where it is
+            position_inc = self.units.position_to_device(held.setpoint)
+            actual = actual._replace(position_inc=position_inc, velocity=held.velocity)
+        mode.preload(actual)
+        self.mode = mode
+
+    def select_back(self, mode: Mode) -> None:
+        """Command the mode of before after a switch that failed; the drive is halted in it."""
+        if not self.node.online or self.mode is mode:
+            return
+        if self.state is DriveState.OPERATION_ENABLED:
+            self.hold()
+        self.select(mode)
+
+    def hold(self) -> None:
+        """Brake, and stay halted until a new target is taken."""
+        self.mode.brake()
+        self.halt.hold()
+
+    def check_target(self, target: float) -> None:
+        """Refuse a target beyond the limits that the drive has in the selected mode.
+
+        Raises:
+            DriveError: It is beyond; the message names the limits.
+        """
+        check_target(self.name, self.mode, self.parameters, target)
+
+    def _step_mode(self, now: float, period: float) -> Controlword:
+        """Advance the mode by a cycle, and the halt; return their bits of the controlword."""
+        bits = self.mode.step(now, period, self.objects.statusword)
+        if not self.halt.advance(now, self.mode):
+            self.mode.brake()
+            self.warn(
+                'stays halted: it has not taken its new target (bit 12); ~/disable and ~/enable '
+                'make it forget the moves that it holds'
+            )
+        halt = self.halt.bits(self.mode)
+        if halt and self.mode.cyclic:
+            self.mode.preload(self._actual())  # from there it goes on
+        return bits | halt
+
+    def _hold_without_target(self) -> Controlword:
+        """Preload what may act on the drive later, and keep up a halt while modes change."""
+        held = self.holding_mode
+        if not self._keeps_target:
+            self._preload_all()
+        if held is None or self.goal is not DriveState.OPERATION_ENABLED:
+            return NO_BITS
+        return self.halt.bits(held)
+
+    def _preload_all(self) -> None:
+        """Let every target be where the drive is, also those of modes that are not selected.
+
+        A drive may stay in the mode that it had, whatever was selected; of two modes with one
+        target object the selected one writes last.
+        """
+        actual = self._actual()
+        for mode in self.modes.values():
+            mode.preload(actual)
+        self.mode.preload(actual)
