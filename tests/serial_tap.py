@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 import itertools
 import os
@@ -123,12 +124,12 @@ class SerialTap:
                 data = os.read(self._bridge, 4096)
                 for frame in self._host.feed(data):
                     self._take(frame)
-                os.write(self._robot, data)
+                _send(self._robot, data)
             if self._robot in ready:
                 data = os.read(self._robot, 4096)
                 frames = self._pushed.feed(data)
                 self.reports += [time.monotonic() for each in frames if each.kind is Kind.PUSH]
-                os.write(self._bridge, data)
+                _send(self._bridge, data)
 
     def _pass_speed_on(self) -> None:
         wanted, there = termios.tcgetattr(self._far), termios.tcgetattr(self._robot)
@@ -142,3 +143,9 @@ class SerialTap:
             motors = (round(motor) for motor in fields['motor'])
             angles = dict(zip(motors, fields['angle'], strict=True))
             self.targets.append(Target(time.monotonic(), angles))
+
+
+def _send(end: int, data: bytes) -> None:
+    """Write to a line; nobody keeps what nobody reads."""
+    with suppress(BlockingIOError):
+        os.write(end, data)

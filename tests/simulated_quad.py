@@ -59,15 +59,15 @@ class SimulatedQuad:
 
     Attributes:
         client: A ROS node of the test.
-        tap: What is on the wire.
+        tap: What is on the wire, if there is one.
         processes: The processes by name: fake_xgo, hardware, controller.
         joints: Messages of /joint_states.
         states: Messages of the controller on its state.
         truth: Messages of the simulator on where the body is.
     """
 
-    def __init__(self, isolation: Isolation, folder: Path) -> None:
-        """Start everything and wait until it is ready."""
+    def __init__(self, isolation: Isolation, folder: Path, *, tapped: bool = True) -> None:
+        """Start everything and wait until it is ready; without a tap, the cable can be pulled."""
         urdf = robot_urdf()
         self.names = [joint.name for joint in movable_joints(urdf)]
         self._isolation = isolation
@@ -75,7 +75,7 @@ class SimulatedQuad:
         parameters = folder / 'parameters.yaml'
         write_parameters(parameters, urdf)
         robot = Stack(str(folder / 'robot'), simulate=True)
-        bridge = Stack(str(folder / 'tapped'))
+        bridge = Stack(str(folder / ('tapped' if tapped else 'robot')))
         specs = [
             quad_processes(robot, parameters, find_executable)[0],
             *quad_processes(bridge, parameters, find_executable)[:2],
@@ -92,8 +92,9 @@ class SimulatedQuad:
             self.states = self.client.listen(String, '/controller_node/state', LATCHED)
             self.truth = self.client.listen(Odometry, GROUND_TRUTH, sensor)
             self.start('fake_xgo')
-            self.tap = SerialTap(folder / 'tapped', folder / 'robot')
-            self._stack.enter_context(self.tap)
+            if tapped:
+                self.tap = SerialTap(folder / 'tapped', folder / 'robot')
+                self._stack.enter_context(self.tap)
             for name in ('hardware', 'controller'):
                 self.start(name)
         except BaseException:

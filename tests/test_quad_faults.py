@@ -8,18 +8,13 @@ from collections.abc import Iterator
 import math
 import signal
 import time
-from typing import TYPE_CHECKING
 
+from isolation import reserve
 import pytest
 from simulated_quad import SimulatedQuad
 
 from quad_bringup.demo.track import tilt_of
 from quad_msgs.msg import JointCommand
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from isolation import Isolation
 
 pytestmark = pytest.mark.scenario
 
@@ -29,12 +24,21 @@ HELD = 1.0
 """Degrees by which the target of a servo that is held may change."""
 
 
-@pytest.fixture
-def quad(isolation: Isolation, tmp_path: Path) -> Iterator[SimulatedQuad]:
-    """Let a simulated quadruped stand, with a listener on its serial line."""
-    with SimulatedQuad(isolation, tmp_path) as quad:
-        quad.stand()
+@pytest.fixture(scope='module')
+def processes(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SimulatedQuad]:
+    """Start a quadruped with a listener on its serial line, for all tests of this module."""
+    folder = tmp_path_factory.mktemp('quad')
+    with reserve() as isolation, SimulatedQuad(isolation, folder) as quad:
         yield quad
+
+
+@pytest.fixture
+def quad(processes: SimulatedQuad) -> SimulatedQuad:
+    """Let it stand; what was on the wire before is forgotten."""
+    processes.clear_fault()
+    processes.stand()
+    processes.tap.forget()
+    return processes
 
 
 def tilt(quad: SimulatedQuad) -> float:

@@ -1,0 +1,111 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The serial line fails while the quadruped walks: it says why, nothing jumps, it walks again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import math
+import re
+from typing import Any, TYPE_CHECKING
+
+from diagnostic_msgs.msg import DiagnosticArray
+from isolation import reserve
+import pytest
+from simulated_quad import SimulatedQuad
+
+from quad_bringup.demo.track import tilt_of
+from quad_msgs.srv import InjectFault
+
+if TYPE_CHECKING:
+    pass
+
+pytestmark = pytest.mark.scenario
+
+LARGEST_STEP = math.radians(23.0)
+"""Radians between two targets of a servo; the trot needs half of it, a jump would be more."""
+DURATION = 2.0
+"""How long a fault goes on in [s]."""
+
+
+@pytest.fixture(scope='module')
+def processes(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SimulatedQuad]:
+    """Start a quadruped for all tests of this module: each leaves it walking again."""
+    folder = tmp_path_factory.mktemp('quad')
+    with reserve() as isolation, SimulatedQuad(isolation, folder, tapped=False) as quad:
+        yield quad
+
+
+@pytest.fixture
+def quad(processes: SimulatedQuad) -> SimulatedQuad:
+    """Let it walk, if the test before has not left it so."""
+    if processes.state != 'walk':
+        walk_again(processes)
+    return processes
+
+
+def walk_again(quad: SimulatedQuad) -> None:
+    """Clear the fault, if there is one, stand up and walk."""
+    quad.clear_fault()
+    quad.stand()
+    quad.set_mode('walk')
+    before = quad.truth[-1].pose.pose.position
+    quad.walk(1.5)
+    after = quad.truth[-1].pose.pose.position
+    assert math.hypot(after.x - before.x, after.y - before.y) > 0.15
+
+
+def inject(quad: SimulatedQuad, fault: str, *settings: str) -> None:
+    """Let the robot misbehave for a while, and walk on in the meantime."""
+    request = InjectFault.Request(fault=fault, settings=settings, duration=DURATION)
+    answer = quad.client.call(InjectFault, '/fake_xgo/fault', request)
+    assert answer.success, answer.message
+    quad.walk(DURATION + 0.5)
+
+
+def largest_step(messages: list[Any]) -> float:
+    """Return the largest step of a servo target that the bridge has sent in [rad]."""
+    statuses = [status for message in messages for status in message.status]
+    values = [value for status in statuses for value in status.values]
+    return max(float(value.value) for value in values if value.key == 'largest_step')
+
+
+def tilt(quad: SimulatedQuad) -> float:
+    """Return how far the body is from upright in [rad]."""
+    turn = quad.truth[-1].pose.pose.orientation
+    return tilt_of((turn.x, turn.y, turn.z, turn.w))
+
+
+STOPPED = ('controller', 'no joint states')
+"""The controller stops the robot by itself, and says why."""
+
+
+@pytest.mark.parametrize(
+    ('fault', 'settings', 'reasons'),
+    [
+        ('unplug', [], [('hardware', 'stale|connecting'), STOPPED]),
+        ('silence', [], [('hardware', 'stale'), STOPPED]),
+        ('brown_out', [], [('hardware', 'stale')]),
+        ('flip', ['rate=0.01'], [('controller', 'joint states|attitude')]),
+        ('drop', ['rate=0.01'], [('controller', 'joint states|attitude')]),
+    ],
+    ids=['unplugged', 'silent', 'without power', 'corrupt', 'lossy'],
+)
+def test_a_broken_line_is_told_and_survived(
+    quad: SimulatedQuad, fault: str, settings: list[str], reasons: list[tuple[str, str]]
+) -> None:
+    """Upright, without a jump, and walking again when the line is good again."""
+    diagnostics = quad.client.listen(DiagnosticArray, '/diagnostics')
+    told = [said(quad, speaker, reason) for speaker, reason in reasons]
+    inject(quad, fault, *settings)
+    for count, (speaker, reason) in zip(told, reasons, strict=True):
+        quad.processes[speaker].wait_for(reason, count=count + 1)
+    if fault != 'brown_out':  # servos without torque hold nobody up
+        assert tilt(quad) < math.radians(15.0)
+    walk_again(quad)
+    assert largest_step(diagnostics) < LARGEST_STEP
+
+
+def said(quad: SimulatedQuad, speaker: str, reason: str) -> int:
+    """Return how often a process has given a reason so far."""
+    return sum(bool(re.search(reason, line)) for line in quad.processes[speaker].lines)
