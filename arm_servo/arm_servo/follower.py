@@ -1,0 +1,145 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Following a moving state: exactly where the limits allow it, catching up where they do not."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from .limits import JointLimits
+from .otg import Generator, MotionState, Plan
+
+TURNS = 6
+"""How often the time of the meeting is improved."""
+
+NEAR = 1e-6
+"""How exactly a meeting must still be where it was planned in [rad], and 100 times in [rad/s]."""
+
+WITHIN = 1.0 + 1e-6
+"""Rounding of velocities and accelerations that is let pass."""
+
+JOLT = 0.1
+"""Change of speed within a cycle, beyond that of an even jerk, that still counts as even."""
+
+
+class Follower:
+    """Follows a state that moves by itself, within the limits of the joints.
+
+    A step that the limits allow is taken exactly. Otherwise it plans to where the state will be
+    when it can be met, and keeps to this plan while the state goes on as foreseen. Planned anew in
+    every cycle, the meeting would be put off again and again.
+    """
+
+    def __init__(self, limits: JointLimits, generator: Generator) -> None:
+        """Prepare.
+
+        Args:
+            limits: Limits of the joints.
+            generator: Plans the way to the meeting.
+        """
+        self._limits = limits
+        self._generator = generator
+        self._plan: Plan | None = None
+        self._elapsed = 0.0
+
+    def step(
+        self, state: MotionState, ahead: Callable[[float], MotionState], period: float
+    ) -> MotionState | None:
+        """Take a step.
+
+        Args:
+            state: Commanded state now.
+            ahead: The state to follow, by the time from now in [s].
+            period: Time to the next step in [s].
+
+        Returns:
+            The state to command next; None when there is no way to meet it.
+        """
+        wanted = ahead(period)
+        if self._allowed(state, wanted, period):
+            self._plan = None
+            return wanted
+        kept = self._kept(state, ahead)
+        if kept and self._plan is not None and self._elapsed + period >= self._plan.duration:
+            self._plan, kept = None, False  # met within this period
+            if self._soft(state, wanted, period):
+                return wanted
+        if not kept:
+            self._plan, self._elapsed = self._meeting(state, ahead, period), 0.0
+        if self._plan is None:
+            return None
+        self._elapsed += period
+        return self._plan.at(self._elapsed)
+
+    def _kept(self, state: MotionState, ahead: Callable[[float], MotionState]) -> bool:
+        """Whether the plan still begins and ends where it should."""
+        if self._plan is None:
+            return False
+        left = self._plan.duration - self._elapsed
+        foreseen, now = self._within(ahead(left)), self._plan.at(self._elapsed)
+        return _same(now, state) and _same(self._plan.at(self._plan.duration), foreseen)
+
+    def _allowed(self, state: MotionState, wanted: MotionState, period: float) -> bool:
+        """Whether a jerk within the limits leads from one state to the other."""
+        if not self._soft(state, wanted, period):
+            return False
+        most = self._limits.jerk * period
+        mean = 0.5 * (state.acceleration + wanted.acceleration) * period
+        if np.any(np.abs(wanted.velocity - state.velocity - mean) > JOLT * most * period):
+            return False
+        bend = (2.0 * state.acceleration + wanted.acceleration) / 6.0 * period
+        way = wanted.position - state.position - (state.velocity + bend) * period
+        return bool(np.all(np.abs(way) <= JOLT * most * period**2))
+
+    def _soft(self, state: MotionState, wanted: MotionState, period: float) -> bool:
+        """Whether a state is within the limits, and its acceleration near the present one."""
+        limits = self._limits
+        bend = np.abs(wanted.acceleration - state.acceleration)
+        return bool(
+            np.all(bend <= limits.jerk * period * WITHIN)
+            and np.all(np.abs(wanted.velocity) <= limits.velocity * WITHIN)
+            and np.all(np.abs(wanted.acceleration) <= limits.acceleration * WITHIN)
+        )
+
+    def _meeting(
+        self, state: MotionState, ahead: Callable[[float], MotionState], period: float
+    ) -> Plan | None:
+        """Plan to where the state will be when it is met."""
+        time, best = period, None
+        for _ in range(TURNS):
+            plan = self._planned(state, self._within(ahead(time)), time)
+            if plan is None:
+                return best
+            best = plan
+            if plan.duration <= time * (1.0 + 1e-9):
+                return best
+            time = plan.duration
+        return best
+
+    def _planned(self, state: MotionState, target: MotionState, shortest: float) -> Plan | None:
+        plan = self._generator.to_state(state, target, shortest)
+        if plan is not None:
+            return plan
+        plan = self._generator.to_state(state, target)  # ruckig may refuse a least duration
+        if plan is not None:
+            return plan
+        even = MotionState(target.position, target.velocity, np.zeros(len(target.velocity)))
+        return self._generator.to_state(state, even)
+
+    def _within(self, target: MotionState) -> MotionState:
+        """Return a state that can be met: its speed and acceleration within the limits."""
+        limits = self._limits
+        acceleration = np.clip(target.acceleration, -limits.acceleration, limits.acceleration)
+        # a speed that does not overrun its limit before the acceleration is taken back
+        coasting = acceleration**2 / (2.0 * limits.jerk)
+        most = np.maximum(limits.velocity - coasting, 0.0)
+        return MotionState(target.position, np.clip(target.velocity, -most, most), acceleration)
+
+
+def _same(one: MotionState, other: MotionState) -> bool:
+    return bool(
+        np.abs(one.position - other.position).max() < NEAR
+        and np.abs(one.velocity - other.velocity).max() < 100.0 * NEAR
+    )

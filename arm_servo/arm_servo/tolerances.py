@@ -1,0 +1,76 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""How far a joint may be off a trajectory, and what is said when it is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from .arrays import Array
+from .goal import JointTolerance
+from .limits import JointLimits
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tolerances:
+    """Tolerances of every joint; infinite where there are none.
+
+    Attributes:
+        position: In [rad].
+        velocity: In [rad/s].
+    """
+
+    position: Array
+    velocity: Array
+
+    def violation(self, limits: JointLimits, position: Array, velocity: Array) -> str | None:
+        """Return what is off by more than its tolerance, in words.
+
+        Args:
+            limits: Limits of the joints, with their names.
+            position: Errors of position in [rad].
+            velocity: Errors of velocity in [rad/s].
+        """
+        for error, tolerance, what, unit in (
+            (position, self.position, 'position', 'rad'),
+            (velocity, self.velocity, 'velocity', 'rad/s'),
+        ):
+            excess = np.abs(error) / tolerance
+            joint = int(np.argmax(excess))
+            if excess[joint] > 1.0:
+                return (
+                    f'{limits.names[joint]}: {what} off by {error[joint]:+.4f} {unit},'
+                    f' tolerance {tolerance[joint]:.4f}'
+                )
+        return None
+
+
+def tolerances(
+    limits: JointLimits,
+    given: Mapping[str, JointTolerance] | None,
+    default: JointTolerance,
+) -> Tolerances:
+    """Put tolerances together: those of a goal, else the default.
+
+    Args:
+        limits: Limits of the joints, with their names.
+        given: The goal's tolerances by joint: above 0 counts, 0 keeps the default, below takes it
+            away.
+        default: The default of each joint; 0 is none.
+    """
+    rows = [
+        (
+            _one(asked.position, default.position),
+            _one(asked.velocity, default.velocity),
+        )
+        for asked in ((given or {}).get(name, JointTolerance()) for name in limits.names)
+    ]
+    return Tolerances(np.array([row[0] for row in rows]), np.array([row[1] for row in rows]))
+
+
+def _one(asked: float, default: float) -> float:
+    value = default if asked == 0.0 else asked
+    return value if value > 0.0 else np.inf

@@ -1,0 +1,258 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The motion core: hand-overs without a jump, stops, refusals."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import contextlib
+import math
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+import numpy as np
+import pytest
+from servo_robots import ready, robot, ROBOTS
+from servo_streams import kept, PERIOD, stream, wave
+
+from arm_servo.core import MotionCore, SetPoint, Source
+from arm_servo.exceptions import CommandError, GoalCode, NotReadyError
+from arm_servo.execution import Phase
+from arm_servo.model import Pose, RobotModel
+from arm_servo.report import Cause
+
+Action = Callable[[MotionCore, float, np.random.Generator], object]
+
+
+def core_of(name: str) -> MotionCore:
+    """Return a core of a robot in its pose to start from."""
+    core = MotionCore(robot(name))
+    core.reset(ready(name))
+    return core
+
+
+def near(core: MotionCore, rng: np.random.Generator, far: float) -> dict[str, float]:
+    """Return joint positions near the arm's, within the limits."""
+    limits = robot_of(core).limits
+    at = core.state.position + rng.uniform(-far, far, len(limits))
+    inside = np.clip(at, limits.lower, limits.upper)
+    return dict(zip(limits.names, inside.tolist(), strict=True))
+
+
+def robot_of(core: MotionCore) -> RobotModel:
+    """Return the model of a core."""
+    return core._model
+
+
+def twist(core: MotionCore, now: float, rng: np.random.Generator) -> None:
+    """Jog the tool."""
+    link = robot_of(core).tip if rng.random() < 0.5 else None
+    core.twist(rng.normal(size=6) * [0.1, 0.1, 0.1, 0.3, 0.3, 0.3], now, link=link, duration=0.3)
+
+
+def jog(core: MotionCore, now: float, rng: np.random.Generator) -> None:
+    """Jog a joint."""
+    name = rng.choice(robot_of(core).joints)
+    core.jog({str(name): float(rng.uniform(-1, 1))}, now, duration=0.3)
+
+
+def track(core: MotionCore, now: float, rng: np.random.Generator) -> None:
+    """Track a pose."""
+    at = np.array(list(near(core, rng, 0.1).values()))
+    core.track(robot_of(core).pose(at), now, duration=0.3)
+
+
+def follow(core: MotionCore, now: float, rng: np.random.Generator) -> None:
+    """Follow a trajectory from the pose to start from."""
+    model = robot_of(core)
+    core.follow(wave(model, ready(model.name), str(rng.choice(['l', 'c', 'q'])), step=2.0))
+
+
+def target(core: MotionCore, now: float, rng: np.random.Generator) -> None:
+    """Move to a single target."""
+    core.move_to(near(core, rng, 0.3))
+
+
+def speed(core: MotionCore, now: float, rng: np.random.Generator) -> None:
+    """Change the speed."""
+    core.override(float(rng.choice([0.0, 0.3, 1.0])))
+
+
+def pause(core: MotionCore, now: float, rng: np.random.Generator) -> None:
+    """Pause, or go on."""
+    (core.resume if core.paused else core.pause)()
+
+
+def stop(core: MotionCore, now: float, rng: np.random.Generator) -> None:
+    """Stop."""
+    core.stop()
+
+
+ACTIONS: list[Action] = [twist, twist, jog, track, follow, target, speed, pause, stop]
+
+
+@pytest.mark.parametrize('name', ROBOTS)
+@settings(max_examples=12, deadline=None)
+@given(
+    seed=st.integers(0, 10**6),
+    steps=st.lists(
+        st.tuples(st.sampled_from(ACTIONS), st.integers(1, 60)), min_size=4, max_size=9
+    ),
+)
+def test_sources_hand_over_without_a_jump(
+    name: str, seed: int, steps: list[tuple[Action, int]]
+) -> None:
+    """In any order, at any moment: velocity, acceleration and jerk keep their limits."""
+    rng, core = np.random.default_rng(seed), core_of(name)
+    states, cycle = [core.state], 0
+    for action, cycles in steps:
+        # refused: jogging while paused, a trajectory that begins too far away; nothing changes
+        with contextlib.suppress(CommandError):
+            action(core, cycle * PERIOD, rng)
+        for _ in range(cycles):
+            states.append(core.step(cycle * PERIOD, PERIOD).state)
+            cycle += 1
+    core.stop()
+    for _ in range(700):
+        states.append(core.step(cycle * PERIOD, PERIOD).state)
+        cycle += 1
+        if not states[-1].moving:
+            break
+    assert not states[-1].moving
+    kept(robot(name).limits, states)
+
+
+@pytest.mark.parametrize('name', ROBOTS)
+def test_a_released_key_is_a_smooth_stop(name: str) -> None:
+    """Without a fresh command the arm comes to rest, and lets go of the jog."""
+    core = core_of(name)
+    core.twist([0.1, 0, 0, 0, 0, 0], 0.0, duration=0.5)
+    points = stream(core, 2.0)
+    assert any(point.state.moving for point in points)
+    assert not points[-1].state.moving
+    assert core.source is Source.NONE
+    kept(robot(name).limits, [point.state for point in points])
+
+
+def test_the_time_out_counts_from_the_command() -> None:
+    """A jog command counts for its time-out, and no longer."""
+    core = core_of('prbt')
+    core.jog({'prbt_joint_1': 0.5}, 0.0)
+    moving = [point.source for point in stream(core, 1.0)]
+    assert moving[0] is Source.JOG
+    assert moving[-1] is Source.NONE
+
+
+def test_a_stop_keeps_the_tool_on_its_line() -> None:
+    """The joints stop in step: a released tool stays within 1 mm of its line."""
+    core = core_of('panda')
+    model = robot('panda')
+    core.twist([0.15, 0, 0, 0, 0, 0], 0.0, duration=0.6)
+    points = stream(core, 1.5)
+    home = model.pose(ready('panda')).position
+    away = [model.pose(point.state.position).position - home for point in points]
+    assert max(float(np.linalg.norm(each[1:])) for each in away) < 1e-3
+
+
+def test_taking_over_ends_the_trajectory_with_words() -> None:
+    """A trajectory that loses the arm ends, and says to what."""
+    core = core_of('prbt')
+    execution = core.follow(wave(robot('prbt'), ready('prbt'), 'q'))
+    stream(core, 0.4)
+    core.jog({'prbt_joint_1': 0.2}, 0.4)
+    assert execution.phase is Phase.DONE
+    assert execution.ending is not None
+    assert execution.ending.code is GoalCode.INVALID_GOAL
+    assert 'jogging took over' in execution.ending.reason
+
+
+@pytest.mark.parametrize('name', ROBOTS)
+def test_a_single_target_is_reached_at_rest(name: str) -> None:
+    """A target is reached exactly, then the arm is free."""
+    core = core_of(name)
+    goal = {robot(name).joints[1]: float(ready(name)[1]) + 0.3}
+    core.move_to(goal)
+    points = stream(core, 3.0)
+    expected = np.array(ready(name))
+    expected[1] += 0.3
+    assert points[-1].state.position == pytest.approx(expected, abs=1e-9)
+    assert core.source is Source.NONE
+    kept(robot(name).limits, [point.state for point in points])
+
+
+def test_a_target_goes_at_the_overridden_speed() -> None:
+    """At 20 % a joint moves at a fifth of its speed at most."""
+    core = core_of('prbt')
+    core.override(0.2)
+    core.move_to({'prbt_joint_1': 1.0})
+    points = stream(core, 2.0)
+    fastest = max(float(np.abs(point.state.velocity).max()) for point in points)
+    assert fastest == pytest.approx(0.2 * 1.57, rel=1e-3)
+
+
+def test_a_pause_holds_everything() -> None:
+    """Paused, a target waits and jogging is refused; then both go on."""
+    core = core_of('prbt')
+    core.move_to({'prbt_joint_1': 1.0})
+    stream(core, 0.3)
+    core.pause()
+    assert not stream(core, 1.0)[-1].state.moving
+    with pytest.raises(CommandError, match='resume first'):
+        core.jog({'prbt_joint_1': 0.1}, 1.3)
+    core.resume()
+    assert stream(core, 3.0)[-1].state.position[0] == pytest.approx(1.0)
+
+
+def test_what_limits_is_in_the_set_point() -> None:
+    """The report of a cycle names joint and factor."""
+    core = core_of('prbt')
+    core.twist([0.0, 0.0, 1.0, 0, 0, 0], 0.0, duration=2.0)
+    reports = [point.report for point in stream(core, 1.0)]
+    causes = {limiter.cause for report in reports for limiter in report.limiters}
+    assert causes & {Cause.JOINT_VELOCITY, Cause.SINGULARITY, Cause.JOINT_ACCELERATION}
+    limited = next(report for report in reports if report.limiters)
+    assert limited.factor < 1.0
+    assert 'x' in str(limited)
+
+
+def test_nothing_is_commanded_before_the_position_is_known() -> None:
+    """Without a position every command is refused."""
+    core = MotionCore(robot('prbt'))
+    refused: list[Callable[[], object]] = [
+        lambda: core.twist([0.0] * 6, 0.0),
+        lambda: core.jog({'prbt_joint_1': 0.1}, 0.0),
+        lambda: core.follow(wave(robot('prbt'), ready('prbt'), 'q')),
+        lambda: core.move_to({'prbt_joint_1': 0.1}),
+        lambda: core.step(0.0, PERIOD),
+    ]
+    for command in refused:
+        with pytest.raises(NotReadyError, match='joint states'):
+            command()
+
+
+BAD: dict[str, tuple[Callable[[MotionCore], object], str]] = {
+    'nan twist': (lambda c: c.twist([math.nan] * 6, 0.0), 'number 0 is nan'),
+    'short twist': (lambda c: c.twist([0.1] * 5, 0.0), '5 numbers, 6 are needed'),
+    'unknown link': (lambda c: c.twist([0.1] * 6, 0.0, link='hand'), "'hand'"),
+    'unknown joint': (lambda c: c.jog({'elbow': 0.1}, 0.0), "'elbow'"),
+    'infinite jog': (lambda c: c.jog({'prbt_joint_1': math.inf}, 0.0), 'inf'),
+    'no joint': (lambda c: c.jog({}, 0.0), 'no joint'),
+    'no rotation': (lambda c: c.track(Pose(np.ones((3, 3)), np.zeros(3)), 0.0), 'no rotation'),
+    'target beyond': (lambda c: c.move_to({'prbt_joint_3': 3.0}), 'beyond its limits'),
+    'target nan': (lambda c: c.move_to({'prbt_joint_3': math.nan}), 'nan'),
+    'speed': (lambda c: c.override(1.2), 'between 0 and 1'),
+    'speed nan': (lambda c: c.override(math.nan), 'between 0 and 1'),
+    'reset': (lambda c: c.reset([0.0] * 5), '5 numbers, 6 are needed'),
+}
+
+
+@pytest.mark.parametrize(('command', 'words'), BAD.values(), ids=BAD.keys())
+def test_bad_commands_are_refused_before_anything_moves(
+    command: Callable[[MotionCore], object], words: str
+) -> None:
+    """A command that makes no sense is refused with a reason, and the arm stays at rest."""
+    core = core_of('prbt')
+    with pytest.raises(CommandError, match=words):
+        command(core)
+    points: list[SetPoint] = stream(core, 0.1)
+    assert not any(point.state.moving for point in points)

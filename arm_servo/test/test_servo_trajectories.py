@@ -1,0 +1,346 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Trajectories: on their path at any pace, refused with reasons, ended with words."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+import math
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+import numpy as np
+import pytest
+from servo_robots import chain, ready, robot, ROBOTS
+from servo_streams import follow_to_the_end, kept, PERIOD, stream, wave
+
+from arm_servo.arrays import Array
+from arm_servo.core import CoreSettings, MotionCore
+from arm_servo.exceptions import GoalCode, GoalError
+from arm_servo.execution import ExecutionSettings, Outcome, Phase
+from arm_servo.goal import GoalPoint, GoalRules, JointTolerance, TrajectoryGoal
+from arm_servo.otg import MotionState
+from arm_servo.path import cubic, linear, Path, PathPoint, quintic
+
+
+def core_of(name: str, execution: ExecutionSettings | None = None) -> MotionCore:
+    """Return a core of a robot in its pose to start from."""
+    core = MotionCore(robot(name), CoreSettings(execution=execution or ExecutionSettings()))
+    core.reset(ready(name))
+    return core
+
+
+def off_the_path(states: list[MotionState], path: Path) -> float:
+    """Return how far positions are from the nearest place of a path, at most, in [rad]."""
+    places = np.array([path.at(t).position for t in np.linspace(0, path.duration, 4000)])
+    return max(float(np.abs(places - s.position).max(axis=1).min()) for s in states[::10])
+
+
+def path_of(core: MotionCore) -> Path:
+    """Return the path that a core follows."""
+    assert core.execution is not None
+    return core.execution._path
+
+
+@settings(max_examples=30, deadline=None)
+@given(seed=st.integers(0, 10**6), duration=st.floats(0.1, 5.0))
+def test_segments_meet_their_ends(seed: int, duration: float) -> None:
+    """A line meets positions, a cubic velocities too, a quintic accelerations too."""
+    rng = np.random.default_rng(seed)
+    begin, end = (PathPoint(*rng.normal(size=(3, 4))) for _ in range(2))
+    straight = linear(1.0, duration, begin.position, end.position)
+    third, fifth = cubic(1.0, duration, begin, end), quintic(1.0, duration, begin, end)
+    for segment in (straight, third, fifth):
+        assert segment.at(1.0).position == pytest.approx(begin.position)
+        assert segment.at(1.0 + duration).position == pytest.approx(end.position, abs=1e-9)
+    for segment in (third, fifth):
+        assert segment.at(1.0).velocity == pytest.approx(begin.velocity)
+        assert segment.at(1.0 + duration).velocity == pytest.approx(end.velocity, abs=1e-8)
+    assert fifth.at(1.0).acceleration == pytest.approx(begin.acceleration)
+    assert fifth.at(1.0 + duration).acceleration == pytest.approx(end.acceleration, abs=1e-6)
+
+
+@settings(max_examples=30, deadline=None)
+@given(seed=st.integers(0, 10**6), share=st.floats(0.1, 0.9))
+def test_derivatives_of_segments_are_differences(seed: int, share: float) -> None:
+    """Velocity and acceleration are the difference quotients of what they derive."""
+    rng, step = np.random.default_rng(seed), 1e-6
+    begin, end = (PathPoint(*rng.normal(size=(3, 4))) for _ in range(2))
+    segment = quintic(0.0, 1.0, begin, end)
+    before, here, after = (segment.at(share + shift) for shift in (-step, 0.0, step))
+    assert here.velocity == pytest.approx(
+        (after.position - before.position) / (2 * step), abs=1e-5
+    )
+    assert here.acceleration == pytest.approx(
+        (after.velocity - before.velocity) / (2 * step), abs=1e-4
+    )
+
+
+@pytest.mark.parametrize('name', ROBOTS)
+@pytest.mark.parametrize('kind', ['l', 'c', 'q'])
+def test_a_trajectory_is_followed_to_its_end(name: str, kind: str) -> None:
+    """Every kind of segment ends at the goal, within the limits, successful."""
+    core = core_of(name)
+    goal = wave(robot(name), ready(name), kind)
+    execution = core.follow(goal)
+    states = follow_to_the_end(core, execution)
+    assert execution.ending is not None
+    assert execution.ending.code is GoalCode.SUCCESSFUL
+    assert states[-1].position == pytest.approx(goal.points[-1].positions, abs=1e-6)
+    assert not states[-1].moving
+    kept(robot(name).limits, states)
+
+
+@pytest.mark.parametrize('kind', ['l', 'c', 'q'])
+def test_a_trajectory_beyond_the_limits_is_followed_within_them(kind: str) -> None:
+    """Where a trajectory asks more acceleration than there is, the arm is late, not rough."""
+    core = core_of('panda')
+    goal = wave(robot('panda'), ready('panda'), kind, step=0.7)
+    states = follow_to_the_end(core, core.follow(goal))
+    assert states[-1].position == pytest.approx(goal.points[-1].positions, abs=1e-6)
+    kept(robot('panda').limits, states)
+
+
+@pytest.mark.parametrize('kind', ['c', 'q'])
+def test_points_are_passed_at_their_times(kind: str) -> None:
+    """A point with velocities is passed at its time, within the rounding of the cubic."""
+    core = core_of('prbt')
+    goal = wave(robot('prbt'), ready('prbt'), kind)
+    states = follow_to_the_end(core, core.follow(goal))
+    for point in goal.points[:-1]:
+        there = states[round(point.time / PERIOD)]
+        assert there.position == pytest.approx(point.positions, abs=2e-3)
+        assert there.velocity == pytest.approx(point.velocities, abs=5e-2)
+
+
+@pytest.mark.parametrize('kind', ['l', 'c', 'q'])
+def test_pause_and_resume_stay_on_the_path(kind: str) -> None:
+    """A paused arm comes to rest on its path, and goes on along it."""
+    core = core_of('panda')
+    goal = wave(robot('panda'), ready('panda'), kind)
+    core.follow(goal)
+    events = {0.7: lambda c, _: c.pause(), 1.6: lambda c, _: c.resume()}
+    states = [point.state for point in stream(core, 6.0, events)]
+    at_rest = [not state.moving for state in states]
+    assert any(at_rest[round(0.8 / PERIOD) : round(1.6 / PERIOD)])
+    assert states[-1].position == pytest.approx(goal.points[-1].positions, abs=1e-6)
+    assert off_the_path(states, path_of(core)) < 1e-3
+    kept(robot('panda').limits, states)
+
+
+@pytest.mark.parametrize('name', ROBOTS)
+@settings(max_examples=5, deadline=None)
+@given(seed=st.integers(0, 10**6))
+def test_any_speed_at_any_time_stays_on_the_path(name: str, seed: int) -> None:
+    """Speed overrides of 0 to 100 % at any time change the pace and not the path."""
+    rng, core = np.random.default_rng(seed), core_of(name)
+    core.follow(wave(robot(name), ready(name), rng.choice(['l', 'c', 'q'])))
+    events = {
+        float(time): (lambda c, _, s=float(speed): c.override(s))
+        for time, speed in zip(rng.uniform(0, 3, 4), [*rng.random(3), 1.0], strict=True)
+    }
+    states = [point.state for point in stream(core, 6.0, events)]
+    assert off_the_path(states, path_of(core)) < 1e-3
+    kept(robot(name).limits, states)
+
+
+def test_a_speed_override_takes_as_much_longer() -> None:
+    """At 50 % a trajectory takes twice its time."""
+    core = core_of('prbt')
+    core.override(0.5)
+    execution = core.follow(wave(robot('prbt'), ready('prbt'), 'q'))
+    states = follow_to_the_end(core, execution)
+    assert len(states) * PERIOD == pytest.approx(9.0, abs=0.05)
+
+
+@pytest.mark.parametrize('name', ROBOTS)
+@pytest.mark.parametrize('time', [0.1, 0.7, 1.45, 2.9])
+def test_cancel_stops_on_the_path(name: str, time: float) -> None:
+    """A cancelled trajectory comes to rest on its path, within the limits, and says so."""
+    core = core_of(name)
+    execution = core.follow(wave(robot(name), ready(name), 'q'))
+    points = stream(core, time + 1.5, {time: lambda c, _: c.stop('canceled')})
+    states = [point.state for point in points]
+    assert execution.ending == Outcome(GoalCode.SUCCESSFUL, 'canceled', canceled=True)
+    assert execution.phase is Phase.DONE
+    assert not states[-1].moving
+    assert off_the_path(states, path_of(core)) < 1e-3
+    kept(robot(name).limits, states)
+
+
+@pytest.mark.parametrize('name', ROBOTS)
+@settings(max_examples=6, deadline=None)
+@given(seed=st.integers(0, 10**6))
+def test_a_new_goal_is_spliced_in(name: str, seed: int) -> None:
+    """A goal that replaces another at any moment is reached without a jump."""
+    rng, core = np.random.default_rng(seed), core_of(name)
+    first = core.follow(wave(robot(name), ready(name), rng.choice(['l', 'c', 'q'])))
+    states = [point.state for point in stream(core, float(rng.uniform(0.05, 2.5)))]
+    goal = wave(robot(name), ready(name), rng.choice(['l', 'c', 'q']))
+    second = core.follow(goal)
+    assert first.ending is not None
+    assert 'new trajectory' in first.ending.reason
+    states += follow_to_the_end(core, second)[1:]
+    assert states[-1].position == pytest.approx(goal.points[-1].positions, abs=1e-6)
+    kept(robot(name).limits, states)
+
+
+def test_a_first_point_without_time_is_caught_up_with() -> None:
+    """Set-points that begin beside the path meet it, and stay on it."""
+    core = core_of('gp110')
+    start = ready('gp110')
+    points = [GoalPoint(0.0, tuple(start + 0.03)), GoalPoint(2.0, tuple(start + 0.4))]
+    states = follow_to_the_end(core, core.follow(TrajectoryGoal(robot('gp110').joints, points)))
+    assert states[-1].position == pytest.approx(start + 0.4, abs=1e-6)
+    assert off_the_path(states[len(states) // 2 :], path_of(core)) < 1e-4
+    kept(robot('gp110').limits, states)
+
+
+def test_continuous_joints_take_the_short_way() -> None:
+    """A goal a turn away is half a turn away at most, and goes on from there."""
+    model = chain('cyyzyz')
+    core = MotionCore(model)
+    core.reset([3.0, 0.0, 0.5, 0.0, 0.5, 0.0])
+    goal = TrajectoryGoal(
+        model.joints, [GoalPoint(1.5, (-3.0 - 4 * math.pi, 0.0, 0.5, 0.0, 0.5, 0.0))]
+    )
+    states = follow_to_the_end(core, core.follow(goal))
+    assert states[-1].position[0] == pytest.approx(2 * math.pi - 3.0, abs=1e-6)
+
+
+def test_a_velocity_at_the_end_is_run_out() -> None:
+    """Where it is allowed, an end with velocity comes to rest behind the last point."""
+    core = core_of('prbt', ExecutionSettings(rules=GoalRules(end_velocity=True)))
+    start, joints = ready('prbt'), robot('prbt').joints
+    point = GoalPoint(1.0, tuple(start + 0.2), (0.4,) * 6)
+    states = follow_to_the_end(core, core.follow(TrajectoryGoal(joints, [point])))
+    assert np.all(states[-1].position > start + 0.2)
+    assert not states[-1].moving
+    kept(robot('prbt').limits, states)
+    with pytest.raises(GoalError, match=r'prbt_joint_1 has 0\.4000 rad/s at the last point'):
+        core_of('prbt').follow(TrajectoryGoal(joints, [point]))
+
+
+def test_a_trajectory_may_begin_later() -> None:
+    """A start in the future is waited for at rest."""
+    core = core_of('prbt')
+    execution = core.follow(replace(wave(robot('prbt'), ready('prbt'), 'q'), age=-0.5))
+    states = [point.state for point in stream(core, 0.48)]
+    assert not any(state.moving for state in states)
+    follow_to_the_end(core, execution)
+    assert execution.ending is not None
+    assert execution.ending.code is GoalCode.SUCCESSFUL
+
+
+def test_a_trajectory_that_has_begun_is_joined() -> None:
+    """Points that have passed are left out; the next one is met in its time."""
+    core = core_of('prbt')
+    goal = replace(wave(robot('prbt'), ready('prbt'), 'q'), age=2.0)
+    states = follow_to_the_end(core, core.follow(goal))
+    assert len(states) * PERIOD == pytest.approx(2.5, abs=0.05)
+    assert states[-1].position == pytest.approx(goal.points[-1].positions, abs=1e-6)
+
+
+def lagging(core: MotionCore, lag: Array, cycles: int) -> None:
+    """Step a core whose drives are off by an amount."""
+    for step in range(cycles):
+        state = core.state
+        measured = MotionState(state.position - lag, state.velocity, state.acceleration)
+        core.step(step * PERIOD, PERIOD, measured)
+
+
+def test_a_path_violation_names_joint_amount_and_time() -> None:
+    """A joint off its path ends the trajectory on the path, with joint, amount and time."""
+    settings_ = ExecutionSettings(path=JointTolerance(0.05))
+    core = core_of('prbt', settings_)
+    execution = core.follow(wave(robot('prbt'), ready('prbt'), 'q'))
+    lagging(core, np.zeros(6), 100)
+    lagging(core, np.array([0, 0, 0.08, 0, 0, 0]), 400)
+    assert execution.ending is not None
+    assert execution.ending.code is GoalCode.PATH_TOLERANCE_VIOLATED
+    for word in ('prbt_joint_3', '+0.08', 'tolerance 0.0500', 'at 0.4'):
+        assert word in execution.ending.reason
+    assert execution.phase is Phase.DONE
+    assert not core.state.moving
+
+
+def test_a_goals_own_tolerance_counts() -> None:
+    """A tolerance of the goal replaces the default, and -1 takes it away."""
+    goal = wave(robot('prbt'), ready('prbt'), 'q')
+    lag = np.array([0, 0, 0.08, 0, 0, 0])
+    for tolerance, expected in ((0.1, None), (-1.0, None), (0.02, 'tolerance 0.0200')):
+        core = core_of('prbt', ExecutionSettings(path=JointTolerance(0.05)))
+        asked = {'prbt_joint_3': JointTolerance(tolerance)}
+        execution = core.follow(replace(goal, path_tolerance=asked))
+        lagging(core, lag, 50)
+        ending = execution.ending
+        assert (ending is None) == (expected is None)
+        assert expected is None or expected in str(ending)
+
+
+def test_a_goal_that_is_not_reached_in_time_says_so() -> None:
+    """A joint that stays off at the end ends with its name, amount and the time."""
+    core = core_of('prbt', ExecutionSettings(goal=JointTolerance(0.01), goal_time=0.3))
+    execution = core.follow(wave(robot('prbt'), ready('prbt'), 'q', step=0.8))
+    lagging(core, np.array([0, 0.02, 0, 0, 0, 0]), 800)
+    assert execution.ending is not None
+    assert execution.ending.code is GoalCode.GOAL_TOLERANCE_VIOLATED
+    for word in ('prbt_joint_2', '+0.0200', 'goal_time 0.3'):
+        assert word in execution.ending.reason
+
+
+def spoiled(index: int, **changes: object) -> TrajectoryGoal:
+    """Return a trajectory with one point changed."""
+    goal = wave(robot('prbt'), ready('prbt'), 'q')
+    points = list(goal.points)
+    points[index] = replace(points[index], **changes)  # type: ignore[arg-type]
+    return replace(goal, points=points)
+
+
+GOOD = wave(robot('prbt'), ready('prbt'), 'q')
+
+REFUSED = {
+    'nan': (spoiled(1, positions=(math.nan,) * 6), -1, 'prbt_joint_1 is nan'),
+    'infinite velocity': (spoiled(1, velocities=(math.inf,) * 6), -1, 'must be finite'),
+    'wrong length': (spoiled(0, positions=(0.0,) * 5), -1, '5 positions for 6 joints'),
+    'no positions': (spoiled(0, positions=()), -1, 'no positions'),
+    'times': (spoiled(1, time=1.5), -1, 'must increase'),
+    'negative time': (spoiled(0, time=-1.0), -1, 'must be 0 or more'),
+    'nan time': (spoiled(0, time=math.nan), -1, 'must be 0 or more'),
+    'beyond': (spoiled(1, positions=(9.0,) * 6), -1, 'prbt_joint_1 at 9.0000 is beyond'),
+    'too fast': (spoiled(1, time=1.6), -1, 'times the time'),
+    'no points': (replace(GOOD, points=[]), -1, 'no points'),
+    'unknown joint': (replace(GOOD, joints=['elbow', *GOOD.joints[1:]]), -2, "'elbow'"),
+    'twice': (replace(GOOD, joints=[GOOD.joints[1], *GOOD.joints[1:]]), -2, 'twice'),
+    'missing joint': (replace(GOOD, joints=GOOD.joints[1:]), -2, 'prbt_joint_1 is missing'),
+    'no joints': (replace(GOOD, joints=[]), -2, 'missing'),
+    'over': (replace(GOOD, age=9.0), -3, 'ended 4.500 s ago'),
+    'far begin': (
+        replace(GOOD, points=[GoalPoint(0.0, tuple(ready('prbt') + 0.3))]),
+        -1,
+        '0.300 rad away',
+    ),
+}
+
+
+@pytest.mark.parametrize(('goal', 'code', 'words'), REFUSED.values(), ids=REFUSED.keys())
+def test_bad_goals_are_refused_with_reasons(goal: TrajectoryGoal, code: int, words: str) -> None:
+    """A goal that cannot be followed is refused with code and reason, and nothing moves."""
+    core = core_of('prbt')
+    running = core.follow(GOOD)
+    with pytest.raises(GoalError, match=words) as refused:
+        core.follow(goal)
+    assert refused.value.code == code
+    assert running.phase is Phase.FOLLOWING
+
+
+def test_joints_in_any_order_and_some_of_them() -> None:
+    """Joints come in any order; where it is allowed, those that are missing stay."""
+    start = ready('prbt')
+    names = robot('prbt').joints
+    core = core_of('prbt', ExecutionSettings(rules=GoalRules(partial=True)))
+    goal = TrajectoryGoal([names[4], names[1]], [GoalPoint(1.5, (start[4] + 0.3, start[1] - 0.2))])
+    states = follow_to_the_end(core, core.follow(goal))
+    expected = np.array(start)
+    expected[[4, 1]] += (0.3, -0.2)
+    assert states[-1].position == pytest.approx(expected, abs=1e-6)
