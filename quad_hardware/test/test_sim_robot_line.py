@@ -104,6 +104,14 @@ def test_every_register_that_can_be_read_has_as_many_bytes_as_were_asked_for(add
         assert (answer.kind, answer.address, len(answer.payload)) == (Kind.REPLY, address, count)
 
 
+def test_any_number_of_bytes_may_be_asked_for() -> None:
+    """None and more than a frame takes are not answered; everything between is."""
+    robot = VirtualRobot(*KINEMATIC, protocol=OLD)
+    for count in range(256):
+        robot.send(Frame(Kind.READ, Register.BATTERY, bytes((count,))))
+        assert [len(f.payload) for f in robot.run(0.03)] == ([count] if 0 < count <= 247 else [])
+
+
 def test_a_write_runs_through_the_registers() -> None:
     """Three bytes at VX are VX, VY and VYAW; walking and bulk angles do not disturb each other."""
     robot = VirtualRobot(*KINEMATIC, protocol=OLD)

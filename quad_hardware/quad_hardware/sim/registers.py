@@ -34,6 +34,7 @@ LIE_DOWN, STAND_UP = 1, 2  # actions, of register 0x3E
 ARM_LEG = 5
 LEG_NAMES = {1: 'fl', 2: 'fr', 3: 'br', 4: 'bl'}
 INT16 = 32767
+LONGEST_ANSWER = OLD.max_length - OLD.overhead  # [B]
 
 _BODY = {0x33: 'x', 0x34: 'y', 0x35: 'z', 0x36: 'roll', 0x37: 'pitch', 0x38: 'yaw'}
 _FEET = range(0x40, 0x4C)
@@ -83,7 +84,7 @@ class Registers:
         if frame.kind is Kind.WRITE:
             self._write(frame)
             return []
-        if len(frame.payload) != 1 or frame.payload[0] == 0:
+        if len(frame.payload) != 1 or not 0 < frame.payload[0] <= LONGEST_ANSWER:
             return []
         payload = self._read(frame.address, frame.payload[0])
         return [] if payload is None else [Frame(Kind.REPLY, frame.address, payload)]
