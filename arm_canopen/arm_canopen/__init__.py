@@ -11,7 +11,7 @@ from __future__ import annotations
 from typing import Any, TYPE_CHECKING
 
 from .can import open_bus
-from .cia402.motion import AxisFeedback, MotionSource
+from .cia402.motion import AxisFeedback, MotionSource, Setpoint
 from .config import load_bus
 from .config.model import BusConfig, NodeConfig
 from .exceptions import CanopenError
@@ -27,6 +27,7 @@ __all__ = [
     'MasterProcess',
     'MotionSource',
     'NodeConfig',
+    'Setpoint',
     'load_bus',
     'open_bus',
     'run_master',

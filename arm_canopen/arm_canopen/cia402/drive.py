@@ -13,11 +13,13 @@ from ..master.remote_node import RemoteNode
 from ..master.scheduler import Scheduler, Task
 from ..standard.drive import Controlword, DriveState, OperationMode, Statusword
 from .cyclic_position import CyclicPosition
+from .feed_forward import FeedForward
 from .moded_drive import ModedDrive
 from .modes import NO_BITS
-from .motion import AxisFeedback
+from .motion import AxisFeedback, Setpoint
 from .observed_drive import FAULTY
 from .state_machine import Command, fault_reset, next_command
+from .target_limits import check_feed_forward
 
 
 class Drive(ModedDrive):
@@ -30,6 +32,7 @@ class Drive(ModedDrive):
         resetting: Send fault resets while the drive is faulted.
         period: Length of the last cycle in [s].
         interrupted: Mode in which it was enabled when its device was lost, None otherwise.
+        feed_forward: What a motion source tells ahead.
         released: Called with a reason when a motion source loses the drive.
         on_ready: Called when state and parameters are known after each boot.
     """
@@ -50,6 +53,8 @@ class Drive(ModedDrive):
         self.resetting = False
         self.period = 0.0
         self.interrupted: OperationMode | None = None
+        self.feed_forward = FeedForward(self.objects, self.units)
+        self._streamed = False
         self._failure = ''
         self._controlword = 0
         self._begun = False
@@ -116,6 +121,9 @@ class Drive(ModedDrive):
     def write(self, now: float, period: float) -> None:
         """Write controlword, mode and target for this cycle."""
         self.period = period
+        if not self._streamed:
+            self.feed_forward.end()
+        self._streamed = False
         bits = NO_BITS
         if self.state is DriveState.UNKNOWN:
             command = Command.DISABLE_VOLTAGE
@@ -137,6 +145,7 @@ class Drive(ModedDrive):
             self.goal = DriveState.QUICK_STOP_ACTIVE
         elif self.goal is not None:
             self.goal = DriveState.SWITCH_ON_DISABLED
+        self.feed_forward.end()
         self._send(self._command())
         text = str(error)
         if not isinstance(error, DriveError):
@@ -150,16 +159,21 @@ class Drive(ModedDrive):
         """End a halt as soon as the drive has the new target, so that no old one revives."""
         self.halt.leave(self._scheduler.now)
 
-    def stream(self, setpoint: float) -> None:
+    def stream(self, setpoint: Setpoint) -> None:
         """Follow a motion source in this cycle.
 
         Raises:
-            DriveError: The set-point is not finite, does not fit the object or is beyond a limit.
+            DriveError: A value is not finite, does not fit its object or is beyond a limit.
         """
-        self.check_target(setpoint)
-        if isinstance(self.mode, CyclicPosition):
-            self.halt.release()
-            self.mode.stream(setpoint)
+        self.check_target(setpoint.position)
+        if not isinstance(self.mode, CyclicPosition):
+            return
+        if self.mode.number is OperationMode.CYCLIC_POSITION:
+            check_feed_forward(self.name, self.parameters, setpoint)
+            self.feed_forward.follow(setpoint)
+        self.mode.stream(setpoint.position)
+        self.halt.release()
+        self._streamed = True
 
     def _send(self, command: Command, bits: Controlword = NO_BITS) -> None:
         self._controlword = int(command) | int(bits)
@@ -215,6 +229,7 @@ class Drive(ModedDrive):
         enabled = self.state is DriveState.OPERATION_ENABLED and self.goal is self.state
         if enabled and not self.node.left_operational:
             self.interrupted = self.mode.number
+        self.feed_forward.end()
         self.goal = None
         self.resetting = self._follows = self._begun = self._announced = False
         self.halt.release()

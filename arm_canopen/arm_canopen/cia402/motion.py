@@ -37,6 +37,23 @@ class AxisFeedback:
     followable: bool
 
 
+@dataclass(frozen=True, slots=True)
+class Setpoint:
+    """A position, and what the drive shall add to its own control on the way there.
+
+    Attributes:
+        position: In user units.
+        velocity: Feed-forward in user units per second (0x60B1, usually the rate of the
+            position); it has an effect in mode 8, where an RPDO carries the object.
+        effort: Feed-forward in units of effort (0x60B2, such as the weight of what hangs on the
+            axis); likewise.
+    """
+
+    position: float
+    velocity: float = 0.0
+    effort: float = 0.0
+
+
 class MotionSource(Protocol):
     """Something that commands positions of one or more drives, cycle by cycle.
 
@@ -49,7 +66,7 @@ class MotionSource(Protocol):
 
     def update(
         self, now: float, period: float, feedback: Sequence[AxisFeedback]
-    ) -> Sequence[float | None]:
+    ) -> Sequence[float | Setpoint | None]:
         """Answer the set-points of this cycle.
 
         A new stream must start at ``feedback[i].setpoint``; a set-point for an axis that is not
@@ -61,7 +78,8 @@ class MotionSource(Protocol):
             feedback: State of each axis, in the order of :attr:`axes`.
 
         Returns:
-            For each axis the position to command in user units, or None to leave it where it is.
+            For each axis the position to command in user units, alone or with its feed-forward,
+            or None to leave it where it is.
         """
 
     def released(self, axis: str, reason: str) -> None:

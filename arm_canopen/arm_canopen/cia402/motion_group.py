@@ -11,7 +11,7 @@ from functools import partial
 from ..exceptions import DriveError
 from ..master.events import Event, EventKind, Report, Severity
 from .drive import Drive
-from .motion import MotionSource
+from .motion import MotionSource, Setpoint
 
 HAND_OVER_MARGIN = 2.0  # cycles of profile velocity from the set-point that a stream may start
 SPEED_MARGIN = 1.5  # share of the greatest speed (0x607F) above which a step is a jump
@@ -114,25 +114,27 @@ class MotionGroup:
             if setpoint is None or not axis.followable or drive not in attachment.owned:
                 attachment.streaming.discard(drive.name)
                 continue
+            whole = setpoint if isinstance(setpoint, Setpoint) else Setpoint(setpoint)
             try:
-                self._stream(attachment, drive, setpoint, period)
+                self._stream(attachment, drive, whole, period)
             except DriveError as error:
                 self._release(drive, f'set-point refused: {error}')
 
     def _stream(
-        self, attachment: Attachment, drive: Drive, setpoint: float, period: float
+        self, attachment: Attachment, drive: Drive, setpoint: Setpoint, period: float
     ) -> None:
+        position = setpoint.position
         if drive.name not in attachment.streaming:
             margin = HAND_OVER_MARGIN * drive.parameters.profile.velocity * period
-            if abs(setpoint - drive.setpoint) > margin:
+            if abs(position - drive.setpoint) > margin:
                 raise DriveError(
-                    f'the stream starts at {setpoint:g}, but the set-point is {drive.setpoint:g}; '
+                    f'the stream starts at {position:g}, but the set-point is {drive.setpoint:g}; '
                     'a stream must start where the drive is'
                 )
             attachment.streaming.add(drive.name)
-        elif abs(setpoint - drive.setpoint) > _greatest_speed(drive) * period:
+        elif abs(position - drive.setpoint) > _greatest_speed(drive) * period:
             raise DriveError(
-                f'the stream jumps from {drive.setpoint:g} to {setpoint:g} within a cycle; the '
+                f'the stream jumps from {drive.setpoint:g} to {position:g} within a cycle; the '
                 f'axis takes up to {_greatest_speed(drive):g} per second'
             )
         drive.stream(setpoint)

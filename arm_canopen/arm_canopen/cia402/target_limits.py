@@ -7,6 +7,7 @@ from __future__ import annotations
 from ..exceptions import DriveError
 from ..standard.drive import OperationMode
 from .modes import Mode
+from .motion import Setpoint
 from .parameters import DriveParameters
 
 VELOCITY_MODES = (
@@ -35,6 +36,12 @@ def check_target(name: str, mode: Mode, told: DriveParameters, target: float) ->
         _check_size(name, told.speed_limit, target, 'velocity {:g} (0x607F)')
     elif mode.number in TORQUE_MODES:
         _check_size(name, told.effort_limit, target, 'torque {:g} (0x6072)')
+
+
+def check_feed_forward(name: str, told: DriveParameters, setpoint: Setpoint) -> None:
+    """Refuse a feed-forward beyond what the drive may ever do; errors as for targets."""
+    _check_size(name, told.speed_limit, setpoint.velocity, 'velocity {:g} (0x607F)')
+    _check_size(name, told.effort_limit, setpoint.effort, 'torque {:g} (0x6072)')
 
 
 def _check_position(name: str, limits: tuple[float, float] | None, target: float) -> None:
