@@ -11,7 +11,7 @@ packages, :mod:`.exclusive` keeps a second bring-up away, :mod:`.terminal` and :
 what the processes write.
 """
 
-from .console import explain, supervise, USAGE_ERROR
+from .console import explain, Farewell, supervise, USAGE_ERROR
 from .exceptions import StartError, SupervisorError
 from .exclusive import exclusive
 from .nodes import (
@@ -36,6 +36,7 @@ __all__ = [
     'POLITE',
     'USAGE_ERROR',
     'Executable',
+    'Farewell',
     'FindExecutable',
     'LineWriter',
     'Notice',

@@ -4,25 +4,42 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 import os
 import sys
+import threading
+from typing import Protocol
 
 from .runner import Runner
 from .spec import ProcessSpec
-from .supervision import Notice, Outcome, Severity
+from .supervision import Notice, Outcome, Phase, Severity
 from .terminal import LineWriter, Painter, wants_colour
 
 USAGE_ERROR = 2
 """Exit code of a bring-up when nothing was started."""
 
 
-def supervise(processes: Sequence[ProcessSpec], name: str = 'bringup') -> Outcome:
+class Farewell(Protocol):
+    """What is done at the first Ctrl-C, while all processes still run."""
+
+    def __call__(self, say: Callable[[str], None], given_up: Callable[[], bool]) -> None:
+        """Do it; everything is stopped when this returns.
+
+        Args:
+            say: Takes what the user is told.
+            given_up: True when it is no longer wanted: Ctrl-C again, or a process has ended.
+        """
+
+
+def supervise(
+    processes: Sequence[ProcessSpec], name: str = 'bringup', farewell: Farewell | None = None
+) -> Outcome:
     """Run processes with their output on standard output, until Ctrl-C or one ends.
 
     Args:
         processes: What to run.
         name: Name before the supervisor's own lines.
+        farewell: Done in a thread before they are stopped, if all had got ready.
 
     Returns:
         How it ended.
@@ -30,15 +47,61 @@ def supervise(processes: Sequence[ProcessSpec], name: str = 'bringup') -> Outcom
     names = [spec.name for spec in processes]
     painter = Painter(name, names, wants_colour(sys.stdout, os.environ))
     write = LineWriter(sys.stdout)
+
+    def notify(notice: Notice) -> None:
+        write(painter.notice(notice))
+
+    leaving = _Leaving(farewell, notify)
     with Runner(
         processes,
         lambda name, line: write(painter.line(name, line)),
-        lambda notice: write(painter.notice(notice)),
+        notify,
+        on_interrupt=leaving.begin,
     ) as runner:
+        leaving.runner = runner
         outcome = runner.run()
+        leaving.join()
     if outcome.exit_code:
-        write(painter.notice(Notice(Severity.ERROR, explain(outcome))))
+        notify(Notice(Severity.ERROR, explain(outcome)))
     return outcome
+
+
+class _Leaving:
+    """Runs a farewell beside the supervisor.
+
+    Attributes:
+        runner: What is stopped after it.
+    """
+
+    runner: Runner
+
+    def __init__(self, farewell: Farewell | None, notify: Callable[[Notice], None]) -> None:
+        self._farewell, self._notify = farewell, notify
+        self._thread: threading.Thread | None = None
+
+    def begin(self) -> bool:
+        """Begin it at Ctrl-C; false when there is none, or nothing to say good-bye to yet."""
+        if self._farewell is None or self.runner.phase is not Phase.RUNNING:
+            return False
+        self._thread = threading.Thread(target=self._run, args=[self._farewell], name='farewell')
+        self._thread.start()
+        return True
+
+    def join(self) -> None:
+        """Wait until it has ended; it is told when it is no longer wanted."""
+        if self._thread is not None:
+            self._thread.join()
+
+    def _run(self, farewell: Farewell) -> None:
+        outcome = Outcome(0, 'stopped by the user')
+        try:
+            farewell(
+                lambda text: self._notify(Notice(Severity.INFO, text)),
+                lambda: self.runner.phase is not Phase.RUNNING,
+            )
+        except Exception as error:  # noqa: BLE001  whatever it is, the processes are stopped
+            outcome = Outcome(1, f'{type(error).__name__}: {error}')
+        self.runner.stop(outcome)
 
 
 def explain(outcome: Outcome) -> str:
