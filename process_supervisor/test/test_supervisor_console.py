@@ -1,0 +1,115 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""A bring-up on standard output, with a farewell before everything is stopped."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import signal
+import threading
+
+import pytest
+from small_processes import PATIENCE, program
+
+from process_supervisor import Farewell, LineWriter, Outcome, supervise
+
+Say = Callable[[str], None]
+GivenUp = Callable[[], bool]
+
+
+def ctrl_c() -> None:
+    """Do as the terminal does."""
+    signal.raise_signal(signal.SIGINT)
+
+
+def run_until(
+    capsys: pytest.CaptureFixture[str], *kinds: str, farewell: Farewell | None
+) -> tuple[Outcome, list[str]]:
+    """Run small processes; they say good-bye by themselves when they are stopped."""
+    outcome = supervise([program(kind, ready='ready') for kind in kinds], farewell=farewell)
+    return outcome, capsys.readouterr().out.splitlines()
+
+
+class CtrlC:
+    """Presses Ctrl-C in a thread, when a line was written; and once more, if that is wanted."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, words: str, times: int = 1) -> None:
+        self._words, self._left = words, times
+        write = LineWriter.__call__
+        monkeypatch.setattr(
+            LineWriter, '__call__', lambda writer, line: self._see(write, writer, line)
+        )
+
+    def _see(self, write: Callable[..., None], writer: object, line: str) -> None:
+        write(writer, line)
+        if self._words in line and self._left:
+            self._left -= 1
+            ctrl_c()
+
+
+def test_a_farewell_is_done_before_anybody_is_stopped(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What it says is among the lines; the exit code is 0."""
+
+    def farewell(say: Say, given_up: GivenUp) -> None:
+        assert not given_up()
+        say('lying down')
+
+    CtrlC(monkeypatch, 'all is ready')
+    outcome, lines = run_until(capsys, 'good', farewell=farewell)
+    assert outcome == Outcome(0, 'stopped by the user')
+    farewells = [index for index, line in enumerate(lines) if 'lying down' in line]
+    byes = [index for index, line in enumerate(lines) if line.endswith('| bye')]
+    assert len(farewells) == len(byes) == 1
+    assert farewells < byes
+
+
+def test_ctrl_c_again_ends_a_farewell(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is told that it is no longer wanted, and everything is stopped at once."""
+    given_up_in_time = threading.Event()
+
+    def farewell(say: Say, given_up: GivenUp) -> None:
+        signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
+        wait = threading.Event()
+        for _ in range(round(PATIENCE / 0.01)):
+            if given_up():
+                given_up_in_time.set()
+                return
+            wait.wait(0.01)
+
+    CtrlC(monkeypatch, 'all is ready')
+    outcome, _ = run_until(capsys, 'good', farewell=farewell)
+    assert outcome.exit_code == 0
+    assert given_up_in_time.is_set()
+
+
+def test_a_farewell_that_fails_stops_everything_all_the_same(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """No process is left because of a mistake in it."""
+
+    def farewell(say: Say, given_up: GivenUp) -> None:
+        raise ZeroDivisionError('in the farewell')
+
+    CtrlC(monkeypatch, 'all is ready')
+    outcome, lines = run_until(capsys, 'good', farewell=farewell)
+    assert outcome == Outcome(1, 'ZeroDivisionError: in the farewell')
+    assert any(line.endswith('| bye') for line in lines)
+
+
+def test_without_readiness_there_is_no_farewell(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Ctrl-C during the start stops at once."""
+
+    def farewell(say: Say, given_up: GivenUp) -> None:
+        say('never')
+
+    CtrlC(monkeypatch, 'good is ready')
+    specs = [program('good', ready='ready'), program('good', 'slow', ready='never said')]
+    outcome = supervise(specs, farewell=farewell)
+    assert outcome.exit_code == 0
+    assert 'never\n' not in capsys.readouterr().out
