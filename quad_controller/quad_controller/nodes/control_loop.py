@@ -14,6 +14,8 @@ from ..states.status import Output
 from ..timing.pacer import Pacer
 from ..timing.statistics import LoopFigures, LoopStatistics
 
+PAIR_TIME = 0.002  # [s] that joint states wait for the attitude of the same report
+
 
 class ControlLoop:
     """Owns the thread; everything else of the controller is used under :attr:`lock`.
@@ -74,6 +76,8 @@ class ControlLoop:
         """Hand in an attitude for the next step."""
         with self._arrived:
             self._imu = imu
+            if self._arrival is not None:
+                self._arrived.notify()
 
     def offer_battery(self, battery: float | None) -> None:
         """Hand in a charge for the next step."""
@@ -117,6 +121,10 @@ class ControlLoop:
         while not self._stopping:
             now = time.monotonic()
             left = self._pacer.deadline(self._arrival is not None) - now
-            if left <= 0.0 or (self._arrival is not None and self._pacer.takes(now)):
+            if self._arrival is not None and self._pacer.takes(now):
+                # joints and attitude of one report come one after the other
+                paired = self._imu is not None
+                left = 0.0 if paired else min(left, self._arrival + PAIR_TIME - now)
+            if left <= 0.0:
                 return
             self._arrived.wait(left)

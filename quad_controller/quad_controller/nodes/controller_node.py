@@ -204,19 +204,18 @@ class ControllerNode(Node):
             self._commands.publish(messages.joint_command(output.targets, stamp))
             if output.shadow is not None:
                 self._shadow.publish(messages.joint_command(output.shadow, stamp))
-            if not self._ready:
-                self._ready = True
-                logger.info('ready: the joints are known; set_mode makes them move')
+        if output.ready and not self._ready:
+            self._ready = True
+            logger.info('ready: joints and attitude are known; set_mode makes the robot move')
         for event in output.events:
             if event.error:
                 logger.error(event.text, throttle_duration_sec=WARN_PERIOD)
             else:
                 logger.info(event.text)
-        status = self._status()
-        if status.title != self._title:
-            self._title = status.title
-            self._state.publish(String(data=status.title))
-            self._publish_diagnostics(status)
+        if output.title != self._title:
+            self._title = output.title
+            self._state.publish(String(data=output.title))
+            self._publish_diagnostics(self._status())
 
     def _publish_diagnostics(self, status: Status) -> None:
         name = self.get_name()

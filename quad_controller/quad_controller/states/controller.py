@@ -125,7 +125,7 @@ class Controller:
         health, machine = self._health, self._machine
         return Status(
             state=machine.state,
-            arrived=machine.motion.finished,
+            title=machine.title,
             goal=machine.goal,
             gait=self._generator.gait,
             velocity=self._generator.velocity,
@@ -153,7 +153,7 @@ class Controller:
         self._commands.pass_time(dt)
         last = self._limiter.last or self._start()
         if last is None:
-            return Output(None, None, tuple(events))
+            return Output(None, None, self._machine.title, False, tuple(events))
         before = self._machine.state
         events += self._watch(last)
         if failure := self._machine.advance(last):
@@ -164,7 +164,9 @@ class Controller:
         situation, dt_motion = self._situation(), min(dt, MAX_STEP)
         wanted = last if self._health.held else self._move(situation, dt_motion, last, events)
         shadow = self._shadow.step(situation, dt_motion, last) if self._shadow else None
-        return Output(self._limiter.step(wanted, dt), shadow, tuple(events))
+        targets = self._limiter.step(wanted, dt)
+        ready = self._health.complete
+        return Output(targets, shadow, self._machine.title, ready, tuple(events))
 
     def _start(self) -> Targets | None:
         """Begin where the joints are, as soon as that is known."""

@@ -17,13 +17,13 @@ class Reaction(IntEnum):
 
 
 class Fault(Enum):
-    """Why; the value is for people."""
+    """Why; the value says what it is about, for people."""
 
-    JOINTS = 'no joint states'
-    IMU = 'no attitude'
-    FALLEN = 'fallen'
-    BATTERY = 'battery low'
-    TARGET = 'no usable target'
+    JOINTS = 'joint states'
+    IMU = 'attitude'
+    FALLEN = 'fall'
+    BATTERY = 'battery'
+    TARGET = 'target'
 
 
 REACTIONS: Mapping[Fault, Reaction] = {

@@ -96,6 +96,11 @@ class StateMachine:
         self.motion: Motion = self._walk
 
     @property
+    def title(self) -> str:
+        """Name of the state, with the way to it as long as it stands up or lies down."""
+        return self.state.value if self.motion.finished else f'to {self.state.value}'
+
+    @property
     def reachable(self) -> bool:
         """Whether the gait's last step was within the legs' reach."""
         return self.motion is not self._walk or self._walk.reachable

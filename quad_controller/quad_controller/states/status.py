@@ -18,7 +18,7 @@ class Status:
 
     Attributes:
         state: What it is doing.
-        arrived: Whether it is there, and not still standing up or lying down.
+        title: Its name, with the way to it as long as it stands up or lies down.
         goal: What it is on the way to.
         gait: The gait.
         velocity: Velocity that the gait walks.
@@ -33,7 +33,7 @@ class Status:
     """
 
     state: State
-    arrived: bool
+    title: str
     goal: State
     gait: Gait
     velocity: Velocity
@@ -45,11 +45,6 @@ class Status:
     refused: int
     limited: int
     unreachable: int
-
-    @property
-    def title(self) -> str:
-        """The state's name, with the way to it."""
-        return self.state.value if self.arrived else f'to {self.state.value}'
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,9 +67,13 @@ class Output:
     Attributes:
         targets: Positions of all joints in [rad]; None as long as no joint state was received.
         shadow: What the policy would do, in a dry run; None otherwise.
+        title: Name of the state, with the way to it.
+        ready: Whether all measurements were heard once that walking needs.
         events: News.
     """
 
     targets: Targets | None
     shadow: Targets | None
+    title: str
+    ready: bool
     events: tuple[Event, ...]
