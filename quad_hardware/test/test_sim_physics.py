@@ -323,7 +323,11 @@ def test_a_description_that_is_no_quadruped_is_refused(urdf: str, message: str) 
         (lambda: Robot(URDF, timestep=0.5), 'timestep 0.5'),
         (lambda: Robot(URDF, pose={'tail_joint': 0}), 'tail_joint'),
         (lambda: Robot(URDF).kick((math.nan, 0, 0)), 'kick'),
+        (lambda: Robot(URDF).kick((0, 0, 11)), 'up to 10 m/s'),
         (lambda: Robot(URDF).push((0, 0, 0), -1), 'push'),
+        (lambda: Robot(URDF).push((1e3, 0, 0), 1), 'up to 200 N'),
+        (lambda: Robot(URDF).push((0, math.inf, 0), 1), 'push'),
+        (lambda: Robot(URDF).push((1, 0, 0), math.nan), 'push'),
     ],
 )
 def test_options_without_sense_are_refused(make: object, message: str) -> None:

@@ -14,7 +14,8 @@ import numpy as np
 from quad_description import movable_joints
 
 from .exceptions import SetupError, SimulationError
-from .model import ACCELEROMETER, BASE, build_model, FEET, GYRO, IMU
+from .inertial import base_rotation, InertialUnit, vector
+from .model import BASE, build_model, FEET
 from .noise import disturb, Noise, NONE
 from .placing import place, start_positions
 from .servo import ServoModel, ServoParameters
@@ -23,7 +24,8 @@ from .targets import TargetRamp, Targets
 from .terrain import FLAT, Terrain
 
 TIMESTEP: Final = 0.002  # [s]
-IMU_BANDWIDTH: Final = 20.0  # [Hz] low-pass of the accelerometer, as IMU chips have one
+STRONGEST: Final = 200.0  # [N] of a push; the robot weighs 7 N
+FASTEST: Final = 10.0  # [m/s] of a kick
 
 
 class Robot:
@@ -73,15 +75,11 @@ class Robot:
         self.feet: Final = FEET
         self._qpos = [int(self._model.joint(name).qposadr[0]) for name in self.joint_names]
         self._qvel = [int(self._model.joint(name).dofadr[0]) for name in self.joint_names]
-        # views: MuJoCo keeps its arrays where they are
-        self._accelerometer = self._data.sensordata[self._sensor(ACCELEROMETER)]
-        self._gyro = self._sensor(GYRO)
-        self._touch = [self._sensor(foot).start for foot in FEET]
+        self._touch = [int(self._model.sensor(foot).adr[0]) for foot in FEET]
+        self._inertial = InertialUnit(self._model, self._data)
         self._gains = self._model.actuator_gainprm.copy(), self._model.actuator_biasprm.copy()
-        self._smoothing = 1.0 - math.exp(-2.0 * math.pi * IMU_BANDWIDTH * timestep)
         self._ramp = TargetRamp(joints, timestep, self._data.ctrl)
         self._random = np.random.default_rng(seed)
-        self._specific_force: Array = np.zeros(3)
         self.reset(pose=pose, seed=seed)
 
     def reset(self, *, pose: Mapping[str, float] | None = None, seed: int = 0) -> None:
@@ -104,9 +102,7 @@ class Robot:
         self._ramp.jump(start)
         place(self._model, self._data, self._terrain)
         mujoco.mj_forward(self._model, self._data)
-        # at rest from the start: a filter that begins at zero would report a fall
-        gravity = np.array([0.0, 0.0, -self._model.opt.gravity[2]])
-        self._specific_force = self._imu_rotation().T @ gravity
+        self._inertial.rest()
 
     # -- what may be done to it
 
@@ -161,10 +157,12 @@ class Robot:
             duration: [s]
 
         Raises:
-            SetupError: A number is not finite, or the duration is negative.
+            SetupError: A number is not finite, far too large, or the duration is negative.
         """
-        if not (all(map(math.isfinite, force)) and math.isfinite(duration) and duration >= 0.0):
-            raise SetupError(f'push of {force} N for {duration} s: give finite numbers')
+        if not (math.hypot(*force) <= STRONGEST and 0.0 <= duration < math.inf):
+            raise SetupError(
+                f'push of {force} N for {duration} s: give up to {STRONGEST:g} N for a finite time'
+            )
         self._data.xfrc_applied[self._base, :3] = self._heading_to_world(force)
         self._push_until = self._steps + round(duration / self._model.opt.timestep)
 
@@ -175,10 +173,10 @@ class Robot:
             velocity: The change [m/s] in the frame that has the robot's heading.
 
         Raises:
-            SetupError: A number is not finite.
+            SetupError: A number is not finite, or far too large.
         """
-        if not all(map(math.isfinite, velocity)):
-            raise SetupError(f'kick of {velocity} m/s: give finite numbers')
+        if not math.hypot(*velocity) <= FASTEST:
+            raise SetupError(f'kick of {velocity} m/s: give up to {FASTEST:g} m/s')
         self._data.qvel[:3] += self._heading_to_world(velocity)
 
     def step(self, duration: float) -> None:
@@ -222,13 +220,13 @@ class Robot:
     def base_velocity(self) -> BaseVelocity:
         """How base_link moves, expressed in base_link."""
         # MuJoCo has the linear part in the world and the angular part in the body
-        linear = self._base_rotation().T @ self._data.qvel[:3]
-        return BaseVelocity(_vector(linear), _vector(self._data.qvel[3:6]))
+        linear = base_rotation(self._data).T @ self._data.qvel[:3]
+        return BaseVelocity(vector(linear), vector(self._data.qvel[3:6]))
 
     @property
     def centre_of_mass(self) -> Vector:
         """Centre of mass of all of it, in the world [m]."""
-        return _vector(self._data.subtree_com[self._base])
+        return vector(self._data.subtree_com[self._base])
 
     @property
     def joint_positions(self) -> Array:
@@ -253,15 +251,7 @@ class Robot:
     @property
     def imu(self) -> Imu:
         """What an ideal IMU feels; its attitude is that of imu_link in the world."""
-        quaternion = np.empty(4)
-        mujoco.mju_mat2Quat(quaternion, self._imu_rotation().ravel())
-        w, x, y, z = quaternion.tolist()
-        pose = BasePose((0.0, 0.0, 0.0), (x, y, z, w))
-        return Imu(
-            _vector(self._specific_force),
-            _vector(self._data.sensordata[self._gyro]),
-            pose.roll_pitch_yaw,
-        )
+        return self._inertial.read()
 
     @property
     def foot_forces(self) -> Array:
@@ -275,7 +265,7 @@ class Robot:
 
     def link_position(self, link: str) -> Vector:
         """Return where the origin of a link is, in the world [m]."""
-        return _vector(self._data.body(link).xpos)
+        return vector(self._data.body(link).xpos)
 
     def measure(self) -> Measurement:
         """Return what the sensors say, with the noise that the robot was made with."""
@@ -295,11 +285,6 @@ class Robot:
     def _base(self) -> int:
         return int(self._model.body(BASE).id)
 
-    def _sensor(self, name: str) -> slice:
-        sensor = self._model.sensor(name)
-        start = int(sensor.adr[0])
-        return slice(start, start + int(sensor.dim[0]))
-
     def _step_once(self) -> None:
         data = self._data
         self._ramp.advance()
@@ -307,30 +292,11 @@ class Robot:
             data.xfrc_applied[self._base] = 0.0
             self._push_until = None
         mujoco.mj_step(self._model, data)
-        self._specific_force += self._smoothing * (self._accelerometer - self._specific_force)
+        self._inertial.sample()
         self._steps += 1
-
-    def _base_rotation(self) -> Array:
-        """Rotation of base_link to the world, of the positions as they are now."""
-        matrix = np.empty(9)
-        mujoco.mju_quat2Mat(matrix, self._data.qpos[3:7])
-        return matrix.reshape(3, 3)
-
-    def _imu_rotation(self) -> Array:
-        """Rotation of imu_link to the world."""
-        body = self._model.body(IMU)
-        matrix = np.empty(9)
-        mujoco.mju_quat2Mat(matrix, body.quat)
-        rotation: Array = self._base_rotation() @ matrix.reshape(3, 3)
-        return rotation
 
     def _heading_to_world(self, vector: Vector) -> Array:
         yaw = self.base_pose.roll_pitch_yaw[2]
         x, y, z = vector
         cos, sin = math.cos(yaw), math.sin(yaw)
         return np.array([cos * x - sin * y, sin * x + cos * y, z])
-
-
-def _vector(array: Array) -> Vector:
-    x, y, z = array.tolist()
-    return x, y, z
