@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
+from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, TYPE_CHECKING
@@ -28,37 +30,35 @@ if TYPE_CHECKING:
     from typing_extensions import Self
 
 TIMEOUT = 20.0  # [s]
+TOPICS = {
+    '/joint_states': JointState,
+    '/imu': Imu,
+    '/odom': Odometry,
+    '/battery_state': BatteryState,
+    '/diagnostics': DiagnosticArray,
+    '/tf': TFMessage,
+    '/fake_xgo/ground_truth': Odometry,
+}
 
 
-class NodeRig:
-    """The node, its robot and a client.
+class Rig(ABC):
+    """The node, a robot and a client.
 
     Attributes:
-        peer: The robot.
         node: Process of the node.
         client: A node of the test.
         heard: Messages by topic.
     """
 
-    def __init__(
-        self, isolation: Isolation, folder: Path, *arguments: str, protocol: Protocol = NEW
-    ) -> None:
-        """Plug the robot in, start the node and listen."""
-        self._stack = ExitStack()
+    def __init__(self, isolation: Isolation, port: Path, *arguments: str) -> None:
+        """Start the robot and the node, and listen until it reports."""
+        self._env, self._stack = isolation.env, ExitStack()
         try:
-            self.peer = self._stack.enter_context(PtyPeer(folder / 'port', protocol))
+            self._add_robot(self._stack, port)
             self.client = self._stack.enter_context(RosClient(isolation.domain_id))
-            sensor = qos_profile_sensor_data
             self.heard: dict[str, list[Any]] = {
-                topic: self.client.listen(kind, topic, sensor)
-                for topic, kind in (
-                    ('/joint_states', JointState),
-                    ('/imu', Imu),
-                    ('/odom', Odometry),
-                    ('/battery_state', BatteryState),
-                    ('/diagnostics', DiagnosticArray),
-                    ('/tf', TFMessage),
-                )
+                topic: self.client.listen(kind, topic, qos_profile_sensor_data)
+                for topic, kind in TOPICS.items()
             }
             self._commands = self.client.node.create_publisher(
                 JointCommand, '/joint_command', COMMAND_QOS
@@ -66,34 +66,38 @@ class NodeRig:
             self._command = [
                 executable('quad_hardware', 'hardware_node'),
                 '--ros-args',
-                *('-p', f'port:={self.peer.link}'),
+                *('-p', f'port:={port}'),
                 *('-p', 'diagnostics_period:=0.2'),
                 *arguments,
             ]
-            self._env = isolation.env
             self.node = self.start()
-            self._wait_until_ready()
+            self.wait_until_ready()
         except BaseException:
             self._stack.close()
             raise
 
-    def begin_anew(self) -> None:
-        """Put the robot to zero, without faults, and forget what was heard."""
-        self.peer.behaviour = Behaviour()
-        self.peer.angles.update(dict.fromkeys(self.peer.angles, 0.0))
-        self.peer.commands.clear()
-        for messages in self.heard.values():
-            messages.clear()
-        self._wait_until_ready()
+    @abstractmethod
+    def _add_robot(self, stack: ExitStack, port: Path) -> None:
+        """Start a robot that ends with the rig."""
 
-    def _wait_until_ready(self) -> None:
+    def start(self, *arguments: str) -> RunningProcess:
+        """Start the node; it ends with the rig."""
+        command = [*self._command, *arguments]
+        return self._stack.enter_context(RunningProcess(command, self._env))
+
+    def restart(self, *arguments: str) -> None:
+        """End the node, and start it again."""
+        assert self.node.stop() == 0
+        self.node = self.start(*arguments)
+        self.node.wait_for('running: reports arrive', TIMEOUT)
+        self.heard['/joint_states'].clear()
+        self.wait_until_ready()
+
+    def wait_until_ready(self) -> None:
+        """Wait until the node reports and hears commands."""
         self.hear('/joint_states')
         matched = self._commands.get_subscription_count
         self.client.spin_until(lambda: matched() > 0, TIMEOUT, 'subscriber of commands')
-
-    def start(self) -> RunningProcess:
-        """Start the node; it ends with the rig."""
-        return self._stack.enter_context(RunningProcess(self._command, self._env))
 
     def hear(self, topic: str, count: int = 1) -> Any:
         """Wait for new messages of a topic; return the last."""
@@ -134,12 +138,17 @@ class NodeRig:
         )
         return self.status(name)
 
-    def largest_step(self) -> float:
-        """Farthest that a servo target moved between two commands [deg]."""
-        steps = [0.0]
-        for before, after in zip(self.peer.commands, self.peer.commands[1:], strict=False):
-            steps += [abs(after[motor] - before[motor]) for motor in after if motor in before]
-        return max(steps)
+    def watch_steps(self) -> Callable[[], list[float]]:
+        """Look at the largest step of a target in every diagnostic from now on [rad]."""
+        first = len(self.heard['/diagnostics'])
+
+        def steps() -> list[float]:
+            self.hear('/diagnostics', 2)
+            statuses = (s for array in self.heard['/diagnostics'][first:] for s in array.status)
+            pairs = (pair for status in statuses for pair in status.values)
+            return [float(pair.value) for pair in pairs if pair.key == 'largest_step']
+
+        return steps
 
     def __enter__(self) -> Self:
         """Use it in a with statement."""
@@ -153,3 +162,52 @@ class NodeRig:
     ) -> None:
         """End everything."""
         self._stack.close()
+
+
+class NodeRig(Rig):
+    """The node with a robot without physics, which lives in the process of the test.
+
+    Attributes:
+        peer: The robot.
+    """
+
+    def __init__(
+        self, isolation: Isolation, folder: Path, *arguments: str, protocol: Protocol = NEW
+    ) -> None:
+        """Plug the robot in, start the node and listen."""
+        self._protocol = protocol
+        super().__init__(isolation, folder / 'port', *arguments)
+
+    def _add_robot(self, stack: ExitStack, port: Path) -> None:
+        self.peer = stack.enter_context(PtyPeer(port, self._protocol))
+
+    def begin_anew(self) -> None:
+        """Put the robot to zero, without faults, and forget what was heard."""
+        self.peer.behaviour = Behaviour()
+        self.peer.angles.update(dict.fromkeys(self.peer.angles, 0.0))
+        self.peer.commands.clear()
+        for messages in self.heard.values():
+            messages.clear()
+        self.wait_until_ready()
+
+    def largest_step(self) -> float:
+        """Farthest that a servo target moved between two commands [deg]."""
+        steps = [0.0]
+        for before, after in zip(self.peer.commands, self.peer.commands[1:], strict=False):
+            steps += [abs(after[motor] - before[motor]) for motor in after if motor in before]
+        return max(steps)
+
+
+class XgoRig(Rig):
+    """The node with the simulated robot, each a process."""
+
+    def _add_robot(self, stack: ExitStack, port: Path) -> None:
+        xgo = [executable('quad_hardware', 'fake_xgo'), '--link', str(port)]
+        process = stack.enter_context(RunningProcess(xgo, self._env))
+        process.wait_for(str(port))
+
+    def reporting(self) -> bool:
+        """Tell whether the newest diagnostic has the link running."""
+        return 'reports arrive' in self.status('serial link').message or (
+            'damaged' in self.status('serial link').message
+        )

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 import pytest
 import yaml
 
+from quad_hardware.calibration import robot
 from quad_hardware.calibration.console import ask_number, CancelledError
 from quad_hardware.calibration.joints import (
     LEAST_TURN,
@@ -157,8 +158,9 @@ def test_all_zeros_at_once(tmp_path: Path) -> None:
     assert {j['offset'] for j in joints.values()} == {round(-math.radians(5.0), 5)}  # type: ignore[attr-defined]
 
 
-def test_no_robot_is_said(tmp_path: Path) -> None:
+def test_no_robot_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """With the remedy, and nothing is written."""
+    monkeypatch.setattr(robot, 'PATIENCE', 0.5)
     script = Script('')
     command = ['joints', '--port', str(tmp_path / 'none'), '--output', str(tmp_path / 'x')]
     assert run_calibrate(command, script) == 1

@@ -7,7 +7,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import ExitStack
 import math
-from pathlib import Path
 
 from diagnostic_msgs.msg import DiagnosticStatus
 from isolation import Isolation, reserve
@@ -19,7 +18,6 @@ from std_srvs.srv import SetBool
 from quad_description import movable_joints, robot_urdf
 from quad_hardware.joints import LimiterSettings
 from quad_hardware.joints.command import LONGEST_PERIOD
-from quad_hardware.protocol import NEW, OLD
 from quad_node_rig import NodeRig, TIMEOUT
 
 pytestmark = pytest.mark.scenario
@@ -44,31 +42,28 @@ def rig(shared_rig: NodeRig) -> NodeRig:
     return shared_rig
 
 
-@pytest.mark.parametrize('protocol', [NEW, OLD], ids=lambda protocol: protocol.name)
-def test_the_topics_of_the_article(isolation: Isolation, tmp_path: Path, protocol: object) -> None:
+def test_the_topics_of_the_article(rig: NodeRig) -> None:
     """Joints in radians in URDF order, IMU, odometry, battery, transforms; servos obey."""
-    chosen = NEW if protocol is NEW else OLD
-    with NodeRig(isolation, tmp_path, protocol=chosen) as rig:
-        rig.peer.behaviour.attitude = (0.0, 0.0, 90.0)
-        rig.stream(POSE, 1.0)
-        joints = rig.hear('/joint_states', 3)
-        assert list(joints.name) == [j.name for j in movable_joints(robot_urdf('lite'))]
-        assert list(joints.position) == pytest.approx(POSE, abs=0.01)
-        assert [rig.peer.angles[m] for m in LEGS_ORDER] == pytest.approx(
-            [math.degrees(p) for p in POSE], abs=0.5
-        )
-        imu = rig.hear('/imu')
-        assert imu.header.frame_id == 'imu_link'
-        assert (imu.orientation.z, imu.orientation.w) == pytest.approx((0.5**0.5, 0.5**0.5))
-        assert imu.linear_acceleration.z == pytest.approx(9.8, abs=0.01)
-        assert rig.hear('/odom').child_frame_id == 'base_link'
-        assert rig.hear('/battery_state').percentage == pytest.approx(0.8)
-        pairs = [(t.header.frame_id, t.child_frame_id) for t in rig.hear('/tf').transforms]
-        assert pairs == [('odom', 'base_link'), ('base_link', 'base_footprint')]
-        published = rig.client.node.get_publishers_info_by_topic('/joint_states')
-        assert published[0].qos_profile.reliability == ReliabilityPolicy.RELIABLE
-        rig.wait_for_status('serial link', DiagnosticStatus.OK, 'reports arrive')
-        assert rig.largest_step() <= LARGEST_STEP + 0.01
+    rig.peer.behaviour.attitude = (0.0, 0.0, 90.0)
+    rig.stream(POSE, 1.0)
+    joints = rig.hear('/joint_states', 3)
+    assert list(joints.name) == [j.name for j in movable_joints(robot_urdf('lite'))]
+    assert list(joints.position) == pytest.approx(POSE, abs=0.01)
+    assert [rig.peer.angles[m] for m in LEGS_ORDER] == pytest.approx(
+        [math.degrees(p) for p in POSE], abs=0.5
+    )
+    imu = rig.hear('/imu')
+    assert imu.header.frame_id == 'imu_link'
+    assert (imu.orientation.z, imu.orientation.w) == pytest.approx((0.5**0.5, 0.5**0.5))
+    assert imu.linear_acceleration.z == pytest.approx(9.8, abs=0.01)
+    assert rig.hear('/odom').child_frame_id == 'base_link'
+    assert rig.hear('/battery_state').percentage == pytest.approx(0.8)
+    pairs = [(t.header.frame_id, t.child_frame_id) for t in rig.hear('/tf').transforms]
+    assert pairs == [('odom', 'base_link'), ('base_link', 'base_footprint')]
+    published = rig.client.node.get_publishers_info_by_topic('/joint_states')
+    assert published[0].qos_profile.reliability == ReliabilityPolicy.RELIABLE
+    rig.wait_for_status('serial link', DiagnosticStatus.OK, 'reports arrive')
+    assert rig.largest_step() <= LARGEST_STEP + 0.01
 
 
 def test_wrong_commands_move_nothing_and_are_told(rig: NodeRig) -> None:
@@ -155,9 +150,7 @@ def test_torque_is_taken_and_given_by_service(rig: NodeRig) -> None:
 
 def test_a_stop_is_clean(rig: NodeRig) -> None:
     """SIGINT ends it with 0, and the port is free for the next program."""
-    assert rig.node.stop() == 0
-    rig.node = rig.start()
-    rig.node.wait_for('running: reports arrive', TIMEOUT)
+    rig.restart()
 
 
 WRONG = {
