@@ -49,6 +49,7 @@ class Keyboard:
         devices: InputDevices | None = None,
         environment: Mapping[str, str] = os.environ,
         kitty: bool = True,
+        evdev: bool = True,
     ) -> None:
         """Prepare; the terminal is touched on entering the context.
 
@@ -57,11 +58,12 @@ class Keyboard:
             devices: Input devices; those of this machine when it is None.
             environment: Tells whether the terminal is on this machine.
             kitty: Ask the terminal for releases.
+            evdev: Ask this machine's keyboards for releases, if the terminal has none.
         """
         self._terminal = TerminalKeyboard(path, kitty=kitty)
         self._matcher = ReleaseMatcher()
         self._keyboards = Keyboards(devices or KernelDevices(), self._matcher)
-        self._watch_keyboards = is_local(environment)
+        self._watch_keyboards = evdev and is_local(environment)
 
     @property
     def release_source(self) -> ReleaseSource:
@@ -91,7 +93,7 @@ class Keyboard:
         Raises:
             TerminalError: The terminal was closed. All keys count as released.
         """
-        if self._watch_keyboards:
+        if self._watch_keyboards and self._terminal.stage is not Stage.ACTIVE:
             self._keyboards.scan(time.monotonic())
         waiting = [self._terminal.fileno(), *self._keyboards.filenos(), *others]
         select.select(waiting, [], [], max(min(timeout, self._terminal.patience()), 0.0))

@@ -223,6 +223,22 @@ def test_other_devices_are_left_alone(other: InjectedDevice) -> None:
     assert other.is_closed
 
 
+def test_other_devices_are_not_opened_every_second() -> None:
+    """Opening a device wakes it; what is no gamepad is left alone for a while, not for ever."""
+    mouse = InjectedDevice('Mouse', {0x110})
+    devices = InjectedDevices(mouse)
+    gamepad = Gamepad(devices)
+    gamepad.scan(0.0)
+    mouse.is_closed = False
+    gamepad.scan(5.0)
+    assert not mouse.is_closed
+    gamepad.scan(11.0)
+    assert mouse.is_closed
+    devices.plugged = [xbox()]  # under the same path
+    gamepad.scan(30.0)
+    assert gamepad.is_connected
+
+
 def test_device_by_path_and_by_name() -> None:
     """Of two gamepads the one that was named is used."""
     first, second = xbox('/dev/input/event1'), playstation()

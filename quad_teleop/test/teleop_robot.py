@@ -61,6 +61,18 @@ class Robot:
             lambda: bool(self.twists) and self.velocities[-1] == STILL, PATIENCE, 'zero'
         )
 
+    def wait_until_silent(self) -> int:
+        """Wait for the zeros at the end of a motion; after them nothing may come.
+
+        Returns:
+            How many messages there are then.
+        """
+        self.client.spin_until(lambda: self.velocities[-3:] == [STILL] * 3, PATIENCE, 'zeros')
+        count = len(self.twists)
+        self.listen_for(0.5)
+        assert len(self.twists) == count, 'an idle teleop is silent'
+        return count
+
     def wait_until_linked(self) -> None:
         """Wait until a teleop publishes here."""
         count = self.client.node.count_publishers

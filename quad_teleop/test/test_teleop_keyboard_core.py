@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 import pytest
 
 from operator_input import AutoRepeat, HeldKeys, KeyAction, KeyEvent
+from operator_input.terminal.decoder import KeyDecoder
 from quad_teleop import BodyPose, Mode, SettingError, Speeds, Velocity
 from quad_teleop.body_pose import NEUTRAL, PoseSteps
 from quad_teleop.command_stream import CommandStream
@@ -110,6 +111,18 @@ def test_never_two_speeds(events: list[tuple[str, KeyAction, float]]) -> None:
         assert set(published(target, now, now + gap)) <= allowed
         now += gap
         feed(target, key, action, now)
+
+
+@given(st.lists(st.tuples(st.binary(max_size=30), st.sampled_from([0.0, 0.03, 0.3, 1.0]))))
+def test_noise_of_an_old_terminal_never_leaves_it_moving(reads: list[tuple[bytes, float]]) -> None:
+    """Any bytes at any pace, as from a broken line: when they end, so does the motion."""
+    target, decoder, now = teleop(), KeyDecoder(), 0.0
+    for data, gap in reads:
+        now += gap
+        for event in decoder.feed(data, now):
+            if isinstance(event, KeyEvent):
+                target.feed(event)
+    assert target.wanted(now + LONGEST) is None
 
 
 def test_tap_moves_and_stops_by_itself() -> None:

@@ -34,7 +34,7 @@ def teleop(
     program = executable('quad_teleop', 'teleop_keyboard')
     process = subprocess.Popen(
         ['setsid', '--ctty', program, '--ros-args', *settings],
-        env=isolation.env,
+        env=isolation.env | {'NO_COLOR': '1'},
         stdin=descriptor,
         stdout=descriptor,
         stderr=descriptor,
@@ -59,7 +59,7 @@ def robot(isolation: Isolation) -> Iterator[Robot]:
 def settle(robot: Robot, terminal: ScriptedTerminal) -> None:
     """Wait until the robot hears, and the terminal has promised true releases."""
     robot.wait_until_linked()
-    terminal.wait_written(rb'true releases', PATIENCE)
+    terminal.wait_written(rb'idle +\| true releases', PATIENCE)
 
 
 def test_true_release(isolation: Isolation, robot: Robot) -> None:
@@ -71,8 +71,7 @@ def test_true_release(isolation: Isolation, robot: Robot) -> None:
         robot.listen_for(1.5)
         assert set(robot.velocities) == {FORWARD}, 'no stutter without repeats'
         terminal.key('i', 3)
-        robot.wait_until_stopped()
-        robot.listen_for(0.5)
+        robot.wait_until_silent()
         assert robot.velocities[-4:] == [FORWARD, STILL, STILL, STILL]
 
 
@@ -137,6 +136,7 @@ def test_stamped_messages(isolation: Isolation, robot: Robot) -> None:
         client = robot.client
         count = client.node.count_publishers
         client.spin_until(lambda: count('cmd_vel_stamped') > 0, PATIENCE, 'publisher')
+        terminal.wait_written(rb'idle +\| timed releases', PATIENCE)
         terminal.send('i')
         client.spin_until(lambda: bool(robot.stamped), PATIENCE, 'TwistStamped')
     message = robot.stamped[0]
@@ -150,6 +150,7 @@ def test_paste_moves_nothing(isolation: Isolation, robot: Robot) -> None:
     """A text that is pasted by mistake is no command."""
     with ScriptedTerminal(kitty=False) as terminal, teleop(terminal, isolation):
         robot.wait_until_linked()
+        terminal.wait_written(rb'idle +\| timed releases', PATIENCE)
         terminal.send('\x1b[200~ivory\n\x1b[201~')
         robot.listen_for(0.7)
         assert robot.twists == []

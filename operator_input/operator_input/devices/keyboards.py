@@ -13,6 +13,7 @@ from .release_matcher import ReleaseMatcher
 
 KEY_Q, KEY_SPACE = 16, 57  # what has these is a keyboard, not a power button
 SCAN_PERIOD = 2.0  # [s] between two looks for keyboards that were plugged in
+OTHERS_PERIOD = 20.0  # [s] for which a device that is no keyboard is not opened again
 
 
 class Keyboards:
@@ -28,7 +29,7 @@ class Keyboards:
         self._devices = devices
         self._matcher = matcher
         self._open: dict[str, InputDevice] = {}
-        self._others: set[str] = set()  # paths that are no keyboards
+        self._others: dict[str, float] = {}  # until when [s] a path is passed over
         self._next_scan = float('-inf')
 
     @property
@@ -49,12 +50,10 @@ class Keyboards:
         if now < self._next_scan:
             return
         self._next_scan = now + SCAN_PERIOD
-        paths = self._devices.paths()
-        self._others.intersection_update(paths)
-        for path in paths:
-            if path not in self._open and path not in self._others:
+        for path in self._devices.paths():
+            if path not in self._open and now >= self._others.get(path, now):
                 with contextlib.suppress(DeviceError):
-                    self._add(self._devices.open(path))
+                    self._add(self._devices.open(path), now)
 
     def read(self, now: float) -> list[KeyEvent]:
         """Read what has come, without waiting.
@@ -78,11 +77,11 @@ class Keyboards:
             device.close()
         self._open.clear()
 
-    def _add(self, device: InputDevice) -> None:
+    def _add(self, device: InputDevice, now: float) -> None:
         if {KEY_Q, KEY_SPACE} <= device.info.keys:
             self._open[device.info.path] = device
         else:
-            self._others.add(device.info.path)
+            self._others[device.info.path] = now + OTHERS_PERIOD
             device.close()
 
     def _read(self, device: InputDevice, now: float) -> list[KeyEvent]:

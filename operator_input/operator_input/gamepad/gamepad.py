@@ -15,6 +15,7 @@ from .presets import AUTO, check_preset, choose_preset, is_gamepad
 from .reading import GamepadReading
 
 SCAN_PERIOD = 1.0  # [s] between two looks for a gamepad when there is none
+OTHERS_PERIOD = 10.0  # [s] for which a device that is no gamepad is not opened again
 
 
 class Gamepad:
@@ -64,6 +65,7 @@ class Gamepad:
         self._device: InputDevice | None = None
         self._reading: GamepadReading | None = None
         self._next_scan = float('-inf')
+        self._others: dict[str, float] = {}  # until when [s] a path is passed over
 
     @property
     def is_connected(self) -> bool:
@@ -89,13 +91,14 @@ class Gamepad:
             return
         self._next_scan = now + SCAN_PERIOD
         for path in self._devices.paths():
-            if self._path and path != self._path:
+            if (self._path and path != self._path) or now < self._others.get(path, now):
                 continue
             with contextlib.suppress(DeviceError):
                 device = self._devices.open(path)
                 if self._use(device):
                     return
                 device.close()
+                self._others[path] = now + OTHERS_PERIOD  # opening wakes a sleeping device
 
     def read(self) -> list[GamepadState]:
         """Read what has come, without waiting.

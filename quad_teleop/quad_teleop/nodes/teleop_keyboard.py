@@ -37,6 +37,7 @@ class TeleopKeyboard(Node):
         teleop: Decides what to publish.
         outputs: Publishes it.
         kitty: Ask the terminal for releases.
+        evdev: Ask this machine's keyboards for releases.
     """
 
     def __init__(self) -> None:
@@ -49,6 +50,7 @@ class TeleopKeyboard(Node):
         first = number(self, 'first_timeout', 0.5, (0.05, 2.0), 'First time-out of a key [s]')
         repeat = number(self, 'repeat_timeout', 0.15, (0.05, 1.0), 'Time-out of its repeats [s]')
         self.kitty = flag(self, 'kitty', True, 'Ask the terminal for true key releases')
+        self.evdev = flag(self, 'evdev', True, 'Ask the keyboards of this machine for releases')
         self.outputs = Outputs(self)
         self.teleop = KeyboardTeleop(
             declare_speeds(self, '', Speeds()),
@@ -177,7 +179,7 @@ def main() -> None:
 
 def _serve(stop: threading.Event) -> None:
     node = TeleopKeyboard()
-    with Keyboard(kitty=node.kitty) as keyboard:
+    with Keyboard(kitty=node.kitty, evdev=node.evdev) as keyboard:
         Session(node, keyboard, stop).run()
 
 
