@@ -81,7 +81,9 @@ def test_the_articles_checks_pass_as_printed(isolation: Isolation) -> None:
             rate = hz.wait_for('average rate', STARTING, count=3)
         assert float(rate.split()[-1]) == pytest.approx(50.0, abs=5.0)
         check_frames(isolation)
-        assert bringup.stop() == 0, bringup.output
+        assert bringup.stop(STARTING) == 0, bringup.output
+    assert 'lying down first' in bringup.output
+    assert 'without lying down' not in bringup.output
     assert not psutil.wait_procs(started, timeout=5.0)[1]
 
 

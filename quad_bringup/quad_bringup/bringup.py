@@ -12,7 +12,13 @@ import sys
 from process_supervisor import supervise, SupervisorError, USAGE_ERROR
 
 from .exceptions import BringupError
+from .leaving import lie_down
 from .session import add_arguments, session
+
+HINT = """in a second terminal:
+    ros2 run quad_teleop teleop_keyboard
+    ros2 service call /set_mode quad_msgs/srv/SetMode "{mode: stand}\""""
+"""What to do with a robot that has been brought up."""
 
 
 def parse(argv: Sequence[str] | None) -> argparse.Namespace:
@@ -25,8 +31,8 @@ def parse(argv: Sequence[str] | None) -> argparse.Namespace:
         prog='ros2 run quad_bringup bringup',
         description='Bring a quadruped up: serial bridge, controller and /tf; with --simulate '
         'also the robot itself, in physics, on a pseudo-serial port. It stays as it is until it '
-        'is told to stand up: by teleop_keyboard, or by /set_mode. Ctrl-C ends everything; the '
-        'servos hold their last position then, so let it lie down before.',
+        'is told to stand up: by teleop_keyboard, or by /set_mode. Ctrl-C lets it lie down and '
+        'ends everything; Ctrl-C again ends it at once, and the servos hold their last position.',
     )
     where = parser.add_mutually_exclusive_group(required=True)
     where.add_argument(
@@ -40,6 +46,11 @@ def parse(argv: Sequence[str] | None) -> argparse.Namespace:
         metavar='FILE',
         type=Path,
         help='parameters of the serial bridge, as "ros2 run quad_hardware calibrate" writes them',
+    )
+    parser.add_argument(
+        '--hold',
+        action='store_true',
+        help='at Ctrl-C end at once and let the servos hold, instead of lying down first',
     )
     add_arguments(parser)
     return parser.parse_args(argv)
@@ -57,8 +68,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = parse(argv)
     try:
         with session(arguments, arguments.port) as quad:
-            sys.stdout.write(f'{quad.title}\n')
-            return supervise(quad.processes).exit_code
+            sys.stdout.write(f'{quad.title}\n{HINT}\n')
+            farewell = None if arguments.hold else lie_down
+            return supervise(quad.processes, farewell=farewell).exit_code
     except (BringupError, SupervisorError) as error:
         sys.stderr.write(f'{error}\n')
         return USAGE_ERROR

@@ -115,7 +115,7 @@ def read_until(process: subprocess.Popen[str], words: str) -> str:
 
 def test_ctrl_c_ends_it_with_0_in_order(workspace: Workspace) -> None:
     """The controller first, the simulator last; nothing is left in the temporary folder."""
-    with workspace.bringup('--simulate') as process:
+    with workspace.bringup('--simulate', '--hold') as process:
         seen = read_until(process, 'all is ready')
         process.send_signal(signal.SIGINT)
         rest, _ = process.communicate(timeout=PATIENCE)
@@ -130,7 +130,7 @@ def test_ctrl_c_ends_it_with_0_in_order(workspace: Workspace) -> None:
 
 def test_a_real_robot_is_on_the_port_that_was_named(workspace: Workspace) -> None:
     """And nothing is simulated."""
-    with workspace.bringup('--port', '/dev/ttyAMA0', '--preset', 'mini') as process:
+    with workspace.bringup('--port', '/dev/ttyAMA0', '--preset', 'mini', '--hold') as process:
         seen = read_until(process, 'all is ready')
         process.send_signal(signal.SIGTERM)
         process.communicate(timeout=PATIENCE)
@@ -183,7 +183,7 @@ def test_a_second_bring_up_on_the_same_port_is_refused(workspace: Workspace) -> 
     port.touch()
     name.symlink_to(port)
     workspace.environment['ROS_DOMAIN_ID'] = '5'
-    with workspace.bringup('--port', str(port)) as first:
+    with workspace.bringup('--port', str(port), '--hold') as first:
         read_until(first, 'all is ready')
         for domain, second, what in (('7', name, 'port'), ('5', '/dev/other', 'ROS domain 5')):
             workspace.environment['ROS_DOMAIN_ID'] = domain
@@ -202,7 +202,7 @@ def test_simulations_in_other_domains_run_side_by_side(workspace: Workspace) -> 
         running, ports = [], set()
         for number in (5, 6):
             workspace.environment['ROS_DOMAIN_ID'] = str(number)
-            running.append(stack.enter_context(workspace.bringup('--simulate')))
+            running.append(stack.enter_context(workspace.bringup('--simulate', '--hold')))
             seen = read_until(running[-1], 'all is ready')
             ports.add(next(line for line in seen.splitlines() if 'simulated, on' in line))
         assert len(ports) == 2

@@ -6,51 +6,38 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 import math
-import time
 from typing import Any
 
 from builtin_interfaces.msg import Time
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import Quaternion, Twist
 from nav_msgs.msg import Odometry
-import rclpy
-from rclpy.context import Context
-from rclpy.executors import SingleThreadedExecutor
-from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data, QoSProfile
-from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import BatteryState, Imu, JointState
 
 from quad_msgs.msg import JointCommand
-from quad_msgs.srv import SetMode
 
-from ..exceptions import CallError, GivenUpError
+from ..mode_client import ModeClient
 from .figures import Figures, UNKNOWN
 from .itinerary import STANDSTILL, Velocity
 from .play import Milestones
 from .rhythm import Beat
 from .track import Pose, tilt_of, Track
 
-SPIN = 0.05
-"""Longest time in [s] after which a wait looks whether it shall be given up."""
 COMMAND_PERIOD = 0.1
 """Time in [s] between two velocity commands; the controller's time-out is 0.5 s."""
-REFUSED_PATIENCE = 3.0
-"""Time in [s] for which a refused mode is asked for again."""
-ASK_AGAIN = 0.2
-"""Time in [s] between that."""
 LOOP_PERIOD = 0.02
 """Period of the controller in [s]."""
 CONTROLLER = 'controller_node'
-"""Node whose status in /diagnostics has the state."""
+"""Node whose errors in /diagnostics say why it is in a fault."""
 FAULT = 'fault'
-"""State in which its message says why."""
+"""State of the controller after an error."""
 COMMAND_QOS = QoSProfile(depth=1)
 """Of /joint_command: reliable, only the latest."""
 
 
-class QuadClient:
-    """A node of its own; use it in one thread."""
+class QuadClient(ModeClient):
+    """Commands, and hears everything; use it in one thread."""
 
     def __init__(
         self, joints: Sequence[str], ground_truth: str, given_up: Callable[[], bool]
@@ -62,22 +49,16 @@ class QuadClient:
             ground_truth: Topic on which the simulator says where the body is.
             given_up: True when nothing shall be waited for any more.
         """
+        super().__init__('demo', given_up)
         self._joints = list(joints)
-        self._given_up = given_up
         self._truth, self._odometry = Track(), Track()
         self._beat = Beat(LOOP_PERIOD)
         self._commanded: Velocity | None = None
-        self._state, self._fault = UNKNOWN, ''
+        self._reason = ''
         self._height = self._tilt = self._tilt_max = self._battery = math.nan
         self._targets: Mapping[str, float] = {}
         self._positions: Mapping[str, float] = {}
-        self._context = Context()
-        rclpy.init(context=self._context, signal_handler_options=SignalHandlerOptions.NO)
-        self._node = Node('demo', context=self._context, enable_rosout=False)
-        self._executor = SingleThreadedExecutor(context=self._context)
-        self._executor.add_node(self._node)
         self._twist = self._node.create_publisher(Twist, 'cmd_vel', 1)
-        self._modes = self._node.create_client(SetMode, 'set_mode')
         self._node.create_timer(COMMAND_PERIOD, self._send)
         self._subscribe(ground_truth)
 
@@ -95,18 +76,12 @@ class QuadClient:
         for kind, topic, callback, qos in topics:
             self._node.create_subscription(kind, topic, callback, qos)
 
-    def close(self) -> None:
-        """Leave the ROS graph."""
-        self._executor.shutdown()
-        self._node.destroy_node()
-        self._context.try_shutdown()
-
     @property
     def figures(self) -> Figures:
         """What was heard last."""
         return Figures(
-            state=self._state,
-            fault=self._fault,
+            state=self.state or UNKNOWN,
+            fault=self._reason if self.state.endswith(FAULT) else '',
             commanded=self._commanded or STANDSTILL,
             measured=self._truth.velocity,
             odometry=self._odometry.velocity,
@@ -151,70 +126,6 @@ class QuadClient:
         self._tilt_max = self._tilt
         self._beat = Beat(LOOP_PERIOD)
 
-    def set_mode(self, mode: str, timeout: float) -> str:
-        """Ask the controller for a mode; again for a while when it refuses.
-
-        A controller that has just begun may not have heard of everything that it needs.
-
-        Args:
-            mode: One that it knows.
-            timeout: Longest time in [s] for an answer.
-
-        Returns:
-            What it answered.
-
-        Raises:
-            CallError: It refused, or did not answer in time.
-            GivenUpError: It is no longer wanted.
-        """
-        patience = time.monotonic() + REFUSED_PATIENCE
-        while True:
-            answer = self._ask(mode, timeout)
-            if answer.success:
-                return str(answer.message)
-            if time.monotonic() > patience:
-                raise CallError(f'the mode {mode!r} was refused: {answer.message}')
-            self.listen(ASK_AGAIN)
-
-    def _ask(self, mode: str, timeout: float) -> SetMode.Response:
-        end = time.monotonic() + timeout
-        self.wait_until(self._modes.service_is_ready, timeout, 'the service /set_mode')
-        future = self._modes.call_async(SetMode.Request(mode=mode))
-        left = max(0.0, end - time.monotonic())
-        self.wait_until(future.done, left, f'an answer of /set_mode to {mode!r}')
-        answer: SetMode.Response = future.result()
-        return answer
-
-    def listen(self, duration: float) -> None:
-        """Hear what comes in.
-
-        Args:
-            duration: For how long in [s].
-        """
-        end = time.monotonic() + duration
-        while (left := end - time.monotonic()) > 0:
-            self._executor.spin_once(timeout_sec=left)
-
-    def wait_until(self, condition: Callable[[], bool], timeout: float, what: str) -> None:
-        """Wait for something.
-
-        Args:
-            condition: True when it is there; asked after whatever comes in.
-            timeout: Longest time in [s].
-            what: What is waited for, for the message.
-
-        Raises:
-            CallError: It did not come in time.
-            GivenUpError: It is no longer wanted.
-        """
-        end = time.monotonic() + timeout
-        while not condition():
-            if time.monotonic() > end:
-                raise CallError(f'waited {timeout:g} s in vain for {what}')
-            if self._given_up():
-                raise GivenUpError(what)
-            self._executor.spin_once(timeout_sec=SPIN)
-
     def _send(self) -> None:
         if self._commanded is None:
             return
@@ -247,10 +158,8 @@ class QuadClient:
 
     def _take_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
-            values = {each.key: each.value for each in status.values}
-            if CONTROLLER in status.name and 'state' in values:
-                self._state = values['state']
-                self._fault = status.message if self._state.endswith(FAULT) else ''
+            if status.name.startswith(CONTROLLER) and status.level == DiagnosticStatus.ERROR:
+                self._reason = status.message
 
 
 def _seconds(stamp: Time) -> float:

@@ -1,0 +1,81 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The robot lies down before its controller is stopped, if it is on its feet."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+from .exceptions import CallError, GivenUpError
+
+HEAR_TIMEOUT = 5.0
+"""Longest time in [s] to hear what the controller is doing."""
+LIE_TIMEOUT = 10.0
+"""Longest time in [s] for it to lie."""
+ON_ITS_FEET = frozenset({'stand', 'walk', 'turn', 'policy'})
+"""States of the controller in which the legs carry the body."""
+ON_THE_WAY = 'to '
+"""In front of a state that is not reached yet."""
+
+
+class Client(Protocol):
+    """What is needed of ROS; :class:`.mode_client.ModeClient` is the real one."""
+
+    @property
+    def state(self) -> str:
+        """State of the controller, empty before it is heard."""
+
+    def set_mode(self, mode: str, timeout: float) -> str:
+        """Ask for a mode; return the answer."""
+
+    def wait_until(self, condition: Callable[[], bool], timeout: float, what: str) -> None:
+        """Wait for something."""
+
+    def close(self) -> None:
+        """Leave the ROS graph."""
+
+
+MakeClient = Callable[[Callable[[], bool]], Client]
+"""Joins the ROS graph; the client asks the argument whether its waiting shall be given up."""
+
+
+def join_ros(given_up: Callable[[], bool]) -> Client:
+    """Make the client; rclpy is loaded only now, a bring-up does not need it.
+
+    Args:
+        given_up: True when nothing shall be waited for any more.
+    """
+    from .mode_client import ModeClient
+
+    return ModeClient('quad_bringup', given_up)
+
+
+def lie_down(
+    say: Callable[[str], None], given_up: Callable[[], bool], make_client: MakeClient = join_ros
+) -> None:
+    """Let the robot lie down, if it is on its feet; a controller that does not help is left.
+
+    Args:
+        say: Takes what the user is told.
+        given_up: True when it is no longer wanted.
+        make_client: Joins the ROS graph.
+    """
+    client = make_client(given_up)
+    try:
+        _lie_down(client, say)
+    except GivenUpError:
+        say('stopping without lying down')
+    except CallError as error:
+        say(f'stopping without lying down: {error}')
+    finally:
+        client.close()
+
+
+def _lie_down(client: Client, say: Callable[[str], None]) -> None:
+    client.wait_until(lambda: bool(client.state), HEAR_TIMEOUT, 'the state of the controller')
+    if client.state.removeprefix(ON_THE_WAY) not in ON_ITS_FEET:
+        return
+    say('lying down first; Ctrl-C again stops at once')
+    client.set_mode('lie', LIE_TIMEOUT)
+    client.wait_until(lambda: client.state == 'lie', LIE_TIMEOUT, 'it to lie')

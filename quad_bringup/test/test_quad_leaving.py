@@ -1,0 +1,89 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The robot lies down before it is left, if that can be."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+from quad_bringup.exceptions import CallError, GivenUpError
+from quad_bringup.leaving import lie_down
+
+
+class Controller:
+    """A controller as its client sees it."""
+
+    def __init__(self, state: str) -> None:
+        self.state = state
+        self.modes: list[str] = []
+        self.closed = False
+        self.obeys, self.refusal = True, ''
+        self.given_up: Callable[[], bool] = lambda: False
+
+    def set_mode(self, mode: str, timeout: float) -> str:
+        """Follow at once, in a while, or never."""
+        if self.refusal:
+            raise CallError(f'the mode {mode!r} was refused: {self.refusal}')
+        self.modes.append(mode)
+        self.state = mode if self.obeys else self.state
+        return mode
+
+    def wait_until(self, condition: Callable[[], bool], timeout: float, what: str) -> None:
+        """Let the time-out pass at once."""
+        if self.given_up():
+            raise GivenUpError(what)
+        if not condition():
+            raise CallError(f'waited {timeout:g} s in vain for {what}')
+
+    def close(self) -> None:
+        """Leave."""
+        self.closed = True
+
+
+def leave(controller: Controller, *, given_up: bool = False) -> list[str]:
+    """Let it lie down; return what was said."""
+    said: list[str] = []
+
+    def make_client(asked: Callable[[], bool]) -> Controller:
+        controller.given_up = asked
+        return controller
+
+    lie_down(said.append, lambda: given_up, make_client)
+    assert controller.closed
+    return said
+
+
+@pytest.mark.parametrize('state', ['stand', 'walk', 'turn', 'policy', 'to stand', 'to walk'])
+def test_a_robot_on_its_feet_lies_down(state: str) -> None:
+    """Also one that is on its way there; the user is told how not to wait."""
+    controller = Controller(state)
+    said = leave(controller)
+    assert controller.modes == ['lie']
+    assert said == ['lying down first; Ctrl-C again stops at once']
+
+
+@pytest.mark.parametrize('state', ['relax', 'lie', 'to lie', 'fault', 'to fault'])
+def test_a_robot_that_lies_or_is_in_a_fault_is_left_as_it_is(state: str) -> None:
+    """Without a word."""
+    controller = Controller(state)
+    assert leave(controller) == []
+    assert controller.modes == []
+
+
+def test_a_controller_that_does_not_help_is_left() -> None:
+    """It refuses, never gets there, or is not heard of: said, and no error."""
+    refusing, idle, silent = Controller('walk'), Controller('walk'), Controller('')
+    refusing.refusal = 'battery low'
+    idle.obeys = False
+    assert leave(refusing)[-1].endswith('refused: battery low')
+    assert leave(idle)[-1].endswith('in vain for it to lie')
+    assert leave(silent)[-1].endswith('in vain for the state of the controller')
+
+
+def test_ctrl_c_again_ends_the_wait() -> None:
+    """Nothing is asked for any more."""
+    controller = Controller('walk')
+    assert leave(controller, given_up=True) == ['stopping without lying down']
+    assert controller.modes == []
