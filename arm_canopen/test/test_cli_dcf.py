@@ -217,6 +217,21 @@ def test_a_device_that_was_configured_by_the_file_is_as_bus_yml_wants_it() -> No
         assert wrong == []
 
 
+@pytest.mark.parametrize(('entry', 'told'), [('0x00090000', True), ('0x00090064', False)])
+def test_an_entry_that_watches_somebody_else_is_left_alone(
+    tmp_path: Path, entry: str, told: bool
+) -> None:
+    """The device watches the master in a free entry, or not at all."""
+    eds = eds_text().splitlines()
+    place = eds.index('DefaultValue=0', eds.index('[1016sub1]'))
+    eds[place] = f'DefaultValue={entry}'
+    config = load_text(tmp_path, BUS, eds='\n'.join(eds))
+    first = device_writes(config, config.nodes[0])[0]
+    assert (first == SdoWrite(0x1016, 1, b'\x2c\x01\x01\0')) is told
+    watched = [e for e in expected_objects(config, config.nodes[0]) if e.index == 0x1016]
+    assert bool(watched) is told
+
+
 @given(
     st.lists(
         st.builds(SdoWrite, st.integers(0, 0xFFFF), st.integers(0, 0xFF), st.binary(max_size=20)),

@@ -23,6 +23,8 @@ MORE_ROWS = (
     Row(0x1005, 0, 'COB-ID SYNC', 7, 'rw', '0x80'),
     Row(0x1006, 0, 'Communication cycle period', 7, 'rw', '0'),
     Row(0x1007, 0, 'Synchronous window length', 7, 'rw', '0'),
+    Row(0x100C, 0, 'Guard time', 6, 'rw', '0'),
+    Row(0x100D, 0, 'Life time factor', 5, 'rw', '0'),
     Row(0x1014, 0, 'COB-ID EMCY', 7, 'rw', '$NODEID+0x80'),
     Row(0x1016, 2, 'Consumer heartbeat time 2', 7, 'rw', '0'),
     Row(0x1019, 0, 'Synchronous counter overflow', 5, 'rw', '0'),
@@ -464,6 +466,16 @@ def test_rates(tmp_path: Path, old: str, new: str, rate: float, reason: str) -> 
     (item,) = [t for t in report.load.traffic if (t.device, t.service) == ('joint1', 'TPDO 2')]
     assert item.rate == pytest.approx(rate)
     assert reason in item.reason
+
+
+def test_guarding_is_as_good_as_a_heartbeat(tmp_path: Path) -> None:
+    """A guarded device is watched; question and answer are in the load."""
+    guarded = 'heartbeat_producer: 0\n    guard_time: 200\n    life_time_factor: 3'
+    report = report_of(tmp_path, CLEAN.replace('# joint1', guarded))
+    assert report.errors == report.warnings == ()
+    assert report.load is not None
+    frames = [t for t in report.load.traffic if t.service == 'guarding']
+    assert [(t.device, t.size, t.rate) for t in frames] == [('joint1', 0, 5), ('joint1', 1, 5)]
 
 
 @pytest.mark.parametrize(

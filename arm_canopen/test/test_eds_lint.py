@@ -20,7 +20,7 @@ from arm_canopen.config.eds_lint import EdsReport, lint_eds
 REPOSITORY = Path(__file__).parents[2]
 OWN_FILES = sorted(
     path
-    for folder in ('arm_canopen/eds', 'arm_bringup/robots')
+    for folder in ('arm_canopen/eds', 'arm_canopen/arm_canopen/config', 'arm_bringup/robots')
     for path in (REPOSITORY / folder).rglob('*')
     if path.suffix in ('.eds', '.dcf')
 )

@@ -90,7 +90,7 @@ class Session:
 
     def await_quiet(self, node_id: int) -> None:
         """Wait until nobody else talks to the SDO server of a device, for a while at most."""
-        self.listen(QUIET)
+        self._step(0.0)
         self.listen(QUIET_WAIT, lambda: monotonic() - self._sdo_times.get(node_id, 0.0) > QUIET)
 
     def _step(self, wait: float) -> None:

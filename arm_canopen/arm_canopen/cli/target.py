@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import cache
 
 from ..config import load_bus, load_eds
-from ..config.eds_standard import STANDARD_OBJECTS
+from ..config.eds_files import DEFAULT_DRIVE
 from ..config.model import BusConfig, NodeConfig
 from ..exceptions import ObjectError
 from ..monitor.object_names import ObjectNames
@@ -80,15 +80,9 @@ class Target:
 
 @cache
 def standard_dictionary() -> ObjectDictionary:
-    """Return the objects that the standards describe, for devices without a file."""
-    names = ObjectNames()
-    return ObjectDictionary(
-        (
-            ObjectEntry(index, subindex, names.name(index, subindex), standard.data_type)
-            for (index, subindex), standard in STANDARD_OBJECTS.items()
-        ),
-        source='the objects of CiA 301 and 402 (no EDS is given)',
-    )
+    """Return the objects of a drive by the standards, for devices without a file."""
+    source = 'the objects of CiA 301 and 402 (no EDS is given)'
+    return ObjectDictionary(load_eds(DEFAULT_DRIVE).dictionary, source=source)
 
 
 def find_target(options: argparse.Namespace) -> Target:

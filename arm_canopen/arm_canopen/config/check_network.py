@@ -44,10 +44,10 @@ def check_heartbeats(subject: Subject) -> None:
     """Check who watches a device, and whom it watches."""
     node = subject.node
     producer = node.heartbeat_producer
-    if not producer and not node.guard_time:
+    if not producer and not node.guarded:
         subject.findings.warning(
             subject.place('heartbeat_producer'),
-            'the device sends no heartbeat: nobody notices when it is gone',
+            'the device sends no heartbeat and is not guarded: nobody notices when it is gone',
             'write heartbeat_producer: 100',
         )
     elif producer and not node.heartbeat_timeout:

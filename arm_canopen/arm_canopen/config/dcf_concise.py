@@ -15,6 +15,7 @@ from ..exceptions import CodecError
 from ..standard.cob_id import COB_ID_INVALID
 from ..standard.datatypes import DataType, encode, Value
 from ..standard.objects import Index
+from .expected import watch_entry
 from .model import BusConfig, NodeConfig, PdoConfig, SdoWrite
 from .pdo_direction import Direction, RPDO, TPDO
 from .shared_keys import HUNDRED_MICROSECONDS, MILLISECONDS
@@ -114,20 +115,9 @@ class _Writer:
 
     def consumer_heartbeat(self) -> Iterator[SdoWrite]:
         """Have the device watch the master, or no longer."""
-        master = self._config.master
-        entries = {
-            entry.subindex: entry.default if isinstance(entry.default, int) else 0
-            for entry in self._node.dictionary.subindices(Index.CONSUMER_HEARTBEAT)
-            if entry.subindex and entry.access.writable
-        }
-        own = [sub for sub, value in entries.items() if value >> 16 & 0xFF == master.node_id]
-        free = [sub for sub, value in entries.items() if not value & 0xFFFF or not value >> 16]
-        if self._node.heartbeat_consumer and (own or free):
-            time = round(master.heartbeat_timeout * MILLISECONDS)
-            value = master.node_id << 16 | time
-            yield self._write(Index.CONSUMER_HEARTBEAT, (own or free)[0], value)
-        elif own:
-            yield self._write(Index.CONSUMER_HEARTBEAT, own[0], 0)
+        watch = watch_entry(self._config.master, self._node)
+        if watch is not None:
+            yield self._write(Index.CONSUMER_HEARTBEAT, *watch)
 
     def error_control(self) -> Iterator[SdoWrite]:
         """Set the heartbeat of the device, and node guarding."""

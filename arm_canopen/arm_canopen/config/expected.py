@@ -106,15 +106,36 @@ def _error_control(master: MasterConfig, node: NodeConfig) -> Iterator[Expected]
         period = round(node.heartbeat_producer * MILLISECONDS)
         key = 'heartbeat_producer'
         yield _number(Index.PRODUCER_HEARTBEAT, 0, period, DataType.UNSIGNED16, key)
-    if node.guard_time > 0:
+    if node.guarded:
         time, factor = round(node.guard_time * MILLISECONDS), node.life_time_factor
         yield _number(Index.GUARD_TIME, 0, time, DataType.UNSIGNED16, 'guard_time')
         yield _number(Index.LIFE_TIME_FACTOR, 0, factor, DataType.UNSIGNED8, 'life_time_factor')
-    if _is_writable(node, Index.CONSUMER_HEARTBEAT, 1):
-        timeout = round(master.heartbeat_timeout * MILLISECONDS)
-        watched = master.node_id << 16 | timeout if node.heartbeat_consumer else 0
+    watch = watch_entry(master, node)
+    if watch is not None:
         key = 'heartbeat_consumer'
-        yield _number(Index.CONSUMER_HEARTBEAT, 1, watched, DataType.UNSIGNED32, key)
+        yield _number(Index.CONSUMER_HEARTBEAT, *watch, DataType.UNSIGNED32, key)
+
+
+def watch_entry(master: MasterConfig, node: NodeConfig) -> tuple[int, int] | None:
+    """Return the entry of 0x1016 by which a device watches the master, or no longer does.
+
+    It is the one that is the master's by the EDS, or else the first that watches nobody.
+
+    Returns:
+        Sub-index and value; None when none is to be written, or there is no room.
+    """
+    others = {w.subindex for w in node.sdo_writes if w.index == Index.CONSUMER_HEARTBEAT}
+    entries = {
+        entry.subindex: entry.default if isinstance(entry.default, int) else 0
+        for entry in node.dictionary.subindices(Index.CONSUMER_HEARTBEAT)
+        if entry.subindex and entry.access.writable and entry.subindex not in others
+    }
+    own = [sub for sub, value in entries.items() if value >> 16 & 0xFF == master.node_id]
+    free = [sub for sub, value in entries.items() if not value & 0xFFFF or not value >> 16]
+    if node.heartbeat_consumer and (own or free):
+        time = round(master.heartbeat_timeout * MILLISECONDS)
+        return (own or free)[0], master.node_id << 16 | time
+    return (own[0], 0) if own else None
 
 
 def _is_writable(node: NodeConfig, index: int, subindex: int) -> bool:

@@ -13,7 +13,7 @@ from ..standard.cob_id import CAN_ID_MASK, CobId
 from ..standard.pdo import SYNCHRONOUS_MAX
 from .check_subject import Subject
 from .findings import Findings
-from .model import BusConfig, PdoConfig
+from .model import BusConfig, NodeConfig, PdoConfig
 from .pdo_direction import Direction, TPDO
 
 
@@ -93,8 +93,8 @@ def estimate_load(config: BusConfig, bitrate: int | None = None) -> LoadEstimate
             cob_id = CobId.HEARTBEAT + node.node_id
             reason = f'every {period * 1e3:g} ms'
             traffic.append(Traffic(node.name, 'heartbeat', cob_id, 1, 1 / period, reason))
-        for direction, pdo in subject.pdos():
-            traffic.append(_pdo_traffic(subject, direction, pdo))
+        traffic += [_pdo_traffic(subject, direction, pdo) for direction, pdo in subject.pdos()]
+        traffic += _guarding(node)
     return LoadEstimate(bitrate or config.master.bitrate, tuple(traffic))
 
 
@@ -113,6 +113,14 @@ def _master_traffic(config: BusConfig) -> Iterator[Traffic]:
         reason = f'every {master.time_period * 1e3:g} ms'
         cob_id = master.time_cob_id & CAN_ID_MASK
         yield Traffic(master.name, 'TIME', cob_id, 6, 1 / master.time_period, reason)
+
+
+def _guarding(node: NodeConfig) -> Iterator[Traffic]:
+    """Yield question and answer of node guarding (CiA 301, 7.2.8.2.2)."""
+    if node.guarded:
+        cob_id, reason = CobId.HEARTBEAT + node.node_id, f'every {node.guard_time * 1e3:g} ms'
+        yield Traffic(node.name, 'guarding', cob_id, 0, 1 / node.guard_time, reason)
+        yield Traffic(node.name, 'guarding', cob_id, 1, 1 / node.guard_time, reason)
 
 
 def _pdo_traffic(subject: Subject, direction: Direction, pdo: PdoConfig) -> Traffic:
