@@ -107,7 +107,7 @@ def test_every_register_that_can_be_read_has_as_many_bytes_as_were_asked_for(add
 def test_any_number_of_bytes_may_be_asked_for() -> None:
     """None and more than a frame takes are not answered; everything between is."""
     robot = VirtualRobot(*KINEMATIC, protocol=OLD)
-    for count in range(256):
+    for count in (0, 1, 2, 24, 100, 246, 247, 248, 255):
         robot.send(Frame(Kind.READ, Register.BATTERY, bytes((count,))))
         assert [len(f.payload) for f in robot.run(0.03)] == ([count] if 0 < count <= 247 else [])
 
