@@ -19,6 +19,9 @@ from .report import Cause, Limiter
 PRESSING = 1e-9
 """Force of a bound above which it counts as pressing."""
 
+BOTH = np.array([[-1.0], [1.0]])
+"""Signs of the two ways of a joint."""
+
 
 @dataclass(frozen=True, slots=True)
 class BrakeSettings:
@@ -99,9 +102,9 @@ class Brakes:
         """
         settings, limits = self._settings, self._limits
         near = self._model.nearest(state.position, settings.horizon, settings.pairs)
-        below, above = state.position - limits.lower, limits.upper - state.position
-        slowest = -brakeable_velocity(below, self._braking)
-        fastest = brakeable_velocity(above, self._braking)
+        ways = np.array((state.position - limits.lower, limits.upper - state.position))
+        below, above = ways
+        slowest, fastest = brakeable_velocity(ways, self._braking) * BOTH
         lower = np.minimum(np.maximum(slowest, state.velocity - self._change), fastest)
         upper = np.maximum(np.minimum(fastest, state.velocity + self._change), slowest)
         rows = np.array([pair.gradient for pair in near]).reshape(len(near), len(limits))

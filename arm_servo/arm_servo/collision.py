@@ -37,6 +37,9 @@ class CollisionModel:
 
     It reads the kinematics that its owner computed last: joint placements for distances, joint
     Jacobians for gradients.
+
+    Attributes:
+        seen: Least distance of the last :meth:`nearest` in [m].
     """
 
     def __init__(
@@ -79,6 +82,7 @@ class CollisionModel:
                 self._pairs.append(names)
                 self._parents.append((parents[first], parents[second]))
         self._results = self._geometry.createData()
+        self.seen = float('inf')
 
     @property
     def pairs(self) -> Sequence[tuple[str, str]]:
@@ -108,6 +112,7 @@ class CollisionModel:
         if not self._pairs:
             return []
         distances = self.measure()
+        self.seen = float(distances.min())
         near = np.flatnonzero(distances < within)
         chosen = near[np.argsort(distances[near])][:count]
         return [self._proximity(int(pair), float(distances[pair])) for pair in chosen]

@@ -67,7 +67,7 @@ class Guard:
         """
         stop = self._generator.brake(wanted)
         if stop is not None:
-            reason = self._overspeed(wanted) or self._refusal(stop, clearances)
+            reason = self._overspeed(wanted) or self._refusal(state, stop, clearances)
             if reason is None:
                 self._stop = stop
                 return wanted, None
@@ -82,13 +82,13 @@ class Guard:
         beyond = peak > self._fastest
         return self._limits.names[int(np.argmax(beyond))] if beyond.any() else None
 
-    def _refusal(self, stop: Plan, clearances: bool) -> str | None:
+    def _refusal(self, state: MotionState, stop: Plan, clearances: bool) -> str | None:
         """Return why a stop is not good enough; remember it when it is."""
         lower, upper = stop.extremes
         beyond = (lower < self._lower - EXACT) | (upper > self._upper + EXACT)
         if beyond.any():
             return self._limits.names[int(np.argmax(beyond))]
-        room = self._distance(stop, np.inf) if clearances else self._room
+        room = self._room_of(stop, state) if clearances else self._room
         if clearances and room < min(self._room, self._clearance):
             return 'distance of links'
         self._remember(stop, room)
@@ -106,6 +106,17 @@ class Guard:
     def _distance(self, stop: Plan | None, default: float) -> float:
         """Return the least distance between links where a stop ends in [m]."""
         return default if stop is None else self._model.clearance(stop.at(stop.duration).position)
+
+    def _room_of(self, stop: Plan, state: MotionState) -> float:
+        """Return the distance of links where a stop ends, or a lower bound that is enough.
+
+        No point of the arm moves farther than the joints turn times its reach, a pair of links not
+        farther apart or together than twice that.
+        """
+        lower, upper = stop.extremes
+        turn = float(np.maximum(upper - state.position, state.position - lower).sum())
+        bound = self._model.seen_clearance(state.position) - 2.0 * turn * self._model.reach
+        return bound if bound > self._clearance else self._distance(stop, np.inf)
 
     def _brake(self, state: MotionState, period: float) -> MotionState:
         stop = self._generator.brake(state)

@@ -90,6 +90,7 @@ class RobotModel:
         self._tip_frame = self._model.getFrameId(self.tip)
         self._base_frame = self._model.getFrameId(self.base)
         self._at: Array | None = None
+        self._seen_at: Array | None = None
         self._collision = CollisionModel(
             self._model, self._data, description.shapes, semantic.disabled
         )
@@ -139,8 +140,8 @@ class RobotModel:
         world = pin.getFrameJacobian(
             self._model, self._data, self._tip_frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
         )
-        rotation = self._placement(self._base_frame).rotation.T
-        turned: Array = np.vstack((rotation @ world[:3], rotation @ world[3:]))
+        rotation = self._placement(self._base_frame).rotation
+        turned = turned_twists(rotation, world)
         return turned if self._plain else turned[:, self._order]
 
     def nearest(self, positions: Array, within: float, count: int) -> list[Proximity]:
@@ -153,6 +154,7 @@ class RobotModel:
         """
         self._update(positions)
         found = self._collision.nearest(within, count)
+        self._seen_at = self._at
         if self._plain:
             return found
         return [replace(p, gradient=p.gradient[self._order]) for p in found]
@@ -165,9 +167,24 @@ class RobotModel:
         """
         if not self._collision.pairs:
             return float('inf')
+        if self._at is not None and np.array_equal(positions, self._at):
+            return float(self._collision.measure().min())
         pin.forwardKinematics(self._model, self._data, self._pin_order(positions))
         self._at = None  # the Jacobians are not those of these positions
         return float(self._collision.measure().min())
+
+    def seen_clearance(self, positions: Array) -> float:
+        """Return the least distance that :meth:`nearest` saw at positions in [m].
+
+        Args:
+            positions: Joint positions in [rad].
+
+        Returns:
+            The distance; minus infinity where it was last called elsewhere.
+        """
+        if self._seen_at is None or not np.array_equal(positions, self._seen_at):
+            return -float('inf')
+        return self._collision.seen
 
     def index(self, joint: str) -> int:
         """Return the place of a joint.
@@ -211,6 +228,18 @@ class RobotModel:
         ]
         tip = self._model.frames[self._tip_frame].placement.translation
         return float(sum(lengths) + np.linalg.norm(tip))
+
+
+def turned_twists(axes: Array, twists: Array) -> Array:
+    """Return twists along other axes.
+
+    Args:
+        axes: Rotation (3, 3) from the other axes to those of the twists.
+        twists: Twists as columns (6, n), or one twist (6).
+    """
+    parts = twists.reshape(2, 3, -1)
+    turned: Array = np.matmul(axes.T, parts).reshape(twists.shape)
+    return turned
 
 
 def _only(semantic: SemanticDescription) -> str:

@@ -16,6 +16,9 @@ import ruckig
 from .arrays import Array, frozen, Native
 from .limits import JointLimits
 
+ENDLESS = 1e6
+"""What counts for the way of a joint without end in [rad]."""
+
 LEAST_SHARE = 0.05
 """Least share of its acceleration that a joint keeps while others set the pace."""
 
@@ -243,16 +246,15 @@ def brakeable_velocity(distance: Array, limits: JointLimits) -> Array:
     v/2 (v/a + a/j) where a is reached (v >= a^2/j), v sqrt(v/j) where it is not.
 
     Args:
-        distance: Ways left in [rad]; negative ones count as zero.
+        distance: Ways left in [rad] (n) or (k, n); negative ones count as zero.
         limits: Limits of the joints.
 
     Returns:
         Velocities in [rad/s], at most those of the limits.
     """
-    way = np.maximum(distance, 0.0)
+    way = np.clip(distance, 0.0, ENDLESS)
     a, j = limits.acceleration, limits.jerk
-    knee = a * a / j
+    half = 0.5 * a * a / j
     short = np.cbrt(way * way * j)
-    long = -0.5 * knee + np.sqrt(0.25 * knee * knee + 2.0 * a * np.where(np.isinf(way), 0.0, way))
-    velocity = np.where(way <= knee * a / j, short, long)
-    return np.minimum(np.where(np.isinf(way), np.inf, velocity), limits.velocity)
+    long = np.sqrt(half * half + 2.0 * a * way) - half
+    return np.minimum(np.where(way <= 2.0 * half * a / j, short, long), limits.velocity)

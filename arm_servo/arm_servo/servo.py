@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from .arrays import Array, Mask
-from .model import Pose, RobotModel
+from .model import Pose, RobotModel, turned_twists
 from .otg import MotionState
 from .report import Cause, Limiter, MotionReport
 from .velocity_ik import IkAnswer, IkSettings, TwistTask, VelocityIk
@@ -153,8 +153,10 @@ class ServoSource:
         if self._held is None or family != self._axes_of:
             self._held, self._axes_of, self._free = pose, family, NO_AXES
         commanded = np.abs(command.twist) > 0.0
-        self._free = self._still_moving(state, axes) & (self._free | commanded)
-        moved = self._free | commanded
+        released = self._free & ~commanded
+        if released.any():
+            released &= self._still_moving(state, axes)
+        moved = self._free = released | commanded
         error = _error(self._held, pose, axes)
         error[moved | self._drift] = 0.0
         self._held = _moved(pose, axes, error)
@@ -181,8 +183,7 @@ class ServoSource:
 
     def _still_moving(self, state: MotionState, axes: Array) -> Mask:
         twist = self._model.jacobian(state.position) @ state.velocity
-        along = np.concatenate((axes.T @ twist[:3], axes.T @ twist[3:]))
-        moving: Mask = np.abs(along) > RELEASED
+        moving: Mask = np.abs(turned_twists(axes, twist)) > RELEASED
         return moving
 
     def _governor(self, error: Array, period: float) -> float:

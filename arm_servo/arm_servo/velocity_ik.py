@@ -24,7 +24,7 @@ import numpy as np
 from .arrays import Array, Mask
 from .bounds import Bounds, Brakes, BrakeSettings
 from .box_qp import Program
-from .model import RobotModel
+from .model import RobotModel, turned_twists
 from .otg import brakeable_velocity, MotionState
 from .report import Cause, Limiter, MotionReport
 from .singular import Directions, directions, LOST, way_out
@@ -167,10 +167,7 @@ class VelocityIk:
 
     def _turned(self, position: Array, axes: Array, weights: Array) -> Array:
         """Return the weighted Jacobian along a task's axes."""
-        jacobian = self._model.jacobian(position)
-        turned = np.vstack((axes.T @ jacobian[:3], axes.T @ jacobian[3:]))
-        turned *= weights[:, None]
-        return turned
+        return turned_twists(axes, self._model.jacobian(position)) * weights[:, None]
 
     def _way_out(
         self,
@@ -205,8 +202,8 @@ class VelocityIk:
         """Return the sense, 1 or -1: as before, else away from the nearer limits."""
         if self._sense is not None:
             return 1.0 if way @ self._sense >= 0 else -1.0
-        upper = brakeable_velocity(self._limits.upper - state.position, self._limits)
-        lower = brakeable_velocity(state.position - self._limits.lower, self._limits)
+        ways = np.array((self._limits.upper - state.position, state.position - self._limits.lower))
+        upper, lower = brakeable_velocity(ways, self._limits)
         concerned = np.abs(way) > 0.1
         forth, back = (
             float(np.min(np.where(sense * way > 0, upper, lower)[concerned], initial=np.inf))

@@ -66,7 +66,7 @@ def test_a_minute_of_rotation_leaves_the_tool_in_place(name: str) -> None:
         twist[3 + int(time / 20)] = 0.2 if time % 6 < 3 else -0.2
         return TwistCommand(twist)
 
-    result = run(model, ready(name), turning, 59.9, period=0.02)
+    result = run(model, ready(name), turning, 59.9, period=0.025)
     home = model.pose(ready(name)).position
     away = [
         np.linalg.norm(model.pose(state.position).position - home) for state in result.states[::20]
@@ -89,7 +89,7 @@ def test_the_straight_pose_can_be_left(name: str) -> None:
     """From the singular pose the tool gets away in more than half of the directions."""
     model, gone = robot(name), 0
     for twist in TWISTS:
-        result = run(model, STRAIGHT[name], TwistCommand(twist), 2.5)
+        result = run(model, STRAIGHT[name], TwistCommand(twist), 2.5, 0.02)
         axis = int(np.argmax(np.abs(twist)))
         gone += int(result.moved[axis] / twist[axis] > 0.1)
     assert gone > 6
