@@ -107,6 +107,8 @@ def test_a_path_in_use_is_refused_and_a_dead_one_replaced(tmp_path: Path) -> Non
         (['--fault', 'fire'], 'there are drop'),
         (['--trunk-mass', '0'], 'trunk_mass'),
         (['--command-gap', '-1'], 'command-gap'),
+        (['--old-baud', '2000000'], 'add --protocol old'),
+        (['--old-baud', '0'], 'give bits a second'),
         (['--mount', '12'], 'give ID=SIGN,DEGREES'),
         (['--mount', '12=2'], 'sign 2'),
         (['--mount', '14=1'], 'no servo has id 14'),

@@ -112,6 +112,14 @@ def test_any_number_of_bytes_may_be_asked_for() -> None:
         assert [len(f.payload) for f in robot.run(0.03)] == ([count] if 0 < count <= 247 else [])
 
 
+def test_the_old_protocol_may_run_at_another_speed() -> None:
+    """A board that a program has switched to 2 Mbaud hears the old protocol only there."""
+    robot = VirtualRobot(*KINEMATIC, '--protocol', 'old', '--old-baud', '2000000', protocol=OLD)
+    assert robot.ask(QUESTION[OLD]) == []
+    robot.line.set_baud(2_000_000)
+    assert answers(robot)
+
+
 def test_a_write_runs_through_the_registers() -> None:
     """Three bytes at VX are VX, VY and VYAW; walking and bulk angles do not disturb each other."""
     robot = VirtualRobot(*KINEMATIC, protocol=OLD)

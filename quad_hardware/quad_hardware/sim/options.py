@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Collection, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 import math
 from pathlib import Path
@@ -55,6 +55,13 @@ def parse_arguments(argv: Sequence[str]) -> argparse.Namespace:
     add('--link', type=Path, default=DEFAULT_LINK, help='path of the port (%(default)s)')
     add('--protocol', choices=_PROTOCOLS, default='both', help='what the board speaks')
     add('--baud', type=int, default=0, help='speed to assume [bit/s]; 0: what the host sets')
+    add(
+        '--old-baud',
+        type=int,
+        default=OLD.baud,
+        metavar='BAUD',
+        help='speed of the old protocol (%(default)s); programs have switched boards to others',
+    )
     add('--preset', choices=PRESETS, default='lite', help='the robot (%(default)s)')
     add('--arm', action='store_true', help='with the arm on its back')
     add('--trunk-mass', type=float, metavar='KG', help="mass of the trunk, not the preset's")
@@ -101,7 +108,7 @@ def build(options: argparse.Namespace) -> Simulation:
     if len(options.firmware) > 10 or not options.firmware.isascii():
         raise SetupError(f'--firmware {options.firmware!r}: give up to 10 ASCII characters')
     faults = FaultPlan(parse_fault(text) for text in options.fault)
-    protocols = _choose_protocols(options.protocol, options.baud)
+    speeds = _choose_speeds(options.protocol, options.old_baud, options.baud)
     try:
         urdf = robot_urdf(options.preset, options.arm, options.trunk_mass)
     except ValueError as error:
@@ -118,7 +125,7 @@ def build(options: argparse.Namespace) -> Simulation:
     )
     line = RobotLine(
         board,
-        protocols,
+        speeds,
         faults=faults,
         fixed_baud=options.baud,
         command_gap=options.command_gap,
@@ -169,12 +176,20 @@ def parse_mount(text: str) -> tuple[int, Mount]:
         raise SetupError(f'--mount {text!r}: give ID=SIGN,DEGREES, such as 12=-1,4.5') from None
 
 
-def _choose_protocols(name: str, baud: int) -> Collection[Protocol]:
+def _choose_speeds(name: str, old_baud: int, baud: int) -> Mapping[int, Protocol]:
     protocols = _PROTOCOLS[name]
-    if baud and baud not in {protocol.baud for protocol in protocols}:
-        speeds = ', '.join(f'{protocol.baud} ({protocol.name})' for protocol in protocols)
-        raise SetupError(f'--baud {baud}: the board speaks at {speeds}')
-    return protocols
+    own = {protocol: protocol.baud for protocol in protocols}
+    if old_baud <= 0:
+        raise SetupError(f'--old-baud {old_baud}: give bits a second, e.g. {OLD.baud}')
+    if OLD in protocols:
+        own[OLD] = old_baud
+    if len(set(own.values())) < len(own):
+        raise SetupError(f'--old-baud {old_baud} is that of the new one; add --protocol old')
+    speeds = {speed: protocol for protocol, speed in own.items()}
+    if baud and baud not in speeds:
+        known = ', '.join(f'{speed} ({protocol.name})' for speed, protocol in speeds.items())
+        raise SetupError(f'--baud {baud}: the board speaks at {known}')
+    return speeds
 
 
 def _make_plant(options: argparse.Namespace, urdf: str) -> Plant:

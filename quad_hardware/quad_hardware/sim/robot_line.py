@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Mapping
 from dataclasses import dataclass
 import math
 
@@ -49,7 +49,7 @@ class RobotLine:
     def __init__(
         self,
         board: Board,
-        protocols: Collection[Protocol] = (NEW, OLD),
+        speeds: Mapping[int, Protocol] | None = None,
         *,
         faults: FaultPlan | None = None,
         fixed_baud: int = 0,
@@ -60,7 +60,7 @@ class RobotLine:
 
         Args:
             board: The robot.
-            protocols: What it speaks, each at its own baud rate.
+            speeds: What it speaks, by baud rate [bit/s]; both protocols at their own for None.
             faults: What goes wrong, and when.
             fixed_baud: Speed to assume [bit/s] whatever the host sets; 0 for the host's.
             command_gap: Least time between two frames of the host in the old protocol [s]; a frame
@@ -73,10 +73,8 @@ class RobotLine:
         self.to_host = Wire(self.faults, FaultKind.SILENCE, seed + 1, slow=True)
         self._board = board
         self._functions, self._registers = Functions(board), Registers(board)
-        self._by_baud = {protocol.baud: protocol for protocol in protocols}
-        self._parsers = {
-            protocol.baud: StreamParser(protocol, HOST_KINDS) for protocol in protocols
-        }
+        self._by_baud = dict(speeds or {NEW.baud: NEW, OLD.baud: OLD})
+        self._forget_partial_frames()
         self._fixed_baud = fixed_baud
         self._command_gap = command_gap
         self._baud = fixed_baud or next(iter(self._by_baud))
@@ -99,10 +97,7 @@ class RobotLine:
         """Follow the speed that the host has set [bit/s]."""
         if not self._fixed_baud and baud != self._baud:
             self._baud = baud
-            self._parsers = {
-                speed: StreamParser(protocol, HOST_KINDS)
-                for speed, protocol in self._by_baud.items()
-            }
+            self._forget_partial_frames()
 
     def receive(self, data: bytes, now: float) -> None:
         """Take bytes that the host has begun to send."""
@@ -178,6 +173,11 @@ class RobotLine:
         for answer in handler.handle(frame, now):
             self._say(answer, protocol, now)
 
+    def _forget_partial_frames(self) -> None:
+        self._parsers = {
+            baud: StreamParser(protocol, HOST_KINDS) for baud, protocol in self._by_baud.items()
+        }
+
     def _give_up_waiting(self, now: float) -> None:
         parser = self._parsers.get(self._baud)
         if parser is not None and parser.pending:
@@ -186,7 +186,7 @@ class RobotLine:
                 self._handle(frame, protocol, now, now, now)
 
     def _say(self, frame: Frame, protocol: Protocol, now: float) -> None:
-        if self._baud == protocol.baud:  # the host may have gone on to another speed
+        if self._by_baud.get(self._baud) is protocol:  # the host may have gone on to another speed
             self.to_host.put(frame.encode(protocol), now, self._baud)
 
     def _change_faults(self, now: float) -> None:
