@@ -25,6 +25,9 @@ setup(
     description='Makes a quadruped walk: gait, ONNX policies, states and watchdogs',
     license='Apache-2.0',
     entry_points={
-        'console_scripts': ['controller_node = quad_controller.nodes.controller_node:main'],
+        'console_scripts': [
+            'check_policy = quad_controller.policy_check.main:main',
+            'controller_node = quad_controller.nodes.controller_node:main',
+        ],
     },
 )

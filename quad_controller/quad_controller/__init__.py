@@ -1,5 +1,65 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Makes a quadruped walk: kinematics, gait, ONNX policies, states and watchdogs."""
+"""Makes a quadruped walk: kinematics, gait, ONNX policies, states and watchdogs.
+
+The pure core, without ROS::
+
+    from quad_controller import (
+        Controller,
+        GaitParameters,
+        Measurement,
+        quadruped,
+        StateParameters,
+        Velocity,
+    )
+
+    controller = Controller(quadruped(urdf), GaitParameters(), StateParameters())
+    output = controller.step(Measurement(joints, imu), 0.02)
+    controller.set_mode('walk')
+    controller.set_velocity(Velocity(0.2))
+"""
+
+from .exceptions import DescriptionError, ParameterError, PolicyError, QuadControllerError
+from .gait.body import BodyPose
+from .gait.generator import GaitGenerator
+from .gait.parameters import GaitParameters
+from .gait.schedule import Gait
+from .gait.servo_compensation import ServoModel
+from .gait.velocity import Velocity
+from .model.quadruped import Quadruped, quadruped
+from .policy.load import load_policy
+from .policy.options import PolicyOptions
+from .states.controller import Controller
+from .states.measurement import ImuSample, JointSample, Measurement
+from .states.modes import Answer, MODES, State
+from .states.parameters import StateParameters
+from .states.status import Output, Status
 
 __version__ = '0.1.0'
+
+__all__ = [
+    'MODES',
+    'Answer',
+    'BodyPose',
+    'Controller',
+    'DescriptionError',
+    'Gait',
+    'GaitGenerator',
+    'GaitParameters',
+    'ImuSample',
+    'JointSample',
+    'Measurement',
+    'Output',
+    'ParameterError',
+    'PolicyError',
+    'PolicyOptions',
+    'QuadControllerError',
+    'Quadruped',
+    'ServoModel',
+    'State',
+    'StateParameters',
+    'Status',
+    'Velocity',
+    'load_policy',
+    'quadruped',
+]

@@ -9,7 +9,7 @@ import math
 
 from quad_controller.gait.parameters import GaitParameters
 from quad_controller.gait.velocity import REST, Velocity
-from quad_controller.model.quadruped import quadruped
+from quad_controller.model.quadruped import Quadruped, quadruped
 from quad_controller.policy.interface import Policy
 from quad_controller.states.controller import Controller
 from quad_controller.states.measurement import ImuSample, JointSample, Measurement
@@ -57,11 +57,12 @@ class PhysicsRig:
         robot: Robot | None = None,
         gait: GaitParameters | None = None,
         policy: Policy | None = None,
+        model: Quadruped = MODEL,
     ) -> None:
         """Stand up."""
-        self.robot = robot or Robot(robot_urdf())
+        self.robot, self.model = robot or Robot(robot_urdf()), model
         self.controller = Controller(
-            MODEL, gait or GaitParameters(), StateParameters(), policy=policy
+            model, gait or GaitParameters(), StateParameters(), policy=policy
         )
         self.tilt = 0.0
         self.step(REST)
@@ -78,7 +79,7 @@ class PhysicsRig:
         self.controller.set_velocity(velocity)
         output = self.controller.step(measure(self.robot), PERIOD)
         if output.targets is not None:
-            self.robot.set_targets(dict(zip(MODEL.names, output.targets, strict=True)))
+            self.robot.set_targets(dict(zip(self.model.names, output.targets, strict=True)))
         self.robot.step(PERIOD)
         self.tilt = max(self.tilt, self.robot.base_pose.tilt)
 

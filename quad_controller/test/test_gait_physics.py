@@ -12,6 +12,7 @@ import pytest
 from quad_controller.gait.parameters import GaitParameters
 from quad_controller.gait.servo_compensation import ServoModel
 from quad_controller.gait.velocity import Velocity
+from quad_controller.model.quadruped import quadruped
 from quad_description import robot_urdf
 from quad_gait_physics import PhysicsRig
 from quad_hardware.sim.physics import Robot
@@ -44,6 +45,30 @@ def test_trot_goes_where_it_is_told_to(velocity: Velocity) -> None:
     assert travel.x == pytest.approx(velocity.x, abs=0.03)
     assert travel.y == pytest.approx(velocity.y, abs=0.02)
     assert travel.yaw == pytest.approx(velocity.yaw, abs=max(0.1 * abs(velocity.yaw), 0.06))
+    assert travel.tilt < LEVEL
+
+
+def test_a_minute_of_trot() -> None:
+    """In a minute it neither falls nor leaves its course by more than a curve of 3 m."""
+    rig = PhysicsRig()
+    rig.mode('walk')
+    travel = rig.travel(60.0, Velocity(0.2))
+    assert not rig.faulted
+    assert travel.x == pytest.approx(0.2, abs=0.02)
+    assert abs(travel.yaw) < 0.2 / 3.0
+    assert travel.tilt < LEVEL
+
+
+@pytest.mark.parametrize(('preset', 'arm'), [('mini', False), ('lite', True)])
+def test_other_builds_of_the_robot_walk_too(preset: str, arm: bool) -> None:
+    """What differs is read from the URDF: limits, and an arm's weight, which stays in place."""
+    urdf = robot_urdf(preset, arm)
+    rig = PhysicsRig(Robot(urdf), model=quadruped(urdf))
+    rig.mode('walk')
+    rig.run(1.0, Velocity(0.2))
+    travel = rig.travel(8.0, Velocity(0.2))
+    assert not rig.faulted
+    assert travel.x == pytest.approx(0.2, abs=0.03)
     assert travel.tilt < LEVEL
 
 

@@ -108,6 +108,7 @@ def test_a_stream_that_breaks_off_stops_the_robot() -> None:
     rig.run(0.6)
     assert rig.controller.status.velocity.at_rest
     assert 'counts as zero' in rig.controller.status.warnings[0]
+    assert sum('counts as zero' in line for line in rig.log) == 1
     assert rig.is_in(State.WALK)
     rig.run(0.5, FORWARD)
     assert rig.controller.status.velocity.x == pytest.approx(0.1)
@@ -170,6 +171,9 @@ def test_a_short_gap_is_survived() -> None:
     rig.run(0.3, FORWARD)
     rig.joints = True
     rig.run(1.0, FORWARD)
+    assert [line for line in rig.log if 'joint states' in line] == [
+        'joint states are 220 ms old; holding the last targets', 'joint states: in order again',
+    ]  # fmt: skip
     assert rig.is_in(State.WALK)
     assert rig.controller.status.velocity.x == pytest.approx(0.1)
 

@@ -31,6 +31,7 @@ from ..exceptions import PolicyError, QuadControllerError
 from ..gait.generator import GaitGenerator
 from ..policy.interface import Policy
 from ..policy.load import load_policy
+from ..policy.shipped import find_policy
 from ..states.controller import Controller
 from ..states.modes import Answer
 from ..states.status import Output, Status
@@ -38,7 +39,6 @@ from . import messages
 from .control_loop import ControlLoop
 from .diagnostics import loop_diagnostic, state_diagnostic
 from .parameters import declare_parameters
-from .policies import find_policy
 from .spinning import spin, stop_on_signals
 
 COMMAND_QOS = QoSProfile(

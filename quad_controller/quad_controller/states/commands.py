@@ -60,8 +60,8 @@ class Commands:
             return Velocity(yaw=self._velocity.yaw)
         return self._velocity
 
-    def warning(self, state: State) -> tuple[str, ...]:
-        """Say whether a stream of velocities broke off instead of ending with zero."""
+    def warning(self, state: State) -> str:
+        """Say that a stream of velocities broke off instead of ending with zero, or nothing."""
         if state in MOVING_STATES and not self._velocity.at_rest and self._age > self._timeout:
-            return (f'the last velocity came {self._age:.1f} s ago; it counts as zero',)
-        return ()
+            return f'the last velocity came {self._age:.1f} s ago; it counts as zero'
+        return ''

@@ -22,11 +22,15 @@ from .machine import Poses, StateMachine
 from .measurement import Measurement
 from .modes import Answer, GAIT_STATES, ModeRequest, MODES, parse_mode, State
 from .motion import Situation
+from .notices import Notices
 from .parameters import StateParameters
 from .shadow import Shadow
 from .status import Event, Output, Status
 
 MAX_STEP = 0.05  # [s] after a longer pause the gait goes on where it was instead of leaping
+
+OVER = {'command': 'velocities: in order again', 'held': 'joint states: in order again'}
+"""What to say when something is no longer the matter."""
 
 UPRIGHT_STATES = GAIT_STATES | {State.POLICY, State.FAULT}
 """States in which the robot is on its legs, and what is wrong with it is a fault."""
@@ -79,6 +83,7 @@ class Controller:
         self._health = Health(len(robot.names), states)
         self._limiter = StepLimiter(robot.limits, states.period, states.target_speed)
         self._latch = FaultLatch()
+        self._notices = Notices()
         self._unreachable = 0
 
     def set_mode(self, text: str) -> Answer:
@@ -123,6 +128,7 @@ class Controller:
     def status(self) -> Status:
         """What can be told of it."""
         health, machine = self._health, self._machine
+        stale = self._commands.warning(machine.state)
         return Status(
             state=machine.state,
             title=machine.title,
@@ -130,7 +136,7 @@ class Controller:
             gait=self._generator.gait,
             velocity=self._generator.velocity,
             faults=self._latch.texts,
-            warnings=(*health.warnings, *self._commands.warning(machine.state)),
+            warnings=(*health.warnings, stale) if stale else health.warnings,
             joints_age=health.joints_age,
             imu_age=health.imu_age,
             battery=health.battery,
@@ -161,6 +167,7 @@ class Controller:
         state = self._machine.state
         if state is not before and state is not State.FAULT:
             events.append(Event(False, f'{before.value} -> {state.value}'))
+        events += self._notices.step(self._matters(state), OVER)
         situation, dt_motion = self._situation(), min(dt, MAX_STEP)
         wanted = last if self._health.held else self._move(situation, dt_motion, last, events)
         shadow = self._shadow.step(situation, dt_motion, last) if self._shadow else None
@@ -185,6 +192,16 @@ class Controller:
             for fault, reason in self._health.faults()
             for event in self._latch_fault(fault, reason, last)
         ]
+
+    def _matters(self, state: State) -> dict[str, str]:
+        """Return what stops the robot without being a fault, by the names in :data:`OVER`."""
+        matters = {}
+        if stale := self._commands.warning(state):
+            matters['command'] = stale
+        if self._health.held and state in UPRIGHT_STATES:
+            age = self._health.joints_age * 1e3
+            matters['held'] = f'joint states are {age:.0f} ms old; holding the last targets'
+        return matters
 
     def _latch_fault(self, fault: Fault, reason: str, last: Targets) -> list[Event]:
         if not self._latch.latch(fault, reason):
