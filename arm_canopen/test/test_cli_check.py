@@ -6,15 +6,18 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+import signal
 import subprocess
 import sys
 
+from can_addresses import free_multicast
 from config_samples import eds_text, write_bus
 import pytest
 
 from arm_canopen.cli.main import main
 
 PACKAGE = Path(__file__).parents[1]
+DEADLINE = 60.0  # [s]
 PANDA = PACKAGE.parent / 'arm_bringup' / 'robots' / 'panda' / 'bus.yml'
 
 
@@ -28,7 +31,7 @@ def test_a_process_ends_with_its_exit_code(tmp_path: Path) -> None:
         capture_output=True,
         text=True,
         check=False,
-        timeout=60,
+        timeout=DEADLINE,
     )
     assert process.returncode == 1
     lines = process.stdout.splitlines()
@@ -95,3 +98,36 @@ def test_wrong_usage_is_2(
         main(arguments)
     assert ending.value.code == 2
     assert message in capsys.readouterr().err
+
+
+def start(*arguments: str) -> subprocess.Popen[str]:
+    """Start the program with its output in pipes."""
+    return subprocess.Popen(
+        [sys.executable, '-m', 'arm_canopen.cli.main', *arguments],
+        env=os.environ | {'PYTHONPATH': str(PACKAGE)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def test_a_reader_that_goes_away_is_no_error() -> None:
+    """``canopen check bus.yml | head`` ends without a traceback."""
+    process = start('check', str(PANDA), '--frames')
+    assert process.stdout
+    process.stdout.close()
+    assert process.wait(DEADLINE) == 1
+    assert process.stderr
+    assert 'Traceback' not in process.stderr.read()
+    process.stderr.close()
+
+
+def test_ctrl_c_ends_a_verb() -> None:
+    """With the exit code of an interrupted program, and without a traceback."""
+    process = start('scan', '--can', free_multicast(), '--listen', '60')
+    assert process.stderr
+    assert 'listening on' in process.stderr.readline()
+    process.send_signal(signal.SIGINT)
+    output, errors = process.communicate(timeout=DEADLINE)
+    assert process.returncode == 130
+    assert output == errors == ''

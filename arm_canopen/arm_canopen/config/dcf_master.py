@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
+from ..exceptions import CodecError
 from ..standard.cob_id import COB_ID_INVALID, CobId, SYNC_PRODUCER
 from ..standard.datatypes import DataType
 from ..standard.dictionary import AccessType
@@ -65,7 +66,7 @@ def master_dcf(config: BusConfig, upload_files: Mapping[int, str]) -> str:
         upload_files: Path of the concise DCF by node id, for those devices that have one.
 
     Raises:
-        ValueError: The devices have more PDOs of one direction than the master can have.
+        CodecError: The devices have more PDOs of one direction than the master can have.
     """
     objects: dict[int, DcfObject] = {
         **dict(_communication(config)),
@@ -75,7 +76,7 @@ def master_dcf(config: BusConfig, upload_files: Mapping[int, str]) -> str:
     for direction in (TPDO, RPDO):
         pdos = list(_pdos(config, direction))
         if len(pdos) > PDO_COUNT_MAX:
-            raise ValueError(
+            raise CodecError(
                 f'the devices have {len(pdos)} {direction.title}s, a master takes {PDO_COUNT_MAX}'
             )
         counts[direction.name] = len(pdos)
