@@ -36,7 +36,8 @@ def main() -> None:
 def _show(gamepad: Gamepad) -> None:
     gamepad.scan(time.monotonic())
     if not gamepad.is_connected:
-        _print('no gamepad yet: plug one in; a user may read it as a member of the group input')
+        problem = KernelDevices().problem() or 'plug one in, or switch it on'
+        _print(f'no gamepad yet: {problem}')
     while True:
         gamepad.scan(time.monotonic())
         select.select(gamepad.filenos(), [], [], WAIT)

@@ -10,6 +10,7 @@ import re
 import select
 import termios
 import threading
+import time
 import tty
 from types import TracebackType
 from typing import TYPE_CHECKING
@@ -28,24 +29,30 @@ class ScriptedTerminal:
         flags: Stack of the protocol's flags.
         modes: DEC private modes that are on.
         written: All that the program wrote.
+        answered: How many answers have been sent.
     """
 
-    def __init__(self, *, kitty: bool, supported: int = 31, answers: bool = True) -> None:
+    def __init__(
+        self, *, kitty: bool, supported: int = 31, answers: bool = True, delay: float = 0.0
+    ) -> None:
         """Open a pseudo-terminal.
 
         Args:
             kitty: Speak the protocol.
             supported: Enhancements that it has.
             answers: Answer questions at all.
+            delay: How long an answer is on its way [s].
         """
         self._master, self._slave = pty.openpty()
         self.path = os.ttyname(self._slave)
         self.flags: list[int] = []
         self.modes: set[int] = set()
         self.written = b''
+        self.answered = 0
         self._kitty = kitty
         self._supported = supported
         self._answers = answers
+        self._delay = delay
         self._stalled = threading.Event()
         self._changed = threading.Condition()
         self._wake, self._waker = os.pipe()
@@ -86,6 +93,11 @@ class ScriptedTerminal:
         with self._changed:
             found = self._changed.wait_for(lambda: re.search(pattern, self.written), timeout)
         assert found, f'no {pattern!r} in {self.written!r}'
+
+    def wait_answered(self, count: int, timeout: float = 5.0) -> None:
+        """Wait until some answers have been sent."""
+        with self._changed:
+            assert self._changed.wait_for(lambda: self.answered >= count, timeout)
 
     def hang_up(self) -> None:
         """Close the window."""
@@ -144,4 +156,8 @@ class ScriptedTerminal:
 
     def _answer(self, text: str) -> None:
         if self._answers:
+            time.sleep(self._delay)
             os.write(self._master, text.encode())
+            with self._changed:
+                self.answered += 1
+                self._changed.notify_all()

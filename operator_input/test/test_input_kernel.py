@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 import os
 from pathlib import Path
+import sys
 import time
 from typing import Any
 
@@ -12,6 +13,8 @@ import pytest
 
 from operator_input import DeviceError
 from operator_input.devices import KernelDevices
+from operator_input.devices.keyboards import Keyboards
+from operator_input.devices.release_matcher import ReleaseMatcher
 from operator_input.gamepad import AT_REST, Axis, Button, Gamepad, GamepadState
 
 UINPUT = Path('/dev/uinput')
@@ -51,6 +54,32 @@ def test_vanished_device(tmp_path: Path) -> None:
     """A device that went away between looking and opening is a DeviceError too."""
     with pytest.raises(DeviceError, match='event3'):
         KernelDevices(str(tmp_path)).open(str(tmp_path / 'event3'))
+
+
+def test_problems_are_told_with_their_remedy(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """No package, no devices, no permission: each has words of its own; else there is none."""
+    devices = KernelDevices(str(tmp_path))
+    assert 'pass it in (--device' in devices.problem()
+    (tmp_path / 'event0').touch()
+    assert not devices.problem()
+    monkeypatch.setattr('os.access', lambda *_: False)
+    assert 'usermod -aG input' in devices.problem()
+    monkeypatch.setattr('importlib.util.find_spec', lambda _: None)
+    assert 'apt-get install python3-evdev' in devices.problem()
+
+
+def test_keys_work_without_the_package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where evdev is not installed, a device is a DeviceError, and keyboards are simply none."""
+    monkeypatch.setitem(sys.modules, 'evdev', None)
+    (tmp_path / 'event0').touch()
+    devices = KernelDevices(str(tmp_path))
+    with pytest.raises(DeviceError, match='package evdev is missing'):
+        devices.open(str(tmp_path / 'event0'))
+    keyboards = Keyboards(devices, ReleaseMatcher())
+    keyboards.scan(0.0)
+    assert keyboards.names == []
 
 
 @pytest.mark.skipif(

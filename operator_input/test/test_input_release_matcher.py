@@ -41,8 +41,13 @@ def test_layout_does_not_matter() -> None:
 
 
 def test_shift_is_not_taken_for_the_letter() -> None:
-    """Shift goes down between the letter's neighbours and is never a candidate."""
+    """Shift types nothing: down before or after the letter, it is never the key."""
     matcher = ReleaseMatcher()
+    matcher.key_down(KEY_L, 0.5)
+    matcher.key_down(KEY_LEFTSHIFT, 0.51)
+    matcher.terminal(typed('l', 0.52))
+    assert actions(matcher.key_up(KEY_L, 0.6)) == [('l', KeyAction.RELEASED)]
+    matcher.key_up(KEY_LEFTSHIFT, 0.7)
     matcher.key_down(KEY_LEFTSHIFT, 1.0)
     matcher.key_down(KEY_I, 1.1)
     assert actions(matcher.terminal(typed('I', 1.1))) == [('I', KeyAction.PRESSED)]

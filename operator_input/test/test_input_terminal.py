@@ -92,10 +92,11 @@ def test_terminal_is_given_back_after_an_error() -> None:
 
 
 def test_quick_exit_leaves_no_answer_behind() -> None:
-    """Left before the terminal answered: its answers do not appear at the shell's prompt."""
-    with ScriptedTerminal(kitty=True) as terminal:
+    """Left before a slow terminal answered: its answers do not appear at the shell's prompt."""
+    with ScriptedTerminal(kitty=True, delay=0.05) as terminal:
         with TerminalKeyboard(terminal.path):
             pass
+        terminal.wait_answered(2)
         terminal.wait_written(rb'2004l')
         assert terminal.unread() == b''
         assert terminal.flags == []

@@ -101,7 +101,7 @@ def test_program_without_a_gamepad_waits_and_ends(isolation: Isolation) -> None:
     )
     try:
         assert process.stderr is not None
-        assert 'no gamepad yet: plug one in' in process.stderr.readline()
+        assert 'no gamepad yet: ' in process.stderr.readline()
         process.send_signal(2)
         assert process.wait(PATIENCE) == 0
     finally:

@@ -6,16 +6,19 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 import contextlib
+import importlib.util
 import os
 from pathlib import Path
 from typing import Any
-
-import evdev
 
 from ..exceptions import DeviceError
 from .events import AxisRange, DeviceInfo, DeviceState, EV_ABS, EV_KEY, InputDevice, InputEvent
 
 FOLDER = '/dev/input'
+MISSING = 'the Python package evdev is missing: sudo apt-get install python3-evdev'
+PERMISSION = (
+    'members of the group input may read it (sudo usermod -aG input $USER, then log in again)'
+)
 
 
 class KernelDevice:
@@ -28,16 +31,18 @@ class KernelDevice:
             path: ``/dev/input/event3``, say.
 
         Raises:
-            DeviceError: It is gone, or may not be read.
+            DeviceError: It is gone, or may not be read, or the package evdev is missing.
         """
+        try:
+            # not every installation has it, and keys work without
+            import evdev
+        except ImportError:
+            raise DeviceError(MISSING) from None
         try:
             self._device = evdev.InputDevice(path)
             capabilities = self._device.capabilities(absinfo=True)
         except OSError as error:
-            raise DeviceError(
-                f'{path}: {error.strerror}; a user may read it as a member of the group input '
-                '(sudo usermod -aG input $USER, then log in again)'
-            ) from None
+            raise DeviceError(f'{path}: {error.strerror}; {PERMISSION}') from None
         axes: list[Any] = capabilities.get(EV_ABS, [])  # its types do not know of absinfo
         self._info = DeviceInfo(
             path=path,
@@ -117,6 +122,17 @@ class KernelDevices:
             DeviceError: It is gone, or may not be read.
         """
         return KernelDevice(path)
+
+    def problem(self) -> str:
+        """Say why nothing can be read, and what helps; empty when something can."""
+        if importlib.util.find_spec('evdev') is None:
+            return MISSING
+        folder = Path(self._folder)
+        if not any(folder.glob('event*')):
+            return f'{folder} has no devices; in a container, pass it in (--device {folder})'
+        if not self.paths():
+            return f'no device of {folder} may be read; {PERMISSION}'
+        return ''
 
 
 def _number(file: Path) -> int:

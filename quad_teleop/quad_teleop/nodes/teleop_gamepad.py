@@ -104,10 +104,8 @@ class Session:
         node = self._node
         node.gamepad.scan(time.monotonic())
         if not node.gamepad.is_connected:
-            node.get_logger().warning(
-                'no gamepad yet: plug one in; to read it, a user must be in the group input '
-                '(sudo usermod -aG input $USER, then log in again)'
-            )
+            problem = KernelDevices().problem() or 'plug one in, or switch it on'
+            node.get_logger().warning(f'no gamepad yet: {problem}')
         try:
             while not self._stop.is_set():
                 self._serve()
