@@ -12,9 +12,9 @@ from .held_keys import HeldKeys
 from .keyboard import Keyboard, ReleaseSource
 
 EXPLANATIONS = {
-    ReleaseSource.TERMINAL: 'the terminal (Kitty keyboard protocol)',
+    ReleaseSource.TERMINAL: 'the terminal (Kitty protocol)',
     ReleaseSource.KEYBOARD: 'the keyboard itself (evdev)',
-    ReleaseSource.TIME_OUT: 'nobody; a key counts as released when its repeat is overdue',
+    ReleaseSource.TIME_OUT: 'nobody: time-outs',
 }
 
 

@@ -61,7 +61,7 @@ def test_problems_are_told_with_their_remedy(
 ) -> None:
     """No package, no devices, no permission: each has words of its own; else there is none."""
     devices = KernelDevices(str(tmp_path))
-    assert 'pass it in (--device' in devices.problem()
+    assert 'plug one in, or give the container --device' in devices.problem()
     (tmp_path / 'event0').touch()
     assert not devices.problem()
     monkeypatch.setattr('os.access', lambda *_: False)

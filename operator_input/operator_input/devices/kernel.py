@@ -129,7 +129,7 @@ class KernelDevices:
             return MISSING
         folder = Path(self._folder)
         if not any(folder.glob('event*')):
-            return f'{folder} has no devices; in a container, pass it in (--device {folder})'
+            return f'{folder} has no devices: plug one in, or give the container --device {folder}'
         if not self.paths():
             return f'no device of {folder} may be read; {PERMISSION}'
         return ''
