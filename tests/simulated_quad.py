@@ -74,8 +74,8 @@ class SimulatedQuad:
         self._folder = folder
         parameters = folder / 'parameters.yaml'
         write_parameters(parameters, urdf)
-        robot = Stack(str(folder / 'robot'), simulate=True)
-        bridge = Stack(str(folder / ('tapped' if tapped else 'robot')))
+        robot = Stack(str(folder / 'robot'), simulate=True, protocol='new')
+        bridge = Stack(str(folder / ('tapped' if tapped else 'robot')), protocol='new')
         specs = [
             quad_processes(robot, parameters, find_executable)[0],
             *quad_processes(bridge, parameters, find_executable)[:2],

@@ -26,6 +26,9 @@ from .stack import quad_processes, Stack
 
 GAITS = ('trot', 'crawl', 'pace')
 """Gaits of quad_controller."""
+AUTO, NEW = 'auto', 'new'
+PROTOCOLS = (AUTO, NEW, 'old')
+"""Serial protocols of quad_hardware."""
 REMEDY = 'another --port and another ROS_DOMAIN_ID'
 """What a second bring-up is told to take."""
 
@@ -70,6 +73,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='FILE',
         type=Path,
         help='ONNX policy to load and check; mode "policy" lets it walk',
+    )
+    parser.add_argument(
+        '--protocol',
+        choices=PROTOCOLS,
+        default=AUTO,
+        help='what is spoken on the serial line; auto asks a real robot, and is new with a '
+        'simulated one (default: %(default)s)',
     )
     parser.add_argument(
         '--timeout',
@@ -120,6 +130,7 @@ def session(arguments: argparse.Namespace, port: str | None) -> Iterator[Session
             simulate=port is None,
             arm=arguments.arm,
             gait=arguments.gait,
+            protocol=_protocol(arguments.protocol, simulate=port is None),
             policy=policy,
             calibration=calibration,
             ready_timeout=arguments.timeout,
@@ -129,6 +140,11 @@ def session(arguments: argparse.Namespace, port: str | None) -> Iterator[Session
         )
         joints = [joint.name for joint in movable_joints(urdf)]
         yield Session(title, joints, quad_processes(wanted, parameters, find_executable))
+
+
+def _protocol(wanted: str, *, simulate: bool) -> str:
+    # a simulated robot may answer late on a busy machine, which is no reason for the slow protocol
+    return NEW if simulate and wanted == AUTO else wanted
 
 
 def _existing(name: str, path: Path | None) -> Path | None:

@@ -49,6 +49,7 @@ class Stack:
         arm: The robot has its arm.
         gait: Gait of the controller.
         policy: Policy that the controller loads; None for the geometric gait alone.
+        protocol: Serial protocol, ``new`` or ``old``; ``auto`` asks the robot.
         calibration: Parameter file that ``quad_hardware calibrate`` has written.
         ready_timeout: How long each process may take to be ready in [s].
     """
@@ -59,6 +60,7 @@ class Stack:
     arm: bool = False
     gait: str = 'trot'
     policy: Path | None = None
+    protocol: str = 'auto'
     calibration: Path | None = None
     ready_timeout: float = 30.0
 
@@ -88,7 +90,10 @@ def quad_processes(stack: Stack, parameters: Path, find: FindExecutable) -> list
 def _simulator(stack: Stack, find: FindExecutable) -> ProcessSpec:
     executable = Executable('quad_hardware', 'fake_xgo')
     program, *ros_arguments = node_argv(executable, find)
-    options = ['--link', stack.port, '--preset', stack.preset, *(['--arm'] if stack.arm else [])]
+    spoken = 'both' if stack.protocol == 'auto' else stack.protocol
+    options = ['--link', stack.port, '--preset', stack.preset, '--protocol', spoken]
+    if stack.arm:
+        options.append('--arm')
     return ProcessSpec(
         name='fake_xgo',
         argv=(program, *options, *ros_arguments),
@@ -100,9 +105,8 @@ def _simulator(stack: Stack, find: FindExecutable) -> ProcessSpec:
 
 
 def _bridge(stack: Stack, parameters: Path, find: FindExecutable) -> ProcessSpec:
-    argv = node_argv(
-        Executable('quad_hardware', 'hardware_node'), find, {'port': stack.port}, parameters
-    )
+    values = {'port': stack.port, 'protocol': stack.protocol}
+    argv = node_argv(Executable('quad_hardware', 'hardware_node'), find, values, parameters)
     if stack.calibration is not None:
         argv = (*argv, '--params-file', str(stack.calibration))
     return ProcessSpec(

@@ -103,7 +103,7 @@ def test_progress_says_state_speeds_tilt_and_rhythm() -> None:
     text = progress_line(GOOD)
     for words in ('walk', 'commanded +0.200', 'measured +0.196', 'tilt 1.0°', '50.0 Hz'):
         assert words in text
-    assert 'unknown' in progress_line(Figures())
+    assert progress_line(Figures()) == 'waiting for the controller'
 
 
 def draw(figures: Figures, moment: Moment, width: int, height: int) -> list[str]:

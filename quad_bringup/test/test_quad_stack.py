@@ -66,6 +66,15 @@ def test_preset_and_arm_reach_the_simulator(tmp_path: Path) -> None:
     assert '--arm' not in processes(tmp_path, Stack('/tmp/xgo', simulate=True))['fake_xgo'].argv
 
 
+def test_both_ends_of_the_line_speak_the_same_protocol(tmp_path: Path) -> None:
+    """A simulated robot speaks both where the bridge asks."""
+    for protocol, spoken in (('auto', 'both'), ('new', 'new'), ('old', 'old')):
+        found = processes(tmp_path, Stack('p', simulate=True, protocol=protocol))
+        argv = found['fake_xgo'].argv
+        assert argv[argv.index('--protocol') + 1] == spoken
+        assert f'protocol:={protocol}' in found['hardware'].argv
+
+
 def test_gait_and_policy_reach_the_controller(tmp_path: Path) -> None:
     """A policy only where there is one."""
     argv = processes(tmp_path, Stack('p', gait='crawl'))['controller'].argv

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 import math
 
-from .figures import Figures
+from .figures import Figures, UNKNOWN
 from .itinerary import Stretch, Velocity
 
 LINEAR_TOLERANCE = 0.04
@@ -47,6 +47,8 @@ def progress_line(figures: Figures) -> str:
     Args:
         figures: The latest.
     """
+    if figures.state == UNKNOWN:
+        return 'waiting for the controller'
     speed = figures.measured or figures.odometry
     return (
         f'{figures.state}, commanded {velocity_text(figures.commanded)}, '
