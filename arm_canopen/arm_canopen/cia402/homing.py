@@ -48,30 +48,39 @@ async def home(
     """
     drive = steps.drive
     tell = on_progress or (lambda progress: None)
+    homing = _homing_mode(steps)
+    method = await _choose(steps, method)
+    tell(HomingProgress.SWITCHING)
+    await steps.switch(homing)
+    tell(HomingProgress.HOMING)
+    await _run(steps, homing, f'the end of homing {method}')
+    if drive.objects.statusword & Statusword.HOMING_ERROR:
+        raise steps.refused(f'failed to home by method {method}')
+    tell(HomingProgress.DONE)
+    return f'homed by method {method}'
+
+
+def _homing_mode(steps: DriveSequences) -> Homing:
+    drive = steps.drive
     homing = drive.modes[OperationMode.HOMING]
     if not isinstance(homing, Homing):
         raise TypeError('mode 6 is no homing mode')
     if not drive.parameters.supports(OperationMode.HOMING):
         raise steps.refused('has no homing (mode 6 is not in 0x6502)')
-    method = await _choose(steps, method)
-    tell(HomingProgress.SWITCHING)
-    await steps.switch(homing)
+    return homing
+
+
+async def _run(steps: DriveSequences, homing: Homing, what: str) -> None:
+    """Set bit 4 until the drive says that it has ended, well or not."""
     # without a falling edge of bit 4 before, the drive would miss the start, and the bits of the
     # last homing would pass for those of this one
-    await steps.pause(EDGE_CYCLES * drive.period)
-    tell(HomingProgress.HOMING)
+    await steps.pause(EDGE_CYCLES * steps.drive.period)
     homing.started = True
     try:
         await steps.pause(HOMING_START)
-        await steps.until(
-            lambda: _is_over(steps), drive.config.homing_timeout, f'the end of homing {method}'
-        )
+        await steps.until(lambda: _is_over(steps), steps.drive.config.homing_timeout, what)
     finally:
         homing.started = False
-    if drive.objects.statusword & Statusword.HOMING_ERROR:
-        raise steps.refused(f'failed to home by method {method}')
-    tell(HomingProgress.DONE)
-    return f'homed by method {method}'
 
 
 async def _choose(steps: DriveSequences, method: int | None) -> int:
