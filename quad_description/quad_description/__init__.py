@@ -3,6 +3,7 @@
 """The XGO quadruped as a URDF, made from its numbers; nothing here imports rclpy."""
 
 from .exceptions import DescriptionError, PresetError
+from .feet import foot_position, standing_height
 from .joints import Joint, LEGS, movable_joints
 from .poses import Pose, pose_positions
 from .urdf import PRESETS, robot_urdf
@@ -14,7 +15,9 @@ __all__ = [
     'Joint',
     'Pose',
     'PresetError',
+    'foot_position',
     'movable_joints',
     'pose_positions',
     'robot_urdf',
+    'standing_height',
 ]

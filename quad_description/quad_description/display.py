@@ -8,6 +8,7 @@ import difflib
 import sys
 from typing import TypeVar
 
+from geometry_msgs.msg import TransformStamped
 from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
 import rclpy
 from rclpy.exceptions import ParameterException
@@ -17,8 +18,10 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.utilities import try_shutdown
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
+from tf2_msgs.msg import TFMessage
 
 from .exceptions import DescriptionError
+from .feet import standing_height
 from .joints import movable_joints
 from .motion import sweep
 from .poses import Pose, pose_positions
@@ -33,7 +36,7 @@ RATE_RANGE = FloatingPointRange(from_value=1.0, to_value=200.0)
 
 
 class Display(Node):
-    """Publishes ``/robot_description``, latched, and ``/joint_states``."""
+    """Publishes ``/robot_description``, latched, ``/joint_states`` and base_footprint."""
 
     def __init__(self) -> None:
         """Read the parameters and begin to publish.
@@ -57,6 +60,7 @@ class Display(Node):
         self._description = self.create_publisher(String, 'robot_description', latched)
         self._description.publish(String(data=urdf))
         self._states = self.create_publisher(JointState, 'joint_states', 10)
+        self._footprint = self.create_publisher(TFMessage, '/tf', 10)
         self._start = self.get_clock().now()
         self.create_timer(1.0 / rate, self._publish)
         self.get_logger().info(f'{preset}: {len(self._joints)} joints, motion {motion}')
@@ -69,6 +73,7 @@ class Display(Node):
         message = JointState(name=list(positions), position=list(positions.values()))
         message.header.stamp = now.to_msg()
         self._states.publish(message)
+        self._footprint.publish(TFMessage(transforms=[_footprint(message)]))
 
     def _declare(
         self, name: str, default: Value, description: str, bounds: FloatingPointRange | None = None
@@ -84,6 +89,16 @@ class Display(Node):
             close = difflib.get_close_matches(name, known, n=1, cutoff=0.8)
             if close and not self.has_parameter(name):
                 raise DescriptionError(f'unknown parameter {name!r}; did you mean {close[0]!r}?')
+
+
+def _footprint(states: JointState) -> TransformStamped:
+    """Return where the ground is below a body that is level and stands on its lowest foot."""
+    transform = TransformStamped(child_frame_id='base_footprint')
+    transform.header.stamp = states.header.stamp
+    transform.header.frame_id = 'base_link'
+    positions = dict(zip(states.name, states.position, strict=True))
+    transform.transform.translation.z = -standing_height(positions)
+    return transform
 
 
 def run(args: list[str] | None = None) -> int:

@@ -22,8 +22,9 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
+from tf2_msgs.msg import TFMessage
 
-from quad_description import movable_joints, Pose, pose_positions, robot_urdf
+from quad_description import movable_joints, Pose, pose_positions, robot_urdf, standing_height
 from quad_description.motion import sweep, SWEEP_DURATION
 
 PACKAGE = Path(__file__).parents[1]
@@ -102,6 +103,10 @@ def test_the_display_publishes_what_viewers_need(listener: Listener, isolation: 
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         description = listener.wait_for(String, '/robot_description', latched)
         assert description.data == robot_urdf('mini', arm=True)
+        tree = listener.wait_for(TFMessage, '/tf', 10).transforms[0]
+        assert (tree.header.frame_id, tree.child_frame_id) == ('base_link', 'base_footprint')
+        lying = standing_height(pose_positions(Pose.LIE))
+        assert tree.transform.translation.z == pytest.approx(-lying)
         assert dict(zip(states.name, states.position, strict=True)) == pose_positions(
             Pose.LIE, arm=True
         )

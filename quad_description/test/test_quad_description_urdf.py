@@ -15,6 +15,7 @@ import pytest
 
 from quad_description import (
     DescriptionError,
+    foot_position,
     LEGS,
     movable_joints,
     Pose,
@@ -22,6 +23,7 @@ from quad_description import (
     PresetError,
     PRESETS,
     robot_urdf,
+    standing_height,
 )
 from quad_description.urdf_command import run
 from quad_kinematics import centre_of_mass, inertia, link_pose, mass, parse, rotation
@@ -107,6 +109,18 @@ def test_legs_bend_as_the_conventions_say(leg: str, hip: float, thigh: float, ca
     assert foot == pytest.approx(expected, abs=1e-9)
 
 
+@pytest.mark.parametrize('leg', LEGS)
+@given(hip=ANGLE, thigh=ANGLE, calf=ANGLE)
+def test_foot_positions_are_those_of_the_urdf(
+    leg: str, hip: float, thigh: float, calf: float
+) -> None:
+    """The closed form and the chain of the URDF's joints agree."""
+    names = (f'{leg}_{joint}_joint' for joint in ('hip', 'thigh', 'calf'))
+    at = dict(zip(names, (hip, thigh, calf), strict=True))
+    expected, _ = link_pose(parse(robot_urdf('mini')), f'{leg}_foot', at)
+    assert foot_position(leg, at) == pytest.approx(expected, abs=1e-9)
+
+
 def test_a_positive_hip_moves_each_foot_inward() -> None:
     """The pad goes from 53.5 mm to 27.7 mm beside the middle at 0.3 rad, as in the vendor's."""
     root = parse(robot_urdf('mini'))
@@ -145,6 +159,7 @@ def test_standing_height_is_that_of_the_vendors_default_pose() -> None:
     """The base stands 125 to 130 mm above the ground."""
     foot, _ = link_pose(parse(robot_urdf('mini')), 'fl_foot', pose_positions(Pose.STAND))
     assert 0.125 <= 0.010 - foot[2] <= 0.130
+    assert standing_height(pose_positions(Pose.STAND)) == pytest.approx(0.010 - foot[2])
 
 
 def test_the_lite_keeps_what_its_servos_reach() -> None:
