@@ -19,7 +19,7 @@ class Reaction(IntEnum):
 class Fault(Enum):
     """Why; the value says what it is about, for people."""
 
-    JOINTS = 'joint states'
+    JOINTS = 'feedback'
     IMU = 'attitude'
     FALLEN = 'fall'
     BATTERY = 'battery'
