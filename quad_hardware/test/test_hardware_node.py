@@ -155,7 +155,7 @@ def test_a_stop_is_clean(rig: NodeRig) -> None:
 
 WRONG = {
     'protokoll:=old': "did you mean 'protocol'",
-    'protocol:=newest': "protocol 'newest' is none of auto, new, old",
+    'protocol:=newest': "protocol 'newest' is none of auto, vendor, new, old",
     'joints.fl_hip_joint.sign:=0': 'sign 0 is neither 1 nor -1',
     'robot_description:=<robot/>': 'no joint for motors 11',
     'robot_description:=none': 'no XML',

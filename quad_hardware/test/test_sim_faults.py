@@ -156,6 +156,27 @@ def test_an_empty_battery_is_told() -> None:
     assert after.faults & Fault.LOW_BATTERY
 
 
+def test_a_limp_servo_gives_way_and_comes_back() -> None:
+    """One servo lets go: the robot sinks there, the board says so; afterwards it holds again."""
+    fault = 'limp,at=0.5,for=1,motor=11'
+    robot = VirtualRobot('--start', 'stand', '--noise', 'none', '--fault', fault)
+    robot.send(ON)
+    servos = robot.simulation.board.servos
+    before, *_, after = (decode_feedback(frame.payload) for frame in robot.run(1.4))
+    assert [motor for motor in servos.fitted if not servos.torque_on(motor)] == [11]
+    assert not before.faults & Fault.SERVO_SILENT
+    assert after.faults & Fault.SERVO_SILENT
+    assert abs(after.position[0] - before.position[0]) > 3.0
+    assert abs(after.attitude[0]) > 0.3
+    robot.send(Frame(Kind.WRITE, Code.TORQUE, b'\xff\x01'))
+    robot.run(0.01)
+    assert not servos.torque_on(11), 'no command repairs it'
+    *_, last = (decode_feedback(frame.payload) for frame in robot.run(0.3))
+    assert all(map(servos.torque_on, servos.fitted))
+    assert not last.faults & Fault.SERVO_SILENT
+    assert last.position[0] == pytest.approx(after.position[0], abs=1.0), 'it does not jump'
+
+
 def test_faults_change_nothing_when_they_are_over() -> None:
     """A robot whose faults have ended says what one without faults says."""
     one = VirtualRobot(*KINEMATIC, '--fault', 'drop,rate=0.5,for=0.2', '--fault', 'flip,for=0.2')

@@ -56,8 +56,9 @@ class Estimate:
         attitude: From base_link to the world, (x, y, z, w); its yaw is the robot's.
         angular_velocity: Of the body, in base_link [rad/s]; None when it is not wanted.
         rate_measured: The angular velocity is that of a gyro.
-        acceleration: Specific force in base_link [m/s²].
-        gravity_error: Between accelerometer and attitude [rad]; None while the body accelerates.
+        acceleration: Specific force in base_link [m/s²]; None where it is not reported.
+        gravity_error: Between accelerometer and attitude [rad]; None while the body accelerates,
+            and without an accelerometer.
         odometry: Where the body is.
     """
 
@@ -67,7 +68,7 @@ class Estimate:
     attitude: Quaternion
     angular_velocity: Vector | None
     rate_measured: bool
-    acceleration: Vector
+    acceleration: Vector | None
     gravity_error: float | None
     odometry: OdometryState
 

@@ -29,12 +29,12 @@ def gravity_from_acceleration(acceleration: Vector) -> Vector | None:
     return -x / length, -y / length, -z / length
 
 
-def disagreement(attitude: Quaternion, acceleration: Vector) -> float | None:
+def disagreement(attitude: Quaternion, acceleration: Vector | None) -> float | None:
     """Return the angle between both directions [rad]; None while the body accelerates.
 
     More than a few degrees at rest: the axes of the IMU are not those of the body.
     """
-    felt = gravity_from_acceleration(acceleration)
+    felt = None if acceleration is None else gravity_from_acceleration(acceleration)
     if felt is None:
         return None
     cosine = sum(a * b for a, b in zip(gravity_from_attitude(attitude), felt, strict=True))

@@ -42,11 +42,12 @@ class Plausibility:
 
 
 def _impossible(state: RobotState) -> Iterator[str]:
-    numbers = (*state.attitude, *state.acceleration, *state.positions.values())
+    felt = state.acceleration or (0.0, 0.0, 0.0)
+    numbers = (*state.attitude, *felt, *state.positions.values())
     if not all(map(math.isfinite, (*numbers, *state.velocities.values()))):
         yield 'a number is not finite'
-    if math.hypot(*state.acceleration) > LARGEST_ACCELERATION:
-        yield f'acceleration {state.acceleration} m/s²'
+    if math.hypot(*felt) > LARGEST_ACCELERATION:
+        yield f'acceleration {felt} m/s²'
     if any(abs(angle) > 360.0 for angle in state.attitude):
         yield f'attitude {state.attitude} deg'
     for motor, angle in state.positions.items():

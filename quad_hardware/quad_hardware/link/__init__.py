@@ -3,9 +3,10 @@
 """The serial line: port, probing, conversation and the thread that keeps it going."""
 
 from .dialect import DialectCounters
-from .driver import Driver, LinkOptions, LinkState, LinkStatus
+from .driver import Driver, LinkState, LinkStatus
 from .port import SerialPort
 from .probe import ask, ask_firmware, connect, Connection
+from .session import LinkOptions
 from .state import RobotState
 
 __all__ = [

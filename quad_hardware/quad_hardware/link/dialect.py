@@ -50,6 +50,10 @@ class Step:
 class Dialect(ABC):
     """Conversation with one robot.
 
+    Attributes:
+        protocol: What the robot speaks.
+        can_release: Its servos can be told to let go.
+
     The caller does :meth:`step` again when its ``wake`` has come, after :meth:`command` and after
     frames; and :meth:`hear` for each frame.
     """
@@ -62,6 +66,7 @@ class Dialect(ABC):
             now: Time [s].
         """
         self.protocol = protocol
+        self.can_release = True
         self._counters = DialectCounters()
         self._now = now
 

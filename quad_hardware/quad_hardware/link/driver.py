@@ -15,20 +15,10 @@ import time
 
 from ..exceptions import LinkError
 from ..protocol import (
-    Model,
-    model_of_firmware,
-    NEW,
     ParserCounters,
-    Protocol,
-    PROTOCOLS,
-    ROBOT_KINDS,
-    StreamParser,
 )
 from .dialect import Dialect, DialectCounters
-from .new_dialect import NewDialect
-from .old_dialect import OldDialect
-from .port import SerialPort
-from .probe import connect, Connection
+from .session import LinkOptions, open_session, Session
 from .state import RobotState
 
 STALE_TIME = 0.5  # [s] without a report, after which nothing is sent any more
@@ -78,25 +68,6 @@ class LinkStatus:
     dialect: DialectCounters
 
 
-@dataclass(frozen=True, slots=True)
-class LinkOptions:
-    """Where the robot is, and how to talk to it.
-
-    Attributes:
-        path: Device file.
-        protocols: What to try, in this order.
-        baud: Speed [bit/s]; 0 takes each protocol's own.
-        model: Whose ranges scale bytes in the old protocol; None asks the firmware.
-        rate: Reports a second [Hz].
-    """
-
-    path: str
-    protocols: tuple[Protocol, ...] = PROTOCOLS
-    baud: int = 0
-    model: Model | None = None
-    rate: int = 50
-
-
 class Driver:
     """A robot on a serial port.
 
@@ -122,9 +93,7 @@ class Driver:
         self._torque: bool | None = None
         self._state = LinkState.CONNECTING
         self._detail = 'not started'
-        self._connection: Connection | None = None
-        self._parser: StreamParser | None = None
-        self._dialect: Dialect | None = None
+        self._session: Session | None = None
         self._connections = 0
         self._commands = 0
         self._dropped = 0
@@ -163,9 +132,11 @@ class Driver:
         """Have all servos hold their place, or let go: the robot drops then.
 
         Returns:
-            False when the link is not running, and nothing will be sent.
+            False when the link is not running or cannot do that, and nothing will be sent.
         """
-        if self._state is not LinkState.RUNNING:
+        session = self._session
+        able = session is not None and session.dialect.can_release
+        if self._state is not LinkState.RUNNING or not able:
             return False
         self._torque = on
         self._wake()
@@ -173,19 +144,19 @@ class Driver:
 
     def status(self) -> LinkStatus:
         """Return how the link is now."""
-        connection, parser, dialect = self._connection, self._parser, self._dialect
+        session = self._session
         return LinkStatus(
             state=self._state,
             detail=self._detail,
-            protocol=connection.protocol.name if connection else '',
-            baud=connection.port.baud if connection else 0,
-            firmware=connection.firmware if connection else '',
+            protocol=session.dialect.protocol.name if session else '',
+            baud=session.port.baud if session else 0,
+            firmware=session.firmware if session else '',
             connections=self._connections,
             age=time.monotonic() - self._reported_at,
             commands=self._commands,
             dropped=self._dropped,
-            parser=parser.counters if parser else ParserCounters(),
-            dialect=dialect.counters if dialect else DialectCounters(),
+            parser=session.parser.counters if session else ParserCounters(),
+            dialect=session.dialect.counters if session else DialectCounters(),
         )
 
     def _wake(self) -> None:
@@ -200,35 +171,30 @@ class Driver:
     def _run(self) -> None:
         while not self._stopping.is_set():
             try:
-                connection = connect(
-                    self._options.path, self._options.protocols, self._options.baud
-                )
+                session = open_session(self._options)
             except LinkError as error:
                 self._enter(LinkState.CONNECTING, str(error))
                 self._stopping.wait(RETRY_PERIOD)
                 continue
             try:
-                self._serve(connection)
+                self._serve(session)
             except LinkError as error:
                 self._enter(LinkState.CONNECTING, str(error))
             finally:
                 self._mailbox = None
-                connection.port.close()
+                session.port.close()
         self._enter(LinkState.STOPPED, 'stopped')
 
-    def _serve(self, connection: Connection) -> None:
-        now = time.monotonic()
-        self._connection = connection
-        self._parser = StreamParser(connection.protocol, ROBOT_KINDS)
-        self._dialect = dialect = make_dialect(connection, self._options, now)
+    def _serve(self, session: Session) -> None:
+        now = heard_at = self._reported_at = time.monotonic()
+        dialect = session.dialect
+        self._session = session
         self._connections += 1
-        self._reported_at = now
         self._enter(
             LinkState.WAITING,
-            f'{connection.firmware} on {connection.port.path} speaks the '
-            f'{connection.protocol.name} protocol at {connection.port.baud} baud',
+            f'{session.firmware} on {session.port.path} speaks the {dialect.protocol.name} '
+            f'protocol at {session.port.baud} baud',
         )
-        heard_at = now
         while not self._stopping.is_set():
             now = time.monotonic()
             silence = now - self._reported_at
@@ -239,12 +205,12 @@ class Driver:
             self._post(dialect)
             step = dialect.step(now)
             if step.send:
-                connection.port.write(step.send)
+                session.port.write(step.send)
             patience = PROBE_AGAIN if silence > STALE_TIME else STALE_TIME
             timeout = min(step.wake, self._reported_at + patience) - now
-            if self._parser.pending:
+            if session.parser.pending:
                 timeout = min(timeout, QUIET_TIME)
-            heard_at = self._listen(connection.port, max(timeout, 0.0), heard_at)
+            heard_at = self._listen(session, max(timeout, 0.0), heard_at)
 
     def _fall_silent(self, dialect: Dialect) -> None:
         dialect.withdraw()
@@ -263,11 +229,9 @@ class Driver:
         if on is not None:
             dialect.torque(on=on)
 
-    def _listen(self, port: SerialPort, timeout: float, heard_at: float) -> float:
+    def _listen(self, session: Session, timeout: float, heard_at: float) -> float:
         """Wait for bytes or a command; return when bytes last came [s]."""
-        parser, dialect = self._parser, self._dialect
-        if parser is None or dialect is None:
-            return heard_at
+        port, parser = session.port, session.parser
         line = port.fileno()
         readable, _, _ = select.select([line, self._wake_read], [], [], timeout)
         if self._wake_read in readable:
@@ -278,26 +242,9 @@ class Driver:
         if not data and parser.pending and now - heard_at > QUIET_TIME:
             frames = parser.expire()
         for frame in frames:
-            report = dialect.hear(frame, now)
+            report = session.dialect.hear(frame, now)
             if report is not None:
                 self._reported_at = now
                 self._enter(LinkState.RUNNING, 'reports arrive')
                 self._on_state(report)
         return now if data else heard_at
-
-
-def make_dialect(connection: Connection, options: LinkOptions, now: float) -> Dialect:
-    """Return the dialect for a robot that answered.
-
-    Raises:
-        LinkError: Its firmware is that of a robot without legs.
-    """
-    if connection.protocol is NEW:
-        return NewDialect(now, options.rate)
-    model = options.model or model_of_firmware(connection.firmware)
-    if model is None:
-        raise LinkError(
-            f'firmware {connection.firmware!r} is of no known quadruped (M mini, L lite, W or MW '
-            'wheeled); name its ranges with the parameter model'
-        )
-    return OldDialect(now, model, options.rate)

@@ -9,6 +9,7 @@ import os
 from pathlib import Path
 import select
 import time
+from typing import Protocol as Interface
 from typing import TYPE_CHECKING
 
 import serial
@@ -22,6 +23,30 @@ if TYPE_CHECKING:
 
 CHUNK = 4096  # [B] more than two frames
 WRITE_PATIENCE = 0.1  # [s] how long a port may take no bytes before it counts as lost
+
+
+class Port(Interface):
+    """What a conversation needs of a port.
+
+    Attributes:
+        path: Device file.
+        baud: Speed [bit/s].
+    """
+
+    path: str
+    baud: int
+
+    def fileno(self) -> int:
+        """Return the file descriptor, for :mod:`select`."""
+
+    def read(self) -> bytes:
+        """Return what has arrived; to be called when something has."""
+
+    def write(self, data: bytes) -> None:
+        """Send bytes."""
+
+    def close(self) -> None:
+        """Close the port."""
 
 
 class SerialPort:

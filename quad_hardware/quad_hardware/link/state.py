@@ -20,7 +20,8 @@ class RobotState:
         arrival: When its last byte came, on the monotonic clock [s].
         wire_time: How long its bytes were on the line [s].
         attitude: Roll, pitch, yaw of the body about fixed axes x, y, z [deg].
-        acceleration: Specific force x, y, z [m/s²]; +9.8 upwards at rest.
+        acceleration: Specific force x, y, z [m/s²]; +9.8 upwards at rest; None where it is not
+            reported.
         positions: Servo angles by motor id [deg].
         velocities: Servo velocities by motor id [deg/s]; empty where they are not reported.
         rates: Angular velocity x, y, z of the body [deg/s]; None where there is no gyro.
@@ -35,7 +36,7 @@ class RobotState:
     arrival: float
     wire_time: float
     attitude: Vector
-    acceleration: Vector
+    acceleration: Vector | None
     positions: Mapping[int, float]
     velocities: Mapping[int, float]
     rates: Vector | None = None

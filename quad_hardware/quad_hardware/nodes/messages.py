@@ -20,6 +20,7 @@ from ..estimation.rotation import Quaternion as Rotation
 from ..link import RobotState
 from .parameters import Deviations, Frames
 
+NOT_THERE = [-1.0, *([0.0] * 8)]  # covariance of what is not measured (REP 145)
 UNUSED = 1e6  # variance of what nobody measures
 VELOCITY_VARIANCE = 0.03**2  # [m²/s²]
 HEIGHT_VARIANCE = 0.01**2  # [m²]
@@ -40,11 +41,14 @@ def imu(estimate: Estimate, deviations: Deviations, frame: str, stamp: Time) -> 
     message = Imu(header=Header(stamp=stamp, frame_id=frame))
     message.orientation = _quaternion(estimate.attitude)
     message.orientation_covariance = _diagonal3(deviations.orientation)
-    x, y, z = estimate.acceleration
-    message.linear_acceleration = Vector3(x=x, y=y, z=z)
-    message.linear_acceleration_covariance = _diagonal3(deviations.acceleration)
+    if estimate.acceleration is None:
+        message.linear_acceleration_covariance = NOT_THERE
+    else:
+        x, y, z = estimate.acceleration
+        message.linear_acceleration = Vector3(x=x, y=y, z=z)
+        message.linear_acceleration_covariance = _diagonal3(deviations.acceleration)
     if estimate.angular_velocity is None:
-        message.angular_velocity_covariance = [-1.0, *([0.0] * 8)]  # REP 145: not there
+        message.angular_velocity_covariance = NOT_THERE
     else:
         x, y, z = estimate.angular_velocity
         message.angular_velocity = Vector3(x=x, y=y, z=z)

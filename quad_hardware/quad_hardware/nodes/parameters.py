@@ -15,12 +15,15 @@ from ..estimation import EstimatorSettings, OdometrySettings, RateSource
 from ..exceptions import CommandError
 from ..joints import JointMap, JointServo, LimiterSettings, servo_of
 from ..link import LinkOptions
+from ..link.vendor import is_installed, VENDOR
 from ..protocol import Model, Protocol, PROTOCOLS
 from .parameter_reader import ParameterReader, refuse_misspelt
 
 AUTO = 'auto'
-_PROTOCOLS: Mapping[str, tuple[Protocol, ...]] = {AUTO: PROTOCOLS} | {
-    protocol.name: (protocol,) for protocol in PROTOCOLS
+_PROTOCOLS: Mapping[str, tuple[Protocol, ...]] = {
+    AUTO: PROTOCOLS,
+    VENDOR.name: (),
+    **{protocol.name: (protocol,) for protocol in PROTOCOLS},
 }
 _MODELS: Mapping[str, Model | None] = {AUTO: None} | {model.value: model for model in Model}
 
@@ -95,12 +98,19 @@ def declare_parameters(node: Node) -> NodeSettings:
         CommandError: One does not make sense; the message names it, its value and the remedy.
     """
     read = ParameterReader(node)
+    protocols = read.choice(
+        'protocol', AUTO, _PROTOCOLS, 'auto: the vendor’s library where it is installed, or asks'
+    )
     link = LinkOptions(
         path=read.text('port', '/dev/ttyAMA0', 'serial port of the robot'),
-        protocols=read.choice('protocol', AUTO, _PROTOCOLS, 'protocol of the robot; auto asks it'),
+        protocols=protocols,
         baud=read.whole('baud', 0, (0, 4_000_000), 'speed [bit/s]; 0: that of the protocol'),
         model=read.choice('model', AUTO, _MODELS, 'ranges of the old protocol; auto: by firmware'),
         rate=read.whole('rate', 50, (10, 100), 'reports a second [Hz]'),
+        vendor=_vendor(protocols),
+        vendor_method=read.text(
+            'vendor_servo_method', AUTO, 'of the vendor’s XgoDog, writes one servo angle'
+        ),
     )
     urdf = _urdf(read)
     settings = NodeSettings(
@@ -120,6 +130,17 @@ def declare_parameters(node: Node) -> NodeSettings:
     )
     refuse_misspelt(node)
     return settings
+
+
+def _vendor(protocols: tuple[Protocol, ...]) -> bool:
+    """Tell whether to try the vendor's library."""
+    installed = len(protocols) != 1 and is_installed()
+    if not protocols and not installed:
+        raise CommandError(
+            'protocol vendor: xgo_lib2 of the vendor is not installed for this Python; '
+            'install it, or choose auto'
+        )
+    return installed
 
 
 def _urdf(read: ParameterReader) -> str:

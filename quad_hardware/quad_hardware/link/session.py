@@ -1,0 +1,142 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""A robot that was found: its port, what finds frames in its bytes, and how to talk to it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import time
+from typing import Protocol as Interface
+
+from ..exceptions import LinkError
+from ..protocol import (
+    Frame,
+    Model,
+    model_of_firmware,
+    NEW,
+    ParserCounters,
+    Protocol,
+    PROTOCOLS,
+    ROBOT_KINDS,
+    StreamParser,
+)
+from .dialect import Dialect
+from .new_dialect import NewDialect
+from .old_dialect import OldDialect
+from .port import Port
+from .probe import connect, Connection
+from .vendor import VendorDialect, VendorParser, VendorPort, WRITE_AUTO
+
+
+@dataclass(frozen=True, slots=True)
+class LinkOptions:
+    """Where the robot is, and how to talk to it.
+
+    Attributes:
+        path: Device file.
+        protocols: What to try, in this order.
+        baud: Speed [bit/s]; 0 takes each protocol's own.
+        model: Whose ranges scale bytes in the old protocol; None asks the firmware.
+        rate: Reports a second [Hz].
+        vendor: Try the vendor's own library first.
+        vendor_method: Name of its method that writes a servo angle; ``auto`` looks for it.
+    """
+
+    path: str
+    protocols: tuple[Protocol, ...] = PROTOCOLS
+    baud: int = 0
+    model: Model | None = None
+    rate: int = 50
+    vendor: bool = False
+    vendor_method: str = WRITE_AUTO
+
+
+class FrameParser(Interface):
+    """What finds frames in bytes.
+
+    Attributes:
+        pending: Bytes that wait for the rest of their frame.
+        counters: A copy of its counters.
+    """
+
+    @property
+    def pending(self) -> int:
+        """Bytes that wait for the rest of their frame."""
+
+    @property
+    def counters(self) -> ParserCounters:
+        """A copy of the counters."""
+
+    def feed(self, data: bytes) -> list[Frame]:
+        """Take bytes and return the frames that they complete."""
+
+    def expire(self) -> list[Frame]:
+        """Give up waiting for the rest of a frame."""
+
+
+@dataclass(frozen=True, slots=True)
+class Session:
+    """A robot that was found.
+
+    Attributes:
+        port: The open port, owned by whoever holds the session.
+        firmware: Version of the robot.
+        parser: Finds frames in its bytes.
+        dialect: How to talk to it.
+    """
+
+    port: Port
+    firmware: str
+    parser: FrameParser
+    dialect: Dialect
+
+
+def open_session(options: LinkOptions) -> Session:
+    """Find the robot: by the vendor's library where that is wanted, else by asking it.
+
+    Raises:
+        LinkError: There is no robot, or it is none that walks; the message says what was tried.
+    """
+    vendors = ''
+    if options.vendor:
+        try:
+            return _open_vendor(options)
+        except LinkError as error:
+            if not options.protocols:
+                raise
+            vendors = f'{error}; then without it: '
+    try:
+        connection = connect(options.path, options.protocols, options.baud)
+    except LinkError as error:
+        raise type(error)(f'{vendors}{error}') from error
+    try:
+        dialect = _make_dialect(connection, options)
+    except LinkError:
+        connection.port.close()
+        raise
+    parser = StreamParser(connection.protocol, ROBOT_KINDS)
+    return Session(connection.port, connection.firmware, parser, dialect)
+
+
+def _open_vendor(options: LinkOptions) -> Session:
+    port = VendorPort(options.path)
+    try:
+        firmware = port.read_version()
+        dialect = VendorDialect(port.dog, time.monotonic(), options.vendor_method)
+        return Session(port, firmware, VendorParser(), dialect)
+    except LinkError:
+        port.close()
+        raise
+
+
+def _make_dialect(connection: Connection, options: LinkOptions) -> Dialect:
+    now = time.monotonic()
+    if connection.protocol is NEW:
+        return NewDialect(now, options.rate)
+    model = options.model or model_of_firmware(connection.firmware)
+    if model is None:
+        raise LinkError(
+            f'firmware {connection.firmware!r} is of no known quadruped (M mini, L lite, W or MW '
+            'wheeled); name its ranges with the parameter model'
+        )
+    return OldDialect(now, model, options.rate)

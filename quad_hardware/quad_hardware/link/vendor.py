@@ -1,0 +1,319 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The vendor's own xgo_lib2 as a way to a robot, where it is installed.
+
+It knows the layout of the new protocol, which is not public. What is public of it is used as it
+is: ``client.XgoDog(port)``, ``read_version``, ``system_set_feedback``,
+``feedback.SendStateParser.feed_bytes``, and the names in its states. What is not public is looked
+for, and told when it is not found: the serial port inside XgoDog, the method that writes a servo
+angle by motor id, and the name of the acceleration.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
+import importlib
+import inspect
+import os
+from typing import Protocol as Interface
+
+from ..exceptions import LinkError
+from ..protocol import Feedback, Frame, MOTOR_ORDER, NEW, ParserCounters, Protocol
+from .dialect import Step
+from .new_dialect import ASK_AGAIN, NewDialect
+from .port import CHUNK
+from .state import RobotState, Vector
+
+VENDOR = Protocol(
+    name='vendor',
+    origin='the vendor’s xgo_lib2',
+    baud=NEW.baud,
+    address_size=NEW.address_size,
+    kinds=NEW.kinds,
+    functions=NEW.functions,
+)
+WRITE_AUTO = 'auto'
+_ACCELERATIONS = ('acceleration', 'acc', 'accel', 'linear_acceleration')
+_WRITE_WORDS, _SERVO_WORDS = ('write', 'set', 'move'), ('servo', 'motor', 'joint')
+_OTHER_WORDS = ('speed', 'load', 'torque', 'offset', 'zero', 'id', 'feedback', 'angles')
+
+WriteAngle = Callable[[int, float], object]
+
+
+class Dog(Interface):
+    """What is public of the vendor's XgoDog."""
+
+    def read_version(self) -> object:
+        """Return the firmware version."""
+
+    def system_set_feedback(self, on: int, /) -> object:
+        """Have states pushed."""
+
+
+class StateParser(Interface):
+    """What is public of the vendor's SendStateParser."""
+
+    def feed_bytes(self, data: bytes, /) -> Iterable[object]:
+        """Take bytes, return states."""
+
+
+def is_installed() -> bool:
+    """Tell whether ``import xgo_lib2`` gives the vendor's library and not our stand-in."""
+    try:
+        library = importlib.import_module('xgo_lib2')
+    except ImportError:
+        return False
+    return not hasattr(library, 'IS_STAND_IN')
+
+
+class VendorPort:
+    """The serial port inside the vendor's XgoDog.
+
+    Attributes:
+        path: Device file.
+        baud: Speed that it was opened with [bit/s], as far as is known.
+        dog: The vendor's object.
+    """
+
+    def __init__(self, path: str) -> None:
+        """Open a robot by the vendor's library.
+
+        Raises:
+            LinkError: The library cannot, or has no serial port that is found.
+        """
+        self.path = path
+        self.baud = VENDOR.baud
+        client = importlib.import_module('xgo_lib2.client')
+        try:
+            self.dog: Dog = client.XgoDog(path)
+        except Exception as error:  # whatever the vendor's library raises
+            raise LinkError(f'xgo_lib2 cannot open {path}: {error}') from error
+        port = _serial_of(self.dog)
+        if port is None:
+            self.close()
+            raise LinkError(
+                'xgo_lib2 is installed, and no serial port is found in its XgoDog; '
+                'set protocol to new or old to do without it'
+            )
+        self._descriptor = int(port.fileno())
+
+    def read_version(self) -> str:
+        """Return the firmware version.
+
+        Raises:
+            LinkError: The robot does not answer.
+        """
+        try:
+            return str(self.dog.read_version())
+        except Exception as error:  # whatever the vendor's library raises
+            raise LinkError(f'xgo_lib2 finds no robot on {self.path}: {error}') from error
+
+    def fileno(self) -> int:
+        """Return the file descriptor."""
+        return self._descriptor
+
+    def read(self) -> bytes:
+        """Return what has arrived, when something has.
+
+        Raises:
+            LinkError: The port is gone.
+        """
+        try:
+            data = os.read(self._descriptor, CHUNK)
+        except BlockingIOError:
+            return b''
+        except OSError as error:
+            raise LinkError(f'{self.path} was lost: {error.strerror}') from error
+        if not data:
+            raise LinkError(f'{self.path} was hung up; was the cable pulled?')
+        return data
+
+    def write(self, data: bytes) -> None:
+        """Send nothing: the vendor's methods send by themselves."""
+
+    def close(self) -> None:
+        """Close the robot as the vendor's library does it."""
+        close = getattr(self.dog, 'close', None)
+        if callable(close):
+            close()
+        else:
+            leave = getattr(self.dog, '__exit__', None)
+            if callable(leave):
+                leave(None, None, None)
+
+
+class VendorParser:
+    """The vendor's parser, its states as frames of ours."""
+
+    def __init__(self) -> None:
+        """Begin with an empty buffer."""
+        feedback = importlib.import_module('xgo_lib2.feedback')
+        registry = importlib.import_module('xgo_lib2.registry')
+        self._parser: StateParser = feedback.SendStateParser()
+        self._slots = [int(registry.feedback_slot_of(motor)) for motor in MOTOR_ORDER]
+        self._counters = ParserCounters()
+        self.pending = 0
+
+    @property
+    def counters(self) -> ParserCounters:
+        """A copy of the counters: bytes and states; the others are the vendor's affair."""
+        return replace(self._counters)
+
+    def feed(self, data: bytes) -> list[Frame]:
+        """Take bytes and return the states that they complete."""
+        self._counters.bytes += len(data)
+        frames = []
+        for state in self._feed(data):
+            self._counters.frames += 1
+            frames.append(self._feedback(state).frame())
+        return frames
+
+    def expire(self) -> list[Frame]:
+        """Return nothing: what waits is known to the vendor's parser only."""
+        return []
+
+    def _feed(self, data: bytes) -> list[object]:
+        try:
+            return list(self._parser.feed_bytes(data))
+        except Exception as error:  # whatever the vendor's library raises
+            raise LinkError(f'xgo_lib2 cannot read what came: {error}') from error
+
+    def _feedback(self, state: object) -> Feedback:
+        try:
+            return Feedback(
+                battery=min(max(int(_number(state, 'battery')), 0), 100),
+                attitude=_vector(_number(state, name) for name in ('roll', 'pitch', 'yaw')),
+                acceleration=_acceleration(state),
+                position=self._by_motor(state, 'joint_pos_deg'),
+                velocity=self._by_motor(state, 'joint_vel_deg_s'),
+                sequence=self._counters.frames % 65536,
+            )
+        except (AttributeError, IndexError, TypeError, ValueError) as error:
+            raise LinkError(f'a state of xgo_lib2 is not as expected: {error}') from error
+
+    def _by_motor(self, state: object, name: str) -> tuple[float, ...]:
+        values = list(getattr(state, name))
+        return tuple(float(values[slot]) for slot in self._slots)
+
+
+class VendorDialect(NewDialect):
+    """States as in the new protocol; commands by the vendor's methods."""
+
+    def __init__(self, dog: Dog, now: float, method: str = WRITE_AUTO) -> None:
+        """Begin a conversation.
+
+        Args:
+            dog: The vendor's robot.
+            now: Time [s].
+            method: Name of the method that writes the angle [deg] of a motor by its id.
+
+        Raises:
+            LinkError: There is no such method.
+        """
+        super().__init__(now)
+        self.protocol = VENDOR
+        self.can_release = False
+        self._dog = dog
+        self._write = _write_method(dog, method)
+        self._angles: dict[int, float] = {}
+
+    def command(self, angles: Mapping[int, float]) -> None:
+        """Set the angles that are written at the next step."""
+        self._angles = dict(angles)
+
+    def withdraw(self) -> None:
+        """Forget a command that has not been sent yet."""
+        self._angles = {}
+
+    def step(self, now: float) -> Step:
+        """Write angles, and ask for states where they are missing.
+
+        Raises:
+            LinkError: The vendor's library failed.
+        """
+        angles, self._angles = self._angles, {}
+        try:
+            if now >= self._ask_at:
+                self._ask_at = now + ASK_AGAIN
+                self._dog.system_set_feedback(1)
+            for motor, angle in angles.items():
+                self._write(motor, angle)
+        except Exception as error:  # whatever the vendor's library raises
+            raise LinkError(f'xgo_lib2 failed: {error}') from error
+        return Step(b'', self._ask_at)
+
+    def hear(self, frame: Frame, now: float) -> RobotState | None:
+        """Take a state; what the vendor's parser does not tell is not made up."""
+        report = super().hear(frame, now)
+        if report is None:
+            return None
+        blind = report.acceleration == NO_ACCELERATION
+        return replace(
+            report,
+            acceleration=None if blind else report.acceleration,
+            device_time=None,
+            temperatures=None,
+        )
+
+
+NO_ACCELERATION: Vector = (0.0, 0.0, 0.0)  # no accelerometer on earth reads that for long
+
+
+@dataclass(frozen=True, slots=True)
+class _Descriptor:
+    """Something with a file descriptor."""
+
+    fileno: Callable[[], int]
+
+
+def _serial_of(dog: object, depth: int = 2) -> _Descriptor | None:
+    """Return the open serial port among the attributes of an object, or of what it holds."""
+    for value in list(getattr(dog, '__dict__', {}).values()):
+        if callable(getattr(value, 'fileno', None)) and callable(getattr(value, 'write', None)):
+            return _Descriptor(value.fileno)
+        if depth > 1 and (found := _serial_of(value, depth - 1)) is not None:
+            return found
+    return None
+
+
+def _write_method(dog: object, name: str) -> WriteAngle:
+    methods = dict(inspect.getmembers(dog, callable))
+    if name != WRITE_AUTO:
+        if name not in methods:
+            raise LinkError(f'the XgoDog of xgo_lib2 has no method {name!r}')
+        return methods[name]
+    fitting = [method for method in methods if _writes_an_angle(method)]
+    if len(fitting) == 1:
+        return methods[fitting[0]]
+    public = ', '.join(method for method in methods if not method.startswith('_'))
+    raise LinkError(
+        f'which method of xgo_lib2’s XgoDog writes one servo angle? {len(fitting)} names fit; set '
+        f'vendor_servo_method to one of {public}'
+    )
+
+
+def _writes_an_angle(method: str) -> bool:
+    words = method.lower().split('_')
+    return (
+        not method.startswith('_')
+        and any(word in words for word in _WRITE_WORDS)
+        and any(word in words for word in _SERVO_WORDS)
+        and not any(word in words for word in _OTHER_WORDS)
+    )
+
+
+def _number(state: object, name: str) -> float:
+    return float(getattr(state, name))
+
+
+def _acceleration(state: object) -> Vector:
+    name = next((name for name in _ACCELERATIONS if hasattr(state, name)), None)
+    if name is None:
+        return NO_ACCELERATION
+    return _vector(float(number) for number in getattr(state, name))
+
+
+def _vector(values: Iterable[float]) -> Vector:
+    x, y, z = values
+    return x, y, z
