@@ -126,7 +126,7 @@ class Board:
         if on == self._powered:
             return
         self._powered = on
-        self._plant.set_torque(on)
+        self.servos.set_torque(self.servos.fitted, on)
         self._boot(self._now + BOOT_TIME if on else math.inf)
 
     @property
@@ -175,6 +175,8 @@ class Board:
             faults |= Fault.OVERHEATED
         if max(map(abs, self.loads(self._measured))) > FULL_LOAD:
             faults |= Fault.OVERLOAD
+        if self.servos.failed is not None:
+            faults |= Fault.SERVO_SILENT
         return faults
 
     # -- who moves the servos

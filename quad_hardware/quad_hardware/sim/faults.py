@@ -26,6 +26,7 @@ class FaultKind(Enum):
     SLOW = 'slow'  # everything the robot says comes late
     BROWN_OUT = 'brown_out'  # the supply fails: the board starts anew, its servos without torque
     UNPLUG = 'unplug'  # the serial port is gone
+    LIMP = 'limp'  # a servo lets go, and the board says that one is silent
     BATTERY = 'battery'  # the charge is another one from now on
 
 
@@ -48,6 +49,7 @@ SETTINGS: Mapping[FaultKind, Mapping[str, _Setting]] = MappingProxyType(
         FaultKind.DROP: {'rate': _RATE},
         FaultKind.FLIP: {'rate': _RATE},
         FaultKind.SLOW: {'delay': _Setting(0.05, 0.0, 60.0, 'later by [s]')},
+        FaultKind.LIMP: {'motor': _Setting(11.0, 11.0, 54.0, 'id')},
         FaultKind.BATTERY: {'level': _Setting(5.0, 0.0, 100.0, 'charge [%]')},
     }
 )

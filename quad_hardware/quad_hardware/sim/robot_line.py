@@ -203,4 +203,7 @@ class RobotLine:
         if battery is not None and battery is not self._battery_fault:
             self._board.battery.charge = battery['level']
         self._battery_fault = battery
+        limp = active(FaultKind.LIMP, now)
+        if self._powered:
+            self._board.servos.fail(None if limp is None else int(limp['motor']))
         self._plugged = active(FaultKind.UNPLUG, now) is None

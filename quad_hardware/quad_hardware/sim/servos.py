@@ -81,6 +81,7 @@ class Servos:
 
     Attributes:
         fitted: Ids of the servos that the robot has, in the order of the wire.
+        failed: Id of the servo that does not work, None if all do.
     """
 
     def __init__(
@@ -119,6 +120,7 @@ class Servos:
         self._gains = np.array([self._scale[motor].gain for motor in order])
         self._offsets = np.array([self._scale[motor].offset for motor in order])
         self.fitted = tuple(motor for motor in MOTOR_ORDER if motor in self._joint)
+        self.failed: int | None = None
         self._speed = dict.fromkeys(self.fitted, MAX_SPEED)
 
     def command(self, angles: Mapping[int, float], duration: float | None = None) -> None:
@@ -151,9 +153,23 @@ class Servos:
         self._speed |= dict.fromkeys(motors, max(speed, 1))
 
     def set_torque(self, motors: Iterable[int], on: bool) -> None:
-        """Switch servos on or off; those that the robot lacks are left out."""
-        names = [self._joint[motor] for motor in motors if motor in self._joint]
+        """Switch servos on or off; those that the robot lacks or that have failed are left out."""
+        names = [
+            self._joint[motor]
+            for motor in motors
+            if motor in self._joint and not (on and motor == self.failed)
+        ]
         self._plant.set_torque(on, names)
+
+    def fail(self, motor: int | None) -> None:
+        """Let a servo fail: it lets go. The one that had failed works, and holds where it is."""
+        if motor == self.failed:
+            return
+        repaired, self.failed = self.failed, motor
+        if repaired is not None:
+            self.set_torque([repaired], True)
+        if motor is not None:
+            self.set_torque([motor], False)
 
     def torque_on(self, motor: int) -> bool:
         """Tell whether a servo holds."""
