@@ -14,8 +14,9 @@ from hypothesis import strategies as st
 import pytest
 import yaml
 
+from quad_calibration_script import Script
 from quad_hardware.calibration import robot
-from quad_hardware.calibration.console import ask_number, CancelledError
+from quad_hardware.calibration.console import ask_number
 from quad_hardware.calibration.joints import (
     LEAST_TURN,
     moved_motor,
@@ -30,30 +31,6 @@ from quad_hardware.protocol import NEW, OLD, Protocol
 from quad_pty_peer import PtyPeer
 
 KNEE = JointServo('fl_calf_joint', 11, lower=-1.134, upper=0.8727)
-
-
-class Script:
-    """Someone who answers in order, moves the robot before, and remembers what was said."""
-
-    def __init__(self, *answers: str | tuple[Callable[[], None], str]) -> None:
-        """Prepare the answers."""
-        self._answers = list(answers)
-        self.said: list[str] = []
-
-    def say(self, text: str) -> None:
-        """Listen."""
-        self.said.append(text)
-
-    def ask(self, question: str) -> str:
-        """Answer; leave when there is no answer left."""
-        self.said.append(question)
-        if not self._answers:
-            raise CancelledError('cancelled; nothing was written')
-        answer = self._answers.pop(0)
-        if isinstance(answer, tuple):
-            move, answer = answer
-            move()
-        return answer
 
 
 @given(

@@ -1,0 +1,122 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Calibration of the odometry: a robot whose odometry is wrong by a known factor."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import suppress
+import math
+from pathlib import Path
+import threading
+from typing import Any
+
+from geometry_msgs.msg import Twist
+from hypothesis import given
+from hypothesis import strategies as st
+from isolation import Isolation
+from nav_msgs.msg import Odometry
+import pytest
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+
+from quad_calibration_script import Script
+from quad_hardware.calibration import odometry
+from quad_hardware.calibration.main import run_calibrate
+from quad_hardware.calibration.odometry import Axis, Place
+from quad_hardware.calibration.parameter_file import read_parameters
+
+PERIOD = 0.01  # [s]
+pytestmark = pytest.mark.scenario
+
+
+class WalkingRobot(Node):
+    """Goes where it is told; its odometry counts what its scale says."""
+
+    def __init__(self, context: Context) -> None:
+        """Stand at an angle, for the way counts in the robot's own heading."""
+        super().__init__('hardware_node', context=context)
+        self.declare_parameter('odometry.scale_x', 1.25)
+        self.velocity = Twist()
+        self.way = 0.0
+        self._odom = self.create_publisher(Odometry, 'odom', 10)
+        self.create_subscription(Twist, 'cmd_vel', self._obey, 1)
+        self.create_timer(PERIOD, self._step)
+
+    def _obey(self, message: Twist) -> None:
+        self.velocity = message
+
+    def _step(self) -> None:
+        self.way += self.velocity.linear.x * PERIOD
+        message = Odometry()
+        message.pose.pose.position.y = self.way
+        message.pose.pose.orientation.z = message.pose.pose.orientation.w = math.sqrt(0.5)
+        self._odom.publish(message)
+
+
+@pytest.fixture
+def walking_robot(isolation: Isolation, monkeypatch: pytest.MonkeyPatch) -> Iterator[WalkingRobot]:
+    """A robot in a domain of its own, served in a thread."""
+    for name, value in isolation.env.items():
+        monkeypatch.setenv(name, value)
+    context = Context()
+    rclpy.init(context=context)
+    robot = WalkingRobot(context)
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(robot)
+    thread = threading.Thread(target=spin, args=(executor,))
+    thread.start()
+    yield robot
+    rclpy.shutdown(context=context)
+    thread.join()
+    robot.destroy_node()
+
+
+def spin(executor: Any) -> None:
+    """Serve until the context ends."""
+    with suppress(ExternalShutdownException):
+        executor.spin()
+
+
+def test_the_scale_is_what_the_tape_says(walking_robot: WalkingRobot, tmp_path: Path) -> None:
+    """It walks, stops, and the scale of before is multiplied by tape over odometry."""
+    output = tmp_path / 'found.yaml'
+    script = Script('', '0.15')
+    command = ['odometry', '--distance', '0.3', '--speed', '0.5', '--output', str(output)]
+    assert run_calibrate(command, script) == 0, script.said
+    assert walking_robot.velocity.linear.x == 0.0
+    said = float(next(line for line in script.said if line.startswith('odometry says')).split()[2])
+    assert said >= 0.3
+    scale = read_parameters(output)['odometry']['scale_x']  # type: ignore[index]
+    assert scale == pytest.approx(1.25 * 0.15 / said, rel=2e-3)
+
+
+def test_nobody_there_is_said(
+    isolation: Isolation, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """Without a robot in the domain, and nothing is written."""
+    for name, value in isolation.env.items():
+        monkeypatch.setenv(name, value)
+    monkeypatch.setattr(odometry, 'PATIENCE', 0.3)
+    script = Script('')
+    output = tmp_path / 'found.yaml'
+    assert run_calibrate(['odometry', '--output', str(output)], script) == 1
+    assert 'bringup' in script.said[-1]
+    assert not output.exists()
+
+
+@given(*[st.floats(-3, 3)] * 3, *[st.floats(-2, 2)] * 2)
+def test_a_way_is_taken_in_the_heading_of_its_start(
+    x: float, y: float, yaw: float, ahead: float, aside: float
+) -> None:
+    """Both axes, from any place."""
+    start = Place(x, y, yaw)
+    end = Place(
+        x + math.cos(yaw) * ahead - math.sin(yaw) * aside,
+        y + math.sin(yaw) * ahead + math.cos(yaw) * aside,
+        0.0,
+    )
+    assert start.way(end, Axis.X) == pytest.approx(ahead, abs=1e-9)
+    assert start.way(end, Axis.Y) == pytest.approx(aside, abs=1e-9)
