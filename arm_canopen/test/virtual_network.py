@@ -248,9 +248,16 @@ class VirtualNetwork:
         self._config = config
         self._dictionaries = dict(dictionaries or {})
         self._servo = servo
+        self.replace_master()
+        for node in config.nodes:
+            if node.name not in absent:
+                self.power_on(node.name)
+
+    def replace_master(self) -> None:
+        """Let the master vanish without a word, and another one take its place."""
         self._cycle_at = NEVER
         self.network = Network(
-            config, lambda frame: self.wire.put(self.now, 'master', frame), self._note
+            self._config, lambda frame: self.wire.put(self.now, 'master', frame), self._note
         )
         scheduler = self.network.scheduler
         drives = [
@@ -264,9 +271,6 @@ class VirtualNetwork:
         self.group = MotionGroup(drives, self._note)
         self.network.on_cycle = self.group.cycle
         self.network.on_feedback = lambda sync: self.feedback_times.append((self.now, sync))
-        for node in config.nodes:
-            if node.name not in absent:
-                self.power_on(node.name)
 
     def connect(self, name: str, station: Station) -> None:
         """Connect a station of the test's own; it sends with :meth:`send_as`."""

@@ -11,7 +11,7 @@ from ..exceptions import DriveError, SdoError
 from ..master.events import Severity
 from ..master.remote_node import RemoteNode
 from ..master.scheduler import Scheduler, Task
-from ..standard.drive import Controlword, DriveState, OperationMode, Statusword
+from ..standard.drive import Controlword, DriveState, mode_title, OperationMode, Statusword
 from .cyclic_position import CyclicPosition
 from .feed_forward import FeedForward
 from .moded_drive import ModedDrive
@@ -111,6 +111,8 @@ class Drive(ModedDrive):
         self._observe()
         if self.state is DriveState.UNKNOWN:
             return
+        if before is DriveState.UNKNOWN and self.node.taken_over and self.goal is None:
+            self._take_over()
         if self.state is not before:
             self._state_changed(before)
         self._watch_following()
@@ -125,6 +127,8 @@ class Drive(ModedDrive):
             self.feed_forward.end()
         self._streamed = False
         bits = NO_BITS
+        if self.state is DriveState.UNKNOWN and self.node.taken_over:
+            return  # its RPDOs go on to carry what another master had commanded
         if self.state is DriveState.UNKNOWN:
             command = Command.DISABLE_VOLTAGE
         else:
@@ -179,6 +183,14 @@ class Drive(ModedDrive):
         self._controlword = int(command) | int(bits)
         self.objects.controlword.write(self._controlword)
         self.objects.mode.write(int(self.mode.number))
+
+    def _take_over(self) -> None:
+        """Go on where another master has left the drive."""
+        if self.adopt():
+            title = mode_title(self.mode.number)
+            self.report(Severity.INFO, f'taken over enabled, in mode {title}; it holds')
+        else:
+            self.warn(f'is not enabled by the new master: {self.describe()}')
 
     def _watch_following(self) -> None:
         """Bit 12 of the cyclic modes: a drive that has followed and does not any more is said."""

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from ..master.process_image import Writer
 from ..master.remote_node import RemoteNode
-from ..standard.drive import drive_state, DriveState
+from ..standard.drive import drive_state, DriveState, OperationMode
 from ..standard.objects import Index
 from ..standard.pdo import SYNCHRONOUS_MAX
 
@@ -81,6 +81,13 @@ class DriveObjects:
     def target_writer(self, index: int, subindex: int = 0) -> Writer | None:
         """Return a writer for a target object that a PDO carries, else None."""
         return self._node.image.writer(self.at(index), subindex)
+
+    def held_position(self, mode: OperationMode) -> int | None:
+        """Target of a cyclic position mode that the RPDOs carry in [inc], None when none does."""
+        interpolated = mode is OperationMode.INTERPOLATED_POSITION
+        place = (Index.INTERPOLATION_DATA, 1) if interpolated else (Index.TARGET_POSITION, 0)
+        value = self._node.image.commanded(self.at(place[0]), place[1])
+        return None if value is None else int(value)
 
     def waits_for_sync_apart(self, index: int) -> bool:
         """Whether an object is in a synchronous RPDO that does not carry the controlword."""

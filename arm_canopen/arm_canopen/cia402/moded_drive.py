@@ -54,6 +54,24 @@ class ModedDrive(ObservedDrive):
         held = self.holding_mode
         return held is not None and (held is self.mode or held.cyclic)
 
+    def adopt(self) -> bool:
+        """Lead on a drive that another master has left enabled: it holds where it is held.
+
+        Returns:
+            False when it is not enabled, or in a mode that this bus.yml has no means for.
+        """
+        held = self.holding_mode
+        if held is None:
+            return False
+        actual = self._actual()
+        target = self.objects.held_position(held.number)
+        if isinstance(held, CyclicPosition) and target is not None:
+            actual = actual._replace(position_inc=target)
+        held.preload(actual)
+        self.mode = held
+        self.goal = DriveState.OPERATION_ENABLED
+        return True
+
     def select(self, mode: Mode) -> None:
         """Command another mode, preloaded with where the drive is, or where it is held.
 

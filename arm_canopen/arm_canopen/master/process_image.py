@@ -247,6 +247,12 @@ class ProcessImage:
             return entry
         return None
 
+    def commanded(self, index: int, subindex: int = 0) -> Number | None:
+        """Return what the RPDOs carry for an object, None when none carries it."""
+        for entry, position in self._mapped_outputs(index, subindex):
+            return entry.values[position]
+        return None
+
     def mapped_output(self, index: int, subindex: int = 0) -> MappedObject | None:
         """Return how an object stands in an RPDO, None when it is in none."""
         for entry, position in self._mapped_outputs(index, subindex):

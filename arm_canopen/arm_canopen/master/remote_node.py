@@ -60,7 +60,8 @@ class RemoteNode:
         last_heartbeat: Steady time of the last heartbeat in [s].
         owes_heartbeat: It was started and never sent a heartbeat, though it is supervised; it has
             to show one before it is started again.
-        taken_over: It was in operation already when it came online, and was not disturbed.
+        taken_over: It was in operation already when it came online, and has not been disturbed
+            since.
         watch_slot: Entry of its 0x1016 by which it watches the master, 0 for none.
         emergencies: The last EMCYs, the newest at the end, with the steady time of each in [s].
         last_emergency: Last EMCY that was no reset, None when the device reported its end.
@@ -319,6 +320,7 @@ class RemoteNode:
         self.offline(reason)
 
     def _stop_drivers(self, reason: str) -> None:
+        self.taken_over = False  # whatever it did, from now on it is led anew
         for driver_stops in self.on_lost:
             driver_stops(reason)
 
