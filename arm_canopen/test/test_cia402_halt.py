@@ -23,7 +23,7 @@ from arm_canopen.cia402.position_modes import Move
 from arm_canopen.config.model import RecoveryPolicy
 from arm_canopen.exceptions import DriveError
 from arm_canopen.master.events import Severity
-from arm_canopen.standard.drive import DriveState, OperationMode
+from arm_canopen.standard.drive import Controlword, DriveState, OperationMode, Statusword
 
 JOINT = 'joint1'
 NODE_ID = 2
@@ -99,6 +99,61 @@ def test_a_halt_drops_the_moves_that_the_drive_holds() -> None:
         highest = max(highest, motor(net))
     assert highest < rest + 5e-3, 'it went on with an old move'
     assert motor(net) == pytest.approx(0.0, abs=2e-3)
+
+
+def full(net: VirtualNetwork) -> None:
+    """Have the drive move, with its buffer full."""
+    for target in (0.5, 1.0, 1.5):
+        net.commands[JOINT].move(Move(target, immediate=False))
+    net.run(0.3)
+    assert motor(net) > 0.05
+    assert net.drives[JOINT].statusword & Statusword.SET_POINT_ACKNOWLEDGE
+
+
+def test_an_immediate_move_does_not_wait_for_a_full_drive() -> None:
+    """What is said to go at once goes at once, and what the drive held is discarded."""
+    net = running_in(OperationMode.PROFILE_POSITION)
+    full(net)
+    assert 'at once' in net.commands[JOINT].move(Move(-0.2))
+    highest = motor(net)
+    for _ in range(300):
+        net.run(PERIOD)
+        highest = max(highest, motor(net))
+    assert highest < 0.5
+    assert motor(net) == pytest.approx(-0.2, abs=2e-3)
+    assert not net.told(Severity.WARNING)
+
+
+class DeafWhileFull:
+    """A drive that ignores bit 4 where it rises while bit 12 is set."""
+
+    def __init__(self, net: VirtualNetwork) -> None:
+        """Watch both words from now on."""
+        self._full = True
+        self._offered = self._ignored = False
+        net.wire.alters = self
+
+    def __call__(self, sender: str, frame: Frame) -> Frame:
+        """Take the bit out of the controlword."""
+        if frame.can_id == 0x180 + NODE_ID:
+            self._full = bool(frame.data[1] & Statusword.SET_POINT_ACKNOWLEDGE >> 8)
+        if frame.can_id != COMMAND_PDO:
+            return frame
+        offered = bool(frame.data[0] & Controlword.NEW_SET_POINT)
+        rising, self._offered = offered and not self._offered, offered
+        self._ignored = offered and (self._ignored or (rising and self._full))
+        word = frame.data[0] & ~int(Controlword.NEW_SET_POINT) if self._ignored else frame.data[0]
+        return frame._replace(data=bytes((word,)) + frame.data[1:])
+
+
+def test_a_full_drive_that_hears_nothing_gets_the_move_later() -> None:
+    """A drive that ignores set-points while its buffer is full makes its moves, then the new."""
+    net = running_in(OperationMode.PROFILE_POSITION)
+    full(net)
+    DeafWhileFull(net)
+    net.commands[JOINT].move(Move(-0.2))
+    net.run(6.0)
+    assert motor(net) == pytest.approx(-0.2, abs=2e-3)
 
 
 def test_a_queued_move_after_a_halt_goes_at_once() -> None:

@@ -8,6 +8,7 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
+import math
 
 from ..exceptions import DriveError
 from ..master.process_image import Writer
@@ -111,6 +112,7 @@ class ProfilePosition(Mode):
         self._bits = Controlword.CHANGE_IMMEDIATELY
         self._offered_at = 0.0
         self._full_since: float | None = None
+        self._imposed: Waiting | None = None
         self._cycles_left = 0
         self._setpoint: float | None = None
         self._reference: float | None = None
@@ -192,11 +194,12 @@ class ProfilePosition(Mode):
         elif self.handshake in (Handshake.WITHDRAWN, Handshake.IMPOSED):
             self._show_edge(now)
         elif self.handshake is Handshake.AWAITED:
-            self._watch_emptied(now, acknowledged=acknowledged)
+            patience = max(FULL_AFTER, EDGE_CYCLES * period)
+            self._watch_emptied(now, patience, acknowledged=acknowledged)
         elif acknowledged:
             self._watch_full(now)
         else:
-            self._full_since = None
+            self._full_since = self._imposed = None
             self._hand_over(now, acknowledged=False)
         if self.handshake in (Handshake.OFFERED, Handshake.IMPOSED):
             return self._bits | Controlword.NEW_SET_POINT
@@ -204,6 +207,7 @@ class ProfilePosition(Mode):
 
     def _forget(self) -> None:
         self._queue.clear()
+        self._imposed = None
         self._taken = False
         if self.handshake in (Handshake.OFFERED, Handshake.IMPOSED):
             self.handshake = Handshake.WITHDRAWN
@@ -241,34 +245,46 @@ class ProfilePosition(Mode):
         """Bit 12 stays, so the buffer of the drive is full; an immediate move empties it.
 
         CiA 402-2, 10.3.2: with bit 5 a set-point is processed at once, and those that wait in
-        the drive are discarded. Others wait until the move that runs has ended.
+        the drive are discarded. Others wait until the move that runs has ended; so do relative
+        ones, which must not be offered twice.
         """
-        if not self._queue or not self._queue[0].move.immediate:
+        move = self._queue[0].move if self._queue else None
+        if move is None or move.relative or not move.immediate:
             self._full_since = None
         elif self._full_since is None:
             self._full_since = now
-        elif now - self._full_since > FULL_AFTER:
-            self._full_since = None
+        elif self._imposed is None and now - self._full_since > FULL_AFTER:
+            self._imposed = self._queue[0]
             self._hand_over(now, acknowledged=True)
+        elif ACKNOWLEDGE_TIMEOUT < now - self._full_since < math.inf:
+            self._full_since = math.inf  # said once
+            self._warn(
+                f'bit 12 has been set for {ACKNOWLEDGE_TIMEOUT:g} s, so a new set-point cannot be '
+                'handed over; it will be when the drive takes the bit back'
+            )
 
-    def _watch_emptied(self, now: float, *, acknowledged: bool) -> None:
+    def _watch_emptied(self, now: float, patience: float, *, acknowledged: bool) -> None:
+        """See whether a full drive has taken an immediate move; else it is handed over later."""
+        imposed = self._imposed
         if not acknowledged:
-            self._taken = True
+            self._taken, self._imposed = True, None
             self._hand_over(now, acknowledged=False)
-        elif now - self._offered_at > ACKNOWLEDGE_TIMEOUT:
-            self._not_acknowledged('bit 12 stays set')
+        elif now - self._offered_at > patience:
+            self.handshake = Handshake.RELEASED
+            if imposed is not None and not self._queue:
+                self._queue.append(imposed)
 
     def _watch_acknowledge(self, now: float, *, acknowledged: bool) -> None:
         if acknowledged:
             self._taken = True
             self.handshake = Handshake.RELEASED
         elif now - self._offered_at > ACKNOWLEDGE_TIMEOUT:
-            self._not_acknowledged('bit 12 stays clear')
+            self._not_acknowledged()
 
-    def _not_acknowledged(self, why: str) -> None:
+    def _not_acknowledged(self) -> None:
         self.handshake = Handshake.RELEASED
         self._reference = None
         self._warn(
-            f'the set-point was not acknowledged within {ACKNOWLEDGE_TIMEOUT:g} s ({why}); it '
+            f'the set-point was not acknowledged within {ACKNOWLEDGE_TIMEOUT:g} s (bit 12); it '
             'may not have been taken'
         )
