@@ -34,7 +34,7 @@ from ..policy.load import load_policy
 from ..policy.shipped import find_policy
 from ..states.controller import Controller
 from ..states.modes import Answer
-from ..states.status import Output, Status
+from ..states.status import EventKind, Output, Status
 from . import messages
 from .control_loop import ControlLoop
 from .diagnostics import loop_diagnostic, state_diagnostic
@@ -208,8 +208,10 @@ class ControllerNode(Node):
             self._ready = True
             logger.info('ready: joints and attitude are known; set_mode makes the robot move')
         for event in output.events:
-            if event.error:
-                logger.error(event.text, throttle_duration_sec=WARN_PERIOD)
+            if event.kind is EventKind.REPEATED:
+                logger.warning(event.text, throttle_duration_sec=WARN_PERIOD)
+            elif event.kind is EventKind.TROUBLE:
+                logger.error(event.text)
             else:
                 logger.info(event.text)
         if output.title != self._title:

@@ -25,7 +25,7 @@ from .motion import Situation
 from .notices import Notices
 from .parameters import StateParameters
 from .shadow import Shadow
-from .status import Event, Output, Status
+from .status import Event, EventKind, Output, Status
 
 MAX_STEP = 0.05  # [s] after a longer pause the gait goes on where it was instead of leaping
 
@@ -155,7 +155,7 @@ class Controller:
         Returns:
             The targets to send, and what happened.
         """
-        events = [Event(True, text) for text in self._health.take(measurement, dt)]
+        events = [Event(EventKind.REPEATED, text) for text in self._health.take(measurement, dt)]
         self._commands.pass_time(dt)
         last = self._limiter.last or self._start()
         if last is None:
@@ -163,10 +163,10 @@ class Controller:
         before = self._machine.state
         events += self._watch(last)
         if failure := self._machine.advance(last):
-            events.append(Event(True, f'the policy was given up: {failure}'))
+            events.append(Event(EventKind.TROUBLE, f'the policy was given up: {failure}'))
         state = self._machine.state
         if state is not before and state is not State.FAULT:
-            events.append(Event(False, f'{before.value} -> {state.value}'))
+            events.append(Event(EventKind.NEWS, f'{before.value} -> {state.value}'))
         events += self._notices.step(self._matters(state), OVER)
         situation, dt_motion = self._situation(), min(dt, MAX_STEP)
         wanted = last if self._health.held else self._move(situation, dt_motion, last, events)
@@ -209,7 +209,7 @@ class Controller:
         reaction = self._latch.reaction
         if reaction is not None:
             self._machine.react(reaction, last)
-        return [Event(True, f'fault, {fault.value}: {reason}')]
+        return [Event(EventKind.TROUBLE, f'fault, {fault.value}: {reason}')]
 
     def _move(
         self, situation: Situation, dt: float, last: Targets, events: list[Event]

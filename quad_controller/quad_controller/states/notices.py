@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from .status import Event
+from .status import Event, EventKind
 
 
 class Notices:
@@ -25,7 +25,7 @@ class Notices:
         """
         for name, text in present.items():
             if name not in self._present:
-                yield Event(True, text)
+                yield Event(EventKind.TROUBLE, text)
         for name in sorted(self._present - set(present)):
-            yield Event(False, over[name])
+            yield Event(EventKind.NEWS, over[name])
         self._present = set(present)

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import Enum
 
 from ..gait.schedule import Gait
 from ..gait.velocity import Velocity
@@ -47,16 +48,24 @@ class Status:
     unreachable: int
 
 
+class EventKind(Enum):
+    """How an event is to be told."""
+
+    NEWS = 'news'
+    TROUBLE = 'trouble'
+    REPEATED = 'repeated'  # trouble of every step: enough to tell it now and then
+
+
 @dataclass(frozen=True, slots=True)
 class Event:
-    """Something that people should hear of once.
+    """Something that people should hear of.
 
     Attributes:
-        error: Whether it is a fault, or else news.
+        kind: How it is to be told.
         text: What happened, and the remedy if there is one.
     """
 
-    error: bool
+    kind: EventKind
     text: str
 
 
