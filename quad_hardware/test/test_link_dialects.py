@@ -52,10 +52,18 @@ class OldRig:
         self.now = 0.0
         self.dialect: Dialect = OldDialect(self.now)
         self.latency = latency
+        self.lose_each = 0
+        self._asked = 0
         self.sent: list[tuple[float, Frame]] = []
         self.states: list[RobotState] = []
         self._answers: list[tuple[float, Frame]] = []
         self._parser = StreamParser(OLD, HOST_KINDS)
+
+    def _answers_to(self, frame: Frame) -> bool:
+        if frame.kind is not Kind.READ or self.latency == math.inf:
+            return False
+        self._asked += 1
+        return not self.lose_each or self._asked % self.lose_each > 0
 
     def run(self, duration: float) -> None:
         """Let time pass."""
@@ -64,7 +72,7 @@ class OldRig:
             step = self.dialect.step(self.now)
             for frame in self._parser.feed(step.send):
                 self.sent.append((self.now, frame))
-                if frame.kind is Kind.READ and self.latency < math.inf:
+                if self._answers_to(frame):
                     reply = answer(frame)
                     wire = OLD.wire_time(len(step.send) + len(reply.encode(OLD)))
                     self._answers.append((self.now + wire + self.latency, reply))
@@ -124,7 +132,25 @@ def test_a_silent_old_robot_is_asked_again_and_counted() -> None:
     rig = OldRig(latency=math.inf)
     rig.run(1.0)
     assert rig.states == []
-    assert rig.dialect.counters.unanswered >= 50
+    assert 10 <= rig.dialect.counters.unanswered <= 50
+
+
+@pytest.mark.parametrize(('latency', 'least'), [(0.0, 50), (0.006, 48), (0.02, 18), (0.045, 9)])
+def test_a_slow_board_makes_the_reports_fewer(latency: float, least: int) -> None:
+    """However slow it answers, reports come, and no answer is given up."""
+    rig = OldRig(latency)
+    rig.run(1.0)
+    assert len(rig.states) >= least
+    assert rig.dialect.counters.unanswered == 0
+
+
+def test_a_lost_answer_costs_little_on_a_quick_board() -> None:
+    """One answer in ten is lost: most periods still give a report."""
+    rig = OldRig(0.001)
+    rig.run(1.0)
+    rig.lose_each = 10
+    rig.run(2.0)
+    assert len(rig.states) >= 50 + 70
 
 
 def test_half_a_report_is_no_report() -> None:

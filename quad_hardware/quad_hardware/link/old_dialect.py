@@ -29,7 +29,9 @@ from .dialect import Dialect, Step
 from .state import RobotState, Vector
 
 HOST_GAP = 0.001  # [s] the board drops some commands that follow each other faster
-BOARD_LATENCY = 0.010  # [s] what an answer may take beyond its time on the line
+LONGEST_LATENCY = 0.050  # [s] what an answer may take beyond its time on the line
+SHORTEST_LATENCY = 0.006  # [s] what is waited for the answer of a quick board
+LATENCY_DECAY = 0.98  # by which a slow answer is forgotten with each quick one
 BATTERY_PERIOD = 2.0  # [s]
 _IMU = OLD.functions[Register.IMU]
 
@@ -55,7 +57,11 @@ _READ_BATTERY = _Request(Register.BATTERY, 1)
 
 
 class OldDialect(Dialect):
-    """Polls a robot; a command goes out as soon as the line is free."""
+    """Polls a robot; a command goes out as soon as the line is free.
+
+    A board that is slower than the period makes the reports fewer. How long an answer is waited
+    for follows from how long others took, so that a lost one costs little on a quick board.
+    """
 
     def __init__(self, now: float, model: Model = Model.LITE, rate: float = 50.0) -> None:
         """Begin a conversation.
@@ -72,7 +78,8 @@ class OldDialect(Dialect):
         self._battery_at = now
         self._queue: deque[_Request] = deque()
         self._waiting: _Request | None = None
-        self._deadline = math.inf
+        self._asked_at = now
+        self._patience = LONGEST_LATENCY
         self._free_at = now
         self._legs = self._torque = b''
         self._arm: dict[int, bytes] = {}
@@ -105,19 +112,14 @@ class OldDialect(Dialect):
 
     def step(self, now: float) -> Step:
         """Return the next frame, where one is due and the line is free."""
-        self._begin_cycle(now)
-        if self._waiting is not None and now >= self._deadline:
-            self._counters.unanswered += 1
-            self._waiting = None
+        if self._waiting is not None and now >= self._deadline(self._waiting):
+            self._give_up()
+        if self._waiting is None and not self._queue and now >= self._cycle_at:
+            self._begin_cycle(now)
         send = self._next(now) if now >= self._free_at else b''
         if send:
             self._free_at = now + OLD.wire_time(len(send)) + HOST_GAP
-        wake = self._cycle_at
-        if self._waiting is not None:
-            wake = min(wake, self._deadline)
-        if self._legs or self._arm or self._torque or (self._queue and self._waiting is None):
-            wake = min(wake, self._free_at)
-        return Step(send, wake)
+        return Step(send, self._wake())
 
     def hear(self, frame: Frame, now: float) -> RobotState | None:
         """Take an answer; with the one of the IMU a report is complete."""
@@ -130,6 +132,9 @@ class OldDialect(Dialect):
             self._counters.unusable += 1
             return None
         self._waiting = None
+        took = now - self._asked_at - waiting.wire_time
+        wanted = max(2 * took, LATENCY_DECAY * self._patience, SHORTEST_LATENCY)
+        self._patience = min(wanted, LONGEST_LATENCY)
         if waiting is _READ_BATTERY:
             self._battery = float(frame.payload[0])
         elif waiting is _READ_MOTORS:
@@ -138,9 +143,23 @@ class OldDialect(Dialect):
             return self._report(frame.payload, now)
         return None
 
+    def _wake(self) -> float:
+        commands = self._free_at if self._legs or self._arm or self._torque else math.inf
+        if self._waiting is not None:
+            return min(commands, self._deadline(self._waiting))
+        return min(commands, self._free_at if self._queue else self._cycle_at)
+
+    def _deadline(self, request: _Request) -> float:
+        return self._asked_at + request.wire_time + self._patience
+
+    def _give_up(self) -> None:
+        """Go on without an answer: the rest of this period is of no use."""
+        self._counters.unanswered += 1
+        self._patience = min(1.5 * self._patience, LONGEST_LATENCY)
+        self._waiting = None
+        self._queue.clear()
+
     def _begin_cycle(self, now: float) -> None:
-        if now < self._cycle_at:
-            return
         self._cycle_at += self._period
         if self._cycle_at <= now:  # held up for longer than a period: no hurry to catch up
             self._cycle_at = now + self._period
@@ -164,7 +183,7 @@ class OldDialect(Dialect):
             return Frame(Kind.WRITE, Register.TORQUE, payload).encode(OLD)
         if self._waiting is None and self._queue:
             self._waiting = self._queue.popleft()
-            self._deadline = now + self._waiting.wire_time + BOARD_LATENCY
+            self._asked_at = now
             return self._waiting.encode()
         return b''
 
