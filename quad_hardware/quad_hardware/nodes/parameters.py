@@ -225,7 +225,7 @@ def _deviations(read: ParameterReader) -> Deviations:
     span = (0.0, 10.0)
     return Deviations(
         orientation=read.number('orientation_stddev', 0.02, span, '[rad]'),
-        rate=read.number('angular_velocity_stddev', 0.15, span, 'differentiated [rad/s]'),
+        rate=read.number('angular_velocity_stddev', 0.2, span, 'differentiated [rad/s]'),
         gyro=read.number('gyro_stddev', 0.02, span, 'of a gyro [rad/s]'),
         acceleration=read.number('linear_acceleration_stddev', 0.3, span, '[m/s²]'),
     )
