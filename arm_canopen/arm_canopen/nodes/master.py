@@ -22,6 +22,7 @@ from rclpy.utilities import try_shutdown
 from ..can import open_bus
 from ..can.bus import Bus
 from ..config import load_bus
+from ..config.checks import check_bus
 from ..config.model import BusConfig
 from ..exceptions import CanopenError
 from .managed_bus import MANAGER
@@ -100,7 +101,7 @@ def _make_process(config: BusConfig, can: Bus, stack: ExitStack) -> MasterProces
     node = Node('master', namespace=config.master.namespace or None)
     stack.callback(node.destroy_node)
     parameters = _declare(node)
-    for warning in config.warnings:
+    for warning in (*config.warnings, *check_bus(config).warnings):
         node.get_logger().warning(str(warning))
     node.get_logger().info(f'{len(config.nodes)} devices of {config.file} on {can.name}')
     return MasterProcess(node, config, can, diagnostics_period=parameters.diagnostics_period)
