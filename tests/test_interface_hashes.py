@@ -10,8 +10,8 @@ from ament_index_python.packages import get_package_share_directory
 from canopen_interfaces.srv import COReadID, COWriteID
 import pytest
 
-# computed with rosidl 4.6.6 from the files that ros2_canopen, geometry2, control_msgs, moveit_msgs and
-# ros2_control publish for Jazzy
+# computed with rosidl 4.6.6 from the files that ros2_canopen, geometry2, control_msgs, moveit_msgs
+# and ros2_control publish for Jazzy
 PUBLIC_HASHES = {
     'canopen_interfaces/msg/COData': (
         '734aa4992e7102aa6fa1d5796932c1d7e2976ce7c59e8ac2c04ec162d7909798'
