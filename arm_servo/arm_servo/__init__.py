@@ -1,3 +1,50 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Jogging and trajectories of an arm on one motion core."""
+"""Jogging, trajectories and single targets of an arm on one jerk-limited motion core."""
+
+from __future__ import annotations
+
+from .bounds import BrakeSettings
+from .core import CoreSettings, MotionCore, SetPoint, Source
+from .exceptions import CommandError, GoalCode, GoalError, ModelError, NotReadyError, ServoError
+from .execution import Execution, ExecutionSettings, Feedback, Outcome, Phase
+from .goal import GoalPoint, GoalRules, JointTolerance, TrajectoryGoal
+from .limits import JointLimits, load_limits
+from .model import Pose, RobotModel
+from .otg import MotionState
+from .report import Cause, Limiter, MotionReport
+from .servo import ServoSettings
+from .velocity_ik import IkSettings
+
+__all__ = [
+    'BrakeSettings',
+    'Cause',
+    'CommandError',
+    'CoreSettings',
+    'Execution',
+    'ExecutionSettings',
+    'Feedback',
+    'GoalCode',
+    'GoalError',
+    'GoalPoint',
+    'GoalRules',
+    'IkSettings',
+    'JointLimits',
+    'JointTolerance',
+    'Limiter',
+    'ModelError',
+    'MotionCore',
+    'MotionReport',
+    'MotionState',
+    'NotReadyError',
+    'Outcome',
+    'Phase',
+    'Pose',
+    'RobotModel',
+    'ServoError',
+    'ServoSettings',
+    'SetPoint',
+    'Source',
+    'TrajectoryGoal',
+    'load_limits',
+]

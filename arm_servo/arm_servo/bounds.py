@@ -19,6 +19,9 @@ from .report import Cause, Limiter
 PRESSING = 1e-9
 """Force of a bound above which it counts as pressing."""
 
+CREEP = 3.0
+"""Least time for the rest of the way to a limit, in cycles."""
+
 BOTH = np.array([[-1.0], [1.0]])
 """Signs of the two ways of a joint."""
 
@@ -94,17 +97,22 @@ class Brakes:
             1.5 * limits.acceleration**2 / limits.jerk + 0.01 * limits.acceleration
         )
 
-    def bounds(self, state: MotionState) -> Bounds:
+    def bounds(self, state: MotionState, period: float) -> Bounds:
         """Find the bounds in a state.
 
         Args:
             state: Commanded state of the joints.
+            period: Time to the next step in [s].
         """
         settings, limits = self._settings, self._limits
         near = self._model.nearest(state.position, settings.horizon, settings.pairs)
         ways = np.array((state.position - limits.lower, limits.upper - state.position))
         below, above = ways
-        slowest, fastest = brakeable_velocity(ways, self._braking) * BOTH
+        # the last of the way is not run through in a cycle
+        brakeable = np.minimum(
+            brakeable_velocity(ways, self._braking), np.maximum(ways, 0.0) / (CREEP * period)
+        )
+        slowest, fastest = brakeable * BOTH
         lower = np.minimum(np.maximum(slowest, state.velocity - self._change), fastest)
         upper = np.maximum(np.minimum(fastest, state.velocity + self._change), slowest)
         rows = np.array([pair.gradient for pair in near]).reshape(len(near), len(limits))

@@ -105,6 +105,11 @@ class MotionCore:
         self._paused = False
 
     @property
+    def model(self) -> RobotModel:
+        """The arm."""
+        return self._model
+
+    @property
     def state(self) -> MotionState:
         """The commanded state.
 
@@ -267,6 +272,23 @@ class MotionCore:
         stay = self.state.position if rest is None else rest.at(rest.duration).position
         self._release('a single target took over')
         self._source, self._target = Source.TARGET, frozen(np.where(moved, values, stay))
+
+    def nudge(self, displacements: Mapping[str, float]) -> None:
+        """Move joints on by amounts, and rest there; nudges add up while they are carried out.
+
+        Args:
+            displacements: How far in [rad] by joint.
+
+        Raises:
+            CommandError: A joint is unknown, or the end is not finite or beyond a limit.
+            NotReadyError: The position of the arm is not known yet.
+        """
+        values, moved = self._by_joint(displacements, 'displacements')
+        begin = self.state.position if self._target is None else self._target
+        names = self._limits.names
+        self.move_to(
+            {names[place]: begin[place] + values[place] for place in np.flatnonzero(moved)}
+        )
 
     def stop(self, reason: str = 'stopped') -> None:
         """Come to rest: a trajectory on its path, anything else in the shortest time.

@@ -6,10 +6,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from .arrays import Array
+from .arrays import Array, Mask
 from .model import RobotModel
 from .otg import Generator, hard_brake, MotionState, Plan
 from .report import Cause, Limiter
+
+TOUCH = 1e-4
+"""Change of a distance that is let pass, in all, in [m]: sliding along is no approach."""
 
 EXACT = 1e-7
 """Rounding of ruckig's positions that is let pass in [rad]."""
@@ -18,8 +21,9 @@ EXACT = 1e-7
 class Guard:
     """Lets a step pass only when the shortest stop behind it stays within the limits.
 
-    The stop behind the step that passed last is always known, so there is always one to fall back
-    on. An arm that begins beyond a limit, or in contact, may go back and may not go further.
+    A joint that could not stop any more brakes instead; where links would come too near, all do.
+    As the step before has passed, there is always a stop to fall back on. An arm that begins
+    beyond a limit, or in contact, may go back and may not go further.
     """
 
     def __init__(self, model: RobotModel, generator: Generator, clearance: float) -> None:
@@ -34,11 +38,10 @@ class Guard:
         self._limits = model.limits
         self._generator = generator
         self._clearance = clearance
-        self._stop: Plan | None = None
         self._lower: Array = model.limits.lower
         self._upper: Array = model.limits.upper
         self._anywhere: Array = np.full(len(model), np.inf)
-        self._room = np.inf
+        self._floor: float | None = None
         self._fastest: Array = model.limits.velocity * (1.0 + 1e-6)
 
     def reset(self, state: MotionState) -> None:
@@ -47,9 +50,11 @@ class Guard:
         Args:
             state: Where the arm is.
         """
-        self._stop = self._generator.brake(state)
+        stop = self._generator.brake(state)
         self._lower, self._upper = -self._anywhere, self._anywhere
-        self._remember(self._stop, self._distance(self._stop, np.inf))
+        self._floor = None
+        if stop is not None:
+            self._remember(stop)
 
     def step(
         self, state: MotionState, wanted: MotionState, period: float, clearances: bool
@@ -65,58 +70,71 @@ class Guard:
         Returns:
             The state to command, and what held the wanted one up.
         """
-        stop = self._generator.brake(wanted)
-        if stop is not None:
-            reason = self._overspeed(wanted) or self._refusal(state, stop, clearances)
-            if reason is None:
-                self._stop = stop
-                return wanted, None
-        else:
-            reason = 'no stop behind it'
-        return self._brake(state, period), Limiter(Cause.STOP_CHECK, reason, 0.0, 0.0)
+        beyond, stop = self._beyond(wanted)
+        limiter = None
+        if beyond.any():  # these joints brake, each for itself; the others go on
+            name = self._limits.names[int(np.argmax(beyond))]
+            limiter = Limiter(Cause.STOP_CHECK, name, 0.0, 0.0)
+            wanted = _mixed(beyond, self._brake(state, period), wanted)
+            beyond, stop = self._beyond(wanted)
+        if stop is not None and not beyond.any():
+            room = self._room(stop, state, clearances)
+            if room is None:
+                self._remember(stop)
+                return wanted, limiter
+            limiter = Limiter(Cause.STOP_CHECK, 'distance of links', room, 0.0)
+        return self._brake(state, period), limiter
 
-    def _overspeed(self, wanted: MotionState) -> str | None:
-        """Return the joint that would overrun its speed before its acceleration is taken back."""
+    def _beyond(self, wanted: MotionState) -> tuple[Mask, Plan | None]:
+        """Return which joints could not stop any more within their limits, and how all would."""
         coasting = wanted.acceleration * np.abs(wanted.acceleration) / (2.0 * self._limits.jerk)
         peak = np.maximum(np.abs(wanted.velocity + coasting), np.abs(wanted.velocity))
-        beyond = peak > self._fastest
-        return self._limits.names[int(np.argmax(beyond))] if beyond.any() else None
-
-    def _refusal(self, state: MotionState, stop: Plan, clearances: bool) -> str | None:
-        """Return why a stop is not good enough; remember it when it is."""
-        lower, upper = stop.extremes
-        beyond = (lower < self._lower - EXACT) | (upper > self._upper + EXACT)
-        if beyond.any():
-            return self._limits.names[int(np.argmax(beyond))]
-        room = self._room_of(stop, state) if clearances else self._room
-        if clearances and room < min(self._room, self._clearance):
-            return 'distance of links'
-        self._remember(stop, room)
-        return None
-
-    def _remember(self, stop: Plan | None, room: float) -> None:
-        """Allow as much beyond the limits as the present stop needs, and no more."""
-        self._room = room
+        beyond: Mask = peak > self._fastest
+        stop = self._generator.brake(wanted)
         if stop is None:
-            return
+            return np.ones_like(beyond), None
+        lower, upper = stop.extremes
+        return beyond | (lower < self._lower - EXACT) | (upper > self._upper + EXACT), stop
+
+    def _remember(self, stop: Plan) -> None:
+        """Allow as much beyond the limits as the present stop needs, and no more."""
         lower, upper = stop.extremes
         self._lower = np.minimum(self._limits.lower, np.maximum(self._lower, lower))
         self._upper = np.maximum(self._limits.upper, np.minimum(self._upper, upper))
 
-    def _distance(self, stop: Plan | None, default: float) -> float:
+    def _room(self, stop: Plan, state: MotionState, clearances: bool) -> float | None:
+        """Return the distance of links that a stop would leave when it is too small.
+
+        Links that are nearer than they should be may stay as they are, not come nearer.
+        """
+        if not clearances:
+            self._floor = None  # what moves the arm now looks after that itself
+            return None
+        if self._floor is None:
+            now = self._generator.brake(state)
+            self._floor = self._clearance if now is None else self._distance(now)
+            self._floor = min(self._floor, self._clearance)
+        if self._seen_room(stop, state) > self._clearance:
+            self._floor = self._clearance
+            return None
+        room = self._distance(stop)
+        if room < self._floor - TOUCH:
+            return room
+        self._floor = max(self._floor, min(room, self._clearance))
+        return None
+
+    def _distance(self, stop: Plan) -> float:
         """Return the least distance between links where a stop ends in [m]."""
-        return default if stop is None else self._model.clearance(stop.at(stop.duration).position)
+        return self._model.clearance(stop.at(stop.duration).position)
 
-    def _room_of(self, stop: Plan, state: MotionState) -> float:
-        """Return the distance of links where a stop ends, or a lower bound that is enough.
+    def _seen_room(self, stop: Plan, state: MotionState) -> float:
+        """Return a lower bound of that from the distances that were seen last.
 
-        No point of the arm moves farther than the joints turn times its reach, a pair of links not
-        farther apart or together than twice that.
+        No point of the arm moves farther than the joints turn times its reach.
         """
         lower, upper = stop.extremes
         turn = float(np.maximum(upper - state.position, state.position - lower).sum())
-        bound = self._model.seen_clearance(state.position) - 2.0 * turn * self._model.reach
-        return bound if bound > self._clearance else self._distance(stop, np.inf)
+        return self._model.seen_clearance(state.position) - 2.0 * turn * self._model.reach
 
     def _brake(self, state: MotionState, period: float) -> MotionState:
         stop = self._generator.brake(state)
@@ -125,3 +143,12 @@ class Guard:
         if period >= stop.duration:
             return MotionState.at_rest(stop.at(stop.duration).position)
         return stop.at(period)
+
+
+def _mixed(mask: Mask, one: MotionState, other: MotionState) -> MotionState:
+    """Return one state where a mask says so, and the other elsewhere."""
+    return MotionState(
+        np.where(mask, one.position, other.position),
+        np.where(mask, one.velocity, other.velocity),
+        np.where(mask, one.acceleration, other.acceleration),
+    )

@@ -140,10 +140,10 @@ class ServoSource:
         """
         if isinstance(command, JointCommand):
             self.reset()
-            return self._ik.joints(state, command.velocity, command.commanded)
+            return self._ik.joints(state, command.velocity, command.commanded, period)
         if isinstance(command, PoseCommand):
             self.reset()
-            return self._toward(state, command.pose)
+            return self._toward(state, command.pose, period)
         return self._jog(state, command, period)
 
     def _jog(self, state: MotionState, command: TwistCommand, period: float) -> IkAnswer:
@@ -164,7 +164,7 @@ class ServoSource:
         task = TwistTask(
             command.twist * share, axes, moved, self._drift, self._settings.hold * error
         )
-        answer = self._ik.cartesian(state, task)
+        answer = self._ik.cartesian(state, task, period)
         if share == 1.0:
             return answer
         off = float(np.abs(error).max())
@@ -193,7 +193,7 @@ class ServoSource:
         wanted = min(1.0, max(LEAST_PACE, 1.0 - (off - scale) / (4.0 * scale)))
         return min(max(wanted, self._share - period / SLOWED), self._share + period / HASTENED)
 
-    def _toward(self, state: MotionState, goal: Pose) -> IkAnswer:
+    def _toward(self, state: MotionState, goal: Pose, period: float) -> IkAnswer:
         """Approach a pose, slowing down so as to arrive at rest."""
         settings = self._settings
         error = _error(goal, self._model.pose(state.position), np.eye(3))
@@ -204,7 +204,9 @@ class ServoSource:
             error[3:], settings.pace, settings.angular_speed, settings.angular_deceleration
         )
         twist = np.concatenate((linear, angular))
-        return self._ik.cartesian(state, TwistTask(twist, np.eye(3), ~self._drift, self._drift))
+        return self._ik.cartesian(
+            state, TwistTask(twist, np.eye(3), ~self._drift, self._drift), period
+        )
 
 
 def _approach(error: Array, pace: float, fastest: float, deceleration: float) -> Array:

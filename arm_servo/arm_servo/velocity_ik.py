@@ -122,17 +122,18 @@ class VelocityIk:
         self._sense: Array | None = None
         self._entered: Array | None = None
 
-    def cartesian(self, state: MotionState, task: TwistTask) -> IkAnswer:
+    def cartesian(self, state: MotionState, task: TwistTask, period: float) -> IkAnswer:
         """Find joint speeds for a speed of the tool.
 
         Args:
             state: Commanded state of the joints.
             task: What is asked.
+            period: Time to the next step in [s].
         """
         weights = np.where(task.commanded, 1.0, self._settings.hold_weight)
         weights[task.drifting & ~task.commanded] = self._settings.drift_weight
         weights *= self._scale
-        bounds = self._brakes.bounds(state)
+        bounds = self._brakes.bounds(state, period)
         # the directions of the weighted task: how well the command does while held axes stay
         asked = _Weighted(
             self._turned(state.position, task.axes, weights),
@@ -150,19 +151,22 @@ class VelocityIk:
             gradient -= (fade * fade * self._escape_speed(way, asked.command)) * way
         return self._answer(hessian, gradient, bounds, asked, found)
 
-    def joints(self, state: MotionState, velocity: Array, commanded: Mask) -> IkAnswer:
+    def joints(
+        self, state: MotionState, velocity: Array, commanded: Mask, period: float
+    ) -> IkAnswer:
         """Find joint speeds near asked ones; joints that are not commanded are held.
 
         Args:
             state: Commanded state of the joints.
             velocity: Asked speeds in [rad/s].
             commanded: Mask of the joints that the command moves.
+            period: Time to the next step in [s].
         """
         self._sense = self._entered = None
         weight = np.where(commanded, 1.0, self._settings.hold_weight)
         asked = _Weighted(np.diag(weight), weight * velocity, np.zeros(len(weight)))
         hessian = np.diag(weight * weight)
-        bounds = self._brakes.bounds(state)
+        bounds = self._brakes.bounds(state, period)
         return self._answer(hessian, -(weight * weight * velocity), bounds, asked, None)
 
     def _turned(self, position: Array, axes: Array, weights: Array) -> Array:

@@ -18,7 +18,7 @@ from servo_streams import kept, PERIOD, stream, wave
 from arm_servo.core import MotionCore, SetPoint, Source
 from arm_servo.exceptions import CommandError, GoalCode, NotReadyError
 from arm_servo.execution import Phase
-from arm_servo.model import Pose, RobotModel
+from arm_servo.model import Pose
 from arm_servo.report import Cause
 
 Action = Callable[[MotionCore, float, np.random.Generator], object]
@@ -33,38 +33,33 @@ def core_of(name: str) -> MotionCore:
 
 def near(core: MotionCore, rng: np.random.Generator, far: float) -> dict[str, float]:
     """Return joint positions near the arm's, within the limits."""
-    limits = robot_of(core).limits
+    limits = core.model.limits
     at = core.state.position + rng.uniform(-far, far, len(limits))
     inside = np.clip(at, limits.lower, limits.upper)
     return dict(zip(limits.names, inside.tolist(), strict=True))
 
 
-def robot_of(core: MotionCore) -> RobotModel:
-    """Return the model of a core."""
-    return core._model
-
-
 def twist(core: MotionCore, now: float, rng: np.random.Generator) -> None:
     """Jog the tool."""
-    link = robot_of(core).tip if rng.random() < 0.5 else None
+    link = core.model.tip if rng.random() < 0.5 else None
     core.twist(rng.normal(size=6) * [0.1, 0.1, 0.1, 0.3, 0.3, 0.3], now, link=link, duration=0.3)
 
 
 def jog(core: MotionCore, now: float, rng: np.random.Generator) -> None:
     """Jog a joint."""
-    name = rng.choice(robot_of(core).joints)
+    name = rng.choice(core.model.joints)
     core.jog({str(name): float(rng.uniform(-1, 1))}, now, duration=0.3)
 
 
 def track(core: MotionCore, now: float, rng: np.random.Generator) -> None:
     """Track a pose."""
     at = np.array(list(near(core, rng, 0.1).values()))
-    core.track(robot_of(core).pose(at), now, duration=0.3)
+    core.track(core.model.pose(at), now, duration=0.3)
 
 
 def follow(core: MotionCore, now: float, rng: np.random.Generator) -> None:
     """Follow a trajectory from the pose to start from."""
-    model = robot_of(core)
+    model = core.model
     core.follow(wave(model, ready(model.name), str(rng.choice(['l', 'c', 'q'])), step=2.0))
 
 
@@ -178,6 +173,21 @@ def test_a_single_target_is_reached_at_rest(name: str) -> None:
     assert points[-1].state.position == pytest.approx(expected, abs=1e-9)
     assert core.source is Source.NONE
     kept(robot(name).limits, [point.state for point in points])
+
+
+def test_nudges_add_up() -> None:
+    """Ten steps of a hundredth, one after the other or at once, make a tenth."""
+    core = core_of('prbt')
+    for _ in range(5):
+        core.nudge({'prbt_joint_1': 0.01})
+    stream(core, 1.0)
+    for _ in range(5):
+        core.nudge({'prbt_joint_1': 0.01})
+        stream(core, 0.02)
+    core.nudge({'prbt_joint_2': 0.02})
+    assert stream(core, 1.0)[-1].state.position[:2] == pytest.approx([0.1, 0.02], abs=1e-9)
+    with pytest.raises(CommandError, match='beyond its limits'):
+        core.nudge({'prbt_joint_1': 9.0})
 
 
 def test_a_target_goes_at_the_overridden_speed() -> None:

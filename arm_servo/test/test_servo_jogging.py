@@ -107,6 +107,25 @@ def test_no_trap_at_a_joint_limit(name: str, twist: Array) -> None:
     kept(model, result)
 
 
+@pytest.mark.parametrize('name', ROBOTS)
+@pytest.mark.parametrize('sense', [1.0, -1.0])
+def test_beyond_a_limit_the_way_leads_back_only(name: str, sense: float) -> None:
+    """A joint that starts beyond its limit can be jogged back, and not further out."""
+    model = robot(name)
+    start = np.array(ready(name))
+    start[4] = model.limits.upper[4] + 0.05
+    velocity, commanded = np.zeros(len(model)), np.zeros(len(model), dtype=np.bool_)
+    velocity[4], commanded[4] = 0.5 * sense, True
+    result = run(model, start, JointCommand(velocity, commanded), 1.0)
+    end = result.states[-1].position[4]
+    if sense > 0:
+        assert end == pytest.approx(start[4], abs=1e-6)
+        assert any(each.cause is Cause.JOINT_POSITION for each in result.report.limiters)
+    else:
+        assert end < model.limits.upper[4] - 0.2
+    kept(model, result)
+
+
 CONTACTS = {
     'panda': [-1.49, 1.32, 0.5, -2.3, -0.74, 1.21, 1.08],
     'prbt': [0.19, 1.58, -1.99, -1.55, -1.63, 0.08],
@@ -136,6 +155,18 @@ def test_contact_can_be_left(name: str) -> None:
     start = np.array(CONTACTS[name])
     ends = [run(model, start, TwistCommand(twist), 1.0).states[-1].position for twist in TWISTS]
     assert max(map(model.clearance, ends)) > model.clearance(start) + 0.01
+
+
+@pytest.mark.parametrize('name', ROBOTS)
+@pytest.mark.parametrize('twist', TWISTS, ids=str)
+def test_the_way_back_is_open(name: str, twist: Array) -> None:
+    """From wherever a jog has led, to a limit or a border, the opposite one leads back."""
+    model = robot(name)
+    out = run(model, ready(name), TwistCommand(4.0 * twist), 2.0, 0.02)
+    still = run(model, out.states[-1], TwistCommand(np.zeros(6)), 0.6, 0.02)
+    back = run(model, still.states[-1], TwistCommand(-twist), 1.0, 0.02)
+    axis = int(np.argmax(np.abs(twist)))
+    assert back.moved[axis] / -twist[axis] > 0.3, f'{back.report}; {back.held_up[-1:]}'
 
 
 @pytest.mark.parametrize('name', ROBOTS)

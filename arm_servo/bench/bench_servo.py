@@ -1,0 +1,172 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Figures of the servo, and beside them those of moveit_servo's documented algorithm.
+
+Run: ``python arm_servo/bench/bench_servo.py [COMMANDS]`` in the sourced workspace.
+
+For each robot: time of a cycle (twist to set-point, with limits, the three nearest pairs, jerk
+limit and stop check), the tool's speed against the asked one, and the share of commands that got
+stuck (less than a twentieth of the asked way in 1 s) on a random walk and from random poses.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+import os
+import sys
+import time
+
+os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')  # before numpy is imported
+
+from moveit_servo_model import MoveitServoModel
+import numpy as np
+from servo_arms import moved as moved_by
+from servo_arms import ready, robot, ROBOTS, SPEED
+
+from arm_servo import MotionCore, RobotModel
+from arm_servo.arrays import Array
+
+PERIOD = 0.01
+STUCK = 0.05
+
+
+@dataclass
+class Tally:
+    """What became of commands."""
+
+    commands: int = 0
+    stuck: int = 0
+    named: int = 0
+    factors: list[float] = field(default_factory=list)
+
+    def __str__(self) -> str:
+        """Say it in a few words."""
+        share = 100.0 * self.stuck / max(self.commands, 1)
+        return f'{self.stuck} of {self.commands} stuck ({share:.0f} %)'
+
+
+def time_of_cycles(model: RobotModel) -> tuple[float, float]:
+    """Return median and 99th percentile of the time of a jogging cycle in [us]."""
+    core = MotionCore(model)
+    core.reset(ready(model.name))
+    times = []
+    for cycle in range(4000):
+        now = cycle * 0.002
+        sense = (-1) ** (cycle // 250)
+        core.twist(sense * np.array([0.05, 0.03, 0.0, 0.0, 0.0, 0.1]), now)
+        begin = time.perf_counter()
+        core.step(now, 0.002)
+        times.append(time.perf_counter() - begin)
+    median, late = np.percentile(times, [50, 99])
+    return 1e6 * float(median), 1e6 * float(late)
+
+
+def ours(core: MotionCore, twist: Array) -> tuple[float, bool]:
+    """Carry out a command for 1 s: the share of the asked way, and whether a cause was named."""
+    model, start = core.model, core.state.position
+    core.twist(twist, 0.0, duration=1.0)
+    named = False
+    for cycle in range(round(1.0 / PERIOD)):
+        named |= bool(core.step(cycle * PERIOD, PERIOD).report.limiters)
+    return share(model, start, core.state.position, twist), named
+
+
+def theirs(model: RobotModel, start: Array, twist: Array) -> tuple[float, Array]:
+    """Carry out a command for 1 s with the model of moveit_servo, after its latency."""
+    servo = MoveitServoModel(model, start, PERIOD)
+    end = start
+    for _ in range(round(1.1 / PERIOD)):
+        end = servo.step(twist)
+    return share(model, start, end, twist), end
+
+
+def share(model: RobotModel, start: Array, end: Array, twist: Array) -> float:
+    """Return the share of the asked way that was moved."""
+    scale = 1.0 / SPEED
+    moved = moved_by(model, start, end) * scale
+    asked = twist * scale
+    return float(moved @ asked / (asked @ asked))
+
+
+def count(tally: Tally, moved: float, named: bool = False) -> None:
+    """Count a command."""
+    tally.commands += 1
+    tally.stuck += moved < STUCK
+    tally.named += moved < STUCK and named
+
+
+def random_twist(rng: np.random.Generator) -> Array:
+    """Return a twist along an axis, or across three."""
+    if rng.random() < 0.5:
+        sense = 1.0 if rng.random() < 0.5 else -1.0
+        one: Array = sense * SPEED * np.eye(6)[rng.integers(6)]
+        return one
+    across: Array = SPEED * rng.normal(size=6)
+    return across
+
+
+def walk(model: RobotModel, commands: int) -> tuple[Tally, Tally]:
+    """Give both the same commands one after the other, each going on from where it is."""
+    rng, here, there = np.random.default_rng(1), Tally(), Tally()
+    core = MotionCore(model)
+    core.reset(ready(model.name))
+    position = np.array(ready(model.name))
+    for _ in range(commands):
+        twist = random_twist(rng)
+        count(here, *ours(core, twist))
+        moved, position = theirs(model, position, twist)
+        count(there, moved)
+    return here, there
+
+
+def from_random_poses(model: RobotModel, commands: int) -> tuple[Tally, Tally]:
+    """Give both the same command from the same random pose that is free of contact."""
+    rng, here, there = np.random.default_rng(2), Tally(), Tally()
+    lower = np.maximum(model.limits.lower, -np.pi)
+    upper = np.minimum(model.limits.upper, np.pi)
+    core = MotionCore(model)
+    while here.commands < commands:
+        start = rng.uniform(lower, upper)
+        if model.clearance(start) < 0.01:
+            continue
+        twist = random_twist(rng)
+        core.reset(start)
+        count(here, *ours(core, twist))
+        count(there, theirs(model, start, twist)[0])
+    return here, there
+
+
+def speed_error(model: RobotModel) -> float:
+    """Return how far the tool's speed is off at most where nothing limits, as a share."""
+    worst = 0.0
+    for axis in range(6):
+        core = MotionCore(model)
+        core.reset(ready(model.name))
+        twist = 0.3 * SPEED * np.eye(6)[axis]
+        core.twist(twist, 0.0, duration=1.0)
+        point = core.step(0.0, PERIOD)
+        for cycle in range(1, 60):
+            point = core.step(cycle * PERIOD, PERIOD)
+        if point.report.limiters:
+            continue
+        achieved = model.jacobian(point.state.position) @ point.state.velocity
+        worst = max(worst, float(np.abs(achieved - twist).max() / np.abs(twist).max()))
+    return worst
+
+
+def main() -> None:
+    """Print the figures."""
+    commands = int(sys.argv[1]) if len(sys.argv) > 1 else 60
+    for name in ROBOTS:
+        model = robot(name)
+        median, late = time_of_cycles(model)
+        print(f'{name} ({len(model)} joints)')
+        print(f'  cycle                p50 {median:.0f} us, p99 {late:.0f} us')
+        print(f'  speed of the tool    off by {100 * speed_error(model):.2f} % at most')
+        for label, run in (('random walk', walk), ('random poses', from_random_poses)):
+            here, there = run(model, commands)
+            print(f'  {label:20} {here}, {here.named} of them named; moveit_servo: {there}')
+
+
+if __name__ == '__main__':
+    main()

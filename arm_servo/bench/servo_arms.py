@@ -1,0 +1,49 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The robots of arm_bringup for the benchmarks, as they are installed."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pinocchio as pin
+
+from arm_bringup.description import expand_xacro
+from arm_bringup.robots import installed_robots_folder
+from arm_servo import load_limits, RobotModel
+from arm_servo.arrays import Array, frozen
+
+ROBOTS = ('panda', 'prbt', 'gp110')
+
+SPEED = frozen([0.1] * 3 + [0.3] * 3)
+"""Speed of a command along each axis in [m/s] and [rad/s]."""
+
+TWISTS = [sign * SPEED * axis for axis in np.eye(6) for sign in (1.0, -1.0)]
+"""Commands along each axis, both ways."""
+
+
+@cache
+def texts(name: str) -> tuple[str, str]:
+    """Return URDF and SRDF of a robot."""
+    folder = installed_robots_folder() / name
+    urdf = expand_xacro(folder / f'{name}.urdf.xacro')
+    return urdf, (folder / f'{name}.srdf').read_text(encoding='utf-8')
+
+
+@cache
+def robot(name: str) -> RobotModel:
+    """Return a robot."""
+    return RobotModel(*texts(name), load_limits(installed_robots_folder() / name / 'limits.yaml'))
+
+
+def ready(name: str) -> Array:
+    """Return the pose of a robot from which it can move in every direction."""
+    return robot(name).poses['ready']
+
+
+def moved(model: RobotModel, start: Array, end: Array) -> Array:
+    """Return the twist of the tip from one place to another in unit time (6)."""
+    before, after = model.pose(start), model.pose(end)
+    angular = pin.log3(after.rotation @ before.rotation.T)
+    return np.concatenate((after.position - before.position, angular))
