@@ -14,7 +14,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from quad_hardware.estimation import Estimate, OdometryState
+from quad_description import movable_joints, robot_urdf
+from quad_hardware.estimation import Estimate, Estimator, EstimatorSettings, OdometryState
 from quad_hardware.estimation.rotation import (
     from_roll_pitch_yaw,
     IDENTITY,
@@ -24,13 +25,21 @@ from quad_hardware.estimation.rotation import (
     yaw_of,
 )
 from quad_hardware.estimation.rotation import Quaternion as Rotation
+from quad_hardware.joints import JointMap, servo_of
 from quad_hardware.link import DialectCounters, LinkState, LinkStatus, RobotState
 from quad_hardware.nodes import messages
-from quad_hardware.nodes.diagnostics import command_diagnostic, CommandCounters, link_diagnostic
+from quad_hardware.nodes.diagnostics import (
+    command_diagnostic,
+    CommandCounters,
+    link_diagnostic,
+    robot_diagnostic,
+)
 from quad_hardware.nodes.parameters import Deviations, Frames
-from quad_hardware.protocol import ParserCounters
+from quad_hardware.protocol import Fault, ParserCounters
 
 STAMP = Time(sec=1)
+URDF = robot_urdf('lite')
+JOINTS = JointMap(servo_of(joint) for joint in movable_joints(URDF))
 FRAMES = Frames('odom', 'base_link', 'base_footprint', 'imu_link', False, True)
 PARENT = replace(FRAMES, footprint_is_parent=True)
 DEVIATIONS = Deviations(orientation=0.02, rate=0.15, gyro=0.02, acceleration=0.3)
@@ -143,6 +152,33 @@ def link_status(**changes: object) -> LinkStatus:
 def test_the_level_of_the_link(status: LinkStatus, level: bytes) -> None:
     """A damaged line is a warning, a silent one stale, none an error."""
     assert link_diagnostic('hardware_node', '/dev/x', status).level == level
+
+
+@pytest.mark.parametrize(
+    ('change', 'error', 'level', 'words'),
+    [
+        ({}, 0.01, DiagnosticStatus.OK, 'no faults'),
+        ({'battery': 15.0}, 0.01, DiagnosticStatus.WARN, 'battery at 15 %'),
+        ({'battery': 5.0}, 0.01, DiagnosticStatus.ERROR, 'battery at 5 %'),
+        ({'temperatures': {11: 80.0, 12: 30.0}}, 0.01, DiagnosticStatus.WARN, 'hot servos: 11'),
+        ({}, 0.5, DiagnosticStatus.WARN, 'disagree by 29 degrees'),
+        ({'faults': Fault.IMU | Fault.OVERLOAD}, 0.01, DiagnosticStatus.ERROR, 'overload, imu'),
+        ({'faults': 0x8000}, 0.01, DiagnosticStatus.OK, 'no faults'),
+    ],
+)
+def test_the_level_of_the_robot(
+    change: dict[str, object], error: float, level: bytes, words: str
+) -> None:
+    """Battery, heat, an IMU that is mounted otherwise, and faults that the robot reports."""
+    state = replace(
+        RobotState(0.0, 0.0, (0, 0, 0), (0, 0, 9.8), {}, {}, battery=80.0),
+        **change,  # type: ignore[arg-type]
+    )
+    estimator = Estimator(URDF, JOINTS, EstimatorSettings())
+    estimate = replace(ESTIMATE, gravity_error=error)
+    status = robot_diagnostic('hardware_node', '/dev/x', state, estimate, estimator)
+    assert status.level == level
+    assert words in status.message
 
 
 def test_a_trouble_is_shown_once() -> None:

@@ -21,7 +21,7 @@ import pytest
 from quad_hardware.exceptions import LinkError
 from quad_hardware.link import Driver, LinkOptions, LinkState, RobotState
 from quad_hardware.link.session import open_session
-from quad_hardware.link.vendor import is_installed
+from quad_hardware.link.vendor_library import is_installed
 from quad_hardware.protocol import LEG_MOTORS, NEW
 
 if TYPE_CHECKING:

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 import importlib.util
 
+from ..link.vendor_library import is_installed
 from .finding import error, Finding, good, note, warning
 
 LEAST_MEMORY = 300e6  # [B] below that, processes are soon ended
@@ -60,6 +61,6 @@ def check_library() -> Finding:
         return warning('xgo_lib2', 'not found', 'build the workspace: it brings one of its own')
     import xgo_lib2
 
-    own = hasattr(xgo_lib2, 'IS_STAND_IN')
-    whose = 'the stand-in of this workspace' if own else f'the vendor’s, {xgo_lib2.__file__}'
+    vendors = is_installed()
+    whose = f'the vendor’s, {xgo_lib2.__file__}' if vendors else 'the stand-in of this workspace'
     return good('xgo_lib2', whose)

@@ -25,7 +25,8 @@ from .new_dialect import NewDialect
 from .old_dialect import OldDialect
 from .port import Port
 from .probe import connect, Connection
-from .vendor import VendorDialect, VendorParser, VendorPort, WRITE_AUTO
+from .vendor import VendorDialect, VendorParser, VendorPort
+from .vendor_library import WRITE_AUTO
 
 
 @dataclass(frozen=True, slots=True)

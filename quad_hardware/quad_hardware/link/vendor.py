@@ -11,12 +11,10 @@ angle by motor id, and the name of the acceleration.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
 import importlib
-import inspect
 import os
-from typing import Protocol as Interface
 
 from ..exceptions import LinkError
 from ..protocol import Feedback, Frame, MOTOR_ORDER, NEW, ParserCounters, Protocol
@@ -24,6 +22,7 @@ from .dialect import Step
 from .new_dialect import ASK_AGAIN, NewDialect
 from .port import CHUNK
 from .state import RobotState, Vector
+from .vendor_library import Dog, find_serial, find_write_method, StateParser, WRITE_AUTO
 
 VENDOR = Protocol(
     name='vendor',
@@ -33,38 +32,7 @@ VENDOR = Protocol(
     kinds=NEW.kinds,
     functions=NEW.functions,
 )
-WRITE_AUTO = 'auto'
 _ACCELERATIONS = ('acceleration', 'acc', 'accel', 'linear_acceleration')
-_WRITE_WORDS, _SERVO_WORDS = ('write', 'set', 'move'), ('servo', 'motor', 'joint')
-_OTHER_WORDS = ('speed', 'load', 'torque', 'offset', 'zero', 'id', 'feedback', 'angles')
-
-WriteAngle = Callable[[int, float], object]
-
-
-class Dog(Interface):
-    """What is public of the vendor's XgoDog."""
-
-    def read_version(self) -> object:
-        """Return the firmware version."""
-
-    def system_set_feedback(self, on: int, /) -> object:
-        """Have states pushed."""
-
-
-class StateParser(Interface):
-    """What is public of the vendor's SendStateParser."""
-
-    def feed_bytes(self, data: bytes, /) -> Iterable[object]:
-        """Take bytes, return states."""
-
-
-def is_installed() -> bool:
-    """Tell whether ``import xgo_lib2`` gives the vendor's library and not our stand-in."""
-    try:
-        library = importlib.import_module('xgo_lib2')
-    except ImportError:
-        return False
-    return not hasattr(library, 'IS_STAND_IN')
 
 
 class VendorPort:
@@ -89,7 +57,7 @@ class VendorPort:
             self.dog: Dog = client.XgoDog(path)
         except Exception as error:  # whatever the vendor's library raises
             raise LinkError(f'xgo_lib2 cannot open {path}: {error}') from error
-        port = _serial_of(self.dog)
+        port = find_serial(self.dog)
         if port is None:
             self.close()
             raise LinkError(
@@ -215,7 +183,7 @@ class VendorDialect(NewDialect):
         self.protocol = VENDOR
         self.can_release = False
         self._dog = dog
-        self._write = _write_method(dog, method)
+        self._write = find_write_method(dog, method)
         self._angles: dict[int, float] = {}
 
     def command(self, angles: Mapping[int, float]) -> None:
@@ -258,49 +226,6 @@ class VendorDialect(NewDialect):
 
 
 NO_ACCELERATION: Vector = (0.0, 0.0, 0.0)  # no accelerometer on earth reads that for long
-
-
-@dataclass(frozen=True, slots=True)
-class _Descriptor:
-    """Something with a file descriptor."""
-
-    fileno: Callable[[], int]
-
-
-def _serial_of(dog: object, depth: int = 2) -> _Descriptor | None:
-    """Return the open serial port among the attributes of an object, or of what it holds."""
-    for value in list(getattr(dog, '__dict__', {}).values()):
-        if callable(getattr(value, 'fileno', None)) and callable(getattr(value, 'write', None)):
-            return _Descriptor(value.fileno)
-        if depth > 1 and (found := _serial_of(value, depth - 1)) is not None:
-            return found
-    return None
-
-
-def _write_method(dog: object, name: str) -> WriteAngle:
-    methods = dict(inspect.getmembers(dog, callable))
-    if name != WRITE_AUTO:
-        if name not in methods:
-            raise LinkError(f'the XgoDog of xgo_lib2 has no method {name!r}')
-        return methods[name]
-    fitting = [method for method in methods if _writes_an_angle(method)]
-    if len(fitting) == 1:
-        return methods[fitting[0]]
-    public = ', '.join(method for method in methods if not method.startswith('_'))
-    raise LinkError(
-        f'which method of xgo_lib2’s XgoDog writes one servo angle? {len(fitting)} names fit; set '
-        f'vendor_servo_method to one of {public}'
-    )
-
-
-def _writes_an_angle(method: str) -> bool:
-    words = method.lower().split('_')
-    return (
-        not method.startswith('_')
-        and any(word in words for word in _WRITE_WORDS)
-        and any(word in words for word in _SERVO_WORDS)
-        and not any(word in words for word in _OTHER_WORDS)
-    )
 
 
 def _number(state: object, name: str) -> float:

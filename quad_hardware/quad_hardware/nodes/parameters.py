@@ -15,7 +15,8 @@ from ..estimation import EstimatorSettings, OdometrySettings, RateSource
 from ..exceptions import CommandError
 from ..joints import JointMap, JointServo, LimiterSettings, servo_of
 from ..link import LinkOptions
-from ..link.vendor import is_installed, VENDOR
+from ..link.vendor import VENDOR
+from ..link.vendor_library import is_installed
 from ..protocol import Model, Protocol, PROTOCOLS
 from .parameter_reader import ParameterReader, refuse_misspelt
 
