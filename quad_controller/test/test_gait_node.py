@@ -198,7 +198,7 @@ def test_silence_is_a_fault_that_is_cleared_by_its_service(robot: Robot) -> None
     robot.names[0] = 'somebody_else'
     robot.until_state('fault')
     robot.process.wait_for('holding the last targets')
-    robot.process.wait_for('fault, feedback: no joint states')
+    robot.process.wait_for('fault, joint states: none for')
     robot.process.wait_for('joint states without fl_hip_joint')
     assert not robot.client.trigger('controller_node/clear_fault').success
     robot.names[0] = ROBOT.names[0]

@@ -154,7 +154,7 @@ def test_silent_joints_hold_then_fault_and_need_clearing() -> None:
     rig.joints = True
     rig.run(1.0, FORWARD)
     assert rig.positions == held
-    assert 'no joint states for' in rig.controller.set_mode('walk').message
+    assert 'joint states: none for' in rig.controller.set_mode('walk').message
     assert rig.controller.clear_fault().accepted
     rig.run(1.0, FORWARD)
     assert rig.positions == held

@@ -20,7 +20,7 @@ from .health import Health
 from .limiter import StepLimiter
 from .machine import Poses, StateMachine
 from .measurement import Measurement
-from .modes import Answer, GAIT_STATES, ModeRequest, MODES, parse_mode, State
+from .modes import Answer, GAIT_STATES, ModeRequest, MODES, MOVING_STATES, parse_mode, State
 from .motion import Situation
 from .notices import Notices
 from .parameters import StateParameters
@@ -28,9 +28,6 @@ from .shadow import Shadow
 from .status import Event, EventKind, Output, Status
 
 MAX_STEP = 0.05  # [s] after a longer pause the gait goes on where it was instead of leaping
-
-OVER = {'command': 'velocities: in order again', 'held': 'joint states: in order again'}
-"""What to say when something is no longer the matter."""
 
 UPRIGHT_STATES = GAIT_STATES | {State.POLICY, State.FAULT}
 """States in which the robot is on its legs, and what is wrong with it is a fault."""
@@ -167,7 +164,7 @@ class Controller:
         state = self._machine.state
         if state is not before and state is not State.FAULT:
             events.append(Event(EventKind.NEWS, f'{before.value} -> {state.value}'))
-        events += self._notices.step(self._matters(state), OVER)
+        events += self._notices.step(self._matters(state), self._over(state))
         situation, dt_motion = self._situation(), min(dt, MAX_STEP)
         wanted = last if self._health.held else self._move(situation, dt_motion, last, events)
         shadow = self._shadow.step(situation, dt_motion, last) if self._shadow else None
@@ -194,7 +191,7 @@ class Controller:
         ]
 
     def _matters(self, state: State) -> dict[str, str]:
-        """Return what stops the robot without being a fault, by the names in :data:`OVER`."""
+        """Return what stops the robot without being a fault, by a name for each."""
         matters = {}
         if stale := self._commands.warning(state):
             matters['command'] = stale
@@ -202,6 +199,15 @@ class Controller:
             age = self._health.joints_age * 1e3
             matters['held'] = f'joint states are {age:.0f} ms old; holding the last targets'
         return matters
+
+    def _over(self, state: State) -> dict[str, str]:
+        """Return what to say when one of these is over, where that lets the robot move again."""
+        over = {}
+        if state in MOVING_STATES:
+            over['command'] = 'velocities: in order again'
+        if state is not State.FAULT:
+            over['held'] = 'joint states: in order again'
+        return over
 
     def _latch_fault(self, fault: Fault, reason: str, last: Targets) -> list[Event]:
         if not self._latch.latch(fault, reason):

@@ -19,7 +19,7 @@ class Reaction(IntEnum):
 class Fault(Enum):
     """Why; the value says what it is about, for people."""
 
-    JOINTS = 'feedback'
+    JOINTS = 'joint states'
     IMU = 'attitude'
     FALLEN = 'fall'
     BATTERY = 'battery'

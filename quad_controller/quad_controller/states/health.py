@@ -98,9 +98,9 @@ class Health:
         """Yield what keeps the robot from moving its legs, each with its reason and remedy."""
         parameters = self._parameters
         if self.joints_age > parameters.fault_age:
-            yield Fault.JOINTS, _age(self.joints_age, 'joint states', '/joint_states')
+            yield Fault.JOINTS, _age(self.joints_age, '/joint_states')
         if parameters.require_imu and self.imu_age > parameters.fault_age:
-            yield Fault.IMU, _age(self.imu_age, 'imu', '/imu')
+            yield Fault.IMU, _age(self.imu_age, '/imu')
         if self.imu is not None and self._fall_time > parameters.fall_time:
             angle = math.degrees(self.imu.tilt)
             yield Fault.FALLEN, f'the body is tilted by {angle:.0f} deg; put it on its feet'
@@ -130,7 +130,7 @@ class Health:
             self.imu, self.imu_age = imu, 0.0
 
 
-def _age(age: float, what: str, topic: str) -> str:
+def _age(age: float, topic: str) -> str:
     if math.isinf(age):
-        return f'no {what} yet; is the hardware node running, and does it publish {topic}?'
-    return f'no {what} for {age:.1f} s; look at the hardware node and its cable'
+        return f'none yet; is the hardware node running, and does it publish {topic}?'
+    return f'none for {age:.1f} s; look at the hardware node and its cable'

@@ -21,11 +21,11 @@ class Notices:
 
         Args:
             present: What is the matter, by a name for it.
-            over: What to say when it is no longer, by the same names.
+            over: What to say when it is no longer, by the same names; nothing where there is none.
         """
         for name, text in present.items():
             if name not in self._present:
                 yield Event(EventKind.TROUBLE, text)
-        for name in sorted(self._present - set(present)):
+        for name in sorted((self._present - set(present)) & set(over)):
             yield Event(EventKind.NEWS, over[name])
         self._present = set(present)
