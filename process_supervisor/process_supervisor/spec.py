@@ -24,11 +24,11 @@ class StopStep:
 
 
 POLITE = (
-    StopStep(Signals.SIGINT, 10.0),
+    StopStep(Signals.SIGINT, 20.0),
     StopStep(Signals.SIGTERM, 2.0),
     StopStep(Signals.SIGKILL, 2.0),
 )
-"""The usual ladder; 10 s because a master takes up to 8 s to bring its drives to rest."""
+"""The usual ladder; 20 s because a master may take 18 s to bring its drives to rest."""
 
 
 @dataclass(frozen=True, slots=True)

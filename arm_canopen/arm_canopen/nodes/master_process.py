@@ -20,6 +20,7 @@ from ..cia402.drive import Drive
 from ..cia402.drive_commands import DriveCommands
 from ..cia402.motion import MotionSource
 from ..cia402.motion_group import MotionGroup
+from ..cia402.sequences import SHUTDOWN_MAX
 from ..cia402.status import drive_status
 from ..config.model import BusConfig
 from ..master.events import Event, EventKind, Severity
@@ -37,7 +38,7 @@ from .output_thread import OutputThread
 LISTENER_PERIOD = 0.1  # [s] how soon a new subscriber hears something
 LAST_WORD_TIMEOUT = 0.5  # [s] for the last /diagnostics
 ATTACH_TIMEOUT = 1.0  # [s] for what the next cycle does
-STOP_TIMEOUT = 8.0  # [s] for all drives to stop; each has its own shorter limits
+STOP_TIMEOUT = SHUTDOWN_MAX + 2.0  # [s] for all drives to stop; each has its own shorter limits
 
 JointSample = tuple[DriveNode, list[tuple[float, float, float]]]
 
