@@ -119,6 +119,10 @@ def test_a_whole_outing() -> None:
     assert not rig.faulted
     assert rig.robot.base_pose.position[2] < start - 0.02
     assert rig.controller.status.unreachable == 0
+    rig.mode('stand')
+    rig.run(3.0)
+    assert rig.state == 'stand'
+    assert rig.robot.base_pose.position[2] == pytest.approx(start, abs=0.005)
 
 
 def test_levelling_turns_the_body_towards_level_on_a_slope() -> None:

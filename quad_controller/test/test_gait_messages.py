@@ -1,0 +1,151 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Messages and the loop's thread, without a graph."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+import math
+import queue
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticStatus
+from geometry_msgs.msg import Pose
+from hypothesis import given
+from hypothesis import strategies as st
+import pytest
+from sensor_msgs.msg import BatteryState, JointState
+
+from quad_controller.gait.parameters import GaitParameters
+from quad_controller.nodes.control_loop import ControlLoop
+from quad_controller.nodes.diagnostics import state_diagnostic
+from quad_controller.nodes.messages import body_pose, charge, JointReader
+from quad_controller.states.controller import Controller
+from quad_controller.states.measurement import JointSample
+from quad_controller.states.parameters import StateParameters
+from quad_controller.states.status import Output
+from quad_gait_rig import FOLDED, Rig, ROBOT, tilted, UPRIGHT
+
+PATIENCE = 10.0  # [s]
+angles = st.floats(-1.2, 1.2)
+
+
+@given(st.permutations(range(14)))
+def test_joints_are_found_by_name(order: list[int]) -> None:
+    """Whatever the order of a message, and whatever else is in it, values go to their names."""
+    known = [*ROBOT.names, 'hand', 'tail']
+    message = JointState(
+        name=[known[index] for index in order],
+        position=[index * 0.1 for index in order],
+        velocity=[index * 1.0 for index in order],
+    )
+    sample = JointReader(ROBOT.names).read(message)
+    assert sample.positions == pytest.approx([index * 0.1 for index in range(12)])
+    assert sample.velocities == pytest.approx([float(index) for index in range(12)])
+
+
+def test_odd_joint_states_are_refused_and_the_next_good_one_is_taken() -> None:
+    """A missing joint and a wrong length are named; velocities may be missing."""
+    reader = JointReader(ROBOT.names)
+    with pytest.raises(ValueError, match='without fl_hip_joint'):
+        reader.read(JointState(name=list(ROBOT.names[1:]), position=[0.0] * 11))
+    with pytest.raises(ValueError, match='11 positions for 12 names'):
+        reader.read(JointState(name=list(ROBOT.names), position=[0.0] * 11))
+    sample = reader.read(JointState(name=list(ROBOT.names), position=[0.5] * 12))
+    assert sample == JointSample((0.5,) * 12, (0.0,) * 12)
+
+
+@given(angles, angles, angles, st.floats(0.1, 3.0))
+def test_body_pose_is_read_from_a_quaternion(
+    roll: float, pitch: float, yaw: float, length: float
+) -> None:
+    """Roll, pitch and yaw come back, of a quaternion that is not quite one as well."""
+    sr, cr, sp, cp = (
+        math.sin(roll / 2),
+        math.cos(roll / 2),
+        math.sin(pitch / 2),
+        math.cos(pitch / 2),
+    )
+    sy, cy = math.sin(yaw / 2), math.cos(yaw / 2)
+    message = Pose()
+    message.position.z = 0.01
+    message.orientation.x = length * (sr * cp * cy - cr * sp * sy)
+    message.orientation.y = length * (cr * sp * cy + sr * cp * sy)
+    message.orientation.z = length * (cr * cp * sy - sr * sp * cy)
+    message.orientation.w = length * (cr * cp * cy + sr * sp * sy)
+    pose = body_pose(message)
+    assert pose.parts == pytest.approx((0.0, 0.0, 0.01, roll, pitch, yaw), abs=1e-9)
+
+
+def test_a_pose_of_zeros_is_no_rotation() -> None:
+    """A message whose quaternion nobody filled in is upright."""
+    message = Pose()
+    message.orientation.w = 0.0
+    assert body_pose(message).parts == (0.0,) * 6
+
+
+def test_an_unknown_charge_is_none() -> None:
+    """NaN is how BatteryState says that it does not know."""
+    assert charge(BatteryState(percentage=math.nan)) is None
+    assert charge(BatteryState(percentage=0.5)) == 0.5
+
+
+def test_diagnostics_say_what_is_wrong() -> None:
+    """Waiting is STALE, standing OK, a fault ERROR with its reason."""
+    rig = Rig()
+    rig.joints = False
+    rig.step()
+    assert state_diagnostic('node', rig.controller.status).level == DiagnosticStatus.STALE
+    rig.joints = True
+    rig.step()
+    rig.ask('stand')
+    rig.run(0.5)
+    status = state_diagnostic('node', rig.controller.status)
+    assert (status.level, status.message) == (DiagnosticStatus.OK, 'to stand')
+    rig.run(2.0)
+    rig.imu = tilted(1.5)
+    rig.run(0.5)
+    status = state_diagnostic('node', rig.controller.status)
+    assert status.level == DiagnosticStatus.ERROR
+    assert 'tilted by 86 deg' in status.message
+
+
+@contextmanager
+def running(publish: Any, fail: Any = None) -> Iterator[ControlLoop]:
+    """Run a loop with a controller of its own."""
+    controller = Controller(ROBOT, GaitParameters(), StateParameters())
+    loop = ControlLoop(controller, 0.02, publish, fail or (lambda error: None))
+    loop.start()
+    try:
+        yield loop
+    finally:
+        loop.stop()
+
+
+def test_feedback_makes_steps_and_is_used_once() -> None:
+    """An output follows the joint states, and the figures know of their latency."""
+    outputs: queue.Queue[Output] = queue.Queue()
+    with running(outputs.put) as loop:
+        assert outputs.get(timeout=PATIENCE).targets is None
+        loop.offer_joints(JointSample(FOLDED, (0.0,) * 12))
+        loop.offer_imu(UPRIGHT)
+        output = outputs.get(timeout=PATIENCE)
+        while output.targets is None:
+            output = outputs.get(timeout=PATIENCE)
+        assert output.targets == FOLDED
+        outputs.get(timeout=PATIENCE)
+        figures = loop.figures()
+    assert figures.latency_p50 > 0.0
+    assert figures.steps >= 2
+
+
+def test_a_defect_is_told_and_ends_the_loop() -> None:
+    """What goes wrong in the thread reaches the node, and stopping afterwards does not hang."""
+    failures: queue.Queue[Exception] = queue.Queue()
+
+    def broken(_output: Output) -> None:
+        raise RuntimeError('no DDS')
+
+    with running(broken, failures.put):
+        assert 'no DDS' in str(failures.get(timeout=PATIENCE))
