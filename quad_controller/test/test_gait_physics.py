@@ -9,6 +9,7 @@ import math
 
 import pytest
 
+from quad_controller.gait.body import BodyPose
 from quad_controller.gait.parameters import GaitParameters
 from quad_controller.gait.servo_compensation import ServoModel
 from quad_controller.gait.velocity import Velocity
@@ -123,6 +124,21 @@ def test_a_whole_outing() -> None:
     rig.run(3.0)
     assert rig.state == 'stand'
     assert rig.robot.base_pose.position[2] == pytest.approx(start, abs=0.005)
+
+
+def test_the_body_takes_its_pose_while_it_walks() -> None:
+    """Lowered and leaning, the body keeps both and the speed."""
+    rig = PhysicsRig()
+    height = rig.robot.base_pose.position[2]
+    rig.mode('walk')
+    rig.controller.set_body_pose(BodyPose(z=-0.012, roll=0.1, pitch=0.08))
+    rig.run(2.0, Velocity(0.1))
+    travel = rig.travel(3.0, Velocity(0.1))
+    roll, pitch, _ = rig.robot.base_pose.roll_pitch_yaw
+    assert roll == pytest.approx(0.1, abs=0.03)
+    assert pitch == pytest.approx(0.08, abs=0.03)
+    assert rig.robot.base_pose.position[2] < height - 0.008
+    assert travel.x == pytest.approx(0.1, abs=0.03)
 
 
 def test_levelling_turns_the_body_towards_level_on_a_slope() -> None:

@@ -198,7 +198,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else '')
     parser.add_argument('path', type=Path, help='ONNX file to write')
     parser.add_argument('--rounds', type=int, default=8, help='of collecting and fitting')
-    parser.add_argument('--episodes', type=int, default=30, help='of each round')
+    parser.add_argument('--episodes', type=int, default=40, help='of each round')
     parser.add_argument(
         '--epochs', type=int, default=30, help='of each round; the last has 3 times'
     )
