@@ -19,6 +19,9 @@ from .report import Cause, Limiter
 PRESSING = 1e-9
 """Force of a bound above which it counts as pressing."""
 
+ALONE = 0.3
+"""Least share of its deceleration that a joint plans with while others take longer to stop."""
+
 CREEP = 3.0
 """Least time for the rest of the way to a limit, in cycles."""
 
@@ -84,14 +87,7 @@ class Brakes:
         """
         limits, share = model.limits, settings.braking
         self._model, self._settings, self._limits = model, settings, limits
-        self._braking = JointLimits(
-            limits.names,
-            limits.lower,
-            limits.upper,
-            limits.velocity,
-            frozen(limits.acceleration * share),
-            frozen(limits.jerk * share),
-        )
+        self._share = share
         # what a speed can change by while its acceleration builds up and down, and a little more
         self._change = frozen(
             1.5 * limits.acceleration**2 / limits.jerk + 0.01 * limits.acceleration
@@ -108,9 +104,11 @@ class Brakes:
         near = self._model.nearest(state.position, settings.horizon, settings.pairs)
         ways = np.array((state.position - limits.lower, limits.upper - state.position))
         below, above = ways
+        left = ways - self._lead(state)
         # the last of the way is not run through in a cycle
         brakeable = np.minimum(
-            brakeable_velocity(ways, self._braking), np.maximum(ways, 0.0) / (CREEP * period)
+            brakeable_velocity(left, self._in_step(state)),
+            np.maximum(left, 0.0) / (CREEP * period),
         )
         slowest, fastest = brakeable * BOTH
         lower = np.minimum(np.maximum(slowest, state.velocity - self._change), fastest)
@@ -123,6 +121,29 @@ class Brakes:
         best = np.maximum(rows, 0.0) @ upper + np.minimum(rows, 0.0) @ lower
         least = np.minimum(allowed, best)
         return Bounds(below, above, slowest, fastest, lower, upper, near, rows, least)
+
+    def _in_step(self, state: MotionState) -> JointLimits:
+        """Return limits with which all joints brake in step: the tool keeps its direction."""
+        limits, speeds = self._limits, np.abs(state.velocity)
+        longest = float(np.max(speeds / limits.acceleration))
+        part = speeds / (longest * limits.acceleration) if longest > 0.0 else np.ones(len(speeds))
+        share = self._share * np.maximum(part, ALONE)
+        return JointLimits(
+            limits.names,
+            limits.lower,
+            limits.upper,
+            limits.velocity,
+            limits.acceleration * share,
+            limits.jerk * share,
+        )
+
+    def _lead(self, state: MotionState) -> Array:
+        """Return the way down and up that goes by while an acceleration is taken back (2, n)."""
+        acceleration = np.maximum(BOTH * state.acceleration, 0.0)
+        velocity = np.maximum(BOTH * state.velocity, 0.0)
+        time = acceleration / self._limits.jerk
+        lead: Array = (velocity + acceleration * time / 3.0) * time
+        return lead
 
     def pressing(self, bounds: Bounds, forces: Array, factor: float) -> list[Limiter]:
         """Name the bounds and rows that press.

@@ -9,7 +9,7 @@ is no event: positions, velocities and accelerations go on from where they are.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 
 import numpy as np
@@ -30,6 +30,12 @@ from .servo import (
     ServoSource,
     TwistCommand,
 )
+
+CALM = 0.02
+"""Share of a joint's speed below which a released jog needs no line any more."""
+
+LONGEST = 1.0
+"""Longest time for which a released jog is slowed down along its line in [s]."""
 
 
 class Source(Enum):
@@ -99,6 +105,7 @@ class MotionCore:
         self._command: Command | None = None
         self._fresh_until = 0.0
         self._stale = False
+        self._slowing_since: float | None = None
         self._execution: Execution | None = None
         self._target: Array | None = None
         self._speed = 1.0
@@ -366,6 +373,7 @@ class MotionCore:
             self._release('jogging took over')
             self._servo.reset()
         self._source, self._command = Source.JOG, command
+        self._slowing_since = None
         self._fresh_until = now + (self._settings.timeout if duration is None else duration)
 
     def _release(self, reason: str) -> None:
@@ -380,10 +388,11 @@ class MotionCore:
         """Return the next state that the source wants; None to come to rest."""
         if self._source is Source.JOG and self._command is not None:
             self._stale = self._paused or now > self._fresh_until
-            if self._stale:
+            command = self._slowing(state, now) if self._stale else self._command
+            if command is None:
                 self._servo.reset()
                 return None, MotionReport()
-            answer = self._servo.step(state, self._command, period)
+            answer = self._servo.step(state, command, period)
             return self._toward(state, answer.velocity, period), answer.report
         if self._source is Source.TRAJECTORY and self._execution is not None:
             return self._execution.step(state, measured, self._pace, period), MotionReport()
@@ -394,6 +403,17 @@ class MotionCore:
                 return None, MotionReport()
             return (there if plan.duration <= period else plan.at(period)), MotionReport()
         return None, MotionReport()
+
+    def _slowing(self, state: MotionState, now: float) -> Command | None:
+        """Return what slows a stale jog down along its line; None for the last of it."""
+        calm = np.all(np.abs(state.velocity) < CALM * self._limits.velocity)
+        if calm or not isinstance(self._command, TwistCommand):
+            return None
+        if self._slowing_since is None:
+            self._slowing_since = now
+        if now - self._slowing_since > LONGEST:
+            return None
+        return replace(self._command, twist=np.zeros(6))
 
     def _toward(self, state: MotionState, velocity: Array, period: float) -> MotionState:
         plan = self._generator.to_velocity(state, velocity)

@@ -135,6 +135,18 @@ class Execution:
         """How long its path lasts at full pace in [s]."""
         return self._path.duration
 
+    def foreseen(self, ahead: float) -> MotionState:
+        """Return where it will be at its present pace; for any thread.
+
+        Args:
+            ahead: Time from the last step in [s]; less than 0 is the past.
+        """
+        feedback, path = self.feedback, self._path
+        here = path.at(feedback.time + feedback.pace * ahead)
+        return MotionState(
+            here.position, here.velocity * feedback.pace, here.acceleration * feedback.pace**2
+        )
+
     def stop(self, outcome: Outcome) -> None:
         """Come to rest on the path, and end.
 

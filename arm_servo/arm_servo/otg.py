@@ -126,17 +126,16 @@ class Generator:
             velocity: Velocities to reach in [rad/s], within the limits.
         """
         limits, demand = self._limits, self._to_velocity
+        present = np.abs(state.acceleration) / limits.acceleration
         share = _shares(velocity - state.velocity, limits.acceleration)
-        unwound = state.acceleration * np.abs(state.acceleration) / (2.0 * limits.jerk * share)
-        change = velocity - state.velocity - unwound
-        share = _shares(change, limits.acceleration)
+        jerk = limits.jerk * np.maximum(share, present)  # what is there is taken back in time
+        unwound = state.acceleration * np.abs(state.acceleration) / (2.0 * jerk)
+        share = _shares(velocity - state.velocity - unwound, limits.acceleration)
         # no time to lose where the speed would overrun its limit
         share[np.abs(state.velocity + unwound) > limits.velocity] = 1.0
         _start(demand, state)
-        demand.max_acceleration = np.maximum(
-            limits.acceleration * share, np.abs(state.acceleration)
-        )
-        demand.max_jerk = limits.jerk * share
+        demand.max_acceleration = limits.acceleration * share
+        demand.max_jerk = limits.jerk * np.maximum(share, np.minimum(present, 1.0))
         demand.target_velocity = velocity
         return self._plan(demand)
 

@@ -8,11 +8,12 @@ from collections.abc import Callable
 import contextlib
 import math
 
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 import numpy as np
 import pytest
 from servo_robots import ready, robot, ROBOTS
+from servo_runs import twist_between
 from servo_streams import kept, PERIOD, stream, wave
 
 from arm_servo.core import MotionCore, SetPoint, Source
@@ -147,6 +148,26 @@ def test_a_stop_keeps_the_tool_on_its_line() -> None:
     home = model.pose(ready('panda')).position
     away = [model.pose(point.state.position).position - home for point in points]
     assert max(float(np.linalg.norm(each[1:])) for each in away) < 1e-3
+
+
+@pytest.mark.parametrize('name', ROBOTS)
+@settings(max_examples=12, deadline=None)
+@given(seed=st.integers(0, 10**6))
+def test_held_axes_stay_from_any_pose(name: str, seed: int) -> None:
+    """A jog along one axis, its stop included, leaves the others within 1 % of the reach."""
+    model, rng = robot(name), np.random.default_rng(seed)
+    limits, period = model.limits, 0.01
+    start = rng.uniform(np.maximum(limits.lower, -math.pi), np.minimum(limits.upper, math.pi))
+    assume(model.clearance(start) > 0.01)
+    core, axis = MotionCore(model), int(rng.integers(6))
+    core.reset(start)
+    asked = np.eye(6)[axis] * ([0.1] * 3 + [0.3] * 3)
+    core.twist(asked, 0.0, duration=1.0)
+    for cycle in range(140):
+        at = core.step(cycle * period, period).state.position
+        aside = twist_between(model, start, at) * ([1.0] * 3 + [model.reach / 3] * 3)
+        aside[axis] = 0.0
+        assert np.abs(aside).max() < 0.01 * model.reach
 
 
 def test_taking_over_ends_the_trajectory_with_words() -> None:
