@@ -19,4 +19,11 @@ setup(
     maintainer_email='developers@example.org',
     description='Jogging and trajectories of an arm on one motion core',
     license='Apache-2.0',
+    entry_points={
+        'console_scripts': [
+            'motion_master = arm_servo.nodes.motion_master:main',
+            'servo_gamepad = arm_servo.teleop.servo_gamepad:main',
+            'servo_keyboard_input = arm_servo.teleop.servo_keyboard_input:main',
+        ],
+    },
 )

@@ -1,0 +1,123 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The motion core as a motion source of arm_canopen: stepped in the CANopen cycle."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..arrays import frozen
+from ..core import Source
+from ..otg import MotionState
+from .desk import Desk
+from .drive_reasons import why_not
+
+if TYPE_CHECKING:
+    from arm_canopen import AxisFeedback, MotionSource, Setpoint
+
+
+class DriveSource:
+    """Commands the drives of an arm; a :class:`arm_canopen.MotionSource`.
+
+    It follows while every drive can. When one drops out, the others stop on the path, and a
+    trajectory ends with the drive named. Afterwards it takes the arm over where the drives'
+    set-points are: at once when nobody took a drive away, else when it is attached again.
+    """
+
+    def __init__(self, desk: Desk) -> None:
+        """Wait for the drives.
+
+        Args:
+            desk: The core's desk; it is stepped here only.
+        """
+        from arm_canopen import Setpoint
+
+        self._make: type[Setpoint] = Setpoint
+        self._desk = desk
+        self._axes = list(desk.model.joints)
+        self._released: dict[str, str] = dict.fromkeys(self._axes, 'it was not attached yet')
+        self._following = False
+        self._lost = ''
+
+    @property
+    def axes(self) -> Sequence[str]:
+        """Names of the drives, which are those of the joints."""
+        return self._axes
+
+    @property
+    def detached(self) -> bool:
+        """Whether a drive was taken away, so that it has to be attached again; any thread."""
+        return bool(self._released)
+
+    def attach(self, attach: Callable[[MotionSource], None]) -> None:
+        """Get back the drives that were taken away; any thread.
+
+        Args:
+            attach: What attaches a source to the bus.
+        """
+        self._released = {}  # before, so that a drive which is taken away right after is known
+        attach(self)
+
+    def released(self, axis: str, reason: str) -> None:
+        """Come to rest, and leave the drives alone until attached again.
+
+        Args:
+            axis: Name of the drive.
+            reason: Why it was taken away.
+        """
+        self._released = {**self._released, axis: f'was taken away: {reason}'}
+
+    def update(
+        self, now: float, period: float, feedback: Sequence[AxisFeedback]
+    ) -> Sequence[Setpoint | None]:
+        """Answer the set-points of a cycle.
+
+        Args:
+            now: Steady time in [s].
+            period: Time to the next cycle in [s].
+            feedback: State of each drive.
+
+        Returns:
+            Position in [rad] and velocity in [rad/s] of each drive that follows.
+        """
+        try:
+            return self._update(now, period, feedback)
+        except Exception as error:  # the bus detaches it then
+            reason = f'was let go, because the motion core raised {type(error).__name__}: {error}'
+            self._released = dict.fromkeys(self._axes, reason)
+            self._following, self._lost = False, ''
+            raise
+
+    def _update(
+        self, now: float, period: float, feedback: Sequence[AxisFeedback]
+    ) -> Sequence[Setpoint | None]:
+        measured = MotionState(
+            frozen([axis.position for axis in feedback]),
+            frozen([axis.velocity for axis in feedback]),
+            np.zeros(len(feedback)),
+        )
+        blocked = why_not(feedback, self._released)
+        if not self._following and not blocked:
+            self._take_over(feedback)
+        if not self._following:
+            self._desk.idle(now, measured, self._lost or blocked)
+            return [None] * len(feedback)
+        if blocked and not self._lost:
+            self._lost = blocked
+            self._desk.fail(blocked)
+        point = self._desk.step(now, period, measured, self._lost)
+        if self._lost and point.source is Source.NONE and not point.state.moving:
+            self._following, self._lost = False, ''
+        rows = zip(point.state.position, point.state.velocity, feedback, strict=True)
+        return [
+            self._make(float(position), float(velocity)) if axis.followable else None
+            for position, velocity, axis in rows
+        ]
+
+    def _take_over(self, feedback: Sequence[AxisFeedback]) -> None:
+        """Begin at rest at the set-points of the drives."""
+        self._desk.begin(frozen([axis.setpoint for axis in feedback]))
+        self._following, self._lost = True, ''

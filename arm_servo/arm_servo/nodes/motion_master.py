@@ -1,0 +1,115 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""``ros2 run arm_servo motion_master``: the master of arm_canopen with the motion core inside.
+
+It takes what ``ros2 run arm_canopen master`` takes, and what describes the arm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import TimeoutError as FutureTimeoutError
+import sys
+from typing import TYPE_CHECKING
+
+from rclpy.logging import get_logger
+from rclpy.node import Node
+
+from arm_canopen import run_master
+
+from ..core import CoreSettings, MotionCore
+from ..exceptions import ModelError, NotReadyError, ServoError
+from .declare import Declarations
+from .desk import Desk
+from .drive_source import DriveSource
+from .robot_parameters import declare_robot
+from .trajectory_controller import TrajectoryController
+from .trajectory_parameters import declare_trajectory
+
+if TYPE_CHECKING:
+    from arm_canopen import MasterProcess
+
+ATTACH_PERIOD = 0.2
+"""Time between two tries to attach when the bus starts in [s]."""
+
+
+class Motion:
+    """The nodes of an arm whose drives are on one bus.
+
+    Attributes:
+        nodes: The nodes, for the executor of the master.
+    """
+
+    def __init__(self, master: MasterProcess) -> None:
+        """Build core and nodes; nothing moves yet.
+
+        Args:
+            master: The process that runs the bus.
+
+        Raises:
+            ModelError: The parameters do not make an arm, or it has joints without a drive.
+        """
+        manager = Node('controller_manager')
+        model = declare_robot(manager)
+        name = Declarations(manager).text(
+            'controller_name', f'{model.group}_controller', 'name of the trajectory controller'
+        )
+        self._check_drives(master, model.joints)
+        controller = Node(name)
+        trajectory = declare_trajectory(controller, model.joints)
+        self._master = master
+        core = MotionCore(model, CoreSettings(execution=trajectory.execution))
+        self._desk = Desk(core)
+        self._source = DriveSource(self._desk)
+        self.nodes = [manager, controller]
+        self._controller = TrajectoryController(controller, self._desk, trajectory, self._prepare)
+        for note in model.notes:
+            manager.get_logger().warning(note)
+        self._attaching = manager.create_timer(ATTACH_PERIOD, self._attach_first)
+        self._manager = manager
+
+    @staticmethod
+    def _check_drives(master: MasterProcess, joints: Sequence[str]) -> None:
+        drives = [node.name for node in master.bus.nodes if node.is_drive]
+        missing = [name for name in joints if name not in drives]
+        if missing:
+            raise ModelError(
+                f'{master.bus.file} has no drive {missing[0]!r}; drives have the names of the'
+                f' joints, and there are: {", ".join(drives) or "none"}'
+            )
+
+    def _attach_first(self) -> None:
+        try:
+            self._prepare()
+        except NotReadyError:
+            return
+        self._manager.destroy_timer(self._attaching)
+
+    def _prepare(self) -> None:
+        """Get back the drives that were taken away, for the motion that follows."""
+        if not self._source.detached:
+            return
+        try:
+            self._source.attach(self._master.attach)
+        except FutureTimeoutError as error:
+            raise NotReadyError('the cycle does not run; is the bus up?') from error
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run the master with the motion core until Ctrl-C.
+
+    Args:
+        argv: ROS arguments; None takes those of the process.
+
+    Returns:
+        The exit code of the master, 1 when the arm cannot be built.
+    """
+    try:
+        return run_master(argv, extend=lambda master: Motion(master).nodes)
+    except ServoError as error:
+        get_logger('motion_master').fatal(str(error))
+        return 1
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,41 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The arm from ROS parameters, under MoveIt's names."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rclpy.node import Node
+
+from ..exceptions import ModelError
+from ..limits import load_limits
+from ..model import RobotModel
+from .declare import Declarations
+
+
+def declare_robot(node: Node) -> RobotModel:
+    """Declare what describes an arm, and build it.
+
+    Args:
+        node: The node.
+
+    Raises:
+        ModelError: A parameter is missing, or they do not make an arm.
+    """
+    declare = Declarations(node)
+    urdf = declare.text('robot_description', '', 'URDF of the robot as XML text')
+    srdf = declare.text('robot_description_semantic', '', 'SRDF of the robot as XML text')
+    limits = declare.text(
+        'joint_limits', '', "path of the limits file, in MoveIt's format of joint_limits.yaml"
+    )
+    group = declare.text('group', '', 'group of the SRDF to move; empty takes its only one')
+    tip = declare.text('tip_link', '', "link that is moved; empty takes the group's end")
+    for name, value in (
+        ('robot_description', urdf),
+        ('robot_description_semantic', srdf),
+        ('joint_limits', limits),
+    ):
+        if not value:
+            raise ModelError(f'no {name}: give it with --ros-args -p {name}:=... or a params file')
+    return RobotModel(urdf, srdf, load_limits(Path(limits)), group or None, tip or None)

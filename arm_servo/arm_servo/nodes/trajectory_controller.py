@@ -1,0 +1,152 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The trajectory controller's topics, service and action on a node."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from concurrent.futures import Future
+from typing import Any
+
+from control_msgs.msg import JointTrajectoryControllerState, SpeedScalingFactor
+from control_msgs.srv import QueryTrajectoryState
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from trajectory_msgs.msg import JointTrajectory
+
+from ..core import Source
+from ..exceptions import NotReadyError, ServoError
+from ..execution import Execution
+from ..goal import TrajectoryGoal
+from .desk import Desk
+from .trajectory_action import TrajectoryAction
+from .trajectory_messages import (
+    difference,
+    goal_of_action,
+    goal_of_trajectory,
+    point_of,
+    seconds,
+)
+from .trajectory_parameters import TrajectoryParameters
+
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+"""For a value that counts until the next one."""
+
+
+class TrajectoryController:
+    """``~/follow_joint_trajectory``, ``~/joint_trajectory`` and what belongs to them.
+
+    Attributes:
+        active: Whether it takes trajectories.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        desk: Desk,
+        parameters: TrajectoryParameters,
+        prepare: Callable[[], None],
+    ) -> None:
+        """Offer them.
+
+        Args:
+            node: The controller's node.
+            desk: The core's desk.
+            parameters: How it behaves.
+            prepare: Called before a trajectory, to get the drives back.
+        """
+        self.active = True
+        self._node = node
+        self._desk = desk
+        self._parameters = parameters
+        self._prepare = prepare
+        self._execution: Execution | None = None
+        self._news: deque[str] = deque()
+        self._state = node.create_publisher(
+            JointTrajectoryControllerState, '~/controller_state', 10
+        )
+        node.create_subscription(JointTrajectory, '~/joint_trajectory', self._take, 10)
+        node.create_subscription(SpeedScalingFactor, '~/speed_scaling_input', self._scale, LATCHED)
+        node.create_service(QueryTrajectoryState, '~/query_state', self._query)
+        node.create_timer(1.0 / parameters.state_rate, self._publish_state)
+        self._action = TrajectoryAction(
+            node, desk, parameters.monitor_rate, self._convert, self._follow
+        )
+        if parameters.speed != 1.0:
+            self._override(parameters.speed)
+
+    @property
+    def _now(self) -> float:
+        return float(self._node.get_clock().now().nanoseconds) * 1e-9
+
+    def _convert(self, request: Any) -> TrajectoryGoal:  # noqa: ANN401  # goals have no type
+        return goal_of_action(request, self._now, self._parameters)
+
+    def _follow(self, goal: TrajectoryGoal) -> Future[Execution]:
+        if not self.active:
+            name = self._node.get_name()
+            raise NotReadyError(f'{name} is inactive; activate it with switch_controller')
+        self._prepare()
+        future = self._desk.submit(lambda core, _now: core.follow(goal))
+        future.add_done_callback(self._remember)
+        return future
+
+    def _remember(self, future: Future[Execution]) -> None:
+        if not future.cancelled() and future.exception() is None:
+            self._execution = future.result()
+
+    def _take(self, message: JointTrajectory) -> None:
+        try:
+            future = self._follow(goal_of_trajectory(message, self._now, self._parameters))
+        except ServoError as error:
+            self._news.append(f'trajectory refused: {error}')
+            return
+        future.add_done_callback(self._tell_refusal)
+
+    def _scale(self, message: SpeedScalingFactor) -> None:
+        self._override(message.factor)
+
+    def _override(self, speed: float) -> None:
+        future = self._desk.submit(lambda core, _now: core.override(speed), moves=False)
+        future.add_done_callback(self._tell_refusal)
+
+    def _tell_refusal(self, future: Future[Any]) -> None:
+        if not future.cancelled() and (error := future.exception()) is not None:
+            self._news.append(f'refused: {error}')  # the cycle must not wait for a log
+
+    def _query(
+        self, request: QueryTrajectoryState.Request, response: QueryTrajectoryState.Response
+    ) -> QueryTrajectoryState.Response:
+        snapshot, execution = self._desk.snapshot, self._execution
+        if snapshot.set_point is None:
+            response.message = snapshot.blocked
+            return response
+        ahead = seconds(request.time) - self._now if seconds(request.time) else 0.0
+        state = snapshot.set_point.state
+        if snapshot.source is Source.TRAJECTORY and execution is not None:
+            state = execution.foreseen(ahead)
+        response.success = True
+        response.name = list(self._desk.model.joints)
+        response.position = state.position.tolist()
+        response.velocity = state.velocity.tolist()
+        response.acceleration = state.acceleration.tolist()
+        return response
+
+    def _publish_state(self) -> None:
+        while self._news:
+            self._node.get_logger().warning(self._news.popleft())
+        snapshot = self._desk.snapshot
+        if snapshot.set_point is None or snapshot.measured is None:
+            return  # as a controller that is not active
+        wanted, measured = snapshot.set_point.state, snapshot.measured
+        message = JointTrajectoryControllerState(
+            joint_names=list(self._desk.model.joints),
+            reference=point_of(wanted),
+            feedback=point_of(measured),
+            error=point_of(difference(wanted, measured)),
+            output=point_of(wanted),
+            speed_scaling_factor=snapshot.speed,
+        )
+        message.header.stamp = self._node.get_clock().now().to_msg()
+        self._state.publish(message)

@@ -1,0 +1,111 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Parameters of the trajectory controller, under joint_trajectory_controller's names."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from rclpy.node import Node
+
+from ..exceptions import ModelError
+from ..execution import ExecutionSettings
+from ..goal import GoalRules, JointTolerance
+from .declare import Declarations
+
+RATES = (0.1, 1000.0)
+"""Span of rates in [Hz]."""
+
+
+@dataclass(frozen=True, slots=True)
+class TrajectoryParameters:
+    """How the trajectory controller behaves.
+
+    Attributes:
+        execution: How trajectories are accepted and followed.
+        path: Tolerances on the way by joint; 0 is none.
+        goal: Tolerances at the end by joint; 0 is none.
+        monitor_rate: Rate of the action's feedback in [Hz].
+        state_rate: Rate of ~/controller_state in [Hz].
+        speed: Speed scaling at the start, 0 to 1.
+    """
+
+    execution: ExecutionSettings
+    path: Mapping[str, JointTolerance]
+    goal: Mapping[str, JointTolerance]
+    monitor_rate: float
+    state_rate: float
+    speed: float
+
+
+def declare_trajectory(node: Node, joints: Sequence[str]) -> TrajectoryParameters:
+    """Declare the parameters of the trajectory controller.
+
+    Args:
+        node: The node.
+        joints: Names of the arm's joints.
+
+    Raises:
+        ModelError: The parameter ``joints`` names others, or an interface is asked for that there
+            is not.
+    """
+    declare = Declarations(node)
+    named = declare.texts('joints', list(joints), "names of the joints: those of the arm's group")
+    if sorted(named) != sorted(joints):
+        raise ModelError(f'joints: {named} are not those of the group, {list(joints)}')
+    _declare_interfaces(declare)
+    stopped = declare.number(
+        'constraints.stopped_velocity_tolerance',
+        0.01,
+        'greatest speed of a joint at the goal [rad/s]; 0 is none',
+        (0.0, 100.0),
+    )
+    path = {name: JointTolerance(_constraint(declare, name, 'trajectory')) for name in joints}
+    goal = {name: JointTolerance(_constraint(declare, name, 'goal'), stopped) for name in joints}
+    rules = GoalRules(
+        partial=declare.flag(
+            'allow_partial_joints_goal', 'accept goals for some of the joints', default=False
+        ),
+        end_velocity=declare.flag(
+            'allow_nonzero_velocity_at_trajectory_end',
+            'accept a velocity at the last point; the arm comes to rest behind it',
+            default=False,
+        ),
+    )
+    goal_time = declare.number(
+        'constraints.goal_time',
+        0.0,
+        'time to come within the tolerances of the goal [s]; 0 waits without end',
+        (0.0, 3600.0),
+    )
+    return TrajectoryParameters(
+        ExecutionSettings(rules=rules, goal=JointTolerance(0.0, stopped), goal_time=goal_time),
+        path,
+        goal,
+        declare.number('action_monitor_rate', 20.0, "rate of the action's feedback [Hz]", RATES),
+        declare.number('state_publish_rate', 50.0, 'rate of ~/controller_state [Hz]', RATES),
+        declare.number(
+            'speed_scaling.initial_scaling_factor', 1.0, 'speed at the start, 0 to 1', (0.0, 1.0)
+        ),
+    )
+
+
+def _constraint(declare: Declarations, joint: str, kind: str) -> float:
+    where = 'on the way' if kind == 'trajectory' else 'at the goal'
+    return declare.number(
+        f'constraints.{joint}.{kind}', 0.0, f'tolerance {where} [rad]; 0 is none', (0.0, 100.0)
+    )
+
+
+def _declare_interfaces(declare: Declarations) -> None:
+    """Take what configurations for ros2_control say, and refuse what is not offered."""
+    wanted = declare.texts('command_interfaces', ['position'], 'position is what is commanded')
+    if set(wanted) - {'position', 'velocity'} or 'position' not in wanted:
+        raise ModelError(f'command_interfaces {wanted}: positions are commanded, use [position]')
+    declare.texts('state_interfaces', ['position', 'velocity'], 'what is measured')
+    method = declare.text(
+        'interpolation_method', 'splines', 'splines: linear, cubic or quintic by what points say'
+    )
+    if method != 'splines':
+        raise ModelError(f'interpolation_method {method!r}: only splines have limited jerk')

@@ -1,0 +1,64 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Ideal drives under a drive source, cycle by cycle, without a bus."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from servo_robots import ready, robot
+
+from arm_canopen import AxisFeedback, MotionSource, Setpoint
+from arm_canopen.standard.drive import DriveState
+from arm_servo.arrays import Array
+from arm_servo.core import MotionCore
+from arm_servo.nodes.desk import Desk
+from arm_servo.nodes.drive_source import DriveSource
+
+PERIOD = 0.01
+
+
+class Drives:
+    """Drives that go to their set-points at once.
+
+    Attributes:
+        desk: The desk of the core that commands them.
+        source: The source under test.
+        axes: State of each drive; to be changed by tests.
+        path: Positions commanded so far, a row for each cycle.
+    """
+
+    def __init__(self, name: str = 'panda') -> None:
+        """Let the drives be ready to follow."""
+        self.now = 100.0
+        self.desk = Desk(MotionCore(robot(name)), lambda: self.now)
+        self.source = DriveSource(self.desk)
+        self.axes = [
+            AxisFeedback(joint, True, DriveState.OPERATION_ENABLED, 8, at, 0.0, at, True)
+            for joint, at in zip(self.desk.model.joints, ready(name).tolist(), strict=True)
+        ]
+        self.path: list[Array] = []
+        self.attachments: list[MotionSource] = []
+
+    def attach(self) -> None:
+        """Give the source its drives."""
+        self.source.attach(self.attachments.append)
+
+    def run(self, cycles: int = 1) -> Sequence[Setpoint | None]:
+        """Run some cycles; return the set-points of the last."""
+        answer: Sequence[Setpoint | None] = []
+        for _ in range(cycles):
+            self.now += PERIOD
+            answer = self.source.update(self.now, PERIOD, self.axes)
+            for number, point in enumerate(answer):
+                if point is not None:
+                    self.axes[number] = replace(
+                        self.axes[number],
+                        position=point.position,
+                        setpoint=point.position,
+                        velocity=point.velocity,
+                    )
+            self.path.append(np.array([axis.setpoint for axis in self.axes]))
+        return answer

@@ -1,0 +1,154 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The core in the CANopen cycle: taking over, dropping out and coming back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import Future
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from servo_drives import Drives, PERIOD
+
+from arm_canopen import AxisFeedback
+from arm_canopen.standard.drive import DriveState
+from arm_servo.core import MotionCore, Source
+from arm_servo.exceptions import GoalCode, NotReadyError
+from arm_servo.execution import Execution, Phase
+from arm_servo.goal import GoalPoint, TrajectoryGoal
+
+Change = Callable[[AxisFeedback], AxisFeedback]
+
+
+def swing(drives: Drives, far: float = 0.4, time: float = 2.0) -> Future[Execution]:
+    """Order a trajectory of all joints."""
+    to = [axis.setpoint + far for axis in drives.axes]
+    to[3] -= 2 * far  # the fourth joint of the Panda has little room upwards
+    goal = TrajectoryGoal(drives.desk.model.joints, [GoalPoint(time, to)])
+    return drives.desk.submit(lambda core, _: core.follow(goal))
+
+
+def attached() -> Drives:
+    """Return drives that follow."""
+    drives = Drives()
+    drives.attach()
+    drives.run()
+    return drives
+
+
+def test_it_begins_where_the_set_points_are() -> None:
+    """The first set-points are those of the drives, not their measured positions."""
+    drives = Drives()
+    drives.axes = [replace(axis, position=axis.position + 0.02) for axis in drives.axes]
+    before = [axis.setpoint for axis in drives.axes]
+    drives.attach()
+    answer = drives.run()
+    assert [point.position for point in answer if point] == pytest.approx(before, abs=1e-12)
+
+
+def test_nothing_moves_before_it_is_attached() -> None:
+    """Without its drives it answers no set-points, and refuses commands."""
+    drives = Drives()
+    future = swing(drives)
+    assert drives.run() == [None] * 7
+    with pytest.raises(NotReadyError, match='not attached yet'):
+        future.result(0.0)
+
+
+@pytest.mark.parametrize(
+    ('change', 'words'),
+    [
+        (lambda axis: replace(axis, online=False), 'offline'),
+        (lambda axis: replace(axis, state=DriveState.FAULT), 'recover'),
+        (lambda axis: replace(axis, state=DriveState.SWITCH_ON_DISABLED), 'init'),
+        (lambda axis: replace(axis, mode=1), 'cyclic_position_mode'),
+        (lambda axis: axis, 'another client'),
+    ],
+)
+def test_the_others_stop_on_the_path_when_a_drive_drops_out(change: Change, words: str) -> None:
+    """The six others come to rest smoothly on the path; the trajectory names drive and remedy."""
+    drives = attached()
+    begin = drives.path[-1]
+    future = swing(drives)
+    drives.run(60)
+    before = len(drives.path)
+    drives.axes[2] = change(replace(drives.axes[2], followable=False))
+    answer = drives.run()
+    assert [point is None for point in answer] == [number == 2 for number in range(7)]
+    drives.run(200)
+    execution = future.result(0.0)
+    assert execution.phase is Phase.DONE
+    assert execution.ending is not None
+    assert execution.ending.code is GoalCode.PATH_TOLERANCE_VIOLATED
+    assert 'panda_joint3' in execution.ending.reason
+    assert words in execution.ending.reason
+    others = [0, 1, 3, 4, 5, 6]
+    path = np.array(drives.path)[:, others] - begin[others]
+    ratio = path[before:] / path[before:, :1]  # all joints swing in proportion on the path
+    assert np.abs(np.abs(ratio) - 1.0).max() < 1e-6
+    speeds = np.diff(path, axis=0) / PERIOD
+    jumps = np.abs(np.diff(speeds, axis=0)) / PERIOD
+    assert (jumps.max(axis=0) < 1.01 * drives.desk.model.limits.acceleration[others]).all()
+    assert np.abs(speeds[-1]).max() == 0.0
+
+
+def test_a_drive_that_was_taken_away_comes_back_when_attached_again() -> None:
+    """Another client's target is left alone until the next attach; then all goes on from there."""
+    drives = attached()
+    drives.source.released('panda_joint5', 'a single target')
+    assert drives.run(3) == [None] * 7
+    assert 'single target' in drives.desk.snapshot.blocked
+    assert drives.source.detached
+    drives.axes[4] = replace(drives.axes[4], position=0.3, setpoint=0.3)
+    drives.attach()
+    answer = drives.run()
+    assert answer[4] is not None
+    assert answer[4].position == pytest.approx(0.3, abs=1e-12)
+
+
+def test_a_drive_that_was_faulted_follows_again_when_it_can() -> None:
+    """It takes over by itself where nobody took the drive away, at rest."""
+    drives = attached()
+    whole = drives.axes[1]
+    drives.axes[1] = replace(whole, followable=False)
+    assert drives.run(3) == [None] * 7
+    drives.axes[1] = whole
+    assert None not in drives.run()
+    assert drives.desk.snapshot.source is Source.NONE
+
+
+def test_a_command_that_waited_too_long_is_refused() -> None:
+    """After a pause of the cycle an old command moves nothing."""
+    drives = attached()
+    future = swing(drives)
+    drives.now += 1.0
+    drives.run()
+    with pytest.raises(NotReadyError, match='stood still'):
+        future.result(0.0)
+
+
+def test_a_defect_of_the_core_is_told_and_latched(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The bus learns of it and detaches the source, which then has to be attached again."""
+    drives = attached()
+
+    def broken(*_: object) -> None:
+        raise ArithmeticError('no solution')
+
+    monkeypatch.setattr(MotionCore, 'step', broken)
+    with pytest.raises(ArithmeticError):
+        drives.run()
+    assert drives.source.detached
+    monkeypatch.undo()
+    drives.attach()
+    assert None not in drives.run()
+
+
+def test_settings_are_taken_while_the_arm_does_not_follow() -> None:
+    """Speed and pause can be set before the drives are there."""
+    drives = Drives()
+    future = drives.desk.submit(lambda core, _: core.override(0.3), moves=False)
+    drives.run()
+    future.result(0.0)
+    assert drives.desk.snapshot.speed == 0.3

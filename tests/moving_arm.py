@@ -1,0 +1,139 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""A simulated arm with the motion core in its master, as ``motion_master`` runs it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any, TYPE_CHECKING
+
+from ament_index_python.packages import get_package_share_directory
+from control_msgs.action import FollowJointTrajectory
+from processes import executable, RunningProcess
+from rclpy.action.client import ActionClient
+from simulated_arm import JOINTS, SimulatedArm
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+from arm_bringup.description import expand_xacro
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from isolation import Isolation
+
+READY = [0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785]
+"""A pose of the Panda from which it can move in every direction in [rad]."""
+
+CONTROLLER = '/panda_arm_controller'
+
+
+def robot_parameters(folder: Path) -> Path:
+    """Write what describes the Panda as a parameter file.
+
+    Args:
+        folder: Where to.
+    """
+    robot = Path(get_package_share_directory('arm_bringup')) / 'robots' / 'panda'
+    values = {
+        'robot_description': expand_xacro(robot / 'panda.urdf.xacro'),
+        'robot_description_semantic': (robot / 'panda.srdf').read_text(encoding='utf-8'),
+        'joint_limits': str(robot / 'limits.yaml'),
+    }
+    path = folder / 'panda.json'  # JSON is YAML
+    path.write_text(json.dumps({'/**': {'ros__parameters': values}}), encoding='utf-8')
+    return path
+
+
+class MovingArm(SimulatedArm):
+    """The Panda's drives and ``motion_master``, whose drives follow from :meth:`follow` on."""
+
+    def __init__(self, isolation: Isolation, folder: Path, *arguments: str) -> None:
+        """Start the processes and wait until all drives are booted."""
+        self._parameters = robot_parameters(folder)
+        self._extra = arguments
+        super().__init__(isolation)
+
+    def start(self, name: str, *arguments: str) -> RunningProcess:
+        """Start an executable; the master is the one with the motion core."""
+        if name != 'master':
+            return super().start(name, *arguments)
+        command = [
+            executable('arm_servo', 'motion_master'),
+            '--ros-args',
+            *('-p', f'bus_config:={self._bus_config}'),
+            *('-p', f'can_interface_name:={self._isolation.bus}'),
+            *('--params-file', str(self._parameters)),
+            *self._extra,
+            *arguments,
+        ]
+        return self.run(*command)
+
+    def follow(self) -> None:
+        """Enable all drives in cyclic position mode."""
+        self.init_all()
+        for joint in self.joints:
+            answer = self.client.trigger(f'/{joint}/cyclic_position_mode')
+            assert answer.success, answer.message
+
+    def send(self, goal: FollowJointTrajectory.Goal) -> GoalRun:
+        """Send a goal; it is accepted."""
+        return GoalRun(self, goal)
+
+
+class GoalRun:
+    """A goal of the action on its way.
+
+    Attributes:
+        feedback: What was fed back so far.
+    """
+
+    def __init__(self, arm: SimulatedArm, goal: FollowJointTrajectory.Goal) -> None:
+        """Send it and wait until it is accepted."""
+        self.feedback: list[Any] = []
+        self._arm = arm
+        self._action = ActionClient(
+            arm.client.node, FollowJointTrajectory, f'{CONTROLLER}/follow_joint_trajectory'
+        )
+        assert self._action.wait_for_server(20.0)
+        sent = self._action.send_goal_async(
+            goal, lambda message: self.feedback.append(message.feedback)
+        )
+        arm.client.spin_until(sent.done, 10.0, 'acceptance')
+        self._handle = sent.result()
+        assert self._handle.accepted
+        self._result = self._handle.get_result_async()
+
+    def cancel(self) -> None:
+        """Ask it to end."""
+        future = self._handle.cancel_goal_async()
+        self._arm.client.spin_until(future.done, 10.0, 'answer to the cancel')
+
+    @property
+    def done(self) -> bool:
+        """Whether it has ended."""
+        return bool(self._result.done())
+
+    def wait(self, timeout: float = 20.0) -> tuple[int, FollowJointTrajectory.Result]:
+        """Wait for its end; return status and result."""
+        self._arm.client.spin_until(self._result.done, timeout, 'end of the goal')
+        answer = self._result.result()
+        return answer.status, answer.result
+
+
+def goal_to(
+    positions: Sequence[float], time: float, joints: Sequence[str] = JOINTS
+) -> FollowJointTrajectory.Goal:
+    """Return a goal with one point.
+
+    Args:
+        positions: In [rad].
+        time: Its time_from_start in [s].
+        joints: Names of the joints.
+    """
+    point = JointTrajectoryPoint(positions=list(positions))
+    point.time_from_start.sec = int(time)
+    point.time_from_start.nanosec = round(time % 1.0 * 1e9)
+    return FollowJointTrajectory.Goal(
+        trajectory=JointTrajectory(joint_names=list(joints), points=[point])
+    )
