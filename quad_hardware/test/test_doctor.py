@@ -136,7 +136,7 @@ def test_a_port_in_use_is_left_alone(isolation: Isolation, tmp_path: Path) -> No
     """The program that has it is named, and no byte is taken from it; exit code 0."""
     with PtyPeer(tmp_path / 'port') as peer:
         node = [executable('quad_hardware', 'hardware_node'), '--ros-args']
-        doctor = [executable('quad_hardware', 'doctor'), '--duration', '1.5']
+        doctor = [executable('quad_hardware', 'doctor'), '--duration', '0.5']
         with RunningProcess([*node, '-p', f'port:={peer.link}'], isolation.env) as running:
             running.wait_for('running: reports arrive')
             with RunningProcess([*doctor, '--port', str(peer.link)], isolation.env) as process:

@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
+from quad_hardware.estimation.battery import Battery, BatteryFilter, REPORTS
 from quad_hardware.estimation.filters import AttitudeRate, JointRate
 from quad_hardware.estimation.gravity import (
     disagreement,
@@ -140,6 +141,18 @@ def test_a_robot_that_restarts_is_dated_anew() -> None:
     begun = 101.0 - STATE.wire_time
     assert clock.time(replace(STATE, arrival=101.0, device_time=0.5)) == pytest.approx(begun)
     assert clock.time(replace(STATE, arrival=5.0)) == 5.0 - STATE.wire_time / 2
+
+
+def test_one_damaged_report_does_not_empty_the_battery() -> None:
+    """Nor a charge that cannot be; a battery that is low is told within half a second."""
+    battery = BatteryFilter()
+    assert battery.update(STATE) == Battery()
+    for charge in (80.0, 80.0, 3.0, 200.0, 80.0):
+        found = battery.update(replace(STATE, battery=charge, voltage=7.4))
+    assert found == Battery(80.0, 7.4)
+    for _ in range(REPORTS):
+        found = battery.update(replace(STATE, battery=5.0))
+    assert found.charge == 5.0
 
 
 @pytest.mark.parametrize(

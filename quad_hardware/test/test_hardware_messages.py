@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 import pytest
 
 from quad_description import movable_joints, robot_urdf
-from quad_hardware.estimation import Estimate, Estimator, EstimatorSettings, OdometryState
+from quad_hardware.estimation import Battery, Estimate, Estimator, EstimatorSettings, OdometryState
 from quad_hardware.estimation.rotation import (
     from_roll_pitch_yaw,
     IDENTITY,
@@ -121,9 +121,8 @@ def test_odometry_is_less_sure_the_farther_it_went() -> None:
 
 def test_an_unknown_charge_is_nan() -> None:
     """As the message wants it; a known one is a share."""
-    state = RobotState(0.0, 0.0, (0, 0, 0), (0, 0, 9.8), {}, {})
-    assert math.isnan(messages.battery(state, STAMP).percentage)
-    known = messages.battery(replace(state, battery=80.0, voltage=7.4), STAMP)
+    assert math.isnan(messages.battery(Battery(), STAMP).percentage)
+    known = messages.battery(Battery(80.0, 7.4), STAMP)
     assert known.percentage == pytest.approx(0.8)
     assert known.voltage == pytest.approx(7.4)
 
@@ -155,27 +154,39 @@ def test_the_level_of_the_link(status: LinkStatus, level: bytes) -> None:
 
 
 @pytest.mark.parametrize(
-    ('change', 'error', 'level', 'words'),
+    ('change', 'charge', 'error', 'level', 'words'),
     [
-        ({}, 0.01, DiagnosticStatus.OK, 'no faults'),
-        ({'battery': 15.0}, 0.01, DiagnosticStatus.WARN, 'battery at 15 %'),
-        ({'battery': 5.0}, 0.01, DiagnosticStatus.ERROR, 'battery at 5 %'),
-        ({'temperatures': {11: 80.0, 12: 30.0}}, 0.01, DiagnosticStatus.WARN, 'hot servos: 11'),
-        ({}, 0.5, DiagnosticStatus.WARN, 'disagree by 29 degrees'),
-        ({'faults': Fault.IMU | Fault.OVERLOAD}, 0.01, DiagnosticStatus.ERROR, 'overload, imu'),
-        ({'faults': 0x8000}, 0.01, DiagnosticStatus.OK, 'no faults'),
+        ({}, 80.0, 0.01, DiagnosticStatus.OK, 'no faults'),
+        ({}, 15.0, 0.01, DiagnosticStatus.WARN, 'battery at 15 %'),
+        ({}, 5.0, 0.01, DiagnosticStatus.ERROR, 'battery at 5 %'),
+        (
+            {'temperatures': {11: 80.0, 12: 30.0}},
+            80.0,
+            0.01,
+            DiagnosticStatus.WARN,
+            'hot servos: 11',
+        ),
+        ({}, None, 0.5, DiagnosticStatus.WARN, 'disagree by 29 degrees'),
+        (
+            {'faults': Fault.IMU | Fault.OVERLOAD},
+            80.0,
+            0.01,
+            DiagnosticStatus.ERROR,
+            'overload, imu',
+        ),
+        ({'faults': 0x8000}, 80.0, 0.01, DiagnosticStatus.OK, 'no faults'),
     ],
 )
 def test_the_level_of_the_robot(
-    change: dict[str, object], error: float, level: bytes, words: str
+    change: dict[str, object], charge: float | None, error: float, level: bytes, words: str
 ) -> None:
     """Battery, heat, an IMU that is mounted otherwise, and faults that the robot reports."""
     state = replace(
-        RobotState(0.0, 0.0, (0, 0, 0), (0, 0, 9.8), {}, {}, battery=80.0),
+        RobotState(0.0, 0.0, (0, 0, 0), (0, 0, 9.8), {}, {}),
         **change,  # type: ignore[arg-type]
     )
     estimator = Estimator(URDF, JOINTS, EstimatorSettings())
-    estimate = replace(ESTIMATE, gravity_error=error)
+    estimate = replace(ESTIMATE, gravity_error=error, battery=Battery(charge))
     status = robot_diagnostic('hardware_node', '/dev/x', state, estimate, estimator)
     assert status.level == level
     assert words in status.message

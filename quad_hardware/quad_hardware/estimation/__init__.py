@@ -2,10 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the robot does not report and the controller needs: rates, odometry, height."""
 
+from .battery import Battery
 from .estimator import Estimate, Estimator, EstimatorSettings, RateSource
 from .odometry import OdometrySettings, OdometryState
 
 __all__ = [
+    'Battery',
     'Estimate',
     'Estimator',
     'EstimatorSettings',

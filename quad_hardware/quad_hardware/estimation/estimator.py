@@ -11,6 +11,7 @@ import math
 
 from ..joints import JointMap
 from ..link.state import RobotState
+from .battery import Battery, BatteryFilter
 from .feet import Feet
 from .filters import AttitudeRate, JointRate
 from .gravity import disagreement
@@ -18,6 +19,8 @@ from .odometry import LegOdometry, OdometrySettings, OdometryState
 from .plausibility import Plausibility
 from .rotation import from_roll_pitch_yaw, Quaternion, Vector
 from .sample_clock import SampleClock
+
+NO_BATTERY = Battery()
 
 
 class RateSource(Enum):
@@ -60,6 +63,7 @@ class Estimate:
         gravity_error: Between accelerometer and attitude [rad]; None while the body accelerates,
             and without an accelerometer.
         odometry: Where the body is.
+        battery: State of the battery.
     """
 
     time: float
@@ -71,6 +75,7 @@ class Estimate:
     acceleration: Vector | None
     gravity_error: float | None
     odometry: OdometryState
+    battery: Battery = NO_BATTERY
 
 
 class Estimator:
@@ -96,6 +101,7 @@ class Estimator:
         self._plausibility = Plausibility()
         self._rate = AttitudeRate(settings.rate_cutoff)
         self._joint_rate = JointRate(settings.joint_cutoff)
+        self._battery = BatteryFilter()
         self._odometry = LegOdometry(settings.odometry, self._feet.radius)
 
     def command(self, time: float, targets: Sequence[float]) -> None:
@@ -133,6 +139,7 @@ class Estimator:
             acceleration=state.acceleration,
             gravity_error=disagreement(attitude, state.acceleration),
             odometry=self._odometry.update(time, self._feet.poses(placed), attitude),
+            battery=self._battery.update(state),
         )
 
     def _angular_velocity(

@@ -12,6 +12,7 @@ from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
 import math
+from statistics import median_low
 
 from ..protocol import (
     ANGLE_SPANS,
@@ -85,7 +86,7 @@ class OldDialect(Dialect):
         self._arm: dict[int, bytes] = {}
         self._arm_sent: dict[int, bytes] = {}
         self._angles: bytes | None = None
-        self._battery: float | None = None
+        self._charges: deque[int] = deque(maxlen=3)
 
     @property
     def motors(self) -> tuple[int, ...]:
@@ -136,7 +137,7 @@ class OldDialect(Dialect):
         wanted = max(2 * took, LATENCY_DECAY * self._patience, SHORTEST_LATENCY)
         self._patience = min(wanted, LONGEST_LATENCY)
         if waiting is _READ_BATTERY:
-            self._battery = float(frame.payload[0])
+            self._charges.append(frame.payload[0])
         elif waiting is _READ_MOTORS:
             self._angles = frame.payload
         elif self._angles is not None:
@@ -203,7 +204,8 @@ class OldDialect(Dialect):
             positions={motor: self._spans[motor].decode(byte) for motor, byte in pairs},
             velocities={},
             rates=_vector(values['rate']),
-            battery=self._battery,
+            # each answer stands for many reports: one damaged answer must not
+            battery=float(median_low(self._charges)) if self._charges else None,
         )
 
 

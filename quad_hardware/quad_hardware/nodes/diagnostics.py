@@ -75,11 +75,12 @@ def link_diagnostic(node: str, port: str, status: LinkStatus) -> DiagnosticStatu
 
 
 def robot_diagnostic(
-    node: str, port: str, state: RobotState, estimate: Estimate | None, estimator: Estimator
+    node: str, port: str, state: RobotState, estimate: Estimate, estimator: Estimator
 ) -> DiagnosticStatus:
     """Describe battery, servos and IMU."""
     level, message = DiagnosticStatus.OK, 'no faults'
-    error = estimate.gravity_error if estimate else None
+    error, charge = estimate.gravity_error, estimate.battery.charge
+    voltage = estimate.battery.voltage
     hot = {m: t for m, t in (state.temperatures or {}).items() if t > HOT_SERVO}
     if error is not None and error > GRAVITY_ERROR:
         level = DiagnosticStatus.WARN
@@ -87,18 +88,18 @@ def robot_diagnostic(
     if hot:
         level = DiagnosticStatus.WARN
         message = f'hot servos: {", ".join(map(str, hot))}'
-    if state.battery is not None and state.battery < LOW_BATTERY:
-        empty = state.battery < EMPTY_BATTERY
+    if charge is not None and charge < LOW_BATTERY:
+        empty = charge < EMPTY_BATTERY
         level = DiagnosticStatus.ERROR if empty else DiagnosticStatus.WARN
-        message = f'battery at {state.battery:.0f} %; charge it'
+        message = f'battery at {charge:.0f} %; charge it'
     faults = Fault(state.faults & sum(Fault))
     if faults:
         level = DiagnosticStatus.ERROR
         names = (str(fault.name).lower().replace('_', ' ') for fault in Fault if fault in faults)
         message = f'the robot reports {", ".join(names)}'
     values = {
-        'battery': '' if state.battery is None else f'{state.battery:.0f}',
-        'voltage': '' if state.voltage is None else f'{state.voltage:.2f}',
+        'battery': '' if charge is None else f'{charge:.0f}',
+        'voltage': '' if voltage is None else f'{voltage:.2f}',
         'faults': state.faults,
         'gravity_error': '' if error is None else f'{error:.3f}',
         'hottest_servo': max((state.temperatures or {0: 0.0}).values()),

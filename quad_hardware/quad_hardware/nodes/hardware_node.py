@@ -204,11 +204,10 @@ class HardwareNode(Node):
             link_diagnostic(name, port, self._driver.status()),
             command_diagnostic(name, port, self._counters),
         ]
-        if state is not None:
-            array.status.append(
-                robot_diagnostic(name, port, state, self._estimate, self._estimator)
-            )
-            self._battery.publish(messages.battery(state, now))
+        estimate = self._estimate
+        if state is not None and estimate is not None:
+            array.status.append(robot_diagnostic(name, port, state, estimate, self._estimator))
+            self._battery.publish(messages.battery(estimate.battery, now))
         self._diagnostics.publish(array)
 
 

@@ -14,10 +14,9 @@ from sensor_msgs.msg import BatteryState, Imu, JointState
 from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
-from ..estimation import Estimate
+from ..estimation import Battery, Estimate
 from ..estimation.rotation import about_z, conjugate, multiply, rotate, yaw_of
 from ..estimation.rotation import Quaternion as Rotation
-from ..link import RobotState
 from .parameters import Deviations, Frames
 
 NOT_THERE = [-1.0, *([0.0] * 8)]  # covariance of what is not measured (REP 145)
@@ -101,10 +100,9 @@ def transforms(estimate: Estimate, frames: Frames, stamp: Time) -> TFMessage:
     return TFMessage(transforms=[first, second])
 
 
-def battery(state: RobotState, stamp: Time) -> BatteryState:
+def battery(state: Battery, stamp: Time) -> BatteryState:
     """Return the charge; what is not reported is NaN, as the message wants it."""
     unknown = math.nan
-    known = state.battery is not None
     return BatteryState(
         header=Header(stamp=stamp),
         voltage=unknown if state.voltage is None else state.voltage,
@@ -113,7 +111,7 @@ def battery(state: RobotState, stamp: Time) -> BatteryState:
         charge=unknown,
         capacity=unknown,
         design_capacity=unknown,
-        percentage=(state.battery or 0.0) / 100.0 if known else unknown,
+        percentage=unknown if state.charge is None else state.charge / 100.0,
         power_supply_status=BatteryState.POWER_SUPPLY_STATUS_UNKNOWN,
         power_supply_health=BatteryState.POWER_SUPPLY_HEALTH_UNKNOWN,
         power_supply_technology=BatteryState.POWER_SUPPLY_TECHNOLOGY_LION,
