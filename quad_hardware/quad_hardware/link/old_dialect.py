@@ -12,7 +12,7 @@ from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
 import math
-from statistics import median_low
+from statistics import median_high
 
 from ..protocol import (
     ANGLE_SPANS,
@@ -205,7 +205,7 @@ class OldDialect(Dialect):
             velocities={},
             rates=_vector(values['rate']),
             # each answer stands for many reports: one damaged answer must not
-            battery=float(median_low(self._charges)) if self._charges else None,
+            battery=float(median_high(self._charges)) if self._charges else None,
         )
 
 
