@@ -53,9 +53,9 @@ def main() -> None:
     robot = quadruped(robot_urdf())
     report('1000 sines, for comparison', lambda: [math.sin(x) for x in range(1000)])
     gait = GaitGenerator(robot, GaitParameters())
-    report('gait', lambda: gait.step(VELOCITY, UPRIGHT, (0.01, 0.0), PERIOD))
+    report('gait', lambda: gait.step(VELOCITY, UPRIGHT, (0.01, 0.0, 0.0), PERIOD))
     soft = GaitGenerator(robot, GaitParameters(servo=ServoModel()))
-    report('gait, soft servos', lambda: soft.step(VELOCITY, UPRIGHT, (0.01, 0.0), PERIOD))
+    report('gait, soft servos', lambda: soft.step(VELOCITY, UPRIGHT, (0.01, 0.0, 0.0), PERIOD))
     stand = gait.stand_targets
     joints = JointSample(stand, (0.0,) * len(stand))
     policy = load_policy(POLICY, robot, stand, PolicyOptions(), PERIOD).runner

@@ -14,6 +14,7 @@ import pytest
 from quad_controller.exceptions import ParameterError
 from quad_controller.gait.body import BodyLimits, BodyPose, feet_in_body, Leveller, UPRIGHT
 from quad_controller.gait.generator import GaitGenerator
+from quad_controller.gait.heading import HeadingHold
 from quad_controller.gait.parameters import GaitParameters
 from quad_controller.gait.servo_compensation import ServoCompensation, ServoModel
 from quad_controller.gait.velocity import REST, Velocity
@@ -48,7 +49,7 @@ def test_a_body_that_hangs_to_the_right_is_lifted_there() -> None:
     """Levelling stretches the legs of the side that hangs."""
     leveller = Leveller(gain=0.5)
     for _ in range(100):
-        pose = leveller.step((0.1, 0.0), UPRIGHT, 0.02)  # roll: left side up, right side down
+        pose = leveller.step((0.1, 0.0, 0.0), UPRIGHT, 0.02)  # roll: left side up, right side down
     heights = [foot[2] for foot in feet_in_body(FEET, pose, CENTRE)]
     assert heights[1] < FEET[1][2] - 1e-3  # right foot further below the body
     assert heights[0] > FEET[0][2] + 1e-3
@@ -59,7 +60,7 @@ def test_levelling_is_bounded_and_fades(roll: float, pitch: float) -> None:
     """No tilt turns the body further than the bound, and without a tilt it comes back."""
     leveller = Leveller(gain=0.8, most=0.2)
     for _ in range(50):
-        pose = leveller.step((roll, pitch), UPRIGHT, 0.02)
+        pose = leveller.step((roll, pitch, 1.0), UPRIGHT, 0.02)
         assert abs(pose.roll) <= 0.2
         assert abs(pose.pitch) <= 0.2
     for _ in range(200):
@@ -72,7 +73,7 @@ def test_a_tilt_that_was_asked_for_is_no_error() -> None:
     leveller = Leveller(gain=0.5)
     asked = BodyPose(roll=0.1, pitch=-0.1)
     for _ in range(50):
-        assert leveller.step((0.1, -0.1), asked, 0.02) == asked
+        assert leveller.step((0.1, -0.1, 0.0), asked, 0.02) == asked
 
 
 @given(poses, poses)
@@ -85,6 +86,45 @@ def test_body_moves_slowly_and_within_limits(present: BodyPose, target: BodyPose
     assert (change[:3] <= limits.speed * 0.02 + 1e-12).all()
     assert (change[3:] <= limits.turn_speed * 0.02 + 1e-12).all()
     assert limits.clamp(goal) == goal
+
+
+@given(st.floats(-3.1, 3.1), st.floats(-1.0, 1.0))
+def test_a_course_is_kept_across_the_seam(heading: float, yaw: float) -> None:
+    """A robot that turns a tenth too fast ends where the commands add up to, on any heading."""
+    hold, start, dt = HeadingHold(2.0), heading, 0.02
+    for _ in range(300):
+        velocity = hold.step(Velocity(0.1, 0.0, yaw), math.remainder(heading, math.tau), dt)
+        assert velocity.x == 0.1
+        assert abs(velocity.yaw - yaw) <= 0.4 + 1e-12
+        heading += 1.1 * velocity.yaw * dt
+    assert heading - start == pytest.approx(300 * yaw * dt, abs=0.1 * abs(yaw) + 0.02)
+
+
+def test_a_course_is_none_at_rest_or_blind() -> None:
+    """A robot at rest does not turn back, nor does one that does not know its heading."""
+    hold = HeadingHold(2.0)
+    hold.step(Velocity(0.1), 0.0, 0.02)
+    assert hold.step(Velocity(0.1), 0.1, 0.02).yaw == pytest.approx(-0.2)
+    assert hold.step(REST, 0.1, 0.02) == REST
+    assert hold.step(Velocity(0.1), 0.1, 0.02).yaw == 0.0
+    assert hold.step(Velocity(0.1), None, 0.02).yaw == 0.0
+    assert hold.step(Velocity(0.1), 1.0, 0.02).yaw == 0.0
+    # turned by hand: it does not turn back further than the bound
+    assert hold.step(Velocity(0.1), -2.0, 0.02).yaw == pytest.approx(0.4)
+    assert hold.step(Velocity(0.1), -1.8, 0.02).yaw == pytest.approx(0.2)
+
+
+def test_a_body_that_looks_elsewhere_keeps_its_course() -> None:
+    """The yaw of the body's pose is no turn of the robot."""
+    generator = GaitGenerator(ROBOT, GaitParameters())
+    for _ in range(100):
+        yaw = generator.pose.yaw
+        generator.step(Velocity(0.1), BodyPose(yaw=0.2), (0.0, 0.0, yaw), 0.02)
+    turned = generator.step(Velocity(0.1), BodyPose(yaw=0.2), (0.0, 0.0, 0.2), 0.02)
+    straight = GaitGenerator(ROBOT, GaitParameters(heading_gain=0.0))
+    for _ in range(101):
+        expected = straight.step(Velocity(0.1), BodyPose(yaw=0.2), (0.0, 0.0, 0.2), 0.02)
+    assert turned.targets == pytest.approx(expected.targets, abs=0.01)
 
 
 def test_height_lowers_the_body() -> None:

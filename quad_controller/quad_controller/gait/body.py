@@ -137,15 +137,19 @@ class Leveller:
         self._roll = 0.0
         self._pitch = 0.0
 
-    def step(self, tilt: tuple[float, float] | None, pose: BodyPose, dt: float) -> BodyPose:
+    def step(
+        self, attitude: tuple[float, float, float] | None, pose: BodyPose, dt: float
+    ) -> BodyPose:
         """Return the pose that is asked for, with the correction added.
 
         Args:
-            tilt: Measured roll and pitch in [rad]; None lets the correction fade.
+            attitude: Measured roll, pitch and yaw in [rad]; None lets the correction fade.
             pose: Pose that is asked for; its own roll and pitch are no error.
             dt: Duration of the step in [s].
         """
-        roll, pitch = (0.0, 0.0) if tilt is None else (tilt[0] - pose.roll, tilt[1] - pose.pitch)
+        roll = pitch = 0.0
+        if attitude is not None:
+            roll, pitch = attitude[0] - pose.roll, attitude[1] - pose.pitch
         share = 1.0 - math.exp(-self._rate * dt)
         self._roll += share * (self._bounded(roll) - self._roll)
         self._pitch += share * (self._bounded(pitch) - self._pitch)

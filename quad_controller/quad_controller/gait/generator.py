@@ -9,7 +9,9 @@ from dataclasses import dataclass
 import math
 
 from ..model.quadruped import Feet, Quadruped, Targets
+from ..model.urdf import Vector
 from .body import BodyPose, feet_in_body, Leveller, UPRIGHT
+from .heading import HeadingHold
 from .parameters import GaitParameters
 from .schedule import Gait, Schedule
 from .servo_compensation import ServoCompensation
@@ -69,6 +71,7 @@ class GaitGenerator:
             parameters.stance_depth,
         )
         self._leveller = Leveller(parameters.level_gain)
+        self._heading = HeadingHold(parameters.heading_gain)
         self._compensation = (
             ServoCompensation(robot, parameters.servo) if parameters.servo is not None else None
         )
@@ -106,7 +109,7 @@ class GaitGenerator:
         self,
         velocity: Velocity,
         pose: BodyPose,
-        tilt: tuple[float, float] | None,
+        attitude: Vector | None,
         dt: float,
     ) -> GaitStep:
         """Advance.
@@ -114,14 +117,16 @@ class GaitGenerator:
         Args:
             velocity: Velocity that is asked for; clamped and approached.
             pose: Pose of the body that is asked for; clamped and approached.
-            tilt: Measured roll and pitch in [rad], None when they are not known.
+            attitude: Measured roll, pitch and yaw in [rad], None when they are not known.
             dt: Duration of the step in [s].
         """
         self._advance_velocity(velocity, dt)
         limits = self._parameters.body
         self.pose = limits.approach(self.pose, limits.clamp(pose), dt)
-        feet = self._stepper.step(self.velocity, dt)
-        moved = self._leveller.step(tilt, self.pose, dt)
+        # the body may look elsewhere than its feet go
+        heading = attitude[2] - self.pose.yaw if attitude is not None else None
+        feet = self._stepper.step(self._heading.step(self.velocity, heading, dt), dt)
+        moved = self._leveller.step(attitude, self.pose, dt)
         sway = self._stepper.sway
         if sway:
             moved = BodyPose(moved.x, moved.y + sway, moved.z, moved.roll, moved.pitch, moved.yaw)

@@ -32,6 +32,7 @@ class GaitParameters:
         duty: Share of the period that a foot stands; 0 takes that of the gait.
         sway: Body to the side away from the lifted legs in [m]; negative takes that of the gait.
         level_gain: Turns the body against the measured tilt, per tilt; 0 is off.
+        heading_gain: Corrects the turning by the measured heading, in [1/s]; 0 is off.
         servo: What to compensate for; None for servos that are firm.
         body: How far the body may be moved over the feet.
     """
@@ -49,6 +50,7 @@ class GaitParameters:
     duty: float = 0.0
     sway: float = -1.0
     level_gain: float = 0.5
+    heading_gain: float = 2.0
     servo: ServoModel | None = None
     body: BodyLimits = field(default_factory=BodyLimits)
 
@@ -105,5 +107,6 @@ RANGES: dict[str, tuple[float, float]] = {
     'duty': (0.0, 0.95),
     'sway': (-1.0, 0.1),
     'level_gain': (0.0, 1.0),
+    'heading_gain': (0.0, 10.0),
 }
 """Range of each parameter, both ends included; units as in :class:`GaitParameters`."""

@@ -34,6 +34,7 @@ GAIT_MEANINGS: Mapping[str, str] = {
     'duty': 'share of a cycle that a foot stands; 0: that of the gait',
     'sway': 'body away from the lifted legs [m]; negative: that of the gait',
     'level_gain': 'turns the body against its measured tilt; 0: off',
+    'heading_gain': 'corrects the turning by the measured heading [1/s]; 0: off',
 }
 STATE_MEANINGS: Mapping[str, str] = {
     'command_timeout': 'an older velocity counts as zero [s]',

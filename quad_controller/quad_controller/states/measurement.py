@@ -79,6 +79,14 @@ class ImuSample:
         return math.atan2(-y, -z), math.asin(min(max(x, -1.0), 1.0))
 
     @property
+    def roll_pitch_yaw(self) -> Vector:
+        """Rotations about fixed axes x, y, z in [rad]."""
+        x, y, z, w = self.orientation
+        roll, pitch = self.roll_pitch
+        yaw = math.atan2(2.0 * (w * z + x * y), w * w + x * x - y * y - z * z)
+        return roll, pitch, yaw
+
+    @property
     def tilt(self) -> float:
         """Angle between the body's z axis and up in [rad]."""
         return math.acos(min(max(-self.down[2], -1.0), 1.0))

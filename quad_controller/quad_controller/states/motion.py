@@ -137,7 +137,7 @@ class Walk(Motion):
 
     def step(self, situation: Situation, dt: float) -> Targets:
         """Return the next targets."""
-        tilt = situation.imu.roll_pitch if situation.imu is not None else None
-        step = self._generator.step(situation.velocity, situation.pose, tilt, dt)
+        attitude = situation.imu.roll_pitch_yaw if situation.imu is not None else None
+        step = self._generator.step(situation.velocity, situation.pose, attitude, dt)
         self.reachable = step.reachable
         return step.targets
