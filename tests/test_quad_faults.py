@@ -82,7 +82,7 @@ def test_a_killed_bridge_is_told_and_its_successor_goes_on_smoothly(quad: Simula
     quad.set_mode('walk')
     quad.walk(1.5)
     killed = kill(quad, 'hardware')
-    quad.processes['controller'].wait_for('no joint states')
+    quad.processes['controller'].wait_for('fault, .*joint states')
     quad.start('hardware')
     quad.spin(1.0)
     check_upright(quad)

@@ -76,7 +76,7 @@ def tilt(quad: SimulatedQuad) -> float:
     return tilt_of((turn.x, turn.y, turn.z, turn.w))
 
 
-STOPPED = ('controller', 'no joint states')
+STOPPED = ('controller', 'fault, .*joint states')
 """The controller stops the robot by itself, and says why."""
 
 
@@ -86,8 +86,8 @@ STOPPED = ('controller', 'no joint states')
         ('unplug', [], [('hardware', 'stale|connecting'), STOPPED]),
         ('silence', [], [('hardware', 'stale'), STOPPED]),
         ('brown_out', [], [('hardware', 'stale')]),
-        ('flip', ['rate=0.01'], [('controller', 'joint states|attitude')]),
-        ('drop', ['rate=0.01'], [('controller', 'joint states|attitude')]),
+        ('flip', ['rate=0.01'], [('controller', 'fault, .*(joint states|attitude|imu)')]),
+        ('drop', ['rate=0.01'], [('controller', 'fault, .*(joint states|attitude|imu)')]),
     ],
     ids=['unplugged', 'silent', 'without power', 'corrupt', 'lossy'],
 )
