@@ -125,6 +125,20 @@ def test_the_same_gait_by_all_of_its_names() -> None:
     assert all(mode in answer.message for mode in MODES)
 
 
+def test_a_velocity_that_is_too_much_is_told_once() -> None:
+    """The robot goes as fast as it can, in the same direction, and says how fast that is."""
+    rig = standing()
+    rig.ask('walk')
+    rig.run(1.0, Velocity(0.8))
+    assert rig.controller.status.velocity == Velocity(0.3)
+    told = [line for line in rig.log if 'is more than' in line]
+    assert told == [
+        '0.80 0.00 m/s 0.00 rad/s is more than a trot can: it is 0.30 0.00 m/s 0.00 rad/s'
+    ]
+    rig.run(1.0, Velocity(0.2))
+    assert len([line for line in rig.log if 'is more than' in line]) == 1
+
+
 @pytest.mark.parametrize('value', [math.nan, math.inf])
 def test_velocities_and_poses_that_are_no_numbers_are_refused(value: float) -> None:
     """They stop the robot or change nothing, and are answered with a reason."""
@@ -176,6 +190,21 @@ def test_a_short_gap_is_survived() -> None:
     ]  # fmt: skip
     assert rig.is_in(State.WALK)
     assert rig.controller.status.velocity.x == pytest.approx(0.1)
+
+
+def test_a_pause_of_the_controller_itself_is_no_silence_of_the_robot() -> None:
+    """After a second without a step the stale velocity stops the robot, and no fault is latched."""
+    rig = standing()
+    rig.ask('walk')
+    rig.run(1.0, FORWARD)
+    before = rig.positions
+    targets = rig.controller.step(Measurement(), 1.0).targets
+    assert targets is not None
+    steps = [abs(a - b) for a, b in zip(targets, before, strict=True)]
+    assert max(steps) <= 10.0 * 1.5 * PERIOD
+    rig.run(1.0)
+    assert rig.is_in(State.WALK)
+    assert rig.controller.status.velocity.at_rest
 
 
 def test_a_lost_attitude_stops_the_walk_on_its_feet() -> None:

@@ -18,6 +18,9 @@ from .servo_compensation import ServoCompensation
 from .stepping import Stepper
 from .velocity import REST, Velocity
 
+CLAMP_LINEAR = 0.005  # [m/s] that may be lacking before it is told; rounding is no clamp
+CLAMP_YAW = 0.02  # [rad/s]
+
 
 @dataclass(frozen=True, slots=True)
 class GaitStep:
@@ -39,6 +42,8 @@ class GaitGenerator:
 
     Attributes:
         velocity: Velocity that is walked at the moment.
+        goal: Velocity that is approached.
+        clamped: Whether that is less than was asked for.
         pose: Pose of the body over its feet at the moment.
         gait: The gait at the moment.
         others: Positions of all joints; those that are no legs' are sent as they are [rad].
@@ -75,7 +80,8 @@ class GaitGenerator:
         self._compensation = (
             ServoCompensation(robot, parameters.servo) if parameters.servo is not None else None
         )
-        self.velocity = REST
+        self.velocity = self.goal = REST
+        self.clamped = False
         self.pose = UPRIGHT
 
     @property
@@ -143,7 +149,9 @@ class GaitGenerator:
                 self.gait = self._wanted_gait
                 self._stepper.schedule = self._parameters.schedule(self.gait)
             velocity = REST
-        goal = self._within_schedule(self._limits.clamp(velocity))
+        self.goal = goal = self._within_schedule(self._limits.clamp(velocity))
+        lost = math.hypot(velocity.x - goal.x, velocity.y - goal.y)
+        self.clamped = lost > CLAMP_LINEAR or abs(velocity.yaw - goal.yaw) > CLAMP_YAW
         self.velocity = self._limits.approach(self.velocity, goal, dt)
 
     def _within_schedule(self, velocity: Velocity) -> Velocity:

@@ -22,6 +22,10 @@ class Velocity:
     y: float = 0.0
     yaw: float = 0.0
 
+    def __str__(self) -> str:
+        """Return it for people."""
+        return f'{self.x:.2f} {self.y:.2f} m/s {self.yaw:.2f} rad/s'
+
     @property
     def finite(self) -> bool:
         """Whether all parts are numbers."""

@@ -210,6 +210,8 @@ class ControllerNode(Node):
         for event in output.events:
             if event.kind is EventKind.REPEATED:
                 logger.warning(event.text, throttle_duration_sec=WARN_PERIOD)
+            elif event.kind is EventKind.WARNING:
+                logger.warning(event.text)
             elif event.kind is EventKind.TROUBLE:
                 logger.error(event.text)
             else:

@@ -198,6 +198,10 @@ class Controller:
         if self._health.held and state in UPRIGHT_STATES:
             age = self._health.joints_age * 1e3
             matters['held'] = f'joint states are {age:.0f} ms old; holding the last targets'
+        gait = self._generator
+        if state in GAIT_STATES and gait.clamped:
+            asked, walked = self._commands.velocity(state), gait.goal
+            matters['clamped'] = f'{asked} is more than a {gait.gait.value} can: it is {walked}'
         return matters
 
     def _over(self, state: State) -> dict[str, str]:

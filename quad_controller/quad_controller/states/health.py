@@ -11,6 +11,8 @@ from .faults import Fault
 from .measurement import ImuSample, JointSample, Measurement
 from .parameters import StateParameters
 
+LONGEST_PAUSE = 0.1  # [s] that counts of a step that came late
+
 
 class Health:
     """The newest measurements, how old they are, and what is wrong.
@@ -51,8 +53,10 @@ class Health:
         Returns:
             What was refused and why.
         """
-        self.joints_age += dt
-        self.imu_age += dt
+        # after a pause of this process itself, what was sent meanwhile is yet to be read
+        waited = min(dt, LONGEST_PAUSE)
+        self.joints_age += waited
+        self.imu_age += waited
         problems = [*self._take_joints(measurement.joints), *self._take_imu(measurement.imu)]
         self.refused += len(problems)
         battery = measurement.battery

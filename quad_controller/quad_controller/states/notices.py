@@ -25,7 +25,7 @@ class Notices:
         """
         for name, text in present.items():
             if name not in self._present:
-                yield Event(EventKind.TROUBLE, text)
+                yield Event(EventKind.WARNING, text)
         for name in sorted((self._present - set(present)) & set(over)):
             yield Event(EventKind.NEWS, over[name])
         self._present = set(present)

@@ -52,6 +52,7 @@ class EventKind(Enum):
     """How an event is to be told."""
 
     NEWS = 'news'
+    WARNING = 'warning'
     TROUBLE = 'trouble'
     REPEATED = 'repeated'  # trouble of every step: enough to tell it now and then
 
