@@ -23,11 +23,11 @@ if TYPE_CHECKING:
 class RosClient:
     """Calls services and listens to topics."""
 
-    def __init__(self, domain_id: int) -> None:
-        """Join a domain."""
+    def __init__(self, domain_id: int, name: str = 'test_client') -> None:
+        """Join a domain as a node of that name."""
         self._context = Context()
         rclpy.init(context=self._context, domain_id=domain_id)
-        self.node = Node('test_client', context=self._context)
+        self.node = Node(name, context=self._context)
         self._executor = EventsExecutor(context=self._context)
         self._executor.add_node(self.node)
 

@@ -3,6 +3,7 @@
 """What a person moves a robot with: keys, with their release, from any terminal; and gamepads."""
 
 from .auto_repeat import AutoRepeat
+from .command_stream import CommandStream
 from .exceptions import DeviceError, OperatorInputError, PresetError, TerminalError
 from .held_keys import HeldKeys
 from .keyboard import Keyboard, ReleaseSource
@@ -11,6 +12,7 @@ from .terminal import StatusLine, TerminalKeyboard
 
 __all__ = [
     'AutoRepeat',
+    'CommandStream',
     'DeviceError',
     'HeldKeys',
     'KeyAction',

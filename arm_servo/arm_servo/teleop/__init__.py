@@ -1,0 +1,19 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Jogging by hand: keyboard and gamepad for a servo node, of this package or of MoveIt."""
+
+from .jog import CartesianJog, Frame, Jog, JointJog
+from .keyboard_teleop import KeyboardTeleop
+from .names import ArmNames, names_of
+from .scales import Scales
+
+__all__ = [
+    'ArmNames',
+    'CartesianJog',
+    'Frame',
+    'Jog',
+    'JointJog',
+    'KeyboardTeleop',
+    'Scales',
+    'names_of',
+]

@@ -1,0 +1,14 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What the programs for jogging by hand raise."""
+
+from __future__ import annotations
+
+from ..exceptions import ServoError
+
+
+class SettingError(ServoError, ValueError):
+    """A parameter is misspelt, or its value makes no sense.
+
+    Scenarios: a speed of 150 %, a button that no gamepad has.
+    """

@@ -1,0 +1,193 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""``ros2 run arm_servo servo_keyboard_input``: jog an arm with the keys of a terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+import os
+import signal
+import threading
+import time
+
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+
+from operator_input import AutoRepeat, CommandStream, HeldKeys, Keyboard, KeyEvent, StatusLine
+from operator_input.command_stream import RESTS
+
+from ..nodes.declare import Declarations
+from .jog import rest_of
+from .key_map import HELP
+from .keyboard_teleop import KeyboardTeleop
+from .program import refuse_misspelt, run
+from .requests import Note, Quit, Request, Suspend, SwitchType, TogglePause
+from .scales import Steps
+from .screen import status, View
+from .servo_link import ServoLink
+
+LONGEST_WAIT = 0.1  # [s] for which answers of services and a signal may wait
+
+
+class ServoKeyboardInput(Node):
+    """The node, with what its parameters say.
+
+    Attributes:
+        teleop: Decides what to publish.
+        servo: Name of the servo's node.
+        frames: Names of the base frame and the tool frame; empty takes the robot's.
+        kitty: Ask the terminal for releases.
+        evdev: Ask this machine's keyboards for releases.
+    """
+
+    def __init__(self) -> None:
+        """Declare the parameters.
+
+        Raises:
+            SettingError: A parameter is misspelt or makes no sense.
+        """
+        super().__init__('servo_keyboard_input')
+        declare = Declarations(self)
+        first = declare.number('first_timeout', 0.5, 'First time-out of a key [s]', (0.05, 2.0))
+        repeat = declare.number('repeat_timeout', 0.15, 'Time-out of its repeats [s]', (0.05, 1.0))
+        self.kitty = declare.flag('kitty', 'Ask the terminal for true key releases', default=True)
+        self.evdev = declare.flag('evdev', "Ask this machine's keyboards for them", default=True)
+        self.servo = declare.text('servo', '/servo_node', 'name of the servo node')
+        self.frames = (
+            declare.text('base_frame', '', "base frame; empty takes the arm's base link"),
+            declare.text('tool_frame', '', "tool frame; empty takes the arm's tip link"),
+        )
+        speed = declare.number('speed', 0.5, "share of the servo's full speed", (0.01, 1.0))
+        rate = declare.number('rate', 50.0, 'commands per second [Hz]', (10.0, 500.0))
+        steps = Steps(
+            declare.number('linear_step', 1e-3, 'single step of the tool [m]', (1e-5, 0.1)),
+            declare.number('angular_step', 0.01745, 'single step [rad]', (1e-4, 0.5)),
+        )
+        held = HeldKeys(AutoRepeat(max(first, repeat), repeat))
+        self.teleop = KeyboardTeleop(speed, steps, held, CommandStream(1.0 / rate, rest_of))
+        refuse_misspelt(self)
+
+
+class Session:
+    """One person at one terminal: reads, publishes, shows."""
+
+    def __init__(
+        self, node: ServoKeyboardInput, keyboard: Keyboard, stop: threading.Event
+    ) -> None:
+        """Prepare.
+
+        Args:
+            node: The node.
+            keyboard: Open keyboard.
+            stop: Ends it.
+        """
+        self._teleop = node.teleop
+        self._keyboard = keyboard
+        self._stop = stop
+        self._line: StatusLine = keyboard.status_line()
+        self._link = ServoLink(node, node.servo, self._line.say, *node.frames)
+        self._executor = SingleThreadedExecutor()
+        self._executor.add_node(node)
+        self._colour = not os.environ.get('NO_COLOR')
+
+    def run(self) -> None:
+        """Serve until the person quits or the event is set.
+
+        Raises:
+            TerminalError: The window was closed.
+        """
+        self._line.say(HELP)
+        try:
+            while not self._stop.is_set():
+                self._serve()
+        finally:
+            self._end()
+            self._executor.shutdown()
+
+    def _serve(self) -> None:
+        now = time.monotonic()
+        self._take(self._keyboard.wait(min(self._teleop.due(now) - now, LONGEST_WAIT)))
+        now = time.monotonic()
+        self._publish(now)
+        self._executor.spin_once(timeout_sec=0)
+        self._link.serve(now)
+        self._teleop.scales = self._link.scales
+        self._teleop.joints = len(self._link.names.joints) or None
+        self._show(now)
+
+    def _take(self, events: Iterable[KeyEvent]) -> None:
+        for event in events:
+            requests = self._teleop.feed(event)
+            # at once: of a press and a release in one reading, both are published
+            self._publish(event.time)
+            for request in requests:
+                self._obey(request)
+
+    def _obey(self, request: Request) -> None:
+        match request:
+            case SwitchType(command_type):
+                self._link.switch(command_type)
+            case TogglePause():
+                self._link.toggle_pause()
+            case Note(text):
+                self._line.say(text)
+            case Quit():
+                self._stop.set()
+            case Suspend():
+                self._suspend()
+
+    def _publish(self, now: float) -> None:
+        jog = self._teleop.step(now)
+        if jog is not None:
+            self._link.publish(jog)
+
+    def _show(self, now: float) -> None:
+        teleop, link = self._teleop, self._link
+        view = View(
+            link.status(now),
+            link.names,
+            link.scales,
+            teleop.speed,
+            teleop.frame,
+            teleop.sign,
+            teleop.stepping,
+            link.paused,
+            teleop.wanted(now),
+            self._keyboard.release_source,
+            link.is_heard,
+        )
+        self._line.show(status(view, self._colour))
+
+    def _suspend(self) -> None:
+        self._end()
+        with self._keyboard.paused():
+            os.killpg(0, signal.SIGTSTP)  # goes on here after the shell's fg
+        self._line.say('going on')
+
+    def _end(self) -> None:
+        """Publish the last rests, and see them off."""
+        self._teleop.end()
+        for _ in range(RESTS):
+            now = time.monotonic()
+            self._publish(now)
+            pause = self._teleop.due(now) - now
+            if 0.0 < pause < LONGEST_WAIT:
+                time.sleep(pause)
+        self._link.flush()
+        self._show(time.monotonic())
+        self._line.end()
+
+
+def main() -> None:
+    """Entry point."""
+    run(_serve)
+
+
+def _serve(stop: threading.Event) -> None:
+    node = ServoKeyboardInput()
+    with Keyboard(kitty=node.kitty, evdev=node.evdev) as keyboard:
+        Session(node, keyboard, stop).run()
+
+
+if __name__ == '__main__':
+    main()

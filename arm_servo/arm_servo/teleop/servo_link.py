@@ -1,0 +1,211 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The servo node as a person's program sees it: commands to it, what it says, what it is asked."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import time
+from typing import Any
+
+from control_msgs.msg import JointJog as JointJogMessage
+from geometry_msgs.msg import TwistStamped, Vector3
+from moveit_msgs.msg import ServoStatus
+from moveit_msgs.srv import ServoCommandType
+from rclpy.duration import Duration
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+from std_srvs.srv import SetBool
+
+from ..exceptions import ModelError
+from .jog import Frame, Jog, JointJog, Vector
+from .names import ArmNames
+from .requests import CommandType
+from .scales import Scales
+from .screen import ServoView
+from .servo_settings import ServoSettings, SettingsClient
+
+FLUSH_PATIENCE = Duration(nanoseconds=300_000_000)
+STATUS_PATIENCE = 1.0  # [s] after which a status is history
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+class ServoLink:
+    """Publishes jogs, and knows the arm's names from the servo, or else from the robot.
+
+    Attributes:
+        names: Names of the arm's parts, as far as they are known.
+        scales: Full speeds of the servo.
+        paused: Whether the person paused the servo.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        servo: str,
+        say: Callable[[str], None],
+        base_frame: str = '',
+        tool_frame: str = '',
+    ) -> None:
+        """Advertise and subscribe.
+
+        Args:
+            node: The node.
+            servo: Full name of the servo's node.
+            say: Tells the person something.
+            base_frame: Frame of jogs in the base; empty takes the arm's base link.
+            tool_frame: Frame of jogs in the tool; empty takes the arm's tip link.
+        """
+        self.names = ArmNames((), base_frame, tool_frame)
+        self.scales = Scales()
+        self.paused = False
+        self._node, self._servo, self._say = node, servo, say
+        self._frames = base_frame, tool_frame
+        self._urdf = ''
+        self._told: ServoSettings = ServoSettings()
+        self._status: tuple[ServoView, float] | None = None
+        self._complained = ''
+        self._twist: Publisher = node.create_publisher(
+            TwistStamped, f'{servo}/delta_twist_cmds', 10
+        )
+        self._jog: Publisher = node.create_publisher(
+            JointJogMessage, f'{servo}/delta_joint_cmds', 10
+        )
+        self._settings = SettingsClient(node, servo, self._learn)
+        self._switch = node.create_client(ServoCommandType, f'{servo}/switch_command_type')
+        self._pause = node.create_client(SetBool, f'{servo}/pause_servo')
+        node.create_subscription(ServoStatus, f'{servo}/status', self._take_status, 10)
+        node.create_subscription(String, 'robot_description', self._take_description, LATCHED)
+        node.create_subscription(JointState, 'joint_states', self._take_joints, 10)
+
+    @property
+    def is_heard(self) -> bool:
+        """Whether anybody listens."""
+        return any(each.get_subscription_count() for each in (self._twist, self._jog))
+
+    def status(self, now: float) -> ServoView | None:
+        """Return what the servo said lately.
+
+        Args:
+            now: Time [s].
+        """
+        if self._status is None or now - self._status[1] > STATUS_PATIENCE:
+            return None
+        return self._status[0]
+
+    def serve(self, now: float) -> None:
+        """Ask the servo what is not known yet.
+
+        Args:
+            now: Time [s].
+        """
+        self._settings.serve(now)
+
+    def publish(self, jog: Jog) -> None:
+        """Publish a motion, or say why not.
+
+        Args:
+            jog: In shares of full speed.
+        """
+        message = self.scales.to_message(jog)
+        if isinstance(message, JointJog):
+            self._publish_joint(message)
+            return
+        base = message.frame is Frame.BASE
+        frame = self.names.base if base else self.names.tool
+        if not frame:
+            self._complain(f'no {message.frame.value} frame yet: there is no robot_description')
+            return
+        twist = TwistStamped()
+        twist.header.stamp = self._node.get_clock().now().to_msg()
+        twist.header.frame_id = frame
+        twist.twist.linear = _vector(message.linear)
+        twist.twist.angular = _vector(message.angular)
+        self._twist.publish(twist)
+
+    def switch(self, command_type: CommandType) -> None:
+        """Tell the servo which kind of command comes.
+
+        Args:
+            command_type: Which.
+        """
+        request = ServoCommandType.Request(command_type=int(command_type))
+        self._call(self._switch, request, f'{command_type.name.lower()} commands', lambda: None)
+
+    def toggle_pause(self) -> None:
+        """Pause the servo, or let it go on."""
+        paused = not self.paused
+
+        def granted() -> None:
+            self.paused = paused
+
+        request = SetBool.Request(data=paused)
+        self._call(self._pause, request, 'pause' if paused else 'go on', granted)
+
+    def flush(self) -> None:
+        """Wait until what was published has arrived, before the program ends."""
+        for publisher in (self._twist, self._jog):
+            publisher.wait_for_all_acked(FLUSH_PATIENCE)
+
+    def _publish_joint(self, jog: JointJog) -> None:
+        if jog.joint >= len(self.names.joints):
+            self._complain(f'joint {jog.joint + 1} has no name yet: no robot description')
+            return
+        message = JointJogMessage()
+        message.header.stamp = self._node.get_clock().now().to_msg()
+        message.header.frame_id = self.names.base
+        message.joint_names = [self.names.joints[jog.joint]]
+        message.velocities = [jog.velocity]
+        self._jog.publish(message)
+
+    def _call(self, client: Any, request: Any, what: str, granted: Callable[[], None]) -> None:  # noqa: ANN401
+        if not client.service_is_ready():
+            self._say(f'{what}: there is no service {client.srv_name}; is the servo running?')
+            return
+
+        def take(future: Any) -> None:  # noqa: ANN401  # rclpy's Future
+            answer = future.result()
+            if answer.success:
+                granted()
+            words = getattr(answer, 'message', '') or ('done' if answer.success else 'refused')
+            self._say(f'{what}: {words}')
+
+        client.call_async(request).add_done_callback(take)
+
+    def _complain(self, text: str) -> None:
+        if text != self._complained:
+            self._say(text)
+        self._complained = text
+
+    def _learn(self, settings: ServoSettings) -> None:
+        self._told = settings
+        self.scales = settings.scales()
+        self._name()
+
+    def _name(self) -> None:
+        try:
+            names = self._told.names(self._urdf)
+        except ModelError as error:
+            self._complain(str(error))
+            return
+        base, tool = self._frames
+        self.names = ArmNames(names.joints, base or names.base, tool or names.tool)
+
+    def _take_description(self, message: String) -> None:
+        self._urdf = message.data
+        self._name()
+
+    def _take_joints(self, message: JointState) -> None:
+        if not self.names.joints:
+            self.names = ArmNames(tuple(message.name), self.names.base, self.names.tool)
+
+    def _take_status(self, message: ServoStatus) -> None:
+        self._status = ServoView(message.code, message.message), time.monotonic()
+
+
+def _vector(vector: Vector) -> Vector3:
+    x, y, z = vector
+    return Vector3(x=x, y=y, z=z)

@@ -1,0 +1,90 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The gamepad's program on an injected pad, over DDS."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import threading
+
+from input_devices import HAT, InjectedDevice, InjectedDevices, STICK
+from isolation import Isolation
+import pytest
+import rclpy
+from ros_client import RosClient
+from servo_listener import PATIENCE, ServoListener
+from servo_robots import texts
+
+from arm_servo.teleop.servo_gamepad import ServoGamepad, Session
+
+pytestmark = pytest.mark.scenario
+ABS_X, ABS_Y, ABS_RX, ABS_RY, ABS_HAT0Y = 0, 1, 3, 4, 0x11
+EAST, LEFT_SHOULDER, RIGHT_SHOULDER, START = 0x131, 0x136, 0x137, 0x13B
+
+
+@pytest.fixture
+def pad() -> InjectedDevice:
+    """Make an Xbox pad."""
+    axes = dict.fromkeys((ABS_X, ABS_Y, ABS_RX, ABS_RY), STICK) | {ABS_HAT0Y: HAT}
+    return InjectedDevice('Xbox Wireless Controller', range(0x130, 0x13F), axes, vendor=0x045E)
+
+
+@pytest.fixture
+def servo(pad: InjectedDevice, isolation: Isolation) -> Iterator[ServoListener]:
+    """Run the node's own loop on the pad, and listen as the servo of a GP110."""
+    rclpy.init(domain_id=isolation.domain_id)
+    stop = threading.Event()
+    node = ServoGamepad(InjectedDevices(pad))
+    thread = threading.Thread(target=Session(node, stop).run)
+    thread.start()
+    try:
+        with RosClient(isolation.domain_id, 'servo_node') as client:
+            servo = ServoListener(client, *texts('gp110'))
+            client.spin_until(
+                lambda: node.link.is_heard and node.link.scales.linear == 0.2, PATIENCE, 'link'
+            )
+            yield servo
+    finally:
+        stop.set()
+        thread.join()
+        node.destroy_node()
+        rclpy.shutdown()
+
+
+def test_deadman_stick_turbo_and_release(pad: InjectedDevice, servo: ServoListener) -> None:
+    """With the deadman the stick moves, with turbo faster; let go, three rests and silence."""
+    pad.move(ABS_Y, -32768)
+    pad.press(LEFT_SHOULDER)
+    forward, fast = (0.06, 0.0, 0.0, 0.0, 0.0, 0.0), (0.2, 0.0, 0.0, 0.0, 0.0, 0.0)
+    servo.client.spin_until(lambda: ('base_link', forward) in servo.heard, PATIENCE, 'motion')
+    assert servo.heard[0] == ('base_link', forward), 'nothing before the deadman'
+    pad.press(RIGHT_SHOULDER)
+    servo.client.spin_until(lambda: ('base_link', fast) in servo.heard, PATIENCE, 'turbo')
+    pad.release(RIGHT_SHOULDER)
+    pad.release(LEFT_SHOULDER)
+    rest = ('base_link', (0.0,) * 6)
+    servo.client.spin_until(lambda: servo.heard[-3:] == [rest] * 3, PATIENCE, 'rest')
+
+
+def test_frames_and_joints(pad: InjectedDevice, servo: ServoListener) -> None:
+    """Menu chooses the tool's frame, B the next joint, which the d-pad moves."""
+    pad.press(LEFT_SHOULDER)
+    pad.press(START)
+    pad.move(ABS_X, -32768)
+    servo.client.spin_until(lambda: bool(servo.twists), PATIENCE, 'motion')
+    assert servo.heard[0] == ('tool0', (0.0, 0.06, 0.0, 0.0, 0.0, 0.0))
+    pad.move(ABS_X, 0)
+    pad.press(EAST)
+    pad.move(ABS_HAT0Y, -1)
+    servo.client.spin_until(lambda: bool(servo.jogs), PATIENCE, 'joint')
+    assert list(servo.jogs[0].joint_names) == ['joint_2_l']
+    assert list(servo.jogs[0].velocities) == [pytest.approx(0.15)]
+
+
+def test_pad_unplugged_while_moving(pad: InjectedDevice, servo: ServoListener) -> None:
+    """The cable is pulled with the deadman held: rests leave."""
+    pad.press(LEFT_SHOULDER)
+    pad.move(ABS_Y, -32768)
+    servo.client.spin_until(lambda: bool(servo.twists), PATIENCE, 'motion')
+    pad.unplug()
+    servo.client.spin_until(lambda: servo.heard[-1][1] == (0.0,) * 6, PATIENCE, 'rest')

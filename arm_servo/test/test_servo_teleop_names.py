@@ -1,0 +1,44 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Names of joints and frames without kinematics."""
+
+from __future__ import annotations
+
+import pytest
+from servo_robots import chain_texts, robot, ROBOTS, texts
+
+from arm_servo import ModelError
+from arm_servo.teleop import names_of
+
+
+@pytest.mark.parametrize('name', ROBOTS)
+def test_agrees_with_the_model(name: str) -> None:
+    """The names are those of the motion core's model."""
+    model, found = robot(name), names_of(*texts(name))
+    assert (found.joints, found.base, found.tool) == (model.joints, model.base, model.tip)
+
+
+@pytest.mark.parametrize('name', ROBOTS)
+def test_without_srdf_the_longest_chain(name: str) -> None:
+    """The description alone is enough for the joints."""
+    assert names_of(texts(name)[0]).joints == robot(name).joints
+
+
+def test_refusals() -> None:
+    """Broken texts and a chain that is not there are told in words."""
+    urdf, srdf, _ = chain_texts('xyz')
+    with pytest.raises(ModelError, match='no XML'):
+        names_of('<robot')
+    with pytest.raises(ModelError, match="no group 'leg'"):
+        names_of(urdf, srdf, 'leg')
+    with pytest.raises(ModelError, match='no chain'):
+        names_of(urdf, srdf.replace('"base"', '"nowhere"'))
+
+
+def test_loop_in_the_description() -> None:
+    """A description that bites its tail ends, too."""
+    loop = (
+        '<robot name="r"><joint name="a" type="fixed"><parent link="x"/><child link="y"/></joint>'
+        '<joint name="b" type="fixed"><parent link="y"/><child link="x"/></joint></robot>'
+    )
+    assert names_of(loop).joints == ()
