@@ -193,7 +193,7 @@ def test_a_short_gap_is_survived() -> None:
 
 
 def test_a_pause_of_the_controller_itself_is_no_silence_of_the_robot() -> None:
-    """After a second without a step the stale velocity stops the robot, and no fault is latched."""
+    """After a second without a step the stale velocity stops the robot; there is no fault."""
     rig = standing()
     rig.ask('walk')
     rig.run(1.0, FORWARD)
@@ -201,7 +201,7 @@ def test_a_pause_of_the_controller_itself_is_no_silence_of_the_robot() -> None:
     targets = rig.controller.step(Measurement(), 1.0).targets
     assert targets is not None
     steps = [abs(a - b) for a, b in zip(targets, before, strict=True)]
-    assert max(steps) <= 10.0 * 1.5 * PERIOD
+    assert max(steps) <= 10.0 * 1.5 * PERIOD + 1e-9
     rig.run(1.0)
     assert rig.is_in(State.WALK)
     assert rig.controller.status.velocity.at_rest
