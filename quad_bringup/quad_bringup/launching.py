@@ -38,6 +38,7 @@ LAUNCH_ARGUMENTS = (
     LaunchArgument('arm', FALSE, 'true: the robot has its arm', flag=True),
     LaunchArgument('gait', '', 'trot, crawl or pace'),
     LaunchArgument('policy', '', 'ONNX policy to load'),
+    LaunchArgument('servo', '', 'servo model of a simulated robot'),
     LaunchArgument('protocol', '', 'auto, new or old'),
     LaunchArgument('calibration', '', 'parameters of the serial bridge'),
 )

@@ -39,11 +39,13 @@ class Session:
 
     Attributes:
         title: What runs, and where.
+        port: Its serial port.
         joints: Names of its joints, in the order of /joint_command.
         processes: What is to be run.
     """
 
     title: str
+    port: str
     joints: list[str]
     processes: list[ProcessSpec]
 
@@ -61,6 +63,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='which robot it is (default: %(default)s)',
     )
     parser.add_argument('--arm', action='store_true', help='the robot has its arm')
+    parser.add_argument(
+        '--servo',
+        metavar='MODEL',
+        help='servos of a simulated robot: firm (like the real ones), vendor_rl (soft, which '
+        'policies of the vendor are trained with), or kp=10,kv=0.25 (default: firm)',
+    )
     way = parser.add_mutually_exclusive_group()
     way.add_argument(
         '--gait',
@@ -106,7 +114,7 @@ def session(arguments: argparse.Namespace, port: str | None) -> Iterator[Session
         port: Serial port of the robot; None for a simulated one.
 
     Raises:
-        ArgumentError: A file is not there.
+        ArgumentError: A file is not there, or the servos of a real robot were chosen.
         StartError: An executable is missing, or another bring-up is on this port or domain.
     """
     policy, calibration = (
@@ -128,6 +136,7 @@ def session(arguments: argparse.Namespace, port: str | None) -> Iterator[Session
             port=port or str(folder / 'xgo'),
             preset=arguments.preset,
             simulate=port is None,
+            servo=_servo(arguments.servo, port),
             arm=arguments.arm,
             gait=arguments.gait,
             protocol=_protocol(arguments.protocol, simulate=port is None),
@@ -139,12 +148,19 @@ def session(arguments: argparse.Namespace, port: str | None) -> Iterator[Session
             f', simulated, on {wanted.port}' if wanted.simulate else f' on {wanted.port}'
         )
         joints = [joint.name for joint in movable_joints(urdf)]
-        yield Session(title, joints, quad_processes(wanted, parameters, find_executable))
+        processes = quad_processes(wanted, parameters, find_executable)
+        yield Session(title, wanted.port, joints, processes)
 
 
 def _protocol(wanted: str, *, simulate: bool) -> str:
     # a simulated robot may answer late on a busy machine, which is no reason for the slow protocol
     return NEW if simulate and wanted == AUTO else wanted
+
+
+def _servo(model: str | None, port: str | None) -> str | None:
+    if model is not None and port is not None:
+        raise ArgumentError(f'--servo {model} is for a simulated robot; leave it out, or --port')
+    return model
 
 
 def _existing(name: str, path: Path | None) -> Path | None:

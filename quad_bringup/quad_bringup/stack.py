@@ -46,6 +46,7 @@ class Stack:
         port: Serial port of the robot; with ``simulate`` a link to the simulated one's.
         preset: Preset of the description.
         simulate: With a simulated robot at the port.
+        servo: Servo model of the simulated robot, as fake_xgo takes it; None for its default.
         arm: The robot has its arm.
         gait: Gait of the controller.
         policy: Policy that the controller loads; None for the geometric gait alone.
@@ -57,6 +58,7 @@ class Stack:
     port: str
     preset: str = 'lite'
     simulate: bool = False
+    servo: str | None = None
     arm: bool = False
     gait: str = 'trot'
     policy: Path | None = None
@@ -94,6 +96,8 @@ def _simulator(stack: Stack, find: FindExecutable) -> ProcessSpec:
     options = ['--link', stack.port, '--preset', stack.preset, '--protocol', spoken]
     if stack.arm:
         options.append('--arm')
+    if stack.servo is not None:
+        options += ['--servo', stack.servo]
     return ProcessSpec(
         name='fake_xgo',
         argv=(program, *options, *ros_arguments),

@@ -163,9 +163,10 @@ def test_a_process_that_dies_ends_it_with_its_last_words(
         (['--simulate', '--gait', 'gallop'], 'gallop'),
         (['--simulate', '--policy', 'nowhere.onnx'], 'no file nowhere.onnx'),
         (['--simulate', '--calibration', 'nowhere.yaml'], 'no file nowhere.yaml'),
+        (['--port', '/dev/ttyAMA0', '--servo', 'firm'], 'for a simulated robot'),
         (['--simulate', '--timeout', 'nan'], 'no positive number'),
     ],
-    ids=['nothing', 'both', 'preset', 'gait', 'policy', 'calibration', 'time'],
+    ids=['nothing', 'both', 'preset', 'gait', 'policy', 'calibration', 'servo', 'time'],
 )
 def test_what_cannot_be_started_says_so_at_once(
     workspace: Workspace, arguments: list[str], words: str

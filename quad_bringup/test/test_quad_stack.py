@@ -63,6 +63,9 @@ def test_preset_and_arm_reach_the_simulator(tmp_path: Path) -> None:
     argv = processes(tmp_path, stack)['fake_xgo'].argv
     assert argv[argv.index('--preset') + 1] == 'mini'
     assert '--arm' in argv
+    assert '--servo' not in argv
+    argv = processes(tmp_path, Stack('p', simulate=True, servo='vendor_rl'))['fake_xgo'].argv
+    assert argv[argv.index('--servo') + 1] == 'vendor_rl'
     assert '--arm' not in processes(tmp_path, Stack('/tmp/xgo', simulate=True))['fake_xgo'].argv
 
 

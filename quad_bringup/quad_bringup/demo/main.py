@@ -82,17 +82,18 @@ def join_ros(joints: Sequence[str], given_up: Callable[[], bool]) -> Client:
     return QuadClient(joints, GROUND_TRUTH, given_up)
 
 
-def commands(domain: str) -> list[str]:
+def commands(domain: str, port: str) -> list[str]:
     """Return commands to try in a second terminal.
 
     Args:
         domain: ROS domain, empty for the default one.
+        port: Serial port of the robot.
     """
     return [
         f'source env.sh; export ROS_DOMAIN_ID={domain}' if domain else 'source env.sh',
         'ros2 topic hz /joint_command',
         'ros2 topic echo /odom',
-        'ros2 run quad_hardware doctor',
+        f'ros2 run quad_hardware doctor --port {port}',
     ]
 
 
@@ -112,7 +113,7 @@ def run(quad: Session, mode: str, duration: float | None) -> int:
     setting = Setting(
         QuadView(quad.title, LEGS),
         Figures(),
-        commands(os.environ.get('ROS_DOMAIN_ID', '')),
+        commands(os.environ.get('ROS_DOMAIN_ID', ''), quad.port),
         Painter('demo', names, wants_colour(sys.stdout, os.environ)),
     )
     display = choose_display(setting, Console(), write)
