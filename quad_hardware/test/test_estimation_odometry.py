@@ -7,6 +7,7 @@ from __future__ import annotations
 from functools import cache
 import math
 import random
+import threading
 
 import numpy as np
 import pytest
@@ -137,6 +138,27 @@ def test_a_rolling_foot_counts(yaw: float) -> None:
     assert state.x == pytest.approx(0.5 * 0.01, rel=1e-3)
     assert state.y == pytest.approx(0.0, abs=1e-9)
     assert state.height == pytest.approx(0.11)
+
+
+def test_commands_may_come_from_another_thread() -> None:
+    """Any number of them while a measurement is taken."""
+    odometry, feet = LegOdometry(OdometrySettings(), 0.01), feet_of(URDF).poses([0.0] * 12)
+    stop = threading.Event()
+
+    def send() -> None:
+        time = 0.0
+        while not stop.is_set():
+            time += 1e-4
+            odometry.command(time, feet)
+
+    sender = threading.Thread(target=send)
+    sender.start()
+    try:
+        for tick in range(2000):
+            odometry.update(tick * PERIOD, feet, IDENTITY)
+    finally:
+        stop.set()
+        sender.join()
 
 
 def test_a_gap_is_no_way() -> None:

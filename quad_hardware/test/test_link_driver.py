@@ -10,7 +10,7 @@ import time
 
 import pytest
 
-from quad_hardware.link import Driver, LinkOptions, LinkState, RobotState
+from quad_hardware.link import Driver, LinkOptions, LinkState, RobotState, SerialPort
 from quad_hardware.protocol import LEG_MOTORS, NEW, OLD
 from quad_pty_peer import PtyPeer
 
@@ -149,6 +149,23 @@ def test_a_rider_is_not_taken_for_a_dog(tmp_path: Path) -> None:
         )
         rig.driver.stop()
         assert peer.commands == []
+
+
+@pytest.mark.filterwarnings('ignore::pytest.PytestUnhandledThreadExceptionWarning')
+def test_a_failure_of_the_caller_is_not_silent(tmp_path: Path) -> None:
+    """What goes wrong with a report ends the link, and the link says so; the port is free."""
+
+    def fail(_: RobotState) -> None:
+        raise ZeroDivisionError
+
+    with PtyPeer(tmp_path / 'port') as peer:
+        driver = Driver(LinkOptions(str(peer.link)), fail, lambda *_: None)
+        driver.start()
+        wait_for(lambda: driver.status().state is LinkState.STOPPED, 'end')
+        assert driver.status().detail == 'internal error: ZeroDivisionError()'
+        assert not driver.command(LEGS)
+        driver.stop()
+        SerialPort(str(peer.link), 115200).close()
 
 
 def test_a_driver_stops_while_it_looks(tmp_path: Path) -> None:

@@ -11,7 +11,6 @@ along, which is more than a tenth of the way (radius over height of the hip).
 
 from __future__ import annotations
 
-from collections import deque
 from dataclasses import dataclass
 import math
 
@@ -28,6 +27,7 @@ Flags = NDArray[np.bool_]
 LONGEST_GAP = 0.2  # [s] more than that cannot be bridged: the body may have been carried
 DRIFT = 0.07  # share of the way that is the standard deviation of the position
 LEAST_VARIANCE = 1e-4  # [m²]
+KEPT_COMMANDS = 32
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +90,8 @@ class LegOdometry:
         """Begin at the origin, with the first update."""
         self._settings = settings
         self._radius = foot_radius
-        self._commands: deque[tuple[float, Array]] = deque(maxlen=32)
+        # replaced as a whole: commands come from another thread than measurements
+        self._commands: tuple[tuple[float, Array], ...] = ()
         self._last: tuple[float, FootPoses, Flags] | None = None
         self._yaw0: float | None = None
         self._place = np.zeros(2)
@@ -105,7 +106,7 @@ class LegOdometry:
             time: When [s].
             feet: Where.
         """
-        self._commands.append((time, feet.position))
+        self._commands = (*self._commands, (time, feet.position))[-KEPT_COMMANDS:]
 
     def update(self, time: float, feet: FootPoses, attitude: Quaternion) -> OdometryState:
         """Take a measurement.
@@ -136,11 +137,11 @@ class LegOdometry:
         )
 
     def _standing(self, time: float, feet: Array, matrix: Array) -> Flags:
-        settings = self._settings
+        settings, commands = self._settings, self._commands
         at = time - settings.delay
-        recent = [f for t, f in self._commands if abs(t - at) <= settings.margin]
+        recent = [f for t, f in commands if abs(t - at) <= settings.margin]
         if not recent:
-            older = [f for t, f in self._commands if at - settings.command_age <= t <= at]
+            older = [f for t, f in commands if at - settings.command_age <= t <= at]
             recent = older[-1:] or [feet]
         standing = np.ones(len(feet), dtype=np.bool_)
         for commanded in recent:

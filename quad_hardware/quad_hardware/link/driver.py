@@ -169,6 +169,14 @@ class Driver:
             self._on_change(state, detail)
 
     def _run(self) -> None:
+        try:
+            self._keep_going()
+        except Exception as error:
+            self._enter(LinkState.STOPPED, f'internal error: {error!r}')
+            raise
+        self._enter(LinkState.STOPPED, 'stopped')
+
+    def _keep_going(self) -> None:
         while not self._stopping.is_set():
             try:
                 session = open_session(self._options)
@@ -183,7 +191,6 @@ class Driver:
             finally:
                 self._mailbox = None
                 session.port.close()
-        self._enter(LinkState.STOPPED, 'stopped')
 
     def _serve(self, session: Session) -> None:
         now = heard_at = self._reported_at = time.monotonic()

@@ -120,7 +120,9 @@ class HardwareNode(Node):
             self._limiter.reset()
         if state in {LinkState.STALE, LinkState.CONNECTING}:
             self.get_logger().warning(f'{state.value}: {detail}')
-        elif state is not LinkState.STOPPED:
+        elif state is LinkState.STOPPED:
+            self.get_logger().debug(detail)
+        else:
             self.get_logger().info(f'{state.value}: {detail}')
 
     def _take(self, message: JointCommand) -> None:
