@@ -12,15 +12,17 @@ from rclpy.node import Node
 
 
 class Declarations:
-    """Declares parameters of a node; all are read-only, except where a node says otherwise."""
+    """Declares parameters of a node."""
 
-    def __init__(self, node: Node, prefix: str = '') -> None:
+    def __init__(self, node: Node, prefix: str = '', *, read_only: bool = True) -> None:
         """Prepare.
 
         Args:
             node: The node.
             prefix: Before each name, with its dot.
+            read_only: They cannot be changed while the node runs.
         """
+        self._read_only = read_only
         self._node = node
         self._prefix = prefix
 
@@ -51,6 +53,8 @@ class Declarations:
         limits: Sequence[FloatingPointRange] = (),
     ) -> Any:  # noqa: ANN401  # the type of the default
         descriptor = ParameterDescriptor(
-            description=description, read_only=True, floating_point_range=list(limits)
+            description=description,
+            read_only=self._read_only,
+            floating_point_range=list(limits),
         )
         return self._node.declare_parameter(self._prefix + name, default, descriptor).value

@@ -16,13 +16,16 @@ from rclpy.logging import get_logger
 from rclpy.node import Node
 
 from arm_canopen import run_master
+from arm_canopen.nodes.misspelt import refuse_misspelt
 
 from ..core import CoreSettings, MotionCore
 from ..exceptions import ModelError, NotReadyError, ServoError
 from .declare import Declarations
 from .desk import Desk
 from .drive_source import DriveSource
-from .robot_parameters import declare_robot
+from .robot_parameters import declare_robot, same_robot
+from .servo import Servo
+from .servo_parameters import declare_servo
 from .trajectory_controller import TrajectoryController
 from .trajectory_parameters import declare_trajectory
 
@@ -57,11 +60,17 @@ class Motion:
         self._check_drives(master, model.joints)
         controller = Node(name)
         trajectory = declare_trajectory(controller, model.joints)
+        servo = Node('servo_node')
+        same_robot(servo, model)
+        jogging = declare_servo(servo, model.group)
+        for node in (manager, controller, servo):
+            refuse_misspelt(node)
         self._master = master
-        core = MotionCore(model, CoreSettings(execution=trajectory.execution))
-        self._desk = Desk(core)
+        settings = CoreSettings(jogging.settings, trajectory.execution, jogging.timeout)
+        self._desk = Desk(MotionCore(model, settings))
         self._source = DriveSource(self._desk)
-        self.nodes = [manager, controller]
+        self.nodes = [manager, controller, servo]
+        self._servo = Servo(servo, self._desk, jogging, self._prepare)
         self._controller = TrajectoryController(controller, self._desk, trajectory, self._prepare)
         for note in model.notes:
             manager.get_logger().warning(note)

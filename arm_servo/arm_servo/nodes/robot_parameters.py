@@ -23,14 +23,7 @@ def declare_robot(node: Node) -> RobotModel:
     Raises:
         ModelError: A parameter is missing, or they do not make an arm.
     """
-    declare = Declarations(node)
-    urdf = declare.text('robot_description', '', 'URDF of the robot as XML text')
-    srdf = declare.text('robot_description_semantic', '', 'SRDF of the robot as XML text')
-    limits = declare.text(
-        'joint_limits', '', "path of the limits file, in MoveIt's format of joint_limits.yaml"
-    )
-    group = declare.text('group', '', 'group of the SRDF to move; empty takes its only one')
-    tip = declare.text('tip_link', '', "link that is moved; empty takes the group's end")
+    urdf, srdf, limits, group, tip = _declare(node)
     for name, value in (
         ('robot_description', urdf),
         ('robot_description_semantic', srdf),
@@ -39,3 +32,34 @@ def declare_robot(node: Node) -> RobotModel:
         if not value:
             raise ModelError(f'no {name}: give it with --ros-args -p {name}:=... or a params file')
     return RobotModel(urdf, srdf, load_limits(Path(limits)), group or None, tip or None)
+
+
+def same_robot(node: Node, model: RobotModel) -> None:
+    """Declare what describes an arm on a further node, where clients ask for it too.
+
+    Args:
+        node: The node.
+        model: The arm.
+
+    Raises:
+        ModelError: The node is given another group or tip.
+    """
+    _urdf, _srdf, _limits, group, tip = _declare(node)
+    if group not in {'', model.group} or tip not in {'', model.tip}:
+        raise ModelError(
+            f'{node.get_name()}: group {group!r} and tip_link {tip!r} are not those of the arm,'
+            f' {model.group!r} and {model.tip!r}'
+        )
+
+
+def _declare(node: Node) -> tuple[str, str, str, str, str]:
+    """Declare URDF, SRDF, limits file, group and tip."""
+    declare = Declarations(node)
+    urdf = declare.text('robot_description', '', 'URDF of the robot as XML text')
+    srdf = declare.text('robot_description_semantic', '', 'SRDF of the robot as XML text')
+    limits = declare.text(
+        'joint_limits', '', "path of the limits file, in MoveIt's format of joint_limits.yaml"
+    )
+    group = declare.text('group', '', 'group of the SRDF to move; empty takes its only one')
+    tip = declare.text('tip_link', '', "link that is moved; empty takes the group's end")
+    return urdf, srdf, limits, group, tip

@@ -20,13 +20,13 @@ from ..exceptions import NotReadyError, ServoError
 from ..execution import Execution
 from ..goal import TrajectoryGoal
 from .desk import Desk
+from .ros_numbers import seconds
 from .trajectory_action import TrajectoryAction
 from .trajectory_messages import (
     difference,
     goal_of_action,
     goal_of_trajectory,
     point_of,
-    seconds,
 )
 from .trajectory_parameters import TrajectoryParameters
 

@@ -12,12 +12,8 @@ from trajectory_msgs.msg import JointTrajectoryPoint
 from ..exceptions import GoalCode, GoalError
 from ..goal import GoalPoint, JointTolerance, TrajectoryGoal
 from ..otg import MotionState
+from .ros_numbers import seconds
 from .trajectory_parameters import TrajectoryParameters
-
-
-def seconds(stamp: Any) -> float:  # noqa: ANN401  # Time and Duration of builtin_interfaces
-    """Return a stamp or a duration in [s]."""
-    return float(stamp.sec) + 1e-9 * float(stamp.nanosec)
 
 
 def duration_fields(time: float) -> dict[str, int]:

@@ -1,0 +1,98 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Frames of TF: which way one is turned and where it is in another."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from ..arrays import Array
+from ..exceptions import CommandError
+from ..model import Pose
+
+STALE = 1.0
+"""Age at which a transform of /tf counts no more in [s]."""
+
+UNIT = 1e-3
+"""How far the length of a quaternion may be off."""
+
+
+def rotation_of(quaternion: Sequence[float]) -> Array:
+    """Return the rotation matrix of a quaternion.
+
+    Args:
+        quaternion: x, y, z, w.
+
+    Raises:
+        CommandError: A number is not finite, or the length is not one.
+    """
+    length = float(np.linalg.norm(quaternion))
+    if not abs(length - 1.0) < UNIT:
+        raise CommandError(f'orientation {list(quaternion)}: its length is {length:.4g}, not 1')
+    matrix: Array = pin.Quaternion(np.array(quaternion) / length).toRotationMatrix()
+    return matrix
+
+
+def combined(outer: Pose, inner: Pose) -> Pose:
+    """Return a pose in the frame in which the outer one is given."""
+    return Pose(outer.rotation @ inner.rotation, outer.position + outer.rotation @ inner.position)
+
+
+def inverse(pose: Pose) -> Pose:
+    """Return the pose of the outer frame in the inner."""
+    return Pose(pose.rotation.T, -pose.rotation.T @ pose.position)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Link:
+    parent: str
+    pose: Pose
+    time: float
+
+
+class FrameTree:
+    """The newest transforms of /tf and /tf_static."""
+
+    def __init__(self) -> None:
+        """Know no frame."""
+        self._links: dict[str, _Link] = {}
+
+    def learn(self, child: str, parent: str, pose: Pose, time: float) -> None:
+        """Take a transform.
+
+        Args:
+            child: Name of a frame.
+            parent: Name of the frame in which its pose is given.
+            pose: Its pose.
+            time: Steady time of its arrival in [s]; infinity for a static one.
+        """
+        self._links[child] = _Link(parent, pose, time)
+
+    def pose(self, frame: str, base: str, now: float) -> Pose | None:
+        """Return the pose of a frame in another; None where they are not connected.
+
+        Args:
+            frame: Name of the frame.
+            base: Name of the other.
+            now: Steady time in [s].
+        """
+        up, over = self._to_root(frame, now), self._to_root(base, now)
+        for name, pose in up.items():
+            if name in over:
+                return combined(inverse(over[name]), pose)
+        return None
+
+    def _to_root(self, frame: str, now: float) -> dict[str, Pose]:
+        """Return the pose of a frame in itself and in each of its ancestors, nearest first."""
+        pose = Pose(np.eye(3), np.zeros(3))
+        found = {frame: pose}
+        while (link := self._links.get(frame)) and now - link.time < STALE:
+            pose, frame = combined(link.pose, pose), link.parent
+            if frame in found:  # a loop: whoever publishes it is wrong
+                break
+            found[frame] = pose
+        return found

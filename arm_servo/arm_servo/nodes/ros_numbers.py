@@ -1,0 +1,26 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Numbers of geometry_msgs and builtin_interfaces as arrays and seconds."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Array
+
+
+def xyz(vector: Any) -> Array:  # noqa: ANN401  # Vector3 or Point; message classes have no type
+    """Return a vector or a point."""
+    return np.array([vector.x, vector.y, vector.z])
+
+
+def xyzw(quaternion: Any) -> list[float]:  # noqa: ANN401
+    """Return the numbers of a quaternion."""
+    return [quaternion.x, quaternion.y, quaternion.z, quaternion.w]
+
+
+def seconds(stamp: Any) -> float:  # noqa: ANN401  # Time and Duration
+    """Return a stamp or a duration in [s]."""
+    return float(stamp.sec) + 1e-9 * float(stamp.nanosec)

@@ -1,0 +1,149 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The servo's topics and services on a node."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import Future
+from functools import partial
+import time
+from typing import Any
+
+from control_msgs.msg import JointJog
+from geometry_msgs.msg import PoseStamped, TwistStamped
+from moveit_msgs.msg import ServoStatus
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from ..core import MotionCore, Source
+from ..exceptions import ModelError, NotReadyError, ServoError
+from .desk import Desk
+from .ros_numbers import seconds
+from .servo_modes import CommandKind, ServoModes
+from .servo_orders import Order, ServoOrders
+from .servo_parameters import PREFIX, read_scales, Scales, ServoParameters
+from .servo_status import status_of
+from .tf_listener import TfListener
+
+FRESH = 0.5
+"""Silence after which a command begins a new motion, which may take drives back, in [s]."""
+
+REMEMBERED = 0.5
+"""How long a refusal is told in the status in [s]."""
+
+FUTURE = 0.1
+"""How far ahead of this clock a stamp may be in [s]."""
+
+
+class Servo:
+    """``~/delta_twist_cmds``, ``~/delta_joint_cmds``, ``~/pose_target_cmds`` and their services.
+
+    Attributes:
+        orders: Makes commands of messages.
+    """
+
+    def __init__(
+        self, node: Node, desk: Desk, parameters: ServoParameters, prepare: Callable[[], None]
+    ) -> None:
+        """Offer them.
+
+        Args:
+            node: The servo's node.
+            desk: The core's desk.
+            parameters: How it behaves.
+            prepare: Called before a new motion, to get the drives back.
+        """
+        self._node, self._desk, self._prepare = node, desk, prepare
+        self._parameters = parameters
+        self._modes = ServoModes(node, self._stop)
+        self.orders = ServoOrders(TfListener(node, desk.model), parameters, read_scales(node))
+        self._last = -FRESH
+        self._refusal = ('', 0.0)
+        self._logged = ''
+        self._status = node.create_publisher(ServoStatus, parameters.status_topic, 10)
+        for kind, message, topic, convert in (
+            (CommandKind.TWIST, TwistStamped, parameters.twist_topic, self.orders.twist),
+            (CommandKind.JOINT_JOG, JointJog, parameters.joint_topic, self.orders.jog),
+            (CommandKind.POSE, PoseStamped, parameters.pose_topic, self.orders.pose),
+        ):
+            node.create_subscription(message, topic, partial(self._take, kind, convert), 10)
+        node.add_on_set_parameters_callback(self._check_scales)
+        node.add_post_set_parameters_callback(self._rescale)
+        node.create_timer(1.0 / parameters.status_rate, self._publish_status)
+
+    def _take(self, kind: CommandKind, convert: Callable[[Any], Order], message: Any) -> None:  # noqa: ANN401  # messages have no type
+        begin = time.monotonic()
+        try:
+            self._check_age(message)
+            self._modes.admit(kind)
+            order = convert(message)
+            if begin - self._last > FRESH:
+                self._prepare()
+        except ServoError as error:
+            self._refuse(str(error))
+            return
+        self._last = begin
+        self._desk.submit(order).add_done_callback(self._note)
+
+    def _check_age(self, message: Any) -> None:  # noqa: ANN401
+        stamp = seconds(message.header.stamp)
+        if not stamp:  # as good as now
+            return
+        age = float(self._node.get_clock().now().nanoseconds) * 1e-9 - stamp
+        if age > self._parameters.timeout:
+            late = age - self._parameters.timeout
+            raise NotReadyError(
+                f'stale by {late:.2f} s: are the clocks in step? A stamp of 0 is taken as now'
+            )
+        if age < -FUTURE:
+            raise NotReadyError(f'stamped {-age:.2f} s in the future: are the clocks in step?')
+
+    def _note(self, future: Future[None]) -> None:
+        """Remember what became of a command; in the cycle, so nothing is logged here."""
+        error = None if future.cancelled() else future.exception()
+        if error is not None:
+            self._refuse(str(error))
+        else:
+            self._refusal = ('', 0.0)
+
+    def _refuse(self, reason: str) -> None:
+        self._refusal = (reason, time.monotonic())
+
+    def _stop(self, reason: str) -> None:
+        def stop(core: MotionCore, _now: float) -> None:
+            if core.source in {Source.JOG, Source.TARGET}:
+                core.stop(reason)
+
+        self._desk.submit(stop, moves=False)
+
+    def _check_scales(self, parameters: list[Parameter]) -> SetParametersResult:
+        for parameter in parameters:
+            if parameter.name == f'{PREFIX}command_in_type':
+                known = {'unitless', 'speed_units'}
+                if parameter.value not in known:
+                    reason = f'{parameter.name}: one of {sorted(known)}'
+                    return SetParametersResult(successful=False, reason=reason)
+        return SetParametersResult(successful=True)
+
+    def _rescale(self, _parameters: list[Parameter]) -> None:
+        self.orders.scales = self._scales()
+
+    def _scales(self) -> Scales:
+        try:
+            return read_scales(self._node)
+        except ModelError:
+            return self.orders.scales
+
+    def _publish_status(self) -> None:
+        refusal, since = self._refusal
+        if time.monotonic() - since > REMEMBERED:
+            refusal = ''
+        code, words = status_of(
+            self._desk.snapshot, refusal, self._modes.paused, self.orders.capped
+        )
+        if refusal and refusal != self._logged:
+            self._node.get_logger().warning(f'refused: {refusal}')
+        self._logged = refusal or self._logged
+        self._status.publish(ServoStatus(code=code, message=words))

@@ -1,0 +1,140 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Parameters of the servo, under moveit_servo's names."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+from rclpy.node import Node
+
+from ..exceptions import ModelError
+from ..servo import ServoSettings
+from .declare import Declarations
+
+PREFIX = 'moveit_servo.'
+
+
+class Units(Enum):
+    """What the numbers of commands are."""
+
+    UNITLESS = 'unitless'
+    SPEED = 'speed_units'
+
+
+@dataclass(frozen=True, slots=True)
+class Scales:
+    """How numbers of commands become speeds; may be changed while the servo runs.
+
+    Attributes:
+        units: What the numbers are.
+        linear: Factor, or cap with speed units, of the tool's speed in [m/s]; 0 is no cap.
+        rotational: The same of its angular speed in [rad/s].
+        joint: Factor of joint speeds in [rad/s].
+        override: Factor of all commands, 0 to 1.
+    """
+
+    units: Units
+    linear: float
+    rotational: float
+    joint: float
+    override: float
+
+
+@dataclass(frozen=True, slots=True)
+class ServoParameters:
+    """How the servo behaves.
+
+    Attributes:
+        timeout: Age at which a command counts no more in [s].
+        about_tip: Twists of other frames turn about the tip; else about the frame's origin.
+        default_frame: Frame of commands without one; empty is the base.
+        twist_topic: Topic of twists.
+        joint_topic: Topic of joint jogs.
+        pose_topic: Topic of poses.
+        status_topic: Topic of the status.
+        status_rate: Its rate in [Hz].
+        settings: How the core jogs.
+    """
+
+    timeout: float
+    about_tip: bool
+    default_frame: str
+    twist_topic: str
+    joint_topic: str
+    pose_topic: str
+    status_topic: str
+    status_rate: float
+    settings: ServoSettings
+
+
+def declare_servo(node: Node, group: str) -> ServoParameters:
+    """Declare the parameters of the servo.
+
+    Args:
+        node: The node.
+        group: Name of the group that it moves.
+
+    Raises:
+        ModelError: move_group_name is another group, or command_in_type is unknown.
+    """
+    declare = Declarations(node, PREFIX)
+    named = declare.text('move_group_name', group, 'group of the SRDF that is moved')
+    if named != group:
+        raise ModelError(f'{PREFIX}move_group_name is {named!r}, but the group is {group!r}')
+    _declare_scales(node)
+    scales = read_scales(node)
+    return ServoParameters(
+        declare.number(
+            'incoming_command_timeout',
+            0.1,
+            'age of a command at which the arm comes to rest [s]',
+            (0.01, 10.0),
+        ),
+        declare.flag(
+            'apply_twist_commands_about_ee_frame',
+            "twists turn about the tip; else about the origin of the command's frame",
+            default=True,
+        ),
+        declare.text(
+            'robot_link_command_frame', '', 'frame of commands without one; empty is the base link'
+        ),
+        declare.text('cartesian_command_in_topic', '~/delta_twist_cmds', 'topic of twists'),
+        declare.text('joint_command_in_topic', '~/delta_joint_cmds', 'topic of joint jogs'),
+        declare.text('pose_command_in_topic', '~/pose_target_cmds', 'topic of poses'),
+        declare.text('status_topic', '~/status', 'topic of the status'),
+        declare.number('status_rate', 25.0, 'rate of the status [Hz]', (1.0, 500.0)),
+        ServoSettings(linear_speed=scales.linear or 0.4, angular_speed=scales.rotational or 0.8),
+    )
+
+
+def read_scales(node: Node) -> Scales:
+    """Return the scales as they are set now.
+
+    Raises:
+        ModelError: command_in_type is unknown.
+    """
+    units = str(node.get_parameter(f'{PREFIX}command_in_type').value)
+    if units not in {unit.value for unit in Units}:
+        known = ' or '.join(unit.value for unit in Units)
+        raise ModelError(f'{PREFIX}command_in_type is {units!r}; it must be {known}')
+    names = ('scale.linear', 'scale.rotational', 'scale.joint', 'override_velocity_scaling_factor')
+    linear, rotational, joint, override = (
+        float(node.get_parameter(PREFIX + name).value) for name in names
+    )
+    # as in moveit_servo, an override of less than a hundredth is none
+    return Scales(Units(units), linear, rotational, joint, override if override >= 0.01 else 1.0)
+
+
+def _declare_scales(node: Node) -> None:
+    live = Declarations(node, PREFIX, read_only=False)
+    live.text('command_in_type', Units.UNITLESS.value, 'unitless (-1 to 1) or speed_units')
+    live.number(
+        'scale.linear', 0.4, 'speed of the tool at 1, cap in speed units [m/s]', (0.0, 10.0)
+    )
+    live.number(
+        'scale.rotational', 0.8, 'angular speed at 1, cap in speed units [rad/s]', (0.0, 20.0)
+    )
+    live.number('scale.joint', 0.5, 'speed of a joint at 1 [rad/s]', (0.0, 20.0))
+    live.number('override_velocity_scaling_factor', 0.0, 'factor; 0 is none', (0.0, 1.0))

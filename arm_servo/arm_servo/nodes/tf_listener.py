@@ -1,0 +1,85 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Frames of commands: links of the robot, or else frames of TF."""
+
+from __future__ import annotations
+
+import math
+import time
+
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from tf2_msgs.msg import TFMessage
+
+from ..exceptions import CommandError
+from ..model import Pose, RobotModel
+from .frame_tree import FrameTree, rotation_of
+from .ros_numbers import xyz, xyzw
+
+STATIC = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+"""How /tf_static is published."""
+
+
+class TfListener:
+    """Listens to TF from the first frame on that is no link of the robot.
+
+    /tf costs a Python node more than the jogging, and few need it.
+    """
+
+    def __init__(self, node: Node, model: RobotModel) -> None:
+        """Do not listen yet.
+
+        Args:
+            node: The node that subscribes.
+            model: The arm; its links need no TF.
+        """
+        self._node = node
+        self._base = model.base
+        self._links = frozenset(model.frames)
+        self._names = ', '.join(model.frames)
+        self._tree: FrameTree | None = None
+
+    def is_link(self, frame: str) -> bool:
+        """Tell whether a frame is a link of the robot."""
+        return frame in self._links
+
+    def pose(self, frame: str) -> Pose:
+        """Return the pose of a frame of TF in the base of the arm.
+
+        Args:
+            frame: Name of the frame.
+
+        Raises:
+            CommandError: It is not known, or not yet.
+        """
+        if self._tree is None:
+            self._listen()
+        found = self._tree.pose(frame, self._base, time.monotonic()) if self._tree else None
+        if found is None:
+            raise CommandError(
+                f'frame {frame!r} is no link of the robot and not (yet) connected to {self._base}'
+                f' by TF; links: {self._names}'
+            )
+        return found
+
+    def _listen(self) -> None:
+        self._tree = FrameTree()
+        self._node.create_subscription(TFMessage, '/tf', self._take, 100)
+        self._node.create_subscription(TFMessage, '/tf_static', self._take_static, STATIC)
+
+    def _take(self, message: TFMessage) -> None:
+        self._learn(message, time.monotonic())
+
+    def _take_static(self, message: TFMessage) -> None:
+        self._learn(message, math.inf)
+
+    def _learn(self, message: TFMessage, now: float) -> None:
+        if self._tree is None:
+            return
+        for transform in message.transforms:
+            try:
+                rotation = rotation_of(xyzw(transform.transform.rotation))
+            except CommandError:
+                continue  # whoever publishes it is told by others that use TF
+            pose = Pose(rotation, xyz(transform.transform.translation))
+            self._tree.learn(transform.child_frame_id, transform.header.frame_id, pose, now)
