@@ -7,10 +7,12 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
+import time
 from typing import Any
 
 from control_msgs.msg import JointTrajectoryControllerState, SpeedScalingFactor
 from control_msgs.srv import QueryTrajectoryState
+from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from trajectory_msgs.msg import JointTrajectory
@@ -148,5 +150,6 @@ class TrajectoryController:
             output=point_of(wanted),
             speed_scaling_factor=snapshot.speed,
         )
-        message.header.stamp = self._node.get_clock().now().to_msg()
+        age = Duration(nanoseconds=round((time.monotonic() - snapshot.time) * 1e9))
+        message.header.stamp = (self._node.get_clock().now() - age).to_msg()  # that of the cycle
         self._state.publish(message)
