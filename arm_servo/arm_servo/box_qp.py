@@ -45,7 +45,8 @@ class Program:
         values, _, flag, info = daqp.solve(self.hessian, self.gradient, self.rows, above, below)
         if flag != OPTIMAL or not np.isfinite(values).all():
             return None
-        return Solution(np.clip(values, self.lower, self.upper), np.array(info['lam']))
+        within = np.minimum(np.maximum(values, self.lower), self.upper)
+        return Solution(within, np.array(info['lam']))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

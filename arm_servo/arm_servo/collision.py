@@ -89,7 +89,7 @@ class CollisionModel:
         """Links of each pair of shapes that is checked."""
         return self._pairs
 
-    def measure(self) -> Array:
+    def measure(self) -> list[float]:
         """Measure all pairs at the placements of the joints.
 
         Returns:
@@ -97,7 +97,13 @@ class CollisionModel:
         """
         pin.updateGeometryPlacements(self._model, self._data, self._geometry, self._results)
         pin.computeDistances(self._geometry, self._results)
-        return np.array([result.min_distance for result in self._results.distanceResults])
+        return [result.min_distance for result in self._results.distanceResults]
+
+    def least(self) -> float:
+        """Measure all pairs, and return the least distance in [m]."""
+        pin.updateGeometryPlacements(self._model, self._data, self._geometry, self._results)
+        nearest = pin.computeDistances(self._geometry, self._results)
+        return float(self._results.distanceResults[nearest].min_distance)
 
     def nearest(self, within: float, count: int) -> list[Proximity]:
         """Measure, and return the nearest pairs with their gradients.
@@ -112,15 +118,17 @@ class CollisionModel:
         if not self._pairs:
             return []
         distances = self.measure()
-        self.seen = float(distances.min())
-        near = np.flatnonzero(distances < within)
-        chosen = near[np.argsort(distances[near])][:count]
-        return [self._proximity(int(pair), float(distances[pair])) for pair in chosen]
+        self.seen = min(distances)
+        # few enough that sorting plain numbers is quicker than numpy
+        near = sorted(
+            (distance, pair) for pair, distance in enumerate(distances) if distance < within
+        )
+        return [self._proximity(pair, distance) for distance, pair in near[:count]]
 
     def _proximity(self, pair: int, distance: float) -> Proximity:
         result = self._results.distanceResults[pair]
-        normal = np.array(result.normal)  # from the first shape to the second
         first, second = self._parents[pair]
+        normal = result.normal  # from the first shape to the second
         gradient = self._toward(second, result.getNearestPoint2(), normal) - self._toward(
             first, result.getNearestPoint1(), normal
         )
@@ -133,17 +141,9 @@ class CollisionModel:
         jacobian = pin.getJointJacobian(
             self._model, self._data, joint, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
         )
-        lever = _cross(point - self._data.oMi[joint].translation, direction)
-        rows: Array = direction @ jacobian[:3] + lever @ jacobian[3:]
-        return rows
-
-
-def _cross(a: Array, b: Array) -> Array:
-    """Return the cross product of two vectors; numpy's own takes ten times as long for one."""
-    return np.array(
-        [
-            a[1] * b[2] - a[2] * b[1],
-            a[2] * b[0] - a[0] * b[2],
-            a[0] * b[1] - a[1] * b[0],
-        ]
-    )
+        a, b, c = (point - self._data.oMi[joint].translation).tolist()
+        x, y, z = direction.tolist()
+        # the lever crossed with the direction, by hand: numpy's own takes ten times as long
+        wrench = np.array([x, y, z, b * z - c * y, c * x - a * z, a * y - b * x])
+        speeds: Array = wrench @ jacobian
+        return speeds

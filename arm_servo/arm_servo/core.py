@@ -9,33 +9,22 @@ is no event: positions, velocities and accelerations go on from where they are.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from enum import Enum
 
 import numpy as np
 
 from .arrays import Array, checked, frozen, Mask
 from .exceptions import CommandError, GoalCode, NotReadyError
-from .execution import ARRIVED, Execution, ExecutionSettings, Feedback, Outcome, Phase
+from .execution import Execution, ExecutionSettings, Feedback, Outcome, Phase
 from .goal import TrajectoryGoal
 from .guard import Guard
+from .jogging import Jogging
 from .model import Pose, RobotModel
 from .otg import Generator, hard_brake, MotionState
 from .report import Limiter, MotionReport
-from .servo import (
-    Command,
-    JointCommand,
-    PoseCommand,
-    ServoSettings,
-    ServoSource,
-    TwistCommand,
-)
-
-CALM = 0.02
-"""Share of a joint's speed below which a released jog needs no line any more."""
-
-LONGEST = 1.0
-"""Longest time for which a released jog is slowed down along its line in [s]."""
+from .servo import Command, JointCommand, PoseCommand, ServoSettings, TwistCommand
+from .single_target import SingleTarget
 
 
 class Source(Enum):
@@ -97,17 +86,12 @@ class MotionCore:
         self._limits = model.limits
         self._settings = settings or CoreSettings()
         self._generator = Generator(model.limits)
-        self._targets = self._generator
-        self._servo = ServoSource(model, self._settings.servo)
+        self._jogging = Jogging(model, self._settings.servo)
+        self._single = SingleTarget(model.limits, self._generator)
         self._guard = Guard(model, self._generator, self._settings.clearance)
         self._state: MotionState | None = None
         self._source = Source.NONE
-        self._command: Command | None = None
-        self._fresh_until = 0.0
-        self._stale = False
-        self._slowing_since: float | None = None
         self._execution: Execution | None = None
-        self._target: Array | None = None
         self._speed = 1.0
         self._paused = False
 
@@ -268,17 +252,10 @@ class MotionCore:
             NotReadyError: The position of the arm is not known yet.
         """
         values, moved = self._by_joint(positions, 'positions')
-        beyond = moved & ((values < self._limits.lower) | (values > self._limits.upper))
-        if beyond.any():
-            joint = int(np.argmax(beyond))
-            raise CommandError(
-                f'{self._limits.names[joint]}: {values[joint]:.4f} is beyond its limits'
-                f' {self._limits.lower[joint]:.4f}..{self._limits.upper[joint]:.4f}'
-            )
-        rest = self._generator.brake(self.state)
+        rest, limits = self._generator.brake(self.state), self._limits
         stay = self.state.position if rest is None else rest.at(rest.duration).position
-        self._release('a single target took over')
-        self._source, self._target = Source.TARGET, frozen(np.where(moved, values, stay))
+        # where a joint comes to rest was not asked for: it need not be refused
+        self._aim(np.where(moved, values, np.clip(stay, limits.lower, limits.upper)))
 
     def nudge(self, displacements: Mapping[str, float]) -> None:
         """Move joints on by amounts, and rest there; nudges add up while they are carried out.
@@ -291,11 +268,12 @@ class MotionCore:
             NotReadyError: The position of the arm is not known yet.
         """
         values, moved = self._by_joint(displacements, 'displacements')
-        begin = self.state.position if self._target is None else self._target
-        names = self._limits.names
-        self.move_to(
-            {names[place]: begin[place] + values[place] for place in np.flatnonzero(moved)}
-        )
+        pending = self._single.target
+        if pending is not None:
+            self._aim(pending + values)  # what other nudges are on their way to stays
+            return
+        ends, names = self.state.position + values, self._limits.names
+        self.move_to({names[place]: float(ends[place]) for place in np.flatnonzero(moved)})
 
     def stop(self, reason: str = 'stopped') -> None:
         """Come to rest: a trajectory on its path, anything else in the shortest time.
@@ -327,8 +305,6 @@ class MotionCore:
         """
         if not 0.0 <= speed <= 1.0:
             raise CommandError(f'speed override {speed}: it must be between 0 and 1')
-        if speed != self._speed:
-            self._targets = self._generator.slowed(max(speed, 0.01))
         self._speed = speed
 
     def step(self, now: float, period: float, measured: MotionState | None = None) -> SetPoint:
@@ -349,7 +325,7 @@ class MotionCore:
             wanted = self._toward(state, np.zeros(len(self._limits)), period)
         after, limiter = self._guard.step(state, wanted, period, clearances=jogging)
         self._state = after
-        return SetPoint(after, self._ended(after), _with(report, limiter))
+        return SetPoint(after, self._ended(after, now), _with(report, limiter))
 
     @property
     def _pace(self) -> float:
@@ -371,49 +347,37 @@ class MotionCore:
             raise CommandError('jogging is paused; resume first')
         if self._source is not Source.JOG:
             self._release('jogging took over')
-            self._servo.reset()
-        self._source, self._command = Source.JOG, command
-        self._slowing_since = None
-        self._fresh_until = now + (self._settings.timeout if duration is None else duration)
+            self._jogging.begin()
+        self._source = Source.JOG
+        self._jogging.take(
+            command, now + (self._settings.timeout if duration is None else duration)
+        )
+
+    def _aim(self, target: Array) -> None:
+        self._single.check(target)
+        if self._source is not Source.TARGET:
+            self._release('a single target took over')
+        self._source, self._single.target = Source.TARGET, frozen(target)
 
     def _release(self, reason: str) -> None:
         """Take the arm from what moves it; it comes to rest unless something else takes over."""
         if self._source is Source.TRAJECTORY and self._execution is not None:
             self._execution.abandon(Outcome(GoalCode.INVALID_GOAL, reason))
-        self._source, self._command, self._target = Source.NONE, None, None
+        self._jogging.end()
+        self._source, self._single.target = Source.NONE, None
 
     def _wanted(
         self, state: MotionState, measured: MotionState, now: float, period: float
     ) -> tuple[MotionState | None, MotionReport]:
         """Return the next state that the source wants; None to come to rest."""
-        if self._source is Source.JOG and self._command is not None:
-            self._stale = self._paused or now > self._fresh_until
-            command = self._slowing(state, now) if self._stale else self._command
-            if command is None:
-                self._servo.reset()
-                return None, MotionReport()
-            answer = self._servo.step(state, command, period)
-            return self._toward(state, answer.velocity, period), answer.report
+        if self._source is Source.JOG:
+            velocity, report = self._jogging.step(state, now, period, held=self._paused)
+            return (None if velocity is None else self._toward(state, velocity, period)), report
         if self._source is Source.TRAJECTORY and self._execution is not None:
             return self._execution.step(state, measured, self._pace, period), MotionReport()
-        if self._source is Source.TARGET and self._target is not None and self._pace > 0.0:
-            there = MotionState.at_rest(self._target)
-            plan = self._targets.to_state(state, there)
-            if plan is None:
-                return None, MotionReport()
-            return (there if plan.duration <= period else plan.at(period)), MotionReport()
+        if self._source is Source.TARGET:
+            return self._single.step(state, self._pace, period), MotionReport()
         return None, MotionReport()
-
-    def _slowing(self, state: MotionState, now: float) -> Command | None:
-        """Return what slows a stale jog down along its line; None for the last of it."""
-        calm = np.all(np.abs(state.velocity) < CALM * self._limits.velocity)
-        if calm or not isinstance(self._command, TwistCommand):
-            return None
-        if self._slowing_since is None:
-            self._slowing_since = now
-        if now - self._slowing_since > LONGEST:
-            return None
-        return replace(self._command, twist=np.zeros(6))
 
     def _toward(self, state: MotionState, velocity: Array, period: float) -> MotionState:
         plan = self._generator.to_velocity(state, velocity)
@@ -423,20 +387,14 @@ class MotionCore:
             return MotionState.at_rest(plan.at(plan.duration).position)
         return plan.at(period)
 
-    def _ended(self, state: MotionState) -> Source:
+    def _ended(self, state: MotionState, now: float) -> Source:
         """Return what moved the arm in this cycle, and let go of what has ended."""
-        source = self._source
-        execution = self._execution
+        source, execution = self._source, self._execution
         done = source is Source.TRAJECTORY and execution and execution.phase is Phase.DONE
-        arrived = (
-            source is Source.TARGET
-            and self._target is not None
-            and not state.moving
-            and np.allclose(state.position, self._target, atol=ARRIVED)
-        )
-        stale = source is Source.JOG and self._stale and not state.moving
-        if done or arrived or stale:
-            self._source = Source.NONE
+        arrived = source is Source.TARGET and self._single.reached(state)
+        stale = self._paused or self._jogging.stale(now)
+        if done or arrived or (source is Source.JOG and stale and not state.moving):
+            self._release('')
         return source
 
 

@@ -138,7 +138,7 @@ class Description:
             raise ModelError(f'there is no link {link!r} in the description; links: {known}')
 
     def group_joints(self, group: Group, semantic: SemanticDescription) -> list[str]:
-        """Return the movable joints of a group, in its order.
+        """Return the movable joints of a group, from the base out.
 
         Args:
             group: The group.
@@ -160,7 +160,14 @@ class Description:
             names += [name] if self.joints[name].movable else []
         if not names:
             raise ModelError(f'group {group.name}: it has no joint that moves')
-        return list(dict.fromkeys(names))
+        return sorted(dict.fromkeys(names), key=self._depth)
+
+    def _depth(self, joint: str) -> int:
+        """Return how many joints a joint hangs on."""
+        depth, above = 0, self._above.get(self.joints[joint].parent)
+        while above is not None:
+            depth, above = depth + 1, self._above.get(above.parent)
+        return depth
 
 
 def _parse(urdf: str) -> ET.Element:

@@ -12,7 +12,8 @@ import numpy as np
 
 from .exceptions import GoalCode, GoalError
 from .follower import Follower
-from .goal import build_path, GoalRules, JointTolerance, TrajectoryGoal
+from .goal import GoalRules, JointTolerance, TrajectoryGoal
+from .goal_path import build_path
 from .limits import JointLimits
 from .otg import Generator, MotionState
 from .path_clock import PathClock

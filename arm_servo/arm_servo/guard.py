@@ -11,6 +11,9 @@ from .model import RobotModel
 from .otg import Generator, hard_brake, MotionState, Plan
 from .report import Cause, Limiter
 
+BEYOND = 1.3
+"""How far the arm and what it holds reach, in reaches of the tip."""
+
 TOUCH = 1e-4
 """Change of a distance that is let pass, in all, in [m]: sliding along is no approach."""
 
@@ -130,11 +133,12 @@ class Guard:
     def _seen_room(self, stop: Plan, state: MotionState) -> float:
         """Return a lower bound of that from the distances that were seen last.
 
-        No point of the arm moves farther than the joints turn times its reach.
+        No link moves farther against another than the joints turn times the reach of the arm, and
+        of what it holds.
         """
         lower, upper = stop.extremes
         turn = float(np.maximum(upper - state.position, state.position - lower).sum())
-        return self._model.seen_clearance(state.position) - 2.0 * turn * self._model.reach
+        return self._model.seen_clearance(state.position) - BEYOND * turn * self._model.reach
 
     def _brake(self, state: MotionState, period: float) -> MotionState:
         stop = self._generator.brake(state)

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -85,12 +85,10 @@ class RobotModel:
         self.poses = _poses(self.limits, semantic.poses.get(chosen.name, {}))
         self._model = _reduced(description, names)
         self._data = self._model.createData()
-        self._order = [self._model.joints[self._model.getJointId(n)].idx_q for n in names]
-        self._plain = self._order == list(range(len(names)))
         self._tip_frame = self._model.getFrameId(self.tip)
         self._base_frame = self._model.getFrameId(self.base)
-        self._at: Array | None = None
-        self._seen_at: Array | None = None
+        self._at = b''  # positions of the kinematics that are cached
+        self._seen_at = b''
         self._collision = CollisionModel(
             self._model, self._data, description.shapes, semantic.disabled
         )
@@ -141,8 +139,7 @@ class RobotModel:
             self._model, self._data, self._tip_frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
         )
         rotation = self._placement(self._base_frame).rotation
-        turned = turned_twists(rotation, world)
-        return turned if self._plain else turned[:, self._order]
+        return turned_twists(rotation, world)
 
     def nearest(self, positions: Array, within: float, count: int) -> list[Proximity]:
         """Return the nearest pairs of shapes with the gradients of their distances.
@@ -153,11 +150,8 @@ class RobotModel:
             count: How many pairs at most.
         """
         self._update(positions)
-        found = self._collision.nearest(within, count)
         self._seen_at = self._at
-        if self._plain:
-            return found
-        return [replace(p, gradient=p.gradient[self._order]) for p in found]
+        return self._collision.nearest(within, count)
 
     def clearance(self, positions: Array) -> float:
         """Return the least distance between two shapes in [m]; infinity when none are checked.
@@ -167,11 +161,10 @@ class RobotModel:
         """
         if not self._collision.pairs:
             return float('inf')
-        if self._at is not None and np.array_equal(positions, self._at):
-            return float(self._collision.measure().min())
-        pin.forwardKinematics(self._model, self._data, self._pin_order(positions))
-        self._at = None  # the Jacobians are not those of these positions
-        return float(self._collision.measure().min())
+        if positions.tobytes() != self._at:
+            pin.forwardKinematics(self._model, self._data, positions)
+            self._at = b''  # the Jacobians are not those of these positions
+        return self._collision.least()
 
     def seen_clearance(self, positions: Array) -> float:
         """Return the least distance that :meth:`nearest` saw at positions in [m].
@@ -182,7 +175,7 @@ class RobotModel:
         Returns:
             The distance; minus infinity where it was last called elsewhere.
         """
-        if self._seen_at is None or not np.array_equal(positions, self._seen_at):
+        if positions.tobytes() != self._seen_at:
             return -float('inf')
         return self._collision.seen
 
@@ -198,17 +191,11 @@ class RobotModel:
         return self.limits.names.index(joint)
 
     def _update(self, positions: Array) -> None:
-        if self._at is not None and np.array_equal(positions, self._at):
+        at = positions.tobytes()
+        if at == self._at:
             return
-        pin.computeJointJacobians(self._model, self._data, self._pin_order(positions))
-        self._at = np.array(positions)
-
-    def _pin_order(self, positions: Array) -> Array:
-        if self._plain:
-            return positions
-        ordered = np.empty(len(self))
-        ordered[self._order] = positions
-        return ordered
+        pin.computeJointJacobians(self._model, self._data, positions)
+        self._at = at
 
     def _placement(self, frame: int) -> Native:
         return pin.updateFramePlacement(self._model, self._data, frame)

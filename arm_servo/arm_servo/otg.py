@@ -251,7 +251,7 @@ def brakeable_velocity(distance: Array, limits: JointLimits) -> Array:
     Returns:
         Velocities in [rad/s], at most those of the limits.
     """
-    way = np.clip(distance, 0.0, ENDLESS)
+    way = np.minimum(np.maximum(distance, 0.0), ENDLESS)
     a, j = limits.acceleration, limits.jerk
     half = 0.5 * a * a / j
     short = np.cbrt(way * way * j)

@@ -18,6 +18,9 @@ from .velocity_ik import IkAnswer, IkSettings, TwistTask, VelocityIk
 NO_AXES: Mask = np.zeros(6, dtype=np.bool_)
 """Mask of no axis of a twist."""
 
+BASE = np.eye(3)
+"""The axes of the base."""
+
 RELEASED = np.array([2e-3] * 3 + [5e-3] * 3)
 """Speed below which a released axis is held again in [m/s] and [rad/s]."""
 
@@ -178,7 +181,7 @@ class ServoSource:
         if command.axes is not None:
             return command.axes
         if command.link is None:
-            return np.eye(3)
+            return BASE
         return self._model.pose(state.position, command.link).rotation
 
     def _still_moving(self, state: MotionState, axes: Array) -> Mask:
@@ -189,7 +192,8 @@ class ServoSource:
     def _governor(self, error: Array, period: float) -> float:
         """Return the share of the command that is carried out while held axes are off."""
         scale = self._settings.path_error
-        off = max(float(np.abs(error[:3]).max()), self._length * float(np.abs(error[3:]).max()))
+        x, y, z, *turns = error.tolist()
+        off: float = max(map(abs, (x, y, z, *(self._length * turn for turn in turns))))
         wanted = min(1.0, max(LEAST_PACE, 1.0 - (off - scale) / (4.0 * scale)))
         return min(max(wanted, self._share - period / SLOWED), self._share + period / HASTENED)
 

@@ -54,6 +54,11 @@ class Directions:
     share: Array
 
     @property
+    def damped(self) -> bool:
+        """Whether any direction is damped."""
+        return bool(self.damping.any())
+
+    @property
     def least(self) -> float:
         """The smallest singular value."""
         return float(self.values[-1])

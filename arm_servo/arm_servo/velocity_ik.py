@@ -21,7 +21,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from .arrays import Array, Mask
+from .arrays import Array, frozen, Mask
 from .bounds import Bounds, Brakes, BrakeSettings
 from .box_qp import Program
 from .model import RobotModel, turned_twists
@@ -119,6 +119,9 @@ class VelocityIk:
         self._brakes = Brakes(model, self._settings.brakes)
         length = model.reach / 3.0
         self._scale = np.array([1.0 / length] * 3 + [1.0] * 3)
+        self._weighed = b''
+        self._axis_weights = self._scale
+        self._ridge = RIDGE * np.eye(len(model))
         self._sense: Array | None = None
         self._entered: Array | None = None
 
@@ -130,9 +133,7 @@ class VelocityIk:
             task: What is asked.
             period: Time to the next step in [s].
         """
-        weights = np.where(task.commanded, 1.0, self._settings.hold_weight)
-        weights[task.drifting & ~task.commanded] = self._settings.drift_weight
-        weights *= self._scale
+        weights = self._weights(task)
         bounds = self._brakes.bounds(state, period)
         # the directions of the weighted task: how well the command does while held axes stay
         asked = _Weighted(
@@ -142,7 +143,8 @@ class VelocityIk:
         )
         found = directions(asked.jacobian, asked.command, asked.correction, self._limits.velocity)
         hessian = asked.jacobian.T @ asked.jacobian
-        hessian += (found.joints.T * found.damping) @ found.joints
+        if found.damped:
+            hessian += (found.joints.T * found.damping) @ found.joints
         gradient = -((asked.command + asked.correction) @ asked.jacobian)
         way = self._way_out(state, task, weights, found, asked.command)
         if way is not None:
@@ -168,6 +170,15 @@ class VelocityIk:
         hessian = np.diag(weight * weight)
         bounds = self._brakes.bounds(state, period)
         return self._answer(hessian, -(weight * weight * velocity), bounds, asked, None)
+
+    def _weights(self, task: TwistTask) -> Array:
+        """Return the weights of the axes; they change only with what is commanded."""
+        key = task.commanded.tobytes() + task.drifting.tobytes()
+        if key != self._weighed:
+            weights = np.where(task.commanded, 1.0, self._settings.hold_weight)
+            weights[task.drifting & ~task.commanded] = self._settings.drift_weight
+            self._weighed, self._axis_weights = key, frozen(weights * self._scale)
+        return self._axis_weights
 
     def _turned(self, position: Array, axes: Array, weights: Array) -> Array:
         """Return the weighted Jacobian along a task's axes."""
@@ -224,7 +235,7 @@ class VelocityIk:
         found: Directions | None,
     ) -> IkAnswer:
         """Solve, slow down to the joints' speeds, and say what limits."""
-        hessian[np.diag_indices_from(hessian)] += RIDGE
+        hessian += self._ridge
         lower, upper, rows, least = bounds.lower, bounds.upper, bounds.rows, bounds.least
         solution = Program(hessian, gradient, lower, upper, rows, least).solve()
         if solution is None:  # too fast for the rows; standing still is feasible
@@ -250,9 +261,11 @@ class VelocityIk:
 
 def _losses(found: Directions, command: Array, factor: float) -> list[Limiter]:
     """Name what the command loses to directions that the arm lacks here."""
+    if factor > 0.99:
+        return []
     parts = command @ found.tool
     kept = float(np.sum(found.share * parts * parts) / (command @ command))
-    if kept > 0.99 or factor > 0.99:
+    if kept > 0.99:
         return []
     axis = AXES[int(np.argmax(np.abs(command)))]
     return [Limiter(Cause.SINGULARITY, f'{axis} is lost here', found.least, max(kept, 0.0))]

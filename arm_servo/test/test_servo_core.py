@@ -206,7 +206,8 @@ def test_nudges_add_up() -> None:
         core.nudge({'prbt_joint_1': 0.01})
         stream(core, 0.02)
     core.nudge({'prbt_joint_2': 0.02})
-    assert stream(core, 1.0)[-1].state.position[:2] == pytest.approx([0.1, 0.02], abs=1e-9)
+    end = stream(core, 1.0)[-1].state.position
+    assert end[:2] == pytest.approx([0.1, 0.02], abs=1e-9)
     with pytest.raises(CommandError, match='beyond its limits'):
         core.nudge({'prbt_joint_1': 9.0})
 

@@ -194,6 +194,22 @@ def test_unknown_names_are_told_with_the_known_ones() -> None:
         chain('zyy').pose(np.zeros(3), 'hand')
 
 
+def test_joints_go_from_the_base_out() -> None:
+    """A group that lists its joints in another order is the same arm."""
+    urdf, srdf, limits = chain_texts('zyy')
+    listed = srdf.replace(
+        '<chain base_link="base" tip_link="tip"/>',
+        '<joint name="j3"/><joint name="j1"/><joint name="j2"/>',
+    )
+    model = RobotModel(urdf, listed, limits, tip='tip')
+    assert model.joints == ('j1', 'j2', 'j3')
+    at = np.array([0.3, 0.5, 0.9])
+    assert model.jacobian(at) == pytest.approx(chain('zyy').jacobian(at))
+    apart = srdf.replace('<chain base_link="base" tip_link="tip"/>', '<joint name="j2"/>')
+    with pytest.raises(ModelError, match='does not hang on'):
+        RobotModel(urdf, apart, limits, tip='base')
+
+
 def test_a_limits_file_that_is_none(tmp_path: Any) -> None:
     """A file without the table, or no file at all, is told with its path."""
     path = tmp_path / 'limits.yaml'
