@@ -16,6 +16,8 @@ from geometry_msgs.msg import Twist, TwistStamped
 from policy_export import joined
 from processes import RunningProcess
 import pytest
+from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
+from rcl_interfaces.srv import SetParameters
 from ros_client import RosClient
 from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import String
@@ -98,6 +100,15 @@ class Robot:
         """Ask for a mode."""
         return self.client.call(SetMode, 'set_mode', SetMode.Request(mode=mode))
 
+    def tune(self, **values: float) -> Any:
+        """Set parameters of the node."""
+        request = SetParameters.Request()
+        for name, number in values.items():
+            value = ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=number)
+            request.parameters.append(Parameter(name=name, value=value))
+        service = 'controller_node/set_parameters'
+        return self.client.call(SetParameters, service, request).results[0]
+
     def until_state(self, state: str) -> None:
         """Wait for a state."""
         self.client.spin_until(
@@ -124,10 +135,14 @@ def test_from_lying_to_walking_and_back(robot: Robot) -> None:
     robot.until_ready()
     assert list(robot.commands[0].position) == pytest.approx(FOLDED, abs=1e-6)
     assert 'gait:crawl' in robot.mode('dance').message
+    assert not robot.tune(nominal_height=0.9).successful
+    assert 'do not reach' in robot.tune(nominal_height=0.2).reason
+    assert robot.tune(swing_height=0.025).successful
     assert robot.mode('stand').success
     robot.until_state('stand')
     assert robot.mode('walk').success
     robot.until_state('walk')
+    assert 'not in walk' in robot.tune(swing_height=0.02).reason
     node = robot.client.node
     message = TwistStamped()
     message.twist.linear.x = 0.2
@@ -215,6 +230,7 @@ def test_silence_is_a_fault_that_is_cleared_by_its_service(robot: Robot) -> None
         ('gait:=gallop', "gait 'gallop' is none of trot, crawl, pace"),
         ('nominal_height:=0.5', 'do not reach'),
         ('loop_rate:=50', 'decimal point'),
+        ('arm_pose:=[0.5, 1.0]', 'arm_pose has 2 positions'),
     ],
 )
 def test_odd_parameters_end_the_node_with_a_reason(

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 import pytest
 
-from quad_controller.exceptions import ParameterError
+from quad_controller.exceptions import DescriptionError, ParameterError
 from quad_controller.gait.body import BodyPose
 from quad_controller.gait.generator import GaitGenerator
 from quad_controller.gait.parameters import GaitParameters
@@ -123,6 +123,28 @@ def test_the_same_gait_by_all_of_its_names() -> None:
     answer = rig.controller.set_mode('dance')
     assert not answer.accepted
     assert all(mode in answer.message for mode in MODES)
+
+
+def test_the_gait_is_tuned_while_nothing_walks() -> None:
+    """Lying, another height is taken and stood up to; on its legs the robot refuses it."""
+    rig = standing()
+    higher = GaitParameters(nominal_height=0.1)
+    assert 'not in stand' in rig.controller.retune(higher).message
+    rig.ask('gait:crawl')
+    rig.until(State.WALK)
+    rig.ask('lie')
+    rig.run(2.0)
+    assert rig.controller.retune(higher).accepted
+    rig.ask('walk')
+    rig.until(State.WALK)
+    rig.run(1.0, Velocity(0.03))
+    assert rig.controller.status.gait.value == 'crawl'
+    assert rig.controller.status.velocity.x == pytest.approx(0.03)
+    rig.run(3.0)
+    height = ROBOT.legs[0].hip[2] - ROBOT.feet(rig.positions)[0][2]
+    assert height == pytest.approx(0.1, abs=1e-4)
+    with pytest.raises(DescriptionError):
+        Rig().controller.retune(GaitParameters(nominal_height=0.5))
 
 
 def test_a_velocity_that_is_too_much_is_told_once() -> None:

@@ -46,6 +46,7 @@ class GaitGenerator:
         clamped: Whether that is less than was asked for.
         pose: Pose of the body over its feet at the moment.
         gait: The gait at the moment.
+        wanted_gait: The gait that was chosen, which begins at rest.
         others: Positions of all joints; those that are no legs' are sent as they are [rad].
     """
 
@@ -68,7 +69,7 @@ class GaitGenerator:
         self._limits = parameters.velocity_limits
         self._centre = robot.hip_centre
         self._neutral = self._stance()
-        self.gait = self._wanted_gait = Gait.TROT
+        self.gait = self.wanted_gait = Gait.TROT
         self._stepper = Stepper(
             parameters.schedule(self.gait),
             self._neutral,
@@ -102,7 +103,7 @@ class GaitGenerator:
 
     def choose(self, gait: Gait) -> None:
         """Change the gait; the robot stops for it when it walks."""
-        self._wanted_gait = gait
+        self.wanted_gait = gait
 
     def reset(self) -> None:
         """Stand, at once; for when something else has moved the joints."""
@@ -144,9 +145,9 @@ class GaitGenerator:
         return GaitStep(targets, contacts, all(solution.reachable for solution in solutions))
 
     def _advance_velocity(self, velocity: Velocity, dt: float) -> None:
-        if self._wanted_gait is not self.gait:
+        if self.wanted_gait is not self.gait:
             if self.standing:
-                self.gait = self._wanted_gait
+                self.gait = self.wanted_gait
                 self._stepper.schedule = self._parameters.schedule(self.gait)
             velocity = REST
         self.goal = goal = self._within_schedule(self._limits.clamp(velocity))

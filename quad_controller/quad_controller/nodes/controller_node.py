@@ -9,8 +9,10 @@ import threading
 
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Pose, Twist, TwistStamped
+from rcl_interfaces.msg import SetParametersResult
 import rclpy
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from rclpy.qos import (
     DurabilityPolicy,
     HistoryPolicy,
@@ -38,7 +40,7 @@ from ..states.status import EventKind, Output, Status
 from . import messages
 from .control_loop import ControlLoop
 from .diagnostics import loop_diagnostic, state_diagnostic
-from .parameters import declare_parameters
+from .parameters import changed_gait, declare_parameters
 from .spinning import spin, stop_on_signals
 
 COMMAND_QOS = QoSProfile(
@@ -93,6 +95,8 @@ class ControllerNode(Node):
         self._subscribe()
         self.create_service(SetMode, 'set_mode', self._set_mode)
         self.create_service(Trigger, '~/clear_fault', self._clear_fault)
+        self._gait = settings.gait
+        self.add_on_set_parameters_callback(self._tune)
         self.create_timer(settings.diagnostics_period, self._diagnose)
         robot = settings.robot
         self.get_logger().info(
@@ -187,6 +191,21 @@ class ControllerNode(Node):
         response.success, response.message = answer.accepted, answer.message
         self.get_logger().info(f'clear_fault: {answer.message}')
         return response
+
+    def _tune(self, parameters: list[Parameter]) -> SetParametersResult:
+        """Take another tuning of the gait, or say why not."""
+        values = {parameter.name: parameter.value for parameter in parameters}
+        try:
+            gait = changed_gait(self._gait, values)
+            if gait is None:
+                return SetParametersResult(successful=True)
+            with self._loop.lock:
+                answer = self._controller.retune(gait)
+        except QuadControllerError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        if answer.accepted:
+            self._gait = gait
+        return SetParametersResult(successful=answer.accepted, reason=answer.message)
 
     def _diagnose(self) -> None:
         self._publish_diagnostics(self._status())

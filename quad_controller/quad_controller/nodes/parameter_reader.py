@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
 from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 
 from ..exceptions import ParameterError
 
@@ -18,7 +19,7 @@ T = TypeVar('T')
 
 
 class ParameterReader:
-    """Declares one parameter after the other; all are read at the start only."""
+    """Declares one parameter after the other; most are read at the start only."""
 
     def __init__(self, node: Node) -> None:
         """Declare for a node."""
@@ -32,16 +33,26 @@ class ParameterReader:
         """Declare and read a yes or no."""
         return bool(self._declare(name, default, ParameterDescriptor(description=meaning)))
 
-    def number(self, name: str, default: float, span: tuple[float, float], meaning: str) -> float:
-        """Declare and read a number within a range."""
+    def number(
+        self,
+        name: str,
+        default: float,
+        span: tuple[float, float],
+        meaning: str,
+        *,
+        fixed: bool = True,
+    ) -> float:
+        """Declare and read a number within a range; one that is not fixed may be set later."""
         limits = [FloatingPointRange(from_value=span[0], to_value=span[1])]
         descriptor = ParameterDescriptor(description=meaning, floating_point_range=limits)
-        return float(self._declare(name, default, descriptor))
+        return float(self._declare(name, default, descriptor, fixed=fixed))
 
     def numbers(self, name: str, meaning: str) -> tuple[float, ...]:
         """Declare and read a list of numbers, none by default."""
-        value = self._declare(name, [0.0][:0], ParameterDescriptor(description=meaning, type=8))
-        return tuple(float(number) for number in value)
+        # an empty list would be one of bytes; a type without a value may stay unset
+        kind = Parameter.Type.DOUBLE_ARRAY
+        value = self._declare(name, kind, ParameterDescriptor(description=meaning))
+        return tuple(float(number) for number in value or ())
 
     def choice(self, name: str, default: str, values: Mapping[str, T], meaning: str) -> T:
         """Declare and read one of several names; return what it stands for.
@@ -54,8 +65,10 @@ class ParameterReader:
             raise ParameterError(f'{name} {chosen!r} is none of {", ".join(values)}')
         return values[chosen]
 
-    def _declare(self, name: str, default: object, descriptor: ParameterDescriptor) -> Any:  # noqa: ANN401
-        descriptor.read_only = True
+    def _declare(  # a parameter's value may be of any type
+        self, name: str, default: object, descriptor: ParameterDescriptor, *, fixed: bool = True
+    ) -> Any:  # noqa: ANN401
+        descriptor.read_only = fixed
         try:
             return self._node.declare_parameter(name, default, descriptor).value
         except InvalidParameterTypeException as error:

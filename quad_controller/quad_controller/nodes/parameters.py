@@ -5,7 +5,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 from rclpy.node import Node
 
@@ -125,6 +126,20 @@ def declare_parameters(node: Node) -> NodeSettings:
     return settings
 
 
+def changed_gait(gait: GaitParameters, values: Mapping[str, object]) -> GaitParameters | None:
+    """Return a tuning with what parameters say of it; None when they say nothing.
+
+    Args:
+        gait: The tuning of now.
+        values: Values of some parameters by their names.
+
+    Raises:
+        ParameterError: A value does not make sense.
+    """
+    changes: dict[str, Any] = {name: values[name] for name in GAIT_MEANINGS if name in values}
+    return replace(gait, **changes) if changes else None
+
+
 def _robot(read: ParameterReader) -> Quadruped:
     text = read.text('robot_description', '', 'URDF as XML text; empty: of quad_description')
     presets = {name: name for name in PRESETS}
@@ -136,7 +151,7 @@ def _robot(read: ParameterReader) -> Quadruped:
 def _gait(read: ParameterReader) -> GaitParameters:
     default = GaitParameters()
     values = {
-        name: read.number(name, getattr(default, name), RANGES[name], meaning)
+        name: read.number(name, getattr(default, name), RANGES[name], meaning, fixed=False)
         for name, meaning in GAIT_MEANINGS.items()
     }
     return GaitParameters(**values, servo=_servo(read), body=BodyLimits())

@@ -73,6 +73,7 @@ class Controller:
         poses = Poses(robot, states.lie_height, arm_pose)
         self._generator = GaitGenerator(robot, gait, poses.typical)
         self._generator.choose(first_gait)
+        self._robot = robot
         self._policy, self._policy_refusal = policy, policy_refusal
         self._machine = StateMachine(poses, self._generator, states, policy)
         self._shadow = Shadow(policy) if policy is not None and dry_run else None
@@ -120,6 +121,24 @@ class Controller:
         self._latch.clear()
         machine.clear()
         return Answer(True, f'cleared; the mode is {machine.state.value}')
+
+    def retune(self, gait: GaitParameters) -> Answer:
+        """Walk with another tuning from now on; only while the robot is not on its legs.
+
+        Args:
+            gait: The new tuning.
+
+        Raises:
+            DescriptionError: The legs do not reach its height.
+        """
+        state = self._machine.state
+        if state not in {State.RELAX, State.LIE} or self._machine.goal is not state:
+            return Answer(False, f'the gait is tuned lying or relaxed, and not in {state.value}')
+        generator = GaitGenerator(self._robot, gait, self._generator.others)
+        generator.choose(self._generator.wanted_gait)
+        self._generator = generator
+        self._machine.retune(generator)
+        return Answer(True, 'tuned')
 
     @property
     def status(self) -> Status:

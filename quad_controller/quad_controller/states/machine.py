@@ -105,6 +105,13 @@ class StateMachine:
         """Whether the gait's last step was within the legs' reach."""
         return self.motion is not self._walk or self._walk.reachable
 
+    def retune(self, generator: GaitGenerator) -> None:
+        """Walk with another generator from now on; for when no leg is walking."""
+        walk = Walk(generator)
+        if self.motion is self._walk:
+            self.motion = walk
+        self._generator, self._walk = generator, walk
+
     def hold(self, last: Targets) -> None:
         """Stay at some targets [rad]."""
         self.motion = Hold(last, self._parameters.hold_band)
