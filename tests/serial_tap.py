@@ -121,12 +121,12 @@ class SerialTap:
             self._pass_speed_on()
             ready, _, _ = select.select([self._robot, self._bridge], [], [], POLL)
             if self._bridge in ready:
-                data = os.read(self._bridge, 4096)
+                data = _receive(self._bridge)
                 for frame in self._host.feed(data):
                     self._take(frame)
                 _send(self._robot, data)
             if self._robot in ready:
-                data = os.read(self._robot, 4096)
+                data = _receive(self._robot)
                 frames = self._pushed.feed(data)
                 self.reports += [time.monotonic() for each in frames if each.kind is Kind.PUSH]
                 _send(self._bridge, data)
@@ -143,6 +143,13 @@ class SerialTap:
             motors = (round(motor) for motor in fields['motor'])
             angles = dict(zip(motors, fields['angle'], strict=True))
             self.targets.append(Target(time.monotonic(), angles))
+
+
+def _receive(end: int) -> bytes:
+    """Read from a line; what was announced may be flushed away by a change of speed."""
+    with suppress(BlockingIOError):
+        return os.read(end, 4096)
+    return b''
 
 
 def _send(end: int, data: bytes) -> None:

@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 import math
 import os
+import re
 import sys
 import threading
 
@@ -19,6 +20,7 @@ from process_supervisor import (
     LineWriter,
     Outcome,
     Painter,
+    ProcessSpec,
     Runner,
     SupervisorError,
     USAGE_ERROR,
@@ -97,6 +99,24 @@ def commands(domain: str, port: str) -> list[str]:
     ]
 
 
+def without_readiness(
+    processes: Sequence[ProcessSpec], take: Callable[[str, str], None]
+) -> Callable[[str, str], None]:
+    """Leave out the lines by which processes say that they are ready: the supervisor says so.
+
+    Args:
+        processes: What runs.
+        take: Takes all other lines, with the name of the process first.
+    """
+    ready = {spec.name: re.compile(spec.ready) for spec in processes if spec.ready}
+
+    def line(name: str, text: str) -> None:
+        if name not in ready or not ready[name].search(text):
+            take(name, text)
+
+    return line
+
+
 def run(quad: Session, mode: str, duration: float | None) -> int:
     """Run the demo.
 
@@ -120,7 +140,10 @@ def run(quad: Session, mode: str, duration: float | None) -> int:
     play = Play(display, mode, duration)
     try:
         with Runner(
-            quad.processes, display.line, display.notice, on_interrupt=play.leave
+            quad.processes,
+            without_readiness(quad.processes, display.line),
+            display.notice,
+            on_interrupt=play.leave,
         ) as runner:
             make_client = partial(join_ros, quad.joints)
             thread = threading.Thread(target=play.run, args=[runner, make_client], name='play')

@@ -47,7 +47,7 @@ def progress_line(figures: Figures) -> str:
     Args:
         figures: The latest.
     """
-    if figures.state == UNKNOWN:
+    if figures.state == UNKNOWN or math.isnan(figures.rhythm.rate):
         return 'waiting for the controller'
     speed = figures.measured or figures.odometry
     return (
