@@ -35,6 +35,7 @@ setup(
     entry_points={
         'console_scripts': [
             'bringup = arm_bringup.bringup:main',
+            'check = arm_bringup.check:main',
             'demo = arm_bringup.demo.main:main',
             'wave_master = arm_bringup.wave_master:main',
         ],

@@ -8,6 +8,10 @@
       bus.yml               the CANopen bus, in ros2_canopen's format
       *.eds                 what bus.yml names
       <robot>.urdf.xacro    the description; its joints have the names of the devices in bus.yml
+      <robot>.srdf          for motion: the group that is moved, and its poses; "ready" is where
+                            to start from
+      limits.yaml           for motion: speeds, accelerations and jerks, in MoveIt's format
+      controllers.yaml      for motion, optional: parameters of the nodes that move the arm
 
 A robot is asked for by name, which means a folder that this package installs, or by a path, which
 means a folder of the user's own.
@@ -38,6 +42,31 @@ class Robot:
     name: str
     bus_config: Path
     description: Path
+
+    @property
+    def folder(self) -> Path:
+        """The folder."""
+        return self.bus_config.parent
+
+    @property
+    def semantic(self) -> Path:
+        """Its SRDF, if it is there."""
+        return self.folder / f'{self.name}.srdf'
+
+    @property
+    def limits(self) -> Path:
+        """Its limits of motion, if they are there."""
+        return self.folder / 'limits.yaml'
+
+    @property
+    def controllers(self) -> Path:
+        """Parameters of the nodes that move it, if they are there."""
+        return self.folder / 'controllers.yaml'
+
+    @property
+    def movable(self) -> bool:
+        """Whether it has all that trajectories and jogging need."""
+        return self.semantic.is_file() and self.limits.is_file()
 
 
 def installed_robots_folder() -> Path:

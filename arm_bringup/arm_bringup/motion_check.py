@@ -1,0 +1,124 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The part of the check that needs kinematics: group, limits, and the pose to start from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any, TYPE_CHECKING
+
+import yaml
+
+from .findings import error, Finding, warning
+from .robots import Robot
+
+if TYPE_CHECKING:
+    from arm_servo import RobotModel
+
+START = 'ready'
+"""Pose of the SRDF from which an arm starts."""
+SINGULAR = 0.05
+"""Least singular value of the Jacobian, lengths divided by the reach, of a good start."""
+CLEARANCE = 0.01
+"""Least distance between links at the start in [m]."""
+
+
+def check_motion(robot: Robot, urdf: str, joints: Sequence[str]) -> list[Finding]:
+    """Look at the files that trajectories and jogging need.
+
+    Args:
+        robot: The robot; its SRDF and its limits exist.
+        urdf: Its description.
+        joints: Names of the movable joints in it.
+    """
+    try:
+        from arm_servo import load_limits, RobotModel, ServoError
+    except ImportError as problem:
+        return [
+            warning(
+                robot.semantic.name,
+                f'motion is not checked: {problem}',
+                'make build builds arm_servo and gets what it needs; then source env.sh',
+            )
+        ]
+    try:
+        limits = load_limits(robot.limits)
+        findings = list(_limits(robot, limits, joints))
+        model = RobotModel(urdf, robot.semantic.read_text(encoding='utf-8'), limits)
+    except ServoError as problem:
+        remedy = 'description, SRDF and limits must name the same joints; see robots/gp110/'
+        return [error(f'{robot.semantic.name} and {robot.limits.name}', str(problem), remedy)]
+    findings += [
+        warning(robot.semantic.name, note, 'mend it, or leave it') for note in model.notes
+    ]
+    findings += _start(robot, model)
+    findings += _controllers(robot, model)
+    return findings
+
+
+def _limits(robot: Robot, limits: Any, joints: Sequence[str]) -> Iterable[Finding]:  # noqa: ANN401  # YAML
+    for name in limits:
+        if name not in joints:
+            yield error(
+                f'{robot.limits.name}, {name}',
+                f'{robot.description.name} has no such joint',
+                f'take it out, or name it as the joint; joints: {", ".join(joints)}',
+            )
+
+
+def _start(robot: Robot, model: RobotModel) -> Iterable[Finding]:
+    import numpy as np
+
+    place = f'{robot.semantic.name}, pose {START!r}'
+    if START not in model.poses:
+        known = ', '.join(model.poses) or 'none'
+        yield error(
+            robot.semantic.name,
+            f'group {model.group} has no pose {START!r} to start from; poses: {known}',
+            f'add <group_state name="{START}" group="{model.group}"> with all its joints',
+        )
+        return
+    start = model.poses[START]
+    jacobian = np.array(model.jacobian(start))
+    jacobian[:3] /= model.reach
+    least = float(np.linalg.svd(jacobian, compute_uv=False)[min(jacobian.shape) - 1])
+    if least < SINGULAR:
+        yield error(
+            place,
+            f'it is singular (least singular value {least:.4f}): some directions cannot be jogged',
+            'bend the elbow and the wrist, by 90 degrees for instance',
+        )
+    clearance = model.clearance(start)
+    if clearance < CLEARANCE:
+        pair = model.nearest(start, CLEARANCE, 1)[0].links
+        yield error(
+            place,
+            f'{pair[0]} and {pair[1]} are {1e3 * clearance:.0f} mm apart'
+            if clearance > 0.0
+            else f'{pair[0]} and {pair[1]} collide, by {-1e3 * clearance:.0f} mm',
+            'move them apart, or disable the pair in the SRDF if they can never meet',
+        )
+
+
+def _controllers(robot: Robot, model: RobotModel) -> Iterable[Finding]:
+    if not robot.controllers.is_file():
+        return
+    place = robot.controllers.name
+    try:
+        table = yaml.safe_load(robot.controllers.read_text(encoding='utf-8'))
+        manager = table.get('controller_manager', {}).get('ros__parameters', {})
+        name = manager.get('controller_name', f'{model.group}_controller')
+        constraints = table.get(name, {}).get('ros__parameters', {}).get('constraints', {})
+    except (yaml.YAMLError, AttributeError) as problem:
+        yield error(place, f'not a parameter file: {problem}', 'see robots/gp110/controllers.yaml')
+        return
+    if name not in table:
+        known = ', '.join(table)
+        yield warning(place, f'no parameters of {name!r}; nodes: {known}', f'name one {name}')
+    for joint, values in constraints.items():
+        if isinstance(values, dict) and joint not in model.joints:
+            yield error(
+                f'{place}, {name}, constraints',
+                f'group {model.group} has no joint {joint!r}',
+                f'joints: {", ".join(model.joints)}',
+            )

@@ -1,0 +1,87 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What the check says of good robot folders, and of each mistake."""
+
+from __future__ import annotations
+
+from pathlib import Path
+import shutil
+
+import pytest
+
+from arm_bringup.check import check_robot, main
+from arm_bringup.findings import Severity
+from arm_bringup.robots import find_robot, Robot
+
+ROBOTS = Path(__file__).parents[1] / 'robots'
+ERROR, WARNING = Severity.ERROR, Severity.WARNING
+
+
+@pytest.fixture
+def robot(tmp_path: Path) -> Robot:
+    """Copy a robot, to break it."""
+    shutil.copytree(ROBOTS / 'gp110', tmp_path / 'gp110')
+    return find_robot('gp110', tmp_path)
+
+
+def replace(path: Path, old: str, new: str) -> None:
+    """Change a file."""
+    text = path.read_text(encoding='utf-8')
+    assert old in text
+    path.write_text(text.replace(old, new), encoding='utf-8')
+
+
+@pytest.mark.parametrize('name', ['panda', 'prbt', 'gp110'])
+def test_nothing_is_wrong_with_our_robots(name: str) -> None:
+    """Neither errors nor warnings."""
+    assert check_robot(find_robot(name, ROBOTS)) == []
+
+
+@pytest.mark.parametrize(
+    ('file', 'old', 'new', 'expected'),
+    [
+        ('bus.yml', ' joint_2_l:', ' joint_x:', [(ERROR, 'joint_x'), (WARNING, 'joint_2_l')]),
+        ('bus.yml', 'cia402_slave.eds', 'lost.eds', [(ERROR, 'lost.eds')]),
+        ('gp110.urdf.xacro', '</robot>', '', [(ERROR, 'gp110.urdf.xacro')]),
+        ('limits.yaml', '  joint_3_u:\n', '  joint_3:\n', [(ERROR, 'joint_3')]),
+        ('gp110.srdf', '"tool0"', '"tool9"', [(ERROR, 'tool9')]),
+        ('gp110.srdf', 'name="ready"', 'name="home"', [(ERROR, 'no pose')]),
+        ('gp110.srdf', 'value="-1.5708"', 'value="0"', [(ERROR, 'singular')]),
+        ('gp110.srdf', 'value="-1.5708"', 'value="-9"', [(WARNING, 'beyond'), (ERROR, 'no pose')]),
+        (
+            'gp110.srdf',
+            '<disable_collisions link1="link_4_r" link2="link_5_b" reason="Adjacent"/>',
+            '',
+            [(ERROR, 'collide')],
+        ),
+        ('controllers.yaml', 'joint_6_t:', 'joint_6:', [(ERROR, "no joint 'joint_6'")]),
+        ('controllers.yaml', 'gp110_arm_controller:\n', 'arm:\n', [(WARNING, 'no parameters')]),
+    ],
+)
+def test_each_mistake_is_found(
+    robot: Robot, file: str, old: str, new: str, expected: list[tuple[Severity, str]]
+) -> None:
+    """Every finding names the place, says what is wrong, and what to do."""
+    replace(robot.folder / file, old, new)
+    found = check_robot(robot)
+    for severity, words in expected:
+        assert any(each.severity is severity and words in str(each) for each in found), found
+    assert all(each.place and each.remedy for each in found)
+
+
+def test_without_the_files_of_motion(robot: Robot) -> None:
+    """A robot that only its drives' services move is complete; that is warned of."""
+    robot.semantic.unlink()
+    robot.limits.unlink()
+    (finding,) = check_robot(robot)
+    assert finding.severity is WARNING
+    assert 'gp110.srdf and limits.yaml' in finding.problem
+
+
+def test_exit_code(robot: Robot, capsys: pytest.CaptureFixture[str]) -> None:
+    """0 when all is well, 1 with an error, 2 for what is no robot."""
+    assert main([f'{robot.folder}/']) == 0
+    replace(robot.folder / 'bus.yml', '  joint_2_l:\n', '  joint_2_x:\n')
+    assert main([f'{robot.folder}/']) == 1
+    assert '1 errors, 1 warnings' in capsys.readouterr().out
+    assert main(['./nowhere/']) == 2
