@@ -22,6 +22,8 @@ setup(
     entry_points={
         'console_scripts': [
             'motion_master = arm_servo.nodes.motion_master:main',
+            'servo_node = arm_servo.nodes.servo_node:main',
+            'trajectory_controller = arm_servo.nodes.trajectory_program:main',
             'servo_gamepad = arm_servo.teleop.servo_gamepad:main',
             'servo_keyboard_input = arm_servo.teleop.servo_keyboard_input:main',
         ],

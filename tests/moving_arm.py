@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from isolation import Isolation
+    from ros_client import RosClient
 
 READY = [0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785]
 """A pose of the Panda from which it can move in every direction in [rad]."""
@@ -78,7 +79,7 @@ class MovingArm(SimulatedArm):
 
     def send(self, goal: FollowJointTrajectory.Goal) -> GoalRun:
         """Send a goal; it is accepted."""
-        return GoalRun(self, goal)
+        return GoalRun(self.client, goal)
 
 
 class GoalRun:
@@ -88,18 +89,18 @@ class GoalRun:
         feedback: What was fed back so far.
     """
 
-    def __init__(self, arm: SimulatedArm, goal: FollowJointTrajectory.Goal) -> None:
+    def __init__(self, client: RosClient, goal: FollowJointTrajectory.Goal) -> None:
         """Send it and wait until it is accepted."""
         self.feedback: list[Any] = []
-        self._arm = arm
+        self._client = client
         self._action = ActionClient(
-            arm.client.node, FollowJointTrajectory, f'{CONTROLLER}/follow_joint_trajectory'
+            client.node, FollowJointTrajectory, f'{CONTROLLER}/follow_joint_trajectory'
         )
         assert self._action.wait_for_server(20.0)
         sent = self._action.send_goal_async(
             goal, lambda message: self.feedback.append(message.feedback)
         )
-        arm.client.spin_until(sent.done, 10.0, 'acceptance')
+        client.spin_until(sent.done, 10.0, 'acceptance')
         self._handle = sent.result()
         assert self._handle.accepted
         self._result = self._handle.get_result_async()
@@ -107,7 +108,7 @@ class GoalRun:
     def cancel(self) -> None:
         """Ask it to end."""
         future = self._handle.cancel_goal_async()
-        self._arm.client.spin_until(future.done, 10.0, 'answer to the cancel')
+        self._client.spin_until(future.done, 10.0, 'answer to the cancel')
 
     @property
     def done(self) -> bool:
@@ -116,7 +117,7 @@ class GoalRun:
 
     def wait(self, timeout: float = 20.0) -> tuple[int, FollowJointTrajectory.Result]:
         """Wait for its end; return status and result."""
-        self._arm.client.spin_until(self._result.done, timeout, 'end of the goal')
+        self._client.spin_until(self._result.done, timeout, 'end of the goal')
         answer = self._result.result()
         return answer.status, answer.result
 

@@ -20,9 +20,11 @@ from arm_canopen.nodes.misspelt import refuse_misspelt
 
 from ..core import CoreSettings, MotionCore
 from ..exceptions import ModelError, NotReadyError, ServoError
+from .controller_manager import ControllerManager, trajectory_entry
 from .declare import Declarations
 from .desk import Desk
 from .drive_source import DriveSource
+from .joint_state_broadcaster import JointStateBroadcaster
 from .robot_parameters import declare_robot, same_robot
 from .servo import Servo
 from .servo_parameters import declare_servo
@@ -52,30 +54,42 @@ class Motion:
         Raises:
             ModelError: The parameters do not make an arm, or it has joints without a drive.
         """
-        manager = Node('controller_manager')
+        self._manager = manager = Node('controller_manager')
         model = declare_robot(manager)
-        name = Declarations(manager).text(
+        declare = Declarations(manager)
+        name = declare.text(
             'controller_name', f'{model.group}_controller', 'name of the trajectory controller'
         )
+        broadcasts = declare.flag(
+            'publish_joint_states', 'publish /joint_states and /dynamic_joint_states', default=True
+        )
         self._check_drives(master, model.joints)
-        controller = Node(name)
-        trajectory = declare_trajectory(controller, model.joints)
-        servo = Node('servo_node')
-        same_robot(servo, model)
-        jogging = declare_servo(servo, model.group)
-        for node in (manager, controller, servo):
-            refuse_misspelt(node)
         self._master = master
+        controller, servo = Node(name), Node('servo_node')
+        broadcaster = Node('joint_state_broadcaster')
+        self.nodes = [manager, controller, servo, broadcaster]
+        same_robot(servo, model)
+        trajectory = declare_trajectory(controller, model.joints)
+        jogging = declare_servo(servo, model.group)
         settings = CoreSettings(jogging.settings, trajectory.execution, jogging.timeout)
         self._desk = Desk(MotionCore(model, settings))
         self._source = DriveSource(self._desk)
-        self.nodes = [manager, controller, servo]
         self._servo = Servo(servo, self._desk, jogging, self._prepare)
         self._controller = TrajectoryController(controller, self._desk, trajectory, self._prepare)
+        self._broadcaster = JointStateBroadcaster(broadcaster, self._desk, active=broadcasts)
+        period = master.bus.master.sync_period
+        self._switch = ControllerManager(
+            manager,
+            [
+                trajectory_entry(name, model.joints, period, self._controller.set_active),
+                self._broadcaster.entry(),
+            ],
+        )
+        for node in self.nodes:
+            refuse_misspelt(node)
         for note in model.notes:
             manager.get_logger().warning(note)
         self._attaching = manager.create_timer(ATTACH_PERIOD, self._attach_first)
-        self._manager = manager
 
     @staticmethod
     def _check_drives(master: MasterProcess, joints: Sequence[str]) -> None:

@@ -17,7 +17,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from trajectory_msgs.msg import JointTrajectory
 
-from ..core import Source
+from ..core import MotionCore, Source
 from ..exceptions import NotReadyError, ServoError
 from ..execution import Execution
 from ..goal import TrajectoryGoal
@@ -77,6 +77,17 @@ class TrajectoryController:
         )
         if parameters.speed != 1.0:
             self._override(parameters.speed)
+
+    def set_active(self, active: bool) -> None:  # a callback of the manager
+        """Take trajectories, or stop on the path and take none."""
+        self.active = active
+
+        def stop(core: MotionCore, _now: float) -> None:
+            if core.source is Source.TRAJECTORY:
+                core.stop('the controller was deactivated')
+
+        if not active:
+            self._desk.submit(stop, moves=False)
 
     @property
     def _now(self) -> float:

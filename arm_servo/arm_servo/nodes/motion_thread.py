@@ -1,0 +1,126 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The motion core in a thread of its own, for drives that are commanded over topics."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import threading
+import time
+
+import numpy as np
+
+from ..core import SetPoint, Source
+from ..otg import MotionState
+from .desk import Desk
+from .joint_feedback import JointFeedback
+
+RESYNC = 0.02
+"""How far the arm may have been moved by others before a motion begins at its place, in [rad]."""
+
+LAST_STOP = 3.0
+"""Longest time for the arm to come to rest at the end of the program in [s]."""
+
+LATE = 10
+"""Periods by which the thread may be late before it lets cycles go."""
+
+
+class MotionCycle:
+    """What is done in a cycle; reads no clock."""
+
+    def __init__(
+        self, desk: Desk, feedback: JointFeedback, output: Callable[[SetPoint], None]
+    ) -> None:
+        """Wait for the arm.
+
+        Args:
+            desk: The core's desk.
+            feedback: The arm's measured state.
+            output: Takes the set-points while something moves, and the last at rest.
+        """
+        self._desk, self._feedback, self._output = desk, feedback, output
+        self._following = False
+        self._lost = ''
+        self._quiet = True
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether nothing moves."""
+        return not self._following or self._quiet
+
+    def step(self, now: float, period: float) -> None:
+        """Run a cycle.
+
+        Args:
+            now: Steady time in [s].
+            period: Time to the next cycle in [s].
+        """
+        measured, blocked = self._feedback.state(now)
+        if not self._following and not blocked and measured is not None:
+            self._desk.begin(measured.position)
+            self._following, self._lost = True, ''
+        if not self._following or measured is None:
+            self._desk.idle(now, measured, blocked)
+            return
+        if self._quiet and not blocked:
+            self._resync(measured)
+        if blocked and not self._lost:
+            self._lost = blocked
+            self._desk.fail(blocked)
+        self._put(self._desk.step(now, period, measured, self._lost))
+
+    def _resync(self, measured: MotionState) -> None:
+        """Begin where the arm is when others have moved it meanwhile."""
+        point = self._desk.snapshot.set_point
+        if point is None or np.abs(measured.position - point.state.position).max() > RESYNC:
+            self._desk.begin(measured.position)
+
+    def _put(self, point: SetPoint) -> None:
+        idle = point.source is Source.NONE and not point.state.moving
+        if not (idle and self._quiet):
+            self._output(point)
+        self._quiet = idle
+        if idle and self._lost:
+            self._following, self._lost = False, ''
+
+
+class MotionThread:
+    """Runs cycles at absolute deadlines of the monotonic clock."""
+
+    def __init__(self, cycle: MotionCycle, period: float, stop_motion: Callable[[], None]) -> None:
+        """Prepare.
+
+        Args:
+            cycle: The cycle.
+            period: Its period in [s].
+            stop_motion: Called once at the end, to bring the arm to rest.
+        """
+        self._cycle, self._period, self._stop_motion = cycle, period, stop_motion
+        self._ending = threading.Event()
+        self._thread = threading.Thread(target=self._run, name='motion', daemon=True)
+
+    def start(self) -> None:
+        """Begin to run."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Bring the arm to rest, then end."""
+        self._stop_motion()
+        self._ending.set()
+        if self._thread.is_alive():
+            self._thread.join(LAST_STOP + 1.0)
+
+    def _run(self) -> None:
+        deadline = time.monotonic()
+        until = float('inf')
+        while True:
+            now = time.monotonic()
+            if self._ending.is_set():
+                until = min(until, now + LAST_STOP)
+                if self._cycle.at_rest or now > until:
+                    return
+            self._cycle.step(deadline, self._period)
+            deadline += self._period
+            if now - deadline > LATE * self._period:
+                deadline = now
+            time.sleep(max(0.0, deadline - time.monotonic()))

@@ -1,0 +1,47 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""``ros2 run arm_servo servo_node``: jogging of an arm whose controller is elsewhere."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import sys
+
+from rclpy.node import Node
+
+from ..core import CoreSettings
+from .motion_thread import MotionThread
+from .robot_parameters import declare_robot
+from .servo import Servo
+from .servo_parameters import declare_servo, PREFIX
+from .standalone import declare_loop, make_loop, run_standalone
+from .topic_output import declare_output, TRAJECTORY
+
+
+def _build() -> tuple[Sequence[Node], MotionThread]:
+    node = Node('servo_node')
+    model = declare_robot(node)
+    servo = declare_servo(node, model.group)
+    topic = f'/{model.group}_controller/joint_trajectory'
+    output = declare_output(node, PREFIX, topic, TRAJECTORY)
+    settings = CoreSettings(servo=servo.settings, timeout=servo.timeout)
+    desk, thread = make_loop(node, model, settings, declare_loop(node, PREFIX), output)
+    Servo(node, desk, servo, _nothing)
+    return [node], thread
+
+
+def _nothing() -> None:
+    """Prepare nothing: whoever has the drives keeps them."""
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run until Ctrl-C.
+
+    Args:
+        args: ROS arguments; None takes those of the process.
+    """
+    return run_standalone('servo_node', _build, args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

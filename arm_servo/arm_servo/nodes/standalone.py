@@ -1,0 +1,141 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What the programs for drives elsewhere share: feedback in, a thread, set-points out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+import sys
+import time
+
+import rclpy
+from rclpy.exceptions import ParameterException
+from rclpy.logging import get_logger
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import try_shutdown
+from sensor_msgs.msg import JointState
+
+from arm_canopen import CanopenError
+from arm_canopen.nodes.misspelt import refuse_misspelt
+from arm_canopen.nodes.spinning import spin, stop_on_signals
+
+from ..core import CoreSettings, MotionCore
+from ..exceptions import ServoError
+from ..model import RobotModel
+from .declare import Declarations
+from .desk import Desk
+from .joint_feedback import JointFeedback
+from .motion_thread import MotionCycle, MotionThread
+from .topic_output import OutputParameters, TopicOutput
+
+SWITCH_INTERVAL = 0.0005
+"""How long a busy callback may keep the interpreter from the cycle in [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class LoopParameters:
+    """How the loop runs.
+
+    Attributes:
+        period: Its period in [s].
+        joint_topic: Topic of the joint states.
+        joint_timeout: Age at which a joint state counts no more in [s].
+    """
+
+    period: float
+    joint_topic: str
+    joint_timeout: float
+
+
+def declare_loop(node: Node, prefix: str) -> LoopParameters:
+    """Declare how the loop runs.
+
+    Args:
+        node: The node.
+        prefix: Before each name, with its dot.
+    """
+    declare = Declarations(node, prefix)
+    return LoopParameters(
+        declare.number('publish_period', 0.01, 'period of the loop [s]', (0.001, 0.1)),
+        declare.text('joint_topic', '/joint_states', 'topic of the joint states'),
+        declare.number(
+            'joint_state_timeout',
+            0.5,
+            'silence of a joint at which the arm comes to rest [s]',
+            (0.02, 10.0),
+        ),
+    )
+
+
+def make_loop(
+    node: Node,
+    model: RobotModel,
+    settings: CoreSettings,
+    loop: LoopParameters,
+    output: OutputParameters,
+) -> tuple[Desk, MotionThread]:
+    """Put core, feedback and output together; nothing runs yet.
+
+    Args:
+        node: The node that subscribes and publishes.
+        model: The arm.
+        settings: How the core behaves.
+        loop: How the loop runs.
+        output: What is published.
+    """
+    desk = Desk(MotionCore(model, settings))
+    feedback = JointFeedback(model.joints, loop.joint_timeout)
+
+    def take(message: JointState) -> None:
+        feedback.take(message.name, message.position, message.velocity, time.monotonic())
+
+    node.create_subscription(JointState, loop.joint_topic, take, 10)
+    publish = TopicOutput(node, output, list(model.joints), loop.period)
+    cycle = MotionCycle(desk, feedback, publish)
+
+    def stop_motion() -> None:
+        desk.submit(lambda core, _now: core.stop('the program ends'), moves=False)
+
+    return desk, MotionThread(cycle, loop.period, stop_motion)
+
+
+def run_standalone(
+    name: str,
+    build: Callable[[], tuple[Sequence[Node], MotionThread]],
+    args: Sequence[str] | None,
+) -> int:
+    """Run a program until Ctrl-C or SIGTERM; the arm comes to rest before it ends.
+
+    Args:
+        name: Name for the log.
+        build: Makes the nodes and the thread.
+        args: Command line; None for the process's own.
+
+    Returns:
+        Exit code: 0, or 1 when the arm cannot be built.
+    """
+    sys.setswitchinterval(SWITCH_INTERVAL)
+    rclpy.init(
+        args=None if args is None else list(args), signal_handler_options=SignalHandlerOptions.NO
+    )
+    stop = stop_on_signals()
+    try:
+        nodes, thread = build()
+        for node in nodes:
+            refuse_misspelt(node)
+        with ExitStack() as stack:
+            for node in nodes:
+                stack.callback(node.destroy_node)
+            thread.start()
+            stack.callback(thread.stop)
+            nodes[0].get_logger().info('ready for commands')
+            spin(nodes, stop=stop)
+    except (ServoError, CanopenError, ParameterException) as error:
+        get_logger(name).fatal(str(error))
+        return 1
+    finally:
+        try_shutdown()
+    return 0

@@ -1,0 +1,58 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""``ros2 run arm_servo trajectory_controller``: trajectories for drives that take set-points."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import sys
+
+from rclpy.node import Node
+
+from ..core import CoreSettings
+from .controller_manager import ControllerManager, trajectory_entry
+from .declare import Declarations
+from .motion_thread import MotionThread
+from .robot_parameters import declare_robot
+from .standalone import declare_loop, make_loop, run_standalone
+from .topic_output import ARRAY, declare_output
+from .trajectory_controller import TrajectoryController
+from .trajectory_parameters import declare_trajectory
+
+OUTPUT = '/forward_position_controller/commands'
+"""Default of command_out_topic, the name that ros2_controllers' examples use."""
+
+
+def _build() -> tuple[Sequence[Node], MotionThread]:
+    manager = Node('controller_manager')
+    model = declare_robot(manager)
+    name = Declarations(manager).text(
+        'controller_name', f'{model.group}_controller', 'name of the trajectory controller'
+    )
+    node = Node(name)
+    trajectory = declare_trajectory(node, model.joints)
+    loop = declare_loop(node, '')
+    output = declare_output(node, '', OUTPUT, ARRAY)
+    settings = CoreSettings(execution=trajectory.execution)
+    desk, thread = make_loop(node, model, settings, loop, output)
+    controller = TrajectoryController(node, desk, trajectory, _nothing)
+    entry = trajectory_entry(name, model.joints, loop.period, controller.set_active)
+    ControllerManager(manager, [entry])
+    return [manager, node], thread
+
+
+def _nothing() -> None:
+    """Prepare nothing: whoever has the drives keeps them."""
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run until Ctrl-C.
+
+    Args:
+        args: ROS arguments; None takes those of the process.
+    """
+    return run_standalone('trajectory_controller', _build, args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

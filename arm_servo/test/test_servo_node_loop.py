@@ -1,0 +1,134 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The standalone loop cycle by cycle, on ideal drives elsewhere."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from servo_robots import ready, robot
+
+from arm_servo.arrays import Array
+from arm_servo.core import MotionCore, SetPoint
+from arm_servo.exceptions import GoalCode, NotReadyError
+from arm_servo.goal import GoalPoint, TrajectoryGoal
+from arm_servo.nodes.desk import Desk
+from arm_servo.nodes.joint_feedback import JointFeedback
+from arm_servo.nodes.motion_thread import MotionCycle
+
+PERIOD = 0.01
+
+
+class Elsewhere:
+    """An arm whose drives take set-points, and publish their state while ``heard``."""
+
+    def __init__(self) -> None:
+        """Stand in the ready pose."""
+        model = robot('gp110')
+        self.now = 50.0
+        self.at = np.array(ready('gp110'))
+        self.heard = True
+        self.points: list[SetPoint] = []
+        self.desk = Desk(MotionCore(model), lambda: self.now)
+        self.feedback = JointFeedback(model.joints, 0.2)
+        self.cycle = MotionCycle(self.desk, self.feedback, self.take)
+
+    def take(self, point: SetPoint) -> None:
+        """Go to a set-point at once."""
+        self.points.append(point)
+        self.at = np.array(point.state.position)
+
+    def run(self, cycles: int = 1) -> None:
+        """Run some cycles."""
+        for _ in range(cycles):
+            self.now += PERIOD
+            if self.heard:
+                self.feedback.take(self.desk.model.joints, self.at.tolist(), [], self.now)
+            self.cycle.step(self.now, PERIOD)
+
+    def path(self) -> Array:
+        """Return the positions commanded so far, a row for each."""
+        return np.array([point.state.position for point in self.points])
+
+
+def swing(arm: Elsewhere, far: float = 0.3) -> TrajectoryGoal:
+    """Return a trajectory of all joints."""
+    return TrajectoryGoal(arm.desk.model.joints, [GoalPoint(2.0, (arm.at + far).tolist())])
+
+
+def test_nothing_is_sent_before_something_moves() -> None:
+    """An idle loop leaves the drives alone, and does not send again what was reached."""
+    arm = Elsewhere()
+    arm.run(20)
+    assert not arm.points
+    goal = swing(arm)
+    arm.desk.submit(lambda core, _: core.follow(goal))
+    arm.run(400)
+    sent = len(arm.points)
+    assert sent > 200
+    arm.run(20)
+    assert len(arm.points) == sent
+    assert arm.at == pytest.approx(goal.points[0].positions, abs=1e-6)
+
+
+def test_it_begins_where_others_have_moved_the_arm() -> None:
+    """After another controller moved the arm a motion starts at the measured place."""
+    arm = Elsewhere()
+    arm.run(5)
+    arm.at = arm.at + 0.2
+    arm.run(2)
+    before = np.array(arm.at)
+    goal = swing(arm)
+    arm.desk.submit(lambda core, _: core.follow(goal))
+    arm.run(2)
+    assert np.abs(arm.path()[0] - before).max() < 1e-4
+
+
+def test_commands_are_refused_before_the_first_joint_state() -> None:
+    """The reason names the joints that are silent."""
+    arm = Elsewhere()
+    arm.heard = False
+    future = arm.desk.submit(lambda core, _: core.jog({'joint_1_s': 0.1}, arm.now))
+    arm.run()
+    with pytest.raises(NotReadyError, match='no joint states of'):
+        future.result(0.0)
+
+
+def test_the_arm_comes_to_rest_on_its_path_when_joint_states_are_lost() -> None:
+    """Set-points slow down to rest, the trajectory ends with the reason; then all goes on."""
+    arm = Elsewhere()
+    arm.run(3)
+    goal = swing(arm, 0.5)
+    future = arm.desk.submit(lambda core, _: core.follow(goal))
+    arm.run(80)
+    arm.heard = False
+    arm.run(200)
+    ending = future.result(0.0).ending
+    assert ending is not None
+    assert ending.code is GoalCode.PATH_TOLERANCE_VIOLATED
+    assert 'no joint states' in ending.reason
+    path = arm.path()
+    assert np.ptp(path - path[:, :1] - (path[0] - path[0, 0]), axis=1).max() < 1e-6  # on the line
+    speeds = np.diff(path, axis=0) / PERIOD
+    jumps = np.abs(np.diff(speeds, axis=0)) / PERIOD
+    assert (jumps.max(axis=0) < 1.01 * arm.desk.model.limits.acceleration).all()
+    assert not arm.points[-1].state.moving
+    arm.heard = True
+    arm.run(5)
+    assert arm.desk.snapshot.blocked == ''
+
+
+def test_numbers_that_are_none_do_not_count() -> None:
+    """A joint that only publishes NaN is silent."""
+    feedback = JointFeedback(['a', 'b'], 0.2)
+    feedback.take(['b', 'a', 'other'], [math.nan, 1.0, 2.0], [0.0, math.nan, 0.0], 1.0)
+    state, blocked = feedback.state(1.0)
+    assert state is None
+    assert 'of b for' in blocked
+    feedback.take(['b'], [0.5], [], 1.1)
+    state, blocked = feedback.state(1.15)
+    assert blocked == ''
+    assert state is not None
+    assert state.position.tolist() == [1.0, 0.5]

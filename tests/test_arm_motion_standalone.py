@@ -1,0 +1,136 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""servo_node and trajectory_controller on their own, for drives that listen to topics."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from itertools import pairwise
+import signal
+from typing import TYPE_CHECKING
+
+from control_msgs.action import FollowJointTrajectory
+from control_msgs.msg import JointJog
+from controller_manager_msgs.srv import ListControllers, SwitchController
+from moving_arm import CONTROLLER, goal_to, GoalRun, READY, robot_parameters
+from processes import executable, RunningProcess
+import pytest
+from ros_client import RosClient
+from sensor_msgs.msg import JointState
+from simulated_arm import JOINTS
+from std_msgs.msg import Float64MultiArray
+from trajectory_msgs.msg import JointTrajectory
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from isolation import Isolation
+    from typing_extensions import Self
+
+pytestmark = pytest.mark.scenario
+
+RESULT = FollowJointTrajectory.Result
+
+
+class TopicArm:
+    """Drives that go where they are told and publish it, and one program that tells them."""
+
+    def __init__(self, isolation: Isolation, folder: Path, program: str) -> None:
+        """Start the program."""
+        self.at = list(READY)
+        self.arrays: list[list[float]] = []
+        self.trajectories: list[JointTrajectory] = []
+        self._stack = ExitStack()
+        self.client = self._stack.enter_context(RosClient(isolation.domain_id))
+        node = self.client.node
+        self._states = node.create_publisher(JointState, '/joint_states', 10)
+        node.create_subscription(
+            Float64MultiArray, '/forward_position_controller/commands', self._take_array, 10
+        )
+        node.create_subscription(
+            JointTrajectory, f'{CONTROLLER}/joint_trajectory', self._take_trajectory, 10
+        )
+        self.speaking = node.create_timer(0.02, self._speak)
+        parameters = str(robot_parameters(folder))
+        command = [executable('arm_servo', program), '--ros-args', '--params-file', parameters]
+        self.process = self._stack.enter_context(RunningProcess(command, isolation.env))
+        self.process.wait_for('ready for commands')
+
+    def _speak(self) -> None:
+        self._states.publish(JointState(name=JOINTS, position=self.at))
+
+    def _take_array(self, message: Float64MultiArray) -> None:
+        self.at = list(message.data)
+        self.arrays.append(self.at)
+
+    def _take_trajectory(self, message: JointTrajectory) -> None:
+        assert list(message.joint_names) == JOINTS
+        self.at = list(message.points[0].positions)
+        self.trajectories.append(message)
+
+    def __enter__(self) -> Self:
+        """Use it in a with statement."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Stop the program."""
+        self._stack.close()
+
+
+def test_a_trajectory_goes_out_as_arrays(isolation: Isolation, tmp_path: Path) -> None:
+    """Goals are reached; the controller is listed, switched off and on; lost states stop it."""
+    with TopicArm(isolation, tmp_path, 'trajectory_controller') as arm:
+        run = GoalRun(arm.client, goal_to([0.3, *READY[1:]], 1.0))
+        assert run.wait()[1].error_code == RESULT.SUCCESSFUL
+        assert arm.at[0] == pytest.approx(0.3, abs=1e-6)
+        listed = arm.client.call(
+            ListControllers, '/controller_manager/list_controllers', ListControllers.Request()
+        ).controller
+        assert [(each.name, each.state) for each in listed] == [('panda_arm_controller', 'active')]
+        assert 'JointTrajectoryController' in listed[0].type
+        _switch(arm, [], ['panda_arm_controller'])
+        refused = GoalRun(arm.client, goal_to(READY, 1.0)).wait()[1]
+        assert 'inactive' in refused.error_string
+        _switch(arm, ['panda_arm_controller'], [])
+        run = GoalRun(arm.client, goal_to(READY, 4.0))
+        arm.client.spin_until(lambda: len(run.feedback) > 8, 10.0, 'motion')
+        arm.client.node.destroy_timer(arm.speaking)
+        result = run.wait()[1]
+        assert 'no joint states of panda_joint1' in result.error_string
+        steps = [abs(b[0] - a[0]) for a, b in pairwise(arm.arrays)]
+        assert max(steps) < 0.01
+        assert steps[-1] < 1e-4  # it slowed down
+
+
+def _switch(arm: TopicArm, on: list[str], off: list[str]) -> None:
+    request = SwitchController.Request(
+        activate_controllers=on,
+        deactivate_controllers=off,
+        strictness=SwitchController.Request.STRICT,
+    )
+    name = '/controller_manager/switch_controller'
+    assert arm.client.call(SwitchController, name, request).ok
+    request.activate_controllers = ['nobody']
+    answer = arm.client.call(SwitchController, name, request)
+    assert not answer.ok
+    assert 'nobody' in answer.message
+
+
+def test_jogging_goes_out_as_trajectories(isolation: Isolation, tmp_path: Path) -> None:
+    """A jog moves its joint; Ctrl-C in the middle of it ends at rest, with exit code 0."""
+    with TopicArm(isolation, tmp_path, 'servo_node') as arm:
+        publisher = arm.client.node.create_publisher(JointJog, '/servo_node/delta_joint_cmds', 10)
+        jog = JointJog(joint_names=['panda_joint1'], velocities=[1.0], duration=10.0)
+        arm.client.node.create_timer(
+            0.05, lambda: None if arm.trajectories else publisher.publish(jog)
+        )
+        arm.client.spin_until(lambda: arm.at[0] > 0.1, 10.0, 'motion of the first joint')
+        assert arm.at[1:] == pytest.approx(READY[1:], abs=1e-4)
+        arm.process.signal(signal.SIGINT)
+        arm.client.spin_until(lambda: not arm.process.is_running(), 10.0, 'end of the program')
+        assert arm.process.wait() == 0
+        speeds = [message.points[0].velocities[0] for message in arm.trajectories]
+        assert max(speeds) == pytest.approx(0.5, abs=0.01)
+        assert speeds[-1] == 0.0
+        drops = [a - b for a, b in pairwise(speeds)]
+        assert max(drops) < 0.2  # no message of the way down to rest is missing
