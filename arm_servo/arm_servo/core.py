@@ -195,8 +195,7 @@ class MotionCore:
             NotReadyError: The position of the arm is not known yet.
         """
         values, commanded = self._by_joint(velocities, 'velocities')
-        fastest = self._limits.velocity
-        self._jog(JointCommand(np.clip(values, -fastest, fastest), commanded), now, duration)
+        self._jog(JointCommand(values, commanded), now, duration)
 
     def track(self, pose: Pose, now: float, duration: float | None = None) -> None:
         """Go to a pose, and track it when it moves.

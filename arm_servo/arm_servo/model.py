@@ -49,7 +49,7 @@ class RobotModel:
         tip: Name of its tip link.
         limits: Limits of the joints, with their names.
         poses: Named poses of the SRDF, in the order of the joints.
-        notes: What was passed over in the description, in words.
+        notes: What was passed over in description and SRDF, in words.
         reach: Greatest distance of the tip from the first joint's axis frame in [m].
     """
 
@@ -81,8 +81,9 @@ class RobotModel:
         self.name, self.group = description.name, chosen.name
         self.base, self.tip = _ends(description, chosen, semantic, names, tip)
         self.limits: JointLimits = merge_limits(names, description.ranges, limits)
-        self.notes = description.notes
-        self.poses = _poses(self.limits, semantic.poses.get(chosen.name, {}))
+        notes = list(description.notes)
+        self.poses = _poses(self.limits, semantic.poses.get(chosen.name, {}), notes)
+        self.notes = tuple(notes)
         self._model = _reduced(description, names)
         self._data = self._model.createData()
         self._tip_frame = self._model.getFrameId(self.tip)
@@ -258,16 +259,21 @@ def _ends(
     return base, end
 
 
-def _poses(limits: JointLimits, poses: Mapping[str, Mapping[str, float]]) -> Mapping[str, Array]:
+def _poses(
+    limits: JointLimits, poses: Mapping[str, Mapping[str, float]], notes: list[str]
+) -> Mapping[str, Array]:
+    """Return the poses that the arm can take; the others are noted."""
     found: dict[str, Array] = {}
     for name, pose in poses.items():
         if missing := [joint for joint in limits.names if joint not in pose]:
-            raise ModelError(f'pose {name!r} of the SRDF lacks joint {missing[0]}')
+            notes.append(f'pose {name!r} of the SRDF lacks joint {missing[0]}; left out')
+            continue
         values = frozen([pose[joint] for joint in limits.names])
         outside = (values < limits.lower) | (values > limits.upper)
         if outside.any():
             joint = limits.names[int(np.argmax(outside))]
-            raise ModelError(f'pose {name!r} of the SRDF: joint {joint} is beyond its limits')
+            notes.append(f'pose {name!r} of the SRDF: {joint} is beyond its limits; left out')
+            continue
         found[name] = values
     return found
 

@@ -25,6 +25,9 @@ HOLD_SHARE = 0.05
 LEAST = 0.004
 """Singular value of the scaled Jacobian below which a direction is damped for any command."""
 
+GOOD = 0.4
+"""Singular value of the scaled Jacobian above which a direction is never damped."""
+
 LOST = 0.5
 """Share of the asked speed below which a direction counts as lost."""
 
@@ -87,7 +90,9 @@ def directions(jacobian: Array, command: Array, correction: Array, fastest: Arra
     allowed = 1.0 / np.max(np.abs(joints) / fastest, axis=1)
     asked = np.abs(command @ tool) / SHARE + np.abs(correction @ tool) / HOLD_SHARE
     knee = np.maximum(asked / allowed, LEAST)
-    damping = np.maximum(knee * knee - values * values, 0.0) / 4.0
+    # a good direction whose command is too fast is slowed down with all others, not damped
+    poor = np.minimum(np.maximum(2.0 - values / (0.5 * GOOD), 0.0), 1.0)
+    damping = poor * np.maximum(knee * knee - values * values, 0.0) / 4.0
     share = values * values / (values * values + damping)
     return Directions(tool, joints, values, damping, share)
 

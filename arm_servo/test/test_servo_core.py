@@ -20,6 +20,7 @@ from arm_servo.core import MotionCore, SetPoint, Source
 from arm_servo.exceptions import CommandError, GoalCode, NotReadyError
 from arm_servo.execution import Phase
 from arm_servo.model import Pose
+from arm_servo.otg import Generator
 from arm_servo.report import Cause
 
 Action = Callable[[MotionCore, float, np.random.Generator], object]
@@ -168,6 +169,34 @@ def test_held_axes_stay_from_any_pose(name: str, seed: int) -> None:
         aside = twist_between(model, start, at) * ([1.0] * 3 + [model.reach / 3] * 3)
         aside[axis] = 0.0
         assert np.abs(aside).max() < 0.01 * model.reach
+
+
+def test_without_an_answer_of_the_generator_the_arm_brakes(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Where ruckig has no answer the joints slow down with their greatest deceleration."""
+    core = core_of('prbt')
+    core.jog({'prbt_joint_1': 0.8, 'prbt_joint_4': -0.5}, 0.0, duration=1.0)
+    stream(core, 0.6)
+    monkeypatch.setattr(Generator, '_plan', lambda self, demand: None)
+    before = core.state
+    states = [point.state for point in stream(core, 0.4)]
+    assert not states[-1].moving
+    speeds = np.abs([before.velocity, *(state.velocity for state in states)])
+    fall = np.diff(speeds, axis=0)
+    assert np.all(fall <= 1e-12)
+    assert np.all(-fall <= robot('prbt').limits.acceleration * PERIOD * 1.001)
+
+
+def test_a_reset_ends_what_moves_the_arm() -> None:
+    """After a reset the set-points begin at rest at the new place, and a trajectory has ended."""
+    core = core_of('prbt')
+    execution = core.follow(wave(robot('prbt'), ready('prbt'), 'q'))
+    stream(core, 0.4)
+    core.reset(ready('prbt') + 0.1, 'the drives were off')
+    assert execution.ending is not None
+    assert execution.ending.reason == 'the drives were off'
+    assert stream(core, 0.1)[-1].state.position == pytest.approx(ready('prbt') + 0.1)
 
 
 def test_taking_over_ends_the_trajectory_with_words() -> None:

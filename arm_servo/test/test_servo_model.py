@@ -162,18 +162,6 @@ BROKEN: dict[str, tuple[Broken, str]] = {
         ),
         'needs <limit',
     ),
-    'pose beyond': (
-        lambda u, s, t: (
-            u,
-            s.replace(
-                '</robot>',
-                '<group_state name="far" group="arm"><joint name="j1" value="9"/>'
-                '<joint name="j2" value="0"/><joint name="j3" value="0"/></group_state></robot>',
-            ),
-            t,
-        ),
-        "'far'",
-    ),
 }
 
 
@@ -192,6 +180,24 @@ def test_unknown_names_are_told_with_the_known_ones() -> None:
         chain('zyy').index('j4')
     with pytest.raises(CommandError, match='link_3'):
         chain('zyy').pose(np.zeros(3), 'hand')
+
+
+def test_poses_that_cannot_be_taken_are_noted() -> None:
+    """A pose beyond a limit or without a joint is left out, and named."""
+    urdf, srdf, limits = chain_texts('zyy')
+    poses = (
+        '<group_state name="far" group="arm"><joint name="j1" value="9"/>'
+        '<joint name="j2" value="0"/><joint name="j3" value="0"/></group_state>'
+        '<group_state name="half" group="arm"><joint name="j1" value="0"/></group_state>'
+        '<group_state name="zero" group="arm"><joint name="j1" value="0"/>'
+        '<joint name="j2" value="0"/><joint name="j3" value="0"/></group_state></robot>'
+    )
+    model = RobotModel(urdf, srdf.replace('</robot>', poses), limits)
+    assert list(model.poses) == ['zero']
+    assert [("'far'" in note, "'half'" in note) for note in model.notes] == [
+        (True, False),
+        (False, True),
+    ]
 
 
 def test_joints_go_from_the_base_out() -> None:
