@@ -23,8 +23,8 @@ HARDWARE_READY = r'running: '
 """What hardware_node logs when the robot has answered and reports come in."""
 CONTROLLER_READY = r'ready: '
 """What controller_node logs when it has heard the joints and answers /set_mode."""
-PUBLISHER_READY = r'[Rr]obot'
-"""What every robot_state_publisher logs when it has read the description."""
+PUBLISHER_READY = r'Robot initialized|frames of robot'
+"""What the public robot_state_publisher and ours log when they have read the description."""
 
 STATE_PUBLISHERS = (
     Executable('robot_state_publisher', 'robot_state_publisher'),
