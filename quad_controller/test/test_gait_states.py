@@ -61,6 +61,21 @@ def test_nothing_moves_before_it_is_asked_to() -> None:
     assert rig.largest_step == 0.0
 
 
+def test_a_joint_found_outside_its_limits_stays_until_something_is_asked() -> None:
+    """Relaxed it is not pulled in; it never goes further out, and standing up takes it in."""
+    outside = (ROBOT.limits[0].upper + 0.1, FOLDED[1], ROBOT.limits[2].lower - 0.2, *FOLDED[3:])
+    rig = Rig(positions=outside)
+    rig.run(1.0)
+    assert rig.positions == outside
+    further = (outside[0] + 0.5, *outside[1:])
+    measured = Measurement(JointSample(further, (0.0,) * 12), UPRIGHT)
+    for _ in range(10):
+        assert rig.controller.step(measured, PERIOD).targets == outside
+    standing(rig)
+    assert rig.positions == pytest.approx(STAND)
+    assert rig.largest_step <= 0.2 + 1e-9
+
+
 def test_a_joint_moved_by_hand_is_not_pulled_back() -> None:
     """Relaxed, the set-point stays within a band of where a joint was moved."""
     rig = Rig()

@@ -1,6 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The last thing that a target passes: limits, and a bound of the step from the one before."""
+"""The last thing that a target passes: limits, and a bound of the step from the one before.
+
+A joint that is found outside of its limits is not pulled into them before something is asked for:
+its range reaches to where it is, and shrinks with it.
+"""
 
 from __future__ import annotations
 
@@ -40,11 +44,8 @@ class StepLimiter:
         return self._last
 
     def start(self, positions: Sequence[float]) -> Targets:
-        """Begin where the joints are [rad]."""
-        self._last = tuple(
-            limits.clamp(position)
-            for limits, position in zip(self._limits, positions, strict=True)
-        )
+        """Begin where the joints are [rad], even if that is outside of their limits."""
+        self._last = tuple(positions)
         return self._last
 
     def step(self, targets: Sequence[float], dt: float) -> Targets:
@@ -60,7 +61,7 @@ class StepLimiter:
         sent = []
         for limits, before, wanted in zip(self._limits, self._last, targets, strict=True):
             most = limits.velocity * dt
-            target = limits.clamp(wanted)
+            target = min(max(wanted, min(limits.lower, before)), max(limits.upper, before))
             if abs(target - before) > most:
                 target = before + math.copysign(most, target - before)
                 self.limited += 1
