@@ -114,7 +114,8 @@ def _pair(targets: Mapping[str, float], positions: Mapping[str, float], joint: s
 
 
 def _signed(value: float) -> str:
-    return f'{value:+.3f}' if math.isfinite(value) else '-'
+    # adding 0.0 turns a rounded -0.0 into 0.0
+    return f'{round(value, 3) + 0.0:+.3f}' if math.isfinite(value) else '-'
 
 
 def _body_line(figures: Figures) -> Text:
