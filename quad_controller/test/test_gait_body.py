@@ -16,9 +16,12 @@ from quad_controller.gait.body import BodyLimits, BodyPose, feet_in_body, Levell
 from quad_controller.gait.generator import GaitGenerator
 from quad_controller.gait.heading import HeadingHold
 from quad_controller.gait.parameters import GaitParameters
+from quad_controller.gait.schedule import Gait
 from quad_controller.gait.servo_compensation import ServoCompensation, ServoModel
+from quad_controller.gait.stepping import Stepper
 from quad_controller.gait.velocity import REST, Velocity
 from quad_controller.model.quadruped import quadruped
+from quad_controller.model.urdf import Vector
 from quad_gait_urdf import urdf
 
 ROBOT = quadruped(urdf())
@@ -112,6 +115,35 @@ def test_a_course_is_none_at_rest_or_blind() -> None:
     # turned by hand: it does not turn back further than the bound
     assert hold.step(Velocity(0.1), -2.0, 0.02).yaw == pytest.approx(0.4)
     assert hold.step(Velocity(0.1), -1.8, 0.02).yaw == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize('gait', list(Gait))
+@pytest.mark.parametrize('asked', [Velocity(0.3), Velocity(0.05), Velocity(yaw=-1.5)], ids=str)
+@pytest.mark.parametrize('most', [0.1, 1.5])
+def test_a_course_is_kept_within_what_the_gait_can(
+    gait: Gait, asked: Velocity, most: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A robot that is held off its course turns back no faster than limits and gait allow."""
+    walked: list[Velocity] = []
+    plain = Stepper.step
+
+    def record(stepper: Stepper, velocity: Velocity, dt: float) -> list[Vector]:
+        walked.append(velocity)
+        return plain(stepper, velocity, dt)
+
+    monkeypatch.setattr(Stepper, 'step', record)
+    parameters = GaitParameters(max_angular_velocity_z=most)
+    generator = GaitGenerator(ROBOT, parameters)
+    generator.choose(gait)
+    for count in range(150):
+        heading = 0.3 * min(max(count - 50, 0) / 25, 1.0)
+        generator.step(asked, UPRIGHT, (0.0, 0.0, heading), 0.02)
+    assert walked[-1].yaw < 0.0
+    for velocity in walked:
+        assert abs(velocity.yaw) <= most
+        for x, y, _ in FEET:
+            speed = math.hypot(velocity.x - velocity.yaw * y, velocity.y + velocity.yaw * x)
+            assert speed <= parameters.schedule(gait).speed + 1e-9
 
 
 def test_a_body_that_looks_elsewhere_keeps_its_course() -> None:

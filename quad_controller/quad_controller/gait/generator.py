@@ -132,7 +132,9 @@ class GaitGenerator:
         self.pose = limits.approach(self.pose, limits.clamp(pose), dt)
         # the body may look elsewhere than its feet go
         heading = attitude[2] - self.pose.yaw if attitude is not None else None
-        feet = self._stepper.step(self._heading.step(self.velocity, heading, dt), dt)
+        course = self._heading.step(self.velocity, heading, dt)
+        # back to the course no faster than the gait and its limits allow, slower ahead if need be
+        feet = self._stepper.step(self._within_schedule(self._limits.bound(course)), dt)
         moved = self._leveller.step(attitude, self.pose, dt)
         sway = self._stepper.sway
         if sway:

@@ -78,6 +78,11 @@ class VelocityLimits:
             yaw if abs(yaw) >= self.dead_yaw else 0.0,
         )
 
+    def bound(self, velocity: Velocity) -> Velocity:
+        """Return a velocity that was clamped before, with its turning within the limits again."""
+        yaw = min(max(velocity.yaw, -self.yaw), self.yaw)
+        return Velocity(velocity.x, velocity.y, yaw)
+
     def approach(self, velocity: Velocity, target: Velocity, dt: float) -> Velocity:
         """Return the velocity after a step of acceleration towards a target.
 
