@@ -6,13 +6,33 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+import contextlib
+from pathlib import Path
 import sys
+import tempfile
 
-from process_supervisor import supervise, SupervisorError, USAGE_ERROR
+from process_supervisor import (
+    find_executable,
+    supervise,
+    SupervisorError,
+    USAGE_ERROR,
+    write_parameters,
+)
 
-from .exceptions import BringupError
-from .session import add_arguments, REAL_BUS, robots_epilog, session, SIMULATED_BUS
-from .stack import MASTER
+from .description import expand_xacro
+from .enabling import enabling
+from .exceptions import BringupError, RobotError
+from .motion import choose_master, motion_files
+from .session import (
+    add_arguments,
+    locate,
+    no_files,
+    REAL_BUS,
+    robots_epilog,
+    session,
+    SIMULATED_BUS,
+)
+from .stack import controller_processes, MASTER
 
 
 def parse(argv: Sequence[str] | None) -> argparse.Namespace:
@@ -23,9 +43,9 @@ def parse(argv: Sequence[str] | None) -> argparse.Namespace:
     """
     parser = argparse.ArgumentParser(
         prog='ros2 run arm_bringup bringup',
-        description='Bring an arm up: CANopen master with all its drives and /joint_states; '
-        'with --simulate also the drives themselves. Ctrl-C stops and disables the drives and '
-        'ends everything.',
+        description='Bring an arm up: CANopen master with all its drives, /joint_states, '
+        'trajectories and jogging; with --simulate also the drives themselves. Ctrl-C stops and '
+        'disables the drives and ends everything.',
         epilog=robots_epilog(),
     )
     default_bus = f'{REAL_BUS}; with --simulate {SIMULATED_BUS}, which is vcan0 when it is there'
@@ -34,6 +54,24 @@ def parse(argv: Sequence[str] | None) -> argparse.Namespace:
         '--simulate',
         action='store_true',
         help='start a simulated drive for each device of the bus',
+    )
+    parser.add_argument(
+        '--enable',
+        action='store_true',
+        help='enable the drives as soon as they have booted, so that they follow trajectories and '
+        'jogging',
+    )
+    kinds = parser.add_mutually_exclusive_group()
+    kinds.add_argument(
+        '--drives-only',
+        action='store_true',
+        help='without trajectories and jogging, as where arm_servo is not built',
+    )
+    kinds.add_argument(
+        '--controller-only',
+        action='store_true',
+        help='trajectories and jogging only, for drives of another process: it hears '
+        '/joint_states, and publishes set-points',
     )
     return parser.parse_args(argv)
 
@@ -49,9 +87,44 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     arguments = parse(argv)
     try:
-        with session(arguments, simulate=arguments.simulate, master=MASTER) as arm:
-            sys.stdout.write(f'{arm.robot.name} on CAN bus {arm.bus}\n')
-            return supervise(arm.processes).exit_code
+        if arguments.controller_only:
+            return _controllers(arguments)
+        return _arm(arguments)
     except (BringupError, SupervisorError) as error:
         sys.stderr.write(f'{error}\n')
         return USAGE_ERROR
+
+
+def _arm(arguments: argparse.Namespace) -> int:
+    master, no_motion = MASTER, '--drives-only'
+    if not arguments.drives_only:
+        master, no_motion = choose_master(locate(arguments.robot), find_executable)
+    files = no_files if no_motion else motion_files
+    with session(arguments, simulate=arguments.simulate, master=master, master_files=files) as arm:
+        offered = f'no motion ({no_motion})' if no_motion else 'trajectories and jogging'
+        _say(f'{arm.robot.name} on CAN bus {arm.bus}: {offered}')
+        with contextlib.ExitStack() as stack:
+            if arguments.enable:
+                stack.enter_context(enabling(arm.drives, arm.mode_service, _say))
+            return supervise(arm.processes).exit_code
+
+
+def _controllers(arguments: argparse.Namespace) -> int:
+    robot = locate(arguments.robot)
+    if not robot.movable:
+        raise RobotError(
+            f'{robot.name} lacks {robot.semantic.name} and {robot.limits.name}: '
+            f'ros2 run arm_bringup check {arguments.robot} tells more'
+        )
+    with tempfile.TemporaryDirectory(prefix='arm_bringup-') as folder:
+        parameters = Path(folder) / 'robot_description.yaml'
+        write_parameters(parameters, expand_xacro(robot.description))
+        files = motion_files(robot, Path(folder))
+        _say(f'{robot.name}: trajectories and jogging for drives of another process')
+        processes = controller_processes(files, parameters, arguments.timeout, find_executable)
+        return supervise(processes).exit_code
+
+
+def _say(text: str) -> None:
+    sys.stdout.write(f'{text}\n')
+    sys.stdout.flush()

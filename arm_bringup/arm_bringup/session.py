@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 import contextlib
 from dataclasses import dataclass
 import os
@@ -148,6 +148,17 @@ def stream_mode_service(drives: Sequence[NodeConfig]) -> str:
     return 'cyclic_position_mode'
 
 
+def no_files(robot: Robot, folder: Path) -> Sequence[Path]:
+    """Make no parameter files; for :func:`session`.
+
+    Args:
+        robot: The robot.
+        folder: Where files would go.
+    """
+    del robot, folder
+    return ()
+
+
 @contextlib.contextmanager
 def session(
     arguments: argparse.Namespace,
@@ -155,6 +166,7 @@ def session(
     simulate: bool,
     master: Executable,
     master_parameters: Mapping[str, str] | None = None,
+    master_files: Callable[[Robot, Path], Sequence[Path]] = no_files,
 ) -> Iterator[Session]:
     """Prepare a bring-up; the bus and the ROS domain are its own as long as the block runs.
 
@@ -163,6 +175,7 @@ def session(
         simulate: With simulated slaves.
         master: What runs the bus.
         master_parameters: ROS parameters for it beside the usual ones.
+        master_files: Makes parameter files for it, in a folder that lasts as long as the block.
 
     Raises:
         RobotError: The robot folder is unknown or incomplete.
@@ -184,7 +197,13 @@ def session(
         parameters = Path(folder) / 'robot_description.yaml'
         write_parameters(parameters, urdf)
         wanted = Stack(
-            robot, bus, simulate, arguments.timeout, master, dict(master_parameters or {})
+            robot,
+            bus,
+            simulate,
+            arguments.timeout,
+            master,
+            dict(master_parameters or {}),
+            master_files(robot, Path(folder)),
         )
         processes = arm_processes(wanted, parameters, find_executable)
         names = [drive.name for drive in drives]

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -21,12 +21,16 @@ from .robots import Robot
 
 MASTER = Executable('arm_canopen', 'master')
 """What runs the bus unless something else is asked for."""
+MOTION_MASTER = Executable('arm_servo', 'motion_master')
+"""The master with the motion core inside: trajectories, jogging and /joint_states."""
 MASTER_READY = r'all \d+ devices operational'
 """What the master logs when every drive of the bus has booted."""
 SLAVES_READY = r'\d+ simulated drives.* on '
 """What the simulated slaves log when they are on the bus."""
 PUBLISHER_READY = r'publishing \d+ joints'
 """What the publisher of /joint_states logs when it has subscribed to the drives."""
+CONTROLLER_READY = 'ready for commands'
+"""What trajectory_controller and servo_node log."""
 
 STATE_PUBLISHERS = (
     Executable('robot_state_publisher', 'robot_state_publisher'),
@@ -51,6 +55,7 @@ class Stack:
         ready_timeout: How long each process may take to be ready in [s].
         master: What runs the bus.
         master_parameters: ROS parameters for it beside the usual ones.
+        master_files: Parameter files for it beside the usual one.
     """
 
     robot: Robot
@@ -59,6 +64,7 @@ class Stack:
     ready_timeout: float = 30.0
     master: Executable = MASTER
     master_parameters: Mapping[str, str] = field(default_factory=dict)
+    master_files: Sequence[Path] = ()
 
 
 def arm_processes(stack: Stack, parameters: Path, find: FindExecutable) -> list[ProcessSpec]:
@@ -79,7 +85,7 @@ def arm_processes(stack: Stack, parameters: Path, find: FindExecutable) -> list[
     everything = [
         _slaves(stack, bus, find),
         _master(stack, bus, parameters, find),
-        _publisher(stack, parameters, find),
+        None if stack.master == MOTION_MASTER else _publisher(stack, parameters, find),
         _state_publisher(parameters, find),
     ]
     return [spec for spec in everything if spec is not None]
@@ -103,12 +109,56 @@ def _master(
 ) -> ProcessSpec:
     return ProcessSpec(
         name='master',
-        argv=node_argv(stack.master, find, {**bus, **stack.master_parameters}, parameters),
+        argv=(
+            *node_argv(stack.master, find, {**bus, **stack.master_parameters}, parameters),
+            *parameter_files(stack.master_files),
+        ),
         environment=LOG_FORMAT,
         ready=MASTER_READY,
         ready_timeout=stack.ready_timeout,
         stop_order=MASTER_FIRST,
     )
+
+
+def controller_processes(
+    files: Sequence[Path], parameters: Path, ready_timeout: float, find: FindExecutable
+) -> list[ProcessSpec]:
+    """Say which processes move drives that another process has.
+
+    Args:
+        files: Parameter files of the nodes that move the arm.
+        parameters: The file of :func:`process_supervisor.write_parameters`.
+        ready_timeout: How long each process may take to be ready in [s].
+        find: Finds executables.
+
+    Raises:
+        StartError: An executable is missing.
+    """
+    specs = [
+        ProcessSpec(
+            name=name,
+            argv=(
+                *node_argv(Executable('arm_servo', program), find, {}, parameters),
+                *parameter_files(files),
+            ),
+            environment=LOG_FORMAT,
+            ready=CONTROLLER_READY,
+            ready_timeout=ready_timeout,
+            stop_order=MASTER_FIRST,
+        )
+        for name, program in (('controller', 'trajectory_controller'), ('servo', 'servo_node'))
+    ]
+    state_publisher = _state_publisher(parameters, find)
+    return specs if state_publisher is None else [*specs, state_publisher]
+
+
+def parameter_files(files: Sequence[Path]) -> list[str]:
+    """Return the arguments that hand over parameter files.
+
+    Args:
+        files: The files; a later one counts more.
+    """
+    return [word for file in files for word in ('--params-file', str(file))]
 
 
 def _publisher(stack: Stack, parameters: Path, find: FindExecutable) -> ProcessSpec:

@@ -159,7 +159,7 @@ def test_a_master_that_never_gets_ready_ends_it(workspace: Workspace) -> None:
 @pytest.mark.parametrize(
     ('arguments', 'words'),
     [
-        (['pandora'], "no robot 'pandora'; robots: panda"),
+        (['pandora'], "no robot 'pandora'; robots: gp110, panda"),
         (['./nowhere'], 'does not exist'),
         (['panda', '--timeout', 'soon'], 'soon'),
         (['panda', '--timeout', 'nan'], 'no positive number'),
@@ -241,5 +241,5 @@ def test_help_names_the_robots(workspace: Workspace) -> None:
     """And what each argument means."""
     code, output = workspace.run('--help')
     assert code == 0
-    for words in ('robots: panda', '--simulate', '--can', 'can0', 'Ctrl-C'):
+    for words in ('robots: gp110, panda', '--simulate', '--can', 'can0', 'Ctrl-C'):
         assert words in output

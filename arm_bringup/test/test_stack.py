@@ -7,9 +7,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+import yaml
 
+from arm_bringup.motion import choose_master, MAKE_MOVE, motion_files
 from arm_bringup.robots import Robot
-from arm_bringup.stack import arm_processes, Stack
+from arm_bringup.stack import arm_processes, MASTER, MOTION_MASTER, Stack
 from process_supervisor import Executable, ProcessSpec, StartError
 
 ROBOT = Robot('panda', Path('/robots/panda/bus.yml'), Path('/robots/panda/panda.urdf.xacro'))
@@ -37,6 +39,36 @@ def processes(folder: Path, stack: Stack, *packages: str) -> dict[str, ProcessSp
     """Plan a stack on an underlay with arm_canopen and more."""
     find = Underlay(folder, 'arm_canopen', 'arm_bringup', *packages).find
     return {spec.name: spec for spec in arm_processes(stack, PARAMETERS, find)}
+
+
+def test_the_master_of_motion_publishes_the_joints(tmp_path: Path) -> None:
+    """It gets the files of the robot, later ones counting more, and needs no other publisher."""
+    files = (Path('/r/motion.yaml'), Path('/r/controllers.yaml'))
+    stack = Stack(ROBOT, 'can0', simulate=True, master=MOTION_MASTER, master_files=files)
+    found = processes(tmp_path, stack, 'arm_servo')
+    assert set(found) == {'slaves', 'master'}
+    assert found['master'].argv[-4:] == (
+        '--params-file',
+        '/r/motion.yaml',
+        '--params-file',
+        '/r/controllers.yaml',
+    )
+
+
+def test_master_without_arm_servo(tmp_path: Path) -> None:
+    """Where it is not built, or the robot lacks its files, the plain master runs; it is told."""
+    robot = Robot('my', tmp_path / 'bus.yml', tmp_path / 'my.urdf.xacro')
+    bare = Underlay(tmp_path, 'arm_canopen').find
+    full = Underlay(tmp_path, 'arm_canopen', 'arm_servo').find
+    assert choose_master(robot, bare) == (MASTER, MAKE_MOVE)
+    assert choose_master(robot, full)[0] == MASTER
+    assert 'lacks my.srdf and limits.yaml' in choose_master(robot, full)[1]
+    robot.semantic.write_text('<robot name="my"/>')
+    robot.limits.touch()
+    assert choose_master(robot, full) == (MOTION_MASTER, '')
+    (file,) = motion_files(robot, tmp_path)
+    values = yaml.safe_load(file.read_text())['/**']['ros__parameters']
+    assert values['robot_description_semantic'] == '<robot name="my"/>'
 
 
 def test_hardware_has_no_slaves_and_simulation_has(tmp_path: Path) -> None:

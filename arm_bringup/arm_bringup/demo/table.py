@@ -94,11 +94,17 @@ class ArmView:
             width: Columns of the terminal.
             height: Lines of the terminal.
         """
-        body: list[RenderableType] = [self._drives(figures, width), Text(''), _bus(figures.bus)]
+        body: list[RenderableType] = [self.drives(figures, width), Text(''), bus_text(figures.bus)]
         room = height - len(self.limits) - LINES_AROUND
         return compose(self.title, moment, body, (min(width, WORDS_FROM), width), room)
 
-    def _drives(self, figures: Figures, width: int) -> Table:
+    def drives(self, figures: Figures, width: int) -> Table:
+        """Draw the table of the drives.
+
+        Args:
+            figures: The latest.
+            width: Columns of the terminal.
+        """
         in_words = width >= WORDS_FROM
         table = Table(box=box.HORIZONTALS, show_edge=False, padding=0, header_style='bold')
         left = [('joint', 12), ('NMT', 11), ('CiA 402 state', 21), ('mode', 21 if in_words else 4)]
@@ -148,7 +154,12 @@ def _gauge(drive: DriveFigures, limits: JointLimits) -> Text:
     return Text.assemble(' ', (before, 'dim'), ('●', style), (after, 'dim'))
 
 
-def _bus(bus: BusFigures) -> Text:
+def bus_text(bus: BusFigures) -> Text:
+    """Write two lines of bus and cycle.
+
+    Args:
+        bus: Their figures.
+    """
     if not math.isfinite(bus.frames_per_second):
         return Text('bus    waiting for the master\n', style='dim')
     return Text.assemble(

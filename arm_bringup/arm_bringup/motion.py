@@ -1,0 +1,57 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What the nodes of arm_servo need to know of a robot; arm_servo itself is not needed here.
+
+arm_servo is an optional companion: it brings kinematics and solvers, which the drives alone do not
+need. Where it is built, and the robot has an SRDF and limits, the bring-up runs its master.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import json
+from pathlib import Path
+
+from process_supervisor import Executable, FindExecutable
+
+from .robots import Robot
+from .stack import MASTER, MOTION_MASTER
+
+MAKE_MOVE = 'build arm_servo (make build) for trajectories and jogging'
+
+
+def motion_files(robot: Robot, folder: Path) -> Sequence[Path]:
+    """Write the parameter file for the nodes of arm_servo.
+
+    Args:
+        robot: A robot with an SRDF and limits.
+        folder: Where to.
+
+    Returns:
+        The files to hand over.
+    """
+    values = {
+        'robot_description_semantic': robot.semantic.read_text(encoding='utf-8'),
+        'joint_limits': str(robot.limits),
+    }
+    path = folder / 'motion.yaml'  # JSON is YAML, whatever characters are in it
+    path.write_text(json.dumps({'/**': {'ros__parameters': values}}), encoding='utf-8')
+    return [path, robot.controllers] if robot.controllers.is_file() else [path]
+
+
+def choose_master(robot: Robot, find: FindExecutable) -> tuple[Executable, str]:
+    """Choose what runs the bus.
+
+    Args:
+        robot: The robot.
+        find: Finds executables.
+
+    Returns:
+        The executable, and in words why it offers no motion; empty when it does.
+    """
+    if find(MOTION_MASTER.package, MOTION_MASTER.name) is None:
+        return MASTER, MAKE_MOVE
+    if not robot.movable:
+        need = f'{robot.semantic.name} and {robot.limits.name}'
+        return MASTER, f'{robot.name} lacks {need} for trajectories and jogging'
+    return MOTION_MASTER, ''
