@@ -1,0 +1,186 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Faults of an arm in motion: drives that fail one by one, other clients, and a dead master."""
+
+from __future__ import annotations
+
+import signal
+import time
+from typing import TYPE_CHECKING
+
+from action_msgs.msg import GoalStatus
+from canopen_interfaces.srv import COTargetDouble
+from control_msgs.action import FollowJointTrajectory
+from control_msgs.msg import JointJog, JointTrajectoryControllerState
+from moveit_msgs.msg import ServoStatus
+from moving_arm import CONTROLLER, goal_to, MovingArm, READY
+import numpy as np
+import pytest
+from std_srvs.srv import SetBool
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+from arm_canopen.can import Frame, open_bus
+from arm_msgs.srv import InjectFault
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from isolation import Isolation
+
+    from arm_canopen.can.bus import Bus
+
+pytestmark = pytest.mark.scenario
+
+Result = FollowJointTrajectory.Result
+
+POSITION, STATUSWORD = 0x6064, 0x6041
+
+
+def test_an_arm_survives_its_drives(isolation: Isolation, tmp_path: Path) -> None:
+    """A drive fails in a trajectory, in rest and by a client's hand; each time it is named."""
+    with MovingArm(isolation, tmp_path) as arm:
+        arm.follow()
+        assert arm.send(goal_to(READY, 2.0)).wait()[1].error_code == Result.SUCCESSFUL
+        _refuses_times_that_do_not_increase(arm)
+        _stops_on_the_path_when_one_drive_fails(arm)
+        _refuses_while_a_drive_is_faulted(arm)
+        _recovers(arm)
+        _leaves_a_target_of_another_client_alone(arm)
+        _refuses_without_torque(arm)
+
+
+def _inject(arm: MovingArm, joint: str, fault: str) -> None:
+    request = InjectFault.Request(fault=fault)
+    answer = arm.client.call(InjectFault, f'/fake_slaves/{joint}/fault', request)
+    assert answer.success, answer.message
+
+
+def _refuses_times_that_do_not_increase(arm: MovingArm) -> None:
+    points = []
+    for seconds in (2, 2):
+        point = JointTrajectoryPoint(positions=READY)
+        point.time_from_start.sec = seconds
+        points.append(point)
+    goal = FollowJointTrajectory.Goal(
+        trajectory=JointTrajectory(joint_names=arm.joints, points=points)
+    )
+    result = arm.send(goal).wait()[1]
+    assert result.error_code == Result.INVALID_GOAL
+    assert 'must increase' in result.error_string
+
+
+def _stops_on_the_path_when_one_drive_fails(arm: MovingArm) -> None:
+    states = arm.client.listen(JointTrajectoryControllerState, f'{CONTROLLER}/controller_state')
+    to = [at + 0.4 for at in READY]
+    run = arm.send(goal_to(to, 3.0))
+    arm.client.spin_until(
+        lambda: any(f.desired.positions[0] > 0.1 for f in run.feedback), 10.0, 'motion'
+    )
+    _inject(arm, 'panda_joint4', 'over_current')
+    status, result = run.wait()
+    assert status == GoalStatus.STATUS_ABORTED
+    assert result.error_code == Result.PATH_TOLERANCE_VIOLATED
+    assert 'panda_joint4 ' in result.error_string
+    assert 'recover' in result.error_string
+    assert 'panda_joint3' not in result.error_string
+    way = np.array([list(state.reference.positions) for state in states]) - READY
+    assert np.ptp(way, axis=1).max() < 1e-4  # all joints were commanded in step, to the end
+    assert 0.1 < way[-1, 0] < 0.39
+    assert not any(states[-1].reference.velocities)
+
+
+def _refuses_while_a_drive_is_faulted(arm: MovingArm) -> None:
+    result = arm.send(goal_to(READY, 3.0)).wait()[1]
+    assert result.error_code == Result.INVALID_GOAL
+    assert 'panda_joint4 ' in result.error_string
+    words = arm.client.listen(ServoStatus, '/servo_node/status')
+    publisher = arm.client.node.create_publisher(JointJog, '/servo_node/delta_joint_cmds', 10)
+    jog = JointJog(joint_names=['panda_joint1'], velocities=[0.5])
+    timer = arm.client.node.create_timer(0.05, lambda: publisher.publish(jog))
+    arm.client.spin_until(
+        lambda: bool(words) and words[-1].code == -1 and 'panda_joint4' in words[-1].message,
+        10.0,
+        'refusal of a jog',
+    )
+    arm.client.node.destroy_timer(timer)
+
+
+def _recovers(arm: MovingArm) -> None:
+    _inject(arm, 'panda_joint4', 'none')
+    answer = arm.client.trigger('/panda_joint4/recover')
+    assert answer.success, answer.message
+    if not arm.client.trigger('/panda_joint4/enable').success:
+        assert arm.client.trigger('/panda_joint4/init').success
+    arm.client.trigger('/panda_joint4/cyclic_position_mode')
+    status, result = arm.send(goal_to(READY, 3.0)).wait()
+    assert status == GoalStatus.STATUS_SUCCEEDED, result.error_string
+
+
+def _leaves_a_target_of_another_client_alone(arm: MovingArm) -> None:
+    run = arm.send(goal_to([0.5, *READY[1:]], 4.0))
+    arm.client.spin_until(lambda: len(run.feedback) > 5, 10.0, 'motion')
+    request = COTargetDouble.Request(target=READY[6] + 0.1)
+    assert arm.client.call(COTargetDouble, '/panda_joint7/target', request).success
+    result = run.wait()[1]
+    assert 'panda_joint7 ' in result.error_string
+    deadline = time.monotonic() + 10.0
+    while True:  # the next goal takes the drive back, when its target is reached
+        status, result = arm.send(goal_to(READY, 2.0)).wait()
+        if status == GoalStatus.STATUS_SUCCEEDED or time.monotonic() > deadline:
+            break
+    assert status == GoalStatus.STATUS_SUCCEEDED, result.error_string
+
+
+def _refuses_without_torque(arm: MovingArm) -> None:
+    name = '/fake_slaves/panda_joint2/sto'
+    assert arm.client.call(SetBool, name, SetBool.Request(data=True)).success
+    result = arm.send(goal_to(READY, 2.0)).wait()[1]
+    assert result.error_code != Result.SUCCESSFUL
+    assert 'panda_joint2 ' in result.error_string
+
+
+def test_drives_stop_by_themselves_when_the_master_is_killed(
+    isolation: Isolation, tmp_path: Path
+) -> None:
+    """No drive runs on, jumps or turns back after SIGKILL in mid-trajectory."""
+    with MovingArm(isolation, tmp_path) as arm:
+        arm.follow()
+        assert arm.send(goal_to(READY, 2.0)).wait()[1].error_code == Result.SUCCESSFUL
+        run = arm.send(goal_to([1.0, *READY[1:]], 4.0))
+        arm.client.spin_until(
+            lambda: any(f.desired.positions[0] > 0.3 for f in run.feedback), 10.0, 'motion'
+        )
+        arm.master.signal(signal.SIGKILL)
+        arm.master.wait()
+        with open_bus(isolation.bus) as bus:
+            path = _path_to_rest(bus)
+        steps = np.diff(path)
+        assert steps.min() >= -1  # increments: it does not turn back
+        assert path[-1] - path[0] < 200  # of 1000 per rad; the goal was 600 further
+
+
+def _path_to_rest(bus: Bus) -> list[int]:
+    """Return the positions of the first drive until it is disabled and stands."""
+    path = [_read(bus, 2, POSITION)]
+    deadline = time.monotonic() + 8.0
+    while not (len(path) > 100 and path[-1] == path[-100] and _stopped(bus)):
+        path.append(_read(bus, 2, POSITION))
+        assert time.monotonic() < deadline, path[::20]
+    return path
+
+
+def _stopped(bus: Bus) -> bool:
+    """Tell whether the first drive is no longer in Operation enabled."""
+    return bool((_read(bus, 2, STATUSWORD) & 0x6F) != 0x27)
+
+
+def _read(bus: Bus, node_id: int, index: int) -> int:
+    """Read a number by SDO, as a second master would."""
+    bus.send(Frame(0x600 + node_id, bytes([0x40, index & 0xFF, index >> 8, 0, 0, 0, 0, 0])))
+    deadline = time.monotonic() + 2.0
+    while time.monotonic() < deadline:
+        for frame in bus.receive(0.1):
+            if frame.can_id == 0x580 + node_id and frame.data[1:3] == index.to_bytes(2, 'little'):
+                size = 4 - ((frame.data[0] >> 2) & 3)
+                return int.from_bytes(frame.data[4 : 4 + size], 'little', signed=True)
+    raise AssertionError(f'node {node_id} does not answer')
