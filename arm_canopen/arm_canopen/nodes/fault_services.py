@@ -114,8 +114,12 @@ class FaultServices:
         except (ValueError, FutureTimeoutError, CancelledError) as error:
             response.message = str(error) or 'the simulated devices do not run'
             response.success = False
-        log = self._node.get_logger().info if response.success else self._node.get_logger().warning
-        log(response.message)
+        logger = self._node.get_logger()
+        # two calls, as rclpy allows one severity to each place in the code
+        if response.success:
+            logger.info(response.message)
+        else:
+            logger.warning(response.message)
         return response
 
 
