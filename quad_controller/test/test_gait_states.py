@@ -244,6 +244,33 @@ def test_a_pause_of_the_controller_itself_is_no_silence_of_the_robot() -> None:
     assert rig.controller.status.velocity.at_rest
 
 
+@pytest.mark.parametrize('dts', [(0.15,), (0.3,), (1.0,), (0.3, 0.02)])
+def test_a_slow_loop_watches_as_well(dts: tuple[float, ...]) -> None:
+    """When steps come late again and again, only the first one is excused."""
+    rig = standing()
+    rig.ask('walk')
+    rig.until(State.WALK)
+    passed = 0.0
+    while not rig.is_in(State.FAULT):
+        for dt in dts:
+            rig.controller.step(Measurement(), dt)
+        passed += sum(dts)
+        assert passed <= 0.5 + 2 * sum(dts)
+
+
+def test_one_odd_sample_after_a_pause_is_no_fault() -> None:
+    """A fall and a low charge must last, in what is seen and not in what was slept through."""
+    rig = standing()
+    still = JointSample(rig.positions, (0.0,) * 12)
+    for _ in range(2):
+        rig.controller.step(Measurement(still, tilted(1.2), 0.01), 4.0)
+        rig.controller.step(Measurement(still, UPRIGHT, 0.9), PERIOD)
+    assert rig.is_in(State.STAND)
+    rig.imu = tilted(1.2)
+    rig.run(0.2)
+    assert rig.is_in(State.FAULT)
+
+
 def test_a_lost_attitude_stops_the_walk_on_its_feet() -> None:
     """Without an attitude the gait ends in standing."""
     rig = standing()

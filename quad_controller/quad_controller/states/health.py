@@ -11,7 +11,7 @@ from .faults import Fault
 from .measurement import ImuSample, JointSample, Measurement
 from .parameters import StateParameters
 
-LONGEST_PAUSE = 0.1  # [s] that counts of a step that came late
+LONGEST_PAUSE = 0.1  # [s] that counts of a single step that came late
 
 
 class Health:
@@ -40,8 +40,9 @@ class Health:
         self.battery: float | None = None
         self.joints_age = self.imu_age = math.inf
         self.refused = 0
-        self._fall_time = 0.0
-        self._low_time = 0.0
+        self._late = False
+        self._falling_for: float | None = None
+        self._low_for: float | None = None
 
     def take(self, measurement: Measurement, dt: float) -> list[str]:
         """Take what is new.
@@ -53,8 +54,7 @@ class Health:
         Returns:
             What was refused and why.
         """
-        # after a pause of this process itself, what was sent meanwhile is yet to be read
-        waited = min(dt, LONGEST_PAUSE)
+        waited = self._waited(dt, heard=measurement.joints is not None)
         self.joints_age += waited
         self.imu_age += waited
         problems = [*self._take_joints(measurement.joints), *self._take_imu(measurement.imu)]
@@ -64,8 +64,8 @@ class Health:
             self.battery = battery
         parameters = self._parameters
         low = self.battery is not None and self.battery < parameters.low_battery
-        self._low_time = self._low_time + dt if low else 0.0
-        self._fall_time = self._fall_time + dt if self._falls() else 0.0
+        self._low_for = _longer(self._low_for, waited) if low else None
+        self._falling_for = _longer(self._falling_for, waited) if self._falls() else None
         return problems
 
     @property
@@ -105,11 +105,24 @@ class Health:
             yield Fault.JOINTS, _age(self.joints_age, '/joint_states')
         if parameters.require_imu and self.imu_age > parameters.fault_age:
             yield Fault.IMU, _age(self.imu_age, '/imu')
-        if self.imu is not None and self._fall_time > parameters.fall_time:
+        if self.imu is not None and (self._falling_for or 0.0) > parameters.fall_time:
             angle = math.degrees(self.imu.tilt)
             yield Fault.FALLEN, f'the body is tilted by {angle:.0f} deg; put it on its feet'
-        if self.battery is not None and self._low_time > parameters.battery_time:
+        if self.battery is not None and (self._low_for or 0.0) > parameters.battery_time:
             yield Fault.BATTERY, f'{self.battery:.0%} left; charge it'
+
+    def _waited(self, dt: float, *, heard: bool) -> float:
+        """Return how much of a step counts [s].
+
+        After one pause of this process itself, what was sent meanwhile is yet to be read; the
+        next one has no such excuse, unless joint states came on time in between.
+        """
+        waited = dt if self._late else min(dt, LONGEST_PAUSE)
+        if dt > LONGEST_PAUSE:
+            self._late = True
+        elif heard:
+            self._late = False
+        return waited
 
     def _falls(self) -> bool:
         if self.imu is None or self.imu_age > self._parameters.hold_age:
@@ -132,6 +145,11 @@ class Health:
             yield f'refused {problem}'
         else:
             self.imu, self.imu_age = imu, 0.0
+
+
+def _longer(time: float | None, dt: float) -> float:
+    """Return how long something has been so [s]; it begins with the first time it is seen."""
+    return 0.0 if time is None else time + dt
 
 
 def _age(age: float, topic: str) -> str:
