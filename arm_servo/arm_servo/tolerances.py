@@ -6,10 +6,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+import math
 
 import numpy as np
 
 from .arrays import Array
+from .exceptions import GoalCode, GoalError
 from .goal import JointTolerance
 from .limits import JointLimits
 
@@ -60,7 +62,18 @@ def tolerances(
         given: The goal's tolerances by joint: above 0 counts, 0 keeps the default, below takes it
             away.
         default: The default of each joint; 0 is none.
+
+    Raises:
+        GoalError: A joint is unknown, or a tolerance is not a number.
     """
+    for name, asked in (given or {}).items():
+        if name not in limits.names:
+            known = ', '.join(limits.names)
+            raise GoalError(
+                GoalCode.INVALID_JOINTS, f'tolerance of {name!r}: no such joint; joints: {known}'
+            )
+        if math.isnan(asked.position) or math.isnan(asked.velocity):
+            raise GoalError(GoalCode.INVALID_GOAL, f'tolerance of {name}: it is not a number')
     rows = [
         (
             _one(asked.position, default.position),

@@ -54,6 +54,14 @@ def test_the_tip_is_where_the_maker_says(
     assert robot(name).pose(np.array(positions)).position == pytest.approx(xyz, abs=1e-4)
 
 
+def test_ranges_of_the_gp110_are_those_of_its_data_sheet() -> None:
+    """Ranges and speeds in degrees, joint by joint."""
+    limits = robot('gp110').limits
+    assert np.degrees(limits.lower) == pytest.approx([-180, -90, -80, -360, -125, -360])
+    assert np.degrees(limits.upper) == pytest.approx([180, 155, 90, 360, 125, 360])
+    assert np.degrees(limits.velocity) == pytest.approx([140, 110, 130, 175, 175, 255], abs=0.01)
+
+
 @pytest.mark.parametrize('model', [*map(robot, ROBOTS), *map(chain, CHAINS)], ids=str)
 @settings(max_examples=15, deadline=None)
 @given(seed=st.integers(0, 10**6))

@@ -241,6 +241,29 @@ def test_a_trajectory_that_has_begun_is_joined() -> None:
     assert states[-1].position == pytest.approx(goal.points[-1].positions, abs=1e-6)
 
 
+def test_a_trajectory_that_waits_can_be_canceled() -> None:
+    """A cancel before the begin ends it at once, at rest."""
+    core = core_of('prbt')
+    execution = core.follow(replace(wave(robot('prbt'), ready('prbt'), 'q'), age=-0.5))
+    points = stream(core, 0.3, {0.1: lambda c, _: c.stop('canceled')})
+    assert execution.ending == Outcome(GoalCode.SUCCESSFUL, 'canceled', canceled=True)
+    assert execution.phase is Phase.DONE
+    assert not any(point.state.moving for point in points)
+
+
+def test_a_trajectory_can_begin_paused() -> None:
+    """At a speed of 0 a trajectory waits; with speed it is followed to its end."""
+    core = core_of('prbt')
+    core.override(0.0)
+    execution = core.follow(wave(robot('prbt'), ready('prbt'), 'q'))
+    assert not any(point.state.moving for point in stream(core, 0.3))
+    core.override(1.0)
+    states = follow_to_the_end(core, execution)
+    assert execution.ending is not None
+    assert execution.ending.code is GoalCode.SUCCESSFUL
+    kept(robot('prbt').limits, states)
+
+
 def lagging(core: MotionCore, lag: Array, cycles: int) -> None:
     """Step a core whose drives are off by an amount."""
     for step in range(cycles):
@@ -315,6 +338,16 @@ REFUSED = {
     'missing joint': (replace(GOOD, joints=GOOD.joints[1:]), -2, 'prbt_joint_1 is missing'),
     'no joints': (replace(GOOD, joints=[]), -2, 'missing'),
     'over': (replace(GOOD, age=9.0), -3, 'ended 4.500 s ago'),
+    'tolerance of a stranger': (
+        replace(GOOD, path_tolerance={'elbow': JointTolerance(0.1)}),
+        -2,
+        "tolerance of 'elbow'",
+    ),
+    'nan tolerance': (
+        replace(GOOD, goal_tolerance={'prbt_joint_1': JointTolerance(math.nan)}),
+        -1,
+        'not a number',
+    ),
     'far begin': (
         replace(GOOD, points=[GoalPoint(0.0, tuple(ready('prbt') + 0.3))]),
         -1,
