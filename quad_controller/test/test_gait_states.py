@@ -331,6 +331,60 @@ def test_a_robot_that_is_carried_while_relaxed_is_no_fault() -> None:
     assert 'put it on its feet' in rig.controller.set_mode('stand').message
 
 
+def lying_down() -> Rig:
+    """Return a rig that is folding its legs."""
+    rig = standing()
+    rig.ask('lie')
+    rig.until(State.LIE)
+    rig.run(0.3)
+    assert rig.controller.status.title == 'to lie'
+    return rig
+
+
+def test_joints_lost_while_lying_down_are_a_fault() -> None:
+    """The legs stop and do not go on by themselves when the joint states come back."""
+    rig = lying_down()
+    rig.joints = False
+    rig.run(0.25)
+    held = rig.positions
+    assert any('holding the last targets' in line for line in rig.log)
+    rig.run(0.5)
+    assert rig.is_in(State.FAULT)
+    rig.joints = True
+    rig.run(2.0)
+    assert rig.positions == held
+    assert rig.controller.clear_fault().message == 'cleared; the mode is relax'
+
+
+def test_a_robot_that_is_turned_over_while_it_lies_down_stops() -> None:
+    """Legs do not fold on in the air; nor do they begin to."""
+    rig = lying_down()
+    rig.imu = tilted(3.0)
+    rig.run(0.2)
+    assert rig.is_in(State.FAULT)
+    held = rig.positions
+    rig.run(1.0)
+    assert rig.positions == held
+    other = Rig()
+    other.imu = tilted(3.0)
+    other.run(0.5)
+    assert 'put it on its feet' in other.controller.set_mode('lie').message
+    assert other.controller.set_mode('relax').accepted
+
+
+def test_lying_down_needs_neither_attitude_nor_charge() -> None:
+    """It is what a robot without them does; at rest it may be carried as well."""
+    rig = lying_down()
+    rig.imu, rig.battery = None, 0.01
+    rig.run(5.0)
+    assert rig.controller.status.title == 'lie'
+    rig.joints = False
+    rig.run(1.0)
+    rig.imu = tilted(3.0)
+    rig.run(1.0)
+    assert rig.is_in(State.LIE)
+
+
 def test_a_low_battery_lies_down() -> None:
     """A charge that stays low ends every motion gently; one low reading does not."""
     rig = standing()

@@ -32,6 +32,12 @@ MAX_STEP = 0.05  # [s] after a longer pause the gait goes on where it was instea
 UPRIGHT_STATES = GAIT_STATES | {State.POLICY, State.FAULT}
 """States in which the robot is on its legs, and what is wrong with it is a fault."""
 
+LYING_FAULTS = frozenset({Fault.JOINTS, Fault.FALLEN})
+"""What ends lying down; without an attitude or charge that is the best that it can do."""
+
+MATTERING = {State.RELAX: frozenset({Fault.JOINTS}), State.LIE: LYING_FAULTS}
+"""What has to be in order before a state is asked for; everything where it is not named."""
+
 
 class Controller:
     """Brings a quadruped from lying to walking and back, whatever happens on the way.
@@ -200,12 +206,14 @@ class Controller:
         return targets
 
     def _watch(self, last: Targets) -> list[Event]:
-        """Latch faults of a robot that is on its legs."""
-        if self._machine.state not in UPRIGHT_STATES:
+        """Latch faults of a robot that is on its legs, or on its way down."""
+        upright = self._machine.state in UPRIGHT_STATES
+        if not upright and self._machine.motion.finished:
             return []
         return [
             event
             for fault, reason in self._health.faults()
+            if upright or fault in LYING_FAULTS
             for event in self._latch_fault(fault, reason, last)
         ]
 
@@ -214,7 +222,7 @@ class Controller:
         matters = {}
         if stale := self._commands.warning(state):
             matters['command'] = stale
-        if self._health.held and state in UPRIGHT_STATES:
+        if self._health.held and (state in UPRIGHT_STATES or not self._machine.motion.finished):
             age = self._health.joints_age * 1e3
             matters['held'] = f'joint states are {age:.0f} ms old; holding the last targets'
         gait = self._generator
@@ -270,8 +278,7 @@ class Controller:
             return self._policy_refusal
         if request.state is State.POLICY and self._shadow is not None:
             return 'the policy is only watched in a dry run (parameter policy_dry_run)'
-        gentle = request.state in {State.RELAX, State.LIE}
         for fault, reason in self._health.faults():
-            if fault is Fault.JOINTS or not gentle:
+            if fault in MATTERING.get(request.state, tuple(Fault)):
                 return f'{fault.value}: {reason}'
         return ''
