@@ -184,6 +184,7 @@ class NodeRig(Rig):
     def begin_anew(self) -> None:
         """Put the robot to zero, without faults, and forget what was heard."""
         self.peer.behaviour = Behaviour()
+        self.hear('/joint_states', 3)  # by then the last command of another test has arrived
         self.peer.angles.update(dict.fromkeys(self.peer.angles, 0.0))
         self.peer.commands.clear()
         for messages in self.heard.values():

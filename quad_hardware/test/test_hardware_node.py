@@ -105,6 +105,21 @@ def test_silence_holds_the_servos(rig: NodeRig) -> None:
     assert rig.largest_step() <= LARGEST_STEP + 0.01
 
 
+def test_no_command_goes_out_while_no_report_can_be(rig: NodeRig) -> None:
+    """A servo that reads 250 degrees: an error that says so, no jump, and it recovers."""
+    rig.peer.angles[11] = 250.0
+    rig.wait_for_status('serial link', DiagnosticStatus.ERROR, 'motor 11 at 250 deg')
+    rig.peer.commands.clear()
+    rig.command([0.4, 1.4, -1.0] * 4)
+    rig.wait_for_status('joint commands', DiagnosticStatus.WARN, 'every report is refused')
+    assert rig.peer.commands == []
+    rig.peer.angles[11] = 20.0
+    rig.wait_for_status('serial link', DiagnosticStatus.OK, 'reports arrive')
+    rig.stream(POSE, 0.2)
+    assert abs(rig.peer.commands[0][11] - 20.0) <= LARGEST_STEP
+    assert rig.largest_step() <= LARGEST_STEP + 0.01
+
+
 def test_a_cut_cable_is_survived_without_a_jump(rig: NodeRig) -> None:
     """Two seconds without it, under a stream of commands; meanwhile the robot was bent by hand."""
     rig.stream(POSE, 0.8)

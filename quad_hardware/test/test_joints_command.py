@@ -102,7 +102,17 @@ def test_limits_are_told() -> None:
     assert command.targets[0] == JOINTS.servos[0].upper
 
 
-def test_a_servo_that_is_not_reported_takes_its_target() -> None:
+def test_a_leg_that_nobody_has_seen_is_not_moved() -> None:
+    """Its target would jump: the command is refused by name, and the next one begins anew."""
+    limiter = CommandLimiter(JOINTS)
+    with pytest.raises(CommandError, match='says where fl_thigh_joint, fl_calf_joint is'):
+        limiter.step([0.5] * 12, [0.0, None, None, *HOME[3:]], 0.0)
+    with pytest.raises(CommandError, match='fl_hip_joint'):
+        limiter.step([0.5] * 12, [None] * 12, 0.02)
+    assert limiter.step([0.5] * 12, HOME, 0.04).targets == pytest.approx([0.04] * 12)
+
+
+def test_an_arm_servo_that_is_not_reported_takes_its_target() -> None:
     """There is nothing to begin from."""
     measured = [*([0.0] * 12), None, 0.0, 0.0, 0.0]
     command = CommandLimiter(ARM_JOINTS).step([*HOME, 0.7, 0.0, 0.0, 0.0], measured, 0.0)

@@ -26,10 +26,14 @@ class Rig:
         self.peer = peer
         self.states: list[RobotState] = []
         self.changes: list[tuple[LinkState, str]] = []
+        self.refusal = ''
         options = LinkOptions(str(peer.link))
-        self.driver = Driver(
-            options, self.states.append, lambda *change: self.changes.append(change)
-        )
+        self.driver = Driver(options, self._take, lambda *change: self.changes.append(change))
+
+    def _take(self, state: RobotState) -> str:
+        if not self.refusal:
+            self.states.append(state)
+        return self.refusal
 
     def reach(self, state: LinkState) -> None:
         """Wait until the link is in a state."""
@@ -39,6 +43,7 @@ class Rig:
         """Wait for more reports."""
         until = len(self.states) + count
         wait_for(lambda: len(self.states) >= until, f'{count} reports')
+        self.reach(LinkState.RUNNING)
 
 
 def wait_for(condition: Callable[[], bool], what: str) -> None:
@@ -112,6 +117,49 @@ def test_silence_stops_the_commands(rig: Rig) -> None:
     wait_for(lambda: len(rig.peer.commands) > sent, 'command after the silence')
 
 
+def test_reports_that_are_all_refused_are_none(rig: Rig) -> None:
+    """From the first on or later: no command goes out, the link says why, and it recovers."""
+    rig.reports(1)
+    rig.refusal = 'motor 11 at 250 deg'
+    rig.reach(LinkState.REFUSED)
+    assert 'every report is refused, motor 11 at 250 deg' in rig.driver.status().detail
+    assert not rig.driver.command(LEGS)
+    rig.peer.unplug()
+    rig.reach(LinkState.CONNECTING)
+    rig.peer.plug()
+    rig.reach(LinkState.REFUSED)
+    states = [state for state, _ in rig.changes]
+    assert states.count(LinkState.RUNNING) == 1
+    assert states.count(LinkState.REFUSED) == 2
+    rig.peer.behaviour.silent = True
+    rig.reach(LinkState.STALE)
+    rig.peer.behaviour.silent = False
+    rig.refusal = ''
+    rig.reports(1)
+    assert rig.peer.commands == []
+    assert rig.driver.status().refused > 20
+
+
+def test_the_link_runs_when_its_first_report_was_taken(tmp_path: Path) -> None:
+    """Whoever sees it running has that report already, also after the cable was out."""
+    seen: list[LinkState | None] = []
+    with PtyPeer(tmp_path / 'port') as peer:
+        driver = Driver(
+            LinkOptions(str(peer.link)),
+            lambda _: seen.append(None) or '',  # type: ignore[func-returns-value]
+            lambda state, _: seen.append(state),
+        )
+        driver.start()
+        wait_for(lambda: LinkState.RUNNING in seen, 'report')
+        peer.unplug()
+        wait_for(lambda: seen[-1] is LinkState.CONNECTING, 'loss')
+        peer.plug()
+        wait_for(lambda: seen.count(LinkState.RUNNING) == 2, 'report again')
+        driver.stop()
+    starts = [index for index, what in enumerate(seen) if what is LinkState.RUNNING]
+    assert [seen[index - 1] for index in starts] == [None, None]
+
+
 def test_a_replugged_robot_is_found_again(rig: Rig) -> None:
     """On another terminal behind the same link; the driver says what it waits for."""
     rig.reports(1)
@@ -155,7 +203,7 @@ def test_a_rider_is_not_taken_for_a_dog(tmp_path: Path) -> None:
 def test_a_failure_of_the_caller_is_not_silent(tmp_path: Path) -> None:
     """What goes wrong with a report ends the link, and the link says so; the port is free."""
 
-    def fail(_: RobotState) -> None:
+    def fail(_: RobotState) -> str:
         raise ZeroDivisionError
 
     with PtyPeer(tmp_path / 'port') as peer:
@@ -172,7 +220,7 @@ def test_a_driver_stops_while_it_looks(tmp_path: Path) -> None:
     """Without any port, it ends at once, and says so."""
     changes: list[LinkState] = []
     options = LinkOptions(str(tmp_path / 'nothing'))
-    driver = Driver(options, lambda _: None, lambda state, _: changes.append(state))
+    driver = Driver(options, lambda _: '', lambda state, _: changes.append(state))
     driver.start()
     wait_for(lambda: 'no such device' in driver.status().detail, 'reason')
     driver.stop()

@@ -66,10 +66,11 @@ class HandheldRobot:
             self._driver.torque(on=True)
             self.angles()
 
-    def _take(self, state: RobotState) -> None:
+    def _take(self, state: RobotState) -> str:
         with self._changed:
             self._recent.append(state.positions)
             self._changed.notify_all()
+        return ''
 
     def _forget(self, _state: LinkState, _detail: str) -> None:
         with self._changed:

@@ -81,11 +81,29 @@ class CommandLimiter:
         Args:
             positions: Targets of all joints, or of the legs only, in the order of the URDF
                 [rad], [m].
-            measured: Where the joints are; None where that is not known.
+            measured: Where the joints are; None where that is not known, which only joints
+                behind the legs may be: what the protocol does not report.
             now: Time [s].
 
         Raises:
-            CommandError: A wrong length, or a number that is not finite; nothing is to be sent.
+            CommandError: A wrong length, a number that is not finite, or a leg of which nobody
+                knows where it is; nothing is to be sent.
+        """
+        self.check(positions)
+        if now - self._last_at > self._settings.stream_timeout:
+            self._begin(positions, measured, now)
+        elapsed = min(max(now - self._last_at, 0.0), LONGEST_PERIOD)
+        self._last_at = now
+        return self._approach(positions, self._speed(now) * elapsed)
+
+    def check(self, positions: Sequence[float]) -> None:
+        """Refuse what is no command, wherever the joints are.
+
+        Args:
+            positions: As in :meth:`step`.
+
+        Raises:
+            CommandError: A wrong length, or a number that is not finite.
         """
         names = self._joints.names
         if len(positions) not in {len(names), self._joints.leg_count}:
@@ -99,15 +117,17 @@ class CommandLimiter:
             raise CommandError(
                 f'no finite position for {", ".join(wrong)}; the command is refused'
             )
-        if now - self._last_at > self._settings.stream_timeout:
-            self._begin(positions, measured, now)
-        elapsed = min(max(now - self._last_at, 0.0), LONGEST_PERIOD)
-        self._last_at = now
-        return self._approach(positions, self._speed(now) * elapsed)
 
     def _begin(
         self, positions: Sequence[float], measured: Sequence[float | None], now: float
     ) -> None:
+        legs = zip(self._joints.names[: self._joints.leg_count], measured, strict=False)
+        lost = [name for name, place in legs if place is None]
+        if lost:
+            raise CommandError(
+                f'no report says where {", ".join(lost)} is, so the target could jump; '
+                'wait for reports of the robot'
+            )
         wanted = [*positions, *(math.nan for _ in range(len(measured) - len(positions)))]
         # the angle of a servo that is not reported is taken to be what is asked of it
         self._targets = [

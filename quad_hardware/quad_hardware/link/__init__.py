@@ -3,13 +3,14 @@
 """The serial line: port, probing, conversation and the thread that keeps it going."""
 
 from .dialect import DialectCounters
-from .driver import Driver, LinkState, LinkStatus
+from .driver import Driver, LinkState, LinkStatus, STALE_TIME
 from .port import SerialPort
 from .probe import ask, ask_firmware, connect, Connection
 from .session import LinkOptions
 from .state import RobotState
 
 __all__ = [
+    'STALE_TIME',
     'Connection',
     'DialectCounters',
     'Driver',

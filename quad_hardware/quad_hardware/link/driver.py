@@ -34,6 +34,7 @@ class LinkState(Enum):
     WAITING = 'waiting'  # a robot answered and has not reported yet
     RUNNING = 'running'
     STALE = 'stale'  # the port is open and no report came for STALE_TIME
+    REFUSED = 'refused'  # reports come, and for STALE_TIME none of them could be
     STOPPED = 'stopped'
 
 
@@ -48,11 +49,12 @@ class LinkStatus:
         baud: Speed of the line [bit/s].
         firmware: Version of the robot.
         connections: How often a robot was found.
-        age: Since the last report [s]; infinite before the first.
+        age: Since the last report that was taken [s]; infinite before the first.
         commands: Joint commands handed to the line.
         dropped: Joint commands that were not sent, because the link was not running.
         parser: What the parser saw in this connection.
         dialect: What the dialect saw in this connection.
+        refused: Reports that could not be, and were not taken.
     """
 
     state: LinkState
@@ -66,20 +68,21 @@ class LinkStatus:
     dropped: int
     parser: ParserCounters
     dialect: DialectCounters
+    refused: int = 0
 
 
 class Driver:
     """A robot on a serial port.
 
-    ``on_state`` is called in the thread of the driver for each report, ``on_change`` when the
-    state of the link changes; both must be quick. Nothing is sent to servos while no reports
-    come: they hold their last target.
+    ``on_state`` is called in the thread of the driver for each report and says why it cannot be,
+    or nothing when it is taken; ``on_change`` when the state of the link changes. Both must be
+    quick. Nothing is sent to servos while no report is taken: they hold their last target.
     """
 
     def __init__(
         self,
         options: LinkOptions,
-        on_state: Callable[[RobotState], None],
+        on_state: Callable[[RobotState], str],
         on_change: Callable[[LinkState, str], None],
     ) -> None:
         """Prepare; :meth:`start` begins."""
@@ -97,7 +100,9 @@ class Driver:
         self._connections = 0
         self._commands = 0
         self._dropped = 0
-        self._reported_at = -float('inf')
+        self._refused = 0
+        self._refusal = ''
+        self._heard_at = self._reported_at = -float('inf')
 
     def start(self) -> None:
         """Start the thread, which looks for the robot until it finds it."""
@@ -157,6 +162,7 @@ class Driver:
             dropped=self._dropped,
             parser=session.parser.counters if session else ParserCounters(),
             dialect=session.dialect.counters if session else DialectCounters(),
+            refused=self._refused,
         )
 
     def _wake(self) -> None:
@@ -193,7 +199,7 @@ class Driver:
                 session.port.close()
 
     def _serve(self, session: Session) -> None:
-        now = heard_at = self._reported_at = time.monotonic()
+        now = bytes_at = self._heard_at = self._reported_at = time.monotonic()
         dialect = session.dialect
         self._session = session
         self._connections += 1
@@ -204,27 +210,35 @@ class Driver:
         )
         while not self._stopping.is_set():
             now = time.monotonic()
-            silence = now - self._reported_at
-            if silence > PROBE_AGAIN:
+            if now - self._heard_at > PROBE_AGAIN:
                 raise LinkError(f'no report for {PROBE_AGAIN} s; looking for the robot again')
-            if silence > STALE_TIME:
-                self._fall_silent(dialect)
+            if now - self._reported_at > STALE_TIME:
+                self._fall_silent(dialect, now)
             self._post(dialect)
             step = dialect.step(now)
             if step.send:
                 session.port.write(step.send)
-            patience = PROBE_AGAIN if silence > STALE_TIME else STALE_TIME
-            timeout = min(step.wake, self._reported_at + patience) - now
+            timeout = min(step.wake, self._deadline(now)) - now
             if session.parser.pending:
                 timeout = min(timeout, QUIET_TIME)
-            heard_at = self._listen(session, max(timeout, 0.0), heard_at)
+            bytes_at = self._listen(session, max(timeout, 0.0), bytes_at)
 
-    def _fall_silent(self, dialect: Dialect) -> None:
+    def _deadline(self, now: float) -> float:
+        """Return when silence has lasted long enough to do something about it [s]."""
+        ends = (self._reported_at + STALE_TIME, self._heard_at + STALE_TIME)
+        return min((end for end in ends if end >= now), default=self._heard_at + PROBE_AGAIN)
+
+    def _fall_silent(self, dialect: Dialect, now: float) -> None:
         dialect.withdraw()
         self._mailbox = self._torque = None
+        refused = now - self._heard_at <= STALE_TIME
+        state = LinkState.REFUSED if refused else LinkState.STALE
+        if state is self._state:
+            return
+        what = f'every report is refused, {self._refusal}' if refused else 'no report'
         self._enter(
-            LinkState.STALE,
-            f'no report for {STALE_TIME} s: the servos hold their last target, nothing is sent',
+            state,
+            f'{what} for {STALE_TIME} s: the servos hold their last target, nothing is sent',
         )
 
     def _post(self, dialect: Dialect) -> None:
@@ -236,7 +250,7 @@ class Driver:
         if on is not None:
             dialect.torque(on=on)
 
-    def _listen(self, session: Session, timeout: float, heard_at: float) -> float:
+    def _listen(self, session: Session, timeout: float, bytes_at: float) -> float:
         """Wait for bytes or a command; return when bytes last came [s]."""
         port, parser = session.port, session.parser
         line = port.fileno()
@@ -246,12 +260,21 @@ class Driver:
         data = port.read() if line in readable else b''
         now = time.monotonic()
         frames = parser.feed(data) if data else []
-        if not data and parser.pending and now - heard_at > QUIET_TIME:
+        if not data and parser.pending and now - bytes_at > QUIET_TIME:
             frames = parser.expire()
         for frame in frames:
             report = session.dialect.hear(frame, now)
             if report is not None:
-                self._reported_at = now
-                self._enter(LinkState.RUNNING, 'reports arrive')
-                self._on_state(report)
-        return now if data else heard_at
+                self._take(report, now)
+        return now if data else bytes_at
+
+    def _take(self, report: RobotState, now: float) -> None:
+        self._heard_at = now
+        reason = self._on_state(report)
+        if reason:
+            self._refused += 1
+            self._refusal = reason
+            return
+        self._reported_at = now
+        # only now: whoever sends a command has a place of the robot to begin from
+        self._enter(LinkState.RUNNING, 'reports arrive')

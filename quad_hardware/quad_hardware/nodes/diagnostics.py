@@ -23,6 +23,7 @@ _LINK_LEVELS = {
     LinkState.WAITING: DiagnosticStatus.WARN,
     LinkState.RUNNING: DiagnosticStatus.OK,
     LinkState.STALE: DiagnosticStatus.STALE,
+    LinkState.REFUSED: DiagnosticStatus.ERROR,
     LinkState.STOPPED: DiagnosticStatus.ERROR,
 }
 
@@ -66,6 +67,7 @@ def link_diagnostic(node: str, port: str, status: LinkStatus) -> DiagnosticStatu
         'firmware': status.firmware,
         'connections': status.connections,
         'report_age': '' if math.isinf(status.age) else f'{status.age:.3f}',
+        'reports_refused': status.refused,
         'commands_sent': status.commands,
         'commands_dropped': status.dropped,
         **asdict(parser),

@@ -26,7 +26,7 @@ from quad_msgs.msg import JointCommand
 from ..estimation import Estimate, Estimator
 from ..exceptions import CommandError, HardwareError
 from ..joints import Command, CommandLimiter
-from ..link import Driver, LinkState, RobotState
+from ..link import Driver, LinkState, RobotState, STALE_TIME
 from . import messages
 from .diagnostics import (
     command_diagnostic,
@@ -63,8 +63,7 @@ class HardwareNode(Node):
         self._limiter = CommandLimiter(settings.joints, settings.limiter)
         self._estimator = Estimator(settings.urdf, settings.joints, settings.estimator)
         self._driver = Driver(settings.link, self._report, self._link_changed)
-        self._state: RobotState | None = None
-        self._estimate: Estimate | None = None
+        self._latest: tuple[RobotState, Estimate] | None = None  # while the link is running
         self._counters = CommandCounters()
         self._last_targets: tuple[float, ...] = ()
         self._limp = False
@@ -88,16 +87,16 @@ class HardwareNode(Node):
         """Close the port; the servos hold their last target."""
         self._driver.stop()
 
-    def _report(self, state: RobotState) -> None:
-        """Publish a report; runs in the thread of the driver."""
+    def _report(self, state: RobotState) -> str:
+        """Publish a report; return why it cannot be. Runs in the thread of the driver."""
         estimate = self._estimator.update(state)
         if estimate is None:
             self.get_logger().warning(
                 f'report refused: {self._estimator.refusal}',
                 throttle_duration_sec=WARN_PERIOD,
             )
-            return
-        self._state, self._estimate = state, estimate
+            return self._estimator.refusal
+        self._latest = state, estimate
         settings, stamp = self._settings, self._stamp(estimate.time)
         self._joint_states.publish(messages.joint_state(estimate, stamp))
         self._imu.publish(messages.imu(estimate, settings.deviations, settings.frames.imu, stamp))
@@ -106,6 +105,7 @@ class HardwareNode(Node):
         )
         if settings.frames.publish:
             self._tf.publish(messages.transforms(estimate, settings.frames, stamp))
+        return ''
 
     def _stamp(self, monotonic: float) -> TimeMessage:
         """Return a moment of the monotonic clock on the clock of ROS."""
@@ -117,8 +117,11 @@ class HardwareNode(Node):
     def _link_changed(self, state: LinkState, detail: str) -> None:
         """Say how the link is; runs in the thread of the driver."""
         if state is not LinkState.RUNNING:
+            self._latest = None  # the robot may be moved while nobody sees it
             self._limiter.reset()
-        if state in {LinkState.STALE, LinkState.CONNECTING}:
+        if state is LinkState.REFUSED:
+            self.get_logger().error(f'{state.value}: {detail}')
+        elif state in {LinkState.STALE, LinkState.CONNECTING}:
             self.get_logger().warning(f'{state.value}: {detail}')
         elif state is LinkState.STOPPED:
             self.get_logger().debug(detail)
@@ -127,10 +130,14 @@ class HardwareNode(Node):
 
     def _take(self, message: JointCommand) -> None:
         self._counters.received += 1
-        now, estimate = time.monotonic(), self._estimate
+        now = time.monotonic()
         try:
             self._check_rest(message)
-            place = estimate.positions if estimate else {}
+            self._limiter.check(message.position)
+            place = self._place(now)
+            if not place:
+                self._drop(self._driver.status().detail)
+                return
             measured = [place.get(name) for name in self._joints.names]
             command = self._limiter.step(message.position, measured, now)
         except CommandError as error:
@@ -145,6 +152,13 @@ class HardwareNode(Node):
         else:
             self._drop(self._driver.status().detail)
 
+    def _place(self, now: float) -> dict[str, float]:
+        """Return where the joints are [rad], [m]; empty when the robot was not seen lately."""
+        latest = self._latest
+        if latest is None or now - latest[0].arrival > STALE_TIME:
+            return {}
+        return latest[1].positions
+
     def _drop(self, reason: str) -> None:
         self._limiter.reset()
         self._last_targets = ()
@@ -155,11 +169,10 @@ class HardwareNode(Node):
         self, request: SetBool.Request, response: SetBool.Response
     ) -> SetBool.Response:
         """Let the servos go, or have them hold where they are."""
-        estimate, on = self._estimate, bool(request.data)
-        if on and estimate is not None:  # a servo that wakes goes to its last target
-            place = [
-                estimate.positions[name] for name in self._joints.names[: self._joints.leg_count]
-            ]
+        on = bool(request.data)
+        positions = self._place(time.monotonic())
+        if on and positions:  # a servo that wakes goes to its last target
+            place = [positions[name] for name in self._joints.names[: self._joints.leg_count]]
             self._driver.command(self._joints.angles(place))
         response.success = self._driver.torque(on=on)
         if not response.success:
@@ -198,7 +211,7 @@ class HardwareNode(Node):
         self.get_logger().warning(reason, throttle_duration_sec=WARN_PERIOD)
 
     def _diagnose(self) -> None:
-        name, port, state = self.get_name(), self._settings.link.path, self._state
+        name, port, latest = self.get_name(), self._settings.link.path, self._latest
         now = self.get_clock().now().to_msg()
         array = DiagnosticArray()
         array.header.stamp = now
@@ -206,8 +219,8 @@ class HardwareNode(Node):
             link_diagnostic(name, port, self._driver.status()),
             command_diagnostic(name, port, self._counters),
         ]
-        estimate = self._estimate
-        if state is not None and estimate is not None:
+        if latest is not None:
+            state, estimate = latest
             array.status.append(robot_diagnostic(name, port, state, estimate, self._estimator))
             self._battery.publish(messages.battery(estimate.battery, now))
         self._diagnostics.publish(array)
