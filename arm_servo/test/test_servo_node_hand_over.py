@@ -1,0 +1,110 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Jogs, trajectories, targets, stops and lost drives in any order: what leaves on the bus."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+import numpy as np
+import pytest
+from servo_drives import Drives, PERIOD
+
+from arm_servo.core import MotionCore
+from arm_servo.exceptions import ServoError
+from arm_servo.goal import GoalPoint, TrajectoryGoal
+
+NUDGES = st.lists(st.floats(-0.3, 0.3), min_size=7, max_size=7)
+TWISTS = st.lists(st.floats(-0.3, 0.3), min_size=6, max_size=6)
+STEPS = st.one_of(
+    st.tuples(st.just('twist'), TWISTS),
+    st.tuples(st.just('jog'), NUDGES),
+    st.tuples(st.just('target'), NUDGES),
+    st.tuples(st.just('trajectory'), NUDGES),
+    st.tuples(
+        st.sampled_from(['stop', 'pause', 'resume', 'slow', 'fast', 'lose', 'find']), NUDGES
+    ),
+)
+PLANS = st.lists(st.tuples(STEPS, st.integers(1, 40)), min_size=2, max_size=8)
+
+
+def order(core: MotionCore, now: float, kind: str, numbers: list[float]) -> None:
+    """Carry out one step of a plan."""
+    names = core.model.joints
+    if kind == 'twist':
+        core.twist(numbers, now, duration=0.2)
+    elif kind == 'jog':
+        core.jog(dict(zip(names, numbers, strict=True)), now, duration=0.2)
+    elif kind == 'target':
+        core.nudge(dict(zip(names, numbers, strict=True)))
+    elif kind == 'trajectory':
+        to = core.state.position + numbers
+        core.follow(TrajectoryGoal(names, [GoalPoint(1.0, to.tolist())]))
+    elif kind in {'slow', 'fast'}:
+        core.override(0.3 if kind == 'slow' else 1.0)
+    elif kind == 'stop':
+        core.stop()
+    elif kind == 'pause':
+        core.pause()
+    elif kind == 'resume':
+        core.resume()
+
+
+def perform(drives: Drives, kind: str, numbers: list[float]) -> None:
+    """Order a step, or let a drive drop out or come back."""
+    if kind in {'lose', 'find'}:
+        drives.axes[3] = replace(drives.axes[3], followable=kind == 'find')
+        return
+    command = partial(order, kind=kind, numbers=numbers)
+    drives.desk.submit(command)
+
+
+@given(PLANS)
+@settings(max_examples=40)
+def test_no_hand_over_makes_the_set_points_jump(
+    plan: list[tuple[tuple[str, list[float]], int]],
+) -> None:
+    """Speed changes by no more than the acceleration limit, from any source to any other.
+
+    A drive that drops out is left alone: its own set-points end where they are.
+    """
+    drives = Drives()
+    drives.attach()
+    drives.run(2)
+    begin = len(drives.path)
+    lost = False
+    for (kind, numbers), cycles in plan:
+        lost = lost or kind == 'lose'
+        perform(drives, kind, numbers)
+        drives.run(cycles)
+    drives.run(300)
+    path = np.array(drives.path)[begin - 1 :]
+    if lost:
+        path = np.delete(path, 3, axis=1)
+    most = (
+        np.delete(drives.desk.model.limits.acceleration, 3)
+        if lost
+        else (drives.desk.model.limits.acceleration)
+    )
+    jumps = np.abs(np.diff(path, 2, axis=0)) / PERIOD**2
+    assert (jumps.max(axis=0) <= 1.02 * most + 1e-6).all()
+
+
+@given(TWISTS)
+@settings(max_examples=10)
+def test_a_refused_command_changes_nothing(numbers: list[float]) -> None:
+    """Whatever moves the arm goes on when another command is refused."""
+    drives = Drives()
+    drives.attach()
+    drives.run(2)
+    drives.desk.submit(lambda core, now: core.twist(numbers, now, duration=5.0))
+    drives.run(5)
+    source = drives.desk.snapshot.source
+    future = drives.desk.submit(lambda core, now: core.twist([float('nan')] * 6, now))
+    drives.run()
+    with pytest.raises(ServoError):
+        future.result(0.0)
+    assert drives.desk.snapshot.source is source
