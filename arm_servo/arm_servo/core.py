@@ -14,7 +14,8 @@ from enum import Enum
 
 import numpy as np
 
-from .arrays import Array, checked, frozen, Mask
+from .arrays import Array, checked, frozen
+from .commands import by_joint, duration_of, pose_command, twist_command
 from .exceptions import CommandError, GoalCode, NotReadyError
 from .execution import Execution, ExecutionSettings, Feedback, Outcome, Phase
 from .goal import TrajectoryGoal
@@ -23,7 +24,7 @@ from .jogging import Jogging
 from .model import Pose, RobotModel
 from .otg import Generator, hard_brake, MotionState
 from .report import Limiter, MotionReport
-from .servo import Command, JointCommand, PoseCommand, ServoSettings, TwistCommand
+from .servo import Command, JointCommand, ServoSettings
 from .single_target import SingleTarget
 
 
@@ -170,15 +171,11 @@ class MotionCore:
             duration: How long it counts in [s]; by default the time-out.
 
         Raises:
-            CommandError: A number is not finite, the count is wrong, or the link is unknown.
+            CommandError: A number is not finite, the count is wrong, the link is unknown, or the
+                axes are no rotation.
             NotReadyError: The position of the arm is not known yet.
         """
-        values = checked(twist, 6, 'twist')
-        if link is not None:
-            self._model.pose(self.state.position, link)
-        if axes is not None:
-            axes = checked(np.ravel(axes), 9, 'axes').reshape(3, 3)
-        self._jog(TwistCommand(values, link, axes), now, duration)
+        self._jog(twist_command(self._model, twist, link, axes), now, duration)
 
     def jog(
         self, velocities: Mapping[str, float], now: float, duration: float | None = None
@@ -194,7 +191,7 @@ class MotionCore:
             CommandError: A joint is unknown, or a number is not finite.
             NotReadyError: The position of the arm is not known yet.
         """
-        values, commanded = self._by_joint(velocities, 'velocities')
+        values, commanded = by_joint(self._model, velocities, 'velocities')
         self._jog(JointCommand(values, commanded), now, duration)
 
     def track(self, pose: Pose, now: float, duration: float | None = None) -> None:
@@ -209,11 +206,7 @@ class MotionCore:
             CommandError: A number is not finite, or the rotation is none.
             NotReadyError: The position of the arm is not known yet.
         """
-        position = checked(pose.position, 3, 'position')
-        rotation = checked(np.ravel(pose.rotation), 9, 'rotation').reshape(3, 3)
-        if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-3:
-            raise CommandError('rotation: it is no rotation; is the quaternion of unit length?')
-        self._jog(PoseCommand(Pose(rotation, position)), now, duration)
+        self._jog(pose_command(pose), now, duration)
 
     def follow(self, goal: TrajectoryGoal) -> Execution:
         """Follow a trajectory, from the commanded state on.
@@ -250,7 +243,7 @@ class MotionCore:
             CommandError: A joint is unknown, or a number is not finite or beyond a limit.
             NotReadyError: The position of the arm is not known yet.
         """
-        values, moved = self._by_joint(positions, 'positions')
+        values, moved = by_joint(self._model, positions, 'positions')
         rest, limits = self._generator.brake(self.state), self._limits
         stay = self.state.position if rest is None else rest.at(rest.duration).position
         # where a joint comes to rest was not asked for: it need not be refused
@@ -266,7 +259,7 @@ class MotionCore:
             CommandError: A joint is unknown, or the end is not finite or beyond a limit.
             NotReadyError: The position of the arm is not known yet.
         """
-        values, moved = self._by_joint(displacements, 'displacements')
+        values, moved = by_joint(self._model, displacements, 'displacements')
         pending = self._single.target
         if pending is not None:
             self._aim(pending + values)  # what other nudges are on their way to stays
@@ -330,27 +323,16 @@ class MotionCore:
     def _pace(self) -> float:
         return 0.0 if self._paused else self._speed
 
-    def _by_joint(self, values: Mapping[str, float], what: str) -> tuple[Array, Mask]:
-        """Return values and mask in the arm's order."""
-        if not values:
-            raise CommandError(f'{what}: no joint is named')
-        places = [self._model.index(name) for name in values]
-        numbers = checked(list(values.values()), len(values), what)
-        ordered, mask = np.zeros(len(self._limits)), np.zeros(len(self._limits), dtype=np.bool_)
-        ordered[places], mask[places] = numbers, True
-        return ordered, mask
-
     def _jog(self, command: Command, now: float, duration: float | None) -> None:
         _ = self.state
+        counts = duration_of(duration, self._settings.timeout)
         if self._paused:
             raise CommandError('jogging is paused; resume first')
         if self._source is not Source.JOG:
             self._release('jogging took over')
             self._jogging.begin()
         self._source = Source.JOG
-        self._jogging.take(
-            command, now + (self._settings.timeout if duration is None else duration)
-        )
+        self._jogging.take(command, now + counts)
 
     def _aim(self, target: Array) -> None:
         self._single.check(target)

@@ -167,6 +167,19 @@ class RobotModel:
             self._at = b''  # the Jacobians are not those of these positions
         return self._collision.least()
 
+    def check_link(self, link: str | None) -> None:
+        """Make sure that a link can be asked for.
+
+        Args:
+            link: Its name; None is the tip.
+
+        Raises:
+            CommandError: There is no such link.
+        """
+        if link is not None and not self._model.existFrame(link, pin.FrameType.BODY):
+            known = ', '.join(self.frames)
+            raise CommandError(f'there is no link {link!r} in {self.name}; links: {known}')
+
     def seen_clearance(self, positions: Array) -> float:
         """Return the least distance that :meth:`nearest` saw at positions in [m].
 
@@ -202,11 +215,8 @@ class RobotModel:
         return pin.updateFramePlacement(self._model, self._data, frame)
 
     def _frame(self, link: str | None) -> int:
-        if link is None:
-            return int(self._tip_frame)
-        if not self._model.existFrame(link, pin.FrameType.BODY):
-            raise CommandError(f'there is no link {link!r} in {self.name}; links: {self.frames}')
-        return int(self._model.getFrameId(link))
+        self.check_link(link)
+        return int(self._tip_frame if link is None else self._model.getFrameId(link))
 
     def _reach(self) -> float:
         """Sum the lengths from joint to joint out to the tip."""
