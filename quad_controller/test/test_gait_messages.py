@@ -15,14 +15,16 @@ from geometry_msgs.msg import Pose
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
-from sensor_msgs.msg import BatteryState, JointState
+from sensor_msgs.msg import BatteryState, Imu, JointState
 
 from quad_controller.gait.parameters import GaitParameters
 from quad_controller.nodes.control_loop import ControlLoop
 from quad_controller.nodes.diagnostics import state_diagnostic
-from quad_controller.nodes.messages import body_pose, charge, JointReader
+from quad_controller.nodes.messages import body_pose, charge, imu_sample, JointReader
+from quad_controller.policy.observation import gravity
+from quad_controller.policy.options import GravitySource
 from quad_controller.states.controller import Controller
-from quad_controller.states.measurement import JointSample
+from quad_controller.states.measurement import ImuSample, JointSample
 from quad_controller.states.parameters import StateParameters
 from quad_controller.states.status import Output
 from quad_gait_rig import FOLDED, Rig, ROBOT, tilted, UPRIGHT
@@ -46,14 +48,34 @@ def test_joints_are_found_by_name(order: list[int]) -> None:
 
 
 def test_odd_joint_states_are_refused_and_the_next_good_one_is_taken() -> None:
-    """A missing joint and a wrong length are named; velocities may be missing."""
+    """A missing joint and a wrong length are named; missing velocities are no zeros."""
     reader = JointReader(ROBOT.names)
     with pytest.raises(ValueError, match='without fl_hip_joint'):
         reader.read(JointState(name=list(ROBOT.names[1:]), position=[0.0] * 11))
     with pytest.raises(ValueError, match='11 positions for 12 names'):
         reader.read(JointState(name=list(ROBOT.names), position=[0.0] * 11))
     sample = reader.read(JointState(name=list(ROBOT.names), position=[0.5] * 12))
-    assert sample == JointSample((0.5,) * 12, (0.0,) * 12)
+    assert sample == JointSample((0.5,) * 12, None)
+
+
+def imu(attitude: float = 0.0, rate: float = 0.0, force: float = 0.0) -> Imu:
+    """Return the message of a level IMU; -1 says that a quantity is not measured."""
+    message = Imu()
+    message.orientation.w, message.angular_velocity.x = 1.0, 0.2
+    message.linear_acceleration.z = 9.8
+    message.orientation_covariance[0] = attitude
+    message.angular_velocity_covariance[0] = rate
+    message.linear_acceleration_covariance[0] = force
+    return message
+
+
+def test_what_an_imu_does_not_measure_is_not_taken_for_zero() -> None:
+    """REP 145: a first covariance of -1 says that there is no such measurement."""
+    assert imu_sample(imu()) == ImuSample((0.0, 0.0, 0.0, 1.0), (0.2, 0.0, 0.0), (0.0, 0.0, 9.8))
+    with pytest.raises(ValueError, match='has no orientation'):
+        imu_sample(imu(attitude=-1.0))
+    assert imu_sample(imu(rate=-1.0)).angular_velocity is None
+    assert gravity(imu_sample(imu(force=-1.0)), GravitySource.ACCEL) == (0.0, 0.0, -1.0)
 
 
 @given(angles, angles, angles, st.floats(0.1, 3.0))

@@ -145,6 +145,18 @@ def test_the_observation_is_as_agreed() -> None:
     assert observed[35:] == pytest.approx(np.arange(12) * 0.01)
 
 
+def test_a_policy_gives_no_targets_for_what_is_not_measured() -> None:
+    """Missing joint velocities or turning are a bad step with its reason, and no zero."""
+    runner = check(FakeNetwork(metadata())).runner
+    for joints, imu, reason in (
+        (replace(STILL, velocities=None), UPRIGHT, 'velocities of the joints'),
+        (STILL, replace(UPRIGHT, angular_velocity=None), 'angular velocity'),
+    ):
+        step = runner.step(joints, imu, REST, PERIOD)
+        assert step.targets is None
+        assert reason in step.reason
+
+
 def test_the_vendors_imu_is_turned_around() -> None:
     """In the vendor's frame the rates about x and y change their sign; gravity does not."""
     network = FakeNetwork(metadata())

@@ -16,6 +16,7 @@ from quad_controller.gait.body import BodyPose
 from quad_controller.gait.generator import GaitGenerator
 from quad_controller.gait.parameters import GaitParameters
 from quad_controller.gait.velocity import Velocity
+from quad_controller.model.urdf import Vector
 from quad_controller.states.controller import Controller
 from quad_controller.states.measurement import JointSample, Measurement
 from quad_controller.states.modes import MODES, State
@@ -479,6 +480,25 @@ def test_a_dry_run_watches_the_policy_only() -> None:
     output = controller.step(Measurement(JointSample(rig.positions, (0.0,) * 12), UPRIGHT), PERIOD)
     assert output.shadow == STAND
     assert 'dry run' in controller.set_mode('policy').message
+
+
+@pytest.mark.parametrize(
+    ('velocities', 'turning', 'reason'),
+    [(None, UPRIGHT.angular_velocity, 'velocities of the joints'), ((0.0,) * 12, None, '/imu')],
+)
+def test_a_policy_is_told_nothing_that_is_not_measured(
+    velocities: tuple[float, ...] | None, turning: Vector | None, reason: str
+) -> None:
+    """Without joint velocities or turning its mode is refused; the gait walks without them."""
+    rig = standing(policy_rig()[0])
+    measured = Measurement(
+        JointSample(rig.positions, velocities), replace(UPRIGHT, angular_velocity=turning)
+    )
+    rig.controller.step(measured, PERIOD)
+    assert reason in rig.controller.set_mode('policy').message
+    assert rig.controller.set_mode('walk').accepted
+    unwatched = [text for text in rig.controller.status.warnings if 'max_turn_rate' in text]
+    assert bool(unwatched) == (turning is None)
 
 
 def test_without_a_policy_its_mode_is_refused() -> None:

@@ -153,7 +153,10 @@ class ControllerNode(Node):
             self.get_logger().warning(str(error), throttle_duration_sec=WARN_PERIOD)
 
     def _take_imu(self, message: Imu) -> None:
-        self._loop.offer_imu(messages.imu_sample(message))
+        try:
+            self._loop.offer_imu(messages.imu_sample(message))
+        except ValueError as error:
+            self.get_logger().warning(str(error), throttle_duration_sec=WARN_PERIOD)
 
     def _take_battery(self, message: BatteryState) -> None:
         self._loop.offer_battery(messages.charge(message))

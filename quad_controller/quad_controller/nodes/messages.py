@@ -47,7 +47,7 @@ class JointReader:
         known = len(velocity) == len(position)
         return JointSample(
             tuple(position[place] for place in self._places),
-            tuple(velocity[place] if known else 0.0 for place in self._places),
+            tuple(velocity[place] for place in self._places) if known else None,
         )
 
     def _find(self, names: list[str]) -> None:
@@ -62,8 +62,20 @@ class JointReader:
         self._seen = names
 
 
+UNMEASURED = -1.0  # first covariance of what an IMU does not measure (sensor_msgs/Imu, REP 145)
+
+
 def imu_sample(message: Imu) -> ImuSample:
-    """Return the attitude of a message; imu_link has the axes of base_link."""
+    """Return the attitude of a message; imu_link has the axes of base_link.
+
+    Raises:
+        ValueError: The orientation is not measured.
+    """
+    if message.orientation_covariance[0] == UNMEASURED:
+        raise ValueError(
+            'the imu has no orientation (orientation_covariance[0] is -1), which walking needs; '
+            'filter it, or set require_imu to false'
+        )
     attitude, rate, force = (
         message.orientation,
         message.angular_velocity,
@@ -71,8 +83,11 @@ def imu_sample(message: Imu) -> ImuSample:
     )
     return ImuSample(
         (attitude.x, attitude.y, attitude.z, attitude.w),
-        (rate.x, rate.y, rate.z),
-        (force.x, force.y, force.z),
+        None if message.angular_velocity_covariance[0] == UNMEASURED else (rate.x, rate.y, rate.z),
+        # no force at all is no gravity, so nobody believes it
+        (0.0, 0.0, 0.0)
+        if message.linear_acceleration_covariance[0] == UNMEASURED
+        else (force.x, force.y, force.z),
     )
 
 

@@ -25,6 +25,20 @@ class PolicyStep:
     reason: str = ''
 
 
+def lacking(joints: JointSample, imu: ImuSample) -> str:
+    """Say what is not measured that a policy has to be told; nothing when all is there.
+
+    Args:
+        joints: The joints.
+        imu: Attitude and turning.
+    """
+    if joints.velocities is None:
+        return 'a policy needs the velocities of the joints, which /joint_states does not have'
+    if imu.angular_velocity is None:
+        return 'a policy needs the angular velocity, which /imu does not have'
+    return ''
+
+
 class Policy(Protocol):
     """A trained policy that fits the robot."""
 

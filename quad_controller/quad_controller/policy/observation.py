@@ -128,7 +128,7 @@ class ObservationBuilder:
             previous: The raw action of the step before.
         """
         row, count = self._row[0], self._count
-        roll, pitch, yaw = imu.angular_velocity
+        roll, pitch, yaw = imu.angular_velocity or (0.0, 0.0, 0.0)
         row[0:3] = (self._sign * roll, self._sign * pitch, yaw)
         row[3:6] = gravity(imu, self._source)
         command = (velocity.x, velocity.y, velocity.yaw)

@@ -12,7 +12,7 @@ import numpy as np
 from ..gait.velocity import Velocity
 from ..model.quadruped import Quadruped, Targets
 from ..states.measurement import ImuSample, JointSample
-from .interface import PolicyStep
+from .interface import lacking, PolicyStep
 from .metadata import PolicyMetadata
 from .network import Floats, Network
 from .observation import ObservationBuilder
@@ -113,7 +113,8 @@ class PolicyRunner:
             velocity: Velocity that is asked for.
         """
         self._positions[self._policy_places] = np.array(joints.positions)[self._robot_places]
-        self._velocities[self._policy_places] = np.array(joints.velocities)[self._robot_places]
+        if joints.velocities is not None:
+            self._velocities[self._policy_places] = np.array(joints.velocities)[self._robot_places]
         return self._builder.build(
             self._positions, self._velocities, imu, velocity, self._previous
         )
@@ -130,6 +131,8 @@ class PolicyRunner:
             dt: Duration of the step in [s].
         """
         self._builder.advance(dt)
+        if lack := lacking(joints, imu):
+            return PolicyStep(None, lack)
         observation = self.observe(joints, imu, velocity)
         if not np.isfinite(observation).all():
             return PolicyStep(None, 'the observation holds what is no number')

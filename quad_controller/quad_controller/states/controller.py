@@ -13,7 +13,7 @@ from ..gait.parameters import GaitParameters
 from ..gait.schedule import Gait
 from ..gait.velocity import Velocity
 from ..model.quadruped import Quadruped, Targets
-from ..policy.interface import Policy
+from ..policy.interface import lacking, Policy
 from .commands import Commands
 from .faults import Fault, FaultLatch
 from .health import Health
@@ -281,4 +281,13 @@ class Controller:
         for fault, reason in self._health.faults():
             if fault in MATTERING.get(request.state, tuple(Fault)):
                 return f'{fault.value}: {reason}'
+        if request.state is State.POLICY:
+            return self._unmeasured()
         return ''
+
+    def _unmeasured(self) -> str:
+        """Say what a policy would have to be told and nobody measures."""
+        joints, imu = self._health.joints, self._health.imu
+        if joints is None or imu is None:
+            return 'a policy needs joint states and an attitude; there are none yet'
+        return lacking(joints, imu)

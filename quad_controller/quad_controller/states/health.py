@@ -96,6 +96,8 @@ class Health:
             texts.append(f'joint states are {self.joints_age * 1e3:.0f} ms old')
         if late < self.imu_age < math.inf:
             texts.append(f'the attitude is {self.imu_age * 1e3:.0f} ms old')
+        if self.imu is not None and self.imu.angular_velocity is None:
+            texts.append('/imu has no angular velocity, so max_turn_rate is not watched')
         return tuple(texts)
 
     def faults(self) -> Iterator[tuple[Fault, str]]:
@@ -127,7 +129,7 @@ class Health:
     def _falls(self) -> bool:
         if self.imu is None or self.imu_age > self._parameters.hold_age:
             return False
-        rate = math.hypot(*self.imu.angular_velocity)
+        rate = math.hypot(*(self.imu.angular_velocity or ()))
         return self.imu.tilt > self._parameters.max_tilt or rate > self._parameters.max_turn_rate
 
     def _take_joints(self, joints: JointSample | None) -> Iterator[str]:

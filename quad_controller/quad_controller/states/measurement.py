@@ -18,11 +18,11 @@ class JointSample:
 
     Attributes:
         positions: In [rad] or [m].
-        velocities: In [rad/s] or [m/s].
+        velocities: In [rad/s] or [m/s]; None when they are not measured.
     """
 
     positions: tuple[float, ...]
-    velocities: tuple[float, ...]
+    velocities: tuple[float, ...] | None
 
     def problem(self, count: int) -> str:
         """Say what is wrong with it, nothing when it can be used.
@@ -31,6 +31,8 @@ class JointSample:
             count: How many joints there are.
         """
         for what, values in (('positions', self.positions), ('velocities', self.velocities)):
+            if values is None:
+                continue
             if len(values) != count:
                 return f'{len(values)} joint {what} instead of {count}'
             if not all(map(math.isfinite, values)):
@@ -44,17 +46,17 @@ class ImuSample:
 
     Attributes:
         orientation: Unit quaternion of the body in the world, x, y, z, w.
-        angular_velocity: In [rad/s].
+        angular_velocity: In [rad/s]; None when it is not measured.
         acceleration: Specific force in [m/s^2]: +9.81 along z at rest (REP 145).
     """
 
     orientation: tuple[float, float, float, float]
-    angular_velocity: Vector
+    angular_velocity: Vector | None
     acceleration: Vector
 
     def problem(self) -> str:
         """Say what is wrong with it, nothing when it can be used."""
-        parts = (*self.orientation, *self.angular_velocity, *self.acceleration)
+        parts = (*self.orientation, *(self.angular_velocity or ()), *self.acceleration)
         if not all(map(math.isfinite, parts)):
             return 'imu values that are no numbers'
         if abs(math.hypot(*self.orientation) - 1.0) > NORM_TOLERANCE:
