@@ -167,16 +167,30 @@ def test_one_damaged_report_does_not_empty_the_battery() -> None:
 )
 def test_a_report_that_cannot_be_is_refused(change: dict[str, object], reason: str) -> None:
     """However often it comes, and the message says what is wrong with it."""
-    plausibility = Plausibility()
+    plausibility = Plausibility(LEG_MOTORS)
     assert plausibility.check(STATE) == ''
     for _ in range(PATIENCE + 3):
         assert reason in plausibility.check(replace(STATE, **change))  # type: ignore[arg-type]
     assert plausibility.check(STATE) == ''
 
 
+@given(st.floats(), st.floats())
+def test_a_motor_that_is_not_fitted_may_report_anything(angle: float, speed: float) -> None:
+    """The slots of an arm that is not there are nobody's; on a robot that has one they count."""
+    garbage = replace(
+        STATE,
+        positions={**STATE.positions, 54: angle},
+        velocities={**STATE.velocities, 52: speed},
+    )
+    plausibility = Plausibility(LEG_MOTORS)
+    assert [plausibility.check(state) for state in (STATE, garbage, STATE)] == [''] * 3
+    broken = replace(STATE, positions={**STATE.positions, 54: math.nan})
+    assert 'not finite' in Plausibility((*LEG_MOTORS, 54)).check(broken)
+
+
 def test_a_jump_is_believed_when_it_stays() -> None:
     """One damaged report is refused; a robot that really is elsewhere is not."""
-    plausibility = Plausibility()
+    plausibility = Plausibility(LEG_MOTORS)
     plausibility.check(STATE)
     jumped = replace(STATE, positions=dict.fromkeys(LEG_MOTORS, 90.0))
     answers = [bool(plausibility.check(jumped)) for _ in range(PATIENCE + 2)]

@@ -120,6 +120,15 @@ def test_no_command_goes_out_while_no_report_can_be(rig: NodeRig) -> None:
     assert rig.largest_step() <= LARGEST_STEP + 0.01
 
 
+@pytest.mark.parametrize('garbage', [250.0, math.nan])
+def test_an_arm_that_is_not_there_disturbs_nothing(rig: NodeRig, garbage: float) -> None:
+    """Whatever its slots report, the legs are published, and obey."""
+    rig.peer.angles[54] = garbage
+    rig.stream(POSE, 0.8)
+    assert list(rig.hear('/joint_states', 10).position) == pytest.approx(POSE, abs=0.01)
+    rig.wait_for_status('serial link', DiagnosticStatus.OK, 'reports arrive')
+
+
 def test_a_cut_cable_is_survived_without_a_jump(rig: NodeRig) -> None:
     """Two seconds without it, under a stream of commands; meanwhile the robot was bent by hand."""
     rig.stream(POSE, 0.8)

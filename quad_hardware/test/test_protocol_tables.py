@@ -122,6 +122,15 @@ def test_a_state_that_is_not_finite_is_refused() -> None:
     assert decode_feedback(state.frame().payload).attitude == (0.0, 0.0, 0.0)
 
 
+def test_a_slot_may_hold_anything() -> None:
+    """Of a motor that is not fitted; the other slots are read."""
+    slots = (*[1.0] * 15, math.nan)
+    read = decode_feedback(Feedback(position=slots, velocity=slots).frame().payload)
+    for values in (read.position, read.velocity):
+        assert values[:15] == slots[:15]
+        assert math.isnan(values[15])
+
+
 def test_refusals_name_row_field_and_need() -> None:
     """Wrong counts, names, values and lengths say what would have been right."""
     servos = NEW.functions[Code.SERVOS]

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+import math
 from statistics import median
 import threading
 from typing import TYPE_CHECKING
@@ -68,7 +69,7 @@ class HandheldRobot:
 
     def _take(self, state: RobotState) -> str:
         with self._changed:
-            self._recent.append(state.positions)
+            self._recent.append({m: a for m, a in state.positions.items() if math.isfinite(a)})
             self._changed.notify_all()
         return ''
 

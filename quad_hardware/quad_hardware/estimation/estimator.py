@@ -98,7 +98,7 @@ class Estimator:
         self._settings = settings
         self._feet = Feet(urdf, joints.names)
         self._clock = SampleClock()
-        self._plausibility = Plausibility()
+        self._plausibility = Plausibility([servo.motor for servo in joints.servos])
         self._rate = AttitudeRate(settings.rate_cutoff)
         self._joint_rate = JointRate(settings.joint_cutoff)
         self._battery = BatteryFilter()

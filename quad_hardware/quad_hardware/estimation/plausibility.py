@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
+from dataclasses import replace
 import math
 
 from ..link.state import RobotState
@@ -18,15 +19,21 @@ PATIENCE = 2  # reports in a row that are refused for a jump, before it is belie
 
 
 class Plausibility:
-    """Says what is wrong with a report, if anything."""
+    """Says what is wrong with a report, if anything, as far as the robot has these motors."""
 
-    def __init__(self) -> None:
-        """Begin without a report."""
+    def __init__(self, motors: Collection[int]) -> None:
+        """Begin without a report.
+
+        Args:
+            motors: Ids of those that a joint uses; what the others report is nothing.
+        """
+        self._motors = frozenset(motors)
         self._last: RobotState | None = None
         self._refused = 0
 
     def check(self, state: RobotState) -> str:
         """Return why a report cannot be; empty when it can."""
+        state = self._of_motors(state)
         reason = next(_impossible(state), '')
         if reason:
             return reason
@@ -39,6 +46,14 @@ class Plausibility:
         self._refused = 0
         self._last = state
         return ''
+
+    def _of_motors(self, state: RobotState) -> RobotState:
+        used = self._motors
+        return replace(
+            state,
+            positions={m: angle for m, angle in state.positions.items() if m in used},
+            velocities={m: speed for m, speed in state.velocities.items() if m in used},
+        )
 
 
 def _impossible(state: RobotState) -> Iterator[str]:

@@ -22,8 +22,9 @@ class RobotState:
         attitude: Roll, pitch, yaw of the body about fixed axes x, y, z [deg].
         acceleration: Specific force x, y, z [m/s²]; +9.8 upwards at rest; None where it is not
             reported.
-        positions: Servo angles by motor id [deg].
-        velocities: Servo velocities by motor id [deg/s]; empty where they are not reported.
+        positions: Servo angles by motor id [deg]; of a motor that is not fitted, anything.
+        velocities: Servo velocities by motor id [deg/s], likewise; empty where they are not
+            reported.
         rates: Angular velocity x, y, z of the body [deg/s]; None where there is no gyro.
         battery: Charge [%]; None while unknown.
         voltage: Voltage of the battery [V]; None where it is not reported.

@@ -76,16 +76,20 @@ class Feedback:
         return Frame(Kind.PUSH, STATE.address, payload)
 
 
-_MUST_BE_FINITE = [  # of the unfused attitude nobody takes anything
-    field.name for field in STATE.fields if field.scalar is Scalar.F32 and field.name != 'euler1'
+# the unfused attitude is nobody's, and a slot may be that of a motor that is not fitted
+_MAY_BE_ANYTHING = ('euler1', 'position', 'velocity')
+_MUST_BE_FINITE = [
+    field.name
+    for field in STATE.fields
+    if field.scalar is Scalar.F32 and field.name not in _MAY_BE_ANYTHING
 ]
 
 
 def decode_feedback(payload: bytes) -> Feedback:
-    """Decode the payload of a state frame.
+    """Decode the payload of a state frame; a slot may hold what is no finite number.
 
     Raises:
-        CodecError: The payload has another length, or a number in it is not finite.
+        CodecError: The payload has another length, or a number of the body is not finite.
     """
     values = STATE.unpack(payload)
     for name in _MUST_BE_FINITE:
