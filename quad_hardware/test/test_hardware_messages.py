@@ -143,6 +143,7 @@ def link_status(**changes: object) -> LinkStatus:
         (link_status(state=LinkState.STALE), DiagnosticStatus.STALE),
         (link_status(state=LinkState.CONNECTING), DiagnosticStatus.ERROR),
         (link_status(state=LinkState.REFUSED), DiagnosticStatus.ERROR),
+        (link_status(state=LinkState.FAILED), DiagnosticStatus.ERROR),
         (
             link_status(parser=ParserCounters(frames=1000, bad_checksum=50)),
             DiagnosticStatus.WARN,

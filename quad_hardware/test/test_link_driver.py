@@ -6,10 +6,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
+import termios
 import time
 
 import pytest
+import serial
 
+from quad_hardware.exceptions import LinkError
 from quad_hardware.link import Driver, LinkOptions, LinkState, RobotState, SerialPort
 from quad_hardware.protocol import LEG_MOTORS, NEW, OLD
 from quad_pty_peer import PtyPeer
@@ -199,21 +202,76 @@ def test_a_rider_is_not_taken_for_a_dog(tmp_path: Path) -> None:
         assert peer.commands == []
 
 
-@pytest.mark.filterwarnings('ignore::pytest.PytestUnhandledThreadExceptionWarning')
-def test_a_failure_of_the_caller_is_not_silent(tmp_path: Path) -> None:
-    """What goes wrong with a report ends the link, and the link says so; the port is free."""
+def test_a_failure_is_told_and_got_over(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    """What goes wrong with a report ends the conversation, not the link: it begins anew."""
+    failures = [ZeroDivisionError(), KeyError(54)]
+    changes: list[tuple[LinkState, str]] = []
+    states: list[RobotState] = []
 
-    def fail(_: RobotState) -> str:
-        raise ZeroDivisionError
+    def fail_twice(state: RobotState) -> str:
+        if failures:
+            raise failures.pop(0)
+        states.append(state)
+        return ''
 
     with PtyPeer(tmp_path / 'port') as peer:
-        driver = Driver(LinkOptions(str(peer.link)), fail, lambda *_: None)
+        options = LinkOptions(str(peer.link))
+        driver = Driver(options, fail_twice, lambda *change: changes.append(change))
         driver.start()
-        wait_for(lambda: driver.status().state is LinkState.STOPPED, 'end')
-        assert driver.status().detail == 'internal error: ZeroDivisionError()'
-        assert not driver.command(LEGS)
+        wait_for(lambda: bool(states), 'report after the failures')
+        wait_for(lambda: driver.status().state is LinkState.RUNNING, 'link')
+        assert driver.command(LEGS)
+        wait_for(lambda: bool(peer.commands), 'command')
         driver.stop()
         SerialPort(str(peer.link), 115200).close()
+    told = [detail for state, detail in changes if state is LinkState.FAILED]
+    assert ['ZeroDivisionError()' in told[0], 'KeyError(54)' in told[1]] == [True, True]
+    assert 'Traceback' in caplog.text
+
+
+def test_a_failure_that_cannot_be_told_ends_nothing(tmp_path: Path) -> None:
+    """Nor when the callback that hears of it fails as well."""
+    states: list[RobotState] = []
+    failing = [LinkState.WAITING, LinkState.FAILED]
+
+    def hear(state: LinkState, _detail: str) -> None:
+        if state in failing:
+            failing.remove(state)
+            raise RuntimeError
+
+    with PtyPeer(tmp_path / 'port') as peer:
+        driver = Driver(
+            LinkOptions(str(peer.link)),
+            lambda state: states.append(state) or '',  # type: ignore[func-returns-value]
+            hear,
+        )
+        driver.start()
+        wait_for(lambda: bool(states), 'report')
+        driver.stop()
+    assert failing == []
+
+
+def test_a_port_that_hangs_up_while_it_is_opened_is_lost(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The flush after opening says so by a termios.error; the driver looks for it again."""
+    flush, hung_up = serial.Serial.reset_input_buffer, [True, True]
+
+    def fail_once(port: serial.Serial) -> None:
+        if hung_up:
+            hung_up.pop()
+            raise termios.error(5, 'Input/output error')
+        flush(port)
+
+    monkeypatch.setattr(serial.Serial, 'reset_input_buffer', fail_once)
+    with PtyPeer(tmp_path / 'port') as peer:
+        with pytest.raises(LinkError, match='hung up while it was opened'):
+            SerialPort(str(peer.link), 115200)
+        rig = Rig(peer)
+        rig.driver.start()
+        rig.reports(1)
+        rig.driver.stop()
+    assert rig.changes[0][0] is LinkState.CONNECTING
 
 
 def test_a_driver_stops_while_it_looks(tmp_path: Path) -> None:

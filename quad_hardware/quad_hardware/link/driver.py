@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from enum import Enum
+import logging
 import os
 import select
 import threading
@@ -26,11 +27,14 @@ PROBE_AGAIN = 3.0  # [s] without a report, after which the robot is looked for a
 RETRY_PERIOD = 0.5  # [s] between attempts to open a port
 QUIET_TIME = 0.015  # [s] longer than a pause inside a frame, shorter than one between states
 
+_log = logging.getLogger(__name__)
+
 
 class LinkState(Enum):
     """What a driver is doing."""
 
     CONNECTING = 'connecting'  # no port, or nobody answers
+    FAILED = 'failed'  # an error of ours ended the conversation; it begins anew
     WAITING = 'waiting'  # a robot answered and has not reported yet
     RUNNING = 'running'
     STALE = 'stale'  # the port is open and no report came for STALE_TIME
@@ -76,7 +80,8 @@ class Driver:
 
     ``on_state`` is called in the thread of the driver for each report and says why it cannot be,
     or nothing when it is taken; ``on_change`` when the state of the link changes. Both must be
-    quick. Nothing is sent to servos while no report is taken: they hold their last target.
+    quick; when one of them fails, the conversation begins anew, and the link says so. Nothing is
+    sent to servos while no report is taken: they hold their last target.
     """
 
     def __init__(
@@ -175,28 +180,41 @@ class Driver:
             self._on_change(state, detail)
 
     def _run(self) -> None:
-        try:
-            self._keep_going()
-        except Exception as error:
-            self._enter(LinkState.STOPPED, f'internal error: {error!r}')
-            raise
+        while not self._stopping.is_set():
+            self._try_to_converse()
         self._enter(LinkState.STOPPED, 'stopped')
 
-    def _keep_going(self) -> None:
-        while not self._stopping.is_set():
-            try:
-                session = open_session(self._options)
-            except LinkError as error:
-                self._enter(LinkState.CONNECTING, str(error))
-                self._stopping.wait(RETRY_PERIOD)
-                continue
-            try:
-                self._serve(session)
-            except LinkError as error:
-                self._enter(LinkState.CONNECTING, str(error))
-            finally:
-                self._mailbox = None
-                session.port.close()
+    def _try_to_converse(self) -> None:
+        try:
+            self._converse()
+        except Exception as error:  # noqa: BLE001  whatever it is, the robot is looked for again
+            self._fail(error)
+            self._stopping.wait(RETRY_PERIOD)
+
+    def _fail(self, error: Exception) -> None:
+        _log.error('the conversation with the robot failed', exc_info=error)
+        try:
+            self._enter(
+                LinkState.FAILED, f'internal error: {error!r}; looking for the robot again'
+            )
+        except Exception:  # noqa: BLE001  the state is set; who hears of it cannot be helped
+            _log.exception('the failure could not be told')
+
+    def _converse(self) -> None:
+        """Look for the robot once, and talk with it until it is lost."""
+        try:
+            session = open_session(self._options)
+        except LinkError as error:
+            self._enter(LinkState.CONNECTING, str(error))
+            self._stopping.wait(RETRY_PERIOD)
+            return
+        try:
+            self._serve(session)
+        except LinkError as error:
+            self._enter(LinkState.CONNECTING, str(error))
+        finally:
+            self._mailbox = None
+            session.port.close()
 
     def _serve(self, session: Session) -> None:
         now = bytes_at = self._heard_at = self._reported_at = time.monotonic()

@@ -8,6 +8,7 @@ import errno
 import os
 from pathlib import Path
 import select
+import termios
 import time
 from typing import Protocol as Interface
 from typing import TYPE_CHECKING
@@ -66,9 +67,13 @@ class SerialPort:
         self.baud = baud
         try:
             self._serial = serial.Serial(path, baud, timeout=0, exclusive=True)
-        except (OSError, ValueError) as error:
+        except (OSError, ValueError, termios.error) as error:  # a termios.error is no OSError
             raise LinkError(_explain(path, baud, error)) from error
-        self._serial.reset_input_buffer()
+        try:
+            self._serial.reset_input_buffer()
+        except (OSError, termios.error) as error:
+            self.close()
+            raise LinkError(f'{path} was hung up while it was opened: {error}') from error
 
     def fileno(self) -> int:
         """Return the file descriptor, for :mod:`select`."""

@@ -20,6 +20,7 @@ DAMAGE_SHARE = 0.01  # of the frames, above which a cable is bad
 
 _LINK_LEVELS = {
     LinkState.CONNECTING: DiagnosticStatus.ERROR,
+    LinkState.FAILED: DiagnosticStatus.ERROR,
     LinkState.WAITING: DiagnosticStatus.WARN,
     LinkState.RUNNING: DiagnosticStatus.OK,
     LinkState.STALE: DiagnosticStatus.STALE,

@@ -119,7 +119,7 @@ class HardwareNode(Node):
         if state is not LinkState.RUNNING:
             self._latest = None  # the robot may be moved while nobody sees it
             self._limiter.reset()
-        if state is LinkState.REFUSED:
+        if state in {LinkState.REFUSED, LinkState.FAILED}:
             self.get_logger().error(f'{state.value}: {detail}')
         elif state in {LinkState.STALE, LinkState.CONNECTING}:
             self.get_logger().warning(f'{state.value}: {detail}')
