@@ -134,3 +134,26 @@ def test_jogging_goes_out_as_trajectories(isolation: Isolation, tmp_path: Path) 
         assert speeds[-1] == 0.0
         drops = [a - b for a, b in pairwise(speeds)]
         assert max(drops) < 0.2  # no message of the way down to rest is missing
+
+
+@pytest.mark.parametrize(
+    ('program', 'arguments', 'words'),
+    [
+        ('servo_node', ['group:=arm'], "'arm'"),
+        ('servo_node', ['moveit_servo.scale.linaer:=0.2'], "did you mean 'moveit_servo.scale.lin"),
+        ('servo_node', ['moveit_servo.command_out_type:=text'], 'std_msgs/Float64MultiArray'),
+        ('servo_node', ['robot_description:=""'], 'no robot_description'),
+        ('trajectory_controller', ['joints:=[a, b]'], 'not those of the group'),
+        ('trajectory_controller', ['joint_limits:=nowhere.yaml'], 'nowhere.yaml'),
+    ],
+)
+def test_a_program_that_cannot_begin_says_why(
+    isolation: Isolation, tmp_path: Path, program: str, arguments: list[str], words: str
+) -> None:
+    """A wrong parameter ends it with exit code 1, and what is wrong is named."""
+    parameters = ['--params-file', str(robot_parameters(tmp_path))]
+    given = [part for argument in arguments for part in ('-p', argument)]
+    command = [executable('arm_servo', program), '--ros-args', *parameters, *given]
+    with RunningProcess(command, isolation.env) as process:
+        assert process.wait() == 1
+        assert words in process.output

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.node import Node
 
 
@@ -41,6 +41,12 @@ class Declarations:
         limits = [FloatingPointRange(from_value=span[0], to_value=span[1])]
         return float(self._declare(name, default, description, limits))
 
+    def integer(self, name: str, default: int, description: str, span: tuple[int, int]) -> int:
+        """Declare a whole number within a range."""
+        descriptor = self._descriptor(description)
+        descriptor.integer_range = [IntegerRange(from_value=span[0], to_value=span[1])]
+        return int(self._node.declare_parameter(self._prefix + name, default, descriptor).value)
+
     def texts(self, name: str, default: list[str], description: str) -> list[str]:
         """Declare a list of texts; the default is never empty, which would have no type."""
         return [str(value) for value in self._declare(name, default, description)]
@@ -52,9 +58,9 @@ class Declarations:
         description: str,
         limits: Sequence[FloatingPointRange] = (),
     ) -> Any:  # noqa: ANN401  # the type of the default
-        descriptor = ParameterDescriptor(
-            description=description,
-            read_only=self._read_only,
-            floating_point_range=list(limits),
-        )
+        descriptor = self._descriptor(description)
+        descriptor.floating_point_range = list(limits)
         return self._node.declare_parameter(self._prefix + name, default, descriptor).value
+
+    def _descriptor(self, description: str) -> ParameterDescriptor:
+        return ParameterDescriptor(description=description, read_only=self._read_only)

@@ -87,15 +87,23 @@ class MotionCycle:
 class MotionThread:
     """Runs cycles at absolute deadlines of the monotonic clock."""
 
-    def __init__(self, cycle: MotionCycle, period: float, stop_motion: Callable[[], None]) -> None:
+    def __init__(
+        self,
+        cycle: MotionCycle,
+        period: float,
+        stop_motion: Callable[[], None],
+        begin: Callable[[], None] = lambda: None,
+    ) -> None:
         """Prepare.
 
         Args:
             cycle: The cycle.
             period: Its period in [s].
             stop_motion: Called once at the end, to bring the arm to rest.
+            begin: Called once in the thread, before the first cycle.
         """
         self._cycle, self._period, self._stop_motion = cycle, period, stop_motion
+        self._begin = begin
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._run, name='motion', daemon=True)
 
@@ -111,6 +119,7 @@ class MotionThread:
             self._thread.join(LAST_STOP + 1.0)
 
     def _run(self) -> None:
+        self._begin()
         deadline = time.monotonic()
         until = float('inf')
         while True:

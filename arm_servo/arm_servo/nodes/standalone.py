@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
+import gc
 import sys
 import time
 
@@ -29,6 +30,7 @@ from .declare import Declarations
 from .desk import Desk
 from .joint_feedback import JointFeedback
 from .motion_thread import MotionCycle, MotionThread
+from .real_time import prefer_this_thread
 from .topic_output import OutputParameters, TopicOutput
 
 SWITCH_INTERVAL = 0.0005
@@ -43,11 +45,13 @@ class LoopParameters:
         period: Its period in [s].
         joint_topic: Topic of the joint states.
         joint_timeout: Age at which a joint state counts no more in [s].
+        priority: SCHED_FIFO priority of its thread; 0 is none.
     """
 
     period: float
     joint_topic: str
     joint_timeout: float
+    priority: int
 
 
 def declare_loop(node: Node, prefix: str) -> LoopParameters:
@@ -66,6 +70,9 @@ def declare_loop(node: Node, prefix: str) -> LoopParameters:
             0.5,
             'silence of a joint at which the arm comes to rest [s]',
             (0.02, 10.0),
+        ),
+        declare.integer(
+            'thread_priority', 40, 'SCHED_FIFO priority of the loop; 0 asks for none', (0, 99)
         ),
     )
 
@@ -99,7 +106,11 @@ def make_loop(
     def stop_motion() -> None:
         desk.submit(lambda core, _now: core.stop('the program ends'), moves=False)
 
-    return desk, MotionThread(cycle, loop.period, stop_motion)
+    def begin() -> None:
+        if words := prefer_this_thread(loop.priority):
+            node.get_logger().info(words)
+
+    return desk, MotionThread(cycle, loop.period, stop_motion, begin)
 
 
 def run_standalone(
@@ -129,6 +140,7 @@ def run_standalone(
         with ExitStack() as stack:
             for node in nodes:
                 stack.callback(node.destroy_node)
+            gc.freeze()  # what is there now is there to stay, and need not be looked through
             thread.start()
             stack.callback(thread.stop)
             nodes[0].get_logger().info('ready for commands')
