@@ -181,6 +181,7 @@ WRONG = {
     'protokoll:=old': "did you mean 'protocol'",
     'protocol:=newest': "protocol 'newest' is none of auto, vendor, new, old",
     'joints.fl_hip_joint.sign:=0': 'sign 0 is neither 1 nor -1',
+    'joints.fl_calf_joint.offset:=6.9': 'correct joints.fl_calf_joint.offset',
     'robot_description:=<robot/>': 'no joint for motors 11',
     'robot_description:=none': 'no XML',
 }

@@ -14,7 +14,9 @@ import pytest
 from quad_description import Joint, movable_joints, robot_urdf
 from quad_hardware.exceptions import CommandError
 from quad_hardware.joints import JointMap, JointServo, servo_of
-from quad_hardware.protocol import LEG_MOTORS
+from quad_hardware.link.new_dialect import NewDialect
+from quad_hardware.link.old_dialect import OldDialect
+from quad_hardware.protocol import LEG_MOTORS, Model
 
 ARM = movable_joints(robot_urdf('lite', arm=True))
 LEGS = movable_joints(robot_urdf('lite'))
@@ -73,6 +75,46 @@ def test_a_joint_without_motor_is_named() -> None:
     assert servo_of(renamed, 11).lower == -1.0
     with pytest.raises(CommandError, match='motor 11 moves two joints'):
         JointMap([*servos, servo_of(renamed, 11)])
+
+
+def test_the_legs_come_first() -> None:
+    """Twelve positions are those of the legs: another order is refused, and so are strange ids."""
+    servos = [servo_of(joint) for joint in ARM]
+    with pytest.raises(CommandError, match='has arm_yaw_joint before joints of the legs'):
+        JointMap([servos[12], *servos[:12], *servos[13:]])
+    assert JointMap([*reversed(servos[:12]), *servos[12:]]).leg_count == 12
+    tail = Joint('tail_joint', -1.0, 1.0, 10.0, 0.4)
+    with pytest.raises(CommandError, match='tail_joint: there is no motor 61'):
+        JointMap([*servos, servo_of(tail, 61)])
+
+
+@given(
+    st.floats(-7, 7), st.sampled_from([1, -1]), st.floats(-math.inf, 7), st.floats(-7, math.inf)
+)
+def test_every_target_fits_into_a_frame(
+    offset: float, sign: int, lower: float, upper: float
+) -> None:
+    """Whatever a parameter file says: it is refused by name, or both limits can be sent."""
+    lower, upper = min(lower, upper), max(lower, upper)
+    hip = replace(servo_of(LEGS[0]), offset=offset, sign=sign, lower=lower, upper=upper)
+    try:
+        joints = JointMap([hip, *(servo_of(joint) for joint in LEGS[1:])])
+    except CommandError as error:
+        assert 'correct joints.fl_hip_joint.offset' in str(error)  # noqa: PT017  or none
+        return
+    servo = joints.servos[0]
+    assert lower <= servo.lower <= servo.upper <= upper
+    for model in Model:
+        for position in (servo.lower, servo.upper):
+            angles = {**dict.fromkeys(LEG_MOTORS, 0.0), servo.motor: servo.angle(position)}
+            for dialect in (NewDialect(0.0), OldDialect(0.0, model)):
+                dialect.command(angles)
+
+
+def test_a_usual_servo_keeps_its_limits() -> None:
+    """Of every joint of the URDF."""
+    servos = [servo_of(joint) for joint in ARM]
+    assert list(JointMap(servos).servos) == servos
 
 
 @pytest.mark.parametrize(

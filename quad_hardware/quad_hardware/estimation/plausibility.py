@@ -8,9 +8,9 @@ from collections.abc import Collection, Iterator
 from dataclasses import replace
 import math
 
+from ..joints.mapping import SERVO_REACH
 from ..link.state import RobotState
 
-LARGEST_ANGLE = 200.0  # [deg] of a servo
 LARGEST_SPEED = 3000.0  # [deg/s] of a servo
 LARGEST_ACCELERATION = 200.0  # [m/s²]
 LARGEST_JUMP = 60.0  # [deg] between reports; a servo does 12 degrees in 20 ms
@@ -66,7 +66,7 @@ def _impossible(state: RobotState) -> Iterator[str]:
     if any(abs(angle) > 360.0 for angle in state.attitude):
         yield f'attitude {state.attitude} deg'
     for motor, angle in state.positions.items():
-        if abs(angle) > LARGEST_ANGLE:
+        if abs(angle) > SERVO_REACH:
             yield f'motor {motor} at {angle:.4g} deg'
     for motor, speed in state.velocities.items():
         if abs(speed) > LARGEST_SPEED:

@@ -9,15 +9,16 @@ gripper, which slides, the travel of the joint is spread over the servo's whole 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 
 from quad_description import Joint
 
 from ..exceptions import CommandError
-from ..protocol import ANGLE_SPANS, LEG_MOTORS, Model, MOTOR_OF_JOINT
+from ..protocol import ANGLE_SPANS, LEG_MOTORS, Model, MOTOR_OF_JOINT, MOTOR_ORDER
 
 GRIPPER_MOTOR = 51
+SERVO_REACH = 200.0  # [deg] no servo turns farther, and the wire carries it
 DEGREE = math.pi / 180.0  # [rad]
 
 
@@ -90,16 +91,29 @@ def servo_of(joint: Joint, motor: int | None = None) -> JointServo:
     return JointServo(joint.name, number, 1, offset, joint.lower, joint.upper, gain)
 
 
+def _within_reach(servo: JointServo) -> JointServo:
+    ends = sorted((servo.position(-SERVO_REACH), servo.position(SERVO_REACH)))
+    lower, upper = max(servo.lower, ends[0]), min(servo.upper, ends[1])
+    if lower > upper:
+        raise CommandError(
+            f'{servo.joint}: with offset {servo.offset:g} its servo would have to turn beyond '
+            f'{SERVO_REACH:g} degrees for {servo.lower:g} to {servo.upper:g}; correct '
+            f'joints.{servo.joint}.offset, .lower or .upper'
+        )
+    return replace(servo, lower=lower, upper=upper)
+
+
 class JointMap:
     """All joints of a robot, in the order of the URDF."""
 
     def __init__(self, servos: Iterable[JointServo]) -> None:
-        """Keep the servos.
+        """Keep the servos; a limit beyond the reach of its servo is taken to that.
 
         Raises:
-            CommandError: A leg's motor is missing, or two joints have the same motor.
+            CommandError: A leg's motor is missing or unknown, two joints have the same motor, a
+                joint of the arm stands before one of a leg, or no servo reaches the limits.
         """
-        self.servos = tuple(servos)
+        self.servos = tuple(map(_within_reach, servos))
         self.names = tuple(servo.joint for servo in self.servos)
         motors = [servo.motor for servo in self.servos]
         missing = [motor for motor in LEG_MOTORS if motor not in motors]
@@ -112,6 +126,17 @@ class JointMap:
         twice = sorted({motor for motor in motors if motors.count(motor) > 1})
         if twice:
             raise CommandError(f'motor {", ".join(map(str, twice))} moves two joints of the URDF')
+        unknown = [s for s in self.servos if s.motor not in MOTOR_ORDER]
+        if unknown:
+            raise CommandError(
+                f'{unknown[0].joint}: there is no motor {unknown[0].motor}; '
+                f'there are {", ".join(map(str, MOTOR_ORDER))}'
+            )
+        early = [s.joint for s in self.servos[: self.leg_count] if s.motor not in LEG_MOTORS]
+        if early:  # twelve positions are those of the legs
+            raise CommandError(
+                f'the URDF has {", ".join(early)} before joints of the legs; put the legs first'
+            )
 
     @property
     def leg_count(self) -> int:
