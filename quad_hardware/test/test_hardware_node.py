@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import ExitStack
 import math
+from pathlib import Path
 
 from diagnostic_msgs.msg import DiagnosticStatus
 from isolation import Isolation, reserve
@@ -18,6 +19,7 @@ from std_srvs.srv import SetBool
 from quad_description import movable_joints, robot_urdf
 from quad_hardware.joints import LimiterSettings
 from quad_hardware.joints.command import LONGEST_PERIOD
+from quad_hardware.protocol import BULK_READ_ORDER, MOTOR_ORDER, NEW, OLD, Protocol
 from quad_node_rig import NodeRig, TIMEOUT
 
 pytestmark = pytest.mark.scenario
@@ -170,6 +172,24 @@ def test_torque_is_taken_and_given_by_service(rig: NodeRig) -> None:
     assert rig.client.call(SetBool, '/hardware_node/torque', SetBool.Request(data=True)).success
     rig.client.spin_until(lambda: rig.peer.torque, TIMEOUT, 'torque on')
     assert rig.peer.commands[-1][11] == pytest.approx(20.0, abs=0.01)
+
+
+@pytest.mark.parametrize('protocol', [NEW, OLD], ids=lambda protocol: protocol.name)
+def test_torque_comes_back_where_the_arm_is(
+    isolation: Isolation, tmp_path: Path, protocol: Protocol
+) -> None:
+    """Every servo that is reported is told its place before it wakes; an arm would snap back."""
+    torque = '/hardware_node/torque'
+    reported = set(MOTOR_ORDER if protocol is NEW else BULK_READ_ORDER)
+    with NodeRig(isolation, tmp_path, '-p', 'arm:=true', protocol=protocol) as rig:
+        assert rig.client.call(SetBool, torque, SetBool.Request(data=False)).success
+        rig.client.spin_until(lambda: not rig.peer.torque, TIMEOUT, 'torque off')
+        rig.peer.angles.update(dict.fromkeys(rig.peer.angles, 20.0))
+        rig.hear('/joint_states', 5)
+        assert rig.client.call(SetBool, torque, SetBool.Request(data=True)).success
+        rig.client.spin_until(lambda: rig.peer.torque, TIMEOUT, 'torque on')
+        told = {motor: angle for angles in rig.peer.commands for motor, angle in angles.items()}
+    assert told == dict.fromkeys(reported, pytest.approx(20.0, abs=0.6))
 
 
 def test_a_stop_is_clean(rig: NodeRig) -> None:

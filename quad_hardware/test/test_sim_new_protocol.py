@@ -143,6 +143,29 @@ def test_torque_is_switched_by_motor_and_for_all() -> None:
     assert all(map(servos.torque_on, servos.fitted))
 
 
+@pytest.mark.parametrize('told', [False, True])
+def test_a_servo_that_wakes_goes_to_its_last_target(*, told: bool) -> None:
+    """So a host tells it where it is before it gives the torque back."""
+    robot = VirtualRobot('--start', 'stand', '--noise', 'none', '--arm')
+    servos = robot.simulation.board.servos
+    robot.ask(Frame(Kind.WRITE, Code.FEEDBACK, b'\1'))
+    standing = states(robot.run(0.3))[-1].position
+    robot.ask(Frame(Kind.WRITE, Code.TORQUE, bytes((0xFF, 0))))
+    sunk = states(robot.run(1.5))[-1].position
+    assert max(abs(a - b) for a, b in zip(standing, sunk, strict=True)) > 15.0
+    if told:
+        groups = (
+            NEW.functions[Code.SERVOS].pack(motor=(motor,), angle=(angle,))
+            for motor, angle in zip(MOTOR_ORDER, sunk, strict=True)
+        )
+        robot.ask(Frame(Kind.WRITE, Code.SERVOS, b''.join(groups)))
+    robot.ask(Frame(Kind.WRITE, Code.TORQUE, bytes((0xFF, 1))))
+    assert all(map(servos.torque_on, servos.fitted))
+    woken = states(robot.run(1.0))[-1].position
+    expected = sunk if told else standing
+    assert woken == pytest.approx(expected, abs=6.0)
+
+
 @pytest.mark.parametrize(
     ('frame', 'reason'),
     [

@@ -49,7 +49,8 @@ def _joints(options: argparse.Namespace, console: Console) -> None:
     servos = [servo_of(joint) for joint in movable_joints(robot_urdf(options.preset, options.arm))]
     chosen = [servo for servo in servos if not options.joint or servo.joint in options.joint]
     console.say(f'{len(chosen)} joints. The servos will let go: support the robot.')
-    with HandheldRobot(LinkOptions(options.port)) as robot:
+    motors = [servo.motor for servo in servos]
+    with HandheldRobot(LinkOptions(options.port), motors) as robot:
         console.ask('Enter takes their torque away; Ctrl-C leaves')
         with robot.limp():
             if options.zero_only:

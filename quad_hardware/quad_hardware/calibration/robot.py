@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 import math
 from statistics import median
@@ -27,12 +27,14 @@ PATIENCE = 4.0  # [s] for a robot to report
 class HandheldRobot:
     """Reads angles, takes torque away and gives it back."""
 
-    def __init__(self, options: LinkOptions) -> None:
+    def __init__(self, options: LinkOptions, motors: Collection[int]) -> None:
         """Look for the robot; use it in a with statement.
 
         Args:
             options: Where it is.
+            motors: Ids of those that it has; a board may refuse a command for any other.
         """
+        self._motors = frozenset(motors)
         self._recent: deque[Mapping[int, float]] = deque(maxlen=SAMPLES)
         self._changed = threading.Condition()
         self._driver = Driver(options, self._take, self._forget)
@@ -69,7 +71,13 @@ class HandheldRobot:
 
     def _take(self, state: RobotState) -> str:
         with self._changed:
-            self._recent.append({m: a for m, a in state.positions.items() if math.isfinite(a)})
+            self._recent.append(
+                {
+                    motor: angle
+                    for motor, angle in state.positions.items()
+                    if motor in self._motors and math.isfinite(angle)
+                }
+            )
             self._changed.notify_all()
         return ''
 

@@ -155,3 +155,7 @@ class JointMap:
         """Return servo angles [deg] by motor for the first joints of the robot."""
         pairs = zip(self.servos, positions, strict=False)
         return {servo.motor: servo.angle(position) for servo, position in pairs}
+
+    def angles_at(self, place: Mapping[str, float]) -> dict[int, float]:
+        """Return servo angles [deg] by motor for positions by joint, of those that are there."""
+        return {s.motor: s.angle(place[s.joint]) for s in self.servos if s.joint in place}

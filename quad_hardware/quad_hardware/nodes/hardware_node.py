@@ -172,8 +172,7 @@ class HardwareNode(Node):
         on = bool(request.data)
         positions = self._place(time.monotonic())
         if on and positions:  # a servo that wakes goes to its last target
-            place = [positions[name] for name in self._joints.names[: self._joints.leg_count]]
-            self._driver.command(self._joints.angles(place))
+            self._driver.command(self._joints.angles_at(positions))
         response.success = self._driver.torque(on=on)
         if not response.success:
             response.message = self._driver.status().detail

@@ -140,7 +140,8 @@ class Functions:
         self._board.servos.command(dict(zip(motors, values['angle'], strict=True)))
 
     def _set_torque(self, values: Values) -> None:
-        self._board.servos.set_torque(self._motors(values), bool(values['on'][0]))
+        servos, on = self._board.servos, bool(values['on'][0])
+        servos.set_torque(self._motors(values), on, hold=False)
 
     def _set_speed(self, values: Values) -> None:
         self._board.servos.set_speed(self._motors(values), int(values['speed'][0]))

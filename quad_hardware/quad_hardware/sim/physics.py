@@ -119,12 +119,16 @@ class Robot:
         """
         self._ramp.approach(targets, self._servo.interpolation if duration is None else duration)
 
-    def set_torque(self, on: bool, joints: Iterable[str] | None = None) -> None:
-        """Switch servos on or off; one that is switched on holds the position that it has.
+    def set_torque(
+        self, on: bool, joints: Iterable[str] | None = None, *, hold: bool = True
+    ) -> None:
+        """Switch servos on or off.
 
         Args:
             on: Whether they hold.
             joints: Their names; all for None.
+            hold: One that is switched on holds the position that it has; else it goes to its
+                last target at once.
 
         Raises:
             SetupError: There is no such joint.
@@ -143,7 +147,8 @@ class Robot:
             ):
                 array[index] = original[index] if on else 0.0
             if switched_on:
-                self._ramp.approach({name: float(self._data.qpos[self._qpos[index]])}, 0.0)
+                place = self._data.qpos[self._qpos[index]] if hold else self._ramp.goal[index]
+                self._ramp.approach({name: float(place)}, 0.0)
 
     def torque_on(self, joint: str) -> bool:
         """Tell whether a servo holds."""

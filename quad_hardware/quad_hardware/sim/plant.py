@@ -52,7 +52,9 @@ class Plant(Protocol):
     def set_targets(self, targets: Targets, duration: float | None = None) -> None:
         """Give servos new targets [rad]."""
 
-    def set_torque(self, on: bool, joints: Iterable[str] | None = None) -> None:
+    def set_torque(
+        self, on: bool, joints: Iterable[str] | None = None, *, hold: bool = True
+    ) -> None:
         """Switch servos on or off."""
 
     def torque_on(self, joint: str) -> bool:
@@ -113,6 +115,7 @@ class KinematicRobot:
         """
         self._random = np.random.default_rng(seed)
         self._on = dict.fromkeys(self.joint_names, True)
+        self._missed: dict[str, float] = {}  # targets that came without torque
         self._steps, self._owed = 0, 0.0
         self._ramp.jump(np.zeros(len(self.joint_names)))
         try:
@@ -152,12 +155,18 @@ class KinematicRobot:
         if not isinstance(targets, Mapping):
             targets = dict(zip(self.joint_names, targets, strict=True))
         held = {name: value for name, value in targets.items() if self._on[name]}
+        self._missed |= {name: value for name, value in targets.items() if not self._on[name]}
         self._ramp.approach(held, SET_POINT_TIME if duration is None else duration)
 
-    def set_torque(self, on: bool, joints: Iterable[str] | None = None) -> None:
-        """Switch servos on or off; they do not fall."""
+    def set_torque(
+        self, on: bool, joints: Iterable[str] | None = None, *, hold: bool = True
+    ) -> None:
+        """Switch servos on or off, as :meth:`.physics.Robot.set_torque`; they do not fall."""
         names = self.joint_names if joints is None else tuple(joints)
         self._on |= dict.fromkeys(names, on)
+        missed = {name: self._missed.pop(name) for name in names if on and name in self._missed}
+        if not hold:
+            self._ramp.approach(missed, 0.0)
 
     def torque_on(self, joint: str) -> bool:
         """Tell whether a servo holds."""

@@ -173,12 +173,12 @@ class Registers:
     def _switch_torque(self, data: bytes) -> None:
         servos, value = self._board.servos, data[0]
         if value in {Torque.UNLOAD_ALL, Torque.LOAD_ALL}:
-            servos.set_torque(servos.fitted, value == Torque.LOAD_ALL)
+            servos.set_torque(servos.fitted, value == Torque.LOAD_ALL, hold=False)
             return
         kind, leg = value & 0xF0, value & 0x0F
         if kind in {Torque.UNLOAD_LEG, Torque.LOAD_LEG}:
             motors = [motor for motor in servos.fitted if motor // 10 == leg]
-            servos.set_torque(motors, kind == Torque.LOAD_LEG)
+            servos.set_torque(motors, kind == Torque.LOAD_LEG, hold=False)
 
     def _act(self, data: bytes) -> None:
         if data[0] in {ACTION_RESET, STAND_UP}:

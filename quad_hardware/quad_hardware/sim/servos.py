@@ -152,14 +152,21 @@ class Servos:
         """Set how fast single commands are carried out, 1 to 255."""
         self._speed |= dict.fromkeys(motors, max(speed, 1))
 
-    def set_torque(self, motors: Iterable[int], on: bool) -> None:
-        """Switch servos on or off; those that the robot lacks or that have failed are left out."""
+    def set_torque(self, motors: Iterable[int], on: bool, *, hold: bool = True) -> None:
+        """Switch servos on or off; those that the robot lacks or that have failed are left out.
+
+        Args:
+            motors: By id.
+            on: Whether they hold.
+            hold: Those that wake hold where they are, as after switching on; else they go to
+                their last target, as when a host gives the torque back.
+        """
         names = [
             self._joint[motor]
             for motor in motors
             if motor in self._joint and not (on and motor == self.failed)
         ]
-        self._plant.set_torque(on, names)
+        self._plant.set_torque(on, names, hold=hold)
 
     def fail(self, motor: int | None) -> None:
         """Let a servo fail: it lets go. The one that had failed works, and holds where it is."""
