@@ -20,14 +20,15 @@ from sensor_msgs.msg import BatteryState, Imu, JointState
 from quad_controller.gait.parameters import GaitParameters
 from quad_controller.nodes.control_loop import ControlLoop
 from quad_controller.nodes.diagnostics import state_diagnostic
-from quad_controller.nodes.messages import body_pose, charge, imu_sample, JointReader
+from quad_controller.nodes.joint_reader import CommandScope, JointReader
+from quad_controller.nodes.messages import body_pose, charge, imu_sample
 from quad_controller.policy.observation import gravity
 from quad_controller.policy.options import GravitySource
 from quad_controller.states.controller import Controller
 from quad_controller.states.measurement import ImuSample, JointSample
 from quad_controller.states.parameters import StateParameters
 from quad_controller.states.status import Output
-from quad_gait_rig import FOLDED, Rig, ROBOT, tilted, UPRIGHT
+from quad_gait_rig import ARM_ROBOT, FOLDED, Rig, ROBOT, tilted, UPRIGHT
 
 PATIENCE = 10.0  # [s]
 angles = st.floats(-1.2, 1.2)
@@ -42,20 +43,46 @@ def test_joints_are_found_by_name(order: list[int]) -> None:
         position=[index * 0.1 for index in order],
         velocity=[index * 1.0 for index in order],
     )
-    sample = JointReader(ROBOT.names).read(message)
+    sample = JointReader(ROBOT).read(message, FOLDED)
     assert sample.positions == pytest.approx([index * 0.1 for index in range(12)])
     assert sample.velocities == pytest.approx([float(index) for index in range(12)])
 
 
 def test_odd_joint_states_are_refused_and_the_next_good_one_is_taken() -> None:
     """A missing joint and a wrong length are named; missing velocities are no zeros."""
-    reader = JointReader(ROBOT.names)
+    reader = JointReader(ROBOT)
     with pytest.raises(ValueError, match='without fl_hip_joint'):
-        reader.read(JointState(name=list(ROBOT.names[1:]), position=[0.0] * 11))
+        reader.read(JointState(name=list(ROBOT.names[1:]), position=[0.0] * 11), FOLDED)
     with pytest.raises(ValueError, match='11 positions for 12 names'):
-        reader.read(JointState(name=list(ROBOT.names), position=[0.0] * 11))
-    sample = reader.read(JointState(name=list(ROBOT.names), position=[0.5] * 12))
+        reader.read(JointState(name=list(ROBOT.names), position=[0.0] * 11), FOLDED)
+    sample = reader.read(JointState(name=list(ROBOT.names), position=[0.5] * 12), FOLDED)
     assert sample == JointSample((0.5,) * 12, None)
+
+
+def test_a_joint_of_the_arm_that_is_never_reported_is_where_it_is_sent() -> None:
+    """The old protocol does not tell of one; once it was told of, it may not get lost."""
+    reader, sent = JointReader(ARM_ROBOT), (*FOLDED, 0.4)
+    legs = JointState(name=list(ROBOT.names), position=[0.5] * 12, velocity=[1.0] * 12)
+    assert reader.read(legs, sent) == JointSample((*[0.5] * 12, 0.4), (*[1.0] * 12, 0.0))
+    assert reader.unreported == ('arm_yaw_joint',)
+    names = list(ARM_ROBOT.names)
+    whole = JointState(name=names, position=[0.5] * 13, velocity=[1.0] * 13)
+    assert reader.read(whole, sent) == JointSample((0.5,) * 13, (1.0,) * 13)
+    assert not reader.unreported
+    with pytest.raises(ValueError, match='without arm_yaw_joint'):
+        reader.read(legs, sent)
+
+
+def test_a_joint_that_nobody_measures_is_left_alone_until_it_is_to_move() -> None:
+    """Nobody knows how far it would jump."""
+    targets, names = (*FOLDED, 0.4), ('arm_yaw_joint',)
+    still = CommandScope(ARM_ROBOT, others_move=False)
+    assert still.cut(targets, 'walk', names) == FOLDED
+    assert still.cut(targets, 'walk', ()) == targets
+    posed = CommandScope(ARM_ROBOT, others_move=True)
+    assert posed.cut(targets, 'to lie', names) == FOLDED
+    assert posed.cut(targets, 'to stand', names) == targets
+    assert posed.cut(targets, 'lie', names) == targets
 
 
 def imu(attitude: float = 0.0, rate: float = 0.0, force: float = 0.0) -> Imu:

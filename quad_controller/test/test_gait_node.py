@@ -76,7 +76,8 @@ class Robot:
         imu.orientation.w = 1.0
         imu.linear_acceleration.z = 9.81
         self._imu.publish(imu)
-        self._joints.publish(JointState(name=self.names, position=self.positions))
+        still = [0.0] * len(self.names)
+        self._joints.publish(JointState(name=self.names, position=self.positions, velocity=still))
 
     def _follow(self, message: Any) -> None:
         stamp = message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec

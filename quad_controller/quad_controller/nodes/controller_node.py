@@ -40,6 +40,7 @@ from ..states.status import EventKind, Output, Status
 from . import messages
 from .control_loop import ControlLoop
 from .diagnostics import loop_diagnostic, state_diagnostic
+from .joint_reader import CommandScope, JointReader
 from .parameters import changed_gait, declare_parameters
 from .spinning import spin, stop_on_signals
 
@@ -84,7 +85,12 @@ class ControllerNode(Node):
         self._loop = ControlLoop(
             self._controller, settings.states.period, self._publish, self._give_up
         )
-        self._joints = messages.JointReader(settings.robot.names)
+        self._joints = JointReader(settings.robot)
+        self._scope = CommandScope(
+            settings.robot, others_move=bool(settings.arm_pose) or policy is not None
+        )
+        self._targets = self._controller.typical
+        self._unreported: tuple[str, ...] = ()
         self._title = ''
         self._ready = False
         self._stop, self.failure = stop, ''
@@ -148,9 +154,14 @@ class ControllerNode(Node):
 
     def _take_joints(self, message: JointState) -> None:
         try:
-            self._loop.offer_joints(self._joints.read(message))
+            self._loop.offer_joints(self._joints.read(message, self._targets))
         except ValueError as error:
             self.get_logger().warning(str(error), throttle_duration_sec=WARN_PERIOD)
+            return
+        if self._joints.unreported != self._unreported:
+            self._unreported = self._joints.unreported
+            names = ', '.join(self._unreported) or 'none'
+            self.get_logger().info(f'joints that nobody measures, which are left alone: {names}')
 
     def _take_imu(self, message: Imu) -> None:
         try:
@@ -223,7 +234,9 @@ class ControllerNode(Node):
         logger = self.get_logger()
         if output.targets is not None:
             stamp = self.get_clock().now().to_msg()
-            self._commands.publish(messages.joint_command(output.targets, stamp))
+            self._targets = output.targets
+            sent = self._scope.cut(output.targets, output.title, self._joints.unreported)
+            self._commands.publish(messages.joint_command(sent, stamp))
             if output.shadow is not None:
                 self._shadow.publish(messages.joint_command(output.shadow, stamp))
         if output.ready and not self._ready:

@@ -9,58 +9,14 @@ import math
 
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Pose, Twist
-from sensor_msgs.msg import BatteryState, Imu, JointState
+from sensor_msgs.msg import BatteryState, Imu
 from std_msgs.msg import Header
 
 from quad_msgs.msg import JointCommand
 
 from ..gait.body import BodyPose
 from ..gait.velocity import Velocity
-from ..states.measurement import ImuSample, JointSample
-
-
-class JointReader:
-    """Puts the joints of a message into the robot's order.
-
-    The order of a message seldom changes, so the permutation is kept until it does.
-    """
-
-    def __init__(self, names: Sequence[str]) -> None:
-        """Read for the joints of a robot, in its order."""
-        self._names = tuple(names)
-        self._seen: list[str] | None = None
-        self._places: list[int] = []
-
-    def read(self, message: JointState) -> JointSample:
-        """Return the joints of a message.
-
-        Raises:
-            ValueError: A joint is missing, or there are not as many positions as names.
-        """
-        if message.name != self._seen:
-            self._find(list(message.name))
-        if len(message.position) != len(message.name):
-            raise ValueError(
-                f'joint states: {len(message.position)} positions for {len(message.name)} names'
-            )
-        position, velocity = message.position, message.velocity
-        known = len(velocity) == len(position)
-        return JointSample(
-            tuple(position[place] for place in self._places),
-            tuple(velocity[place] for place in self._places) if known else None,
-        )
-
-    def _find(self, names: list[str]) -> None:
-        missing = [name for name in self._names if name not in names]
-        if missing:
-            self._seen = None
-            raise ValueError(
-                f'joint states without {", ".join(missing)}; does the hardware node use the same '
-                'robot description?'
-            )
-        self._places = [names.index(name) for name in self._names]
-        self._seen = names
-
+from ..states.measurement import ImuSample
 
 UNMEASURED = -1.0  # first covariance of what an IMU does not measure (sensor_msgs/Imu, REP 145)
 

@@ -77,6 +77,7 @@ class Controller:
             ParameterError: ``arm_pose`` does not fit the robot.
         """
         poses = Poses(robot, states.lie_height, arm_pose)
+        self._typical = poses.typical
         self._generator = GaitGenerator(robot, gait, poses.typical)
         self._generator.choose(first_gait)
         self._robot = robot
@@ -145,6 +146,11 @@ class Controller:
         self._generator = generator
         self._machine.retune(generator)
         return Answer(True, 'tuned')
+
+    @property
+    def typical(self) -> Targets:
+        """Positions of all joints that are assumed of those that nobody has measured [rad]."""
+        return self._typical
 
     @property
     def status(self) -> Status:

@@ -1,0 +1,110 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Joint states in the robot's order, and what to do about joints that nobody measures.
+
+The legs must be measured. An arm's servo need not be: the old protocol of the XGO does not report
+one of them. Such a joint counts as being where it is sent, and is not sent anywhere before it is
+to move, because nobody knows how far it would jump.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from sensor_msgs.msg import JointState
+
+from ..model.quadruped import Quadruped, Targets
+from ..states.measurement import JointSample
+
+STILL_TITLES = frozenset({'relax', 'to relax', 'lie', 'to lie'})
+"""States of the controller in which no joint but those of the legs moves."""
+
+
+class JointReader:
+    """Puts the joints of a message into the robot's order.
+
+    The order of a message seldom changes, so the permutation is kept until it does.
+
+    Attributes:
+        unreported: Joints that were in no message yet; empty before the first.
+    """
+
+    def __init__(self, robot: Quadruped) -> None:
+        """Read for the joints of a robot, in its order."""
+        self._names = robot.names
+        self._spared = {robot.names[index] for index in robot.others}
+        self._seen: list[str] | None = None
+        self._places: list[int | None] = []
+        self.unreported: tuple[str, ...] = ()
+
+    def read(self, message: JointState, sent: Sequence[float]) -> JointSample:
+        """Return the joints of a message.
+
+        Args:
+            message: What was measured.
+            sent: Where all joints were sent [rad], for those that are never reported.
+
+        Raises:
+            ValueError: A joint of a leg, or one that was there before, is missing, or there are
+                not as many positions as names.
+        """
+        if len(message.position) != len(message.name):
+            raise ValueError(
+                f'joint states: {len(message.position)} positions for {len(message.name)} names'
+            )
+        if message.name != self._seen:
+            self._find(list(message.name))
+        position, velocity = message.position, message.velocity
+        known = len(velocity) == len(position)
+        return JointSample(
+            tuple(
+                target if place is None else position[place]
+                for place, target in zip(self._places, sent, strict=True)
+            ),
+            tuple(0.0 if place is None else velocity[place] for place in self._places)
+            if known
+            else None,
+        )
+
+    def _find(self, names: list[str]) -> None:
+        missing = [name for name in self._names if name not in names]
+        if needed := [name for name in missing if name not in self._spared]:
+            self._seen = None
+            raise ValueError(
+                f'joint states without {", ".join(needed)}; does the hardware node use the same '
+                'robot description?'
+            )
+        self._spared &= set(missing)
+        self.unreported = tuple(missing)
+        self._places = [names.index(name) if name in names else None for name in self._names]
+        self._seen = names
+
+
+class CommandScope:
+    """Decides how many joints a command is for: all, or the first ones, which are the legs."""
+
+    def __init__(self, robot: Quadruped, *, others_move: bool) -> None:
+        """Begin with a robot that has not moved.
+
+        Args:
+            robot: The robot.
+            others_move: Whether joints that are no legs' will be sent elsewhere, ever.
+        """
+        legs = len(robot.names) - len(robot.others)
+        legs_first = all(index >= legs for index in robot.others)
+        self._count = legs if legs_first else len(robot.names)
+        self._others_move = others_move
+        self._moved = False
+
+    def cut(self, targets: Targets, title: str, unreported: Sequence[str]) -> Targets:
+        """Return the targets to send.
+
+        Args:
+            targets: Of all joints [rad].
+            title: Name of the controller's state.
+            unreported: Joints that nobody measures.
+        """
+        self._moved = self._moved or title not in STILL_TITLES
+        if unreported and not (self._others_move and self._moved):
+            return targets[: self._count]
+        return targets
