@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 import math
 
 from hypothesis import given
@@ -125,6 +126,28 @@ def test_an_arm_joint_is_sent_when_it_changes() -> None:
         rig.run(0.02)
     arm = [frame for _, frame in rig.sent if frame.address == 0x5D]
     assert [frame.payload[0] for frame in arm] == [ANGLE_SPANS[Model.LITE][52].encode(20.0)]
+
+
+def arm_writes(rig: OldRig) -> int:
+    """How often the elbow was sent."""
+    return sum(frame.address == 0x5D for _, frame in rig.sent)
+
+
+def test_an_arm_joint_is_sent_again_for_a_frame_may_be_lost() -> None:
+    """Twice a second while commands come, and at once after silence or a change of torque."""
+    rig = OldRig()
+    for _ in range(100):
+        rig.dialect.command({**LEGS, 52: 20.0})
+        rig.run(0.02)
+    assert arm_writes(rig) == 4
+    for count, forget in (
+        (5, rig.dialect.withdraw),
+        (6, partial(rig.dialect.torque, on=False)),
+    ):
+        forget()
+        rig.dialect.command({**LEGS, 52: 20.0})
+        rig.run(0.02)
+        assert arm_writes(rig) == count
 
 
 def test_a_silent_old_robot_is_asked_again_and_counted() -> None:

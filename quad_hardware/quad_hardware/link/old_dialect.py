@@ -34,6 +34,7 @@ LONGEST_LATENCY = 0.050  # [s] what an answer may take beyond its time on the li
 SHORTEST_LATENCY = 0.006  # [s] what is waited for the answer of a quick board
 LATENCY_DECAY = 0.98  # by which a slow answer is forgotten with each quick one
 BATTERY_PERIOD = 2.0  # [s]
+ARM_AGAIN = 0.5  # [s] after which an arm joint is sent again, for a frame may be lost
 _IMU = OLD.functions[Register.IMU]
 
 
@@ -84,7 +85,7 @@ class OldDialect(Dialect):
         self._free_at = now
         self._legs = self._torque = b''
         self._arm: dict[int, bytes] = {}
-        self._arm_sent: dict[int, bytes] = {}
+        self._arm_sent: dict[int, tuple[bytes, float]] = {}  # and until when that counts [s]
         self._angles: bytes | None = None
         self._charges: deque[int] = deque(maxlen=3)
 
@@ -96,7 +97,8 @@ class OldDialect(Dialect):
     def command(self, angles: Mapping[int, float]) -> None:
         """Set the angles that are sent when the line is free.
 
-        All legs go in one frame, so all of them must be there; the arm follows, where it changed.
+        All legs go in one frame, so all of them must be there; the arm follows, where it changed
+        or was last sent a while ago.
         """
         self._legs = bytes(self._spans[motor].encode(angles[motor]) for motor in LEG_MOTORS)
         for motor in angles.keys() - set(LEG_MOTORS):
@@ -104,12 +106,14 @@ class OldDialect(Dialect):
 
     def torque(self, *, on: bool) -> None:
         """Have all servos hold their place, or let go, behind a pending command."""
+        self._arm_sent.clear()
         self._torque = bytes((Torque.LOAD_ALL if on else Torque.UNLOAD_ALL,))
 
     def withdraw(self) -> None:
         """Forget a command that has not been sent yet."""
         self._legs = b''
         self._arm.clear()
+        self._arm_sent.clear()
 
     def step(self, now: float) -> Step:
         """Return the next frame, where one is due and the line is free."""
@@ -176,8 +180,9 @@ class OldDialect(Dialect):
             return Frame(Kind.WRITE, Register.MOTORS, payload).encode(OLD)
         while self._arm:
             motor, payload = self._arm.popitem()
-            if self._arm_sent.get(motor) != payload:
-                self._arm_sent[motor] = payload
+            sent, until = self._arm_sent.get(motor, (b'', now))
+            if sent != payload or now >= until:
+                self._arm_sent[motor] = payload, now + ARM_AGAIN
                 return Frame(Kind.WRITE, REGISTER_OF_MOTOR[motor], payload).encode(OLD)
         if self._torque:
             payload, self._torque = self._torque, b''
