@@ -84,6 +84,18 @@ def test_a_stream_begins_slowly_where_the_robot_is() -> None:
     assert last.slowed == ()
 
 
+@given(st.floats(0.1, 100.0), st.floats(0.1, 100.0))
+def test_no_target_is_faster_than_the_fastest(speed: float, start_speed: float) -> None:
+    """Also at the beginning of a stream, where someone allows less than the usual start."""
+    limiter = CommandLimiter(JOINTS, LimiterSettings(speed=speed, start_speed=start_speed))
+    last = HOME
+    for tick in range(40):
+        targets = limiter.step([0.5] * 12, HOME, tick * 0.02).targets
+        step = max(abs(b - a) for a, b in zip(last, targets, strict=True))
+        assert step <= speed * 0.02 + 1e-9
+        last = list(targets)
+
+
 def test_after_a_pause_the_stream_begins_anew() -> None:
     """The robot may have been moved meanwhile; the same holds after a reset."""
     limiter = CommandLimiter(JOINTS)

@@ -21,7 +21,7 @@ class LimiterSettings:
 
     Attributes:
         speed: Fastest [rad/s]; of the gripper, times its travel in a radian of servo.
-        start_speed: Fastest at the beginning of a stream of commands [rad/s].
+        start_speed: Fastest at the beginning of a stream of commands [rad/s]; never above speed.
         start_time: After which ``speed`` is reached [s].
         stream_timeout: A pause that ends a stream [s].
     """
@@ -139,7 +139,8 @@ class CommandLimiter:
     def _speed(self, now: float) -> float:
         settings = self._settings
         share = min((now - self._began_at) / settings.start_time, 1.0)
-        return settings.start_speed + share * (settings.speed - settings.start_speed)
+        start = min(settings.start_speed, settings.speed)
+        return start + share * (settings.speed - start)
 
     def _approach(self, positions: Sequence[float], step: float) -> Command:
         clamped, slowed = [], []
