@@ -210,11 +210,12 @@ class Execution:
         clock, path = self._clock, self._path
 
         def ahead(time: float) -> MotionState:
-            here = path.at(clock.time + clock.pace * (time - period))
+            at, pace, change = clock.ahead(time - period)
+            here = path.at(at)
             return MotionState(
                 here.position,
-                here.velocity * clock.pace,
-                here.acceleration * clock.pace**2 + here.velocity * clock.change,
+                here.velocity * pace,
+                here.acceleration * pace**2 + here.velocity * change,
             )
 
         return ahead

@@ -19,18 +19,23 @@ ABRUPTEST = 200.0
 SHARE = 0.9
 """Share of the joints' acceleration that a change of the pace may bring them to."""
 
-JERK_SHARE = 0.5
+JERK_SHARE = 0.4
 """Share of the joints' jerk that a change of the pace may ask."""
 
 SPREAD = 5.0
 """Cycles at least in which a change of the pace builds up."""
 
 FLOOR = 0.2
-"""Share of the acceleration that a change of the pace has where the path leaves none."""
+"""Share of its room that a change of the pace has where the path leaves none."""
+
+SOON = 0.01
+"""How far ahead on the path its own jerk is looked for in [s]."""
 
 
 class PathClock:
     """Walks a path at a pace of 0 to 1 that changes smoothly.
+
+    Coming to a stop it may overrun by a little, and walk that back.
 
     Attributes:
         time: Time of the path in [s].
@@ -50,9 +55,26 @@ class PathClock:
         self._demand = ruckig.InputParameter(1)
         self._demand.control_interface = ruckig.ControlInterface.Velocity
         self._demand.max_velocity = [10.0]
+        self._wanted = pace
         self.time = 0.0
         self.pace = pace
         self.change = 0.0
+
+    def ahead(self, time: float) -> tuple[float, float, float]:
+        """Foresee time, pace and change, for a change that goes on evenly until the wanted pace.
+
+        Args:
+            time: How far ahead in [s].
+        """
+        gap = self._wanted - self.pace
+        if self.change * gap <= 0.0:
+            return self.time + self.pace * time, self.pace, self.change
+        changing = gap / self.change
+        if time < changing:
+            way = (self.pace + 0.5 * self.change * time) * time
+            return self.time + way, self.pace + self.change * time, self.change
+        way = (self.pace + 0.5 * gap) * changing + self._wanted * (time - changing)
+        return self.time + way, self._wanted, 0.0
 
     @property
     def stopped(self) -> bool:
@@ -67,6 +89,7 @@ class PathClock:
             wanted: Pace to reach.
             period: Time to advance by in [s].
         """
+        self._wanted = wanted
         if self.pace == wanted and self.change == 0.0:
             self.time += self.pace * period
             return
@@ -90,15 +113,23 @@ class PathClock:
             left = period - trajectory.duration
             self.time, self.pace, self.change = reached + wanted * left, wanted, 0.0
             return
-        time, pace, change = (values[0] for values in trajectory.at_time(period))
-        self.time, self.pace, self.change = time, max(pace, 0.0), change
+        self.time, self.pace, self.change = (values[0] for values in trajectory.at_time(period))
 
     def _room(self, path: Path, sense: float) -> tuple[float, float]:
         """Return how fast the pace may change in [1/s], and that in [1/s2]."""
-        here, limits = path.at(self.time), self._limits
+        here, soon, limits = path.at(self.time), path.at(self.time + SOON), self._limits
         speed = np.maximum(np.abs(here.velocity), 1e-9)
+        bend = np.maximum(np.abs(here.acceleration), np.abs(soon.acceleration)) * self.pace
         used = sense * np.sign(here.velocity) * here.acceleration * self.pace**2
         room = np.maximum(SHARE * limits.acceleration - used, FLOOR * limits.acceleration)
-        quickest = float(np.min(room / speed))
-        abruptest = float(np.min(JERK_SHARE * limits.jerk / speed))
+        # by the chain rule a change c of the pace p costs jerk: three times acceleration p c, and
+        # velocity dc/dt, beside the path's own jerk p^3
+        quickest = min(
+            float(np.min(room / speed)),
+            float(np.min(JERK_SHARE * limits.jerk / np.maximum(3.0 * bend, 1e-9))),
+        )
+        own = np.abs(soon.acceleration - here.acceleration) / SOON * self.pace**3
+        left = limits.jerk - own - 3.0 * bend * abs(self.change)
+        left = JERK_SHARE * np.maximum(left, FLOOR * limits.jerk)
+        abruptest = float(np.min(left / speed))
         return min(quickest, QUICKEST), min(abruptest, ABRUPTEST)
