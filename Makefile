@@ -15,11 +15,12 @@ ARGS ?=
 WORKSPACE = cd tools && $(or $(PYTHON),python3) -m workspace $(if $(PYTHON),--python $(PYTHON))
 IN_ENVIRONMENT = bash -c '. "$(CURDIR)/env.sh" && exec "$$@"' environment
 
-.PHONY: help demo demo-quad test build lint bench setup pins clean distclean
+.PHONY: help demo demo-arm demo-quad test build lint bench setup pins clean distclean
 .DEFAULT_GOAL := help
 
 help:
 	@echo 'make demo       watch a simulated arm move (DURATION=20 ends it, ROBOT=prbt is another arm)'
+	@echo 'make demo-arm   jog it and send it trajectories, with what was measured (ROBOT=gp110)'
 	@echo 'make demo-quad  watch a simulated quadruped walk (DURATION=20 ends it after that)'
 	@echo 'make test       build everything and run all tests'
 	@echo 'make build      build every package; then: source env.sh'
@@ -37,6 +38,10 @@ demo: system
 demo-quad: system
 	@$(WORKSPACE) build quad_bringup
 	@$(IN_ENVIRONMENT) ros2 run quad_bringup demo $(if $(DURATION),--duration $(DURATION))
+
+demo-arm: system
+	@$(WORKSPACE) build arm_motion_bringup
+	@$(IN_ENVIRONMENT) ros2 run arm_motion_bringup demo $(ROBOT) $(if $(DURATION),--duration $(DURATION))
 
 test: system
 	@$(WORKSPACE) build --dev

@@ -11,9 +11,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 import json
 from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import yaml
 
 from process_supervisor import Executable, FindExecutable
 
+from .exceptions import RobotError
 from .robots import Robot
 from .stack import MASTER, MOTION_MASTER
 
@@ -37,6 +41,28 @@ def motion_files(robot: Robot, folder: Path) -> Sequence[Path]:
     path = folder / 'motion.yaml'  # JSON is YAML, whatever characters are in it
     path.write_text(json.dumps({'/**': {'ros__parameters': values}}), encoding='utf-8')
     return [path, robot.controllers] if robot.controllers.is_file() else [path]
+
+
+def controller_name(robot: Robot) -> str:
+    """Return the name of a robot's trajectory controller.
+
+    Args:
+        robot: A robot with an SRDF; without a name in controllers.yaml, that of its first group
+            is used.
+
+    Raises:
+        RobotError: A file cannot be read as what it should be.
+    """
+    try:
+        table = (
+            yaml.safe_load(robot.controllers.read_text()) if robot.controllers.is_file() else {}
+        )
+        manager = table.get('controller_manager', {}).get('ros__parameters', {})
+        group = ET.parse(robot.semantic).getroot().find('group')  # noqa: S314  the robot's own
+    except (yaml.YAMLError, AttributeError, ET.ParseError) as error:
+        raise RobotError(f'{robot.folder}: {error}') from error
+    first = '' if group is None else group.get('name', '')
+    return str(manager.get('controller_name', f'{first}_controller'))
 
 
 def choose_master(robot: Robot, find: FindExecutable) -> tuple[Executable, str]:

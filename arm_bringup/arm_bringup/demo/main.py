@@ -54,7 +54,7 @@ def parse(argv: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument(
         '--duration',
         metavar='S',
-        type=_duration,
+        type=positive_seconds,
         help='end after so many seconds of wave, with a summary; the exit code says whether all '
         'joints were enabled, moved (it takes them 5 s to get going) and followed (default: until '
         'Ctrl-C)',
@@ -62,7 +62,15 @@ def parse(argv: Sequence[str] | None) -> argparse.Namespace:
     return parser.parse_args(argv)
 
 
-def _duration(text: str) -> float:
+def positive_seconds(text: str) -> float:
+    """Read a duration of the command line.
+
+    Args:
+        text: The number.
+
+    Raises:
+        ArgumentTypeError: It is not positive, or not finite.
+    """
     value = float(text)
     if not 0 < value < math.inf:
         raise argparse.ArgumentTypeError(f'{text} is no positive number of seconds')

@@ -1,0 +1,255 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The course of the demo: squares, a singular pose, trajectories with override and cancel."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+import time
+
+from action_msgs.msg import GoalStatus
+import numpy as np
+
+from arm_bringup.exceptions import CallError
+from arm_servo import RobotModel
+from arm_servo.arrays import Array
+
+from .client import GoalRun, MotionClient
+from .goals import beside, duration
+from .results import Results, WORST_PATH
+from .samples import away_from_line, peak_jerk, tool_speed, tracking_error
+
+PERIOD = 0.02
+"""Time between two jog commands in [s]."""
+SETTLE = 0.35
+"""Pause after a motion in [s]."""
+SPEED = 0.1
+"""Speed of the squares in [m/s]."""
+SIDE = 0.8
+"""Time of a side of a square in [s]."""
+FAST = 0.3
+"""Speed of the way to the singular pose in [m/s]."""
+OUT, DOWN = 0.866, 0.5
+"""Direction of the way to the singular pose: shares of outwards and down."""
+STUCK = 0.06
+"""Speed below which the tool has come to its end in [m/s]."""
+LONGEST = 5.0
+"""Longest time of the way to the singular pose in [s]; the way back may take twice as long."""
+WAY = 0.5
+"""How far each joint goes in the trajectories in [rad]."""
+SLOW = 0.3
+"""Speed override."""
+START = 'ready'
+"""Pose of the SRDF from which it starts."""
+
+
+class Left(Exception):  # noqa: N818  # it is no error: the user asked for the end
+    """The user asked for the end."""
+
+
+@dataclass(frozen=True, slots=True)
+class Course:
+    """The parts of the demo, for a client whose drives are enabled.
+
+    Attributes:
+        client: The client.
+        model: The arm.
+        period: Period of the cycle in [s].
+        results: Where figures go.
+        enter: Told of each part.
+        look: Called often; shows how it goes, and raises Left.
+    """
+
+    client: MotionClient
+    model: RobotModel
+    period: float
+    results: Results
+    enter: Callable[[str], None]
+    look: Callable[[], None]
+
+    def run(self) -> None:
+        """Run every part once.
+
+        Raises:
+            CallError: A trajectory was refused or failed, or somebody does not answer.
+            GivenUpError: The processes have ended.
+            Left: The user asked for the end.
+        """
+        self.go_to_start()
+        self.square('base frame', self.model.base)
+        self.square('tool frame', self.model.tip)
+        self.singularity()
+        self.go_to_start()
+        self.trajectory()
+        self.cancel()
+
+    def go_to_start(self) -> None:
+        """Follow a trajectory to the start pose."""
+        self.enter('to the start pose')
+        self._wait(SETTLE)
+        end = self.model.poses[START]
+        begin = self.client.last.position if self.client.samples else np.zeros(len(self.model))
+        self._finish(self.client.send(end, duration(begin, end, self.model.limits)))
+
+    def square(self, name: str, frame: str) -> None:
+        """Jog the tool along the sides of a square.
+
+        Args:
+            name: What the frame is called.
+            frame: Link along whose axes.
+        """
+        self.enter(f'a square in the {name}')
+        speeds, commanded, measured = [], 0.0, 0.0
+        for way in ((1, 0, 0), (0, 1, 0), (-1, 0, 0), (0, -1, 0)):
+            begin = self.client.last
+            axes = self.model.pose(begin.position, frame).rotation
+            direction = axes @ np.array(way, dtype=float)
+            first = len(self.client.samples)
+            self._jog(SPEED * np.array(way), frame, SIDE)
+            moving = self.client.samples[first:]
+            self._wait(SETTLE)
+            side = self.client.samples[first:]
+            speeds.append(tool_speed(moving, self.period))
+            tools = [each.tool for each in side]
+            commanded = max(commanded, away_from_line(tools, begin.tool, direction))
+            tools = [each.measured_tool for each in side]
+            measured = max(measured, away_from_line(tools, begin.measured_tool, direction))
+        reached = min(speeds, key=lambda speed: -abs(speed - SPEED))
+        self.results.square(f'square, {name}', SPEED, reached, commanded, measured)
+
+    def singularity(self) -> None:
+        """Jog the tool outwards until the arm is straight, or something else ends it, and back."""
+        self.enter('into the straight arm, and back')
+        begin = self.client.last.tool
+        outwards = straight_ahead(begin)
+        first = len(self.client.samples)
+        self.client.limited.clear()
+        self._jog(FAST * outwards, self.model.base, LONGEST, self._stuck)
+        self._wait(SETTLE)
+        singular = [words for words in self.client.limited if 'singular' in words]
+        words = (singular or self.client.limited or [''])[-1]
+        out = max(float((each.tool - begin) @ outwards) for each in self.client.samples[first:])
+        self._jog(
+            -FAST * outwards,
+            self.model.base,
+            2.0 * LONGEST,
+            lambda: bool((self.client.last.tool - begin) @ outwards <= 0.0),
+        )
+        self._wait(SETTLE)
+        left = float((self.client.last.tool - begin) @ outwards)
+        self.results.singularity(out, out - left, words)
+
+    def trajectory(self) -> None:
+        """Follow a trajectory, at 30 % in its middle."""
+        self.enter('a trajectory, at 30 % in its middle')
+        begin, end, nominal = self._plan()
+        first = len(self.client.samples)
+        begun = time.monotonic()
+        run = self.client.send(end, nominal)
+        self._wait(0.4 * nominal)
+        self.client.override(SLOW)
+        self._wait(0.4 * nominal)
+        slow = self.client.last.speed
+        self.client.override(1.0)
+        self._finish(run)
+        took = time.monotonic() - begun
+        error = self._path_error(first, begin, end)
+        figures = (
+            f'path error {1e3 * error:.3f} mrad, {nominal:.1f} s planned, {took:.1f} s with '
+            f'{100 * slow:.0f} % in its middle'
+        )
+        problem = ''
+        if error > WORST_PATH:
+            problem = f'{1e3 * error:.1f} mrad off the path'
+        elif slow != SLOW or took < nominal * (1.0 + 0.4 * (1.0 - SLOW) / 2.0):
+            problem = f'the override did not slow it down: {took:.1f} s'
+        self.results.add('trajectory', figures, problem)
+
+    def cancel(self) -> None:
+        """Cancel a trajectory in its middle: it comes to rest on its path."""
+        self.enter('a trajectory, canceled')
+        begin, end, nominal = self._plan()
+        first = len(self.client.samples)
+        run = self.client.send(end, nominal)
+        self._wait(0.5 * nominal)
+        run.cancel()
+        self.client.wait_until(lambda: self._seen(run), 2.0 * nominal, 'the end of the canceled')
+        self._wait(SETTLE)
+        error = self._path_error(first, begin, end)
+        status, words = run.end()
+        done = float(np.linalg.norm(self.client.last.position - begin))
+        share = done / float(np.linalg.norm(end - begin))
+        problem = '' if status == GoalStatus.STATUS_CANCELED else f'it was not canceled: {words}'
+        if error > WORST_PATH:
+            problem = f'{1e3 * error:.1f} mrad off the path'
+        elif np.abs(self.client.last.velocity).max() > 0.0:
+            problem = 'the arm does not rest'
+        figures = (
+            f'at rest after {100 * share:.0f} % of the way, {1e3 * error:.3f} mrad off the path'
+        )
+        self.results.add('cancel', figures, problem)
+
+    def measure(self) -> None:
+        """Take in what was measured all the time."""
+        samples = self.client.samples
+        jerk = peak_jerk(samples, self.period, self.model.limits.jerk)
+        tracking = tracking_error(samples, self.period)
+        self.results.motion(jerk, tracking, self.client.figures.bus)
+
+    def _plan(self) -> tuple[Array, Array, float]:
+        """Return begin, end and time of a trajectory from where the arm is."""
+        begin = self.client.last.position
+        end = beside(begin, self.model.limits, WAY)
+        return begin, end, duration(begin, end, self.model.limits)
+
+    def _path_error(self, first: int, begin: Array, end: Array) -> float:
+        points = [each.position for each in self.client.samples[first:]]
+        return away_from_line(points, begin, end - begin)
+
+    def _jog(
+        self, linear: Array, frame: str, longest: float, done: Callable[[], bool] | None = None
+    ) -> None:
+        """Jog for a time, or until it is done."""
+        begun = time.monotonic()
+        while (elapsed := time.monotonic() - begun) < longest:
+            self.client.jog(linear, frame)
+            self.client.listen(PERIOD)
+            self.look()
+            if done is not None and elapsed > 2.0 * SETTLE and done():
+                break
+        self.client.jog(0.0 * linear, frame)
+
+    def _stuck(self) -> bool:
+        """Say whether the tool has hardly moved lately."""
+        recent = self.client.samples[-round(SETTLE / self.period) :]
+        way = float(np.linalg.norm(recent[-1].tool - recent[0].tool))
+        return way < STUCK * SETTLE
+
+    def _finish(self, run: GoalRun) -> None:
+        self.client.wait_until(lambda: self._seen(run), 60.0, 'the end of a trajectory')
+        status, words = run.end()
+        if status != GoalStatus.STATUS_SUCCEEDED:
+            raise CallError(f'a trajectory failed: {words}')
+
+    def _seen(self, run: GoalRun) -> bool:
+        self.look()
+        return run.done
+
+    def _wait(self, pause: float) -> None:
+        end = time.monotonic() + pause
+        while (left := end - time.monotonic()) > 0:
+            self.client.listen(min(left, PERIOD))
+            self.look()
+
+
+def straight_ahead(tool: Array) -> Array:
+    """Return a direction in which an arm becomes straight: away from its axis, and down a little.
+
+    Args:
+        tool: Position of the tool in the base in [m].
+    """
+    ahead = np.array([tool[0], tool[1], 0.0])
+    ahead /= max(float(np.linalg.norm(ahead)), 1e-6)
+    direction: Array = OUT * ahead - np.array([0.0, 0.0, DOWN])
+    return direction

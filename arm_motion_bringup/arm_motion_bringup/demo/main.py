@@ -1,0 +1,208 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""``ros2 run arm_motion_bringup demo``: a simulated arm is jogged and follows trajectories."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Sequence
+import json
+import os
+from pathlib import Path
+import sys
+import threading
+
+from rich.console import Console
+
+from arm_bringup.demo.figures import Figures
+from arm_bringup.demo.main import conclude, positive_seconds
+from arm_bringup.demo.table import ArmView
+from arm_bringup.description import joint_limits
+from arm_bringup.exceptions import BringupError, RobotError
+from arm_bringup.motion import controller_name, motion_files
+from arm_bringup.robots import Robot
+from arm_bringup.session import (
+    add_arguments,
+    locate,
+    robots_epilog,
+    Session,
+    session,
+    SIMULATED_BUS,
+)
+from arm_bringup.stack import MOTION_MASTER
+from arm_servo import load_limits, RobotModel, ServoError
+from process_supervisor import (
+    LineWriter,
+    Painter,
+    Runner,
+    SupervisorError,
+    USAGE_ERROR,
+    wants_colour,
+)
+from process_supervisor.display import choose_display, Setting
+
+from .client import MotionClient
+from .course import START
+from .figures import MotionFigures
+from .play import MotionPlay
+from .view import MotionView
+
+RATE = 100.0
+"""Rate of the controller's states in [Hz]."""
+
+
+def parse(argv: Sequence[str] | None) -> argparse.Namespace:
+    """Parse the command line.
+
+    Args:
+        argv: Arguments without the program's name; None takes those of the process.
+    """
+    parser = argparse.ArgumentParser(
+        prog='ros2 run arm_motion_bringup demo',
+        description='Bring a simulated arm up and move it: a square with the tool in the base '
+        'frame and in its own, into the straight arm and back, a trajectory with a speed override '
+        'in its middle, and one that is canceled. Ends with what was measured.',
+        epilog=robots_epilog(),
+    )
+    add_arguments(parser, default_bus=f'{SIMULATED_BUS}: vcan0 when it is there, else multicast')
+    parser.add_argument(
+        '--duration',
+        metavar='S',
+        type=positive_seconds,
+        help='repeat it until so many seconds are over, once at least (default: until Ctrl-C)',
+    )
+    return parser.parse_args(argv)
+
+
+def demo_files(robot: Robot, folder: Path) -> Sequence[Path]:
+    """Write the parameter files of the demo: the robot's own, and what the demo relies on.
+
+    Args:
+        robot: A robot with an SRDF and limits.
+        folder: Where to.
+    """
+    values = {
+        controller_name(robot): {'ros__parameters': {'state_publish_rate': RATE}},
+        'servo_node': {
+            'ros__parameters': {
+                'moveit_servo': {
+                    'command_in_type': 'speed_units',
+                    'scale': {'linear': 1.0},  # cap [m/s]
+                }
+            }
+        },
+    }
+    path = folder / 'demo.yaml'
+    path.write_text(json.dumps(values), encoding='utf-8')
+    return [*motion_files(robot, folder), path]
+
+
+def build_model(robot: Robot, urdf: str) -> RobotModel:
+    """Build the arm, for where its tool is.
+
+    Args:
+        robot: The robot.
+        urdf: Its description.
+
+    Raises:
+        RobotError: It has no pose to start from.
+        ModelError: Its files do not make an arm.
+    """
+    semantic = robot.semantic.read_text(encoding='utf-8')
+    model = RobotModel(urdf, semantic, load_limits(robot.limits))
+    if START not in model.poses:
+        raise RobotError(f'{robot.semantic} has no pose {START!r} to start from')
+    return model
+
+
+def run(arm: Session, duration: float | None) -> int:
+    """Run the demo.
+
+    Args:
+        arm: The arm, prepared.
+        duration: How long it is repeated in [s]; None until Ctrl-C.
+
+    Returns:
+        0, or 1 when something went wrong.
+
+    Raises:
+        RobotError: The arm has no pose to start from.
+        ModelError: Its files do not make an arm.
+    """
+    from arm_canopen import load_bus
+
+    model = build_model(arm.robot, arm.urdf)
+    period = load_bus(arm.robot.bus_config).master.sync_period
+    controller = controller_name(arm.robot)
+    write = LineWriter(sys.stdout)
+    limits = {name: each for name, each in joint_limits(arm.urdf).items() if name in arm.drives}
+    title = f'{arm.robot.name}: {len(arm.drives)} simulated drives on {arm.bus}'
+    setting: Setting[Figures] = Setting(
+        MotionView(ArmView(title, limits)),
+        MotionFigures(),
+        commands(controller, os.environ.get('ROS_DOMAIN_ID', '')),
+        Painter('demo', [s.name for s in arm.processes], wants_colour(sys.stdout, os.environ)),
+    )
+    display = choose_display(setting, Console(), write)
+    play = MotionPlay(list(limits), arm.mode_service, display, duration)
+    play.model, play.period = model, period
+
+    def join(given_up: Callable[[], bool]) -> MotionClient:
+        return MotionClient(given_up, model, controller, period)
+
+    try:
+        with Runner(
+            arm.processes, display.line, display.notice, on_interrupt=play.leave
+        ) as runner:
+            thread = threading.Thread(target=play.run, args=[runner, join], name='play')
+            thread.start()
+            outcome = runner.run()
+            thread.join()
+    finally:
+        display.close()
+    return conclude(write, play, outcome, with_summary=True)
+
+
+def commands(controller: str, domain: str) -> list[str]:
+    """Return commands to try in a second terminal.
+
+    Args:
+        controller: Name of the trajectory controller.
+        domain: ROS domain, empty for the default one.
+    """
+    return [
+        f'source env.sh; export ROS_DOMAIN_ID={domain}' if domain else 'source env.sh',
+        'ros2 run arm_servo servo_keyboard_input',
+        'ros2 topic echo /servo_node/status',
+        f'ros2 topic echo /{controller}/controller_state',
+    ]
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the demo until its end or Ctrl-C.
+
+    Args:
+        argv: Arguments without the program's name; None takes those of the process.
+
+    Returns:
+        0 when all went well, 1 when something did not, 2 when nothing was started.
+    """
+    arguments = parse(argv)
+    try:
+        robot = locate(arguments.robot)
+        if not robot.movable:
+            raise RobotError(
+                f'{robot.name} lacks {robot.semantic.name} and {robot.limits.name}: '
+                f'ros2 run arm_bringup check {arguments.robot} tells more'
+            )
+        with session(
+            arguments,
+            simulate=True,
+            master=MOTION_MASTER,
+            master_parameters={'diagnostics_period': '0.2'},
+            master_files=demo_files,
+        ) as arm:
+            return run(arm, arguments.duration)
+    except (BringupError, SupervisorError, ServoError) as error:
+        sys.stderr.write(f'{error}\n')
+        return USAGE_ERROR

@@ -1,0 +1,71 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Runs the demo beside the supervisor: boot, enable, the course again and again, stop."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import math
+import time
+
+from arm_bringup.demo.play import CALL_TIMEOUT, Client, ENABLE_TIMEOUT, Play, Result
+from arm_bringup.demo.report import warnings
+from arm_bringup.exceptions import CallError
+from arm_servo import RobotModel
+
+from .client import MotionClient
+from .course import Course, Left
+from .results import Results
+
+
+class MotionPlay(Play):
+    """The demo in a thread of its own.
+
+    Attributes:
+        model: The arm; set before it is run.
+        period: Period of the cycle in [s]; set before it is run.
+    """
+
+    model: RobotModel
+    period: float
+
+    def _course(self, client: Client, ready: Callable[[], bool]) -> None:
+        if not isinstance(client, MotionClient):
+            raise TypeError(f'{client!r} cannot move an arm')
+        init, mode, _ = self._services()
+        client.prepare([*init, *mode])
+        self._enter('booting')
+        client.wait_until(lambda: self._booted(client, ready), math.inf, 'the processes')
+        self._enter('enabling')
+        client.call(init, ENABLE_TIMEOUT)
+        client.call(mode, CALL_TIMEOUT)
+        self._waving.set()
+        results = Results()
+        course = Course(
+            client, self.model, self.period, results, self._enter, lambda: self._look(client)
+        )
+        try:
+            self._repeat(course)
+        except Left:
+            self._enter('leaving')
+        except CallError as error:
+            results.problems.append(str(error))
+        if client.samples:
+            course.measure()
+        self.result = Result(results.lines(), results.problems, warnings(client.figures))
+
+    def _repeat(self, course: Course) -> None:
+        """Run the course until the time is over, once at least."""
+        begun = time.monotonic()
+        while True:
+            lap = time.monotonic()
+            course.run()
+            now = time.monotonic()
+            if now + (now - lap) > begun + self._duration:
+                return  # another one would take longer
+            course.results.rows.clear()
+
+    def _look(self, client: MotionClient) -> None:
+        self._show(client)
+        if self.left:
+            raise Left

@@ -1,0 +1,110 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What the demo found out: rows of the summary, and what went wrong."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from arm_bringup.demo.figures import BusFigures
+from arm_bringup.demo.report import bus_line
+
+WORST_LINE = 3e-3
+"""Greatest distance of the tool from the line that it is jogged along, in [m]."""
+WORST_SPEED = 0.01
+"""Greatest difference of the tool's speed from the asked one, as a share."""
+WORST_PATH = 5e-3
+"""Greatest distance of a set-point from the path of a trajectory, in [rad]."""
+WORST_JERK = 1.05
+"""Greatest jerk, as a share of the limit; the numbers in the messages are rounded."""
+LEAST_RETURN = 0.9
+"""Share of the way that the tool must come back from the singular pose."""
+WORST_TRACKING = 0.2
+"""A joint that was this far from its set-point in [rad] did not follow; late cycles are in it."""
+
+
+@dataclass(slots=True)
+class Results:
+    """Filled while the demo runs.
+
+    Attributes:
+        rows: Name and figures of each part, in their order.
+        problems: What went wrong.
+        complete: Whether every part was run.
+    """
+
+    rows: list[tuple[str, str]] = field(default_factory=list)
+    problems: list[str] = field(default_factory=list)
+    complete: bool = False
+
+    def add(self, name: str, figures: str, problem: str = '') -> None:
+        """Take in a part.
+
+        Args:
+            name: What it was.
+            figures: What was measured.
+            problem: What went wrong; empty when all went well.
+        """
+        self.rows.append((name, figures))
+        if problem:
+            self.problems.append(f'{name}: {problem}')
+
+    def square(
+        self, name: str, asked: float, reached: float, commanded: float, measured: float
+    ) -> None:
+        """Take in a square of the tool.
+
+        Args:
+            name: What it was.
+            asked: Speed that was asked in [m/s].
+            reached: Speed that was reached in [m/s].
+            commanded: Greatest distance of the commanded tool from the sides in [m].
+            measured: The same of the measured tool in [m].
+        """
+        figures = (
+            f'TCP speed asked {asked:.3f} m/s, reached {reached:.4f} m/s; off the line '
+            f'{1e3 * commanded:.2f} mm commanded, {1e3 * measured:.2f} mm measured'
+        )
+        problem = ''
+        if measured > WORST_LINE:
+            problem = f'the tool was {1e3 * measured:.1f} mm off its line'
+        elif abs(reached - asked) > WORST_SPEED * asked:
+            problem = f'the tool moved at {reached:.4f} m/s instead of {asked:.3f} m/s'
+        self.add(name, figures, problem)
+
+    def singularity(self, out: float, back: float, words: str) -> None:
+        """Take in the way to the singular pose and back.
+
+        Args:
+            out: Way of the tool out in [m].
+            back: Way that it came back in [m].
+            words: What the servo said there.
+        """
+        problem = ''
+        if out <= 0.0 or back < LEAST_RETURN * out:
+            problem = (
+                f'the tool came back {back:.3f} m of {out:.3f} m; {words or "no reason given"}'
+            )
+        figures = f'{out:.3f} m out, {back:.3f} m back; there: {words or "nothing limits"}'
+        self.add('singularity', figures, problem)
+
+    def motion(self, jerk: float, tracking: float, bus: BusFigures) -> None:
+        """Take in what was measured all the time.
+
+        Args:
+            jerk: Greatest jerk, as a share of the limit.
+            tracking: Greatest distance of a joint from where it was sent in [rad].
+            bus: Bus and cycle.
+        """
+        figures = f'{100 * jerk:.1f} % of the limit of the joint'
+        problem = f'{100 * jerk:.0f} % of a limit' if jerk > WORST_JERK else ''
+        self.add('peak jerk', figures, problem)
+        slow = f'a joint was {tracking:.3f} rad from its set-point'
+        problem = slow if tracking > WORST_TRACKING else ''
+        self.add('joint tracking error', f'{1e3 * tracking:.2f} mrad', problem)
+        self.add('bus and loop', bus_line(bus))
+
+    def lines(self) -> list[str]:
+        """Return the summary."""
+        width = max((len(name) for name, _ in self.rows), default=0)
+        return [f'{name:<{width}}  {figures}' for name, figures in self.rows]
