@@ -143,6 +143,32 @@ def test_a_robot_that_restarts_is_dated_anew() -> None:
     assert clock.time(replace(STATE, arrival=5.0)) == 5.0 - STATE.wire_time / 2
 
 
+@given(st.floats(-60.0, 60.0).filter(lambda error: abs(error) > 0.101))
+def test_a_damaged_clock_ages_no_other_report(error: float) -> None:
+    """The report is refused; and where it was the first after a pause, the rest gets over it."""
+    plausibility, clock = Plausibility(LEG_MOTORS), SampleClock()
+    ages = []
+    for tick in range(60):
+        time = 10.0 + tick * 0.02
+        wrong = error if tick == 10 else 0.0
+        state = replace(STATE, arrival=time, device_time=70.0 + tick * 0.02 + wrong)
+        assert bool(plausibility.check(state)) is (tick == 10)
+        ages.append(time - clock.time(state))
+    assert max(ages[40:]) < 0.003
+    assert min(ages) >= 0.0
+
+
+def test_reports_that_were_held_up_keep_their_times() -> None:
+    """All of a pause come at once; the clock of the robot still tells when they were made."""
+    plausibility, clock = Plausibility(LEG_MOTORS), SampleClock()
+    for tick in range(100):
+        made = tick * 0.02
+        arrival = 0.8 if 0.4 < made < 0.8 else made
+        state = replace(STATE, arrival=arrival + STATE.wire_time, device_time=made)
+        assert plausibility.check(state) == ''
+        assert clock.time(state) == pytest.approx(made, abs=1e-3)
+
+
 def test_one_damaged_report_does_not_empty_the_battery() -> None:
     """Nor a charge that cannot be; a battery that is low is told within half a second."""
     battery = BatteryFilter()

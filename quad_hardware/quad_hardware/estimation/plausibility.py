@@ -9,11 +9,12 @@ from dataclasses import replace
 import math
 
 from ..joints.mapping import SERVO_REACH
-from ..link.state import RobotState
+from ..link.state import DEVICE_TIME_WRAP, RobotState
 
 LARGEST_SPEED = 3000.0  # [deg/s] of a servo
 LARGEST_ACCELERATION = 200.0  # [m/s²]
 LARGEST_JUMP = 60.0  # [deg] between reports; a servo does 12 degrees in 20 ms
+LARGEST_LAG = 0.1  # [s] between the robot's clock and ours from one report to the next
 JUMP_TIME = 0.1  # [s] after which anything may have happened
 PATIENCE = 2  # reports in a row that are refused for a jump, before it is believed
 
@@ -80,3 +81,7 @@ def _jumps(last: RobotState, state: RobotState) -> Iterator[str]:
     for name, before, now in zip('rpy', last.attitude, state.attitude, strict=True):
         if abs(math.remainder(now - before, 360.0)) > LARGEST_JUMP:
             yield f'attitude {name} jumped to {now:.4g} deg'
+    if last.device_time is not None and state.device_time is not None:
+        passed = math.remainder(state.device_time - last.device_time, DEVICE_TIME_WRAP)
+        if abs(passed - (state.arrival - last.arrival)) > LARGEST_LAG:
+            yield f'the clock of the robot went on by {passed:.3f} s'

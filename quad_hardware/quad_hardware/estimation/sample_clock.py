@@ -10,13 +10,16 @@ from ..link.state import DEVICE_TIME_WRAP, RobotState
 
 DRIFT = 1e-4  # share by which the robot's clock may be off
 RESTART = 1.0  # [s] a difference beyond that is a robot that began anew
+LATE = 0.1  # [s] a report that is later than others by that may be right, and they wrong
+PATIENCE = 0.5  # [s] for which all reports are late, until they are believed
 
 
 class SampleClock:
     """Maps the clock of the robot to ours by the fastest report so far.
 
     No report arrives before it was made, so the least difference of both clocks is the best; it
-    is let grow slowly, for clocks drift. Without a clock in the report, its arrival counts, less
+    is let grow slowly, for clocks drift. When all of them are late for a while, the one that was
+    quicker was damaged, and is forgotten. Without a clock in the report, its arrival counts, less
     half the time it was on the line.
     """
 
@@ -25,6 +28,7 @@ class SampleClock:
         self._offset = math.inf
         self._device = 0.0
         self._wraps = 0
+        self._late_since = math.inf
 
     def time(self, state: RobotState) -> float:
         """Return when a report was made [s], on the clock of its arrival."""
@@ -36,7 +40,14 @@ class SampleClock:
         elapsed, self._device = state.device_time - self._device, state.device_time
         device = state.device_time + self._wraps * DEVICE_TIME_WRAP
         offset = begun - device
-        if abs(offset - self._offset) > RESTART:
+        if abs(offset - self._offset) > RESTART or self._is_long_late(offset, begun):
             self._offset = offset
         self._offset = min(self._offset + max(elapsed, 0.0) * DRIFT, offset)
         return device + self._offset
+
+    def _is_long_late(self, offset: float, begun: float) -> bool:
+        if offset - self._offset <= LATE:
+            self._late_since = math.inf
+            return False
+        self._late_since = min(self._late_since, begun)
+        return begun - self._late_since > PATIENCE
