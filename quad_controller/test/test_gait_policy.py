@@ -61,6 +61,16 @@ def check(network: FakeNetwork, options: PolicyOptions | None = None) -> LoadedP
         ({'observation_terms_scale': '0.25,1.0'}, 'history, scale, clip'),
         ({'imu_frame': 'sideways'}, 'imu frame'),
         ({'phase_period': '-1.0'}, 'phase period'),
+        ({'phase_period': '0.000001'}, 'phase period'),
+        ({'phase_command_threshold': '-1'}, 'phase threshold: -1'),
+        ({'step_dt': '0.005'}, 'loop_rate: 50 Hz instead of 200 Hz (step_dt)'),
+        ({'control_dt': 'soon'}, 'loop_rate: 50 Hz instead of nan s'),
+        ({'obs_dim': '99'}, 'obs_dim (observation): 99 instead of 47'),
+        ({'num_actions': '16'}, 'num_actions (action): 16 instead of 12'),
+        ({'dims': "{'obs': 47, 'actions': 13}"}, 'dims (action): 13 instead of 12'),
+        ({'observation_scale': '0.25,1,1,1,1,0.05,1'}, 'observation_scale = 0.25'),
+        ({'clip_actions': '1.0'}, 'clip_actions = 1.0'),
+        ({'obs_history': 'five'}, 'obs_history = five'),
     ],
 )  # fmt: skip
 def test_what_disagrees_is_refused_and_named(changes: dict[str, str | None], reason: str) -> None:
@@ -68,6 +78,29 @@ def test_what_disagrees_is_refused_and_named(changes: dict[str, str | None], rea
     with pytest.raises(PolicyError) as refusal:
         check(FakeNetwork(metadata(**changes)))
     assert reason in refusal.value.reason
+
+
+@pytest.mark.parametrize('rate', [10.0, 200.0])
+def test_a_policy_runs_at_the_rate_of_its_training_only(rate: float) -> None:
+    """50 Hz when the file does not say, else what it says."""
+    for changes, fits in (({}, False), ({'step_dt': f'{1.0 / rate}'}, True)):
+        report = ''
+        try:
+            admit(
+                'test', FakeNetwork(metadata(**changes)), ROBOT, STAND,
+                options=PolicyOptions(), period=1.0 / rate, clock=lambda: 0.0,
+            )  # fmt: skip
+        except PolicyError as refusal:
+            report = refusal.reason
+        assert report == (
+            '' if fits else f"loop_rate: {rate:g} Hz instead of 50 Hz (the vendor's)"
+        )
+
+
+def test_keys_that_are_not_understood_are_told() -> None:
+    """What looks like a rate or size is in the table with a warning."""
+    report = str(check(FakeNetwork(metadata(decimation='4', latent_dim='8'))).report)
+    assert 'not understood: decimation = 4, latent_dim = 8' in report
 
 
 def test_shapes_and_answers_are_looked_at() -> None:
@@ -99,6 +132,9 @@ def test_what_the_file_leaves_open_is_told() -> None:
         {'action_scale': joined([0.25] * 12)},
         {'observation_names': MJLAB_TERMS},
         {'observation_terms_scale': '[None, 1.0]', 'observation_terms_history_length': '1,1'},
+        {'observation_terms_clip': 'None,(-inf, inf)', 'clip_obs': '100.0',
+         'observation_terms_flatten_history_dim': 'True,True'},
+        {'step_dt': '0.020', 'dims': '47,512,256,12', 'num_obs': '47', 'action_dim': '12'},
     ],
 )  # fmt: skip
 def test_other_spellings_are_understood(changes: dict[str, str]) -> None:

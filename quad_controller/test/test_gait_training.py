@@ -44,6 +44,7 @@ def test_a_short_training_gives_a_policy_of_the_right_form(tmp_path: Path) -> No
     network = OnnxNetwork(tmp_path / 'short.onnx')
     metadata = read_metadata(network.metadata)
     stand = GaitGenerator(MODEL, GaitParameters()).stand_targets
-    for row in check_contract(network, metadata, MODEL, stand, PolicyOptions()):
+    options, period = PolicyOptions(), 0.02
+    for row in check_contract(network, metadata, MODEL, stand, options=options, period=period):
         assert row.verdict.value == 'ok', row
     assert math.isclose(metadata.phase_period or 0.0, 0.28)

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 
@@ -14,11 +14,14 @@ from ..model.quadruped import Quadruped, Targets
 from .metadata import PolicyMetadata
 from .network import FLOAT, Floats, Network
 from .observation import ALIASES, TERMS, width
-from .options import ImuFrame, PolicyOptions, VENDOR_PHASE_PERIOD
+from .options import ImuFrame, PolicyOptions, VENDOR_PHASE_PERIOD, VENDOR_STEP_PERIOD
 
 MAX_POSE_DISTANCE = 0.8  # [rad] of the default pose from where the gait stands
 MAX_SCALE = 1.0  # [rad] an action of one may move a joint by
 MAX_RESTING_ACTION = 1.0  # [rad] a policy that wants more while standing is another robot's
+MAX_PERIOD_ERROR = 0.02  # of the loop's period, that of the training may differ by
+PHASE_PERIODS = (0.1, 5.0)  # [s] of a gait of legs of this size
+MAX_THRESHOLD = 1.0  # a gait that has no phase at faster commands is none
 WARM_UP = 20
 TIMED_RUNS = 100
 MAX_LATENCY_SHARE = 0.25  # of the period
@@ -87,7 +90,9 @@ def check_contract(
     metadata: PolicyMetadata,
     robot: Quadruped,
     stand: Targets,
+    *,
     options: PolicyOptions,
+    period: float,
 ) -> Iterator[Row]:
     """Compare what a policy says of itself with the robot; yields a row for each.
 
@@ -97,10 +102,14 @@ def check_contract(
         robot: The robot.
         stand: Where the gait stands [rad].
         options: How it shall be run.
+        period: Time between two steps in [s].
     """
     count = len(metadata.joint_names)
     yield _shape('input', network.inputs, width(count), f'11 + 3 x {count} joints')
     yield _shape('output', network.outputs, count, f'{count} joints')
+    yield from _sizes('observation', metadata.observation_sizes, width(count))
+    yield from _sizes('action', metadata.action_sizes, count)
+    yield from _rates(metadata, period)
     yield from _joints(metadata, robot, options)
     yield from _lengths(metadata)
     yield from _defaults(metadata, robot, stand)
@@ -110,6 +119,9 @@ def check_contract(
     yield _observation(metadata.observation_names)
     unusual = ', '.join(f'{key} = {value}' for key, value in metadata.unusual.items())
     yield _row('history, scale, clip', 'none', unusual or 'none', not unusual)
+    if metadata.unknown:
+        unknown = ', '.join(f'{key} = {value}' for key, value in metadata.unknown.items())
+        yield Row('keys', 'understood', f'not understood: {unknown}', Verdict.WARN)
     yield from _assumptions(metadata, options)
 
 
@@ -168,6 +180,20 @@ def _shape(
         and (ports[0][2][0] == 1 or not isinstance(ports[0][2][0], int))
     )
     return _row(what, f'float [1, {expected}] ({meaning})', found, fits)
+
+
+def _sizes(what: str, sizes: Mapping[str, float], expected: int) -> Iterator[Row]:
+    for key, size in sizes.items():
+        yield _row(f'{key} ({what})', f'{expected}', f'{size:g}', size == expected)
+
+
+def _rates(metadata: PolicyMetadata, period: float) -> Iterator[Row]:
+    """Compare the rate that the policy was trained for with that of the loop."""
+    said = metadata.step_periods or {"the vendor's": VENDOR_STEP_PERIOD}
+    for key, step in said.items():
+        fits = abs(step - period) <= MAX_PERIOD_ERROR * period
+        expected = f'{1.0 / step:g} Hz ({key})' if step > 0.0 else f'{step:g} s ({key})'
+        yield _row('loop_rate', expected, f'{1.0 / period:g} Hz', fits)
 
 
 def _joints(metadata: PolicyMetadata, robot: Quadruped, options: PolicyOptions) -> Iterator[Row]:
@@ -235,7 +261,14 @@ def _assumptions(metadata: PolicyMetadata, options: PolicyOptions) -> Iterator[R
     said = bool(options.phase_period) or metadata.phase_period is not None
     found = f'{period:g} s' if said else f"{period:g} s, the vendor's"
     verdict = Verdict.OK if said else Verdict.WARN
-    yield Row('phase period', 'known', found, verdict if period > 0.0 else Verdict.REFUSE)
+    least, most = PHASE_PERIODS
+    fits = least <= period <= most
+    expected = f'known, {least:g} to {most:g} s'
+    yield Row('phase period', expected, found, verdict if fits else Verdict.REFUSE)
+    threshold = metadata.phase_threshold
+    if threshold is not None:
+        fits = 0.0 <= threshold <= MAX_THRESHOLD
+        yield _row('phase threshold', f'0 to {MAX_THRESHOLD:g}', f'{threshold:g}', fits)
     frame = metadata.imu_frame if options.imu_frame is ImuFrame.AUTO else options.imu_frame.value
     known_frames = {ImuFrame.BASE.value, ImuFrame.YAWED.value}
     if frame is None:

@@ -93,7 +93,9 @@ def admit(
         PolicyError: It does not fit; the message has the table.
     """
     metadata = read_metadata(network.metadata)
-    report = Report(tuple(check_contract(network, metadata, robot, stand, options)))
+    report = Report(
+        tuple(check_contract(network, metadata, robot, stand, options=options, period=period))
+    )
     if report.refused:
         raise PolicyError(f'policy {name} does not fit this robot:\n{report}', report.reason)
     runner = PolicyRunner(name, network, metadata, robot, options)

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import math
 
 from ..exceptions import PolicyError
+from . import extras
 
 OWN_KEYS = {
     'phase_period': 'period of the phase in [s]',
@@ -23,13 +24,6 @@ OWN_KEYS = {
     'kind': 'how the policy was made',
 }
 """Keys that only policies made by this package have."""
-
-NEUTRAL_KEYS: Mapping[str, frozenset[str]] = {
-    'observation_terms_scale': frozenset({'1', '1.0', '1.000', 'None', ''}),
-    'observation_terms_clip': frozenset({'None', 'inf', '-inf', ''}),
-    'observation_terms_history_length': frozenset({'0', '1', 'None', ''}),
-}
-"""Keys that change an observation, with the values that change nothing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +39,11 @@ class PolicyMetadata:
         phase_threshold: A command whose norm is smaller has no phase; None when not said.
         imu_frame: Frame of the angular velocity, None when not said.
         kind: How it was made; empty when not said.
-        unusual: Keys that would change observations, with their values.
+        step_periods: Time between two steps in [s], by the keys that say it.
+        observation_sizes: Width of the observation, by the keys that say it.
+        action_sizes: Number of actions, by the keys that say it.
+        unusual: Keys that would change observations or actions, with their values.
+        unknown: Keys that look as if they mattered, with their values.
     """
 
     joint_names: tuple[str, ...]
@@ -56,7 +54,11 @@ class PolicyMetadata:
     phase_threshold: float | None
     imu_frame: str | None
     kind: str
+    step_periods: Mapping[str, float]
+    observation_sizes: Mapping[str, float]
+    action_sizes: Mapping[str, float]
     unusual: Mapping[str, str]
+    unknown: Mapping[str, str]
 
 
 def read_metadata(values: Mapping[str, str]) -> PolicyMetadata:
@@ -80,7 +82,11 @@ def read_metadata(values: Mapping[str, str]) -> PolicyMetadata:
         phase_threshold=_optional(values, 'phase_command_threshold'),
         imu_frame=values.get('imu_frame'),
         kind=values.get('kind', ''),
-        unusual={key: values[key] for key in NEUTRAL_KEYS if not _neutral(values, key)},
+        step_periods=extras.step_periods(values),
+        observation_sizes=extras.observation_sizes(values),
+        action_sizes=extras.action_sizes(values),
+        unusual=extras.changing(values),
+        unknown=extras.not_understood(values),
     )
 
 
@@ -122,10 +128,6 @@ def _numbers(values: Mapping[str, str], key: str) -> tuple[float, ...]:
 
 def _optional(values: Mapping[str, str], key: str) -> float | None:
     return _numbers(values, key)[0] if key in values else None
-
-
-def _neutral(values: Mapping[str, str], key: str) -> bool:
-    return set(_flat(values.get(key, ''))) <= NEUTRAL_KEYS[key]
 
 
 def _base_name(name: str) -> str:

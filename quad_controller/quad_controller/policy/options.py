@@ -35,6 +35,7 @@ class ImuFrame(Enum):
 
 
 VENDOR_PHASE_PERIOD = 0.4  # [s] luwu_mjlab, XGOMini velocity task; no exporter writes it
+VENDOR_STEP_PERIOD = 0.02  # [s] luwu_mjlab: 500 Hz physics, decimation 10
 VENDOR_PHASE_THRESHOLD = 0.1  # luwu_mjlab, norm of (vx, vy, yaw rate)
 
 
