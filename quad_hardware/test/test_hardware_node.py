@@ -204,6 +204,9 @@ WRONG = {
     'joints.fl_calf_joint.offset:=6.9': 'correct joints.fl_calf_joint.offset',
     'robot_description:=<robot/>': 'no joint for motors 11',
     'robot_description:=none': 'no XML',
+    'max_joint_speed:=2': 'max_joint_speed is no number with a point; the default is 12.0',
+    'max_joint_speed:=500.0': 'max_joint_speed out of range Min: 0.1, Max: 100.0',
+    'publish_tf:=3': 'publish_tf is no true or false',
 }
 
 
@@ -220,3 +223,4 @@ def test_a_wrong_parameter_ends_the_node(isolation: Isolation) -> None:
         for process, reason in zip(processes, WRONG.values(), strict=True):
             assert process.wait() == 2
             assert reason in process.output
+            assert 'Traceback' not in process.output

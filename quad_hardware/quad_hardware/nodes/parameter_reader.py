@@ -6,18 +6,30 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 import difflib
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
 from rclpy.node import Node
 
 from ..exceptions import CommandError
 
 T = TypeVar('T')
+Value = str | bool | int | float
+
+_KINDS = {
+    str: 'text',
+    bool: 'true or false',
+    int: 'whole number',
+    float: 'number with a point',
+}
 
 
 class ParameterReader:
-    """Declares one parameter after the other; all are read at the start only."""
+    """Declares one parameter after the other; all are read at the start only.
+
+    Every method raises CommandError for a value of the wrong type or out of its range.
+    """
 
     def __init__(self, node: Node) -> None:
         """Declare for a node."""
@@ -26,18 +38,18 @@ class ParameterReader:
     def text(self, name: str, default: str, meaning: str) -> str:
         """Declare and read a text."""
         descriptor = ParameterDescriptor(description=meaning, read_only=True)
-        return str(self._node.declare_parameter(name, default, descriptor).value)
+        return str(self._declare(name, default, descriptor))
 
     def flag(self, name: str, *, default: bool, meaning: str) -> bool:
         """Declare and read a yes or no."""
         descriptor = ParameterDescriptor(description=meaning, read_only=True)
-        return bool(self._node.declare_parameter(name, default, descriptor).value)
+        return bool(self._declare(name, default, descriptor))
 
     def whole(self, name: str, default: int, span: tuple[int, int], meaning: str) -> int:
         """Declare and read a whole number within a range."""
         limits = [IntegerRange(from_value=span[0], to_value=span[1], step=0)]
         descriptor = ParameterDescriptor(description=meaning, read_only=True, integer_range=limits)
-        return int(self._node.declare_parameter(name, default, descriptor).value)
+        return int(self._declare(name, default, descriptor))
 
     def number(
         self, name: str, default: float, span: tuple[float, float] | None, meaning: str
@@ -47,7 +59,7 @@ class ParameterReader:
         descriptor = ParameterDescriptor(
             description=meaning, read_only=True, floating_point_range=limits
         )
-        return float(self._node.declare_parameter(name, default, descriptor).value)
+        return float(self._declare(name, default, descriptor))
 
     def choice(self, name: str, default: str, values: Mapping[str, T], meaning: str) -> T:
         """Declare and read one of several names; return what it stands for.
@@ -59,6 +71,18 @@ class ParameterReader:
         if chosen not in values:
             raise CommandError(f'{name} {chosen!r} is none of {", ".join(values)}')
         return values[chosen]
+
+    def _declare(  # a parameter's value may be of any type
+        self, name: str, default: Value, descriptor: ParameterDescriptor
+    ) -> Any:  # noqa: ANN401
+        try:
+            return self._node.declare_parameter(name, default, descriptor).value
+        except InvalidParameterTypeException as error:
+            raise CommandError(
+                f'{name} is no {_KINDS[type(default)]}; the default is {default!r}'
+            ) from error
+        except InvalidParameterValueException as error:
+            raise CommandError(str(error)) from error
 
 
 def refuse_misspelt(node: Node) -> None:
