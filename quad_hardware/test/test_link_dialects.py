@@ -193,12 +193,11 @@ def test_a_command_withdrawn_is_not_sent() -> None:
     for dialect in (OldDialect(0.0), NewDialect(0.0)):
         dialect.step(0.0)
         dialect.command(LEGS)
+        dialect.torque(on=False)
         dialect.withdraw()
-        kinds = [
-            f.kind
-            for f in StreamParser(dialect.protocol, HOST_KINDS).feed(dialect.step(0.05).send)
-        ]
-        assert Kind.WRITE not in kinds
+        steps = [dialect.step(0.05 + tick * 0.01).send for tick in range(5)]
+        frames = StreamParser(dialect.protocol, HOST_KINDS).feed(b''.join(steps))
+        assert Kind.WRITE not in [frame.kind for frame in frames]
 
 
 def test_the_new_protocol_asks_until_states_come() -> None:

@@ -229,6 +229,28 @@ def test_a_failure_is_told_and_got_over(tmp_path: Path, caplog: pytest.LogCaptur
     assert 'Traceback' in caplog.text
 
 
+def test_an_order_does_not_outlive_its_connection(tmp_path: Path) -> None:
+    """Given in the moment in which the robot is lost, it is not carried out on the next one."""
+    states: list[RobotState] = []
+    given: list[bool] = []
+
+    def order_and_fail(state: RobotState) -> str:
+        states.append(state)
+        if len(states) == 5:
+            given.extend((driver.torque(on=False), driver.command(LEGS)))
+            raise ZeroDivisionError
+        return ''
+
+    with PtyPeer(tmp_path / 'port') as peer:
+        driver = Driver(LinkOptions(str(peer.link)), order_and_fail, lambda *_: None)
+        driver.start()
+        wait_for(lambda: len(states) > 15, 'reports of the second connection')
+        driver.stop()
+        assert given == [True, True]
+        assert peer.torque
+        assert peer.commands == []
+
+
 def test_a_failure_that_cannot_be_told_ends_nothing(tmp_path: Path) -> None:
     """Nor when the callback that hears of it fails as well."""
     states: list[RobotState] = []

@@ -94,7 +94,7 @@ class Dialect(ABC):
 
     @abstractmethod
     def withdraw(self) -> None:
-        """Forget a command that has not been sent yet."""
+        """Forget a command and a change of torque that have not been sent yet."""
 
     @abstractmethod
     def step(self, now: float) -> Step:

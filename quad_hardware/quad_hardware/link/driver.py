@@ -213,7 +213,7 @@ class Driver:
         except LinkError as error:
             self._enter(LinkState.CONNECTING, str(error))
         finally:
-            self._mailbox = None
+            self._forget_orders()
             session.port.close()
 
     def _serve(self, session: Session) -> None:
@@ -248,7 +248,7 @@ class Driver:
 
     def _fall_silent(self, dialect: Dialect, now: float) -> None:
         dialect.withdraw()
-        self._mailbox = self._torque = None
+        self._forget_orders()
         refused = now - self._heard_at <= STALE_TIME
         state = LinkState.REFUSED if refused else LinkState.STALE
         if state is self._state:
@@ -258,6 +258,9 @@ class Driver:
             state,
             f'{what} for {STALE_TIME} s: the servos hold their last target, nothing is sent',
         )
+
+    def _forget_orders(self) -> None:
+        self._mailbox = self._torque = None
 
     def _post(self, dialect: Dialect) -> None:
         angles, self._mailbox = self._mailbox, None

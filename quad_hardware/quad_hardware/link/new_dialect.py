@@ -63,8 +63,8 @@ class NewDialect(Dialect):
         self._torque = Frame(Kind.WRITE, Code.TORQUE, payload).encode(NEW)
 
     def withdraw(self) -> None:
-        """Forget a command that has not been sent yet."""
-        self._pending = b''
+        """Forget what has not been sent yet."""
+        self._pending = self._torque = b''
 
     def step(self, now: float) -> Step:
         """Return a pending command, and the request for states where they are missing."""

@@ -110,8 +110,8 @@ class OldDialect(Dialect):
         self._torque = bytes((Torque.LOAD_ALL if on else Torque.UNLOAD_ALL,))
 
     def withdraw(self) -> None:
-        """Forget a command that has not been sent yet."""
-        self._legs = b''
+        """Forget what has not been sent yet."""
+        self._legs = self._torque = b''
         self._arm.clear()
         self._arm_sent.clear()
 
