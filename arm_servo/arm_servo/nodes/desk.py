@@ -14,7 +14,8 @@ from typing import Any, Generic, TypeVar
 from ..arrays import Array
 from ..core import MotionCore, SetPoint, Source
 from ..exceptions import GoalCode, NotReadyError
-from ..execution import Outcome
+from ..execution import Execution, Outcome
+from ..goal import TrajectoryGoal
 from ..model import RobotModel
 from ..otg import MotionState
 
@@ -40,6 +41,8 @@ class Snapshot:
         paused: Whether it is paused.
         speed: Speed override, 0 to 1.
         cycles: Cycles so far in which the arm followed.
+        period: Period of the cycle in [s].
+        execution: The trajectory that was followed last; None before the first.
     """
 
     time: float
@@ -50,6 +53,8 @@ class Snapshot:
     paused: bool = False
     speed: float = 1.0
     cycles: int = 0
+    period: float = 0.01
+    execution: Execution | None = None
 
 
 @dataclass(slots=True)
@@ -58,6 +63,7 @@ class _Order(Generic[T]):
     future: Future[T]
     time: float
     moves: bool
+    begin: float
 
 
 class Desk:
@@ -90,24 +96,41 @@ class Desk:
         return self._snapshot
 
     def submit(
-        self, command: Callable[[MotionCore, float], T], *, moves: bool = True
+        self,
+        command: Callable[[MotionCore, float], T],
+        *,
+        moves: bool = True,
+        begin: float = 0.0,
     ) -> Future[T]:
-        """Have a command carried out at the begin of the next cycle.
+        """Have a command carried out at the begin of the next cycle, or of a later one.
 
         Args:
             command: Called with the core and the steady time in [s]; it must not wait.
             moves: It makes the arm move, so it is refused while the arm does not follow, and when
                 it has waited for longer than :data:`LATEST`.
+            begin: Steady time before which it is not carried out in [s].
 
         Returns:
             Its result, or the ServoError with which it was refused.
         """
-        order = _Order(command, Future[T](), self._clock(), moves)
+        order = _Order(command, Future[T](), self._clock(), moves, begin)
         if len(self._orders) >= MOST:
             order.future.set_exception(NotReadyError(f'{MOST} commands wait for the cycle'))
         else:
             self._orders.append(order)
         return order.future
+
+    def plan(self, goal: TrajectoryGoal, state: MotionState) -> Execution:
+        """Plan a trajectory outside of the cycle, for which it would take too long; any thread.
+
+        Args:
+            goal: The trajectory.
+            state: The commanded state at which it will begin.
+
+        Raises:
+            GoalError: It is refused.
+        """
+        return self._core.plan(goal, state)
 
     def begin(self, positions: Array) -> None:
         """Take the arm over where it stands.
@@ -137,6 +160,8 @@ class Desk:
             self._core.paused,
             self._core.speed,
             self._snapshot.cycles + 1,
+            period,
+            self._core.execution,
         )
         return set_point
 
@@ -175,8 +200,11 @@ class Desk:
         )
 
     def _obey(self, now: float, blocked: str) -> None:
-        while self._orders:
+        for _ in range(len(self._orders)):
             order = self._orders.popleft()
+            if order.begin > now and not blocked:
+                self._orders.append(order)
+                continue
             if not order.future.set_running_or_notify_cancel():
                 continue
             try:
@@ -191,5 +219,5 @@ class Desk:
             return
         if blocked:
             raise NotReadyError(blocked)
-        if (age := now - order.time) > LATEST:
+        if (age := now - max(order.time, order.begin)) > LATEST:
             raise NotReadyError(f'the cycle stood still for {age:.2f} s')

@@ -22,8 +22,11 @@ from ..goal import TrajectoryGoal
 from .desk import Desk
 from .trajectory_messages import difference, point_of
 
-PATIENCE = 1.0
-"""Time in which the cycle must take a goal in [s]."""
+PATIENCE = 2.0
+"""Time in which a goal must be planned and taken by the cycle in [s]."""
+
+PER_POINT = 0.01
+"""The same for each of its points in [s]."""
 
 Follow = Callable[[TrajectoryGoal], Future[Execution]]
 
@@ -34,13 +37,16 @@ class _Goal:
 
     handle: Any
     future: Future[Execution]
+    patience: float
     begin: float = field(default_factory=time.monotonic)
     outcome: Outcome | None = None
 
     def ending(self) -> Outcome | None:
         """Return how it has ended; None while it goes on."""
+        if self.future.cancelled():
+            return Outcome(GoalCode.SUCCESSFUL, 'canceled before it began', canceled=True)
         if not self.future.done():
-            late = time.monotonic() - self.begin > PATIENCE
+            late = time.monotonic() - self.begin > self.patience
             if late and self.future.cancel():
                 return Outcome(GoalCode.INVALID_GOAL, 'the cycle does not run; is the bus up?')
             return None
@@ -100,10 +106,15 @@ class TrajectoryAction:
         except ServoError as error:
             future = Future()
             future.set_exception(error)
-        self._goals[bytes(handle.goal_id.uuid)] = _Goal(handle, future)
+        self._goals[bytes(handle.goal_id.uuid)] = _Goal(
+            handle, future, PATIENCE + PER_POINT * len(handle.request.trajectory.points)
+        )
 
     def _cancel(self, handle: Any) -> CancelResponse:  # noqa: ANN401
         goal = self._goals.get(bytes(handle.goal_id.uuid))
+
+        if goal is not None and goal.future.cancel():
+            return CancelResponse.ACCEPT  # it has not begun
 
         def stop(_core: MotionCore, _now: float) -> None:
             if goal is not None and goal.future.done() and goal.future.exception() is None:

@@ -22,6 +22,7 @@ from ..exceptions import NotReadyError, ServoError
 from ..execution import Execution
 from ..goal import TrajectoryGoal
 from .desk import Desk
+from .planner import Planner
 from .ros_numbers import seconds
 from .trajectory_action import TrajectoryAction
 from .trajectory_messages import (
@@ -65,6 +66,7 @@ class TrajectoryController:
         self._prepare = prepare
         self._execution: Execution | None = None
         self._news: deque[str] = deque()
+        self._planner = Planner(desk, self._check_active)
         self._state = node.create_publisher(
             JointTrajectoryControllerState, '~/controller_state', 10
         )
@@ -97,13 +99,16 @@ class TrajectoryController:
         return goal_of_action(request, self._now, self._parameters)
 
     def _follow(self, goal: TrajectoryGoal) -> Future[Execution]:
+        self._check_active()
+        self._prepare()
+        future = self._planner.follow(goal)
+        future.add_done_callback(self._remember)
+        return future
+
+    def _check_active(self) -> None:
         if not self.active:
             name = self._node.get_name()
             raise NotReadyError(f'{name} is inactive; activate it with switch_controller')
-        self._prepare()
-        future = self._desk.submit(lambda core, _now: core.follow(goal))
-        future.add_done_callback(self._remember)
-        return future
 
     def _remember(self, future: Future[Execution]) -> None:
         if not future.cancelled() and future.exception() is None:

@@ -1,0 +1,123 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Trajectories are planned in a thread of their own, and begin in the cycle foreseen for them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
+from concurrent.futures import TimeoutError as FutureTimeoutError
+from dataclasses import replace
+import math
+
+from ..core import MotionCore, Source
+from ..exceptions import NotReadyError
+from ..execution import Execution
+from ..goal import TrajectoryGoal
+from ..otg import MotionState
+from .desk import Desk, Snapshot
+
+PER_POINT = 1e-3
+"""Time that planning may take for each point in [s]; twice what was measured."""
+
+PATIENCE = 1.0
+"""Time in which the cycle must answer in [s]."""
+
+LEAST = 3
+"""Least cycles from the begin of the planning to that of the motion, where the arm moves."""
+
+
+class Planner:
+    """Plans trajectories one after another.
+
+    Planning takes 0.4 ms a point, and MoveIt's plans have tens to hundreds of them: the cycle has
+    no time for that. Where the arm moves, the trajectory is planned from where it will be some
+    cycles later, and begins then; what the foresight was off, the core catches up smoothly.
+    """
+
+    def __init__(self, desk: Desk, check: Callable[[], None]) -> None:
+        """Prepare; the thread begins with the first trajectory.
+
+        Args:
+            desk: The core's desk.
+            check: Called in the cycle before a trajectory begins; raises why it must not.
+        """
+        self._desk = desk
+        self._check = check
+        self._worker = ThreadPoolExecutor(1, thread_name_prefix='trajectory planner')
+
+    def follow(self, goal: TrajectoryGoal) -> Future[Execution]:
+        """Have a trajectory planned and followed.
+
+        Args:
+            goal: The trajectory.
+
+        Returns:
+            Its execution once it began, or why it is refused. Cancelled, it does not begin.
+        """
+        answer: Future[Execution] = Future()
+        self._worker.submit(self._plan, goal, answer)
+        return answer
+
+    def _plan(self, goal: TrajectoryGoal, answer: Future[Execution]) -> None:
+        try:
+            execution, begin = self._planned(goal)
+        except Exception as error:  # noqa: BLE001  # whoever ordered it is told
+            _refuse(answer, error)
+            return
+
+        def start(core: MotionCore, _now: float) -> Execution:
+            self._check()
+            if not answer.set_running_or_notify_cancel():
+                raise CancelledError
+            core.begin(execution)
+            return execution
+
+        def finish(order: Future[Execution]) -> None:
+            error = order.exception()
+            if error is None:
+                answer.set_result(order.result())
+            else:
+                _refuse(answer, error)
+
+        self._desk.submit(start, begin=begin).add_done_callback(finish)
+
+    def _planned(self, goal: TrajectoryGoal) -> tuple[Execution, float]:
+        """Return the execution, and the steady time in [s] at which it begins."""
+        snapshot = self._desk.snapshot
+        if snapshot.set_point is None or snapshot.blocked:
+            return self._desk.plan(goal, self._state()), 0.0
+        state = snapshot.set_point.state
+        if not state.moving and snapshot.source is Source.NONE:
+            return self._desk.plan(goal, state), 0.0
+        cycles = max(LEAST, math.ceil(PER_POINT * len(goal.points) / snapshot.period) + 1)
+        lead = (cycles - 1) * snapshot.period
+        if goal.age:
+            goal = replace(goal, age=goal.age + lead)
+        execution = self._desk.plan(goal, _foreseen(snapshot, state, lead))
+        return execution, snapshot.time + (cycles - 0.5) * snapshot.period
+
+    def _state(self) -> MotionState:
+        """Ask the cycle for the commanded state: the arm may follow from now on."""
+        order = self._desk.submit(lambda core, _now: core.state)
+        try:
+            return order.result(PATIENCE)
+        except FutureTimeoutError as error:
+            order.cancel()
+            raise NotReadyError('the cycle does not run; is the bus up?') from error
+
+
+def _foreseen(snapshot: Snapshot, state: MotionState, ahead: float) -> MotionState:
+    """Return where the arm will be some time after a commanded state."""
+    if snapshot.source is Source.TRAJECTORY and snapshot.execution is not None:
+        return snapshot.execution.foreseen(ahead)
+    still = 0.0 * state.acceleration
+    return MotionState(state.position + ahead * state.velocity, state.velocity, still)
+
+
+def _refuse(answer: Future[Execution], error: BaseException) -> None:
+    """Tell why it does not begin, unless nobody waits any more."""
+    if answer.cancelled() or isinstance(error, CancelledError):
+        return
+    if answer.running() or answer.set_running_or_notify_cancel():
+        answer.set_exception(error)

@@ -1,0 +1,120 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Trajectories are planned beside the cycle, and take over without a jump."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import Future
+import time
+
+import numpy as np
+import pytest
+from servo_drives import Drives, PERIOD
+
+from arm_servo.core import Source
+from arm_servo.exceptions import GoalCode, GoalError, NotReadyError
+from arm_servo.execution import Execution
+from arm_servo.goal import GoalPoint, TrajectoryGoal
+from arm_servo.nodes.planner import Planner
+
+Done = Callable[[], bool]
+
+
+def wave(drives: Drives, count: int) -> TrajectoryGoal:
+    """Return a trajectory of many points, 0.05 s apart, that ends where it began."""
+    begin = np.array([axis.setpoint for axis in drives.axes])
+    points = []
+    for number in range(1, count + 1):
+        share = number / count
+        points.append(
+            GoalPoint(0.5 + 0.05 * number, (begin + 0.2 * np.sin(np.pi * share) ** 2).tolist())
+        )
+    return TrajectoryGoal(drives.desk.model.joints, points)
+
+
+def run_until(drives: Drives, done: Done) -> None:
+    """Run cycles at their pace."""
+    deadline = time.monotonic() + 20.0
+    while not done():
+        drives.run()
+        time.sleep(PERIOD)
+        assert time.monotonic() < deadline
+
+
+def ready() -> tuple[Drives, Planner]:
+    """Return drives that follow, and their planner."""
+    drives = Drives()
+    drives.attach()
+    drives.run(2)
+    return drives, Planner(drives.desk, lambda: None)
+
+
+@pytest.mark.parametrize('moving', [False, True])
+def test_a_long_trajectory_begins_without_a_jump(moving: bool) -> None:
+    """Speeds change by no more than the acceleration limit, from rest and out of a jog."""
+    drives, planner = ready()
+    goal = wave(drives, 60)
+    if moving:
+        drives.desk.submit(lambda core, now: core.jog({'panda_joint1': 0.4}, now, 30.0))
+        drives.run(50)
+    before = len(drives.path) - 2
+    future = planner.follow(goal)
+    run_until(drives, future.done)
+    execution = future.result(0.0)
+    drives.run(450)
+    path = np.array(drives.path)[before:]
+    jumps = np.abs(np.diff(path, 2, axis=0)) / PERIOD**2
+    assert (jumps.max(axis=0) <= 1.02 * drives.desk.model.limits.acceleration).all()
+    assert execution.ending is not None
+    assert execution.ending.code is GoalCode.SUCCESSFUL, execution.ending.reason
+    assert path[-1] == pytest.approx(goal.points[-1].positions, abs=1e-6)
+
+
+def test_one_trajectory_takes_over_from_another_in_motion() -> None:
+    """It is planned from where the first will be, and joins it there."""
+    drives, planner = ready()
+    first = planner.follow(wave(drives, 60))
+    run_until(drives, first.done)
+    drives.run(120)
+    before = len(drives.path) - 2
+    goal = wave(drives, 20)
+    second = planner.follow(goal)
+    run_until(drives, second.done)
+    drives.run(300)
+    path = np.array(drives.path)[before:]
+    jumps = np.abs(np.diff(path, 2, axis=0)) / PERIOD**2
+    assert (jumps.max(axis=0) <= 1.02 * drives.desk.model.limits.acceleration).all()
+    assert path[-1] == pytest.approx(goal.points[-1].positions, abs=1e-6)
+    ending = first.result(0.0).ending
+    assert ending is not None
+    assert 'took over' in ending.reason
+
+
+def test_a_trajectory_that_was_cancelled_before_it_began_does_not_begin() -> None:
+    """The arm stays where it is."""
+    drives, planner = ready()
+    future = planner.follow(wave(drives, 60))
+    assert future.cancel()
+    planner._worker.submit(lambda: None).result(5.0)  # the planning before is done
+    drives.run(50)
+    assert drives.desk.snapshot.source is Source.NONE
+
+
+def test_refusals_reach_whoever_asked() -> None:
+    """What is wrong with the goal, with the drives, and what the owner forbids."""
+    drives, planner = ready()
+    wrong: Future[Execution] = planner.follow(TrajectoryGoal(['elbow'], []))
+    run_until(drives, wrong.done)
+    with pytest.raises(GoalError, match='elbow'):
+        wrong.result(0.0)
+    drives.source.released('panda_joint1', 'a single target')
+    drives.run(3)
+    blocked = planner.follow(wave(drives, 40))
+    run_until(drives, blocked.done)
+    with pytest.raises(NotReadyError, match='panda_joint1'):
+        blocked.result(0.0)
+    drives.attach()  # and at once a goal, before the next cycle
+    accepted = planner.follow(wave(drives, 40))
+    run_until(drives, accepted.done)
+    accepted.result(0.0)
