@@ -14,6 +14,9 @@ import serial
 
 from quad_hardware.exceptions import LinkError
 from quad_hardware.link import Driver, LinkOptions, LinkState, RobotState, SerialPort
+from quad_hardware.link.dialect import Dialect
+from quad_hardware.link.new_dialect import NewDialect
+from quad_hardware.link.old_dialect import OldDialect
 from quad_hardware.protocol import LEG_MOTORS, NEW, OLD
 from quad_pty_peer import PtyPeer
 
@@ -118,6 +121,27 @@ def test_silence_stops_the_commands(rig: Rig) -> None:
     assert states.count(LinkState.STALE) == 1
     assert rig.driver.command(LEGS)
     wait_for(lambda: len(rig.peer.commands) > sent, 'command after the silence')
+
+
+def test_no_command_slips_through_when_the_robot_falls_silent(
+    rig: Rig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """While the pending one is being withdrawn, another is refused already."""
+    answers: list[tuple[bool, bool]] = []
+
+    def command_meanwhile(_: Dialect) -> None:
+        answers.append((rig.driver.command(LEGS), rig.driver.torque(on=False)))
+
+    for dialect in (NewDialect, OldDialect):
+        monkeypatch.setattr(dialect, 'withdraw', command_meanwhile)
+    rig.reports(1)
+    rig.peer.behaviour.silent = True
+    rig.reach(LinkState.STALE)
+    wait_for(lambda: bool(answers), 'withdrawal')
+    rig.peer.behaviour.silent = False
+    rig.reports(3)
+    assert set(answers) == {(False, False)}
+    assert rig.peer.commands == []
 
 
 def test_reports_that_are_all_refused_are_none(rig: Rig) -> None:

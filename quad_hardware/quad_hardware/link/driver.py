@@ -247,27 +247,29 @@ class Driver:
         return min((end for end in ends if end >= now), default=self._heard_at + PROBE_AGAIN)
 
     def _fall_silent(self, dialect: Dialect, now: float) -> None:
-        dialect.withdraw()
-        self._forget_orders()
         refused = now - self._heard_at <= STALE_TIME
         state = LinkState.REFUSED if refused else LinkState.STALE
-        if state is self._state:
-            return
+        if state is not self._state:
+            self._enter(state, self._silence(refused=refused))
+        # only now: from here on nobody is told that a command will be sent
+        dialect.withdraw()
+        self._forget_orders()
+
+    def _silence(self, *, refused: bool) -> str:
         what = f'every report is refused, {self._refusal}' if refused else 'no report'
-        self._enter(
-            state,
-            f'{what} for {STALE_TIME} s: the servos hold their last target, nothing is sent',
-        )
+        return f'{what} for {STALE_TIME} s: the servos hold their last target, nothing is sent'
 
     def _forget_orders(self) -> None:
         self._mailbox = self._torque = None
 
     def _post(self, dialect: Dialect) -> None:
         angles, self._mailbox = self._mailbox, None
+        on, self._torque = self._torque, None
+        if self._state is not LinkState.RUNNING:  # it came while the state changed
+            return
         if angles is not None:
             dialect.command(angles)
             self._commands += 1
-        on, self._torque = self._torque, None
         if on is not None:
             dialect.torque(on=on)
 
