@@ -272,6 +272,32 @@ def test_one_odd_sample_after_a_pause_is_no_fault() -> None:
     assert rig.is_in(State.FAULT)
 
 
+@pytest.mark.parametrize('frozen', [(1,), tuple(range(12))])
+def test_a_frozen_sensor_is_told(frozen: tuple[int, ...]) -> None:
+    """Joint states that come on time but never change are a warning, and only those are."""
+    rig = standing()
+    rig.ask('walk')
+    rig.run(3.0, FORWARD)
+    assert not rig.controller.status.warnings
+    stuck = rig.positions
+    for _ in range(150):
+        rig.controller.set_velocity(FORWARD)
+        positions = tuple(
+            stuck[index] if index in frozen else angle for index, angle in enumerate(rig.positions)
+        )
+        output = rig.controller.step(
+            Measurement(JointSample(positions, (0.0,) * 12), UPRIGHT), PERIOD
+        )
+        rig.log += [event.text for event in output.events]
+        rig.positions = output.targets or rig.positions
+    told = [line for line in rig.log if 'do not follow their targets' in line]
+    assert len(told) == 1
+    (warning,) = rig.controller.status.warnings
+    assert ('fl_thigh_joint' if len(frozen) == 1 else 'all that move') in warning
+    rig.run(2.5, FORWARD)
+    assert not rig.controller.status.warnings
+
+
 def test_a_lost_attitude_stops_the_walk_on_its_feet() -> None:
     """Without an attitude the gait ends in standing."""
     rig = standing()

@@ -16,6 +16,7 @@ from ..model.quadruped import Quadruped, Targets
 from ..policy.interface import lacking, Policy
 from .commands import Commands
 from .faults import Fault, FaultLatch
+from .following import Following
 from .health import Health
 from .limiter import StepLimiter
 from .machine import Poses, StateMachine
@@ -87,6 +88,7 @@ class Controller:
         self._commands = Commands(states.command_timeout)
         self._health = Health(len(robot.names), states)
         self._limiter = StepLimiter(robot.limits, states.period, states.target_speed)
+        self._following = Following(robot.names)
         self._latch = FaultLatch()
         self._notices = Notices()
         self._unreachable = 0
@@ -156,7 +158,7 @@ class Controller:
     def status(self) -> Status:
         """What can be told of it."""
         health, machine = self._health, self._machine
-        stale = self._commands.warning(machine.state)
+        more = (self._commands.warning(machine.state), self._following.text)
         return Status(
             state=machine.state,
             title=machine.title,
@@ -164,7 +166,7 @@ class Controller:
             gait=self._generator.gait,
             velocity=self._generator.velocity,
             faults=self._latch.texts,
-            warnings=(*health.warnings, stale) if stale else health.warnings,
+            warnings=(*health.warnings, *filter(None, more)),
             joints_age=health.joints_age,
             imu_age=health.imu_age,
             battery=health.battery,
@@ -200,6 +202,8 @@ class Controller:
         wanted = last if self._health.held else self._move(situation, dt_motion, last, events)
         shadow = self._shadow.step(situation, dt_motion, last) if self._shadow else None
         targets = self._limiter.step(wanted, dt)
+        if self._health.joints is not None:
+            self._following.step(targets, self._health.joints.positions, dt)
         ready = self._health.complete
         return Output(targets, shadow, self._machine.title, ready, tuple(events))
 
@@ -231,6 +235,8 @@ class Controller:
         if self._health.held and (state in UPRIGHT_STATES or not self._machine.motion.finished):
             age = self._health.joints_age * 1e3
             matters['held'] = f'joint states are {age:.0f} ms old; holding the last targets'
+        if self._following.text:
+            matters['following'] = self._following.text
         gait = self._generator
         if state in GAIT_STATES and gait.clamped:
             asked, walked = self._commands.velocity(state), gait.goal

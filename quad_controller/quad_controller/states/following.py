@@ -1,0 +1,66 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Sees joints that stand still while their targets move: frozen sensors, servos without power.
+
+Messages that keep coming with the same values have no age that would tell.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+WINDOW = 1.0  # [s] longer than a period of every gait
+LEAST_TRAVEL = 0.15  # [rad] that a target must have gone to be of interest
+LEAST_SHARE = 0.1  # of that way, that its joint must have gone; soft servos go a third
+
+
+class Following:
+    """Compares how far targets and joints went.
+
+    Attributes:
+        text: Which joints did not follow in the last window; empty when all did.
+    """
+
+    def __init__(self, names: Sequence[str]) -> None:
+        """Begin with a new window.
+
+        Args:
+            names: Of the joints.
+        """
+        self._names = tuple(names)
+        self._targets: list[Sequence[float]] = []
+        self._measured: list[Sequence[float]] = []
+        self._time = 0.0
+        self.text = ''
+
+    def step(self, targets: Sequence[float], measured: Sequence[float], dt: float) -> None:
+        """Take what was sent and measured in a step.
+
+        Args:
+            targets: Of all joints in [rad].
+            measured: Where they are in [rad].
+            dt: Duration of the step in [s].
+        """
+        self._targets.append(targets)
+        self._measured.append(measured)
+        self._time += dt
+        if self._time < WINDOW:
+            return
+        wanted, gone = _travel(self._targets), _travel(self._measured)
+        stuck = [
+            name
+            for name, way, went in zip(self._names, wanted, gone, strict=True)
+            if way > LEAST_TRAVEL and went < LEAST_SHARE * way
+        ]
+        moving = sum(way > LEAST_TRAVEL for way in wanted)
+        which = 'all that move' if len(stuck) == moving > 1 else ', '.join(stuck)
+        self.text = (
+            f'do not follow their targets: {which}; are the servos on, and their angles alive?'
+            if stuck
+            else ''
+        )
+        self._targets, self._measured, self._time = [], [], 0.0
+
+
+def _travel(rows: Sequence[Sequence[float]]) -> list[float]:
+    return [max(column) - min(column) for column in zip(*rows, strict=True)]
