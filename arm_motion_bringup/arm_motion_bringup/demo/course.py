@@ -28,13 +28,13 @@ SPEED = 0.1
 """Speed of the squares in [m/s]."""
 SIDE = 0.8
 """Time of a side of a square in [s]."""
-FAST = 0.3
+FAST = 0.2
 """Speed of the way to the singular pose in [m/s]."""
 OUT, DOWN = 0.866, 0.5
 """Direction of the way to the singular pose: shares of outwards and down."""
-STUCK = 0.06
+STUCK = 0.05
 """Speed below which the tool has come to its end in [m/s]."""
-LONGEST = 5.0
+LONGEST = 6.0
 """Longest time of the way to the singular pose in [s]; the way back may take twice as long."""
 WAY = 0.5
 """How far each joint goes in the trajectories in [rad]."""

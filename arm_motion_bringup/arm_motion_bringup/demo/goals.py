@@ -12,7 +12,9 @@ from arm_servo.arrays import Array
 # peaks of a quintic from rest to rest over unit way and unit time
 PEAK_VELOCITY, PEAK_ACCELERATION, PEAK_JERK = 1.875, 5.7735, 60.0
 SHARE = 0.6
-"""Share of the limits that is used."""
+"""Share of the limits of acceleration and jerk that is used."""
+SPEED_SHARE = 0.35
+"""Share of the limits of speed: a drive that waits for a busy computer must not lose its path."""
 SHORTEST = 1.5
 """Shortest motion in [s]: there must be time to interfere."""
 
@@ -27,7 +29,7 @@ def duration(begin: Array, end: Array, limits: JointLimits) -> float:
     """
     way = np.abs(end - begin)
     needed = (
-        PEAK_VELOCITY * way / (SHARE * limits.velocity),
+        PEAK_VELOCITY * way / (SPEED_SHARE * limits.velocity),
         np.sqrt(PEAK_ACCELERATION * way / (SHARE * limits.acceleration)),
         np.cbrt(PEAK_JERK * way / (SHARE * limits.jerk)),
     )

@@ -52,7 +52,18 @@ class MotionPlay(Play):
             results.problems.append(str(error))
         if client.samples:
             course.measure()
-        self.result = Result(results.lines(), results.problems, warnings(client.figures))
+        self.result = Result(
+            results.lines(), results.problems, [*warnings(client.figures), *self._hold_ups(client)]
+        )
+
+    def _hold_ups(self, client: MotionClient) -> list[str]:
+        jitter = client.figures.bus.jitter_p99
+        if math.isnan(jitter) or jitter <= self.period / 2:
+            return []
+        return [
+            f'the cycle was late by {1e3 * jitter:.0f} ms now and then (p99): this computer is '
+            'too busy, drives wait for it and may lose their path'
+        ]
 
     def _repeat(self, course: Course) -> None:
         """Run the course until the time is over, once at least."""
