@@ -135,6 +135,19 @@ def test_all_zeros_at_once(tmp_path: Path) -> None:
     assert {j['offset'] for j in joints.values()} == {round(-math.radians(5.0), 5)}  # type: ignore[attr-defined]
 
 
+def test_a_robot_of_no_known_firmware_is_calibrated(tmp_path: Path) -> None:
+    """The message names the option, and the option does it."""
+    output = tmp_path / 'found.yaml'
+    command = ['joints', '--zero-only', '--output', str(output), '--protocol', 'old']
+    with PtyPeer(tmp_path / 'port', OLD, firmware='X-1') as peer:
+        command += ['--port', str(peer.link)]
+        script = Script('', '')
+        assert run_calibrate(command, script) == 1
+        assert 'name its ranges with the parameter or option model' in script.said[-1]
+        assert run_calibrate([*command, '--model', 'lite'], Script('', '')) == 0
+    assert output.exists()
+
+
 def test_no_robot_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """With the remedy, and nothing is written."""
     monkeypatch.setattr(robot, 'PATIENCE', 0.5)

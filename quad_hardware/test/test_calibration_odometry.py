@@ -9,6 +9,7 @@ from contextlib import suppress
 import math
 from pathlib import Path
 import threading
+import time
 from typing import Any
 
 from geometry_msgs.msg import Twist
@@ -91,6 +92,42 @@ def test_the_scale_is_what_the_tape_says(walking_robot: WalkingRobot, tmp_path: 
     assert said >= 0.3
     scale = read_parameters(output)['odometry']['scale_x']  # type: ignore[index]
     assert scale == pytest.approx(1.25 * 0.15 / said, rel=2e-3)
+
+
+@pytest.mark.parametrize('option', ['--speed', '--distance'])
+@pytest.mark.parametrize('value', ['0', '-1', 'nan', 'inf', 'far'])
+def test_a_way_that_cannot_be_walked_is_refused(
+    option: str, value: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Before anything moves, and the message names the option."""
+    with pytest.raises(SystemExit) as ended:
+        run_calibrate(['odometry', f'{option}={value}'], Script())
+    assert ended.value.code == 2
+    assert option in capsys.readouterr().err
+
+
+def test_who_breaks_off_has_it_stopped(
+    walking_robot: WalkingRobot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Ctrl-C on the way: the robot is told to stand, and nothing is written."""
+    place = odometry.Walker.place
+
+    def break_off(walker: odometry.Walker) -> Place:
+        if walking_robot.way > 0.02:
+            raise KeyboardInterrupt
+        return place(walker)
+
+    monkeypatch.setattr(odometry.Walker, 'place', break_off)
+    output = tmp_path / 'found.yaml'
+    script = Script('')
+    command = ['odometry', '--speed', '0.5', '--output', str(output)]
+    assert run_calibrate(command, script) == 1
+    assert script.said[-1] == 'cancelled; nothing was written'
+    assert not output.exists()
+    deadline = time.monotonic() + 10.0
+    while walking_robot.velocity.linear.x != 0.0:
+        assert time.monotonic() < deadline, 'it walks on'
+        time.sleep(0.01)
 
 
 def test_nobody_there_is_said(

@@ -5,7 +5,8 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+import math
 from pathlib import Path
 import sys
 
@@ -14,12 +15,19 @@ from quad_description import movable_joints, PRESETS, robot_urdf
 from ..exceptions import HardwareError
 from ..joints import servo_of
 from ..link import LinkOptions
+from ..protocol import Model, Protocol, PROTOCOLS
 from .console import CancelledError, Console, TerminalConsole
 from .parameter_file import servo_parameters, write_parameters
 from .robot import HandheldRobot
 from .wizard import calibrate_joints, zero_all
 
 DEFAULT_FILE = Path('quad_calibration.yaml')
+AUTO = 'auto'
+_PROTOCOLS: Mapping[str, tuple[Protocol, ...]] = {
+    AUTO: PROTOCOLS,
+    **{protocol.name: (protocol,) for protocol in PROTOCOLS},
+}
+_MODELS: Mapping[str, Model | None] = {AUTO: None} | {model.value: model for model in Model}
 
 
 def run_calibrate(argv: Sequence[str], console: Console) -> int:
@@ -30,6 +38,9 @@ def run_calibrate(argv: Sequence[str], console: Console) -> int:
             _joints(options, console)
         else:
             _odometry(options, console)
+    except KeyboardInterrupt:
+        console.say('cancelled; nothing was written')
+        return 1
     except (HardwareError, CancelledError) as error:
         console.say(str(error))
         return 1
@@ -50,7 +61,10 @@ def _joints(options: argparse.Namespace, console: Console) -> None:
     chosen = [servo for servo in servos if not options.joint or servo.joint in options.joint]
     console.say(f'{len(chosen)} joints. The servos will let go: support the robot.')
     motors = [servo.motor for servo in servos]
-    with HandheldRobot(LinkOptions(options.port), motors) as robot:
+    link = LinkOptions(
+        options.port, protocols=_PROTOCOLS[options.protocol], model=_MODELS[options.model]
+    )
+    with HandheldRobot(link, motors) as robot:
         console.ask('Enter takes their torque away; Ctrl-C leaves')
         with robot.limp():
             if options.zero_only:
@@ -79,6 +93,12 @@ def _parser() -> argparse.ArgumentParser:
     kinds = parser.add_subparsers(dest='what', required=True)
     joints = kinds.add_parser('joints', help='signs, offsets and limits; moves joints by hand')
     joints.add_argument('--port', default='/dev/ttyAMA0', help='of the robot (%(default)s)')
+    joints.add_argument(
+        '--protocol', choices=_PROTOCOLS, default=AUTO, help='what the robot speaks (%(default)s)'
+    )
+    joints.add_argument(
+        '--model', choices=_MODELS, default=AUTO, help='ranges of the old protocol (%(default)s)'
+    )
     joints.add_argument('--preset', choices=PRESETS, default='lite', help='(%(default)s)')
     joints.add_argument('--arm', action='store_true', help='with the arm on its back')
     joints.add_argument('--joint', action='append', default=[], help='only this one; repeatable')
@@ -86,13 +106,20 @@ def _parser() -> argparse.ArgumentParser:
     joints.add_argument('--zero-only', action='store_true', help='all offsets at once, in a jig')
     odometry = kinds.add_parser('odometry', help='scale; walks while bringup runs')
     odometry.add_argument('--axis', choices=('x', 'y'), default='x', help='(%(default)s)')
-    odometry.add_argument('--distance', type=float, default=1.0, help='[m] (%(default)s)')
-    odometry.add_argument('--speed', type=float, default=0.15, help='[m/s] (%(default)s)')
+    odometry.add_argument('--distance', type=_positive, default=1.0, help='[m] (%(default)s)')
+    odometry.add_argument('--speed', type=_positive, default=0.15, help='[m/s] (%(default)s)')
     for kind in (joints, odometry):
         kind.add_argument(
             '--output', type=Path, default=DEFAULT_FILE, help='parameter file (%(default)s)'
         )
     return parser
+
+
+def _positive(text: str) -> float:
+    number = float(text)
+    if not 0.0 < number < math.inf:
+        raise argparse.ArgumentTypeError(f'{text} is no positive number')
+    return number
 
 
 if __name__ == '__main__':

@@ -138,6 +138,6 @@ def _make_dialect(connection: Connection, options: LinkOptions) -> Dialect:
     if model is None:
         raise LinkError(
             f'firmware {connection.firmware!r} is of no known quadruped (M mini, L lite, W or MW '
-            'wheeled); name its ranges with the parameter model'
+            'wheeled); name its ranges with the parameter or option model'
         )
     return OldDialect(now, model, options.rate)
