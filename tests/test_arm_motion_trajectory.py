@@ -11,9 +11,11 @@ from action_msgs.msg import GoalStatus
 from control_msgs.action import FollowJointTrajectory
 from control_msgs.msg import JointTrajectoryControllerState, SpeedScalingFactor
 from control_msgs.srv import QueryTrajectoryState
+from controller_manager_msgs.srv import ListControllers, SwitchController
 from moving_arm import CONTROLLER, goal_to, MovingArm, READY
 import pytest
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from sensor_msgs.msg import JointState
 from simulated_arm import JOINTS
 
 if TYPE_CHECKING:
@@ -37,6 +39,7 @@ def test_an_arm_follows_goals_and_says_why_not(isolation: Isolation, tmp_path: P
         _refuses_what_is_wrong(arm)
         _reaches_a_goal(arm)
         assert states
+        _is_listed_and_switched(arm)
         _takes_a_goal_from_the_command_line(arm)
         _cancels_on_the_path(arm)
         _slows_down(arm)
@@ -84,6 +87,34 @@ def _reaches_a_goal(arm: MovingArm) -> None:
     )
     assert answer.success
     assert list(answer.position) == pytest.approx(READY, abs=1e-3)
+
+
+def _is_listed_and_switched(arm: MovingArm) -> None:
+    states = arm.client.listen(JointState, '/joint_states')
+    arm.client.spin_until(lambda: bool(states), 10.0, 'joint states')
+    assert list(states[-1].name) == JOINTS
+    assert list(states[-1].position) == pytest.approx(READY, abs=0.02)
+    listed = arm.client.call(
+        ListControllers, '/controller_manager/list_controllers', ListControllers.Request()
+    )
+    assert {each.name: each.state for each in listed.controller} == {
+        'panda_arm_controller': 'active',
+        'joint_state_broadcaster': 'active',
+    }
+    run = arm.send(goal_to([0.5, *READY[1:]], 4.0))
+    arm.client.spin_until(lambda: len(run.feedback) > 5, 10.0, 'motion')
+    _switch(arm, SwitchController.Request(deactivate_controllers=['panda_arm_controller']))
+    status, result = run.wait()
+    assert status == GoalStatus.STATUS_ABORTED
+    assert 'deactivated' in result.error_string
+    assert 'inactive' in arm.send(goal_to(READY, 2.0)).wait()[1].error_string
+    _switch(arm, SwitchController.Request(activate_controllers=['panda_arm_controller']))
+
+
+def _switch(arm: MovingArm, request: SwitchController.Request) -> None:
+    request.strictness = SwitchController.Request.STRICT
+    answer = arm.client.call(SwitchController, '/controller_manager/switch_controller', request)
+    assert answer.ok, answer.message
 
 
 def _takes_a_goal_from_the_command_line(arm: MovingArm) -> None:
