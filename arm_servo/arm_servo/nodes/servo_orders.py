@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -16,12 +16,21 @@ from ..model import Pose
 from .frame_tree import combined, rotation_of
 from .ros_numbers import xyz, xyzw
 from .servo_parameters import Scales, ServoParameters, Units
-from .tf_listener import TfListener
 
 Order = Callable[[MotionCore, float], None]
 
 LONGEST = 60.0
 """Longest duration of a joint jog in [s]."""
+
+
+class Frames(Protocol):
+    """Frames of commands: links of the robot, or others whose pose is known."""
+
+    def is_link(self, frame: str) -> bool:
+        """Tell whether a frame is a link of the robot."""
+
+    def pose(self, frame: str) -> Pose:
+        """Return the pose of a frame that is no link in the base; raises CommandError."""
 
 
 class ServoOrders:
@@ -32,7 +41,7 @@ class ServoOrders:
         capped: What was cut off the last command, in words; empty when nothing was.
     """
 
-    def __init__(self, frames: TfListener, parameters: ServoParameters, scales: Scales) -> None:
+    def __init__(self, frames: Frames, parameters: ServoParameters, scales: Scales) -> None:
         """Prepare.
 
         Args:
@@ -81,10 +90,8 @@ class ServoOrders:
             ways = _by_name(names, message.displacements, 'displacements')
             self.capped = ''
             return lambda core, _now: core.nudge(ways)
-        if not 0.0 <= message.duration < np.inf:
-            raise CommandError(
-                f'duration {message.duration} s: it must be 0 (the time-out) or more'
-            )
+        if not 0.0 <= message.duration <= LONGEST:
+            raise CommandError(f'duration {message.duration} s: 0 (the time-out) to {LONGEST:g}')
         speeds = _by_name(names, message.velocities, 'velocities')
         factor = self.scales.override
         if self.scales.units is Units.UNITLESS:
