@@ -60,10 +60,8 @@ class MotionPlay(Play):
         jitter = client.figures.bus.jitter_p99
         if math.isnan(jitter) or jitter <= self.period / 2:
             return []
-        return [
-            f'the cycle was late by {1e3 * jitter:.0f} ms now and then (p99): this computer is '
-            'too busy, drives wait for it and may lose their path'
-        ]
+        late = f'the cycle was late by {1e3 * jitter:.0f} ms now and then (p99)'
+        return [f'{late}: this computer is too busy, drives wait and may lose their path']
 
     def _repeat(self, course: Course) -> None:
         """Run the course until the time is over, once at least."""

@@ -39,7 +39,9 @@ class Sample:
 
 
 SEARCH = 6
-"""How many cycles a stamp may be wrong."""
+"""How many cycles a stamp may be too early."""
+LONGEST_GAP = 3
+"""Cycles between two samples up to which their jerk can be told."""
 WEIGHT = 0.1
 """Weight in [s] of a change of velocity beside one of position."""
 PRIOR = 1e-7
@@ -68,7 +70,7 @@ def cycles_between(before: Sample, after: Sample, period: float) -> int:
         change = WEIGHT * (after.velocity - before.velocity - rate * time)
         return float(way @ way + change @ change) + (PRIOR * (cycles - stamped)) ** 2
 
-    return min(range(max(stamped - SEARCH, 0), max(stamped, 0) + SEARCH), key=mismatch)
+    return min(range(max(stamped, 0) + SEARCH), key=mismatch)  # a held-up cycle is still one
 
 
 def peak_jerk(samples: Sequence[Sample], period: float, limits: Array) -> float:
@@ -82,8 +84,8 @@ def peak_jerk(samples: Sequence[Sample], period: float, limits: Array) -> float:
     worst = 0.0
     for before, after in pairwise(samples):
         cycles = cycles_between(before, after, period)
-        if cycles < 1:
-            continue  # the same cycle, published twice
+        if not 1 <= cycles <= LONGEST_GAP:
+            continue  # the same cycle, published twice; or a mean that hides what happened
         jerk = np.abs(after.acceleration - before.acceleration) / (cycles * period)
         worst = max(worst, float((jerk / limits).max()))
     return worst
