@@ -3,11 +3,12 @@
 """The serial line: port, probing, conversation and the thread that keeps it going."""
 
 from .dialect import DialectCounters
-from .driver import Driver, LinkState, LinkStatus, STALE_TIME
+from .driver import Driver, STALE_TIME
 from .port import SerialPort
 from .probe import ask, ask_firmware, connect, Connection
 from .session import LinkOptions
 from .state import RobotState
+from .status import LinkState, LinkStatus
 
 __all__ = [
     'STALE_TIME',

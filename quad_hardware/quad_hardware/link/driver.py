@@ -6,8 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
-from enum import Enum
 import logging
 import os
 import select
@@ -15,12 +13,11 @@ import threading
 import time
 
 from ..exceptions import LinkError
-from ..protocol import (
-    ParserCounters,
-)
+from ..protocol import ParserCounters
 from .dialect import Dialect, DialectCounters
 from .session import LinkOptions, open_session, Session
 from .state import RobotState
+from .status import LinkState, LinkStatus
 
 STALE_TIME = 0.5  # [s] without a report, after which nothing is sent any more
 PROBE_AGAIN = 3.0  # [s] without a report, after which the robot is looked for anew
@@ -28,51 +25,6 @@ RETRY_PERIOD = 0.5  # [s] between attempts to open a port
 QUIET_TIME = 0.015  # [s] longer than a pause inside a frame, shorter than one between states
 
 _log = logging.getLogger(__name__)
-
-
-class LinkState(Enum):
-    """What a driver is doing."""
-
-    CONNECTING = 'connecting'  # no port, or nobody answers
-    FAILED = 'failed'  # an error of ours ended the conversation; it begins anew
-    WAITING = 'waiting'  # a robot answered and has not reported yet
-    RUNNING = 'running'
-    STALE = 'stale'  # the port is open and no report came for STALE_TIME
-    REFUSED = 'refused'  # reports come, and for STALE_TIME none of them could be
-    STOPPED = 'stopped'
-
-
-@dataclass(frozen=True, slots=True)
-class LinkStatus:
-    """How a link is at one moment.
-
-    Attributes:
-        state: What the driver is doing.
-        detail: In words; why, when it is not running.
-        protocol: What the robot speaks; empty while there is none.
-        baud: Speed of the line [bit/s].
-        firmware: Version of the robot.
-        connections: How often a robot was found.
-        age: Since the last report that was taken [s]; infinite before the first.
-        commands: Joint commands handed to the line.
-        dropped: Joint commands that were not sent, because the link was not running.
-        parser: What the parser saw in this connection.
-        dialect: What the dialect saw in this connection.
-        refused: Reports that could not be, and were not taken.
-    """
-
-    state: LinkState
-    detail: str
-    protocol: str
-    baud: int
-    firmware: str
-    connections: int
-    age: float
-    commands: int
-    dropped: int
-    parser: ParserCounters
-    dialect: DialectCounters
-    refused: int = 0
 
 
 class Driver:
