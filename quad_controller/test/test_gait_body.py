@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 import math
 
 from hypothesis import given
@@ -144,6 +145,21 @@ def test_a_course_is_kept_within_what_the_gait_can(
         for x, y, _ in FEET:
             speed = math.hypot(velocity.x - velocity.yaw * y, velocity.y + velocity.yaw * x)
             assert speed <= parameters.schedule(gait).speed + 1e-9
+
+
+@pytest.mark.parametrize('gait', [Gait.CRAWL, Gait.PACE])
+@pytest.mark.parametrize('asked', [Velocity(0.3), Velocity(y=0.15), Velocity(yaw=1.5)], ids=str)
+def test_slow_gaits_ask_for_no_more_than_the_servos_speed(gait: Gait, asked: Velocity) -> None:
+    """When it walks as fast as it ever does, no joint is faster than its servo."""
+    generator = GaitGenerator(ROBOT, GaitParameters())
+    generator.choose(gait)
+    steps = [generator.step(asked, UPRIGHT, None, 0.02).targets for _ in range(300)]
+    assert generator.clamped
+    if asked.x:
+        assert generator.goal.x == pytest.approx(GaitParameters().top_speed(gait))
+    for before, after in pairwise(steps[100:]):
+        for old, new, limits in zip(before, after, ROBOT.limits, strict=True):
+            assert abs(new - old) <= limits.velocity * 0.02
 
 
 def test_a_body_that_looks_elsewhere_keeps_its_course() -> None:

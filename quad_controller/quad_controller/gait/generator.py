@@ -20,6 +20,7 @@ from .velocity import REST, Velocity
 
 CLAMP_LINEAR = 0.005  # [m/s] that may be lacking before it is told; rounding is no clamp
 CLAMP_YAW = 0.02  # [rad/s]
+LEAST_LIFT = 0.001  # [m] over which the speed of a lift is measured
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +76,7 @@ class GaitGenerator:
             self._neutral,
             parameters.swing_height,
             parameters.stance_depth,
+            self._lift_speed(),
         )
         self._leveller = Leveller(parameters.level_gain)
         self._heading = HeadingHold(parameters.heading_gain)
@@ -169,6 +171,19 @@ class GaitGenerator:
     @property
     def _schedule(self) -> Schedule:
         return self._stepper.schedule
+
+    def _lift_speed(self) -> float:
+        """Return how fast the joints of the slowest leg can lift its foot [m/s]."""
+        height = max(self._parameters.swing_height, LEAST_LIFT)
+        low = self._robot.solve(self._neutral)
+        high = self._robot.solve([(x, y, z + height) for x, y, z in self._neutral])
+        limits = self._robot.limits
+        times = [
+            abs(up - down) / limits[index].velocity
+            for indices, lower, upper in zip(self._robot.leg_indices, low, high, strict=True)
+            for index, down, up in zip(indices, lower.angles, upper.angles, strict=True)
+        ]
+        return height / max(times)
 
     def _stance(self) -> Feet:
         shift = self._parameters.com_x_translation

@@ -80,6 +80,10 @@ class GaitParameters:
             self.angular_acceleration,
         )
 
+    def top_speed(self, gait: Gait) -> float:
+        """Return how fast a gait goes straight ahead at most [m/s]."""
+        return min(self.max_linear_velocity_x, self.schedule(gait).speed)
+
     def schedule(self, gait: Gait) -> Schedule:
         """Return a gait with what was tuned of it."""
         schedule = SCHEDULES[gait]

@@ -64,6 +64,6 @@ class Schedule:
 SCHEDULES = {
     Gait.TROT: Schedule((0.0, 0.5, 0.5, 0.0), 0.154, 0.55, 0.0, 0.45),
     Gait.CRAWL: Schedule((0.0, 0.5, 0.75, 0.25), 0.8, 0.8, 0.012, 0.06),
-    Gait.PACE: Schedule((0.0, 0.5, 0.0, 0.5), 0.15, 0.75, 0.0, 0.15),
+    Gait.PACE: Schedule((0.0, 0.5, 0.0, 0.5), 0.12, 0.6, 0.0, 0.13),
 }
 """The gaits as they were found to walk in physics simulation with the XGO's dimensions."""

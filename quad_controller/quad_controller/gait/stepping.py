@@ -43,7 +43,12 @@ class Stepper:
     """
 
     def __init__(
-        self, schedule: Schedule, neutral: Feet, swing_height: float, depth: float
+        self,
+        schedule: Schedule,
+        neutral: Feet,
+        swing_height: float,
+        depth: float,
+        lift_speed: float = math.inf,
     ) -> None:
         """Start with all feet at their neutral places.
 
@@ -52,11 +57,13 @@ class Stepper:
             neutral: Where the feet are without motion, in the body's frame in [m].
             swing_height: How high a foot is lifted in [m].
             depth: How far a standing foot is pushed below the ground in [m].
+            lift_speed: How fast a leg lifts its foot in [m/s]; a short swing is lifted less.
         """
         self.schedule = schedule
         self._neutral = neutral
         self._swing_height = swing_height
         self._depth = depth
+        self._lift_speed = lift_speed
         self._feet = [_Foot() for _ in neutral]
         self._phase = 0.0
         self._walking = False
@@ -167,7 +174,9 @@ class Stepper:
         travel = math.hypot(end_x - foot.start_x, end_y - foot.start_y)
         speed = math.hypot(hip_x, hip_y)
         scale = min(1.0, max(speed / FULL_LIFT_SPEED, travel / FULL_LIFT_TRAVEL))
-        foot.z = self._swing_height * scale * 0.5 * (1.0 - math.cos(math.tau * part))
+        # the fastest moment of the cosine is pi / 2 times its mean
+        lift = min(self._swing_height, self._lift_speed * duration / math.pi)
+        foot.z = lift * scale * 0.5 * (1.0 - math.cos(math.tau * part))
 
     def _all_at_place(self) -> bool:
         return all(
