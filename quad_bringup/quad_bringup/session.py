@@ -19,6 +19,7 @@ from process_supervisor import (
     ros_domain,
     write_parameters,
 )
+from quad_controller import find_policy, PolicyError
 from quad_description import movable_joints, PRESETS, robot_urdf
 
 from .exceptions import ArgumentError
@@ -80,7 +81,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--policy',
         metavar='FILE',
         type=Path,
-        help='ONNX policy to load and check; mode "policy" lets it walk',
+        help='ONNX policy to load and check, a file or trot_imitation; mode "policy" lets it walk',
     )
     parser.add_argument(
         '--protocol',
@@ -166,6 +167,11 @@ def _servo(model: str | None, port: str | None) -> str | None:
 def _existing(name: str, path: Path | None) -> Path | None:
     if path is None:
         return None
+    if name == 'policy':
+        try:
+            return find_policy(str(path)).resolve()
+        except PolicyError as error:
+            raise ArgumentError(f'--policy: {error}') from error
     if not path.is_file():
         raise ArgumentError(f'--{name}: there is no file {path}')
     return path.resolve()

@@ -29,6 +29,7 @@ from .gait.velocity import Velocity
 from .model.quadruped import Quadruped, quadruped
 from .policy.load import load_policy
 from .policy.options import PolicyOptions
+from .policy.shipped import find_policy
 from .states.controller import Controller
 from .states.measurement import ImuSample, JointSample, Measurement
 from .states.modes import Answer, MODES, State
@@ -60,6 +61,7 @@ __all__ = [
     'StateParameters',
     'Status',
     'Velocity',
+    'find_policy',
     'load_policy',
     'quadruped',
 ]

@@ -12,15 +12,18 @@ from rcl_interfaces.msg import ParameterDescriptor
 import rclpy
 from rclpy.exceptions import InvalidTopicNameException, ParameterException
 from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.time import Time
 from rclpy.utilities import try_shutdown
 from sensor_msgs.msg import JointState
+from std_msgs.msg import String
 
 from ..exceptions import CanopenError
 from ..joints.aggregator import JointAggregator, JointSample, JointSet
 from ..joints.robot_joints import movable_joints
 from .spinning import spin
 
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 WATCH_PERIOD = 2.0  # [s] between two looks for joints that are silent
 
 
@@ -31,20 +34,36 @@ class JointStatePublisher(Node):
         """Read the robot description and subscribe.
 
         Raises:
-            CanopenError: There is no robot description, or it is no URDF.
+            CanopenError: The robot description is no URDF.
         """
         super().__init__('canopen_joint_state_publisher')
-        descriptor = ParameterDescriptor(description='URDF as XML text', read_only=True)
-        description = self.declare_parameter('robot_description', '', descriptor).value
-        if not description:
-            raise CanopenError(
-                'no robot_description: give the URDF as text, e.g. '
-                '--ros-args -p robot_description:="$(xacro robot.urdf.xacro)"'
-            )
-        joints = movable_joints(str(description))
-        self._aggregator = JointAggregator(joints)
+        descriptor = ParameterDescriptor(
+            description='URDF as XML text; without it, the topic robot_description tells it',
+            read_only=True,
+        )
+        description = str(self.declare_parameter('robot_description', '', descriptor).value)
+        self._begun = False
+        self._aggregator = JointAggregator([])
         self._silent: list[str] = []
         self._publisher = self.create_publisher(JointState, 'joint_states', 10)
+        if description:
+            self._begin(description)
+        else:
+            self.create_subscription(String, 'robot_description', self._take_description, LATCHED)
+            self.get_logger().info('waiting for the URDF on the topic robot_description')
+
+    def _take_description(self, message: String) -> None:
+        if self._begun:
+            return  # a robot that changes its joints is another robot, for another process
+        try:
+            self._begin(message.data)
+        except CanopenError as error:
+            self.get_logger().error(f'robot_description: {error}')
+
+    def _begin(self, description: str) -> None:
+        joints = movable_joints(description)
+        self._begun = True
+        self._aggregator = JointAggregator(joints)
         for joint in joints:
             self._listen_to(joint.name)
         self.create_timer(WATCH_PERIOD, self._watch)

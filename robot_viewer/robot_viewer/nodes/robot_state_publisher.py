@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+import contextlib
 from pathlib import Path
 import sys
 import time
@@ -165,5 +166,7 @@ def main() -> int:
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     finally:
-        try_shutdown()
+        # the signal handler of rclpy may be at it already, between the look and the call
+        with contextlib.suppress(RuntimeError):
+            try_shutdown()
     return 0
