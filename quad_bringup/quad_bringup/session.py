@@ -19,7 +19,6 @@ from process_supervisor import (
     ros_domain,
     write_parameters,
 )
-from quad_controller import find_policy, PolicyError
 from quad_description import movable_joints, PRESETS, robot_urdf
 
 from .exceptions import ArgumentError
@@ -168,6 +167,9 @@ def _existing(name: str, path: Path | None) -> Path | None:
     if path is None:
         return None
     if name == 'policy':
+        # only here, as it takes a while and most runs have no policy
+        from quad_controller import find_policy, PolicyError
+
         try:
             return find_policy(str(path)).resolve()
         except PolicyError as error:
