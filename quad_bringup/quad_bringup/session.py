@@ -166,7 +166,7 @@ def _servo(model: str | None, port: str | None) -> str | None:
 def _existing(name: str, path: Path | None) -> Path | None:
     if path is None:
         return None
-    if name == 'policy':
+    if name == 'policy' and not path.suffix:  # the name of a shipped one
         # only here, as it takes a while and most runs have no policy
         from quad_controller import find_policy, PolicyError
 
