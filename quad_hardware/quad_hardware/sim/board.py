@@ -12,7 +12,7 @@ from quad_description import movable_joints, Pose, pose_positions
 
 from ..protocol import Fault, Model, MOTOR_ORDER
 from .plant import Plant
-from .power import Battery, FULL_LOAD, HOT, LOW_BATTERY, Warmth
+from .power import Battery, HOT, LOW_BATTERY, Overload, Warmth
 from .servos import Mount, Servos
 from .state import Measurement, Vector
 from .turning import Turn
@@ -86,6 +86,7 @@ class Board:
         self._efforts = [joint.effort for joint in joints]
         self._with_arm = len(joints) > len(pose_positions(Pose.STAND))
         self._warmth = Warmth(len(joints))
+        self._overload = Overload(len(joints))
         self._now = now
         self._measured = plant.measure()
         self._power_at = now
@@ -173,7 +174,7 @@ class Board:
             faults |= Fault.LOW_BATTERY
         if self._warmth.temperatures.max() > HOT:
             faults |= Fault.OVERHEATED
-        if max(map(abs, self.loads(self._measured))) > FULL_LOAD:
+        if self._overload.lasts:
             faults |= Fault.OVERLOAD
         if self.servos.failed is not None:
             faults |= Fault.SERVO_SILENT
@@ -248,3 +249,4 @@ class Board:
         torques = self.measure().torques
         self.battery.advance(torques, POWER_PERIOD)
         self._warmth.advance(torques / self._efforts, POWER_PERIOD)
+        self._overload.advance(torques / self._efforts, POWER_PERIOD)

@@ -20,7 +20,8 @@ HEATING = 55.0  # [K] above ambient of a servo that is held at stall for good
 WARM_UP = 90.0  # [s]
 LOW_BATTERY = 15.0  # [%]
 HOT = 70.0  # [degC]
-FULL_LOAD = 95.0  # [%] a servo above counts as overloaded
+FULL_LOAD = 0.95  # share of the stall torque; a servo above for a while counts as overloaded
+OVERLOAD_TIME = 1.0  # [s] a step of the gait is shorter
 
 
 @dataclass(slots=True)
@@ -63,3 +64,20 @@ class Warmth:
         """Warm up for a time [s] under loads (1: stall)."""
         goal = AMBIENT + HEATING * loads * loads
         self.temperatures += (goal - self.temperatures) * min(duration / WARM_UP, 1.0)
+
+
+class Overload:
+    """How long each servo has been held at its full torque; a foot that lands is no overload."""
+
+    def __init__(self, count: int) -> None:
+        """Begin without load."""
+        self._since: Array = np.zeros(count)
+
+    def advance(self, loads: Array, duration: float) -> None:
+        """Be loaded for a time [s] (1: stall)."""
+        self._since = np.where(np.abs(loads) > FULL_LOAD, self._since + duration, 0.0)
+
+    @property
+    def lasts(self) -> bool:
+        """Whether a servo has been overloaded for too long."""
+        return bool(self._since.max() > OVERLOAD_TIME)
