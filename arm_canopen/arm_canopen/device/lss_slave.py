@@ -28,8 +28,6 @@ from ..standard.objects import Index
 from .object_store import ObjectStore
 from .parameter_memory import ParameterMemory
 
-__all__ = ['UNCONFIGURED', 'LssSlave']
-
 
 class LssSlave:
     """The LSS of one device.

@@ -14,9 +14,9 @@ from rclpy.node import Node
 
 from ..config import load_eds
 from ..device.host import DeviceHost
-from ..device.lss_slave import UNCONFIGURED
 from ..exceptions import CanopenError
 from ..standard.cob_id import NODE_ID_MAX, NODE_ID_MIN
+from ..standard.lss import UNCONFIGURED
 from .slave_process import memories, Population, run_slaves, text_parameter
 
 DEFAULT_NODE_ID = 2
