@@ -166,7 +166,7 @@ class PtyPeer:
         spans = ANGLE_SPANS[Model.LITE]
         if frame.kind is Kind.WRITE and frame.address == Register.TORQUE:
             self.torque = frame.payload[0] == Torque.LOAD_ALL
-        elif frame.kind is Kind.WRITE:
+        elif frame.kind is Kind.WRITE and frame.address in MOTOR_OF_REGISTER:
             self._set(
                 {
                     MOTOR_OF_REGISTER[r]: spans[MOTOR_OF_REGISTER[r]].decode(data[0])

@@ -91,6 +91,21 @@ def test_beyond_limits_is_taken_to_them_and_told(rig: NodeRig) -> None:
     assert rig.peer.angles[13] == pytest.approx(math.degrees(0.5236), abs=0.02)
 
 
+def test_a_servo_beyond_its_limits_is_left_there_and_told(rig: NodeRig) -> None:
+    """A stream that asks it to stay sends exactly where it is."""
+    rig.peer.angles[13] = 40.0
+    rig.hear('/joint_states', 30)  # by then the stream of another test has ended
+    found = [math.radians(40.0), *HOME[1:]]
+    rig.peer.commands.clear()
+    rig.stream(found, 0.3)
+    assert {command[13] for command in rig.peer.commands} == {40.0}
+    told = rig.wait_for_status('joint commands', DiagnosticStatus.WARN, 'found beyond limits')
+    assert 'fl_hip_joint' in told.message
+    rig.stream(HOME, 0.8)
+    assert rig.peer.angles[13] == pytest.approx(0.0, abs=0.1)
+    assert rig.largest_step() <= LARGEST_STEP + 0.01
+
+
 def test_silence_holds_the_servos(rig: NodeRig) -> None:
     """After half a second nothing is sent, diagnostics says so; then the stream begins anew."""
     rig.stream(POSE, 0.8)

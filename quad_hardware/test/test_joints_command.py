@@ -21,24 +21,25 @@ POSITIONS = st.lists(st.floats(-1e3, 1e3), min_size=12, max_size=12)
 
 
 @given(
-    POSITIONS,
+    st.lists(st.floats(-3.4, 3.4), min_size=12, max_size=12),
     st.lists(st.tuples(POSITIONS, st.floats(0.0, 2.0)), min_size=1, max_size=20),
 )
-def test_no_target_jumps_or_leaves_its_limits(
+def test_no_target_jumps_or_goes_farther_beyond_its_limits(
     measured: list[float], stream: list[tuple[list[float], float]]
 ) -> None:
     """From wherever the robot is, whatever is asked for, at whatever intervals."""
     limiter = CommandLimiter(JOINTS)
-    measured = [
-        min(max(p, s.lower), s.upper) for p, s in zip(measured, JOINTS.servos, strict=True)
-    ]
     last, now = measured, 0.0
     for wanted, pause in stream:
         now += pause
-        targets = list(limiter.step(wanted, last, now).targets)
+        command = limiter.step(wanted, last, now)
+        targets = list(command.targets)
         steps = [abs(b - a) for a, b in zip(last, targets, strict=True)]
         assert max(steps) <= limiter.largest_step + 1e-9
-        assert all(s.lower <= t <= s.upper for t, s in zip(targets, JOINTS.servos, strict=True))
+        for servo, before, target in zip(JOINTS.servos, last, targets, strict=True):
+            assert min(servo.lower, before) <= target <= max(servo.upper, before)
+            inside = servo.lower <= target <= servo.upper
+            assert inside == (servo.joint not in command.outside)
         last = targets
 
 
@@ -124,8 +125,41 @@ def test_a_leg_that_nobody_has_seen_is_not_moved() -> None:
     assert limiter.step([0.5] * 12, HOME, 0.04).targets == pytest.approx([0.04] * 12)
 
 
-def test_an_arm_servo_that_is_not_reported_takes_its_target() -> None:
-    """There is nothing to begin from."""
-    measured = [*([0.0] * 12), None, 0.0, 0.0, 0.0]
-    command = CommandLimiter(ARM_JOINTS).step([*HOME, 0.7, 0.0, 0.0, 0.0], measured, 0.0)
-    assert command.targets[12] == 0.7
+def test_an_arm_servo_that_is_not_reported_takes_its_first_target_and_that_is_told() -> None:
+    """There is nothing to begin from; then it is where it was sent, even after a pause."""
+    limiter = CommandLimiter(ARM_JOINTS)
+    measured = [*HOME, None, 0.0, 0.0, 0.0]
+    first = limiter.step([*HOME, 0.7, 0.0, 0.0, 0.0], measured, 0.0)
+    assert first.targets[12] == 0.7
+    assert first.unseen == ('arm_yaw_joint',)
+    later = limiter.step([*HOME, 0.0, 0.0, 0.0, 0.0], measured, 5.0)
+    assert later.targets[12] == pytest.approx(0.7 - 0.04)
+    assert later.unseen == ()
+    limiter.reset()
+    assert limiter.step([*HOME, 0.0, 0.0, 0.0, 0.0], measured, 5.02).unseen != ()
+
+
+def test_a_servo_found_beyond_its_limits_is_not_moved_by_starting() -> None:
+    """Asked to stay, it stays, for as long as it is asked; and it is told."""
+    limiter = CommandLimiter(JOINTS)
+    found = [0.9, *HOME[1:]]
+    for tick in range(50):
+        command = limiter.step(found, found, tick * 0.02)
+        assert command.targets == tuple(found)
+        assert (command.outside, command.clamped) == (('fl_hip_joint',), ())
+
+
+def test_from_beyond_its_limits_a_servo_only_comes_back() -> None:
+    """Farther is refused and told, nearer is slow, and what was gained is not given away."""
+    limiter = CommandLimiter(JOINTS)
+    found = [0.9, *HOME[1:]]
+    farther = limiter.step([1.2, *HOME[1:]], found, 0.0)
+    assert farther.targets[0] == 0.9
+    assert (farther.outside, farther.clamped) == (('fl_hip_joint',), ('fl_hip_joint',))
+    nearer = limiter.step([0.3, *HOME[1:]], found, 0.02)
+    assert 0.9 - 0.05 < nearer.targets[0] < 0.9
+    assert limiter.step([1.2, *HOME[1:]], found, 0.04).targets[0] == nearer.targets[0]
+    for tick in range(3, 60):
+        command = limiter.step([0.3, *HOME[1:]], found, tick * 0.02)
+    assert command.targets[0] == 0.3
+    assert command.outside == ()

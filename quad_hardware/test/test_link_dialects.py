@@ -15,6 +15,7 @@ from quad_hardware.link.dialect import Dialect
 from quad_hardware.link.new_dialect import ASK_AGAIN, NewDialect
 from quad_hardware.link.old_dialect import HOST_GAP, OldDialect
 from quad_hardware.link.state import RobotState
+from quad_hardware.link.unseen_servo import LOWEST_RATE, UnseenServo
 from quad_hardware.protocol import (
     ANGLE_SPANS,
     BULK_READ_ORDER,
@@ -148,6 +149,56 @@ def test_an_arm_joint_is_sent_again_for_a_frame_may_be_lost() -> None:
         rig.dialect.command({**LEGS, 52: 20.0})
         rig.run(0.02)
         assert arm_writes(rig) == count
+
+
+def writes_to(rig: OldRig, *registers: int) -> list[tuple[int, int]]:
+    """Registers and values of single writes, in order."""
+    return [(f.address, f.payload[0]) for _, f in rig.sent if f.address in registers]
+
+
+def test_a_servo_that_is_not_reported_goes_slowly_until_it_must_be_there() -> None:
+    """The lowest speed comes first, and for it alone; unplugged, it may be anywhere again."""
+    rig = OldRig()
+    rig.dialect.command({**LEGS, 54: 100.0})
+    rig.run(0.05)
+    yaw = ANGLE_SPANS[Model.LITE][54].encode(100.0)
+    assert writes_to(rig, 0x5C, 0x70) == [(0x5C, 1), (0x70, yaw)]
+    rig.sent.clear()
+    rig.dialect.command({**LEGS, 52: 20.0, 54: 100.0})
+    rig.run(0.05)
+    elbow = ANGLE_SPANS[Model.LITE][52].encode(20.0)
+    assert writes_to(rig, 0x5C, 0x5D) == [(0x5C, 255), (0x5D, elbow)]
+    rig.sent.clear()
+    rig.run(135.0)  # from the other end of its range, 275 degrees at 2.07 deg/s
+    rig.dialect.command({**LEGS, 54: 90.0})
+    rig.run(0.05)
+    assert (0x5C, 1) not in writes_to(rig, 0x5C)
+    rig.dialect.withdraw()
+    rig.sent.clear()
+    rig.dialect.command({**LEGS, 54: 90.0})
+    rig.run(0.05)
+    assert writes_to(rig, 0x5C) == [(0x5C, 1)]
+
+
+@given(
+    st.lists(st.tuples(st.floats(-175, 175), st.floats(0, 60)), min_size=1, max_size=8),
+    st.floats(-175, 175),
+)
+def test_an_unseen_servo_has_arrived_only_when_it_has(
+    orders: list[tuple[float, float]], place: float
+) -> None:
+    """From wherever it begins, whatever it was told: what is called arrived is there."""
+    servo = UnseenServo(ANGLE_SPANS[Model.LITE][54], 0.0)
+    now = 0.0
+    for target, time in orders:
+        servo.send(target, now)
+        now += time
+        way = LOWEST_RATE * time
+        place = min(max(target, place - way), place + way)
+        if servo.arrived(now):
+            assert place == pytest.approx(target, abs=1e-6)
+    servo.send(0.0, now)
+    assert servo.arrived(now + 350.0 / LOWEST_RATE)
 
 
 def test_a_silent_old_robot_is_asked_again_and_counted() -> None:

@@ -40,18 +40,25 @@ class Command:
         targets: Positions [rad], [m] of the first joints, in their order.
         clamped: Joints that were asked to go beyond their limits.
         slowed: Joints that were asked to move faster than allowed.
+        outside: Joints that were found beyond their limits and are not back yet.
+        unseen: Joints that begin to move from a place that nobody knows.
     """
 
     targets: tuple[float, ...]
     clamped: tuple[str, ...] = ()
     slowed: tuple[str, ...] = ()
+    outside: tuple[str, ...] = ()
+    unseen: tuple[str, ...] = ()
 
 
 class CommandLimiter:
     """Lets commands through so that no servo target jumps.
 
     A stream of commands begins where the joints are measured to be; it ends with a pause, or
-    when :meth:`reset` is called because the robot was lost.
+    when :meth:`reset` is called because the robot was lost. A joint that is found beyond its
+    limits may stay there or come back: its range reaches to where it is, and shrinks with it. A
+    joint that is not measured is taken to be where it was sent last; before that nobody knows
+    where it is, and its servo has to go slowly.
     """
 
     def __init__(self, joints: JointMap, settings: LimiterSettings | None = None) -> None:
@@ -70,8 +77,9 @@ class CommandLimiter:
         return self._settings.speed * LONGEST_PERIOD
 
     def reset(self) -> None:
-        """End the stream: the next command begins anew."""
+        """End the stream: the next command begins anew, and joints may have been moved."""
         self._last_at = -math.inf
+        self._targets = []
 
     def step(
         self, positions: Sequence[float], measured: Sequence[float | None], now: float
@@ -91,7 +99,7 @@ class CommandLimiter:
         """
         self.check(positions)
         if now - self._last_at > self._settings.stream_timeout:
-            self._begin(positions, measured, now)
+            self._begin(measured, now)
         elapsed = min(max(now - self._last_at, 0.0), LONGEST_PERIOD)
         self._last_at = now
         return self._approach(positions, self._speed(now) * elapsed)
@@ -118,9 +126,7 @@ class CommandLimiter:
                 f'no finite position for {", ".join(wrong)}; the command is refused'
             )
 
-    def _begin(
-        self, positions: Sequence[float], measured: Sequence[float | None], now: float
-    ) -> None:
+    def _begin(self, measured: Sequence[float | None], now: float) -> None:
         legs = zip(self._joints.names[: self._joints.leg_count], measured, strict=False)
         lost = [name for name, place in legs if place is None]
         if lost:
@@ -128,10 +134,9 @@ class CommandLimiter:
                 f'no report says where {", ".join(lost)} is, so the target could jump; '
                 'wait for reports of the robot'
             )
-        wanted = [*positions, *(math.nan for _ in range(len(measured) - len(positions)))]
-        # the angle of a servo that is not reported is taken to be what is asked of it
+        sent = self._targets or [math.nan] * len(measured)
         self._targets = [
-            want if place is None else place for want, place in zip(wanted, measured, strict=True)
+            last if place is None else place for last, place in zip(sent, measured, strict=True)
         ]
         self._began_at = now
         self._last_at = now - NOMINAL_PERIOD
@@ -143,17 +148,26 @@ class CommandLimiter:
         return start + share * (settings.speed - start)
 
     def _approach(self, positions: Sequence[float], step: float) -> Command:
-        clamped, slowed = [], []
+        clamped, slowed, outside, unseen = [], [], [], []
         for index, wanted in enumerate(positions):
-            servo = self._joints.servos[index]
-            goal = min(max(wanted, servo.lower), servo.upper)
+            servo, last = self._joints.servos[index], self._targets[index]
+            if math.isnan(last):
+                unseen.append(servo.joint)
+                last = min(max(wanted, servo.lower), servo.upper)
+            goal = min(max(wanted, min(servo.lower, last)), max(servo.upper, last))
             if goal != wanted:
                 clamped.append(servo.joint)
-            last, reach = self._targets[index], step * self._share[index]
-            if math.isnan(last):
-                last = goal
+            reach = step * self._share[index]
             target = min(max(goal, last - reach), last + reach)
             if target != goal:
                 slowed.append(servo.joint)
+            if not servo.lower <= target <= servo.upper:
+                outside.append(servo.joint)
             self._targets[index] = target
-        return Command(tuple(self._targets[: len(positions)]), tuple(clamped), tuple(slowed))
+        return Command(
+            tuple(self._targets[: len(positions)]),
+            tuple(clamped),
+            tuple(slowed),
+            tuple(outside),
+            tuple(unseen),
+        )

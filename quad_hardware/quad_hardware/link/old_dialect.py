@@ -28,6 +28,7 @@ from ..protocol import (
 )
 from .dialect import Dialect, Step
 from .state import RobotState, Vector
+from .unseen_servo import FULL_SPEED, LOWEST_SPEED, UnseenServo
 
 HOST_GAP = 0.001  # [s] the board drops some commands that follow each other faster
 LONGEST_LATENCY = 0.050  # [s] what an answer may take beyond its time on the line
@@ -35,6 +36,7 @@ SHORTEST_LATENCY = 0.006  # [s] what is waited for the answer of a quick board
 LATENCY_DECAY = 0.98  # by which a slow answer is forgotten with each quick one
 BATTERY_PERIOD = 2.0  # [s]
 ARM_AGAIN = 0.5  # [s] after which an arm joint is sent again, for a frame may be lost
+_BOARDS_OWN, _FORGOTTEN = -1, -2  # speeds that nobody set, or that a restart may have undone
 _IMU = OLD.functions[Register.IMU]
 
 
@@ -86,6 +88,8 @@ class OldDialect(Dialect):
         self._legs = self._torque = b''
         self._arm: dict[int, bytes] = {}
         self._arm_sent: dict[int, tuple[bytes, float]] = {}  # and until when that counts [s]
+        self._unseen: dict[int, UnseenServo] = {}
+        self._speed = _BOARDS_OWN  # of single servos
         self._angles: bytes | None = None
         self._charges: deque[int] = deque(maxlen=3)
 
@@ -98,7 +102,7 @@ class OldDialect(Dialect):
         """Set the angles that are sent when the line is free.
 
         All legs go in one frame, so all of them must be there; the arm follows, where it changed
-        or was last sent a while ago.
+        or was last sent a while ago; a servo that is not reported goes slowly at first.
         """
         self._legs = bytes(self._spans[motor].encode(angles[motor]) for motor in LEG_MOTORS)
         for motor in angles.keys() - set(LEG_MOTORS):
@@ -106,14 +110,14 @@ class OldDialect(Dialect):
 
     def torque(self, *, on: bool) -> None:
         """Have all servos hold their place, or let go, behind a pending command."""
-        self._arm_sent.clear()
+        self._forget_arm()
         self._torque = bytes((Torque.LOAD_ALL if on else Torque.UNLOAD_ALL,))
 
     def withdraw(self) -> None:
         """Forget what has not been sent yet."""
         self._legs = self._torque = b''
         self._arm.clear()
-        self._arm_sent.clear()
+        self._forget_arm()
 
     def step(self, now: float) -> Step:
         """Return the next frame, where one is due and the line is free."""
@@ -178,12 +182,8 @@ class OldDialect(Dialect):
         if self._legs:
             payload, self._legs = self._legs, b''
             return Frame(Kind.WRITE, Register.MOTORS, payload).encode(OLD)
-        while self._arm:
-            motor, payload = self._arm.popitem()
-            sent, until = self._arm_sent.get(motor, (b'', now))
-            if sent != payload or now >= until:
-                self._arm_sent[motor] = payload, now + ARM_AGAIN
-                return Frame(Kind.WRITE, REGISTER_OF_MOTOR[motor], payload).encode(OLD)
+        if arm := self._next_of_arm(now):
+            return arm
         if self._torque:
             payload, self._torque = self._torque, b''
             return Frame(Kind.WRITE, Register.TORQUE, payload).encode(OLD)
@@ -192,6 +192,37 @@ class OldDialect(Dialect):
             self._asked_at = now
             return self._waiting.encode()
         return b''
+
+    def _next_of_arm(self, now: float) -> bytes:
+        while self._arm:
+            motor, payload = self._arm.popitem()
+            sent, until = self._arm_sent.get(motor, (b'', now))
+            if sent == payload and now < until:
+                continue
+            speed = self._speed_of(motor, now)
+            if speed != self._speed:  # it counts for every single servo that follows
+                self._speed, self._arm[motor] = speed, payload
+                return Frame(Kind.WRITE, Register.MOTOR_SPEED, bytes((speed,))).encode(OLD)
+            self._arm_sent[motor] = payload, now + ARM_AGAIN
+            if motor in self._unseen:
+                self._unseen[motor].send(self._spans[motor].decode(payload[0]), now)
+            return Frame(Kind.WRITE, REGISTER_OF_MOTOR[motor], payload).encode(OLD)
+        return b''
+
+    def _speed_of(self, motor: int, now: float) -> int:
+        if motor not in BULK_READ_ORDER:
+            if motor not in self._unseen:
+                self._unseen[motor] = UnseenServo(self._spans[motor], now)
+            if not self._unseen[motor].arrived(now):
+                return LOWEST_SPEED
+        return _BOARDS_OWN if self._speed == _BOARDS_OWN else FULL_SPEED
+
+    def _forget_arm(self) -> None:
+        """Send the arm anew, for it may have been moved."""
+        self._arm_sent.clear()
+        self._unseen.clear()
+        if self._speed != _BOARDS_OWN:
+            self._speed = _FORGOTTEN
 
     def _report(self, imu: bytes, now: float) -> RobotState | None:
         angles, self._angles = self._angles or b'', None

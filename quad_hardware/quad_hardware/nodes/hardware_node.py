@@ -201,9 +201,19 @@ class HardwareNode(Node):
         counters.largest_step = max(counters.largest_step, step)
         self._last_targets = command.targets
         counters.slowed += bool(command.slowed)
+        if command.unseen:
+            self._trouble(
+                f'nobody measures where {", ".join(command.unseen)} is: it goes to its first '
+                'target at the lowest speed'
+            )
         if command.clamped:
             counters.clamped += 1
-            self._trouble(f'beyond limits, taken to them: {", ".join(command.clamped)}')
+        beyond = {
+            'beyond limits, taken to them': set(command.clamped) - set(command.outside),
+            'found beyond limits, moved only towards them': command.outside,
+        }
+        if told := [f'{what}: {", ".join(sorted(who))}' for what, who in beyond.items() if who]:
+            self._trouble('; '.join(told))
 
     def _trouble(self, reason: str) -> None:
         self._counters.reason, self._counters.troubled = reason, True
