@@ -76,12 +76,13 @@ MESSAGE = [
         for joint in JOINTS
     ),
 ]
-GOOD = Figures().updated(MESSAGE)
+READ = Figures().updated(MESSAGE)
+GOOD = replace(READ, bus=replace(READ.bus, missed_pdos=0))
 
 
 def test_figures_are_read_from_the_statuses() -> None:
     """Of bus, drives and wave, with their units."""
-    assert GOOD.bus == BusFigures(2912.4, 26.91, 0, 0.00014, 0.00122, 3)
+    assert READ.bus == BusFigures(2912.4, 26.91, 0, 0.00014, 0.00122, 3)
     assert list(GOOD.drives) == JOINTS
     assert GOOD.drives['joint1'] == DriveFigures(
         online=True,
@@ -101,7 +102,7 @@ def test_figures_are_read_from_the_statuses() -> None:
 def test_other_statuses_are_passed_over() -> None:
     """Other nodes publish diagnostics, too."""
     others = [status('battery', level='low'), status('joint1: encoder', position='7')]
-    assert GOOD.updated(others) == GOOD
+    assert READ.updated(others) == READ
 
 
 texts = st.dictionaries(
@@ -163,3 +164,12 @@ def test_lost_frames_are_a_warning() -> None:
     lost = replace(GOOD, bus=replace(GOOD.bus, lost=12))
     assert '12 frames were lost' in warnings(lost)[0]
     assert problems(lost, JOINTS) == []
+
+
+def test_late_answers_are_a_warning_and_judge_no_path() -> None:
+    """An old measurement lies behind its set-point, as far as the joint went meanwhile."""
+    axes = {name: replace(axis, error_max=0.5) for name, axis in GOOD.axes.items()}
+    late = replace(GOOD, axes=axes, bus=replace(GOOD.bus, missed_pdos=7))
+    assert '7 PDOs of drives missed their cycle' in warnings(late)[0]
+    assert problems(late, JOINTS) == []
+    assert problems(replace(GOOD, axes=axes), JOINTS)

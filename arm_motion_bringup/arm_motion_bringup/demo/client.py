@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+import math
 from typing import Any
 
 from control_msgs.action import FollowJointTrajectory
@@ -80,6 +81,13 @@ class MotionClient(ArmClient):
         if not self.samples:
             raise CallError('the trajectory controller publishes no state: is the arm enabled?')
         return self.samples[-1]
+
+    @property
+    def age(self) -> float:
+        """Age of the latest sample in [s]; infinite when there is none."""
+        if not self.samples:
+            return math.inf
+        return 1e-9 * self._node.get_clock().now().nanoseconds - self.samples[-1].time
 
     def jog(self, linear: Array, frame: str) -> None:
         """Move the tool; counts for a tenth of a second.
