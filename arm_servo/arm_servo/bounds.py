@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .arrays import Array, frozen
-from .collision import Proximity
+from .clearances import Proximity
 from .limits import JointLimits
 from .model import RobotModel
 from .otg import brakeable_velocity, MotionState

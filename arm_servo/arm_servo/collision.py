@@ -1,11 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Distances between the links of an arm, and how fast its joints change them."""
+"""Shapes on the links of an arm, the pairs of them that are checked, and how joints part them."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
@@ -15,135 +14,105 @@ from .description import Shape
 from .srdf import Pair
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Proximity:
-    """Two shapes that are near to each other.
-
-    Attributes:
-        pair: Number of the pair, a place in :attr:`CollisionModel.pairs`.
-        links: Names of their links.
-        distance: Between their surfaces in [m]; negative when they overlap.
-        gradient: Change of the distance with each joint in [m/rad].
-    """
-
-    pair: int
-    links: tuple[str, str]
-    distance: float
-    gradient: Array
-
-
 class CollisionModel:
     """Shapes on the links of a reduced pinocchio model, and the pairs of them that are checked.
 
-    It reads the kinematics that its owner computed last: joint placements for distances, joint
-    Jacobians for gradients.
+    It is not changed once it is made, so any thread may read it.
 
     Attributes:
-        seen: Least distance of the last :meth:`nearest` in [m].
+        model: The pinocchio model.
+        geometry: Its shapes and their pairs.
+        pairs: Links of each pair of shapes (k).
+        parting: Sense in which each joint moves the second shape of a pair against the first
+            (k, n): 1, -1, or 0 for a joint that is not between them.
+        levers: How far each joint changes a pair's distance at most (k, n) in [m/rad], wherever
+            the arm is.
     """
 
-    def __init__(
-        self, model: Native, data: Native, shapes: Sequence[Shape], disabled: frozenset[Pair]
-    ) -> None:
+    def __init__(self, model: Native, shapes: Sequence[Shape], disabled: frozenset[Pair]) -> None:
         """Attach the shapes and pair them.
 
         Args:
-            model: A pinocchio model; links are frames of it.
-            data: Its data.
+            model: A pinocchio model of one chain; links are frames of it.
             shapes: Shapes of the links.
             disabled: Pairs of links that are not checked.
         """
-        self._model, self._data = model, data
-        self._geometry = pin.GeometryModel()
-        links: list[str] = []
+        self.model = model
+        self.geometry = pin.GeometryModel()
         for number, shape in enumerate(shapes):
-            frame_id = model.getFrameId(shape.link)
-            frame = model.frames[frame_id]
-            placement = frame.placement * shape.placement
-            self._geometry.addGeometryObject(
-                pin.GeometryObject(
-                    f'{shape.link}_{number}',
-                    frame.parentJoint,
-                    frame_id,
-                    placement,
-                    shape.geometry,
-                )
-            )
-            links.append(shape.link)
-        parents = [obj.parentJoint for obj in self._geometry.geometryObjects]
-        self._pairs: list[tuple[str, str]] = []
-        self._parents: list[tuple[int, int]] = []
-        for first in range(len(links)):
-            for second in range(first + 1, len(links)):
-                names = (links[first], links[second])
-                if parents[first] == parents[second] or frozenset(names) in disabled:
+            self._attach(number, shape)
+        joints = [obj.parentJoint for obj in self.geometry.geometryObjects]
+        pairs: list[tuple[str, str]] = []
+        ends: list[tuple[int, int]] = []
+        for first in range(len(joints)):
+            for second in range(first + 1, len(joints)):
+                names = (shapes[first].link, shapes[second].link)
+                if joints[first] == joints[second] or frozenset(names) in disabled:
                     continue
-                self._geometry.addCollisionPair(pin.CollisionPair(first, second))
-                self._pairs.append(names)
-                self._parents.append((parents[first], parents[second]))
-        self._results = self._geometry.createData()
-        self.seen = float('inf')
+                self.geometry.addCollisionPair(pin.CollisionPair(first, second))
+                pairs.append(names)
+                ends.append((first, second))
+        self.pairs: Sequence[tuple[str, str]] = tuple(pairs)
+        self.parting: Array = np.array(
+            [_between(joints[first], joints[second], model.nv) for first, second in ends]
+        ).reshape(len(pairs), model.nv)
+        self.levers: Array = np.array(
+            [np.minimum(self._levers(a, b), self._levers(b, a)) for a, b in ends]
+        ).reshape(len(pairs), model.nv)
 
-    @property
-    def pairs(self) -> Sequence[tuple[str, str]]:
-        """Links of each pair of shapes that is checked."""
-        return self._pairs
+    def _attach(self, number: int, shape: Shape) -> None:
+        frame_id = self.model.getFrameId(shape.link)
+        frame = self.model.frames[frame_id]
+        self.geometry.addGeometryObject(
+            pin.GeometryObject(
+                f'{shape.link}_{number}',
+                frame.parentJoint,
+                frame_id,
+                frame.placement * shape.placement,
+                shape.geometry,
+            )
+        )
 
-    def measure(self) -> list[float]:
-        """Measure all pairs at the placements of the joints.
+    def _levers(self, shape: int, other: int) -> Array:
+        """Return how far each joint between two shapes moves a point of the first at most.
 
-        Returns:
-            Distance of each pair in [m].
+        Seen from the joint, nothing of the shape is farther away than the lengths that lead there.
         """
-        pin.updateGeometryPlacements(self._model, self._data, self._geometry, self._results)
-        pin.computeDistances(self._geometry, self._results)
-        return [result.min_distance for result in self._results.distanceResults]
+        objects, model = self.geometry.geometryObjects, self.model
+        near, far = objects[shape].parentJoint, objects[other].parentJoint
+        levers = np.zeros(model.nv)
+        reach = _extent(objects[shape])
+        outward = near < far
+        # from the shape joint by joint towards the other one
+        for joint in range(near + 1, far + 1) if outward else range(near, far, -1):
+            if outward:
+                reach += _length(model, joint)
+            sliding = model.joints[joint].shortname().startswith('JointModelP')
+            if sliding:
+                place = joint - 1
+                reach += max(
+                    abs(model.lowerPositionLimit[place]), abs(model.upperPositionLimit[place])
+                )
+            levers[joint - 1] = 1.0 if sliding else reach
+            if not outward:
+                reach += _length(model, joint)
+        return levers
 
-    def least(self) -> float:
-        """Measure all pairs, and return the least distance in [m]."""
-        pin.updateGeometryPlacements(self._model, self._data, self._geometry, self._results)
-        nearest = pin.computeDistances(self._geometry, self._results)
-        return float(self._results.distanceResults[nearest].min_distance)
 
-    def nearest(self, within: float, count: int) -> list[Proximity]:
-        """Measure, and return the nearest pairs with their gradients.
+def _between(first: int, second: int, count: int) -> Array:
+    """Return the sense in which each joint of a chain moves one body against another."""
+    senses = np.zeros(count)
+    senses[first:second] = 1.0
+    senses[second:first] = -1.0
+    return senses
 
-        Args:
-            within: Greatest distance of interest in [m].
-            count: How many pairs at most.
 
-        Returns:
-            The nearest pairs, the nearest first.
-        """
-        if not self._pairs:
-            return []
-        distances = self.measure()
-        self.seen = min(distances)
-        # few enough that sorting plain numbers is quicker than numpy
-        near = sorted(
-            (distance, pair) for pair, distance in enumerate(distances) if distance < within
-        )
-        return [self._proximity(pair, distance) for distance, pair in near[:count]]
+def _extent(shape: Native) -> float:
+    """Return the distance of the farthest point of a shape from its joint in [m]."""
+    shape.geometry.computeLocalAABB()
+    center = shape.placement.act(shape.geometry.aabb_center)
+    return float(np.linalg.norm(center)) + float(shape.geometry.aabb_radius)
 
-    def _proximity(self, pair: int, distance: float) -> Proximity:
-        result = self._results.distanceResults[pair]
-        first, second = self._parents[pair]
-        normal = result.normal  # from the first shape to the second
-        gradient = self._toward(second, result.getNearestPoint2(), normal) - self._toward(
-            first, result.getNearestPoint1(), normal
-        )
-        return Proximity(pair, self._pairs[pair], distance, gradient)
 
-    def _toward(self, joint: int, point: Array, direction: Array) -> Array:
-        """Return the speed of a point on a joint's body along a direction, per joint speed."""
-        if joint == 0:
-            return np.zeros(self._model.nv)
-        jacobian = pin.getJointJacobian(
-            self._model, self._data, joint, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-        )
-        a, b, c = (point - self._data.oMi[joint].translation).tolist()
-        x, y, z = direction.tolist()
-        # the lever crossed with the direction, by hand: numpy's own takes ten times as long
-        wrench = np.array([x, y, z, b * z - c * y, c * x - a * z, a * y - b * x])
-        speeds: Array = wrench @ jacobian
-        return speeds
+def _length(model: Native, joint: int) -> float:
+    return float(np.linalg.norm(model.jointPlacements[joint].translation))

@@ -11,9 +11,6 @@ from .model import RobotModel
 from .otg import Generator, hard_brake, MotionState, Plan
 from .report import Cause, Limiter
 
-BEYOND = 1.3
-"""How far the arm and what it holds reach, in reaches of the tip."""
-
 TOUCH = 1e-4
 """Change of a distance that is let pass, in all, in [m]: sliding along is no approach."""
 
@@ -117,9 +114,6 @@ class Guard:
             now = self._generator.brake(state)
             self._floor = self._clearance if now is None else self._distance(now)
             self._floor = min(self._floor, self._clearance)
-        if self._seen_room(stop, state) > self._clearance:
-            self._floor = self._clearance
-            return None
         room = self._distance(stop)
         if room < self._floor - TOUCH:
             return room
@@ -127,18 +121,8 @@ class Guard:
         return None
 
     def _distance(self, stop: Plan) -> float:
-        """Return the least distance between links where a stop ends in [m]."""
-        return self._model.clearance(stop.at(stop.duration).position)
-
-    def _seen_room(self, stop: Plan, state: MotionState) -> float:
-        """Return a lower bound of that from the distances that were seen last.
-
-        No link moves farther against another than the joints turn times the reach of the arm, and
-        of what it holds.
-        """
-        lower, upper = stop.extremes
-        turn = float(np.maximum(upper - state.position, state.position - lower).sum())
-        return self._model.seen_clearance(state.position) - BEYOND * turn * self._model.reach
+        """Return the least distance between links where a stop ends in [m], if it is small."""
+        return self._model.clearance(stop.at(stop.duration).position, self._clearance)
 
     def _brake(self, state: MotionState, period: float) -> MotionState:
         stop = self._generator.brake(state)

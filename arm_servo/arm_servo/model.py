@@ -6,13 +6,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+import math
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
 from .arrays import Array, frozen, Native
-from .collision import CollisionModel, Proximity
+from .clearances import Clearances, Proximity
+from .collision import CollisionModel
 from .description import Description
 from .exceptions import CommandError, ModelError
 from .limits import JointLimits, merge_limits
@@ -89,10 +91,8 @@ class RobotModel:
         self._tip_frame = self._model.getFrameId(self.tip)
         self._base_frame = self._model.getFrameId(self.base)
         self._at = b''  # positions of the kinematics that are cached
-        self._seen_at = b''
-        self._collision = CollisionModel(
-            self._model, self._data, description.shapes, semantic.disabled
-        )
+        self._shapes = CollisionModel(self._model, description.shapes, semantic.disabled)
+        self._clearances = Clearances(self._shapes)
         self.reach = self._reach()
 
     def __len__(self) -> int:
@@ -107,7 +107,7 @@ class RobotModel:
     @property
     def pairs(self) -> Sequence[tuple[str, str]]:
         """Links of each pair of shapes that is checked for collision."""
-        return self._collision.pairs
+        return self._shapes.pairs
 
     @property
     def frames(self) -> Sequence[str]:
@@ -150,22 +150,21 @@ class RobotModel:
             within: Greatest distance of interest in [m].
             count: How many pairs at most.
         """
-        self._update(positions)
-        self._seen_at = self._at
-        return self._collision.nearest(within, count)
+        return self._clearances.nearest(positions, within, count)
 
-    def clearance(self, positions: Array) -> float:
+    def clearance(self, positions: Array, within: float = math.inf) -> float:
         """Return the least distance between two shapes in [m]; infinity when none are checked.
 
         Args:
             positions: Joint positions in [rad].
+            within: Distance of interest in [m]; where it is more, a lower bound is good enough.
         """
-        if not self._collision.pairs:
-            return float('inf')
-        if positions.tobytes() != self._at:
-            pin.forwardKinematics(self._model, self._data, positions)
-            self._at = b''  # the Jacobians are not those of these positions
-        return self._collision.least()
+        distances = self._clearances.least(positions, within)
+        return float(distances.min(initial=math.inf))
+
+    def clearances(self) -> Clearances:
+        """Return what measures distances for another thread than the owner's."""
+        return Clearances(self._shapes)
 
     def check_link(self, link: str | None) -> None:
         """Make sure that a link can be asked for.
@@ -179,19 +178,6 @@ class RobotModel:
         if link is not None and not self._model.existFrame(link, pin.FrameType.BODY):
             known = ', '.join(self.frames)
             raise CommandError(f'there is no link {link!r} in {self.name}; links: {known}')
-
-    def seen_clearance(self, positions: Array) -> float:
-        """Return the least distance that :meth:`nearest` saw at positions in [m].
-
-        Args:
-            positions: Joint positions in [rad].
-
-        Returns:
-            The distance; minus infinity where it was last called elsewhere.
-        """
-        if positions.tobytes() != self._seen_at:
-            return -float('inf')
-        return self._collision.seen
 
     def index(self, joint: str) -> int:
         """Return the place of a joint.

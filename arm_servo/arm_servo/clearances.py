@@ -1,0 +1,127 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Distances between the links of an arm, and how fast its joints change them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from .arrays import Array
+from .collision import CollisionModel
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Proximity:
+    """Two shapes that are near to each other.
+
+    Attributes:
+        pair: Number of the pair, a place in :attr:`CollisionModel.pairs`.
+        links: Names of their links.
+        distance: Between their surfaces in [m]; negative when they overlap.
+        gradient: Change of the distance with each joint in [m/rad].
+    """
+
+    pair: int
+    links: tuple[str, str]
+    distance: float
+    gradient: Array
+
+
+class Clearances:
+    """Measures the distances of pairs, as far as they are not known well enough.
+
+    What was measured holds on: a pair comes nearer by the turns of the joints times their levers
+    at most. Pairs that are far apart are so measured once in many cycles. It belongs to one
+    thread.
+    """
+
+    def __init__(self, shapes: CollisionModel) -> None:
+        """Begin with nothing known.
+
+        Args:
+            shapes: The shapes and their pairs.
+        """
+        self._shapes = shapes
+        self._data = shapes.model.createData()
+        self._results = shapes.geometry.createData()
+        self._found = self._results.distanceResults
+        self._distances: Array = np.full(len(shapes.pairs), -np.inf)
+        self._places: Array = np.zeros_like(shapes.levers)
+
+    @property
+    def pairs(self) -> Sequence[tuple[str, str]]:
+        """Links of each pair of shapes."""
+        return self._shapes.pairs
+
+    @property
+    def levers(self) -> Array:
+        """How far each joint changes a pair's distance at most (k, n) in [m/rad]."""
+        return self._shapes.levers
+
+    def least(self, positions: Array, within: float) -> Array:
+        """Return distances: exact ones below a distance of interest, else least ones.
+
+        Args:
+            positions: Joint positions in [rad].
+            within: The distance of interest in [m].
+
+        Returns:
+            Distance of each pair in [m].
+        """
+        turned = np.abs(positions - self._places)
+        bounds: Array = self._distances - np.einsum('kn,kn->k', turned, self._shapes.levers)
+        (doubtful,) = (bounds < within).nonzero()
+        if not doubtful.size:
+            return bounds
+        shapes, results = self._shapes, self._results
+        pin.forwardKinematics(shapes.model, self._data, positions)
+        pin.updateGeometryPlacements(shapes.model, self._data, shapes.geometry, results)
+        for pair in doubtful.tolist():
+            result = pin.computeDistance(shapes.geometry, results, pair)
+            bounds[pair] = result.min_distance
+        self._distances[doubtful] = bounds[doubtful]
+        self._places[doubtful] = positions
+        return bounds
+
+    def nearest(self, positions: Array, within: float, count: int) -> list[Proximity]:
+        """Return the nearest pairs with the gradients of their distances.
+
+        Args:
+            positions: Joint positions in [rad].
+            within: Greatest distance of interest in [m].
+            count: How many pairs at most.
+
+        Returns:
+            The pairs, the nearest first.
+        """
+        distances = self.least(positions, within)
+        (places,) = (distances < within).nonzero()
+        near = sorted(zip(distances[places].tolist(), places.tolist(), strict=True))[:count]
+        if not near:
+            return []
+        gradients = self._gradients(positions, [pair for _, pair in near])
+        return [
+            Proximity(pair, self._shapes.pairs[pair], distance, gradient)
+            for (distance, pair), gradient in zip(near, gradients, strict=True)
+        ]
+
+    def _gradients(self, positions: Array, pairs: Sequence[int]) -> Array:
+        """Return the change of distance of pairs that were measured here with each joint (m, n).
+
+        A joint with the twist v, w about the base's origin moves a point p at v + w x p; along
+        the normal n, which points from the first shape to the second, that is n v + (p x n) w.
+        """
+        pin.computeJointJacobians(self._shapes.model, self._data, positions)
+        wrenches = []
+        for pair in pairs:
+            result = self._found[pair]
+            a, b, c = result.getNearestPoint2().tolist()
+            x, y, z = result.normal.tolist()
+            # crossed by hand: numpy's own takes ten times as long
+            wrenches.append((x, y, z, b * z - c * y, c * x - a * z, a * y - b * x))
+        gradients: Array = (np.array(wrenches) @ self._data.J) * self._shapes.parting[pairs]
+        return gradients

@@ -1,0 +1,49 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Distances that hold on from what was measured before are never too great."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from servo_robots import chain, robot, ROBOTS
+
+from arm_servo.model import RobotModel
+
+ARMS = [*(robot(name) for name in ROBOTS), chain('zpyypz')]
+"""The robots, and a chain with sliding joints."""
+
+ROUNDING = 1e-4
+"""Accuracy of a distance that was searched for from another begin in [m]."""
+
+
+@pytest.mark.parametrize('model', ARMS, ids=lambda model: model.name)
+@pytest.mark.parametrize('stride', [0.003, 0.05, 1.0])
+def test_what_is_known_is_a_lower_bound_and_exact_where_it_matters(
+    model: RobotModel, stride: float
+) -> None:
+    """On random walks with short and long steps, for each pair at each step."""
+    rng = np.random.default_rng(5)
+    lower, upper = np.maximum(model.limits.lower, -4.0), np.minimum(model.limits.upper, 4.0)
+    at, within = (lower + upper) / 2.0, 0.05
+    known = model.clearances()
+    for _ in range(150):
+        at = np.clip(at + stride * rng.uniform(-1.0, 1.0, len(at)), lower, upper)
+        measured = model.clearances().least(at, math.inf)
+        told = known.least(at, within)
+        assert (told <= measured + ROUNDING).all()
+        near = measured < within
+        assert told[near] == pytest.approx(measured[near], abs=ROUNDING)
+
+
+@pytest.mark.parametrize('model', ARMS, ids=lambda model: model.name)
+def test_no_distance_changes_faster_than_its_levers_say(model: RobotModel) -> None:
+    """Gradients anywhere are at most the levers."""
+    rng = np.random.default_rng(6)
+    lower, upper = np.maximum(model.limits.lower, -4.0), np.minimum(model.limits.upper, 4.0)
+    levers = model.clearances().levers
+    for _ in range(100):
+        for near in model.nearest(rng.uniform(lower, upper), math.inf, len(model.pairs)):
+            assert (np.abs(near.gradient) <= levers[near.pair] + 1e-9).all()
