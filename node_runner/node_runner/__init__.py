@@ -1,0 +1,26 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What every node's program has to do, once: start, end, and refuse parameters with words."""
+
+from .construction import destroyed_if_refused, destroyed_when_refused
+from .exceptions import ParameterError
+from .misspelt import refuse_misspelt, refuse_similar
+from .parameter_reader import ParameterReader
+from .program import run_node, run_program
+from .signals import stop_on_signals
+from .spinning import make_executor, spin, WAKE_PERIOD
+
+__all__ = [
+    'WAKE_PERIOD',
+    'ParameterError',
+    'ParameterReader',
+    'destroyed_if_refused',
+    'destroyed_when_refused',
+    'make_executor',
+    'refuse_misspelt',
+    'refuse_similar',
+    'run_node',
+    'run_program',
+    'spin',
+    'stop_on_signals',
+]

@@ -1,0 +1,62 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Names that nobody knows, because they are misspelt."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+import difflib
+
+from rclpy.node import Node
+
+from .exceptions import ParameterError
+
+ALIKE = 0.8  # of SequenceMatcher: one letter in five; short names for other nodes pass
+RCLPY_PREFIX = 'qos_overrides.'  # declared with a topic, so some of them later than our look
+
+
+def refuse_misspelt(node: Node) -> None:
+    """Refuse a parameter that looks like one of a node's; rclpy would ignore it.
+
+    Others are left alone: a parameter file may be for several nodes.
+
+    Args:
+        node: A node that has declared all its parameters.
+
+    Raises:
+        ParameterError: There is one; the message says what was meant.
+    """
+    given = node._parameter_overrides  # noqa: SLF001  # there is no public way to ask
+    unknown = [name for name in given if not node.has_parameter(name)]
+    known = node.get_parameters_by_prefix('')
+    refuse_similar(
+        (name for name in unknown if not name.startswith(RCLPY_PREFIX)),
+        (name for name in known if not name.startswith(RCLPY_PREFIX)),
+    )
+
+
+def refuse_similar(unknown: Iterable[str], known: Iterable[str]) -> None:
+    """Refuse a name that looks like a known one.
+
+    Args:
+        unknown: Names that nobody knows.
+        known: Names that there are.
+
+    Raises:
+        ParameterError: There is one; the message says what was meant.
+    """
+    names = list(known)
+    for name in sorted(unknown):
+        if meant := closest(name, names):
+            raise ParameterError(f'unknown parameter {name!r}; did you mean {meant!r}?')
+
+
+def closest(name: str, names: Iterable[str], alike: float = ALIKE) -> str:
+    """Return the one of some names that is most like another one; empty when none is.
+
+    Args:
+        name: What was written.
+        names: What there is.
+        alike: Least likeness, 0 to 1.
+    """
+    return next(iter(difflib.get_close_matches(name, list(names), n=1, cutoff=alike)), '')

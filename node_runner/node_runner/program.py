@@ -1,0 +1,99 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Start and end of a program that runs ROS nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+import threading
+
+import rclpy
+from rclpy.exceptions import NameValidationException, ParameterException
+from rclpy.logging import get_logger
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import try_shutdown
+
+from .exceptions import ParameterError
+from .signals import stop_on_signals
+from .spinning import spin
+
+REFUSED = 1
+"""Exit code of a program that could not begin."""
+
+Body = Callable[[threading.Event], int | None]
+
+
+def run_program(
+    name: str,
+    body: Body,
+    *errors: type[Exception],
+    args: Sequence[str] | None = None,
+    patient: bool = False,
+) -> int:
+    """Run a program until it returns; signals end it, and never tear it in the middle.
+
+    Parameters that are refused, arguments that ROS does not understand and the errors named here
+    are told in one line of the log. Everything else is a defect, and has its traceback.
+
+    Args:
+        name: Name for the log.
+        body: Makes the nodes and serves them; ends soon after the event is set, by Ctrl-C, SIGTERM
+            or the closing of the terminal. May return an exit code.
+        *errors: What else is told in a line.
+        args: Command line; None for the process's own.
+        patient: As in :func:`.stop_on_signals`.
+
+    Returns:
+        Exit code: that of the body, or 1 when it raised one of the errors.
+    """
+    stop = stop_on_signals(patient=patient)
+    try:
+        rclpy.init(
+            args=None if args is None else list(args),
+            signal_handler_options=SignalHandlerOptions.NO,
+        )
+    except RuntimeError as error:  # rcl has no finer class for all of them
+        get_logger(name).fatal(f'ROS does not take these arguments: {error}')
+        return REFUSED
+    told: tuple[type[Exception], ...] = (
+        ParameterError,
+        ParameterException,
+        NameValidationException,
+        *errors,
+    )
+    try:
+        return body(stop) or 0
+    except told as error:
+        get_logger(name).fatal(str(error))
+        return REFUSED
+    finally:
+        try_shutdown()
+
+
+def run_node(
+    name: str,
+    make: Callable[[], Node],
+    *errors: type[Exception],
+    args: Sequence[str] | None = None,
+) -> int:
+    """Run one node that needs no more than its callbacks.
+
+    Args:
+        name: Name for the log.
+        make: Makes the node.
+        *errors: What is told in a line when it cannot be made.
+        args: Command line; None for the process's own.
+
+    Returns:
+        Exit code: 0, or 1 when the node could not be made.
+    """
+
+    def body(stop: threading.Event) -> None:
+        node = make()
+        try:
+            spin([node], stop)
+        finally:
+            node.destroy_node()
+
+    return run_program(name, body, *errors, args=args)

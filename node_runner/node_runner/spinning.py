@@ -1,0 +1,51 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Serve the callbacks of nodes with the executor that costs least."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+import threading
+
+from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.utilities import ok
+
+WAKE_PERIOD = 0.1
+"""How late the end may be noticed, in [s]."""
+
+
+def make_executor() -> Executor:
+    """Return an events executor where rclpy has one, else a single-threaded one.
+
+    A MultiThreadedExecutor is no choice: in Jazzy it hands queued tasks out again and again
+    while its workers wait for the interpreter lock (rclpy issue 1452).
+    """
+    try:
+        from rclpy.experimental.events_executor import EventsExecutor
+    except ImportError:  # rclpy before 7.1.4
+        return SingleThreadedExecutor()
+    return EventsExecutor()
+
+
+def spin(nodes: Iterable[Node], stop: threading.Event, executor: Executor | None = None) -> None:
+    """Serve nodes until an event is set, or until ``rclpy.shutdown``.
+
+    The nodes are still there afterwards; destroying them is up to the caller.
+
+    Args:
+        nodes: The nodes to serve.
+        stop: Ends it within :data:`WAKE_PERIOD`.
+        executor: What serves them; :func:`make_executor` chooses when it is None.
+    """
+    executor = executor or make_executor()
+    for node in nodes:
+        executor.add_node(node)
+    try:
+        # the unbounded spin() of some EventsExecutors burns a core and runs nothing
+        while ok() and not stop.is_set():
+            executor.spin_once(timeout_sec=WAKE_PERIOD)
+    except ExternalShutdownException:
+        pass
+    finally:
+        executor.shutdown()

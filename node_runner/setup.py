@@ -1,0 +1,22 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Build description of node_runner."""
+
+from setuptools import find_packages, setup
+
+setup(
+    name='node_runner',
+    version='0.1.0',
+    packages=find_packages(include=['node_runner', 'node_runner.*']),
+    package_data={'node_runner': ['py.typed']},
+    data_files=[
+        ('share/ament_index/resource_index/packages', ['resource/node_runner']),
+        ('share/node_runner', ['package.xml']),
+    ],
+    install_requires=['setuptools'],
+    zip_safe=True,
+    maintainer='The arm and quad developers',
+    maintainer_email='developers@example.org',
+    description='Runs ROS nodes until they are told to end, and reads their parameters',
+    license='Apache-2.0',
+)

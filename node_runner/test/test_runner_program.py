@@ -1,0 +1,126 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+import signal
+import subprocess
+import sys
+
+from isolation import Isolation
+import pytest
+
+PROGRAM = Path(__file__).with_name('runner_program.py')
+PATIENCE = 30.0  # [s]
+
+
+@contextmanager
+def running(
+    isolation: Isolation, *words: str, prefix: tuple[str, ...] = ()
+) -> Iterator[subprocess.Popen[str]]:
+    """Start the program; it is gone afterwards."""
+    process = subprocess.Popen(
+        [*prefix, sys.executable, str(PROGRAM), *words],
+        env=isolation.env,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def said(process: subprocess.Popen[str]) -> str:
+    """Return the next line of a process."""
+    assert process.stdout is not None
+    return process.stdout.readline().strip()
+
+
+@pytest.mark.scenario
+@pytest.mark.parametrize('first', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_the_first_signal_ends_it_and_a_sigterm_does_not_cut_the_end_short(
+    isolation: Isolation, first: signal.Signals
+) -> None:
+    """Whatever the signal, the program ends its own way, though a SIGTERM follows; code 0."""
+    with running(isolation) as process:
+        assert said(process) == 'ready'
+        process.send_signal(first)
+        assert said(process) == 'stopping'
+        process.send_signal(signal.SIGTERM)
+        process.send_signal(signal.SIGHUP)
+        output, errors = process.communicate('go on\n', timeout=PATIENCE)
+        assert (output.strip(), process.returncode) == ('ended', 0), errors
+
+
+@pytest.mark.scenario
+def test_a_second_ctrl_c_ends_it_at_once(isolation: Isolation) -> None:
+    """A program that hangs in its end is left with a second SIGINT, which is in its exit code."""
+    with running(isolation) as process:
+        assert said(process) == 'ready'
+        process.send_signal(signal.SIGINT)
+        assert said(process) == 'stopping'
+        process.send_signal(signal.SIGINT)
+        assert process.wait(PATIENCE) == -signal.SIGINT
+
+
+@pytest.mark.scenario
+def test_a_patient_program_takes_a_second_ctrl_c(isolation: Isolation) -> None:
+    """A program that has a terminal to restore does so, however often Ctrl-C is pressed."""
+    with running(isolation, '--patient') as process:
+        assert said(process) == 'ready'
+        process.send_signal(signal.SIGINT)
+        assert said(process) == 'stopping'
+        process.send_signal(signal.SIGINT)
+        output, _ = process.communicate('go on\n', timeout=PATIENCE)
+        assert (output.strip(), process.returncode) == ('ended', 0)
+
+
+@pytest.mark.scenario
+def test_nohup_is_respected(isolation: Isolation) -> None:
+    """A SIGHUP that was ignored when the program began does not end it."""
+    with running(isolation, prefix=('nohup',)) as process:
+        assert said(process) == 'ready'
+        process.send_signal(signal.SIGHUP)
+        process.send_signal(signal.SIGTERM)  # is told, the one before was not
+        assert said(process) == 'stopping'
+        process.communicate('go on\n', timeout=PATIENCE)
+        assert process.returncode == 0
+
+
+@pytest.mark.scenario
+def test_the_exit_code_is_that_of_the_body(isolation: Isolation) -> None:
+    """What the body returns is what the process ends with."""
+    with running(isolation, '--ros-args', '-p', 'code:=7') as process:
+        assert said(process) == 'ready'
+        process.send_signal(signal.SIGTERM)
+        process.communicate('go on\n', timeout=PATIENCE)
+        assert process.returncode == 7
+
+
+WRONG = {
+    'range': (('-p', 'rate:=0.5'), 'rate is 0.5: it must be 1.0 to 100.0'),
+    'misspelt': (('-p', 'ratte:=5.0'), "unknown parameter 'ratte'; did you mean 'rate'?"),
+    'no rule': (('-p', 'rate'), "'-p rate'"),
+    'no file': (('--params-file', '/nowhere.yaml'), '/nowhere.yaml'),
+    'no option': (('--bogus',), '--bogus'),
+    'rclpy': (('-p', 'start_type_description_service:=5'), 'start_type_description_service'),
+}
+
+
+@pytest.mark.scenario
+@pytest.mark.parametrize('case', WRONG)
+def test_what_is_refused_is_one_line(isolation: Isolation, case: str) -> None:
+    """Parameters and arguments that are wrong end it with 1 and a line, without a traceback."""
+    words, reason = WRONG[case]
+    with running(isolation, '--ros-args', *words) as process:
+        output, errors = process.communicate(timeout=PATIENCE)
+        assert process.returncode == 1
+        assert reason in errors
+        assert errors.count('[FATAL]') == 1
+        assert 'Traceback' not in errors + output
