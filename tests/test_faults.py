@@ -5,12 +5,15 @@
 from __future__ import annotations
 
 import signal
+import time
 from typing import TYPE_CHECKING
 
 from bus_recorder import BusRecorder
 from canopen_interfaces.srv import COTargetDouble
 import pytest
 from simulated_arm import JOINTS, SimulatedArm
+
+from arm_canopen.standard.cob_id import CobId
 
 if TYPE_CHECKING:
     from isolation import Isolation
@@ -53,3 +56,19 @@ def test_ctrl_c_leaves_every_drive_disabled(isolation: Isolation) -> None:
         assert arm.master.stop() == 0, arm.master.output
         states = recorder.last_states()
         assert states == dict.fromkeys(range(2, 9), 'Switch on disabled')
+
+
+def test_a_second_master_leaves_the_bus_of_the_first_alone(isolation: Isolation) -> None:
+    """It ends with words and without a frame; the drives of the first stay enabled."""
+    with SimulatedArm(isolation) as arm, BusRecorder(isolation.bus) as recorder:
+        arm.init_all()
+        begin = time.monotonic()
+        second = arm.start('master')
+        second.wait_for('another master is on .*SYNC.*beside_master:=true')
+        assert second.wait() == 1, second.output
+        assert 'Traceback' not in second.output
+        assert arm.client.trigger('/panda_joint1/position_mode').success
+        after = [frame for frame in recorder.frames if frame.timestamp >= begin]
+        assert not [frame for frame in after if frame.can_id == CobId.NMT]
+        assert set(recorder.last_states().values()) == {'Operation enabled'}
+        assert 'ERROR' not in arm.master.output

@@ -230,6 +230,7 @@ class VirtualNetwork:
         absent: Iterable[str] = (),
         dictionaries: Mapping[str, ObjectDictionary] | None = None,
         servo: ServoModel | None = None,
+        beside_master: bool = False,
     ) -> None:
         """Connect everything and switch the devices on; the master waits for :meth:`start`.
 
@@ -238,6 +239,7 @@ class VirtualNetwork:
             absent: Names of devices that are not there (yet).
             dictionaries: What devices really have, where it is not what ``config`` says.
             servo: Time constants of the motors.
+            beside_master: Another master is meant to be on the bus, too.
         """
         self.now = START
         self.wire = VirtualWire()
@@ -248,6 +250,7 @@ class VirtualNetwork:
         self._config = config
         self._dictionaries = dict(dictionaries or {})
         self._servo = servo
+        self._beside_master = beside_master
         self.replace_master()
         for node in config.nodes:
             if node.name not in absent:
@@ -257,7 +260,10 @@ class VirtualNetwork:
         """Let the master vanish without a word, and another one take its place."""
         self._cycle_at = NEVER
         self.network = Network(
-            self._config, lambda frame: self.wire.put(self.now, 'master', frame), self._note
+            self._config,
+            lambda frame: self.wire.put(self.now, 'master', frame),
+            self._note,
+            beside_master=self._beside_master,
         )
         scheduler = self.network.scheduler
         drives = [

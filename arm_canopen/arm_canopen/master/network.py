@@ -26,6 +26,7 @@ from .nmt_sender import NmtSender
 from .process_image import SyncRound
 from .producers import HeartbeatProducer, SyncCounter, TimeProducer, utc_now, WallClock
 from .remote_node import RemoteNode
+from .rivals import RivalWatch
 from .scheduler import Scheduler, Task
 from .sdo_client import SdoClient
 from .startup import Startup
@@ -58,6 +59,8 @@ class Network:
         send: Callable[[Frame], None],
         report: Report,
         wall_clock: WallClock = utc_now,
+        *,
+        beside_master: bool = False,
     ) -> None:
         """Build the network; nothing is sent before :meth:`start`.
 
@@ -66,6 +69,8 @@ class Network:
             send: Hands a frame to the bus; may raise BusError.
             report: Takes events.
             wall_clock: Time of day for TIME.
+            beside_master: Another master leads other devices on this bus, so that no NMT command
+                is for all nodes.
         """
         master = config.master
         self.config = config
@@ -89,6 +94,7 @@ class Network:
         self._time = TimeProducer(
             master.time_cob_id & CAN_ID_MASK, master.time_period, wall_clock, self.send
         )
+        self._broadcasts = not beside_master
         self._nmt = NmtSender(self.scheduler, self.send, master.nmt_inhibit_time)
         self.nodes = {
             node.name: RemoteNode(node, self.scheduler, self._sync, self.send, report)
@@ -100,10 +106,9 @@ class Network:
         self._boot_tasks: dict[str, Task[None]] = {}
         self._handlers: dict[int, Callable[[Frame], None]] = {}
         self._handlers[CobId.NMT] = self._hear_nmt
-        self._rivals: set[int] = set()
-        self._handlers[CobId.HEARTBEAT + master.node_id] = self._hear_rival
-        if master.sync_period > 0:
-            self._handlers[CobId.SYNC] = self._hear_rival
+        rivals = RivalWatch(config, report, expected=beside_master)
+        for can_id in (CobId.HEARTBEAT + master.node_id, CobId.SYNC):
+            self._handlers[can_id] = rivals.receive
         self._strangers: dict[int, SdoClient] = {}
         for node in self.nodes.values():
             self._connect(node)
@@ -187,7 +192,11 @@ class Network:
             self._set_state(command)
             return
         self._note_nmt(command, node_id)
-        self._nmt.send(command, node_id)
+        if node_id == ALL_NODES and not self._broadcasts:
+            for node in self.nodes.values():
+                self._nmt.send(command, node.config.node_id)
+        else:
+            self._nmt.send(command, node_id)
 
     def _set_state(self, command: NmtCommand) -> None:
         before = self.state
@@ -249,18 +258,6 @@ class Network:
         parsed = parse_nmt(frame.data)
         if parsed is not None:
             self._note_nmt(*parsed)
-
-    def _hear_rival(self, frame: Frame) -> None:
-        """Say that somebody else sends what only the master of a bus sends."""
-        if frame.can_id in self._rivals:
-            return
-        self._rivals.add(frame.can_id)
-        what = 'SYNC' if frame.can_id == CobId.SYNC else f'the heartbeat 0x{frame.can_id:03X}'
-        text = (
-            f'another master is on this bus: somebody else sends {what}; two masters command the '
-            'same drives, so end one of them'
-        )
-        self._report(Event(EventKind.BUS, Severity.ERROR, '', text))
 
     def note_pause(self, late: float) -> None:
         """Say that a cycle came late by so many [s], before its consequences show."""

@@ -44,7 +44,7 @@ def run_master(args: Sequence[str] | None = None, *, extend: Extend | None = Non
             the executor, which may attach motion sources.
 
     Returns:
-        Exit code: 0, or 1 when the bus could not be configured or opened.
+        Exit code: 0, or 1 when the bus could not be configured or opened, or has a master.
     """
     sys.setswitchinterval(SWITCH_INTERVAL)
     rclpy.init(
@@ -74,11 +74,13 @@ class Parameters:
         bus_configs: Paths of the bus.yml files, one for each bus.
         can_names: Names of the CAN interfaces, in the same order.
         diagnostics_period: Time between two /diagnostics messages in [s].
+        beside_master: Start although another master is heard on the bus.
     """
 
     bus_configs: list[str]
     can_names: list[str]
     diagnostics_period: float
+    beside_master: bool
 
 
 def _run(stop: threading.Event, extend: Extend | None) -> None:
@@ -104,7 +106,13 @@ def _make_process(config: BusConfig, can: Bus, stack: ExitStack) -> MasterProces
     for warning in (*config.warnings, *check_bus(config).warnings):
         node.get_logger().warning(str(warning))
     node.get_logger().info(f'{len(config.nodes)} devices of {config.file} on {can.name}')
-    return MasterProcess(node, config, can, diagnostics_period=parameters.diagnostics_period)
+    return MasterProcess(
+        node,
+        config,
+        can,
+        diagnostics_period=parameters.diagnostics_period,
+        beside_master=parameters.beside_master,
+    )
 
 
 def _serve(
@@ -116,9 +124,11 @@ def _serve(
         nodes += [node for process in processes for node in extend(process)]
     for node in nodes:
         executor.add_node(node)
-    for process in processes:
-        process.start()
     try:
+        with ThreadPoolExecutor() as pool:  # all buses before the first word on any of them
+            list(pool.map(MasterProcess.listen, processes))
+        for process in processes:
+            process.start()
         while not stop.is_set():
             executor.spin_once(timeout_sec=WAKE_PERIOD)
     finally:
@@ -174,12 +184,22 @@ def _declare(node: Node) -> Parameters:
             floating_point_range=[FloatingPointRange(from_value=0.05, to_value=60.0)],
         ),
     ).value
+    beside_master = node.declare_parameter(
+        'beside_master',
+        False,
+        ParameterDescriptor(
+            description='start although another master is heard, which leads other devices',
+            read_only=True,
+        ),
+    ).value
     refuse_misspelt(node)
     if not configs:
         raise CanopenError(
             'no bus_config: give the path of a bus.yml with --ros-args -p bus_config:=FILE'
         )
-    parameters = Parameters(configs.split(','), can_names.split(','), float(period))
+    parameters = Parameters(
+        configs.split(','), can_names.split(','), float(period), bool(beside_master)
+    )
     if len(parameters.bus_configs) != len(parameters.can_names):
         raise CanopenError(
             f'bus_config names {len(parameters.bus_configs)} buses, can_interface_name '

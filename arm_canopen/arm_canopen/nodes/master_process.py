@@ -26,6 +26,7 @@ from ..config.model import BusConfig
 from ..master.events import Event, EventKind, Severity
 from ..master.network import Network
 from ..master.remote_node import RemoteNode
+from ..master.rivals import describe, listen, refuse_rival
 from ..master.runner import NetworkThread
 from ..master.status import node_status
 from .device_node import DeviceNode
@@ -52,7 +53,13 @@ class MasterProcess:
     """
 
     def __init__(
-        self, node: Node, config: BusConfig, can: Bus, *, diagnostics_period: float
+        self,
+        node: Node,
+        config: BusConfig,
+        can: Bus,
+        *,
+        diagnostics_period: float,
+        beside_master: bool = False,
     ) -> None:
         """Build it; nothing is sent before :meth:`start`.
 
@@ -61,18 +68,21 @@ class MasterProcess:
             config: The bus.
             can: The open CAN interface; it stays the caller's to close.
             diagnostics_period: Time between two /diagnostics messages in [s].
+            beside_master: Start although another master is heard, and command no device of its.
         """
         self.bus = config
         self._node = node
         self._can = can
         self._output = OutputThread(node.get_logger())
         self._load = BusLoad(config.master.bitrate, time.monotonic())
-        self._network = Network(config, self._send, self._report)
+        self._beside_master = beside_master
+        self._network = Network(config, self._send, self._report, beside_master=beside_master)
         self._network.on_frame = self._load.count
         self._thread = NetworkThread(can, self._network)
         self._group = self._build_drives()
         self._network.on_cycle = self._group.cycle
         self._network.on_feedback = self._feedback
+        self._started = False
         self._feedback_posted = False
         self._operational: set[str] = set()
         self._devices = {
@@ -97,13 +107,29 @@ class MasterProcess:
             services.admit = managed.admit
             self.nodes.append(managed.manager)
 
+    def listen(self) -> None:
+        """Listen for another master before the first word; call it right before :meth:`start`.
+
+        Raises:
+            RivalError: There is one, and nobody said to go on beside it.
+        """
+        if not self._beside_master:
+            refuse_rival(self._can, self.bus)
+        elif heard := listen(self._can, self.bus):
+            self._node.get_logger().warning(
+                f'going on beside another master, as beside_master says: {describe(heard)}'
+            )
+
     def start(self) -> None:
         """Boot the devices and start the cycle."""
+        self._started = True
         self._output.start()
         self._thread.start()
 
     def stop(self) -> None:
         """Bring every drive to quick stop and disable it, then end the cycle."""
+        if not self._started:
+            return  # the devices are not ours
         scheduler = self._network.scheduler
 
         async def leave() -> None:

@@ -1,0 +1,179 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Another master on the bus: the frames by which it is known, and looking for it beforehand.
+
+Two masters command the same drives, and the first thing that a master does is to reset them. So it
+listens before it says a word.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import IntEnum
+import time
+
+from ..can.bus import Bus
+from ..can.frame import Frame
+from ..config.model import BusConfig, MasterConfig
+from ..exceptions import BusError, RivalError
+from ..standard.cob_id import CobId
+from ..standard.nmt import ALL_NODES, parse_nmt
+from .events import Event, EventKind, Report, Severity
+
+LISTEN_MIN = 0.1  # [s] a master that runs may be held up by its computer for so long
+LISTEN_MAX = 0.2  # [s] what a start may take longer when nobody is there
+SIGNS_TOLD = 3
+PERIODS = 2  # of SYNC in which a master that runs shows itself
+
+
+class Telling(IntEnum):
+    """How much a frame says about who sends it, the clearest first."""
+
+    COMMAND = 0
+    HEARTBEAT = 1
+    SYNC = 2
+    RPDO = 3
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Sign:
+    """A kind of frame that only the master of a bus sends.
+
+    Attributes:
+        telling: How much it says.
+        text: What it is, in words.
+    """
+
+    telling: Telling
+    text: str
+
+
+class RivalSigns:
+    """Reads from frames of others what only the master of this bus would send."""
+
+    def __init__(self, config: BusConfig) -> None:
+        """Note which frames are those of the master.
+
+        Args:
+            config: The bus.
+        """
+        master = config.master
+        heartbeat = CobId.HEARTBEAT + master.node_id
+        from_devices = {pdo.cob_id for node in config.nodes for pdo in node.tpdos}
+        self._signs = {
+            pdo.cob_id: Sign(
+                Telling.RPDO, f'RPDO {pdo.number} (0x{pdo.cob_id:03X}) of {node.name}'
+            )
+            for node in config.nodes
+            for pdo in node.rpdos
+            if pdo.enabled and pdo.cob_id not in from_devices  # devices may command each other
+        }
+        text = f'the heartbeat 0x{heartbeat:03X} of node id {master.node_id}, which is our own'
+        self._signs[heartbeat] = Sign(Telling.HEARTBEAT, text)
+        if master.sync_period > 0:
+            self._signs[CobId.SYNC] = Sign(Telling.SYNC, f'SYNC (0x{CobId.SYNC:03X})')
+
+    def read(self, frame: Frame) -> Sign | None:
+        """Return what a frame of somebody else says, None when any device may send it."""
+        if frame.is_extended or frame.is_remote or frame.is_error:
+            return None
+        if frame.can_id == CobId.NMT:
+            return _command(frame)
+        return self._signs.get(frame.can_id)
+
+
+class RivalWatch:
+    """Says once of each kind of frame that somebody else sends what only the master sends."""
+
+    def __init__(self, config: BusConfig, report: Report, *, expected: bool) -> None:
+        """Begin with nobody heard.
+
+        Args:
+            config: The bus.
+            report: Takes events.
+            expected: The other master is meant to be there.
+        """
+        self._signs = RivalSigns(config)
+        self._report = report
+        self._severity = Severity.WARNING if expected else Severity.ERROR
+        self._told: set[Sign] = set()
+
+    def receive(self, frame: Frame) -> None:
+        """Take a frame of somebody else."""
+        sign = self._signs.read(frame)
+        if sign is not None and sign not in self._told:
+            self._told.add(sign)
+            text = (
+                f'another master is on this bus: somebody else sends {sign.text}; two masters '
+                'command the same drives, so end one of them'
+            )
+            self._report(Event(EventKind.BUS, self._severity, '', text))
+
+
+def listening_time(master: MasterConfig) -> float:
+    """Return for how long another master is listened for in [s].
+
+    It most likely runs with the same bus.yml, so it shows itself with each SYNC.
+    """
+    if not (master.start and master.sync_period):
+        return LISTEN_MAX
+    return min(max(PERIODS * master.sync_period, LISTEN_MIN), LISTEN_MAX)
+
+
+def listen(
+    bus: Bus, config: BusConfig, clock: Callable[[], float] = time.monotonic
+) -> Counter[Sign]:
+    """Listen for another master, without a word.
+
+    Args:
+        bus: An open bus that nobody else reads.
+        config: What this master is about to do on it.
+        clock: The steady clock in [s].
+
+    Returns:
+        What was heard of it, and how often; empty when nobody is there.
+    """
+    signs, heard = RivalSigns(config), Counter[Sign]()
+    begin = clock()
+    end = begin + listening_time(config.master)
+    while (left := end - clock()) > 0.0:
+        try:
+            frames = bus.receive(left)
+        except BusError:  # nobody can be heard on it now; it says so itself when it is used
+            break
+        # what came before may be the last words of a master that has ended since
+        fresh = (signs.read(frame) for frame in frames if frame.timestamp >= begin)
+        heard.update(sign for sign in fresh if sign is not None)
+    return heard
+
+
+def describe(heard: Counter[Sign]) -> str:
+    """Name what was heard of another master, the clearest first."""
+    return ', '.join(f'{sign.text} {heard[sign]} times' for sign in sorted(heard)[:SIGNS_TOLD])
+
+
+def refuse_rival(bus: Bus, config: BusConfig) -> None:
+    """Listen, and refuse a bus on which another master is heard.
+
+    Raises:
+        RivalError: There is one; the message says by which frames it is known.
+    """
+    heard = listen(bus, config)
+    if heard:
+        raise RivalError(
+            f'another master is on {bus.name}: it sent {describe(heard)} in '
+            f'{listening_time(config.master):g} s. Nothing was sent, as a start resets the '
+            'devices that it leads. End it, choose another can_interface_name, or, if it has '
+            'devices of its own, go on beside it with -p beside_master:=true'
+        )
+
+
+def _command(frame: Frame) -> Sign | None:
+    parsed = parse_nmt(frame.data)
+    if parsed is None:
+        return None
+    command, node_id = parsed
+    whom = 'all nodes' if node_id == ALL_NODES else f'node {node_id}'
+    return Sign(Telling.COMMAND, f'the NMT command {command.name} to {whom}')
