@@ -214,14 +214,14 @@ def test_a_stop_is_clean(rig: NodeRig) -> None:
 
 WRONG = {
     'protokoll:=old': "did you mean 'protocol'",
-    'protocol:=newest': "protocol 'newest' is none of auto, vendor, new, old",
+    'protocol:=newest': "protocol is 'newest': it must be auto, vendor, new or old",
     'joints.fl_hip_joint.sign:=0': 'sign 0 is neither 1 nor -1',
     'joints.fl_calf_joint.offset:=6.9': 'correct joints.fl_calf_joint.offset',
     'robot_description:=<robot/>': 'no joint for motors 11',
     'robot_description:=none': 'no XML',
-    'max_joint_speed:=2': 'max_joint_speed is no number with a point; the default is 12.0',
-    'max_joint_speed:=500.0': 'max_joint_speed out of range Min: 0.1, Max: 100.0',
-    'publish_tf:=3': 'publish_tf is no true or false',
+    'max_joint_speed:=fast': "max_joint_speed is 'fast': it must be a number",
+    'max_joint_speed:=500.0': 'max_joint_speed is 500.0: it must be 0.1 to 100.0',
+    'publish_tf:=3': 'publish_tf is 3: it must be true or false',
 }
 
 
@@ -236,6 +236,6 @@ def test_a_wrong_parameter_ends_the_node(isolation: Isolation) -> None:
             for argument in WRONG
         ]
         for process, reason in zip(processes, WRONG.values(), strict=True):
-            assert process.wait() == 2
+            assert process.wait() == 1
             assert reason in process.output
             assert 'Traceback' not in process.output

@@ -10,7 +10,6 @@ import threading
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Pose, Twist, TwistStamped
 from rcl_interfaces.msg import SetParametersResult
-import rclpy
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import (
@@ -20,12 +19,11 @@ from rclpy.qos import (
     QoSProfile,
     ReliabilityPolicy,
 )
-from rclpy.signals import SignalHandlerOptions
-from rclpy.utilities import try_shutdown
 from sensor_msgs.msg import BatteryState, Imu, JointState
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
+from node_runner import destroyed_when_refused, run_program, spin
 from quad_msgs.msg import JointCommand
 from quad_msgs.srv import SetMode
 
@@ -42,7 +40,6 @@ from .control_loop import ControlLoop
 from .diagnostics import loop_diagnostic, state_diagnostic
 from .joint_reader import CommandScope, JointReader
 from .parameters import changed_gait, declare_parameters
-from .spinning import spin, stop_on_signals
 
 COMMAND_QOS = QoSProfile(
     reliability=ReliabilityPolicy.RELIABLE, history=HistoryPolicy.KEEP_LAST, depth=1
@@ -59,6 +56,7 @@ class ControllerNode(Node):
         failure: Why the loop ended, empty as long as it runs.
     """
 
+    @destroyed_when_refused
     def __init__(self, stop: threading.Event) -> None:
         """Declare parameters, topics and services; :meth:`begin` starts the loop.
 
@@ -66,7 +64,8 @@ class ControllerNode(Node):
             stop: Set when the loop has ended by a defect.
 
         Raises:
-            QuadControllerError: A parameter or the robot description does not fit.
+            ParameterError: A parameter is misspelt or of the wrong kind.
+            QuadControllerError: Parameters or the robot description do not fit.
         """
         super().__init__('controller_node')
         self._settings = settings = declare_parameters(self)
@@ -273,25 +272,21 @@ class ControllerNode(Node):
         self._stop.set()
 
 
-def main() -> None:
-    """Entry point."""
-    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-    stop = stop_on_signals()
-    try:
-        node = ControllerNode(stop)
-    except QuadControllerError as error:
-        rclpy.logging.get_logger('controller_node').fatal(str(error))
-        try_shutdown()
-        sys.exit(2)
+def main() -> int:
+    """Run until Ctrl-C; return the exit code."""
+    return run_program('controller_node', _serve, QuadControllerError)
+
+
+def _serve(stop: threading.Event) -> int:
+    node = ControllerNode(stop)
     node.begin()
     try:
-        spin(node, stop)
+        spin([node], stop)
     finally:
         node.end()
         node.destroy_node()
-        try_shutdown()
-    sys.exit(1 if node.failure else 0)
+    return 1 if node.failure else 0
 
 
 if __name__ == '__main__':
-    main()
+    sys.exit(main())

@@ -10,6 +10,7 @@ from typing import Any
 
 from rclpy.node import Node
 
+from node_runner import ParameterReader, refuse_misspelt
 from quad_description import PRESETS, robot_urdf
 
 from ..gait.body import BodyLimits
@@ -19,7 +20,6 @@ from ..gait.servo_compensation import ServoModel
 from ..model.quadruped import Quadruped, quadruped
 from ..policy.options import GravitySource, ImuFrame, OPTION_RANGES, PolicyOptions
 from ..states.parameters import STATE_RANGES, StateParameters
-from .parameter_reader import ParameterReader, refuse_misspelt
 
 GAIT_MEANINGS: Mapping[str, str] = {
     'max_linear_velocity_x': 'forward and backward [m/s]',
@@ -97,13 +97,14 @@ def declare_parameters(node: Node) -> NodeSettings:
     """Declare all parameters of the node and read them.
 
     Raises:
-        ParameterError: One does not make sense; the message names it, its value and the remedy.
+        node_runner.ParameterError: One is misspelt, of another kind or out of its range.
+        ParameterError: They do not make sense together; the message names the remedy.
         DescriptionError: The robot description is no quadruped's.
     """
     read = ParameterReader(node)
     settings = NodeSettings(
         robot=_robot(read),
-        gait=_gait(read),
+        gait=_gait(node, read),
         first_gait=read.choice(
             'gait', Gait.TROT.value, {gait.value: gait for gait in Gait}, 'gait to begin with'
         ),
@@ -148,10 +149,10 @@ def _robot(read: ParameterReader) -> Quadruped:
     return quadruped(text or robot_urdf(preset, arm=arm))
 
 
-def _gait(read: ParameterReader) -> GaitParameters:
-    default = GaitParameters()
+def _gait(node: Node, read: ParameterReader) -> GaitParameters:
+    default, live = GaitParameters(), ParameterReader(node, fixed=False)
     values = {
-        name: read.number(name, getattr(default, name), RANGES[name], meaning, fixed=False)
+        name: live.number(name, getattr(default, name), RANGES[name], meaning)
         for name, meaning in GAIT_MEANINGS.items()
     }
     return GaitParameters(**values, servo=_servo(read), body=BodyLimits())

@@ -6,21 +6,20 @@ from __future__ import annotations
 
 import math
 import sys
+import threading
 import time
 
 from builtin_interfaces.msg import Time as TimeMessage
 from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import Odometry
-import rclpy
 from rclpy.node import Node
 from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
-from rclpy.signals import SignalHandlerOptions
 from rclpy.time import Time
-from rclpy.utilities import try_shutdown
 from sensor_msgs.msg import BatteryState, Imu, JointState
 from std_srvs.srv import SetBool
 from tf2_msgs.msg import TFMessage
 
+from node_runner import destroyed_when_refused, run_program, spin
 from quad_msgs.msg import JointCommand
 
 from ..estimation import Estimate, Estimator
@@ -35,7 +34,6 @@ from .diagnostics import (
     robot_diagnostic,
 )
 from .parameters import declare_parameters
-from .spinning import spin, stop_on_signals
 
 COMMAND_QOS = QoSProfile(
     reliability=ReliabilityPolicy.RELIABLE, history=HistoryPolicy.KEEP_LAST, depth=1
@@ -51,11 +49,13 @@ class HardwareNode(Node):
     checked in a callback and handed to that thread.
     """
 
+    @destroyed_when_refused
     def __init__(self) -> None:
         """Declare parameters, topics and the driver; :meth:`begin` opens the port.
 
         Raises:
-            HardwareError: A parameter or the URDF does not make sense.
+            ParameterError: A parameter is misspelt or of the wrong kind.
+            HardwareError: Parameters or the URDF do not make sense.
         """
         super().__init__('hardware_node')
         self._settings = settings = declare_parameters(self)
@@ -235,24 +235,20 @@ class HardwareNode(Node):
         self._diagnostics.publish(array)
 
 
-def main() -> None:
-    """Entry point."""
-    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-    stop = stop_on_signals()
-    try:
-        node = HardwareNode()
-    except HardwareError as error:
-        rclpy.logging.get_logger('hardware_node').fatal(str(error))
-        try_shutdown()
-        sys.exit(2)
+def main() -> int:
+    """Run until Ctrl-C; return the exit code."""
+    return run_program('hardware_node', _serve, HardwareError)
+
+
+def _serve(stop: threading.Event) -> None:
+    node = HardwareNode()
     node.begin()
     try:
-        spin(node, stop)
+        spin([node], stop)
     finally:
         node.end()
         node.destroy_node()
-        try_shutdown()
 
 
 if __name__ == '__main__':
-    main()
+    sys.exit(main())

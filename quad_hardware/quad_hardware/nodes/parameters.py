@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 from rclpy.node import Node
 
+from node_runner import ParameterReader, refuse_misspelt
 from quad_description import DescriptionError, Joint, movable_joints, PRESETS, robot_urdf
 
 from ..estimation import EstimatorSettings, OdometrySettings, RateSource
@@ -18,7 +19,6 @@ from ..link import LinkOptions
 from ..link.vendor import VENDOR
 from ..link.vendor_library import is_installed
 from ..protocol import Model, Protocol, PROTOCOLS
-from .parameter_reader import ParameterReader, refuse_misspelt
 
 AUTO = 'auto'
 _PROTOCOLS: Mapping[str, tuple[Protocol, ...]] = {
@@ -96,7 +96,8 @@ def declare_parameters(node: Node) -> NodeSettings:
     """Declare all parameters of the node and read them.
 
     Raises:
-        CommandError: One does not make sense; the message names it, its value and the remedy.
+        ParameterError: One is misspelt, of another kind or out of its range.
+        CommandError: They do not fit the robot; the message names the remedy.
     """
     read = ParameterReader(node)
     protocols = read.choice(
