@@ -4,21 +4,16 @@
 
 from __future__ import annotations
 
-import difflib
 import sys
-from typing import TypeVar
 
 from geometry_msgs.msg import TransformStamped
-from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
-import rclpy
-from rclpy.exceptions import ParameterException
-from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
-from rclpy.utilities import try_shutdown
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from tf2_msgs.msg import TFMessage
+
+from node_runner import destroyed_when_refused, ParameterReader, refuse_misspelt, run_node
 
 from .exceptions import DescriptionError
 from .feet import standing_height
@@ -27,31 +22,30 @@ from .motion import sweep
 from .poses import Pose, pose_positions
 from .urdf import PRESETS, robot_urdf
 
-Value = TypeVar('Value', bool, float, str)
-
 SWEEP = 'sweep'
 MOTIONS = (SWEEP, *(pose.value for pose in Pose))
 
-RATE_RANGE = FloatingPointRange(from_value=1.0, to_value=200.0)
+RATES = (1.0, 200.0)  # [Hz]
 
 
 class Display(Node):
     """Publishes ``/robot_description``, latched, ``/joint_states`` and base_footprint."""
 
+    @destroyed_when_refused
     def __init__(self) -> None:
         """Read the parameters and begin to publish.
 
         Raises:
-            DescriptionError: A parameter has no sense.
+            ParameterError: A parameter makes no sense.
+            DescriptionError: The description cannot be made.
         """
         super().__init__('display')
-        preset = self._declare('preset', 'lite', f'the robot: {", ".join(PRESETS)}')
-        arm = self._declare('arm', False, 'with the arm on its back')
-        motion = self._declare('motion', SWEEP, f'what it does: {", ".join(MOTIONS)}')
-        rate = self._declare('rate', 50.0, 'joint states a second [Hz]', RATE_RANGE)
-        self._refuse_misspelt()
-        if motion not in MOTIONS:
-            raise DescriptionError(f'motion {motion!r} is none of {", ".join(MOTIONS)}')
+        read = ParameterReader(self)
+        preset = read.choice('preset', 'lite', {name: name for name in PRESETS}, 'the robot')
+        arm = read.flag('arm', 'with the arm on its back', default=False)
+        motion = read.choice('motion', SWEEP, {name: name for name in MOTIONS}, 'what it does')
+        rate = read.number('rate', 50.0, RATES, 'joint states a second [Hz]')
+        refuse_misspelt(self)
         urdf = robot_urdf(preset, arm)
         self._joints = movable_joints(urdf)
         self._moves = motion == SWEEP
@@ -75,21 +69,6 @@ class Display(Node):
         self._states.publish(message)
         self._footprint.publish(TFMessage(transforms=[_footprint(message)]))
 
-    def _declare(
-        self, name: str, default: Value, description: str, bounds: FloatingPointRange | None = None
-    ) -> Value:
-        descriptor = ParameterDescriptor(description=description, read_only=True)
-        if bounds is not None:
-            descriptor.floating_point_range = [bounds]
-        return type(default)(self.declare_parameter(name, default, descriptor).value)
-
-    def _refuse_misspelt(self) -> None:
-        known = list(self.get_parameters_by_prefix(''))
-        for name in self._parameter_overrides:  # rclpy has no public way to ask
-            close = difflib.get_close_matches(name, known, n=1, cutoff=0.8)
-            if close and not self.has_parameter(name):
-                raise DescriptionError(f'unknown parameter {name!r}; did you mean {close[0]!r}?')
-
 
 def _footprint(states: JointState) -> TransformStamped:
     """Return where the ground is below a body that is level and stands on its lowest foot."""
@@ -103,17 +82,7 @@ def _footprint(states: JointState) -> TransformStamped:
 
 def run(args: list[str] | None = None) -> int:
     """Display until Ctrl-C; return the exit code."""
-    rclpy.init(args=args)
-    try:
-        rclpy.spin(Display())
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    except (DescriptionError, ParameterException) as error:
-        sys.stderr.write(f'display: {error}\n')
-        return 2
-    finally:
-        try_shutdown()
-    return 0
+    return run_node('display', Display, DescriptionError, args=args)
 
 
 def main() -> None:

@@ -7,7 +7,7 @@ transforms follow from a JointState, as ROS' robot_state_publisher does; :class:
 joints that are missing. None of them knows ROS; the nodes are in :mod:`.nodes`.
 """
 
-from .exceptions import DescriptionError, ParameterError, ViewerError
+from .exceptions import DescriptionError, ViewerError
 from .joint_watch import JointWatch
 from .state_publisher import FrameTransform, joint_transform, Remark, Settings, StatePublisher
 from .transforms import Transform
@@ -22,7 +22,6 @@ __all__ = [
     'JointKind',
     'JointWatch',
     'Mimic',
-    'ParameterError',
     'Remark',
     'RobotModel',
     'Settings',

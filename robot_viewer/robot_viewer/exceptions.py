@@ -5,10 +5,10 @@
 ::
 
     ViewerError
-    ├── DescriptionError (ValueError)   a robot description cannot be used; says which element
-    └── ParameterError (ValueError)     a parameter of a node is not usable, or misspelt
+    └── DescriptionError (ValueError)   a robot description cannot be used; says which element
 
-Arguments of the wrong kind from a *programmer* stay ``ValueError``/``TypeError``.
+A parameter of a node that is not usable raises ``node_runner.ParameterError``. Arguments of the
+wrong kind from a *programmer* stay ``ValueError``/``TypeError``.
 """
 
 from __future__ import annotations
@@ -23,11 +23,4 @@ class DescriptionError(ViewerError, ValueError):
 
     Scenarios: it is empty or no XML, a joint names a link that does not exist, two links have the
     same name, the joints make a loop, a number is no number.
-    """
-
-
-class ParameterError(ViewerError, ValueError):
-    """A parameter of a node is not usable.
-
-    Scenarios: no robot_description, a frequency beyond its range, a misspelt name.
     """

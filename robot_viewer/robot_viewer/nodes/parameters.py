@@ -5,13 +5,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-import difflib
 
-from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor, SetParametersResult
+from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from ..exceptions import DescriptionError, ParameterError
+from node_runner import ParameterReader, refuse_misspelt
+
+from ..exceptions import DescriptionError
 from ..state_publisher import HIGHEST_FREQUENCY, Settings
 from ..urdf import read_urdf
 
@@ -29,31 +30,21 @@ def declare(node: Node, description: str = '') -> None:
     Raises:
         ParameterError: A value is not usable, or a name is misspelt.
     """
-    frequency = ParameterDescriptor(
-        description='greatest rate of each transform in [Hz]; 0: one for every message',
-        floating_point_range=[FloatingPointRange(from_value=0.0, to_value=HIGHEST_FREQUENCY)],
+    read = ParameterReader(node, fixed=False)
+    read.number(
+        'publish_frequency',
+        DEFAULTS.publish_frequency,
+        (0.0, HIGHEST_FREQUENCY),
+        'greatest rate of each transform in [Hz]; 0: one for every message',
     )
-    prefix = ParameterDescriptor(description='put in front of each frame name, as it is')
-    ignore = ParameterDescriptor(description='publish at each message, whatever its stamp is')
-    text = ParameterDescriptor(description='URDF as XML text; may be changed while it runs')
-    try:
-        node.declare_parameter('publish_frequency', DEFAULTS.publish_frequency, frequency)
-        node.declare_parameter('frame_prefix', DEFAULTS.frame_prefix, prefix)
-        node.declare_parameter('ignore_timestamp', DEFAULTS.ignore_timestamp, ignore)
-        node.declare_parameter(DESCRIPTION, description, text)
-    except Exception as error:  # rclpy has a class for each way of being wrong
-        raise ParameterError(str(error)) from error
-    _refuse_misspelt(node)
-
-
-def _refuse_misspelt(node: Node) -> None:
-    """Refuse a name that looks like one of the node's; others may be meant for other nodes."""
-    known = list(node.get_parameters_by_prefix(''))
-    given = node._parameter_overrides  # noqa: SLF001  # there is no public way to ask
-    for name in sorted(given):
-        close = difflib.get_close_matches(name, known, n=1, cutoff=0.8)
-        if close and name not in known:
-            raise ParameterError(f'unknown parameter {name!r}; did you mean {close[0]!r}?')
+    read.text('frame_prefix', DEFAULTS.frame_prefix, 'put in front of each frame name, as it is')
+    read.flag(
+        'ignore_timestamp',
+        'publish at each message, whatever its stamp is',
+        default=DEFAULTS.ignore_timestamp,
+    )
+    read.text(DESCRIPTION, description, 'URDF as XML text; may be changed while it runs')
+    refuse_misspelt(node)
 
 
 def read_settings(node: Node) -> Settings:

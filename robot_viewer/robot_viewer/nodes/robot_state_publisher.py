@@ -5,26 +5,24 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-import contextlib
 from pathlib import Path
 import sys
 import time
 
 from geometry_msgs.msg import TransformStamped
-import rclpy
-from rclpy.executors import ExternalShutdownException
-from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, qos_profile_sensor_data, QoSProfile
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.time import Time
-from rclpy.utilities import remove_ros_args, try_shutdown
+from rclpy.utilities import remove_ros_args
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from tf2_msgs.msg import TFMessage
 
-from ..exceptions import DescriptionError, ParameterError, ViewerError
+from node_runner import destroyed_when_refused, ParameterError, run_node
+
+from ..exceptions import DescriptionError, ViewerError
 from ..joint_watch import JointWatch
 from ..state_publisher import FrameTransform, Remark, StatePublisher
 from ..urdf import JointKind, read_urdf
@@ -41,6 +39,7 @@ WATCH_PERIOD = 1.0
 class RobotStatePublisher(Node):
     """Publishes /tf, /tf_static and robot_description."""
 
+    @destroyed_when_refused
     def __init__(self, description: str = '') -> None:
         """Publish what does not move, and subscribe.
 
@@ -156,17 +155,4 @@ def main() -> int:
     Returns:
         0, or 1 when it could not begin.
     """
-    rclpy.init()
-    try:
-        node = RobotStatePublisher(_read_argument(sys.argv))
-        rclpy.spin(node)
-    except ViewerError as error:
-        get_logger(NAME).fatal(str(error))
-        return 1
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    finally:
-        # the signal handler of rclpy may be at it already, between the look and the call
-        with contextlib.suppress(RuntimeError):
-            try_shutdown()
-    return 0
+    return run_node(NAME, lambda: RobotStatePublisher(_read_argument(sys.argv)), ViewerError)
