@@ -378,15 +378,15 @@ def test_init_homes_only_where_bus_yml_asks(asked: bool) -> None:
 
 
 def test_init_homes_by_the_method_of_bus_yml_whatever_was_tried_before() -> None:
-    """The method of a goal stays in the drive; the one that is said is the one that is made."""
+    """A method that somebody wrote counts for ~/home, and the drive keeps it after ~/init."""
     net = booted(sdo_writes=(*MOTION_WRITES, sdo_write(0x6098, 0, 37)))
     commands = net.commands[JOINT]
-    net.result(commands.run('home', commands.home(35)))
-    net.run(0.1)
+    net.result(commands.run('home', commands.home(34)))
+    net.result(commands.drive.node.write_object(0x6098, 0, 35))
     assert 'homed by method 35' in net.do(JOINT, 'home')
     assert 'homed by method 37' in net.do(JOINT, 'init')
     writes = [data[4] for data in net.frames(0x600 + NODE_ID) if data[:3] == b'\x2f\x98\x60']
-    assert writes[-1] == 37
+    assert writes == [37, 34, 37, 35, 37, 35]
 
 
 @pytest.mark.parametrize('policy', list(RecoveryPolicy), ids=lambda policy: policy.value)

@@ -8,6 +8,8 @@ from collections.abc import Callable
 from enum import Enum
 
 from ..exceptions import CodecError, DriveError, SdoError
+from ..master.events import EventKind, Severity
+from ..master.scheduler import Promise
 from ..standard.drive import OperationMode, Statusword
 from ..standard.objects import Index
 from .modes import Homing
@@ -33,7 +35,8 @@ async def home(
 ) -> str:
     """Home a drive that is enabled; it is left in mode 6.
 
-    Ended from outside, bit 4 is cleared, which interrupts the homing.
+    Ended from outside, bit 4 is cleared, which interrupts the homing. A method that is given is
+    for this time only: whatever happens, 0x6098 gets back the one that the drive had.
 
     Args:
         steps: Steps of the drive.
@@ -49,11 +52,16 @@ async def home(
     drive = steps.drive
     tell = on_progress or (lambda progress: None)
     homing = _homing_mode(steps)
-    method = await _choose(steps, method)
-    tell(HomingProgress.SWITCHING)
-    await steps.switch(homing)
-    tell(HomingProgress.HOMING)
-    await _run(steps, homing, f'the end of homing {method}')
+    stored = await _stored_method(steps)
+    method = await _choose(steps, method, stored)
+    try:
+        tell(HomingProgress.SWITCHING)
+        await steps.switch(homing)
+        tell(HomingProgress.HOMING)
+        await _run(steps, homing, f'the end of homing {method}')
+    finally:
+        if method != stored:
+            _put_back(steps, stored)
     if drive.objects.statusword & Statusword.HOMING_ERROR:
         raise steps.refused(f'failed to home by method {method}')
     tell(HomingProgress.DONE)
@@ -83,12 +91,36 @@ async def _run(steps: DriveSequences, homing: Homing, what: str) -> None:
         homing.started = False
 
 
-async def _choose(steps: DriveSequences, method: int | None) -> int:
+async def _stored_method(steps: DriveSequences) -> int:
+    """Return what is in 0x6098 now, which the end of the last homing may just have changed."""
+    drive = steps.drive
+    try:
+        stored = await drive.node.read_object(drive.objects.at(Index.HOMING_METHOD))
+    except (SdoError, CodecError):
+        return drive.parameters.homing_method
+    return stored if isinstance(stored, int) else drive.parameters.homing_method
+
+
+def _put_back(steps: DriveSequences, method: int) -> None:
+    """Write a method without waiting, as there is no time to when the homing was cancelled."""
+    drive = steps.drive
+
+    def look(written: Promise[None]) -> None:
+        if written.error is not None:
+            text = f'the homing method {method} was not put back into 0x6098: {written.error}'
+            drive.node.report(EventKind.DRIVE, Severity.WARNING, text)
+
+    drive.node.write_object(drive.objects.at(Index.HOMING_METHOD), 0, method).when_done(look)
+
+
+async def _choose(steps: DriveSequences, method: int | None, stored: int) -> int:
     drive = steps.drive
     if method is None:
-        if not drive.parameters.homing_method:
+        if not stored:
             raise steps.refused('has no homing method (0x6098 is 0); name one')
-        return drive.parameters.homing_method
+        return stored
+    if method == stored:
+        return method
     try:
         await drive.node.write_object(drive.objects.at(Index.HOMING_METHOD), 0, method)
     except (SdoError, CodecError) as error:
