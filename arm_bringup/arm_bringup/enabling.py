@@ -9,8 +9,9 @@ import contextlib
 import threading
 import time
 
+from process_supervisor import CallError, GivenUpError
+
 from .demo.play import Client
-from .exceptions import CallError, GivenUpError
 
 PATIENCE = 60.0
 """Longest time for all drives to boot and to be enabled in [s]."""

@@ -7,12 +7,10 @@
     BringupError
     ├── RobotError (ValueError)   a robot folder is unknown or incomplete; lists what there is
     ├── DescriptionError (ValueError)   a xacro file cannot be expanded, or its URDF is not usable
-    ├── WaveError (ValueError)    the wave cannot be planned within the limits of a joint
-    ├── CallError                 a service of the arm refused, or did not answer in time
-    └── GivenUpError              what is waited for is no longer wanted
+    └── WaveError (ValueError)    the wave cannot be planned within the limits of a joint
 
-What cannot be started is told by ``process_supervisor.StartError``. Arguments of the wrong
-kind from a *programmer* stay ``ValueError``/``TypeError``.
+What cannot be started, or refuses, is told by the errors of ``process_supervisor``. Arguments of
+the wrong kind from a *programmer* stay ``ValueError``/``TypeError``.
 """
 
 from __future__ import annotations
@@ -40,18 +38,4 @@ class WaveError(BringupError, ValueError):
     """The wave cannot be planned within the limits of a joint.
 
     Scenarios: a joint's range is narrower than the margins, its velocity limit is zero.
-    """
-
-
-class CallError(BringupError):
-    """A service of the arm refused, or did not answer in time.
-
-    Scenarios: a drive that does not enable says why, a service that is not there.
-    """
-
-
-class GivenUpError(BringupError):
-    """What is waited for is no longer wanted.
-
-    Scenarios: Ctrl-C, a process of the bring-up has ended.
     """

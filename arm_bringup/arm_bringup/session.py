@@ -21,6 +21,7 @@ from process_supervisor import (
     ros_domain,
     write_parameters,
 )
+from process_supervisor.arguments import add_timeout
 
 from .description import expand_xacro
 from .exceptions import RobotError
@@ -78,20 +79,7 @@ def add_arguments(parser: argparse.ArgumentParser, *, default_bus: str) -> None:
         help='CAN bus: can0, vcan0, udp_multicast[:239.x.y.z[:PORT]], auto, or an adapter of '
         f'python-can as INTERFACE:CHANNEL@BITRATE (default: {default_bus})',
     )
-    parser.add_argument(
-        '--timeout',
-        metavar='S',
-        type=_seconds,
-        default=30.0,
-        help='longest time until all is ready in [s]; inf waits for ever (default: %(default)s)',
-    )
-
-
-def _seconds(text: str) -> float:
-    value = float(text)
-    if not value > 0:
-        raise argparse.ArgumentTypeError(f'{text} is no positive number of seconds')
-    return value
+    add_timeout(parser)
 
 
 def robots_epilog() -> str:

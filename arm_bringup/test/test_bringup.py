@@ -162,7 +162,7 @@ def test_a_master_that_never_gets_ready_ends_it(workspace: Workspace) -> None:
         (['pandora'], "no robot 'pandora'; robots: gp110, panda"),
         (['./nowhere'], 'does not exist'),
         (['panda', '--timeout', 'soon'], 'soon'),
-        (['panda', '--timeout', 'nan'], 'no positive number'),
+        (['panda', '--timeout', 'nan'], 'no number of seconds above 0'),
         ([], 'robot'),
     ],
     ids=['unknown', 'no folder', 'no number', 'no time', 'nothing'],

@@ -11,8 +11,7 @@ import pytest
 
 from arm_bringup.demo.figures import AxisFigures, DriveFigures, Figures
 from arm_bringup.demo.play import Play
-from arm_bringup.exceptions import CallError, GivenUpError
-from process_supervisor import Notice, Outcome, Phase
+from process_supervisor import CallError, GivenUpError, Notice, Outcome, Phase
 
 JOINTS = ['joint1', 'joint2']
 DRIVE = DriveFigures(online=True, state='Operation enabled')

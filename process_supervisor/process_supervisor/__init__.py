@@ -12,7 +12,7 @@ what the processes write.
 """
 
 from .console import explain, Farewell, supervise, USAGE_ERROR
-from .exceptions import StartError, SupervisorError
+from .exceptions import CallError, GivenUpError, StartError, SupervisorError
 from .exclusive import exclusive
 from .nodes import (
     Executable,
@@ -35,9 +35,11 @@ __all__ = [
     'LOG_FORMAT',
     'POLITE',
     'USAGE_ERROR',
+    'CallError',
     'Executable',
     'Farewell',
     'FindExecutable',
+    'GivenUpError',
     'LineWriter',
     'Notice',
     'Outcome',

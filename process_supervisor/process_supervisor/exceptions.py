@@ -5,7 +5,9 @@
 ::
 
     SupervisorError
-    └── StartError (OSError)   a process cannot be started
+    ├── StartError (OSError)   a process cannot be started
+    ├── CallError              what runs refused something, or did not answer in time
+    └── GivenUpError           what is waited for is no longer wanted
 
 Arguments of the wrong kind from a *programmer* stay ``ValueError``/``TypeError``.
 """
@@ -22,4 +24,19 @@ class StartError(SupervisorError, OSError):
 
     Scenarios: the package is not built, the workspace is not sourced, another bring-up of this
     user holds the bus, the port or the ROS domain, ROS_DOMAIN_ID is no domain.
+    """
+
+
+class CallError(SupervisorError):
+    """What runs refused something, did not answer in time, or is in a fault.
+
+    Scenarios: a drive that does not enable says why, a mode that is not accepted, a robot that has
+    fallen, a service that is not there.
+    """
+
+
+class GivenUpError(SupervisorError):
+    """What is waited for is no longer wanted.
+
+    Scenarios: Ctrl-C, a process of the bring-up has ended.
     """

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Protocol
 
-from .exceptions import CallError, GivenUpError
+from process_supervisor import CallError, GivenUpError
 
 HEAR_TIMEOUT = 5.0
 """Longest time in [s] to hear what the controller is doing."""

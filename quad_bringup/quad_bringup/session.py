@@ -19,6 +19,7 @@ from process_supervisor import (
     ros_domain,
     write_parameters,
 )
+from process_supervisor.arguments import add_timeout
 from quad_description import movable_joints, PRESETS, robot_urdf
 
 from .exceptions import ArgumentError
@@ -89,20 +90,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='what is spoken on the serial line; auto asks a real robot, and is new with a '
         'simulated one (default: %(default)s)',
     )
-    parser.add_argument(
-        '--timeout',
-        metavar='S',
-        type=_seconds,
-        default=30.0,
-        help='longest time until all is ready in [s]; inf waits for ever (default: %(default)s)',
-    )
-
-
-def _seconds(text: str) -> float:
-    value = float(text)
-    if not value > 0:
-        raise argparse.ArgumentTypeError(f'{text} is no positive number of seconds')
-    return value
+    add_timeout(parser)
 
 
 @contextlib.contextmanager

@@ -164,7 +164,7 @@ def test_a_process_that_dies_ends_it_with_its_last_words(
         (['--simulate', '--policy', 'nowhere.onnx'], 'no file nowhere.onnx'),
         (['--simulate', '--calibration', 'nowhere.yaml'], 'no file nowhere.yaml'),
         (['--port', '/dev/ttyAMA0', '--servo', 'firm'], 'for a simulated robot'),
-        (['--simulate', '--timeout', 'nan'], 'no positive number'),
+        (['--simulate', '--timeout', 'nan'], 'no number of seconds above 0'),
     ],
     ids=['nothing', 'both', 'preset', 'gait', 'policy', 'calibration', 'servo', 'time'],
 )

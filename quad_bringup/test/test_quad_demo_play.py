@@ -9,14 +9,13 @@ from dataclasses import replace
 
 import pytest
 
-from process_supervisor import Notice, Outcome, Phase
+from process_supervisor import CallError, GivenUpError, Notice, Outcome, Phase
 from quad_bringup.demo import play as play_module
 from quad_bringup.demo.figures import Figures
 from quad_bringup.demo.itinerary import STANDSTILL, Velocity
 from quad_bringup.demo.play import Milestones, Play
 from quad_bringup.demo.rhythm import Rhythm
 from quad_bringup.demo.track import Milestone
-from quad_bringup.exceptions import CallError, GivenUpError
 
 STEP = 0.05
 """Virtual time in [s] between two looks of a wait."""

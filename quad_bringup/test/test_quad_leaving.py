@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import pytest
 
-from quad_bringup.exceptions import CallError, GivenUpError
+from process_supervisor import CallError, GivenUpError
 from quad_bringup.leaving import lie_down
 
 

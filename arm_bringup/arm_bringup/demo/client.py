@@ -9,20 +9,15 @@ import time
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
-import rclpy
-from rclpy.executors import SingleThreadedExecutor
-from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
 from std_srvs.srv import Trigger
 
-from ..exceptions import CallError, GivenUpError
+from process_supervisor import CallError
+from process_supervisor.graph_client import GraphClient
+
 from .figures import Figures
 
-SPIN = 0.05
-"""Longest time in [s] after which a wait looks whether it shall be given up."""
 
-
-class ArmClient:
+class ArmClient(GraphClient):
     """A node of its own; use it in one thread.
 
     Attributes:
@@ -35,54 +30,13 @@ class ArmClient:
         Args:
             given_up: True when nothing shall be waited for any more.
         """
+        super().__init__('demo', given_up)
         self.figures = Figures()
-        self._given_up = given_up
-        self._context = rclpy.context.Context()
-        rclpy.init(context=self._context, signal_handler_options=SignalHandlerOptions.NO)
-        self._node = Node('demo', context=self._context, enable_rosout=False)
-        self._executor = SingleThreadedExecutor(context=self._context)
-        self._executor.add_node(self._node)
-        self._node.create_subscription(DiagnosticArray, '/diagnostics', self._take, 50)
+        self.node.create_subscription(DiagnosticArray, '/diagnostics', self._take, 50)
         self._clients: dict[str, Any] = {}
-
-    def close(self) -> None:
-        """Leave the ROS graph."""
-        self._executor.shutdown()
-        self._node.destroy_node()
-        self._context.try_shutdown()
 
     def _take(self, message: DiagnosticArray) -> None:
         self.figures = self.figures.updated(message.status)
-
-    def listen(self, duration: float) -> None:
-        """Hear what comes in.
-
-        Args:
-            duration: For how long in [s].
-        """
-        end = time.monotonic() + duration
-        while (left := end - time.monotonic()) > 0:
-            self._executor.spin_once(timeout_sec=left)
-
-    def wait_until(self, condition: Callable[[], bool], timeout: float, what: str) -> None:
-        """Wait for something.
-
-        Args:
-            condition: True when it is there; asked after whatever comes in.
-            timeout: Longest time in [s].
-            what: What is waited for, for the message.
-
-        Raises:
-            CallError: It did not come in time.
-            GivenUpError: It is no longer wanted.
-        """
-        end = time.monotonic() + timeout
-        while not condition():
-            if time.monotonic() > end:
-                raise CallError(f'waited {timeout:g} s in vain for {what}')
-            if self._given_up():
-                raise GivenUpError(what)
-            self._executor.spin_once(timeout_sec=SPIN)
 
     def prepare(self, services: Iterable[str]) -> None:
         """Look for services that will be called, so that they are known when they are needed.
@@ -91,7 +45,7 @@ class ArmClient:
             services: Their names, all of type std_srvs/Trigger.
         """
         for name in services:
-            self._clients[name] = self._node.create_client(Trigger, name)
+            self._clients[name] = self.node.create_client(Trigger, name)
 
     def call(self, services: list[str], timeout: float) -> dict[str, str]:
         """Call services side by side.

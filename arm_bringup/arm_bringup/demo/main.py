@@ -6,31 +6,19 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Sequence
-import math
 import os
 import sys
-import threading
 
-from rich.console import Console
-
-from process_supervisor import (
-    Executable,
-    explain,
-    LineWriter,
-    Outcome,
-    Painter,
-    Runner,
-    SupervisorError,
-    USAGE_ERROR,
-    wants_colour,
-)
-from process_supervisor.display import choose_display, Setting, TableDisplay
+from process_supervisor import Executable, SupervisorError, USAGE_ERROR
+from process_supervisor.arguments import seconds_from
+from process_supervisor.demo import perform
+from process_supervisor.play import REFRESH
 
 from ..description import joint_limits
 from ..exceptions import BringupError
 from ..session import add_arguments, robots_epilog, Session, session, SIMULATED_BUS
 from .figures import Figures
-from .play import Client, Play, REFRESH
+from .play import Client, Play
 from .table import ArmView
 
 WAVE_MASTER = Executable('arm_bringup', 'wave_master')
@@ -54,27 +42,12 @@ def parse(argv: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument(
         '--duration',
         metavar='S',
-        type=positive_seconds,
+        type=seconds_from(0.0),
         help='end after so many seconds of wave, with a summary; the exit code says whether all '
         'joints were enabled, moved (it takes them 5 s to get going) and followed (default: until '
         'Ctrl-C)',
     )
     return parser.parse_args(argv)
-
-
-def positive_seconds(text: str) -> float:
-    """Read a duration of the command line.
-
-    Args:
-        text: The number.
-
-    Raises:
-        ArgumentTypeError: It is not positive, or not finite.
-    """
-    value = float(text)
-    if not 0 < value < math.inf:
-        raise argparse.ArgumentTypeError(f'{text} is no positive number of seconds')
-    return value
 
 
 def join_ros(given_up: Callable[[], bool]) -> Client:
@@ -88,18 +61,16 @@ def join_ros(given_up: Callable[[], bool]) -> Client:
     return ArmClient(given_up)
 
 
-def commands(joint: str, mode_service: str, candump: str, domain: str) -> list[str]:
+def commands(joint: str, mode_service: str, candump: str) -> list[str]:
     """Return commands to try in a second terminal.
 
     Args:
         joint: Name of a drive.
         mode_service: Service that selects the mode of the wave.
         candump: Command that shows the bus.
-        domain: ROS domain, empty for the default one.
     """
     call = 'ros2 service call'
     return [
-        f'source env.sh; export ROS_DOMAIN_ID={domain}' if domain else 'source env.sh',
         f'{call} /{joint}/position_mode std_srvs/srv/Trigger',
         f'{call} /{joint}/target canopen_interfaces/srv/COTargetDouble "{{ target: 1.0 }}"',
         'ros2 topic hz /joint_states',
@@ -120,65 +91,25 @@ def run(arm: Session, duration: float | None) -> int:
     Returns:
         0, or 1 when something went wrong.
     """
-    write = LineWriter(sys.stdout)
     for name in sorted(set(arm.drives) - set(joint_limits(arm.urdf))):
-        write(f'warning: no joint of the description is called {name!r}; its drive stands still')
+        sys.stdout.write(
+            f'warning: no joint of the description is called {name!r}; its drive stands still\n'
+        )
     bus_config = os.path.relpath(arm.robot.bus_config)
-    names = [spec.name for spec in arm.processes]
     view = ArmView(
         f'{arm.robot.name}: {len(arm.drives)} simulated drives on {arm.bus}',
         {name: limits for name, limits in joint_limits(arm.urdf).items() if name in arm.drives},
     )
-    setting = Setting(
-        view,
-        Figures(),
-        commands(
-            arm.drives[0],
-            arm.mode_service,
-            f'ros2 run arm_canopen candump {arm.bus} --bus-config {bus_config}',
-            os.environ.get('ROS_DOMAIN_ID', ''),
-        ),
-        Painter('demo', names, wants_colour(sys.stdout, os.environ)),
+    candump = f'ros2 run arm_canopen candump {arm.bus} --bus-config {bus_config}'
+    return perform(
+        arm.processes,
+        view=view,
+        figures=Figures(),
+        commands=commands(arm.drives[0], arm.mode_service, candump),
+        make_play=lambda display: Play(list(view.limits), arm.mode_service, display, duration),
+        make_client=join_ros,
+        endless=duration is None,
     )
-    display = choose_display(setting, Console(), write)
-    play = Play(list(view.limits), arm.mode_service, display, duration)
-    try:
-        with Runner(
-            arm.processes, display.line, display.notice, on_interrupt=play.leave
-        ) as runner:
-            thread = threading.Thread(target=play.run, args=[runner, join_ros], name='play')
-            thread.start()
-            outcome = runner.run()
-            thread.join()
-    finally:
-        display.close()
-    with_summary = duration is not None or not isinstance(display, TableDisplay)
-    return conclude(write, play, outcome, with_summary=with_summary)
-
-
-def conclude(write: LineWriter, play: Play, outcome: Outcome, *, with_summary: bool) -> int:
-    """Say how it went.
-
-    Args:
-        write: Takes the lines.
-        play: The course, ended.
-        outcome: How the supervisor ended.
-        with_summary: Write the summary of the wave.
-
-    Returns:
-        The exit code.
-    """
-    result = play.result
-    for line in result.summary if with_summary else []:
-        write(line)
-    for line in result.warnings:
-        write(f'warning: {line}')
-    failures = [] if play.left else result.problems
-    if outcome.exit_code:
-        failures = [explain(outcome), *failures]
-    for line in failures:
-        write(f'error: {line}')
-    return 1 if failures else 0
 
 
 def main(argv: Sequence[str] | None = None) -> int:

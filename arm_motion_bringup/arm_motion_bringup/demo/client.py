@@ -20,9 +20,9 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from arm_bringup.demo.client import ArmClient
 from arm_bringup.demo.figures import AxisFigures
-from arm_bringup.exceptions import CallError
 from arm_servo import RobotModel
 from arm_servo.arrays import Array
+from process_supervisor import CallError
 
 from .figures import MotionFigures
 from .samples import cycles_between, peak_jerk, Sample
@@ -58,7 +58,7 @@ class MotionClient(ArmClient):
         self.words = ''
         self.limited: list[str] = []
         self._model, self._period = model, period
-        node = self._node
+        node = self.node
         self._twist = node.create_publisher(TwistStamped, '/servo_node/delta_twist_cmds', 10)
         self._speed = node.create_publisher(
             SpeedScalingFactor, f'/{controller}/speed_scaling_input', LATCHED
@@ -87,7 +87,7 @@ class MotionClient(ArmClient):
         """Age of the latest sample in [s]; infinite when there is none."""
         if not self.samples:
             return math.inf
-        return 1e-9 * self._node.get_clock().now().nanoseconds - self.samples[-1].time
+        return 1e-9 * self.node.get_clock().now().nanoseconds - self.samples[-1].time
 
     def jog(self, linear: Array, frame: str) -> None:
         """Move the tool; counts for a tenth of a second.
@@ -97,7 +97,7 @@ class MotionClient(ArmClient):
             frame: Link along whose axes.
         """
         message = TwistStamped()
-        message.header.stamp = self._node.get_clock().now().to_msg()
+        message.header.stamp = self.node.get_clock().now().to_msg()
         message.header.frame_id = frame
         vector = message.twist.linear
         vector.x, vector.y, vector.z = (float(value) for value in linear)

@@ -11,9 +11,9 @@ import time
 from action_msgs.msg import GoalStatus
 import numpy as np
 
-from arm_bringup.exceptions import CallError
 from arm_servo import RobotModel
 from arm_servo.arrays import Array
+from process_supervisor import CallError
 
 from .client import GoalRun, MotionClient
 from .goals import beside, duration

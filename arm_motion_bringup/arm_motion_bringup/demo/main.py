@@ -5,17 +5,12 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 import json
-import os
 from pathlib import Path
 import sys
-import threading
-
-from rich.console import Console
 
 from arm_bringup.demo.figures import Figures
-from arm_bringup.demo.main import conclude, positive_seconds
 from arm_bringup.demo.table import ArmView
 from arm_bringup.description import joint_limits
 from arm_bringup.exceptions import BringupError, RobotError
@@ -31,15 +26,10 @@ from arm_bringup.session import (
 )
 from arm_bringup.stack import MOTION_MASTER
 from arm_servo import load_limits, RobotModel, ServoError
-from process_supervisor import (
-    LineWriter,
-    Painter,
-    Runner,
-    SupervisorError,
-    USAGE_ERROR,
-    wants_colour,
-)
-from process_supervisor.display import choose_display, Setting
+from process_supervisor import SupervisorError, USAGE_ERROR
+from process_supervisor.arguments import seconds_from
+from process_supervisor.demo import perform
+from process_supervisor.display import Display
 
 from .client import MotionClient
 from .course import START
@@ -68,7 +58,7 @@ def parse(argv: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument(
         '--duration',
         metavar='S',
-        type=positive_seconds,
+        type=seconds_from(0.0),
         help='repeat it until so many seconds are over, once at least (default: until Ctrl-C)',
     )
     return parser.parse_args(argv)
@@ -134,44 +124,32 @@ def run(arm: Session, duration: float | None) -> int:
     model = build_model(arm.robot, arm.urdf)
     period = load_bus(arm.robot.bus_config).master.sync_period
     controller = controller_name(arm.robot)
-    write = LineWriter(sys.stdout)
     limits = {name: each for name, each in joint_limits(arm.urdf).items() if name in arm.drives}
     title = f'{arm.robot.name}: {len(arm.drives)} simulated drives on {arm.bus}'
-    setting: Setting[Figures] = Setting(
-        MotionView(ArmView(title, limits)),
-        MotionFigures(),
-        commands(controller, os.environ.get('ROS_DOMAIN_ID', '')),
-        Painter('demo', [s.name for s in arm.processes], wants_colour(sys.stdout, os.environ)),
+
+    def make_play(display: Display[Figures]) -> MotionPlay:
+        play = MotionPlay(list(limits), arm.mode_service, display, duration)
+        play.model, play.period = model, period
+        return play
+
+    return perform(
+        arm.processes,
+        view=MotionView(ArmView(title, limits)),
+        figures=MotionFigures(),
+        commands=commands(controller),
+        make_play=make_play,
+        make_client=lambda given_up: MotionClient(given_up, model, controller, period),
+        endless=False,
     )
-    display = choose_display(setting, Console(), write)
-    play = MotionPlay(list(limits), arm.mode_service, display, duration)
-    play.model, play.period = model, period
-
-    def join(given_up: Callable[[], bool]) -> MotionClient:
-        return MotionClient(given_up, model, controller, period)
-
-    try:
-        with Runner(
-            arm.processes, display.line, display.notice, on_interrupt=play.leave
-        ) as runner:
-            thread = threading.Thread(target=play.run, args=[runner, join], name='play')
-            thread.start()
-            outcome = runner.run()
-            thread.join()
-    finally:
-        display.close()
-    return conclude(write, play, outcome, with_summary=True)
 
 
-def commands(controller: str, domain: str) -> list[str]:
+def commands(controller: str) -> list[str]:
     """Return commands to try in a second terminal.
 
     Args:
         controller: Name of the trajectory controller.
-        domain: ROS domain, empty for the default one.
     """
     return [
-        f'source env.sh; export ROS_DOMAIN_ID={domain}' if domain else 'source env.sh',
         'ros2 run arm_servo servo_keyboard_input',
         'ros2 topic echo /servo_node/status',
         f'ros2 topic echo /{controller}/controller_state',

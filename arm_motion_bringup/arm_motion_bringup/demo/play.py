@@ -8,10 +8,11 @@ from collections.abc import Callable
 import math
 import time
 
-from arm_bringup.demo.play import CALL_TIMEOUT, Client, ENABLE_TIMEOUT, Play, Result
+from arm_bringup.demo.play import CALL_TIMEOUT, Client, ENABLE_TIMEOUT, Play
 from arm_bringup.demo.report import warnings
-from arm_bringup.exceptions import CallError
 from arm_servo import RobotModel
+from process_supervisor import CallError
+from process_supervisor.play import Result
 
 from .client import MotionClient
 from .course import Course, Left
@@ -34,12 +35,11 @@ class MotionPlay(Play):
             raise TypeError(f'{client!r} cannot move an arm')
         init, mode, _ = self._services()
         client.prepare([*init, *mode])
-        self._enter('booting')
         client.wait_until(lambda: self._booted(client, ready), math.inf, 'the processes')
         self._enter('enabling')
         client.call(init, ENABLE_TIMEOUT)
         client.call(mode, CALL_TIMEOUT)
-        self._waving.set()
+        self._moving.set()
         results = Results()
         course = Course(
             client, self.model, self.period, results, self._enter, lambda: self._look(client)

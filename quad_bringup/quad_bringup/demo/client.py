@@ -58,8 +58,8 @@ class QuadClient(ModeClient):
         self._height = self._tilt = self._tilt_max = self._battery = math.nan
         self._targets: Mapping[str, float] = {}
         self._positions: Mapping[str, float] = {}
-        self._twist = self._node.create_publisher(Twist, 'cmd_vel', 1)
-        self._node.create_timer(COMMAND_PERIOD, self._send)
+        self._twist = self.node.create_publisher(Twist, 'cmd_vel', 1)
+        self.node.create_timer(COMMAND_PERIOD, self._send)
         self._subscribe(ground_truth)
 
     def _subscribe(self, ground_truth: str) -> None:
@@ -74,7 +74,7 @@ class QuadClient(ModeClient):
             (DiagnosticArray, '/diagnostics', self._take_diagnostics, 50),
         )
         for kind, topic, callback, qos in topics:
-            self._node.create_subscription(kind, topic, callback, qos)
+            self.node.create_subscription(kind, topic, callback, qos)
 
     @property
     def figures(self) -> Figures:

@@ -7,26 +7,11 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Sequence
 from functools import partial
-import math
-import os
-import re
 import sys
-import threading
 
-from rich.console import Console
-
-from process_supervisor import (
-    explain,
-    LineWriter,
-    Outcome,
-    Painter,
-    ProcessSpec,
-    Runner,
-    SupervisorError,
-    USAGE_ERROR,
-    wants_colour,
-)
-from process_supervisor.display import choose_display, Setting, TableDisplay
+from process_supervisor import SupervisorError, USAGE_ERROR
+from process_supervisor.arguments import seconds_from
+from process_supervisor.demo import perform
 from quad_description import LEGS
 
 from ..exceptions import BringupError
@@ -56,20 +41,11 @@ def parse(argv: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument(
         '--duration',
         metavar='S',
-        type=_duration,
+        type=seconds_from(SHORTEST),
         help=f'walk for so many seconds, at least {SHORTEST:g}, and end with a summary; the exit '
         'code says whether it moved as it was told (default: until Ctrl-C)',
     )
     return parser.parse_args(argv)
-
-
-def _duration(text: str) -> float:
-    value = float(text)
-    if not SHORTEST <= value < math.inf:
-        raise argparse.ArgumentTypeError(
-            f'{text} is no number of seconds from {SHORTEST:g} on: the robot would not get going'
-        )
-    return value
 
 
 def join_ros(joints: Sequence[str], given_up: Callable[[], bool]) -> Client:
@@ -84,37 +60,17 @@ def join_ros(joints: Sequence[str], given_up: Callable[[], bool]) -> Client:
     return QuadClient(joints, GROUND_TRUTH, given_up)
 
 
-def commands(domain: str, port: str) -> list[str]:
+def commands(port: str) -> list[str]:
     """Return commands to try in a second terminal.
 
     Args:
-        domain: ROS domain, empty for the default one.
         port: Serial port of the robot.
     """
     return [
-        f'source env.sh; export ROS_DOMAIN_ID={domain}' if domain else 'source env.sh',
         'ros2 topic hz /joint_command',
         'ros2 topic echo /odom',
         f'ros2 run quad_hardware doctor --port {port}',
     ]
-
-
-def without_readiness(
-    processes: Sequence[ProcessSpec], take: Callable[[str, str], None]
-) -> Callable[[str, str], None]:
-    """Leave out the lines by which processes say that they are ready: the supervisor says so.
-
-    Args:
-        processes: What runs.
-        take: Takes all other lines, with the name of the process first.
-    """
-    ready = {spec.name: re.compile(spec.ready) for spec in processes if spec.ready}
-
-    def line(name: str, text: str) -> None:
-        if name not in ready or not ready[name].search(text):
-            take(name, text)
-
-    return line
 
 
 def run(quad: Session, mode: str, duration: float | None) -> int:
@@ -128,54 +84,15 @@ def run(quad: Session, mode: str, duration: float | None) -> int:
     Returns:
         0, or 1 when something went wrong.
     """
-    write = LineWriter(sys.stdout)
-    names = [spec.name for spec in quad.processes]
-    setting = Setting(
-        QuadView(quad.title, LEGS),
-        Figures(),
-        commands(os.environ.get('ROS_DOMAIN_ID', ''), quad.port),
-        Painter('demo', names, wants_colour(sys.stdout, os.environ)),
+    return perform(
+        quad.processes,
+        view=QuadView(quad.title, LEGS),
+        figures=Figures(),
+        commands=commands(quad.port),
+        make_play=lambda display: Play(display, mode, duration),
+        make_client=partial(join_ros, quad.joints),
+        endless=duration is None,
     )
-    display = choose_display(setting, Console(), write)
-    play = Play(display, mode, duration)
-    try:
-        with Runner(
-            quad.processes,
-            without_readiness(quad.processes, display.line),
-            display.notice,
-            on_interrupt=play.leave,
-        ) as runner:
-            make_client = partial(join_ros, quad.joints)
-            thread = threading.Thread(target=play.run, args=[runner, make_client], name='play')
-            thread.start()
-            outcome = runner.run()
-            thread.join()
-    finally:
-        display.close()
-    with_summary = duration is not None or not isinstance(display, TableDisplay)
-    return conclude(write, play, outcome, with_summary=with_summary)
-
-
-def conclude(write: LineWriter, play: Play, outcome: Outcome, *, with_summary: bool) -> int:
-    """Say how it went.
-
-    Args:
-        write: Takes the lines.
-        play: The course, ended.
-        outcome: How the supervisor ended.
-        with_summary: Write the summary of the walk.
-
-    Returns:
-        The exit code.
-    """
-    for line in play.result.summary if with_summary else []:
-        write(line)
-    failures = [] if play.left else play.result.problems
-    if outcome.exit_code:
-        failures = [explain(outcome), *failures]
-    for line in failures:
-        write(f'error: {line}')
-    return 1 if failures else 0
 
 
 def main(argv: Sequence[str] | None = None) -> int:

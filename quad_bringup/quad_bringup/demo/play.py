@@ -7,21 +7,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 import math
-import threading
 import time
 from typing import Protocol
 
-from process_supervisor import Outcome, Phase
+from process_supervisor import CallError, play
 from process_supervisor.display import Display
 
-from ..exceptions import CallError, GivenUpError
 from .figures import Figures
 from .itinerary import itinerary, STANDSTILL, Stretch, Velocity
 from .report import Measured, problems, summary_lines
 from .track import mean_velocity, Milestone
 
-REFRESH = 0.2
-"""Time between two pictures in [s]."""
 FIND_TIMEOUT = 20.0
 """Longest time in [s] for the demo's node and the others to find each other."""
 MODE_TIMEOUT = 15.0
@@ -43,20 +39,7 @@ class Milestones:
     odometry: Milestone | None
 
 
-@dataclass(frozen=True, slots=True)
-class Result:
-    """How a demo went.
-
-    Attributes:
-        summary: The lines of its summary, empty when it did not get as far as walking.
-        problems: What went wrong.
-    """
-
-    summary: list[str]
-    problems: list[str]
-
-
-class Client(Protocol):
+class Client(play.Client, Protocol):
     """What the demo needs of ROS; :class:`.client.QuadClient` is the real one."""
 
     @property
@@ -80,37 +63,9 @@ class Client(Protocol):
     def set_mode(self, mode: str, timeout: float) -> str:
         """Ask for a mode; return the answer."""
 
-    def wait_until(self, condition: Callable[[], bool], timeout: float, what: str) -> None:
-        """Wait for something."""
 
-    def listen(self, duration: float) -> None:
-        """Hear what comes in."""
-
-    def close(self) -> None:
-        """Leave the ROS graph."""
-
-
-MakeClient = Callable[[Callable[[], bool]], Client]
-"""Joins the ROS graph; the client asks the argument whether its waiting shall be given up."""
-
-
-class Supervisor(Protocol):
-    """What the demo needs of the supervisor of its processes."""
-
-    @property
-    def phase(self) -> Phase:
-        """What it is doing."""
-
-    def stop(self, outcome: Outcome) -> None:
-        """Ask for an orderly end."""
-
-
-class Play:
-    """Runs the demo in a thread of its own, beside the supervisor.
-
-    Attributes:
-        result: How it went, when the thread has ended.
-    """
+class Play(play.Play[Client]):
+    """Lets the robot walk."""
 
     def __init__(self, display: Display[Figures], mode: str, duration: float | None) -> None:
         """Prepare; nothing happens yet.
@@ -120,59 +75,16 @@ class Play:
             mode: Mode in which it walks.
             duration: How long it walks in [s]; None until :meth:`leave`.
         """
-        self.result = Result([], [])
-        self._display = display
+        super().__init__(display)
         self._mode = mode
         self._duration = duration
         self._measured: list[Measured] = []
-        self._leaving = threading.Event()
-        self._up = threading.Event()
-        self._next_picture = 0.0
-        self._phase = ''
-
-    @property
-    def left(self) -> bool:
-        """The user asked for the end."""
-        return self._leaving.is_set()
-
-    def leave(self) -> bool:
-        """Ask for the end, from any thread.
-
-        Returns:
-            True when the robot is on its feet: then it lies down first.
-        """
-        self._leaving.set()
-        return self._up.is_set()
-
-    def run(self, supervisor: Supervisor, make_client: MakeClient) -> None:
-        """Run until the end, and stop the supervisor then.
-
-        Args:
-            supervisor: About to be run in the main thread.
-            make_client: Makes the demo's ROS client, here in this thread.
-        """
-        self._enter('starting')
-        ended = {Phase.STOPPING, Phase.STOPPED}
-        client = make_client(lambda: supervisor.phase in ended)
-        try:
-            self._course(client, lambda: supervisor.phase is Phase.RUNNING)
-            supervisor.stop(Outcome(0, 'the demo has ended'))
-        except GivenUpError:
-            pass  # the supervisor knows why
-        except CallError as error:
-            supervisor.stop(Outcome(1, str(error)))
-        except Exception as error:
-            supervisor.stop(Outcome(1, f'{type(error).__name__}: {error}'))
-            raise
-        finally:
-            self._follow_stop(client, lambda: supervisor.phase is Phase.STOPPED)
-            client.close()
 
     def _course(self, client: Client, ready: Callable[[], bool]) -> None:
         self._wait(client, ready, math.inf, 'the processes')
         self._find(client)
         self._reach(client, 'stand', 'standing up')
-        self._up.set()
+        self._moving.set()
         client.watch_tilt()
         self._reach(client, self._mode, self._mode)
         for stretch in itinerary(self._duration):
@@ -236,31 +148,15 @@ class Play:
 
         client.wait_until(reached, timeout, what)
 
-    def _enter(self, phase: str) -> None:
-        if phase != self._phase:
-            self._phase = phase
-            self._display.phase(phase)
-
-    def _show(self, client: Client) -> None:
-        now = time.monotonic()
-        if now >= self._next_picture:
-            self._next_picture = now + REFRESH
-            self._display.show(client.figures)
-
     def _conclude(self, figures: Figures) -> None:
         if self._measured:
-            self.result = Result(
+            self.result = play.Result(
                 summary_lines(figures, self._measured), problems(figures, self._measured)
             )
 
-    def _follow_stop(self, client: Client, stopped: Callable[[], bool]) -> None:
-        """Keep the picture alive until everything has ended."""
+    def _accompany(self, client: Client, stopped: Callable[[], bool]) -> None:
         client.command(None)
-        self._enter('stopping')
-        while not stopped():
-            client.listen(REFRESH / 4)
-            self._show(client)
-        self._display.show(client.figures)
+        super()._accompany(client, stopped)
 
 
 def _between(begin: Milestone | None, end: Milestone | None) -> Velocity | None:

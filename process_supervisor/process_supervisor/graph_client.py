@@ -1,0 +1,80 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""A ROS client that waits: for programs that ask running nodes for something, step by step.
+
+This module is not imported by the package: it loads rclpy, which a mere bring-up does not need.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import time
+
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+
+from .exceptions import CallError, GivenUpError
+
+SPIN = 0.05
+"""Longest time in [s] after which a wait looks whether it shall be given up."""
+
+
+class GraphClient:
+    """A node of its own, in a context of its own; use it in one thread.
+
+    Attributes:
+        node: The node, for what is published, heard and called.
+    """
+
+    def __init__(self, name: str, given_up: Callable[[], bool]) -> None:
+        """Join the ROS graph.
+
+        Args:
+            name: Name of the node.
+            given_up: True when nothing shall be waited for any more.
+        """
+        self._given_up = given_up
+        self._context = Context()
+        rclpy.init(context=self._context, signal_handler_options=SignalHandlerOptions.NO)
+        self.node = Node(name, context=self._context, enable_rosout=False)
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self.node)
+
+    def close(self) -> None:
+        """Leave the ROS graph."""
+        self._executor.shutdown()
+        self.node.destroy_node()
+        self._context.try_shutdown()
+
+    def listen(self, duration: float) -> None:
+        """Hear what comes in.
+
+        Args:
+            duration: For how long in [s].
+        """
+        end = time.monotonic() + duration
+        while (left := end - time.monotonic()) > 0:
+            self._executor.spin_once(timeout_sec=left)
+
+    def wait_until(self, condition: Callable[[], bool], timeout: float, what: str) -> None:
+        """Wait for something.
+
+        Args:
+            condition: True when it is there; asked after whatever comes in.
+            timeout: Longest time in [s].
+            what: What is waited for, for the message.
+
+        Raises:
+            CallError: It did not come in time.
+            GivenUpError: It is no longer wanted.
+        """
+        end = time.monotonic() + timeout
+        while not condition():
+            if time.monotonic() > end:
+                raise CallError(f'waited {timeout:g} s in vain for {what}')
+            if self._given_up():
+                raise GivenUpError(what)
+            self._executor.spin_once(timeout_sec=SPIN)
