@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -287,14 +288,16 @@ def test_measurements_are_noisy_and_in_steps_of_the_encoder() -> None:
     assert np.std(rolls) == pytest.approx(BOARD.attitude, rel=0.2)
 
 
-def test_physics_that_blows_up_says_so() -> None:
-    """A servo that is no servo ends in an error with the remedy, and not in silent nonsense."""
+def test_physics_that_blows_up_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A servo that is no servo ends in an error with the remedy, and leaves no file behind."""
+    monkeypatch.chdir(tmp_path)
     wild = ServoParameters(stiffness=1e9, damping=0.0, armature=0.0)
     heavy = robot_urdf('mini').replace('effort="0.46"', 'effort="1e12"')
     robot = Robot(heavy, wild)
     robot.set_targets([0.3] * 12)
     with pytest.raises(SimulationError, match='softer servo'):
         robot.step(4.0)
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize(

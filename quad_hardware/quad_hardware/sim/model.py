@@ -29,6 +29,10 @@ FEET: Final = tuple(f'{leg}_foot' for leg in LEGS)
 _TOUCH_MARGIN = 0.002  # [m] how far the region that feels the ground reaches beyond the foot
 
 
+def _pass_over(_text: str) -> None:
+    """Leave a warning of MuJoCo to those who look at its counters."""
+
+
 def build_model(
     urdf: str, servo: ServoParameters, terrain: Terrain, timestep: float
 ) -> mujoco.MjModel:
@@ -46,6 +50,8 @@ def build_model(
     Raises:
         SetupError: The URDF is no such robot.
     """
+    if mujoco.get_mju_user_warning() is None:  # else it writes a MUJOCO_LOG.TXT where it runs
+        mujoco.set_mju_user_warning(_pass_over)
     try:
         spec = mujoco.MjSpec.from_string(_loadable(urdf))
         _set_options(spec, timestep)
