@@ -5,7 +5,8 @@
 from __future__ import annotations
 
 from .bounds import BrakeSettings
-from .core import CoreSettings, MotionCore, SetPoint, Source
+from .core import MotionCore
+from .core_settings import CoreSettings
 from .exceptions import CommandError, GoalCode, GoalError, ModelError, NotReadyError, ServoError
 from .execution import Execution, ExecutionSettings, Feedback, Outcome, Phase
 from .goal import GoalPoint, GoalRules, JointTolerance, TrajectoryGoal
@@ -14,6 +15,7 @@ from .model import Pose, RobotModel
 from .otg import MotionState
 from .report import Cause, Limiter, MotionReport
 from .servo import ServoSettings
+from .set_point import SetPoint, Source
 from .velocity_ik import IkSettings
 
 __all__ = [

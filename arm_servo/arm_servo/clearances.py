@@ -87,6 +87,18 @@ class Clearances:
         self._places[doubtful] = positions
         return bounds
 
+    def proven(self, positions: Array, within: float) -> int:
+        """Count the leading rows at which nothing is as near, as far as is known unmeasured.
+
+        Args:
+            positions: Joint positions in [rad] (m, n).
+            within: The distance of interest in [m].
+        """
+        turned = np.abs(positions[:, None, :] - self._places)
+        bounds = self._distances - np.einsum('mkn,kn->mk', turned, self._shapes.levers)
+        doubtful = (bounds < within).any(axis=1)
+        return int(doubtful.argmax()) if doubtful.any() else len(positions)
+
     def nearest(self, positions: Array, within: float, count: int) -> list[Proximity]:
         """Return the nearest pairs with the gradients of their distances.
 

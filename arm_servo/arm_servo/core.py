@@ -9,64 +9,23 @@ is no event: positions, velocities and accelerations go on from where they are.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from enum import Enum
 
 import numpy as np
 
-from .arrays import Array, checked, frozen
+from .arrays import Array, checked
 from .commands import by_joint, duration_of, pose_command, twist_command
-from .exceptions import CommandError, GoalCode, NotReadyError
-from .execution import Execution, ExecutionSettings, Feedback, Outcome, Phase
+from .core_settings import CoreSettings
+from .exceptions import CommandError, NotReadyError
+from .execution import Execution, Feedback
 from .goal import TrajectoryGoal
 from .guard import Guard
-from .jogging import Jogging
 from .model import Pose, RobotModel
-from .otg import Generator, hard_brake, MotionState
+from .otg import Generator, MotionState
+from .planning import Planning, Way
 from .report import Limiter, MotionReport
-from .servo import Command, JointCommand, ServoSettings
-from .single_target import SingleTarget
-
-
-class Source(Enum):
-    """What moves the arm."""
-
-    NONE = 'none'
-    JOG = 'jog'
-    TRAJECTORY = 'trajectory'
-    TARGET = 'target'
-
-
-@dataclass(frozen=True, slots=True)
-class CoreSettings:
-    """How the core behaves.
-
-    Attributes:
-        servo: How jogging behaves.
-        execution: How trajectories are followed.
-        timeout: Time without a fresh jog command after which the arm comes to rest in [s].
-        clearance: Least distance between links that a stop may end at in [m].
-    """
-
-    servo: ServoSettings = field(default_factory=ServoSettings)
-    execution: ExecutionSettings = field(default_factory=ExecutionSettings)
-    timeout: float = 0.1
-    clearance: float = 0.005
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class SetPoint:
-    """What to command in a cycle.
-
-    Attributes:
-        state: Positions, velocities and accelerations.
-        source: What moves the arm.
-        report: What limits the motion.
-    """
-
-    state: MotionState
-    source: Source
-    report: MotionReport
+from .servo import Command, JointCommand
+from .set_point import SetPoint, Source
+from .sources import Sources
 
 
 class MotionCore:
@@ -87,14 +46,13 @@ class MotionCore:
         self._limits = model.limits
         self._settings = settings or CoreSettings()
         self._generator = Generator(model.limits)
-        self._jogging = Jogging(model, self._settings.servo)
-        self._single = SingleTarget(model.limits, self._generator)
+        self._planning = Planning(model, self._generator, self._settings)
+        self._sources = Sources(model, self._generator, self._settings)
         self._guard = Guard(model, self._generator, self._settings.clearance)
         self._state: MotionState | None = None
-        self._source = Source.NONE
-        self._execution: Execution | None = None
         self._speed = 1.0
         self._paused = False
+        self._turn = 0
 
     @property
     def model(self) -> RobotModel:
@@ -115,17 +73,17 @@ class MotionCore:
     @property
     def source(self) -> Source:
         """What moves the arm."""
-        return self._source
+        return self._sources.active
 
     @property
     def execution(self) -> Execution | None:
         """The trajectory that was followed last, with its outcome; None before the first."""
-        return self._execution
+        return self._sources.execution
 
     @property
     def feedback(self) -> Feedback | None:
         """Where the trajectory is; None without one."""
-        return None if self._execution is None else self._execution.feedback
+        return None if self.execution is None else self.execution.feedback
 
     @property
     def speed(self) -> float:
@@ -148,7 +106,8 @@ class MotionCore:
             CommandError: The count is wrong, or a position is not finite.
         """
         where = checked(positions, len(self._model), 'positions')
-        self._release(reason)
+        self._turn += 1
+        self._sources.release(reason)
         self._state = MotionState.at_rest(where)
         self._guard.reset(self._state)
 
@@ -226,7 +185,7 @@ class MotionCore:
         return execution
 
     def plan(self, goal: TrajectoryGoal, state: MotionState) -> Execution:
-        """Check a trajectory and plan its execution, which takes 0.4 ms a point; for any thread.
+        """Check a trajectory and plan its execution, see :class:`Planning`; for any one thread.
 
         Args:
             goal: The trajectory.
@@ -235,14 +194,7 @@ class MotionCore:
         Raises:
             GoalError: It is refused.
         """
-        return Execution(
-            goal,
-            limits=self._limits,
-            generator=self._generator,
-            state=state,
-            pace=self._pace,
-            settings=self._settings.execution,
-        )
+        return self._planning.execution(goal, state, self._pace)
 
     def begin(self, execution: Execution) -> None:
         """Follow a trajectory that was planned; where it is off, the arm catches up smoothly.
@@ -254,8 +206,8 @@ class MotionCore:
             NotReadyError: The position of the arm is not known yet.
         """
         _ = self.state
-        self._release('a new trajectory took over')
-        self._source, self._execution = Source.TRAJECTORY, execution
+        self._turn += 1
+        self._sources.follow(execution)
 
     def move_to(self, positions: Mapping[str, float]) -> None:
         """Move joints to positions in the shortest time, and rest there.
@@ -264,14 +216,13 @@ class MotionCore:
             positions: Targets in [rad] by joint; the others come to rest.
 
         Raises:
-            CommandError: A joint is unknown, or a number is not finite or beyond a limit.
+            CommandError: A joint is unknown, a number is not finite or beyond a limit, or links
+                meet on the way.
             NotReadyError: The position of the arm is not known yet.
         """
-        values, moved = by_joint(self._model, positions, 'positions')
-        rest, limits = self._generator.brake(self.state), self._limits
-        stay = self.state.position if rest is None else rest.at(rest.duration).position
-        # where a joint comes to rest was not asked for: it need not be refused
-        self._aim(np.where(moved, values, np.clip(stay, limits.lower, limits.upper)))
+        way = self.way_to(positions)
+        self.check(way)
+        self.go(way)
 
     def nudge(self, displacements: Mapping[str, float]) -> None:
         """Move joints on by amounts, and rest there; nudges add up while they are carried out.
@@ -280,16 +231,54 @@ class MotionCore:
             displacements: How far in [rad] by joint.
 
         Raises:
-            CommandError: A joint is unknown, or the end is not finite or beyond a limit.
+            CommandError: A joint is unknown, the end is not finite or beyond a limit, or links
+                meet on the way.
             NotReadyError: The position of the arm is not known yet.
         """
+        way = self.way_by(displacements)
+        self.check(way)
+        self.go(way)
+
+    def way_to(self, positions: Mapping[str, float]) -> Way:
+        """Return the way of :meth:`move_to`, for :meth:`check` and :meth:`go`; nothing moves."""
+        values, moved = by_joint(self._model, positions, 'positions')
+        rest, limits = self._generator.brake(self.state), self._limits
+        stay = self.state.position if rest is None else rest.at(rest.duration).position
+        # where a joint comes to rest was not asked for: it need not be refused
+        return self._way(np.where(moved, values, np.clip(stay, limits.lower, limits.upper)))
+
+    def way_by(self, displacements: Mapping[str, float]) -> Way:
+        """Return the way of :meth:`nudge`, for :meth:`check` and :meth:`go`; nothing moves."""
         values, moved = by_joint(self._model, displacements, 'displacements')
-        pending = self._single.target
+        pending = self._sources.target
         if pending is not None:
-            self._aim(pending + values)  # what other nudges are on their way to stays
-            return
+            return self._way(pending + values)  # what other nudges are on their way to stays
         ends, names = self.state.position + values, self._limits.names
-        self.move_to({names[place]: float(ends[place]) for place in np.flatnonzero(moved)})
+        return self.way_to({names[place]: float(ends[place]) for place in np.flatnonzero(moved)})
+
+    def check(self, way: Way) -> None:
+        """Look for collisions on a way, see :class:`Planning`; for any one thread.
+
+        Args:
+            way: The way.
+
+        Raises:
+            CommandError: Links meet on it.
+        """
+        self._planning.check(way)
+
+    def go(self, way: Way) -> None:
+        """Go a way that was checked.
+
+        Args:
+            way: What :meth:`way_to` or :meth:`way_by` returned.
+
+        Raises:
+            CommandError: Another command came in between.
+        """
+        if way.turn != self._turn:
+            raise CommandError('another command came before this one had begun; give it again')
+        self._sources.aim(way.target)
 
     def stop(self, reason: str = 'stopped') -> None:
         """Come to rest: a trajectory on its path, anything else in the shortest time.
@@ -297,13 +286,12 @@ class MotionCore:
         Args:
             reason: Why, for the trajectory that this ends.
         """
-        if self._source is Source.TRAJECTORY and self._execution is not None:
-            self._execution.stop(Outcome(GoalCode.SUCCESSFUL, reason, canceled=True))
-            return
-        self._release(reason)
+        self._turn += 1
+        self._sources.stop(reason)
 
     def pause(self) -> None:
         """Come to rest, a trajectory on its path; jogging is refused until :meth:`resume`."""
+        self._turn += 1
         self._paused = True
 
     def resume(self) -> None:
@@ -335,13 +323,14 @@ class MotionCore:
             NotReadyError: The position of the arm is not known yet.
         """
         state = self.state
-        wanted, report = self._wanted(state, measured or state, now, period)
-        jogging = self._source is Source.JOG
-        if wanted is None:
-            wanted = self._toward(state, np.zeros(len(self._limits)), period)
+        wanted, report = self._sources.step(
+            state, measured or state, now, period, pace=self._pace, paused=self._paused
+        )
+        jogging = self._sources.active is Source.JOG
         after, limiter = self._guard.step(state, wanted, period, clearances=jogging)
         self._state = after
-        return SetPoint(after, self._ended(after, now), _with(report, limiter))
+        source = self._sources.ended(after, now, paused=self._paused)
+        return SetPoint(after, source, _with(report, limiter))
 
     @property
     def _pace(self) -> float:
@@ -352,55 +341,12 @@ class MotionCore:
         counts = duration_of(duration, self._settings.timeout)
         if self._paused:
             raise CommandError('jogging is paused; resume first')
-        if self._source is not Source.JOG:
-            self._release('jogging took over')
-            self._jogging.begin()
-        self._source = Source.JOG
-        self._jogging.take(command, now + counts)
+        self._turn += 1
+        self._sources.jog(command, now + counts)
 
-    def _aim(self, target: Array) -> None:
-        self._single.check(target)
-        if self._source is not Source.TARGET:
-            self._release('a single target took over')
-        self._source, self._single.target = Source.TARGET, frozen(target)
-
-    def _release(self, reason: str) -> None:
-        """Take the arm from what moves it; it comes to rest unless something else takes over."""
-        if self._source is Source.TRAJECTORY and self._execution is not None:
-            self._execution.abandon(Outcome(GoalCode.INVALID_GOAL, reason))
-        self._jogging.end()
-        self._source, self._single.target = Source.NONE, None
-
-    def _wanted(
-        self, state: MotionState, measured: MotionState, now: float, period: float
-    ) -> tuple[MotionState | None, MotionReport]:
-        """Return the next state that the source wants; None to come to rest."""
-        if self._source is Source.JOG:
-            velocity, report = self._jogging.step(state, now, period, held=self._paused)
-            return (None if velocity is None else self._toward(state, velocity, period)), report
-        if self._source is Source.TRAJECTORY and self._execution is not None:
-            return self._execution.step(state, measured, self._pace, period), MotionReport()
-        if self._source is Source.TARGET:
-            return self._single.step(state, self._pace, period), MotionReport()
-        return None, MotionReport()
-
-    def _toward(self, state: MotionState, velocity: Array, period: float) -> MotionState:
-        plan = self._generator.to_velocity(state, velocity)
-        if plan is None:
-            return hard_brake(state, self._limits, period)
-        if period >= plan.duration and not velocity.any():
-            return MotionState.at_rest(plan.at(plan.duration).position)
-        return plan.at(period)
-
-    def _ended(self, state: MotionState, now: float) -> Source:
-        """Return what moved the arm in this cycle, and let go of what has ended."""
-        source, execution = self._source, self._execution
-        done = source is Source.TRAJECTORY and execution and execution.phase is Phase.DONE
-        arrived = source is Source.TARGET and self._single.reached(state)
-        stale = self._paused or self._jogging.stale(now)
-        if done or arrived or (source is Source.JOG and stale and not state.moving):
-            self._release('')
-        return source
+    def _way(self, target: Array) -> Way:
+        self._sources.check_target(target)
+        return Way(self.state, target, self._turn)
 
 
 def _with(report: MotionReport, limiter: Limiter | None) -> MotionReport:

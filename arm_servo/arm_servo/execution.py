@@ -16,6 +16,7 @@ from .goal import GoalRules, JointTolerance, TrajectoryGoal
 from .goal_path import build_path
 from .limits import JointLimits
 from .otg import Generator, MotionState
+from .path import Path
 from .path_clock import PathClock
 from .tolerances import tolerances
 
@@ -130,6 +131,11 @@ class Execution:
         self.ending: Outcome | None = None
         self.phase = Phase.FOLLOWING
         self.feedback = Feedback(0.0, state, state, pace)
+
+    @property
+    def path(self) -> Path:
+        """The path that it follows."""
+        return self._path
 
     @property
     def duration(self) -> float:

@@ -140,6 +140,7 @@ class Path:
         self.joined = joined
         self.segments = tuple(segments)
         self._starts = [segment.start for segment in self.segments]
+        self._coefficients = np.array([segment.coefficients for segment in self.segments])
         last = self.segments[-1]
         self.duration = last.start + last.duration
         self.end = last.at(self.duration)
@@ -151,6 +152,14 @@ class Path:
             return PathPoint(self.end.position, rest, rest)
         place = max(0, bisect_right(self._starts, time) - 1)
         return self.segments[place].at(max(time, 0.0))
+
+    def positions(self, times: Array) -> Array:
+        """Return the positions (k, n) in [rad] at times of the path (k) in [s]."""
+        within = np.clip(times, 0.0, self.duration)
+        places = np.maximum(np.searchsorted(self._starts, within, side='right') - 1, 0)
+        powers = (within - np.array(self._starts)[places])[:, None] ** _POWERS
+        positions: Array = np.einsum('kp,kpn->kn', powers, self._coefficients[places])
+        return positions
 
 
 def rounded(path: Path, limits: JointLimits) -> Path:

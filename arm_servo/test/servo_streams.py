@@ -9,12 +9,13 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from arm_servo.arrays import Array
-from arm_servo.core import MotionCore, SetPoint
+from arm_servo.core import MotionCore
 from arm_servo.execution import Execution, Phase
 from arm_servo.goal import GoalPoint, TrajectoryGoal
 from arm_servo.limits import JointLimits
 from arm_servo.model import RobotModel
 from arm_servo.otg import MotionState
+from arm_servo.set_point import SetPoint
 
 PERIOD = 0.004
 """Cycle of the streams in [s]."""

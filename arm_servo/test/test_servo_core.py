@@ -16,12 +16,13 @@ from servo_robots import ready, robot, ROBOTS
 from servo_runs import twist_between
 from servo_streams import kept, PERIOD, stream, wave
 
-from arm_servo.core import MotionCore, SetPoint, Source
+from arm_servo.core import MotionCore
 from arm_servo.exceptions import CommandError, GoalCode, NotReadyError
 from arm_servo.execution import Phase
 from arm_servo.model import Pose
 from arm_servo.otg import Generator
 from arm_servo.report import Cause
+from arm_servo.set_point import SetPoint, Source
 
 Action = Callable[[MotionCore, float, np.random.Generator], object]
 

@@ -14,10 +14,11 @@ from servo_drives import Drives, PERIOD
 
 from arm_canopen import AxisFeedback
 from arm_canopen.standard.drive import DriveState
-from arm_servo.core import MotionCore, Source
+from arm_servo.core import MotionCore
 from arm_servo.exceptions import GoalCode, NotReadyError
 from arm_servo.execution import Execution, Phase
 from arm_servo.goal import GoalPoint, TrajectoryGoal
+from arm_servo.set_point import Source
 
 Change = Callable[[AxisFeedback], AxisFeedback]
 

@@ -11,12 +11,13 @@ import pytest
 from servo_robots import ready, robot
 
 from arm_servo.arrays import Array
-from arm_servo.core import MotionCore, SetPoint
+from arm_servo.core import MotionCore
 from arm_servo.exceptions import GoalCode, NotReadyError
 from arm_servo.goal import GoalPoint, TrajectoryGoal
 from arm_servo.nodes.desk import Desk
 from arm_servo.nodes.joint_feedback import JointFeedback
 from arm_servo.nodes.motion_thread import MotionCycle
+from arm_servo.set_point import SetPoint
 
 PERIOD = 0.01
 

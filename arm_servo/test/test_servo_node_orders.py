@@ -106,7 +106,9 @@ def test_a_joint_jog_is_cut_and_scaled() -> None:
     core.reset(ready('gp110'))
     name = core.model.joints[0]
     for number in range(60):
-        made.jog(JointJog(joint_names=[name], velocities=[2.0]))(core, number * PERIOD)
+        order = made.jog(JointJog(joint_names=[name], velocities=[2.0]))
+        assert callable(order)
+        order(core, number * PERIOD)
         core.step(number * PERIOD, PERIOD)
     assert core.state.velocity[0] == pytest.approx(0.4, abs=1e-3)
     assert 'cut' in made.capped

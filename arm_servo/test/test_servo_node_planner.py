@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 from servo_drives import Drives, PERIOD
 
-from arm_servo.core import Source
 from arm_servo.exceptions import GoalCode, GoalError, NotReadyError
 from arm_servo.execution import Execution
 from arm_servo.goal import GoalPoint, TrajectoryGoal
 from arm_servo.nodes.planner import Planner
+from arm_servo.set_point import Source
 
 Done = Callable[[], bool]
 

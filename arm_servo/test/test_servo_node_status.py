@@ -7,11 +7,11 @@ from __future__ import annotations
 import pytest
 from servo_drives import Drives
 
-from arm_servo.core import SetPoint, Source
 from arm_servo.nodes.desk import Snapshot
 from arm_servo.nodes.servo_status import code_of, status_of, StatusCode
 from arm_servo.otg import MotionState
 from arm_servo.report import Cause, Limiter, MotionReport
+from arm_servo.set_point import SetPoint, Source
 
 
 def snapshot(report: MotionReport, source: Source = Source.JOG) -> Snapshot:

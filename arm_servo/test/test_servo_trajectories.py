@@ -15,7 +15,8 @@ from servo_robots import chain, ready, robot, ROBOTS
 from servo_streams import follow_to_the_end, kept, PERIOD, stream, wave
 
 from arm_servo.arrays import Array
-from arm_servo.core import CoreSettings, MotionCore
+from arm_servo.core import MotionCore
+from arm_servo.core_settings import CoreSettings
 from arm_servo.exceptions import GoalCode, GoalError
 from arm_servo.execution import ExecutionSettings, Outcome, Phase
 from arm_servo.goal import GoalPoint, GoalRules, JointTolerance, TrajectoryGoal

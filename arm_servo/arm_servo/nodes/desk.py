@@ -8,16 +8,19 @@ from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass
+import threading
 import time
 from typing import Any, Generic, TypeVar
 
 from ..arrays import Array
-from ..core import MotionCore, SetPoint, Source
+from ..core import MotionCore
 from ..exceptions import GoalCode, NotReadyError
 from ..execution import Execution, Outcome
 from ..goal import TrajectoryGoal
 from ..model import RobotModel
 from ..otg import MotionState
+from ..planning import Way
+from ..set_point import SetPoint, Source
 
 T = TypeVar('T')
 
@@ -89,6 +92,7 @@ class Desk:
         self._clock = clock
         self._orders: deque[_Order[Any]] = deque()
         self._snapshot = Snapshot(0.0, None, None, 'the cycle has not begun yet')
+        self._planning = threading.Lock()
 
     @property
     def snapshot(self) -> Snapshot:
@@ -130,7 +134,20 @@ class Desk:
         Raises:
             GoalError: It is refused.
         """
-        return self._core.plan(goal, state)
+        with self._planning:
+            return self._core.plan(goal, state)
+
+    def check(self, way: Way) -> None:
+        """Look for collisions on the way to a single target, outside of the cycle; any thread.
+
+        Args:
+            way: The way.
+
+        Raises:
+            CommandError: Links meet on it.
+        """
+        with self._planning:
+            self._core.check(way)
 
     def begin(self, positions: Array) -> None:
         """Take the arm over where it stands.

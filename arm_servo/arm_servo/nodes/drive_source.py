@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..arrays import frozen
-from ..core import Source
 from ..otg import MotionState
+from ..set_point import Source
 from .desk import Desk
 from .drive_reasons import why_not
 

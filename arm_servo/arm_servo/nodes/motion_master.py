@@ -18,7 +18,8 @@ from rclpy.node import Node
 from arm_canopen import run_master
 from arm_canopen.nodes.misspelt import refuse_misspelt
 
-from ..core import CoreSettings, MotionCore
+from ..core import MotionCore
+from ..core_settings import CoreSettings
 from ..exceptions import ModelError, NotReadyError, ServoError
 from .controller_manager import ControllerManager, trajectory_entry
 from .declare import Declarations
@@ -71,7 +72,12 @@ class Motion:
         same_robot(servo, model)
         trajectory = declare_trajectory(controller, model.joints)
         jogging = declare_servo(servo, model.group)
-        settings = CoreSettings(jogging.settings, trajectory.execution, jogging.timeout)
+        settings = CoreSettings(
+            jogging.settings,
+            trajectory.execution,
+            jogging.timeout,
+            check_self_collision=trajectory.check,
+        )
         self._desk = Desk(MotionCore(model, settings))
         self._source = DriveSource(self._desk)
         self._servo = Servo(servo, self._desk, jogging, self._prepare)

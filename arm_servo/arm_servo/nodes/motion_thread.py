@@ -10,8 +10,8 @@ import time
 
 import numpy as np
 
-from ..core import SetPoint, Source
 from ..otg import MotionState
+from ..set_point import SetPoint, Source
 from .desk import Desk
 from .joint_feedback import JointFeedback
 

@@ -10,18 +10,25 @@ from concurrent.futures import TimeoutError as FutureTimeoutError
 from dataclasses import replace
 import math
 
-from ..core import MotionCore, Source
+from ..core import MotionCore
 from ..exceptions import NotReadyError
 from ..execution import Execution
 from ..goal import TrajectoryGoal
 from ..otg import MotionState
+from ..set_point import Source
 from .desk import Desk, Snapshot
 
 PER_POINT = 1e-3
 """Time that planning may take for each point in [s]; twice what was measured."""
 
+PER_SECOND = 5e-3
+"""Time that looking for collisions may take for each second of the path in [s]; the same."""
+
 PATIENCE = 1.0
 """Time in which the cycle must answer in [s]."""
+
+LONGEST = 100.0
+"""Part of a trajectory for whose check a begin in motion waits in [s]."""
 
 LEAST = 3
 """Least cycles from the begin of the planning to that of the motion, where the arm moves."""
@@ -30,9 +37,10 @@ LEAST = 3
 class Planner:
     """Plans trajectories one after another.
 
-    Planning takes 0.4 ms a point, and MoveIt's plans have tens to hundreds of them: the cycle has
-    no time for that. Where the arm moves, the trajectory is planned from where it will be some
-    cycles later, and begins then; what the foresight was off, the core catches up smoothly.
+    Planning takes 0.4 ms a point and 3 ms for a second of motion, and MoveIt's plans have tens to
+    hundreds of points: the cycle has no time for that. Where the arm moves, the trajectory is
+    planned from where it will be some cycles later, and begins then; what the foresight was off,
+    the core catches up smoothly.
     """
 
     def __init__(self, desk: Desk, check: Callable[[], None]) -> None:
@@ -90,7 +98,8 @@ class Planner:
         state = snapshot.set_point.state
         if not state.moving and snapshot.source is Source.NONE:
             return self._desk.plan(goal, state), 0.0
-        cycles = max(LEAST, math.ceil(PER_POINT * len(goal.points) / snapshot.period) + 1)
+        needed = PER_POINT * len(goal.points) + PER_SECOND * _duration(goal)
+        cycles = max(LEAST, math.ceil(needed / snapshot.period) + 1)
         lead = (cycles - 1) * snapshot.period
         if goal.age:
             goal = replace(goal, age=goal.age + lead)
@@ -113,6 +122,12 @@ def _foreseen(snapshot: Snapshot, state: MotionState, ahead: float) -> MotionSta
         return snapshot.execution.foreseen(ahead)
     still = 0.0 * state.acceleration
     return MotionState(state.position + ahead * state.velocity, state.velocity, still)
+
+
+def _duration(goal: TrajectoryGoal) -> float:
+    """Return about how long a goal lasts in [s]; it is not checked yet."""
+    last = goal.points[-1].time if goal.points else 0.0
+    return min(max(last - goal.age, 0.0), LONGEST) if math.isfinite(last) else 0.0
 
 
 def _refuse(answer: Future[Execution], error: BaseException) -> None:

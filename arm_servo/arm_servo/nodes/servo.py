@@ -17,15 +17,19 @@ from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from ..core import MotionCore, Source
+from ..core import MotionCore
 from ..exceptions import ModelError, NotReadyError, ServoError
+from ..set_point import Source
+from .aimer import Aimer
 from .desk import Desk
 from .ros_numbers import seconds
 from .servo_modes import CommandKind, ServoModes
-from .servo_orders import Order, ServoOrders
+from .servo_orders import Displacements, Order, ServoOrders
 from .servo_parameters import PREFIX, read_scales, Scales, ServoParameters
 from .servo_status import status_of
 from .tf_listener import TfListener
+
+Convert = Callable[[Any], Order | Displacements]
 
 FRESH = 0.5
 """Silence after which a command begins a new motion, which may take drives back, in [s]."""
@@ -57,6 +61,7 @@ class Servo:
         """
         self._node, self._desk, self._prepare = node, desk, prepare
         self._parameters = parameters
+        self._aimer = Aimer(desk)
         self._modes = ServoModes(node, self._stop)
         self.orders = ServoOrders(TfListener(node, desk.model), parameters, read_scales(node))
         self._last = -FRESH
@@ -73,7 +78,7 @@ class Servo:
         node.add_post_set_parameters_callback(self._rescale)
         node.create_timer(1.0 / parameters.status_rate, self._publish_status)
 
-    def _take(self, kind: CommandKind, convert: Callable[[Any], Order], message: Any) -> None:  # noqa: ANN401  # messages have no type
+    def _take(self, kind: CommandKind, convert: Convert, message: Any) -> None:  # noqa: ANN401  # messages have no type
         begin = time.monotonic()
         try:
             self._check_age(message)
@@ -85,7 +90,12 @@ class Servo:
             self._refuse(str(error))
             return
         self._last = begin
-        self._desk.submit(order).add_done_callback(self._note)
+        if isinstance(order, Displacements):
+            future = self._aimer.nudge(order.by_joint)
+        else:
+            self._aimer.cancel()
+            future = self._desk.submit(order)
+        future.add_done_callback(self._note)
 
     def _check_age(self, message: Any) -> None:  # noqa: ANN401
         stamp = seconds(message.header.stamp)
@@ -116,6 +126,7 @@ class Servo:
             if core.source in {Source.JOG, Source.TARGET}:
                 core.stop(reason)
 
+        self._aimer.cancel()
         self._desk.submit(stop, moves=False)
 
     def _check_scales(self, parameters: list[Parameter]) -> SetParametersResult:

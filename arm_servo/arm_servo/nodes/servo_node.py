@@ -9,13 +9,15 @@ import sys
 
 from rclpy.node import Node
 
-from ..core import CoreSettings
+from ..core_settings import CoreSettings
+from .declare import Declarations
 from .motion_thread import MotionThread
 from .robot_parameters import declare_robot
 from .servo import Servo
 from .servo_parameters import declare_servo, PREFIX
 from .standalone import declare_loop, make_loop, run_standalone
 from .topic_output import declare_output, TRAJECTORY
+from .trajectory_parameters import declare_check
 
 
 def _build() -> tuple[Sequence[Node], MotionThread]:
@@ -24,7 +26,11 @@ def _build() -> tuple[Sequence[Node], MotionThread]:
     servo = declare_servo(node, model.group)
     topic = f'/{model.group}_controller/joint_trajectory'
     output = declare_output(node, PREFIX, topic, TRAJECTORY)
-    settings = CoreSettings(servo=servo.settings, timeout=servo.timeout)
+    settings = CoreSettings(
+        servo=servo.settings,
+        timeout=servo.timeout,
+        check_self_collision=declare_check(Declarations(node, PREFIX)),
+    )
     desk, thread = make_loop(node, model, settings, declare_loop(node, PREFIX), output)
     Servo(node, desk, servo, _nothing)
     return [node], thread

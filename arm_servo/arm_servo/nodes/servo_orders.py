@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
@@ -18,6 +19,18 @@ from .ros_numbers import xyz, xyzw
 from .servo_parameters import Scales, ServoParameters, Units
 
 Order = Callable[[MotionCore, float], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Displacements:
+    """An order to move joints on.
+
+    Attributes:
+        by_joint: How far in [rad] by joint.
+    """
+
+    by_joint: Mapping[str, float]
+
 
 LONGEST = 60.0
 """Longest duration of a joint jog in [s]."""
@@ -75,7 +88,7 @@ class ServoOrders:
         axes = self._frames.pose(frame).rotation
         return lambda core, now: core.twist(twist, now, axes=axes)
 
-    def jog(self, message: Any) -> Order:  # noqa: ANN401
+    def jog(self, message: Any) -> Order | Displacements:  # noqa: ANN401
         """Return the command of a JointJog: speeds for a duration, or displacements.
 
         Raises:
@@ -89,7 +102,7 @@ class ServoOrders:
         if message.displacements:
             ways = _by_name(names, message.displacements, 'displacements')
             self.capped = ''
-            return lambda core, _now: core.nudge(ways)
+            return Displacements(ways)
         if not 0.0 <= message.duration <= LONGEST:
             raise CommandError(f'duration {message.duration} s: 0 (the time-out) to {LONGEST:g}')
         speeds = _by_name(names, message.velocities, 'velocities')

@@ -6,8 +6,8 @@ from __future__ import annotations
 
 from enum import IntEnum
 
-from ..core import Source
 from ..report import Cause, MotionReport
+from ..set_point import Source
 from .desk import Snapshot
 
 HALTED = 0.02

@@ -23,7 +23,8 @@ from arm_canopen import CanopenError
 from arm_canopen.nodes.misspelt import refuse_misspelt
 from arm_canopen.nodes.spinning import spin, stop_on_signals
 
-from ..core import CoreSettings, MotionCore
+from ..core import MotionCore
+from ..core_settings import CoreSettings
 from ..exceptions import ServoError
 from ..model import RobotModel
 from .declare import Declarations

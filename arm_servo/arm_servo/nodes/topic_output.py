@@ -10,8 +10,8 @@ from rclpy.node import Node
 from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from ..core import SetPoint
 from ..exceptions import ModelError
+from ..set_point import SetPoint
 from .declare import Declarations
 from .trajectory_messages import duration_fields
 

@@ -22,7 +22,7 @@ from ..goal import TrajectoryGoal
 from .desk import Desk
 from .trajectory_messages import difference, point_of
 
-PATIENCE = 2.0
+PATIENCE = 5.0
 """Time in which a goal must be planned and taken by the cycle in [s]."""
 
 PER_POINT = 0.01

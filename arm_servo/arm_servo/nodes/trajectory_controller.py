@@ -17,10 +17,11 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from trajectory_msgs.msg import JointTrajectory
 
-from ..core import MotionCore, Source
+from ..core import MotionCore
 from ..exceptions import NotReadyError, ServoError
 from ..execution import Execution
 from ..goal import TrajectoryGoal
+from ..set_point import Source
 from .desk import Desk
 from .planner import Planner
 from .ros_numbers import seconds

@@ -29,6 +29,7 @@ class TrajectoryParameters:
         monitor_rate: Rate of the action's feedback in [Hz].
         state_rate: Rate of ~/controller_state in [Hz].
         speed: Speed scaling at the start, 0 to 1.
+        check: Whether motions on whose way links meet are refused.
     """
 
     execution: ExecutionSettings
@@ -37,6 +38,7 @@ class TrajectoryParameters:
     monitor_rate: float
     state_rate: float
     speed: float
+    check: bool
 
 
 def declare_trajectory(node: Node, joints: Sequence[str]) -> TrajectoryParameters:
@@ -88,6 +90,20 @@ def declare_trajectory(node: Node, joints: Sequence[str]) -> TrajectoryParameter
         declare.number(
             'speed_scaling.initial_scaling_factor', 1.0, 'speed at the start, 0 to 1', (0.0, 1.0)
         ),
+        declare_check(declare),
+    )
+
+
+def declare_check(declare: Declarations) -> bool:
+    """Declare whether motions on whose way links meet are refused.
+
+    Args:
+        declare: The node's declarations.
+    """
+    return declare.flag(
+        'check_self_collision',
+        'refuse trajectories and displacements on whose way links of the arm collide',
+        default=True,
     )
 
 

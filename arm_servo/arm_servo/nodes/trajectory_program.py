@@ -9,7 +9,7 @@ import sys
 
 from rclpy.node import Node
 
-from ..core import CoreSettings
+from ..core_settings import CoreSettings
 from .controller_manager import ControllerManager, trajectory_entry
 from .declare import Declarations
 from .motion_thread import MotionThread
@@ -33,7 +33,7 @@ def _build() -> tuple[Sequence[Node], MotionThread]:
     trajectory = declare_trajectory(node, model.joints)
     loop = declare_loop(node, '')
     output = declare_output(node, '', OUTPUT, ARRAY)
-    settings = CoreSettings(execution=trajectory.execution)
+    settings = CoreSettings(execution=trajectory.execution, check_self_collision=trajectory.check)
     desk, thread = make_loop(node, model, settings, loop, output)
     controller = TrajectoryController(node, desk, trajectory, _nothing)
     entry = trajectory_entry(name, model.joints, loop.period, controller.set_active)

@@ -1,0 +1,99 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Whether links of the arm meet on a way, found before anything moves.
+
+A way is looked at in steps in which no link moves by more than :data:`STEP` against another, so a
+contact that is passed over is shallower than that. Distances are measured only where the levers of
+:class:`CollisionModel` do not prove that a pair is still apart.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+import math
+
+import numpy as np
+
+from .arrays import Array
+from .model import RobotModel
+
+STEP = 0.005
+"""Greatest motion of a link against another from one look to the next in [m]."""
+
+COARSE = 0.01
+"""Time between the places from which the steps are laid out in [s]."""
+
+MOST = 50_000
+"""Looks at one way at most: beyond 250 m of motion they are farther apart."""
+
+FARTHEST = 64
+"""Looks that are proven at once at most."""
+
+TOUCH = 1e-4
+"""Overlap that is let pass in [m], for rounding; in contact already, how much more of it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Contact:
+    """Two links that meet on a way.
+
+    Attributes:
+        links: Their names.
+        time: When they meet in [s].
+    """
+
+    links: tuple[str, str]
+    time: float
+
+
+class PathCheck:
+    """Looks for contact of links on ways; for one thread."""
+
+    def __init__(self, model: RobotModel) -> None:
+        """Prepare.
+
+        Args:
+            model: The arm; its cached kinematics are not touched.
+        """
+        self._clearances = model.clearances()
+
+    def contact(self, positions_at: Callable[[Array], Array], duration: float) -> Contact | None:
+        """Return the first contact on a way.
+
+        An arm that begins in contact may part, and may not come nearer.
+
+        Args:
+            positions_at: Joint positions in [rad] (k, n) at times in [s] (k).
+            duration: How long the way lasts in [s].
+        """
+        if not self._clearances.pairs:
+            return None
+        times = self._looks(positions_at, duration)
+        rows = positions_at(times)
+        floor = np.full(len(self._clearances.pairs), -np.inf)
+        place, ahead = 0, 1
+        while place < len(rows):
+            passed = self._clearances.proven(rows[place : place + ahead], 0.0)
+            if passed:
+                floor.fill(-TOUCH)
+                place, ahead = place + passed, min(2 * ahead, FARTHEST)
+                continue
+            distances = self._clearances.least(rows[place], 0.0)
+            deeper = distances < floor
+            if deeper.any():
+                links = self._clearances.pairs[int(deeper.argmax())]
+                return Contact(links, float(times[place]))
+            floor = np.maximum(floor, np.minimum(distances, 0.0) - TOUCH)
+            place, ahead = place + 1, 1
+        return None
+
+    def _looks(self, positions_at: Callable[[Array], Array], duration: float) -> Array:
+        """Return the times to look at: dense where the arm moves fast."""
+        coarse = np.linspace(0.0, duration, math.ceil(duration / COARSE) + 2)
+        turns = np.abs(np.diff(positions_at(coarse), axis=0))
+        motion = (turns @ self._clearances.levers.T).max(axis=1)
+        along = np.concatenate(((0.0,), np.cumsum(motion)))
+        count = min(math.ceil(along[-1] / STEP), MOST)
+        times: Array = np.interp(np.linspace(0.0, along[-1], count + 1), along, coarse)
+        return times

@@ -1,0 +1,152 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Motions on whose way links meet are refused before anything moves."""
+
+from __future__ import annotations
+
+from functools import cache
+import math
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+import numpy as np
+import pytest
+from servo_robots import ready, robot, ROBOTS
+
+from arm_servo.arrays import Array
+from arm_servo.core import MotionCore
+from arm_servo.core_settings import CoreSettings
+from arm_servo.exceptions import CommandError, GoalCode, GoalError
+from arm_servo.execution import Phase
+from arm_servo.goal import GoalPoint, TrajectoryGoal
+from arm_servo.path_check import PathCheck, STEP
+from arm_servo.set_point import Source
+
+PERIOD = 0.01
+
+
+def core_at(name: str, positions: Array, check: bool = True) -> MotionCore:
+    """Return a core whose arm rests somewhere."""
+    core = MotionCore(robot(name), CoreSettings(check_self_collision=check))
+    core.reset(positions)
+    return core
+
+
+def goal_to(core: MotionCore, positions: Array, duration: float = 8.0) -> TrajectoryGoal:
+    """Return a trajectory of one point."""
+    return TrajectoryGoal(core.model.joints, [GoalPoint(duration, positions.tolist())])
+
+
+def by_name(core: MotionCore, positions: Array) -> dict[str, float]:
+    """Return positions by joint."""
+    return dict(zip(core.model.joints, positions.tolist(), strict=True))
+
+
+@cache
+def find_blocked(name: str) -> tuple[Array, Array]:
+    """Return two free places of an arm whose straight connection is not free."""
+    model, rng = robot(name), np.random.default_rng(7)
+    lower = np.maximum(model.limits.lower, -3.0)
+    upper = np.minimum(model.limits.upper, 3.0)
+    for _ in range(5000):
+        begin, end = rng.uniform(lower, upper, (2, len(model)))
+        if min(model.clearance(begin), model.clearance(end)) < 0.002:
+            continue
+        shares = np.linspace(0.1, 0.9, 20)
+        if min(model.clearance(begin + share * (end - begin)) for share in shares) < -0.01:
+            return begin, end
+    raise AssertionError(f'{name} is never in its own way')
+
+
+@pytest.mark.parametrize('name', ROBOTS)
+def test_a_trajectory_through_contact_is_refused_with_pair_and_time(name: str) -> None:
+    """Links and time are those of the first contact; the arm stays where it is."""
+    begin, end = find_blocked(name)
+    core = core_at(name, begin)
+    with pytest.raises(GoalError, match=r'would collide at \d+\.\d\d s') as caught:
+        core.follow(goal_to(core, end))
+    assert caught.value.code is GoalCode.INVALID_GOAL
+    assert core.source is Source.NONE
+    core.step(0.0, PERIOD)
+    assert core.state.position.tolist() == begin.tolist()
+    allowed = core_at(name, begin, check=False)
+    path = allowed.follow(goal_to(allowed, end)).path
+    time = float(str(caught.value).split(' would collide at ')[1].split(' s ')[0])
+    times = np.arange(0.0, path.duration, 1e-3)
+    distances = [core.model.clearance(at) for at in path.positions(times)]
+    first = int(np.argmax(np.array(distances) < 0.0))
+    assert time == pytest.approx(times[first], abs=0.05)
+    links = core.model.nearest(path.positions(times)[first], math.inf, 1)[0].links
+    assert all(link in str(caught.value) for link in links)
+
+
+@pytest.mark.parametrize('name', ROBOTS)
+@settings(max_examples=12, deadline=None)
+@given(seed=st.integers(0, 10**6))
+def test_what_is_refused_collides_and_what_is_accepted_does_not(name: str, seed: int) -> None:
+    """Against looking at every millisecond; what is passed over is shallower than a step."""
+    model, rng = robot(name), np.random.default_rng(seed)
+    lower = np.maximum(model.limits.lower, -2.5)
+    upper = np.minimum(model.limits.upper, 2.5)
+    begin, end = rng.uniform(lower, upper, (2, len(model)))
+    shares = np.linspace(0.0, 1.0, 2001)
+    least = min(model.clearance(begin + share * (end - begin)) for share in shares)
+
+    def positions(times: Array) -> Array:
+        places: Array = begin + np.outer(times / 4.0, end - begin)
+        return places
+
+    if model.clearance(begin) > 0.0:
+        found = PathCheck(model).contact(positions, 4.0)
+        assert least < 0.0 if found else least > -STEP
+
+
+@pytest.mark.parametrize('name', ROBOTS)
+def test_a_single_target_through_contact_is_refused(name: str) -> None:
+    """As a place and as a displacement; what moved the arm goes on; it can be switched off."""
+    begin, end = find_blocked(name)
+    core = core_at(name, begin)
+    with pytest.raises(CommandError, match='would collide after'):
+        core.move_to(by_name(core, end))
+    with pytest.raises(CommandError, match='would collide after'):
+        core.nudge(by_name(core, end - begin))
+    execution = core.follow(goal_to(core, begin))
+    with pytest.raises(CommandError, match='would collide after'):
+        core.move_to(by_name(core, end))
+    assert core.source is Source.TRAJECTORY
+    assert execution.phase is Phase.FOLLOWING
+    allowed = core_at(name, begin, check=False)
+    allowed.move_to(by_name(allowed, end))
+    assert allowed.source is Source.TARGET
+
+
+@pytest.mark.parametrize('name', ROBOTS)
+def test_an_arm_in_contact_may_part_and_not_go_deeper(name: str) -> None:
+    """The way back is open to trajectories too."""
+    begin, end = find_blocked(name)
+    shares = np.linspace(0.0, 1.0, 400)
+    model = robot(name)
+    distances = np.array([model.clearance(begin + share * (end - begin)) for share in shares])
+    shallow = begin + shares[int(np.argmax(distances < -0.002))] * (end - begin)
+    inside = begin + shares[int(np.argmin(distances))] * (end - begin)
+    core = core_at(name, shallow)
+    execution = core.follow(goal_to(core, begin, 8.0))
+    for cycle in range(2000):
+        core.step(cycle * PERIOD, PERIOD)
+        if execution.phase is Phase.DONE:
+            break
+    assert core.state.position == pytest.approx(begin, abs=1e-5)
+    core.reset(shallow)
+    with pytest.raises(GoalError, match='would collide'):
+        core.follow(goal_to(core, inside, 8.0))
+
+
+def test_a_way_is_void_when_another_command_came() -> None:
+    """What was checked is not begun behind a stop."""
+    core = core_at('prbt', ready('prbt'))
+    way = core.way_by({'prbt_joint_1': 0.1})
+    core.check(way)
+    core.stop()
+    with pytest.raises(CommandError, match='another command'):
+        core.go(way)
+    assert core.source is Source.NONE
