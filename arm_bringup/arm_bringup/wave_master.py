@@ -7,8 +7,6 @@ It takes what ``ros2 run arm_canopen master`` takes, and robot_description for i
 
 from __future__ import annotations
 
-from rclpy.logging import get_logger
-
 from arm_canopen import run_master
 
 from .exceptions import BringupError
@@ -24,8 +22,4 @@ def main(argv: list[str] | None = None) -> int:
     Returns:
         The exit code of the master, 1 when the wave cannot be planned.
     """
-    try:
-        return run_master(argv, extend=lambda master: [WaveNode(master)])
-    except BringupError as error:
-        get_logger('wave').fatal(str(error))
-        return 1
+    return run_master(argv, extend=lambda master: [WaveNode(master)], errors=[BringupError])

@@ -7,9 +7,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
 from std_srvs.srv import Trigger
+
+from node_runner import destroyed_when_refused, ParameterReader, refuse_misspelt
 
 from .description import joint_limits
 from .wave import plan_wave, WaveStyle
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 class WaveNode(Node):
     """Offers ~/start and ~/stop, and says in /diagnostics how well the drives follow."""
 
+    @destroyed_when_refused
     def __init__(self, master: MasterProcess) -> None:
         """Plan the wave for the drives of a running master; nothing moves yet.
 
@@ -30,16 +32,18 @@ class WaveNode(Node):
             master: The process that runs the bus.
 
         Raises:
+            ParameterError: A parameter is misspelt.
             DescriptionError: Parameter robot_description is not usable.
             WaveError: The wave cannot be planned.
         """
         super().__init__('wave')
         self._master = master
-        description = ParameterDescriptor(
-            description='URDF of the robot as XML; the wave stays within its joint limits',
-            read_only=True,
+        urdf = ParameterReader(self).text(
+            'robot_description',
+            '',
+            'URDF of the robot as XML; the wave stays within its joint limits',
         )
-        urdf = str(self.declare_parameter('robot_description', '', description).value)
+        refuse_misspelt(self)
         drives = [node.name for node in master.bus.nodes if node.is_drive]
         style = WaveStyle()
         self._source = WaveSource(plan_wave(joint_limits(urdf), drives, style), style)

@@ -11,7 +11,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import threading
 import time
 
 from can_addresses import free_multicast
@@ -132,32 +131,3 @@ def test_errors_are_one_message(processes: list[subprocess.Popen[str]], case: st
     assert culprit in text
     assert text.count('[FATAL]') == 1
     assert 'Traceback' not in text
-
-
-@pytest.mark.scenario
-@pytest.mark.parametrize('kind', ['chosen', 'single-threaded'])
-def test_spin_serves_until_shutdown(kind: str) -> None:
-    """Callbacks run until the context is shut down from elsewhere; then spin returns."""
-    from rclpy.executors import SingleThreadedExecutor
-
-    from arm_canopen.nodes.spinning import make_executor, spin
-
-    rclpy.init(domain_id=1 + os.getpid() % 90)
-    try:
-        executor = SingleThreadedExecutor() if kind == 'single-threaded' else make_executor()
-        node = rclpy.create_node('spinner')
-        called = threading.Event()
-        node.create_timer(0.005, called.set)
-
-        def end() -> None:
-            called.wait(ARRIVAL)
-            rclpy.shutdown()
-
-        ender = threading.Thread(target=end)
-        ender.start()
-        spin([node], executor)
-        ender.join()
-        assert called.is_set()
-        node.destroy_node()
-    finally:
-        rclpy.try_shutdown()

@@ -17,6 +17,8 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
+from node_runner import destroyed_when_refused
+
 from ..exceptions import CanopenError, SdoError
 from ..master.object_access import bytes_from_raw, number_from_raw, raw_from_bytes, raw_from_number
 from ..master.process_image import Input
@@ -56,6 +58,7 @@ class DeviceNode(Node):
         admit: Called before every request; raises CanopenError when none is taken at the moment.
     """
 
+    @destroyed_when_refused
     def __init__(self, device: RemoteNode, thread: NetworkThread, output: OutputThread) -> None:
         """Offer the services.
 

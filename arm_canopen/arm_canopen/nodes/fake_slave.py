@@ -9,15 +9,16 @@ from pathlib import Path
 import sys
 
 from ament_index_python.packages import get_package_share_directory
-from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
+
+from node_runner import ParameterReader
 
 from ..config import load_eds
 from ..device.host import DeviceHost
 from ..exceptions import CanopenError
 from ..standard.cob_id import NODE_ID_MAX, NODE_ID_MIN
 from ..standard.lss import UNCONFIGURED
-from .slave_process import memories, Population, run_slaves, text_parameter
+from .slave_process import memories, Population, run_slaves
 
 DEFAULT_NODE_ID = 2
 
@@ -38,17 +39,19 @@ def default_eds() -> Path:
 
 
 def _populate(node: Node, host: DeviceHost) -> Population:
-    descriptor = ParameterDescriptor(
-        description='CANopen node id of the device; 255: LSS has to give it one',
-        read_only=True,
+    read = ParameterReader(node)
+    node_id = read.whole(
+        'node_id',
+        DEFAULT_NODE_ID,
+        (NODE_ID_MIN, UNCONFIGURED),
+        'CANopen node id of the device; 255: LSS has to give it one',
     )
-    node_id = int(node.declare_parameter('node_id', DEFAULT_NODE_ID, descriptor).value)
     if not NODE_ID_MIN <= node_id <= NODE_ID_MAX and node_id != UNCONFIGURED:
         raise CanopenError(
             f'node_id {node_id} is not {NODE_ID_MIN} to {NODE_ID_MAX}; {UNCONFIGURED} makes a '
             'device that LSS has to give an id'
         )
-    path = text_parameter(node, 'slave_config', '', 'EDS of the device; empty for our own drive')
+    path = read.text('slave_config', '', 'EDS of the device; empty for our own drive')
     eds = load_eds(path or default_eds())
     for warning in eds.warnings:
         node.get_logger().warning(str(warning))

@@ -9,10 +9,12 @@ import sys
 
 from rclpy.node import Node
 
+from node_runner import ParameterReader
+
 from ..config import load_bus
 from ..device.host import DeviceHost
 from ..exceptions import CanopenError
-from .slave_process import memories, Population, run_slaves, text_parameter
+from .slave_process import memories, Population, run_slaves
 
 
 def run_fake_slaves(args: Sequence[str] | None = None) -> int:
@@ -26,7 +28,7 @@ def main() -> None:
 
 
 def _populate(node: Node, host: DeviceHost) -> Population:
-    path = text_parameter(node, 'bus_config', '', 'bus.yml whose devices are simulated')
+    path = ParameterReader(node).text('bus_config', '', 'bus.yml whose devices are simulated')
     if not path:
         raise CanopenError(
             'no bus_config: give the path of a bus.yml with --ros-args -p bus_config:=FILE'

@@ -8,20 +8,18 @@ from functools import partial
 import sys
 import time
 
-from rcl_interfaces.msg import ParameterDescriptor
-import rclpy
-from rclpy.exceptions import InvalidTopicNameException, ParameterException
+from rclpy.exceptions import InvalidTopicNameException
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.time import Time
-from rclpy.utilities import try_shutdown
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
+
+from node_runner import destroyed_when_refused, ParameterReader, refuse_misspelt, run_node
 
 from ..exceptions import CanopenError
 from ..joints.aggregator import JointAggregator, JointSample, JointSet
 from ..joints.robot_joints import movable_joints
-from .spinning import spin
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 WATCH_PERIOD = 2.0  # [s] between two looks for joints that are silent
@@ -30,18 +28,21 @@ WATCH_PERIOD = 2.0  # [s] between two looks for joints that are silent
 class JointStatePublisher(Node):
     """Subscribes ``/<joint>/joint_states`` of all joints and publishes ``/joint_states``."""
 
+    @destroyed_when_refused
     def __init__(self) -> None:
         """Read the robot description and subscribe.
 
         Raises:
+            ParameterError: A parameter is misspelt, or no text.
             CanopenError: The robot description is no URDF.
         """
         super().__init__('canopen_joint_state_publisher')
-        descriptor = ParameterDescriptor(
-            description='URDF as XML text; without it, the topic robot_description tells it',
-            read_only=True,
+        description = ParameterReader(self).text(
+            'robot_description',
+            '',
+            'URDF as XML text; without it, the topic robot_description tells it',
         )
-        description = str(self.declare_parameter('robot_description', '', descriptor).value)
+        refuse_misspelt(self)
         self._begun = False
         self._aggregator = JointAggregator([])
         self._silent: list[str] = []
@@ -117,19 +118,10 @@ class JointStatePublisher(Node):
         self._silent = silent
 
 
-def main() -> None:
-    """Entry point."""
-    rclpy.init()
-    try:
-        node = JointStatePublisher()
-    except (CanopenError, ParameterException) as error:
-        rclpy.logging.get_logger('canopen_joint_state_publisher').fatal(str(error))
-        try_shutdown()
-        sys.exit(1)
-    spin([node])
-    node.destroy_node()
-    try_shutdown()
+def main() -> int:
+    """Run until Ctrl-C; return the exit code."""
+    return run_node('canopen_joint_state_publisher', JointStatePublisher, CanopenError)
 
 
 if __name__ == '__main__':
-    main()
+    sys.exit(main())

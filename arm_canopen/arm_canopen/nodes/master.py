@@ -11,13 +11,9 @@ from dataclasses import dataclass
 import sys
 import threading
 
-from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
-import rclpy
-from rclpy.exceptions import ParameterException
-from rclpy.logging import get_logger
 from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
-from rclpy.utilities import try_shutdown
+
+from node_runner import ParameterReader, refuse_misspelt, run_program, spin
 
 from ..can import open_bus
 from ..can.bus import Bus
@@ -27,38 +23,31 @@ from ..config.model import BusConfig
 from ..exceptions import CanopenError
 from .managed_bus import MANAGER
 from .master_process import MasterProcess
-from .misspelt import refuse_misspelt
-from .spinning import make_executor, stop_on_signals, WAKE_PERIOD
 
 SWITCH_INTERVAL = 0.0005  # [s] how long a busy callback may keep the interpreter from the cycle
 
 Extend = Callable[[MasterProcess], Sequence[Node]]
 
 
-def run_master(args: Sequence[str] | None = None, *, extend: Extend | None = None) -> int:
+def run_master(
+    args: Sequence[str] | None = None,
+    *,
+    extend: Extend | None = None,
+    errors: Sequence[type[Exception]] = (),
+) -> int:
     """Run a bus until Ctrl-C or SIGTERM, then stop and disable its drives.
 
     Args:
         args: Command line; None for the process's own.
         extend: Called with the process of each bus before it starts; returns further nodes for
             the executor, which may attach motion sources.
+        errors: What it may raise then, to be told in one line.
 
     Returns:
         Exit code: 0, or 1 when the bus could not be configured or opened, or has a master.
     """
     sys.setswitchinterval(SWITCH_INTERVAL)
-    rclpy.init(
-        args=None if args is None else list(args), signal_handler_options=SignalHandlerOptions.NO
-    )
-    stop = stop_on_signals()
-    try:
-        _run(stop, extend)
-    except (CanopenError, ParameterException) as error:
-        get_logger('master').fatal(str(error))
-        return 1
-    finally:
-        try_shutdown()
-    return 0
+    return run_program('master', lambda stop: _run(stop, extend), CanopenError, *errors, args=args)
 
 
 def main() -> None:
@@ -106,39 +95,36 @@ def _make_process(config: BusConfig, can: Bus, stack: ExitStack) -> MasterProces
     for warning in (*config.warnings, *check_bus(config).warnings):
         node.get_logger().warning(str(warning))
     node.get_logger().info(f'{len(config.nodes)} devices of {config.file} on {can.name}')
-    return MasterProcess(
+    process = MasterProcess(
         node,
         config,
         can,
         diagnostics_period=parameters.diagnostics_period,
         beside_master=parameters.beside_master,
     )
+    for other in process.nodes[1:]:
+        stack.callback(other.destroy_node)
+    return process
 
 
 def _serve(
     processes: Sequence[MasterProcess], stop: threading.Event, extend: Extend | None
 ) -> None:
-    executor = make_executor()
-    nodes = [node for process in processes for node in process.nodes]
-    if extend is not None:
-        nodes += [node for process in processes for node in extend(process)]
-    for node in nodes:
-        executor.add_node(node)
-    try:
-        with ThreadPoolExecutor() as pool:  # all buses before the first word on any of them
-            list(pool.map(MasterProcess.listen, processes))
-        for process in processes:
-            process.start()
-        while not stop.is_set():
-            executor.spin_once(timeout_sec=WAKE_PERIOD)
-    finally:
-        with ThreadPoolExecutor() as pool:  # no bus waits for the drives of another to stop
-            list(pool.map(MasterProcess.stop, processes))
-        executor.shutdown()
-        masters = [process.nodes[0] for process in processes]
-        for node in nodes:
-            if node not in masters:
-                node.destroy_node()
+    with ExitStack() as stack:
+        nodes = [node for process in processes for node in process.nodes]
+        if extend is not None:
+            for node in (node for process in processes for node in extend(process)):
+                stack.callback(node.destroy_node)
+                nodes.append(node)
+        try:
+            with ThreadPoolExecutor() as pool:  # all buses before the first word on any of them
+                list(pool.map(MasterProcess.listen, processes))
+            for process in processes:
+                process.start()
+            spin(nodes, stop)
+        finally:
+            with ThreadPoolExecutor() as pool:  # no bus waits for the drives of another to stop
+                list(pool.map(MasterProcess.stop, processes))
 
 
 def _check_names(configs: Sequence[BusConfig]) -> None:
@@ -160,46 +146,32 @@ def _check_names(configs: Sequence[BusConfig]) -> None:
 
 
 def _declare(node: Node) -> Parameters:
-    def text(name: str, default: str, description: str) -> str:
-        descriptor = ParameterDescriptor(description=description, read_only=True)
-        return str(node.declare_parameter(name, default, descriptor).value)
-
-    configs = text(
+    read = ParameterReader(node)
+    configs = read.text(
         'bus_config', '', 'bus.yml with the master and its devices; several with commas'
     )
-    can_names = text(
+    can_names = read.text(
         'can_interface_name',
         'auto',
         'can0, vcan0, udp_multicast:239.x.y.z[:port], auto, or INTERFACE:CHANNEL[@BITRATE]; one '
         'for each bus.yml, with commas',
     )
-    text('master_config', '', 'accepted for ros2_canopen; not needed')
-    text('master_bin', '', 'accepted for ros2_canopen; not needed')
-    period = node.declare_parameter(
-        'diagnostics_period',
-        1.0,
-        ParameterDescriptor(
-            description='time between two /diagnostics messages [s]',
-            read_only=True,
-            floating_point_range=[FloatingPointRange(from_value=0.05, to_value=60.0)],
-        ),
-    ).value
-    beside_master = node.declare_parameter(
+    read.text('master_config', '', 'accepted for ros2_canopen; not needed')
+    read.text('master_bin', '', 'accepted for ros2_canopen; not needed')
+    period = read.number(
+        'diagnostics_period', 1.0, (0.05, 60.0), 'time between two /diagnostics messages [s]'
+    )
+    beside_master = read.flag(
         'beside_master',
-        False,
-        ParameterDescriptor(
-            description='start although another master is heard, which leads other devices',
-            read_only=True,
-        ),
-    ).value
+        'start although another master is heard, which leads other devices',
+        default=False,
+    )
     refuse_misspelt(node)
     if not configs:
         raise CanopenError(
             'no bus_config: give the path of a bus.yml with --ros-args -p bus_config:=FILE'
         )
-    parameters = Parameters(
-        configs.split(','), can_names.split(','), float(period), bool(beside_master)
-    )
+    parameters = Parameters(configs.split(','), can_names.split(','), period, beside_master)
     if len(parameters.bus_configs) != len(parameters.can_names):
         raise CanopenError(
             f'bus_config names {len(parameters.bus_configs)} buses, can_interface_name '

@@ -10,12 +10,9 @@ import logging
 from pathlib import Path
 import threading
 
-from rcl_interfaces.msg import ParameterDescriptor
-import rclpy
-from rclpy.exceptions import ParameterException
 from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
-from rclpy.utilities import try_shutdown
+
+from node_runner import ParameterReader, refuse_misspelt, run_program, spin
 
 from ..can import open_bus
 from ..device.host import DeviceHost
@@ -25,8 +22,6 @@ from ..device.scenario import ScenarioPlayer
 from ..device.scenario_file import load_scenario
 from ..exceptions import CanopenError
 from .fault_services import FaultServices
-from .misspelt import refuse_misspelt
-from .spinning import spin, stop_on_signals
 
 CAN_INTERFACES = (
     'can0, vcan0, udp_multicast:239.x.y.z[:port], auto, or INTERFACE:CHANNEL[@BITRATE]'
@@ -68,15 +63,9 @@ class RosLogHandler(logging.Handler):
             self._logger.warning(self.format(record))
 
 
-def text_parameter(node: Node, name: str, default: str, description: str) -> str:
-    """Declare a read-only text parameter and return its value."""
-    descriptor = ParameterDescriptor(description=description, read_only=True)
-    return str(node.declare_parameter(name, default, descriptor).value)
-
-
 def memories(node: Node) -> Callable[[int], ParameterMemory]:
     """Declare ``store_directory``; return what gives each device its memory, by node id."""
-    folder = text_parameter(node, 'store_directory', '', STORE_DIRECTORY)
+    folder = ParameterReader(node).text('store_directory', '', STORE_DIRECTORY)
 
     def memory(node_id: int) -> ParameterMemory:
         return (
@@ -100,26 +89,22 @@ def run_slaves(
     Returns:
         Exit code: 0, or 1 when the devices could not be described or the bus not be opened.
     """
-    stop = stop_on_signals()
-    rclpy.init(
-        args=None if args is None else list(args), signal_handler_options=SignalHandlerOptions.NO
-    )
-    node = Node(name)
-    handler = RosLogHandler(node)
-    logging.getLogger('arm_canopen').addHandler(handler)
-    try:
-        return _run(node, populate, default_bus, stop)
-    except (CanopenError, ParameterException) as error:
-        node.get_logger().fatal(str(error))
-        return 1
-    finally:
-        logging.getLogger('arm_canopen').removeHandler(handler)
-        node.destroy_node()
-        try_shutdown()
+
+    def body(stop: threading.Event) -> None:
+        node = Node(name)
+        handler = RosLogHandler(node)
+        logging.getLogger('arm_canopen').addHandler(handler)
+        try:
+            _run(node, populate, default_bus, stop)
+        finally:
+            logging.getLogger('arm_canopen').removeHandler(handler)
+            node.destroy_node()
+
+    return run_program(name, body, CanopenError, args=args)
 
 
-def _run(node: Node, populate: Populate, default_bus: str, stop: threading.Event) -> int:
-    interface = text_parameter(node, 'can_interface_name', default_bus, CAN_INTERFACES)
+def _run(node: Node, populate: Populate, default_bus: str, stop: threading.Event) -> None:
+    interface = ParameterReader(node).text('can_interface_name', default_bus, CAN_INTERFACES)
     with open_bus(interface) as bus:
         runner = DeviceRunner(bus)
         population = populate(node, runner.host)
@@ -129,14 +114,13 @@ def _run(node: Node, populate: Populate, default_bus: str, stop: threading.Event
         runner.start()
         try:
             node.get_logger().info(f'{population.what} on {bus.name}')
-            spin([node], stop=stop)
+            spin([node], stop)
         finally:
             runner.stop()
-    return 0
 
 
 def _play_scenario(node: Node, host: DeviceHost, population: Population) -> None:
-    path = text_parameter(node, 'scenario', '', SCENARIO)
+    path = ParameterReader(node).text('scenario', '', SCENARIO)
     if not path:
         return
     drives = frozenset(device.node_id for device in host.devices if device.drive is not None)

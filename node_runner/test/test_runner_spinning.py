@@ -1,0 +1,42 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+from collections.abc import Callable
+import threading
+
+from isolation import Isolation
+import pytest
+import rclpy
+from rclpy.executors import Executor, SingleThreadedExecutor
+from rclpy.utilities import try_shutdown
+
+from node_runner import make_executor, spin
+
+PATIENCE = 20.0  # [s]
+
+
+@pytest.mark.parametrize('make', [make_executor, SingleThreadedExecutor])
+@pytest.mark.parametrize('end', ['event', 'shutdown'])
+def test_spin_serves_until_the_end(
+    isolation: Isolation, make: Callable[[], Executor], end: str
+) -> None:
+    """Callbacks run until the event is set, or the context is shut down from elsewhere."""
+    rclpy.init(args=[], domain_id=isolation.domain_id)
+    try:
+        node = rclpy.create_node('spinner')
+        called, stop = threading.Event(), threading.Event()
+        node.create_timer(0.005, called.set)
+
+        def finish() -> None:
+            called.wait(PATIENCE)
+            stop.set() if end == 'event' else rclpy.shutdown()
+
+        finisher = threading.Thread(target=finish)
+        finisher.start()
+        spin([node], stop, make())
+        finisher.join()
+        assert called.is_set()
+        node.destroy_node()
+    finally:
+        try_shutdown()
