@@ -6,13 +6,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import Future
+from concurrent.futures import TimeoutError as FutureTimeoutError
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from servo_drives import Drives, PERIOD
 
-from arm_canopen import AxisFeedback
+from arm_canopen import AxisFeedback, MotionSource
 from arm_canopen.standard.drive import DriveState
 from arm_servo.core import MotionCore
 from arm_servo.exceptions import GoalCode, NotReadyError
@@ -107,6 +108,22 @@ def test_a_drive_that_was_taken_away_comes_back_when_attached_again() -> None:
     answer = drives.run()
     assert answer[4] is not None
     assert answer[4].position == pytest.approx(0.3, abs=1e-12)
+
+
+def test_an_attach_that_failed_is_tried_again() -> None:
+    """A bus that was too busy to answer leaves the source detached, with the old reason."""
+    drives = Drives()
+
+    def busy(_: MotionSource) -> None:
+        raise FutureTimeoutError
+
+    with pytest.raises(FutureTimeoutError):
+        drives.source.attach(busy)
+    assert drives.source.detached
+    assert drives.run() == [None] * 7
+    assert 'not attached yet' in drives.desk.snapshot.blocked
+    drives.attach()
+    assert None not in drives.run()
 
 
 def test_a_drive_that_was_faulted_follows_again_when_it_can() -> None:

@@ -56,10 +56,16 @@ class DriveSource:
         """Get back the drives that were taken away; any thread.
 
         Args:
-            attach: What attaches a source to the bus.
+            attach: What attaches a source to the bus; what it raises is passed on, and the next
+                command tries again.
         """
+        before = self._released
         self._released = {}  # before, so that a drive which is taken away right after is known
-        attach(self)
+        try:
+            attach(self)
+        except Exception:
+            self._released = {**before, **self._released}
+            raise
 
     def released(self, axis: str, reason: str) -> None:
         """Come to rest, and leave the drives alone until attached again.
