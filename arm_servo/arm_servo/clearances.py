@@ -99,6 +99,18 @@ class Clearances:
         doubtful = (bounds < within).any(axis=1)
         return int(doubtful.argmax()) if doubtful.any() else len(positions)
 
+    def apart(self, lower: Array, upper: Array, within: float) -> bool:
+        """Whether nothing is as near at any positions between bounds, as far as is known.
+
+        Args:
+            lower: Least joint positions in [rad].
+            upper: Greatest joint positions in [rad].
+            within: The distance of interest in [m].
+        """
+        turned = np.maximum(upper - self._places, self._places - lower)
+        bounds = self._distances - np.einsum('kn,kn->k', turned, self._shapes.levers)
+        return not (bounds < within).any()
+
     def nearest(self, positions: Array, within: float, count: int) -> list[Proximity]:
         """Return the nearest pairs with the gradients of their distances.
 

@@ -53,6 +53,7 @@ class MotionCore:
         self._speed = 1.0
         self._paused = False
         self._turn = 0
+        self._loose = False
 
     @property
     def model(self) -> RobotModel:
@@ -326,8 +327,11 @@ class MotionCore:
         wanted, report = self._sources.step(
             state, measured or state, now, period, pace=self._pace, paused=self._paused
         )
-        jogging = self._sources.active is Source.JOG
-        after, limiter = self._guard.step(state, wanted, period, clearances=jogging)
+        # the ways of trajectories and targets were looked at; but not from out of a jog
+        self._loose = self._sources.active in {Source.JOG, Source.NONE} or (
+            self._loose and state.moving and self._sources.active is Source.TARGET
+        )
+        after, limiter = self._guard.step(state, wanted, period, clearances=self._loose)
         self._state = after
         source = self._sources.ended(after, now, paused=self._paused)
         return SetPoint(after, source, _with(report, limiter))

@@ -18,7 +18,7 @@ class CoreSettings:
         servo: How jogging behaves.
         execution: How trajectories are followed.
         timeout: Time without a fresh jog command after which the arm comes to rest in [s].
-        clearance: Least distance between links that a stop may end at in [m].
+        clearance: Least distance between links that a jog and its stop may bring about in [m].
         check_self_collision: Whether a trajectory or a single target is refused on whose way
             links meet.
     """

@@ -14,6 +14,9 @@ from .report import Cause, Limiter
 TOUCH = 1e-4
 """Change of a distance that is let pass, in all, in [m]: sliding along is no approach."""
 
+LOOKS = 8
+"""Places of a stop at which distances are looked at."""
+
 EXACT = 1e-7
 """Rounding of ruckig's positions that is let pass in [rad]."""
 
@@ -32,7 +35,7 @@ class Guard:
         Args:
             model: The arm.
             generator: Plans its stops.
-            clearance: Least distance between links at the end of a stop in [m].
+            clearance: Least distance between links on a stop in [m].
         """
         self._model = model
         self._limits = model.limits
@@ -116,13 +119,22 @@ class Guard:
             self._floor = min(self._floor, self._clearance)
         room = self._distance(stop)
         if room < self._floor - TOUCH:
+            # what stopping now brings about cannot be had better
+            now = self._generator.brake(state)
+            least = self._floor - TOUCH if now is None else min(self._floor, self._distance(now))
+            self._floor = min(self._floor, least + TOUCH)
+        if room < self._floor - TOUCH - EXACT:
             return room
         self._floor = max(self._floor, min(room, self._clearance))
         return None
 
     def _distance(self, stop: Plan) -> float:
-        """Return the least distance between links where a stop ends in [m], if it is small."""
-        return self._model.clearance(stop.at(stop.duration).position, self._clearance)
+        """Return the least distance between links on a stop in [m], if it is small."""
+        if self._model.stays_apart(*stop.extremes, self._clearance):
+            return self._clearance
+        times = np.linspace(0.0, stop.duration, LOOKS + 1)[1:].tolist()
+        places = np.array([stop.at(time).position for time in times])
+        return self._model.least_clearance(places, self._clearance)
 
     def _brake(self, state: MotionState, period: float) -> MotionState:
         stop = self._generator.brake(state)

@@ -162,6 +162,25 @@ class RobotModel:
         distances = self._clearances.least(positions, within)
         return float(distances.min(initial=math.inf))
 
+    def least_clearance(self, places: Array, within: float) -> float:
+        """Return the least distance between two shapes at any of some places in [m].
+
+        Args:
+            places: Joint positions in [rad] (m, n).
+            within: Distance of interest in [m]; where it is more, a lower bound is good enough.
+        """
+        return min(self.clearance(positions, within) for positions in places)
+
+    def stays_apart(self, lower: Array, upper: Array, within: float) -> bool:
+        """Whether no shapes are as near at any positions between bounds, as far as is known.
+
+        Args:
+            lower: Least joint positions in [rad].
+            upper: Greatest joint positions in [rad].
+            within: The distance of interest in [m].
+        """
+        return self._clearances.apart(lower, upper, within)
+
     def clearances(self) -> Clearances:
         """Return what measures distances for another thread than the owner's."""
         return Clearances(self._shapes)
