@@ -9,7 +9,7 @@ from virtual_network import bus_config, drive_config, sdo_write, VirtualNetwork
 
 from arm_canopen.exceptions import DriveError
 from arm_canopen.master.events import Severity
-from arm_canopen.master.scheduler import Task
+from arm_canopen.master.scheduler import Promise
 
 JOINT = 'joint'
 METHOD = 0x6098
@@ -24,7 +24,7 @@ def network(method: int) -> VirtualNetwork:
     return net
 
 
-def begin(net: VirtualNetwork, method: int | None) -> Task[str]:
+def begin(net: VirtualNetwork, method: int | None) -> Promise[str]:
     """Begin to home by a method, or by that of the drive."""
     commands = net.commands[JOINT]
     return commands.run('home', commands.home(method))

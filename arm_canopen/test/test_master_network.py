@@ -57,7 +57,7 @@ def test_a_lost_heartbeat_is_told_within_the_consumer_time() -> None:
     net.run_until(note)
     assert set(lost_at) == {'a', 'c'}
     for name, moment in lost_at.items():
-        silent_since = net.network.nodes[name].last_heartbeat
+        silent_since = net.network.nodes[name].life.last
         assert silent_since <= begin
         assert CONSUMER_TIME < moment - silent_since <= CONSUMER_TIME + PERIOD
         assert '300 ms' in events(net, EventKind.HEARTBEAT_LOST, name)[0]
@@ -139,17 +139,17 @@ def test_emergencies_are_told_in_words_until_they_end() -> None:
     told = events(net, EventKind.EMERGENCY, 'a')
     assert '0x8210 PDO not processed, length error' in told[0]
     assert '0x4320 too low drive temperature' in told[1]
-    assert node.last_emergency is not None
-    assert node.last_emergency.code == 0x4320
+    assert node.emergencies.last is not None
+    assert node.emergencies.last.code == 0x4320
     net.send_as('a', Frame(EMCY + 2, bytes(8)))
     net.run(0.01)
-    assert node.last_emergency is None
+    assert node.emergencies.last is None
     net.send_as('a', Frame(EMCY + 2, bytes.fromhex('20 43 09 01 02 03 04 05')))
     net.run(0.01)
     net.power_off('a')
     net.power_on('a')
     net.run(0.2)
-    assert node.last_emergency is None
+    assert node.emergencies.last is None
 
 
 def test_an_odd_emergency_is_told_as_such() -> None:
@@ -167,9 +167,9 @@ def test_an_odd_heartbeat_is_no_heartbeat(data: bytes) -> None:
     net = network()
     net.boot()
     node = net.network.nodes['a']
-    before = (node.last_heartbeat, node.nmt_state)
+    before = (node.life.last, node.nmt_state)
     node.receive_heartbeat(Frame(HEARTBEAT + 2, data, timestamp=net.now + 1.0))
-    assert (node.last_heartbeat, node.nmt_state) == before
+    assert (node.life.last, node.nmt_state) == before
 
 
 def test_states_are_told_when_they_change_only() -> None:
@@ -315,7 +315,7 @@ def test_missed_pdos_are_counted_and_hold_nothing_up() -> None:
     net.wire.loses = lambda sender, frame: False
     net.run(2 * PERIOD)
     nodes = net.network.nodes
-    assert (nodes['a'].missed_pdos, nodes['b'].missed_pdos) == (0, 10)
+    assert (nodes['a'].pdos.missed, nodes['b'].pdos.missed) == (0, 10)
     assert net.network.missed_pdos == 10
     assert len(net.feedback_times) == 12
     late = [moment - sync for moment, sync in net.feedback_times[1:9]]

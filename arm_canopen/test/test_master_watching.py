@@ -67,6 +67,31 @@ def test_a_guarded_device_that_does_not_answer_is_lost_and_found() -> None:
     net.run_until(lambda: net.network.nodes['a'].online)
 
 
+def test_a_device_that_never_answers_guarding_is_told_once_and_left_in_peace() -> None:
+    """It is not booted again and again: it has to answer before it is configured again."""
+    net = VirtualNetwork(bus_config(guarded_config()))
+    node = net.network.nodes['a']
+    deaf = {'a'}
+    # RTR frames do not reach it, as in a controller that has no remote frames
+    net.wire.loses = lambda sender, frame: frame.is_remote and bool(deaf)
+    net.boot()
+    net.run_until(lambda: not node.online)
+    begin = net.now
+    net.run(30.0)
+    assert not node.online
+    assert len(net.told(Severity.WARNING)) == 2, net.told(Severity.WARNING)
+    assert 'no answer to node guarding 3 times' in net.told(Severity.ERROR)[0]
+    assert 'has never answered node guarding' in net.told(Severity.WARNING)[-1]
+    assert 'guard_time: 0' in net.told(Severity.WARNING)[-1]
+    assert net.frames(0x000, since=begin + 2.0).count(b'\x01\x02') == 0
+    questions = [s for s in net.wire.log if s.frame.is_remote and s.time > begin + 2.0]
+    assert len(questions) <= 28
+    deaf.clear()
+    net.run_until(lambda: node.online)
+    net.run(2.0)
+    assert node.online
+
+
 def test_an_answer_that_is_repeated_is_none() -> None:
     """The toggle bit tells a new answer from an old one."""
     asked: list[Frame] = []
@@ -94,7 +119,7 @@ def test_an_emergency_is_heard_where_the_device_sends_it() -> None:
     net = VirtualNetwork(bus_config(written, eds, silent), absent=['b', 'c'])
     for can_id in (0x0A2, 0x0B3, 0x084):
         net.network.receive(Frame(can_id, bytes.fromhex('10 23 01 00 00 00 00 00'), net.now))
-    heard = {name: node.last_emergency is not None for name, node in net.network.nodes.items()}
+    heard = {name: node.emergencies.last is not None for name, node in net.network.nodes.items()}
     assert heard == {'a': True, 'b': True, 'c': False}
 
 
@@ -104,7 +129,7 @@ def test_the_last_emergencies_are_remembered() -> None:
     for second, code in enumerate(('10 23', '00 00', '10 43')):
         data = bytes.fromhex(f'{code} 01 00 00 00 00 00')
         net.network.receive(Frame(0x082, data, net.now + second))
-    history = net.network.nodes['a'].emergencies
+    history = net.network.nodes['a'].emergencies.history
     assert [emergency.code for _, emergency in history] == [0x2310, 0x0000, 0x4310]
     assert [time - net.now for time, _ in history] == [0.0, 1.0, 2.0]
 

@@ -125,8 +125,8 @@ class ObservedDrive:
             parts.append('halted')
         if self.error:
             parts.append(f'error {self.error}')
-        if self.node.last_emergency is not None:
-            parts.append(f'EMCY {self.node.last_emergency}')
+        if self.node.emergencies.last is not None:
+            parts.append(f'EMCY {self.node.emergencies.last}')
         if self.node.left_operational and self.node.nmt_state is not None:
             parts.append(f'NMT state {self.node.nmt_state.name}: call ~/nmt_start_node')
         return '; '.join(parts)

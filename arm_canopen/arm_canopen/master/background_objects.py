@@ -12,7 +12,7 @@ from .events import EventKind, Severity
 from .scheduler import Promise
 
 if TYPE_CHECKING:
-    from .remote_node import RemoteNode
+    from .remote_objects import RemoteObjects
 
 
 class BackgroundReader:
@@ -26,7 +26,7 @@ class BackgroundReader:
 class BackgroundWriter:
     """An object that no RPDO carries; it is written by SDO when it changes."""
 
-    def __init__(self, node: RemoteNode, index: int, subindex: int) -> None:
+    def __init__(self, node: RemoteObjects, index: int, subindex: int) -> None:
         """Remember nothing written yet."""
         self._node = node
         self._address = (index, subindex)

@@ -137,6 +137,8 @@ class BootProcess:
         await self._check_identity(node.config.identity)
         # PDO parameters may only be written while the device does not process PDOs
         self._send_nmt(NmtCommand.ENTER_PRE_OPERATIONAL, node.config.node_id)
+        if node.life.owed and node.config.guarded:
+            await self._await_answer_to_guarding()
         self._fault = BootFault.CONFIGURATION
         if node.config.restore_configuration and not self._restored:
             await self._restore(node.config.restore_configuration)
@@ -144,7 +146,7 @@ class BootProcess:
         await self._configurator.apply()
         # not waiting for the first heartbeat saves its period; its absence is noticed all the
         # same, and only a device that once was without it has to show it first
-        if node.owes_heartbeat:
+        if node.life.owed and not node.config.guarded:
             await self._await_heartbeat(configured_at)
         started = await self._admitted()
         self._enter(BootPhase.STARTING)
@@ -238,13 +240,30 @@ class BootProcess:
                 'EDS of this device'
             )
 
+    async def _await_answer_to_guarding(self) -> None:
+        """Ask before anything is written, so that a device that never answers is left in peace."""
+        node = self._node
+        self._fault = BootFault.NO_GUARDING
+        self._enter(BootPhase.ERROR_CONTROL)
+        since = self._scheduler.now
+        self._ask_state(node.config.node_id)
+        try:
+            await self._scheduler.until(lambda: node.life.last > since, STATE_PATIENCE)
+        except TimeoutError:
+            raise BootError(
+                f'{node.name} (node {node.config.node_id}) has never answered node guarding; it '
+                'is not started, because its loss would go unnoticed. It is asked again every '
+                f'{node.config.boot_timeout + STATE_PATIENCE:g} s; give it a heartbeat_producer '
+                'instead of guard_time, or guard_time: 0 if it has neither'
+            ) from None
+
     async def _await_heartbeat(self, since: float) -> None:
         node = self._node
         timeout = node.config.heartbeat_timeout
         self._fault = BootFault.NO_HEARTBEAT
         self._enter(BootPhase.ERROR_CONTROL)
         try:
-            await self._scheduler.until(lambda: node.last_heartbeat > since, timeout)
+            await self._scheduler.until(lambda: node.life.last > since, timeout)
         except TimeoutError:
             raise BootError(
                 f'{node.name} (node {node.config.node_id}) sent no heartbeat within '

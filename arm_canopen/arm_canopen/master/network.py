@@ -246,7 +246,7 @@ class Network:
         self._handlers[CobId.HEARTBEAT + node_id] = node.receive_heartbeat
         emergency_id = emergency_can_id(node.config)
         if emergency_id is not None:
-            self._handlers[emergency_id] = node.receive_emergency
+            self._handlers[emergency_id] = node.emergencies.receive
         self._handlers[CobId.SDO_RESPONSE + node_id] = node.sdo.receive
         for entry in node.image.inputs:
             self._handlers[entry.config.cob_id] = entry.receive
@@ -277,11 +277,7 @@ class Network:
 
     def _booted(self, node: RemoteNode) -> None:
         self._end_boot(node)
-        if node.online:
-            node.lost('restarted: a boot-up message came while it was operational')
-        else:
-            node.offline('the device restarted')
-        node.sdo.restarted()
+        node.restarted()
         self._start_boot(node, announced=True)
 
     def _end_boot(self, node: RemoteNode) -> None:

@@ -51,7 +51,7 @@ def node_status(node: RemoteNode, now: float) -> NodeStatus:
         node: The device.
         now: Steady time in [s].
     """
-    heard = node.config.heartbeat_timeout > 0 and node.last_heartbeat > 0
+    heard = node.config.heartbeat_timeout > 0 and node.life.last > 0
     return NodeStatus(
         name=node.name,
         node_id=node.config.node_id,
@@ -59,11 +59,12 @@ def node_status(node: RemoteNode, now: float) -> NodeStatus:
         nmt_state=node.nmt_state,
         phase=node.phase,
         phase_detail=node.phase_detail,
-        heartbeat_age=now - node.last_heartbeat if heard else None,
-        emergency=node.last_emergency,
+        heartbeat_age=now - node.life.last if heard else None,
+        emergency=node.emergencies.last,
         emergencies=tuple(
-            f'{now - time:.1f} s ago {emergency}' for time, emergency in reversed(node.emergencies)
+            f'{now - time:.1f} s ago {emergency}'
+            for time, emergency in reversed(node.emergencies.history)
         ),
-        missed_pdos=node.missed_pdos,
+        missed_pdos=node.pdos.missed,
         sdo=replace(node.sdo.counters),
     )

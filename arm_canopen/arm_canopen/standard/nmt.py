@@ -28,6 +28,9 @@ class NmtState(IntEnum):
 
 ALL_NODES = 0
 
+RESETS = frozenset({NmtCommand.RESET_NODE, NmtCommand.RESET_COMMUNICATION})
+"""Commands after which a device sends its boot-up message."""
+
 COMMANDED_STATES: dict[NmtCommand, NmtState] = {
     NmtCommand.START: NmtState.OPERATIONAL,
     NmtCommand.STOP: NmtState.STOPPED,

@@ -1,0 +1,151 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The objects of a device: by PDO where one carries them, else by SDO, typed by its EDS."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+from ..can.frame import Frame
+from ..config.model import NodeConfig
+from ..exceptions import CodecError, SdoError
+from ..standard.datatypes import decode, encode, Value
+from ..standard.dictionary import ObjectEntry
+from ..standard.objects import Index
+from .background_objects import BackgroundReader, BackgroundWriter
+from .events import Event, EventKind, Report, Severity
+from .process_image import ProcessImage, Reader, SyncRound, Writer
+from .scheduler import Promise, Scheduler
+from .sdo_client import SdoClient
+from .start_values import start_value
+
+
+class RemoteObjects:
+    """A device as a set of objects.
+
+    Attributes:
+        config: What bus.yml and its EDS say.
+        name: Name in bus.yml.
+        image: Its process image.
+        sdo: Its SDO client.
+        online: Booted, and not lost since.
+    """
+
+    def __init__(
+        self,
+        config: NodeConfig,
+        scheduler: Scheduler,
+        sync: SyncRound,
+        send: Callable[[Frame], None],
+        report: Report,
+    ) -> None:
+        """Build the device from its configuration.
+
+        Args:
+            config: What bus.yml and its EDS say.
+            scheduler: Time.
+            sync: The SYNC round of the bus.
+            send: Hands a frame to the bus.
+            report: Takes events.
+        """
+        self.config = config
+        self.name = config.name
+        self.image = ProcessImage(
+            config.tpdos,
+            config.rpdos,
+            sync,
+            start=partial(start_value, config),
+            send_last=Index.CONTROLWORD,
+        )
+        self.sdo = SdoClient(config.node_id, config.name, scheduler, send)
+        self.online = False
+        self._scheduler = scheduler
+        self._report = report
+        self._polled: dict[tuple[int, int], BackgroundReader] = {}
+        self._background_writers: list[BackgroundWriter] = []
+
+    def report(self, kind: EventKind, severity: Severity, text: str) -> None:
+        """Tell the owner of the network something about this device."""
+        self._report(Event(kind, severity, self.name, text))
+
+    def reader(self, index: int, subindex: int = 0) -> Reader:
+        """Return a reader for an object, by TPDO when it is mapped, else by polling."""
+        mapped = self.image.reader(index, subindex)
+        if mapped is not None:
+            return mapped
+        return self._polled.setdefault((index, subindex), BackgroundReader())
+
+    def writer(self, index: int, subindex: int = 0) -> Writer:
+        """Return a writer for an object, by RPDO when it is mapped, else by SDO on change."""
+        mapped = self.image.writer(index, subindex)
+        if mapped is not None:
+            return mapped
+        writer = BackgroundWriter(self, index, subindex)
+        self._background_writers.append(writer)
+        return writer
+
+    async def poll(self, period: float) -> None:
+        """Keep the objects that no TPDO carries up to date while the device is online."""
+        while self._polled and self.online:
+            for address, entry in list(self._polled.items()):
+                try:
+                    value = await self.read_object(*address)
+                except (SdoError, CodecError):
+                    if not self.online:
+                        return
+                    continue  # the SDO counters show it; the value stays as old as it is
+                entry.value = value if isinstance(value, (int, float)) else None
+            await self._scheduler.timer(period)
+
+    def entry(self, index: int, subindex: int = 0) -> ObjectEntry:
+        """Return what the EDS says of an object.
+
+        Raises:
+            SdoError: The EDS does not know it.
+        """
+        entry = self.config.dictionary.get(index, subindex)
+        if entry is None:
+            raise SdoError(
+                f'{self.name} has no object 0x{index:04X}:{subindex:02X} in '
+                f'{self.config.eds.name}; the services of the master node, whose requests name '
+                'the data type, reach it all the same'
+            )
+        return entry
+
+    async def read_object(
+        self, index: int, subindex: int = 0, *, timeout: float | None = None
+    ) -> Value:
+        """Read an object by SDO and decode it by its type in the EDS.
+
+        Args:
+            index: Object index.
+            subindex: Sub-index.
+            timeout: How long each answer may take in [s]; by default what bus.yml says.
+
+        Raises:
+            SdoError: The device did not answer or aborted, or the EDS does not know the object.
+            CodecError: The answer does not fit the type.
+        """
+        entry = self.entry(index, subindex)
+        patience = self.config.sdo_timeout if timeout is None else timeout
+        return decode(entry.data_type, await self.sdo.read(index, subindex, patience))
+
+    def write_object(self, index: int, subindex: int, value: Value) -> Promise[None]:
+        """Write an object by SDO, encoded by its type in the EDS; errors reject the promise."""
+        try:
+            data = encode(self.entry(index, subindex).data_type, value)
+        except (SdoError, CodecError) as error:
+            refused: Promise[None] = Promise()
+            refused.reject(error)
+            return refused
+        return self.sdo.write(index, subindex, data, self.config.sdo_timeout)
+
+    def _forget_objects(self, reason: str) -> None:
+        """The device went away, or restarted: what it said and was told is no longer true."""
+        self.image.clear()
+        self.sdo.cancel_all(reason)
+        for entry in self._polled.values():
+            entry.value = None
+        for writer in self._background_writers:
+            writer.forget()
