@@ -152,7 +152,7 @@ def test_bring_ups_on_other_buses_and_domains_run_side_by_side(workspace: SmallW
             arguments = ('panda', '--simulate', '--can', bus)
             running.append(stack.enter_context(workspace.bringup(*arguments)))
             seen = read_until(running[-1], 'all is ready')
-            assert f'can_interface_name:={bus}' in seen
+            assert f'simulated drives on {bus}' in seen
         for process in running:
             process.send_signal(signal.SIGINT)
             process.communicate(timeout=PATIENCE)
