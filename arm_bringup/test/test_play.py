@@ -8,51 +8,16 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 import pytest
+from small_play import Show, Supervisor
 
 from arm_bringup.demo.figures import AxisFigures, DriveFigures, Figures
 from arm_bringup.demo.play import Play
-from process_supervisor import CallError, GivenUpError, Notice, Outcome, Phase
+from process_supervisor import CallError, GivenUpError, Outcome, Phase
 
 JOINTS = ['joint1', 'joint2']
 DRIVE = DriveFigures(online=True, state='Operation enabled')
 MOVED = AxisFigures(True, -0.4, 0.4, 0.01, 0.005)
 GOOD = Figures(dict.fromkeys(JOINTS, DRIVE), axes=dict.fromkeys(JOINTS, MOVED), wave='running')
-
-
-class Show:
-    """A display that keeps the phases."""
-
-    def __init__(self) -> None:
-        self.phases: list[str] = []
-
-    def phase(self, text: str) -> None:
-        """Keep it."""
-        self.phases.append(text)
-
-    def show(self, figures: Figures) -> None:
-        """Nobody looks."""
-
-    def line(self, name: str, text: str) -> None:
-        """Nobody reads."""
-
-    def notice(self, notice: Notice) -> None:
-        """Nobody reads."""
-
-    def close(self) -> None:
-        """Nothing is open."""
-
-
-class Supervisor:
-    """A supervisor that runs until it is asked to stop."""
-
-    def __init__(self, phase: Phase = Phase.RUNNING) -> None:
-        self.phase = phase
-        self.outcome: Outcome | None = None
-
-    def stop(self, outcome: Outcome) -> None:
-        """Stop at once."""
-        self.outcome = outcome
-        self.phase = Phase.STOPPED
 
 
 class Client:

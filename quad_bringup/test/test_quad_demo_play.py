@@ -8,8 +8,9 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
+from small_play import Show, Supervisor
 
-from process_supervisor import CallError, GivenUpError, Notice, Outcome, Phase
+from process_supervisor import CallError, GivenUpError, Outcome, Phase
 from quad_bringup.demo import play as play_module
 from quad_bringup.demo.figures import Figures
 from quad_bringup.demo.itinerary import STANDSTILL, Velocity
@@ -38,42 +39,6 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     clock = Clock()
     monkeypatch.setattr(play_module, 'time', clock)
     return clock
-
-
-class Show:
-    """A display that keeps the phases."""
-
-    def __init__(self) -> None:
-        self.phases: list[str] = []
-
-    def phase(self, text: str) -> None:
-        """Keep it."""
-        self.phases.append(text)
-
-    def show(self, figures: Figures) -> None:
-        """Nobody looks."""
-
-    def line(self, name: str, text: str) -> None:
-        """Nobody reads."""
-
-    def notice(self, notice: Notice) -> None:
-        """Nobody reads."""
-
-    def close(self) -> None:
-        """Nothing is open."""
-
-
-class Supervisor:
-    """A supervisor that runs until it is asked to stop."""
-
-    def __init__(self) -> None:
-        self.phase = Phase.RUNNING
-        self.outcome: Outcome | None = None
-
-    def stop(self, outcome: Outcome) -> None:
-        """Stop at once."""
-        self.outcome = outcome
-        self.phase = Phase.STOPPED
 
 
 class Robot:

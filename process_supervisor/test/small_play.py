@@ -1,0 +1,43 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""A display and a supervisor for tests of the course of a demo."""
+
+from __future__ import annotations
+
+from process_supervisor import Notice, Outcome, Phase
+
+
+class Show:
+    """A display that keeps the phases."""
+
+    def __init__(self) -> None:
+        self.phases: list[str] = []
+
+    def phase(self, text: str) -> None:
+        """Keep it."""
+        self.phases.append(text)
+
+    def show(self, figures: object) -> None:
+        """Nobody looks."""
+
+    def line(self, name: str, text: str) -> None:
+        """Nobody reads."""
+
+    def notice(self, notice: Notice) -> None:
+        """Nobody reads."""
+
+    def close(self) -> None:
+        """Nothing is open."""
+
+
+class Supervisor:
+    """A supervisor that runs until it is asked to stop."""
+
+    def __init__(self, phase: Phase = Phase.RUNNING) -> None:
+        self.phase = phase
+        self.outcome: Outcome | None = None
+
+    def stop(self, outcome: Outcome) -> None:
+        """Stop at once."""
+        self.outcome = outcome
+        self.phase = Phase.STOPPED
