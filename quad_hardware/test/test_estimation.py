@@ -172,13 +172,14 @@ def test_reports_that_were_held_up_keep_their_times() -> None:
 def test_one_damaged_report_does_not_empty_the_battery() -> None:
     """Nor a charge that cannot be; a battery that is low is told within half a second."""
     battery = BatteryFilter()
-    assert battery.update(STATE) == Battery()
+    battery.take(STATE)
+    assert battery.state == Battery()
     for charge in (80.0, 80.0, 3.0, 200.0, 80.0):
-        found = battery.update(replace(STATE, battery=charge, voltage=7.4))
-    assert found == Battery(80.0, 7.4)
+        battery.take(replace(STATE, battery=charge, voltage=7.4))
+    assert battery.state == Battery(80.0, 7.4)
     for _ in range(REPORTS):
-        found = battery.update(replace(STATE, battery=5.0))
-    assert found.charge == 5.0
+        battery.take(replace(STATE, battery=5.0))
+    assert battery.state.charge == 5.0
 
 
 @pytest.mark.parametrize(

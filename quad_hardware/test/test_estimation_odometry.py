@@ -10,14 +10,17 @@ import random
 import threading
 
 import numpy as np
+from numpy.typing import NDArray
 import pytest
 
 from quad_description import movable_joints, Pose, pose_positions, robot_urdf
-from quad_hardware.estimation.feet import Array, Feet, FootPoses
+from quad_hardware.estimation.feet import Feet, FootPose, FootPoses
 from quad_hardware.estimation.odometry import LegOdometry, OdometrySettings, OdometryState
 from quad_hardware.estimation.rotation import from_roll_pitch_yaw, IDENTITY, rotate
 from quad_hardware.exceptions import CommandError
 from quad_hardware.sim.physics import Robot
+
+Array = NDArray[np.float64]
 
 URDF = robot_urdf('lite')
 NAMES = [joint.name for joint in movable_joints(URDF)]
@@ -31,18 +34,27 @@ def feet_of(urdf: str) -> Feet:
     return Feet(urdf, NAMES)
 
 
+def places(feet: FootPoses) -> Array:
+    """Centres of the feet [m], (4, 3)."""
+    return np.array([foot.position for foot in feet], dtype=np.float64)
+
+
+def feet_at(angles: Array) -> FootPoses:
+    """Where the feet are for joint angles [rad]."""
+    return feet_of(URDF).poses(angles.tolist())
+
+
 def solve(wanted: Array, angles: Array) -> Array:
     """Joint angles that put the feet somewhere, by Newton's method."""
-    legs = feet_of(URDF)
     for _ in range(12):
-        error = wanted - legs.poses(angles).position
+        error = wanted - places(feet_at(angles))
         if np.abs(error).max() < 1e-7:
             break
         columns = []
         for joint in range(3):
             moved = angles.copy()
             moved[joint::3] += 1e-6
-            columns.append((legs.poses(moved).position - legs.poses(angles).position) / 1e-6)
+            columns.append((places(feet_at(moved)) - places(feet_at(angles))) / 1e-6)
         jacobian = np.stack(columns, axis=2)
         angles = angles + np.linalg.solve(jacobian, error[..., None])[..., 0].ravel()
     return angles
@@ -69,7 +81,7 @@ def walk(velocity: tuple[float, float], duration: float) -> tuple[Array, Odometr
     odometry = LegOdometry(OdometrySettings(), legs.radius)
     stand = pose_positions(Pose.STAND)
     angles = np.array([stand[name] for name in NAMES])
-    neutral = legs.poses(angles).position.copy()
+    neutral = places(feet_at(angles))
     neutral[:, 0] = [0.025, 0.025, -0.125, -0.125]
     neutral[:, 2] = -0.022 - HEIGHT
     angles = solve(neutral, angles)
@@ -81,12 +93,12 @@ def walk(velocity: tuple[float, float], duration: float) -> tuple[Array, Odometr
         time = tick * PERIOD
         measured = robot.joint_positions + [rng.gauss(0, math.radians(0.1)) for _ in NAMES]
         attitude = [angle + rng.gauss(0, math.radians(0.1)) for angle in robot.imu.roll_pitch_yaw]
-        state = odometry.update(time, legs.poses(measured), from_roll_pitch_yaw(*attitude))
+        state = odometry.update(time, feet_at(measured), from_roll_pitch_yaw(*attitude))
         ramp = min(time / 0.5, 1.0)
         speed = velocity[0] * ramp, velocity[1] * ramp
         angles = solve(trot(time / GAIT_PERIOD, speed, neutral), angles)
         robot.set_targets(list(angles))
-        odometry.command(time, legs.poses(angles))
+        odometry.command(time, feet_at(angles))
         robot.step(PERIOD)
     assert state is not None
     x, y, _ = np.array(robot.base_pose.position) - start
@@ -121,19 +133,10 @@ def test_standing_goes_nowhere() -> None:
 def test_a_rolling_foot_counts(yaw: float) -> None:
     """A wheel that turns by an angle goes by angle times radius, in the heading of the start."""
     odometry = LegOdometry(OdometrySettings(), 0.01)
-    position = np.array(
-        [[0.1, 0.1, -0.1], [0.1, -0.1, -0.1], [-0.1, 0.1, -0.1], [-0.1, -0.1, -0.1]]
-    )
+    places = [(0.1, 0.1, -0.1), (0.1, -0.1, -0.1), (-0.1, 0.1, -0.1), (-0.1, -0.1, -0.1)]
     for tick in range(51):
-        angle = tick * 0.01
-        turned = np.array(
-            [
-                [math.cos(angle), 0, math.sin(angle)],
-                [0, 1, 0],
-                [-math.sin(angle), 0, math.cos(angle)],
-            ]
-        )
-        poses = FootPoses(position, np.broadcast_to(turned, (4, 3, 3)))
+        turned = from_roll_pitch_yaw(0.0, tick * 0.01, 0.0)
+        poses = [FootPose(place, turned) for place in places]
         state = odometry.update(tick * PERIOD, poses, from_roll_pitch_yaw(0.0, 0.0, yaw))
     assert state.x == pytest.approx(0.5 * 0.01, rel=1e-3)
     assert state.y == pytest.approx(0.0, abs=1e-9)
@@ -175,7 +178,7 @@ def test_feet_are_where_physics_has_them() -> None:
     pose = {name: 0.1 * math.sin(3 * index) for index, name in enumerate(NAMES)}
     robot = Robot(URDF, pose=pose)
     (x, y, z), rotation = robot.base_pose.position, robot.base_pose.orientation
-    found = feet_of(URDF).poses([pose[name] for name in NAMES]).position
+    found = places(feet_of(URDF).poses([pose[name] for name in NAMES]))
     for leg, foot in enumerate(robot.feet):
         place = rotate(rotation, (found[leg, 0], found[leg, 1], found[leg, 2]))
         wanted = np.array(robot.link_position(foot)) - (x, y, z)

@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 import math
 
 from builtin_interfaces.msg import Time
@@ -12,10 +13,13 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import Transform
 from hypothesis import given
 from hypothesis import strategies as st
+from nav_msgs.msg import Odometry
 import pytest
+from rclpy.serialization import deserialize_message
+from sensor_msgs.msg import Imu, JointState
+from std_msgs.msg import Header
 
-from quad_description import movable_joints, robot_urdf
-from quad_hardware.estimation import Battery, Estimate, Estimator, EstimatorSettings, OdometryState
+from quad_hardware.estimation import Battery, Estimate, Health, OdometryState
 from quad_hardware.estimation.rotation import (
     from_roll_pitch_yaw,
     IDENTITY,
@@ -25,7 +29,7 @@ from quad_hardware.estimation.rotation import (
     yaw_of,
 )
 from quad_hardware.estimation.rotation import Quaternion as Rotation
-from quad_hardware.joints import JointMap, servo_of
+from quad_hardware.exceptions import HardwareError
 from quad_hardware.link import DialectCounters, LinkState, LinkStatus, RobotState
 from quad_hardware.nodes import messages
 from quad_hardware.nodes.diagnostics import (
@@ -35,11 +39,10 @@ from quad_hardware.nodes.diagnostics import (
     robot_diagnostic,
 )
 from quad_hardware.nodes.parameters import Deviations, Frames
+from quad_hardware.nodes.wire import Form, Template
 from quad_hardware.protocol import Fault, ParserCounters
 
 STAMP = Time(sec=1)
-URDF = robot_urdf('lite')
-JOINTS = JointMap(servo_of(joint) for joint in movable_joints(URDF))
 FRAMES = Frames('odom', 'base_link', 'base_footprint', 'imu_link', False, True)
 PARENT = replace(FRAMES, footprint_is_parent=True)
 DEVIATIONS = Deviations(orientation=0.02, rate=0.15, gyro=0.02, acceleration=0.3)
@@ -52,8 +55,6 @@ ESTIMATE = Estimate(
     angular_velocity=(0.1, 0.2, 0.3),
     rate_measured=False,
     acceleration=(0.0, 0.0, 9.8),
-    gravity_error=0.0,
-    odometry=PLACE,
 )
 ROTATIONS = st.builds(from_roll_pitch_yaw, *[st.floats(-1.2, 1.2)] * 3)
 
@@ -61,8 +62,8 @@ ROTATIONS = st.builds(from_roll_pitch_yaw, *[st.floats(-1.2, 1.2)] * 3)
 @given(ROTATIONS, st.sampled_from([FRAMES, PARENT]))
 def test_both_trees_put_frames_at_the_same_place(rotation: Rotation, frames: Frames) -> None:
     """base_link where odometry has it; base_footprint below it on the ground, level."""
-    estimate = replace(ESTIMATE, odometry=replace(PLACE, rotation=rotation))
-    first, second = messages.transforms(estimate, frames, STAMP).transforms
+    numbers = messages.transforms_numbers(replace(PLACE, rotation=rotation), frames)
+    first, second = messages.transforms_form(frames).message(STAMP, numbers).transforms
     chain = {first.child_frame_id: pose(first.transform)}
     (x, y, z), turn = pose(first.transform)
     offset, further = pose(second.transform)
@@ -89,17 +90,33 @@ def pose(transform: Transform) -> tuple[Vector, Rotation]:
 
 def test_joints_keep_their_order() -> None:
     """Each velocity stands beside its name; efforts are left out."""
-    message = messages.joint_state(ESTIMATE, STAMP)
+    form = messages.joint_states_form(ESTIMATE)
+    message = form.message(STAMP, messages.joint_numbers(ESTIMATE))
     assert message.name == ['b', 'a']
     assert list(message.velocity) == [1.0, 2.0]
     assert list(message.effort) == []
 
 
+def imu(estimate: Estimate) -> Imu:
+    """The message of an estimate."""
+    form = messages.imu_form(estimate, DEVIATIONS, 'imu_link')
+    message: Imu = form.message(STAMP, messages.imu_numbers(estimate))
+    return message
+
+
+def odometry(state: OdometryState, frames: Frames) -> Odometry:
+    """The message of a place."""
+    form = messages.odometry_form(ESTIMATE, DEVIATIONS, frames)
+    numbers = messages.odometry_numbers(ESTIMATE, state, frames)
+    message: Odometry = form.message(STAMP, numbers)
+    return message
+
+
 def test_a_differentiated_rate_says_so_by_its_covariance() -> None:
     """Larger than a gyro's; and minus one when there is none (REP 145)."""
-    differentiated = messages.imu(ESTIMATE, DEVIATIONS, 'imu_link', STAMP)
-    gyro = messages.imu(replace(ESTIMATE, rate_measured=True), DEVIATIONS, 'imu_link', STAMP)
-    none = messages.imu(replace(ESTIMATE, angular_velocity=None), DEVIATIONS, 'imu_link', STAMP)
+    differentiated = imu(ESTIMATE)
+    gyro = imu(replace(ESTIMATE, rate_measured=True))
+    none = imu(replace(ESTIMATE, angular_velocity=None))
     assert differentiated.angular_velocity_covariance[0] == pytest.approx(0.15**2)
     assert gyro.angular_velocity_covariance[8] == pytest.approx(0.02**2)
     assert none.angular_velocity_covariance[0] == -1.0
@@ -108,15 +125,50 @@ def test_a_differentiated_rate_says_so_by_its_covariance() -> None:
 
 def test_odometry_is_less_sure_the_farther_it_went() -> None:
     """No covariance is all zeros; what nobody measures has a huge one."""
-    near = messages.odometry(ESTIMATE, DEVIATIONS, FRAMES, STAMP)
-    far = messages.odometry(
-        replace(ESTIMATE, odometry=replace(PLACE, distance=30.0)), DEVIATIONS, FRAMES, STAMP
-    )
+    near, far = odometry(PLACE, FRAMES), odometry(replace(PLACE, distance=30.0), FRAMES)
     assert 0.0 < near.pose.covariance[0] < far.pose.covariance[0]
     assert near.twist.covariance[14] == messages.UNUSED
     assert all(near.pose.covariance[::7] > 0.0)
-    level = messages.odometry(ESTIMATE, DEVIATIONS, PARENT, STAMP)
+    level = odometry(PLACE, PARENT)
     assert (level.child_frame_id, level.pose.pose.position.z) == ('base_footprint', 0.0)
+
+
+FORMS: list[Form] = [
+    messages.JointStates(('a',)),
+    messages.JointStates(tuple('abcdefghijkl')),
+    messages.ImuForm('imu_link', 0.02, 0.3, 0.15),
+    messages.ImuForm('', 0.02, None, None),
+    messages.OdometryForm('odom', 'base_link', 0.02, 0.1),
+    messages.OdometryForm('o', 'a longer name', 0.02, None),
+    messages.transforms_form(FRAMES),
+    messages.transforms_form(PARENT),
+]
+
+
+@given(st.sampled_from(FORMS), st.integers(0, 2**31 * 10**9 - 1), st.data())
+def test_a_template_is_heard_as_the_message(form: Form, time: int, data: st.DataObject) -> None:
+    """Whatever its numbers, and whenever it is stamped."""
+    floats = st.floats(allow_nan=False)
+    numbers = data.draw(st.lists(floats, min_size=form.count, max_size=form.count))
+    message = form.message(Time(sec=time // 10**9, nanosec=time % 10**9), numbers)
+    assert deserialize_message(Template(form).fill(time, numbers), type(message)) == message
+
+
+@dataclass(frozen=True)
+class Forgetful:
+    """A form that leaves its second number out."""
+
+    count: int = 2
+
+    def message(self, stamp: Time, numbers: Sequence[float]) -> JointState:
+        """Make a message."""
+        return JointState(header=Header(stamp=stamp), position=numbers[:1])
+
+
+def test_a_form_that_loses_a_number_is_refused() -> None:
+    """Before anything is published; the message says which number."""
+    with pytest.raises(HardwareError, match='number 3'):
+        Template(Forgetful())
 
 
 def test_an_unknown_charge_is_nan() -> None:
@@ -187,9 +239,8 @@ def test_the_level_of_the_robot(
         RobotState(0.0, 0.0, (0, 0, 0), (0, 0, 9.8), {}, {}),
         **change,  # type: ignore[arg-type]
     )
-    estimator = Estimator(URDF, JOINTS, EstimatorSettings())
-    estimate = replace(ESTIMATE, gravity_error=error, battery=Battery(charge))
-    status = robot_diagnostic('hardware_node', '/dev/x', state, estimate, estimator)
+    health = Health(Battery(charge), error, refused=0, refusal='')
+    status = robot_diagnostic('hardware_node', '/dev/x', state, health)
     assert status.level == level
     assert words in status.message
 

@@ -62,6 +62,17 @@ def test_payloads_survive(data: st.DataObject, row: Function) -> None:
     assert row.unpack(row.pack(**values)) == values
 
 
+@given(st.lists(st.tuples(st.integers(0, 255), st.floats(-327, 327)), min_size=1, max_size=16))
+def test_groups_in_one_go_are_groups_one_by_one(groups: list[tuple[int, float]]) -> None:
+    """The same bytes; and what does not fit is refused by the name of the row."""
+    row = NEW.functions[Code.SERVOS]
+    one_by_one = [row.pack(motor=(motor,), angle=(angle,)) for motor, angle in groups]
+    assert row.pack_groups(groups) == b''.join(one_by_one)
+    for wrong in (400.0, math.nan):
+        with pytest.raises(CodecError, match='servos'):
+            row.pack_groups([*groups, (11, wrong)])
+
+
 @pytest.mark.parametrize('row', ROWS, ids=lambda row: row.name)
 def test_fields_do_not_overlap(row: Function) -> None:
     """No byte of a payload belongs to two fields, and the table has no hole but at its end."""

@@ -3,7 +3,7 @@
 """What the robot does not report and the controller needs: rates, odometry, height."""
 
 from .battery import Battery
-from .estimator import Estimate, Estimator, EstimatorSettings, RateSource
+from .estimator import Estimate, Estimator, EstimatorSettings, Health, RateSource
 from .odometry import OdometrySettings, OdometryState
 
 __all__ = [
@@ -11,6 +11,7 @@ __all__ = [
     'Estimate',
     'Estimator',
     'EstimatorSettings',
+    'Health',
     'OdometrySettings',
     'OdometryState',
     'RateSource',

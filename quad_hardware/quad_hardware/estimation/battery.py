@@ -35,13 +35,18 @@ class BatteryFilter:
         self._charges: deque[float] = deque(maxlen=REPORTS)
         self._voltages: deque[float] = deque(maxlen=REPORTS)
 
-    def update(self, state: RobotState) -> Battery:
+    def take(self, state: RobotState) -> None:
         """Take a report; charges that cannot be do not count."""
         if state.battery is not None and EMPTY <= state.battery <= FULL:
             self._charges.append(state.battery)
         if state.voltage is not None:
             self._voltages.append(state.voltage)
+
+    @property
+    def state(self) -> Battery:
+        """The state of the battery now; may be asked for from any thread."""
+        charges, voltages = self._charges.copy(), self._voltages.copy()
         return Battery(
-            median(self._charges) if self._charges else None,
-            median(self._voltages) if self._voltages else None,
+            median(charges) if charges else None,
+            median(voltages) if voltages else None,
         )

@@ -20,8 +20,6 @@ from .plausibility import Plausibility
 from .rotation import from_roll_pitch_yaw, Quaternion, Vector
 from .sample_clock import SampleClock
 
-NO_BATTERY = Battery()
-
 
 class RateSource(Enum):
     """Where the angular velocity is from."""
@@ -60,10 +58,6 @@ class Estimate:
         angular_velocity: Of the body, in base_link [rad/s]; None when it is not wanted.
         rate_measured: The angular velocity is that of a gyro.
         acceleration: Specific force in base_link [m/s²]; None where it is not reported.
-        gravity_error: Between accelerometer and attitude [rad]; None while the body accelerates,
-            and without an accelerometer.
-        odometry: Where the body is.
-        battery: State of the battery.
     """
 
     time: float
@@ -73,17 +67,31 @@ class Estimate:
     angular_velocity: Vector | None
     rate_measured: bool
     acceleration: Vector | None
+
+
+@dataclass(frozen=True, slots=True)
+class Health:
+    """What is looked at now and then.
+
+    Attributes:
+        battery: State of the battery.
+        gravity_error: Between accelerometer and attitude [rad]; None while the body accelerates,
+            and without an accelerometer.
+        refused: Reports that could not be.
+        refusal: Why the last of them could not be.
+    """
+
+    battery: Battery
     gravity_error: float | None
-    odometry: OdometryState
-    battery: Battery = NO_BATTERY
+    refused: int
+    refusal: str
 
 
 class Estimator:
     """Turns reports into estimates.
 
     Attributes:
-        refused: Reports that could not be.
-        refusal: Why the last of them could not be.
+        refusal: Why the last report that was refused could not be.
     """
 
     def __init__(self, urdf: str, joints: JointMap, settings: EstimatorSettings) -> None:
@@ -92,7 +100,7 @@ class Estimator:
         Raises:
             CommandError: The legs of the URDF cannot be read.
         """
-        self.refused = 0
+        self._refused = 0
         self.refusal = ''
         self._joints = joints
         self._settings = settings
@@ -114,10 +122,10 @@ class Estimator:
         self._odometry.command(time, self._feet.poses(self._padded(targets)))
 
     def update(self, state: RobotState) -> Estimate | None:
-        """Take a report; return None when it cannot be."""
+        """Take a report; return None when it cannot be. :meth:`walk` comes next."""
         reason = self._plausibility.check(state)
         if reason:
-            self.refused += 1
+            self._refused += 1
             self.refusal = reason
             return None
         time = self._clock.time(state)
@@ -127,7 +135,7 @@ class Estimator:
         velocities = self._joints.velocities(state.velocities)
         if not velocities:
             velocities = self._joint_rate.update(time, positions)
-        placed = self._padded([positions.get(name, 0.0) for name in self._joints.names])
+        self._battery.take(state)
         rate, measured = self._angular_velocity(time, attitude, state)
         return Estimate(
             time=time,
@@ -137,9 +145,21 @@ class Estimator:
             angular_velocity=rate,
             rate_measured=measured,
             acceleration=state.acceleration,
-            gravity_error=disagreement(attitude, state.acceleration),
-            odometry=self._odometry.update(time, self._feet.poses(placed), attitude),
-            battery=self._battery.update(state),
+        )
+
+    def walk(self, estimate: Estimate) -> OdometryState:
+        """Return where the body is by an estimate, to be called once for each."""
+        positions = estimate.positions
+        placed = [positions.get(name, 0.0) for name in self._joints.names]
+        return self._odometry.update(estimate.time, self._feet.poses(placed), estimate.attitude)
+
+    def health(self, estimate: Estimate) -> Health:
+        """Return how the robot is, by its newest estimate."""
+        return Health(
+            self._battery.state,
+            disagreement(estimate.attitude, estimate.acceleration),
+            self._refused,
+            self.refusal,
         )
 
     def _angular_velocity(

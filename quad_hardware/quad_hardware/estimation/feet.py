@@ -1,59 +1,79 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Where the feet are in the body, for all legs at once, from the chains of the URDF."""
+"""Where the feet are in the body, from the chains of the URDF.
+
+In plain numbers: for four legs of three joints, arrays cost several times as much.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 import math
+from typing import NamedTuple
 from xml.etree import ElementTree as ET
-
-import numpy as np
-from numpy.typing import NDArray
 
 from quad_description import LEGS
 
 from ..exceptions import CommandError
-
-Array = NDArray[np.float64]
+from .rotation import from_roll_pitch_yaw, IDENTITY, multiply, Quaternion, rotate, Vector
 
 BASE = 'base_link'
 FEET = tuple(f'{leg}_foot' for leg in LEGS)
-_EYE = np.eye(3)
-_IDENTITIES: Array = np.stack([_EYE] * len(FEET))
-_ORIGINS: Array = np.zeros((len(FEET), 3))
+_ORIGIN: Vector = (0.0, 0.0, 0.0)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class FootPoses:
-    """Where the feet are in base_link, in URDF order.
+class FootPose(NamedTuple):
+    """Where a foot is.
 
     Attributes:
-        position: Of their centres [m], (4, 3).
-        rotation: From the foot to base_link, (4, 3, 3).
+        position: Of its centre [m].
+        rotation: From the foot to what the position is given in, (x, y, z, w).
     """
 
-    position: Array
-    rotation: Array
+    position: Vector
+    rotation: Quaternion
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Stage:
-    """One joint of each leg: a fixed part, then a turn about an axis of each."""
+FootPoses = Sequence[FootPose]
+"""Where the feet are, in URDF order."""
 
-    rotation: Array  # (4, 3, 3)
-    position: Array  # (4, 3)
-    cross: Array  # (4, 3, 3) cross product with the axis
-    cross_twice: Array  # (4, 3, 3)
-    joints: NDArray[np.intp]  # where their angles stand (4, 1, 1)
+
+@dataclass(frozen=True, slots=True)
+class _Joint:
+    """A turning joint, and the fixed part of the leg before it."""
+
+    position: Vector  # [m]
+    rotation: Quaternion
+    axis: Vector  # of length 1
+    index: int  # of its angle
+
+
+@dataclass(frozen=True, slots=True)
+class _Leg:
+    joints: tuple[_Joint, ...]
+    tip: FootPose  # behind the last joint
+
+    def pose(self, angles: Sequence[float]) -> FootPose:
+        position, rotation = _ORIGIN, IDENTITY
+        for joint in self.joints:
+            position = _sum(position, rotate(rotation, joint.position))
+            if joint.rotation is not IDENTITY:
+                rotation = multiply(rotation, joint.rotation)
+            sine, (x, y, z) = math.sin(angles[joint.index] / 2), joint.axis
+            turn = sine * x, sine * y, sine * z, math.cos(angles[joint.index] / 2)
+            rotation = multiply(rotation, turn)
+        tip = self.tip
+        return FootPose(
+            _sum(position, rotate(rotation, tip.position)), multiply(rotation, tip.rotation)
+        )
 
 
 class Feet:
     """Forward kinematics of the feet.
 
     Attributes:
-        radius: Of the feet, below the point that is computed [m].
+        radius: Of a foot, which is a ball [m].
     """
 
     def __init__(self, urdf: str, joints: Sequence[str]) -> None:
@@ -64,44 +84,24 @@ class Feet:
             joints: Order of the positions that are given to :meth:`poses`.
 
         Raises:
-            CommandError: A foot is missing, or the legs have chains of different lengths.
+            CommandError: A foot is missing.
         """
         root = ET.fromstring(urdf)  # noqa: S314  # the robot's own description
-        parents = {_link(j, 'child'): j for j in root.iter('joint')}
-        chains = [_chain(parents, foot) for foot in FEET]
+        parents = {_link(joint, 'child'): joint for joint in root.iter('joint')}
         self.radius = _sphere_radius(root, FEET[0])
-        moving = [[j for j in chain if j.get('type') == 'revolute'] for chain in chains]
-        if len({len(chain) for chain in moving}) != 1:
-            raise CommandError('the legs of the URDF have different numbers of joints')
-        splits = [_split(chain) for chain in chains]
-        self._stages = [
-            _stage([split[k] for split in splits], [chain[k] for chain in moving], joints)
-            for k in range(len(moving[0]))
-        ]
-        self._tip_rotation, self._tip_position = _stack([split[-1] for split in splits])
+        self._legs = [_leg(_chain(parents, foot), joints) for foot in FEET]
 
-    def poses(self, angles: Sequence[float] | Array) -> FootPoses:
-        """Return where the feet are.
+    def poses(self, angles: Sequence[float]) -> FootPoses:
+        """Return where the feet are in base_link.
 
         Args:
             angles: Positions of the joints [rad].
         """
-        values = np.asarray(angles, dtype=np.float64)
-        rotation, position = _IDENTITIES, _ORIGINS
-        sines, versines = np.sin(values), 1.0 - np.cos(values)
-        for stage in self._stages:
-            position = position + _apply(rotation, stage.position)
-            sine, versine = sines[stage.joints], versines[stage.joints]
-            # Rodrigues: I + sin K + (1 - cos) K²
-            turn = _EYE + sine * stage.cross + versine * stage.cross_twice
-            rotation = rotation @ stage.rotation @ turn
-        tip = position + _apply(rotation, self._tip_position)
-        return FootPoses(tip, rotation @ self._tip_rotation)
+        return [leg.pose(angles) for leg in self._legs]
 
 
-def _apply(rotation: Array, vector: Array) -> Array:
-    result: Array = (rotation @ vector[:, :, None])[:, :, 0]
-    return result
+def _sum(one: Vector, other: Vector) -> Vector:
+    return one[0] + other[0], one[1] + other[1], one[2] + other[2]
 
 
 def _chain(parents: dict[str, ET.Element], foot: str) -> list[ET.Element]:
@@ -124,54 +124,29 @@ def _link(joint: ET.Element, end: str) -> str:
     return '' if element is None else element.get('link', '')
 
 
-def _split(chain: Sequence[ET.Element]) -> list[tuple[Array, Array]]:
-    """Return the fixed parts of a chain: before each moving joint, and behind the last."""
-    parts = []
-    rotation, position = np.eye(3), np.zeros(3)
+def _leg(chain: Sequence[ET.Element], names: Sequence[str]) -> _Leg:
+    """Gather the fixed parts of a chain: before each turning joint, and behind the last."""
+    joints = []
+    position, rotation = _ORIGIN, IDENTITY
     for joint in chain:
         origin = joint.find('origin')
-        xyz = _numbers(origin, 'xyz', '0 0 0')
-        position = position + rotation @ xyz
-        rotation = rotation @ _rotation(_numbers(origin, 'rpy', '0 0 0'))
+        position = _sum(position, rotate(rotation, _vector(origin, 'xyz', '0 0 0')))
+        rpy = _vector(origin, 'rpy', '0 0 0')
+        if any(rpy):
+            rotation = multiply(rotation, from_roll_pitch_yaw(*rpy))
         if joint.get('type') == 'revolute':
-            parts.append((rotation, position))
-            rotation, position = np.eye(3), np.zeros(3)
-    return [*parts, (rotation, position)]
+            x, y, z = _vector(joint.find('axis'), 'xyz', '1 0 0')
+            length = math.hypot(x, y, z)
+            axis = x / length, y / length, z / length
+            joints.append(_Joint(position, rotation, axis, names.index(joint.get('name', ''))))
+            position, rotation = _ORIGIN, IDENTITY
+    return _Leg(tuple(joints), FootPose(position, rotation))
 
 
-def _stage(
-    fixed: Sequence[tuple[Array, Array]], moving: Sequence[ET.Element], joints: Sequence[str]
-) -> _Stage:
-    rotation, position = _stack(fixed)
-    axes = [_numbers(joint.find('axis'), 'xyz', '1 0 0') for joint in moving]
-    cross = np.array([_cross(axis / np.linalg.norm(axis)) for axis in axes])
-    indices = np.array([joints.index(j.get('name', '')) for j in moving], dtype=np.intp)
-    return _Stage(rotation, position, cross, cross @ cross, indices[:, None, None])
-
-
-def _stack(parts: Sequence[tuple[Array, Array]]) -> tuple[Array, Array]:
-    return np.array([part[0] for part in parts]), np.array([part[1] for part in parts])
-
-
-def _numbers(element: ET.Element | None, key: str, default: str) -> Array:
+def _vector(element: ET.Element | None, key: str, default: str) -> Vector:
     text = default if element is None else element.get(key, default)
-    return np.array([float(word) for word in text.split()])
-
-
-def _cross(axis: Array) -> Array:
-    x, y, z = axis
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-
-
-def _rotation(rpy: Array) -> Array:
-    (sr, cr), (sp, cp), (sy, cy) = ((math.sin(a), math.cos(a)) for a in rpy)
-    return np.array(
-        [
-            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-            [-sp, cp * sr, cp * cr],
-        ]
-    )
+    x, y, z = (float(word) for word in text.split())
+    return x, y, z
 
 
 def _sphere_radius(root: ET.Element, link: str) -> float:

@@ -14,20 +14,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
-from .feet import FootPoses
+from .feet import FootPose, FootPoses
 from .filters import low_pass_share
-from .rotation import about_z, multiply, Quaternion, yaw_of
+from .rotation import about_z, conjugate, multiply, Quaternion, rotate, Vector, yaw_of
 
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
+Flags = tuple[bool, ...]
 
 LONGEST_GAP = 0.2  # [s] more than that cannot be bridged: the body may have been carried
 DRIFT = 0.07  # share of the way that is the standard deviation of the position
 LEAST_VARIANCE = 1e-4  # [m²]
 KEPT_COMMANDS = 32
+REST = (0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,12 +88,10 @@ class LegOdometry:
         self._settings = settings
         self._radius = foot_radius
         # replaced as a whole: commands come from another thread than measurements
-        self._commands: tuple[tuple[float, Array], ...] = ()
+        self._commands: tuple[tuple[float, list[Vector]], ...] = ()
         self._last: tuple[float, FootPoses, Flags] | None = None
         self._yaw0: float | None = None
-        self._place = np.zeros(2)
-        self._held = np.zeros(2)  # [m/s] in the body turned level, raw
-        self._smooth = np.zeros(2)
+        self._place = self._held = self._smooth = REST  # the velocities in the body turned level
         self._distance = 0.0
 
     def command(self, time: float, feet: FootPoses) -> None:
@@ -106,7 +101,8 @@ class LegOdometry:
             time: When [s].
             feet: Where.
         """
-        self._commands = (*self._commands, (time, feet.position))[-KEPT_COMMANDS:]
+        places = [foot.position for foot in feet]
+        self._commands = (*self._commands, (time, places))[-KEPT_COMMANDS:]
 
     def update(self, time: float, feet: FootPoses, attitude: Quaternion) -> OdometryState:
         """Take a measurement.
@@ -120,33 +116,38 @@ class LegOdometry:
         if self._yaw0 is None:
             self._yaw0 = yaw
         rotation = multiply(about_z(-self._yaw0), attitude)
-        matrix = _matrix(rotation)
-        standing = self._standing(time, feet.position, matrix)
-        turned = FootPoses(feet.position @ matrix.T, matrix @ feet.rotation)
+        standing = self._standing(time, feet, rotation)
+        turned = [
+            FootPose(rotate(rotation, foot.position), multiply(rotation, foot.rotation))
+            for foot in feet
+        ]
         self._integrate(time, turned, standing, yaw - self._yaw0)
         self._last = time, turned, standing
         return OdometryState(
-            x=float(self._place[0]),
-            y=float(self._place[1]),
-            height=self._height(turned.position, standing),
-            rotation=rotation,
-            velocity_x=float(self._smooth[0]),
-            velocity_y=float(self._smooth[1]),
-            distance=self._distance,
-            standing=tuple(map(bool, standing)),
+            *self._place,
+            self._height(turned, standing),
+            rotation,
+            *self._smooth,
+            self._distance,
+            standing,
         )
 
-    def _standing(self, time: float, feet: Array, matrix: Array) -> Flags:
+    def _standing(self, time: float, feet: FootPoses, rotation: Quaternion) -> Flags:
         settings, commands = self._settings, self._commands
         at = time - settings.delay
-        recent = [f for t, f in commands if abs(t - at) <= settings.margin]
+        recent = [places for t, places in commands if abs(t - at) <= settings.margin]
         if not recent:
-            older = [f for t, f in commands if at - settings.command_age <= t <= at]
-            recent = older[-1:] or [feet]
-        standing = np.ones(len(feet), dtype=np.bool_)
-        for commanded in recent:
-            heights = commanded @ matrix[2]
-            standing &= heights <= heights.min() + settings.tolerance
+            older = [places for t, places in commands if at - settings.command_age <= t <= at]
+            recent = older[-1:] or [[foot.position for foot in feet]]
+        x, y, z = rotate(conjugate(rotation), (0.0, 0.0, 1.0))  # up, in the body
+        standing = (True,) * len(feet)
+        for places in recent:
+            heights = [x * px + y * py + z * pz for px, py, pz in places]
+            highest = min(heights) + settings.tolerance
+            standing = tuple(
+                stands and height <= highest
+                for stands, height in zip(standing, heights, strict=True)
+            )
         return standing
 
     def _integrate(self, time: float, feet: FootPoses, standing: Flags, heading: float) -> None:
@@ -155,39 +156,38 @@ class LegOdometry:
         last_time, last_feet, stood = self._last
         elapsed = time - last_time
         if not 0.0 < elapsed <= LONGEST_GAP:
-            self._held, self._smooth = np.zeros(2), np.zeros(2)
+            self._held = self._smooth = REST
             return
         cosine, sine = math.cos(heading), math.sin(heading)
-        to_odom = np.array([[cosine, -sine], [sine, cosine]])
-        both = standing & stood
-        if both.any():
-            moved = (self._rolled(last_feet, feet) - feet.position + last_feet.position)[both, :2]
-            scale = np.array([self._settings.scale_x, self._settings.scale_y])
-            self._held = (to_odom.T @ moved.mean(axis=0)) * scale / elapsed
-        step = to_odom @ self._held * elapsed
-        self._place = self._place + step
-        self._distance += float(np.hypot(*step))
+        pairs = zip(last_feet, feet, standing, stood, strict=True)
+        ways = [self._way(last, foot) for last, foot, *both in pairs if all(both)]
+        if ways:
+            x, y = (sum(way) / len(ways) / elapsed for way in zip(*ways, strict=True))
+            self._held = (
+                (cosine * x + sine * y) * self._settings.scale_x,
+                (cosine * y - sine * x) * self._settings.scale_y,
+            )
+        ahead, left = self._held[0] * elapsed, self._held[1] * elapsed
+        self._place = (
+            self._place[0] + cosine * ahead - sine * left,
+            self._place[1] + sine * ahead + cosine * left,
+        )
+        self._distance += math.hypot(ahead, left)
         share = low_pass_share(self._settings.cutoff, elapsed)
-        self._smooth = self._smooth + share * (self._held - self._smooth)
+        (x, y), (held_x, held_y) = self._smooth, self._held
+        self._smooth = x + share * (held_x - x), y + share * (held_y - y)
 
-    def _rolled(self, before: FootPoses, after: FootPoses) -> Array:
-        """Return how far the centre of each foot has rolled over the ground [m], (4, 3)."""
-        turn = after.rotation @ before.rotation.transpose(0, 2, 1)
-        about_x, about_y = turn[:, 2, 1] - turn[:, 1, 2], turn[:, 0, 2] - turn[:, 2, 0]
-        # angular step times the vector from the ground to the centre
-        return np.stack([about_y, -about_x, np.zeros(len(turn))], axis=1) * (self._radius / 2)
+    def _way(self, before: FootPose, after: FootPose) -> tuple[float, float]:
+        """Return how far the body has gone over a foot that stands [m]."""
+        x, y, _, w = multiply(after.rotation, conjugate(before.rotation))
+        # the foot has rolled by the angular step times the vector from the ground to its centre
+        rolled = 2.0 * w * self._radius
+        return (
+            rolled * y - after.position[0] + before.position[0],
+            -rolled * x - after.position[1] + before.position[1],
+        )
 
-    def _height(self, feet: Array, standing: Flags) -> float:
-        heights = feet[standing, 2] if standing.any() else feet[:, 2]
-        return float(-heights.mean()) + self._radius
-
-
-def _matrix(rotation: Quaternion) -> Array:
-    x, y, z, w = rotation
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
+    def _height(self, feet: FootPoses, standing: Flags) -> float:
+        heights = [foot.position[2] for foot, stands in zip(feet, standing, strict=True) if stands]
+        heights = heights or [foot.position[2] for foot in feet]
+        return self._radius - sum(heights) / len(heights)

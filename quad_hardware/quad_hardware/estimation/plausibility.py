@@ -4,8 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
-from dataclasses import replace
+from collections.abc import Collection
 import math
 
 from ..joints.mapping import SERVO_REACH
@@ -16,6 +15,7 @@ LARGEST_ACCELERATION = 200.0  # [m/s²]
 LARGEST_JUMP = 60.0  # [deg] between reports; a servo does 12 degrees in 20 ms
 LARGEST_LAG = 0.1  # [s] between the robot's clock and ours from one report to the next
 JUMP_TIME = 0.1  # [s] after which anything may have happened
+NOT_FINITE = 'a number is not finite'
 PATIENCE = 2  # reports in a row that are refused for a jump, before it is believed
 
 
@@ -28,19 +28,18 @@ class Plausibility:
         Args:
             motors: Ids of those that a joint uses; what the others report is nothing.
         """
-        self._motors = frozenset(motors)
+        self._motors = tuple(motors)
         self._last: RobotState | None = None
         self._refused = 0
 
     def check(self, state: RobotState) -> str:
         """Return why a report cannot be; empty when it can."""
-        state = self._of_motors(state)
-        reason = next(_impossible(state), '')
+        reason = self._impossible(state)
         if reason:
             return reason
         last = self._last
         if last is not None and state.arrival - last.arrival < JUMP_TIME:
-            reason = next(_jumps(last, state), '')
+            reason = self._jump(last, state)
         if reason and self._refused < PATIENCE:
             self._refused += 1
             return reason
@@ -48,40 +47,37 @@ class Plausibility:
         self._last = state
         return ''
 
-    def _of_motors(self, state: RobotState) -> RobotState:
-        used = self._motors
-        return replace(
-            state,
-            positions={m: angle for m, angle in state.positions.items() if m in used},
-            velocities={m: speed for m, speed in state.velocities.items() if m in used},
-        )
+    def _impossible(self, state: RobotState) -> str:
+        felt = state.acceleration or (0.0, 0.0, 0.0)
+        if not all(map(math.isfinite, (*state.attitude, *felt))):
+            return NOT_FINITE
+        if math.hypot(*felt) > LARGEST_ACCELERATION:
+            return f'acceleration {felt} m/s²'
+        if max(map(abs, state.attitude)) > 360.0:
+            return f'attitude {state.attitude} deg'
+        for name, values, most in (
+            ('deg', state.positions, SERVO_REACH),
+            ('deg/s', state.velocities, LARGEST_SPEED),
+        ):
+            for motor in self._motors:
+                value = values.get(motor, 0.0)
+                if not abs(value) <= most:
+                    finite = math.isfinite(value)
+                    return f'motor {motor} at {value:.4g} {name}' if finite else NOT_FINITE
+        return ''
 
-
-def _impossible(state: RobotState) -> Iterator[str]:
-    felt = state.acceleration or (0.0, 0.0, 0.0)
-    numbers = (*state.attitude, *felt, *state.positions.values())
-    if not all(map(math.isfinite, (*numbers, *state.velocities.values()))):
-        yield 'a number is not finite'
-    if math.hypot(*felt) > LARGEST_ACCELERATION:
-        yield f'acceleration {felt} m/s²'
-    if any(abs(angle) > 360.0 for angle in state.attitude):
-        yield f'attitude {state.attitude} deg'
-    for motor, angle in state.positions.items():
-        if abs(angle) > SERVO_REACH:
-            yield f'motor {motor} at {angle:.4g} deg'
-    for motor, speed in state.velocities.items():
-        if abs(speed) > LARGEST_SPEED:
-            yield f'motor {motor} at {speed:.4g} deg/s'
-
-
-def _jumps(last: RobotState, state: RobotState) -> Iterator[str]:
-    for motor, angle in state.positions.items():
-        if abs(angle - last.positions.get(motor, angle)) > LARGEST_JUMP:
-            yield f'motor {motor} jumped to {angle:.4g} deg'
-    for name, before, now in zip('rpy', last.attitude, state.attitude, strict=True):
-        if abs(math.remainder(now - before, 360.0)) > LARGEST_JUMP:
-            yield f'attitude {name} jumped to {now:.4g} deg'
-    if last.device_time is not None and state.device_time is not None:
-        passed = math.remainder(state.device_time - last.device_time, DEVICE_TIME_WRAP)
-        if abs(passed - (state.arrival - last.arrival)) > LARGEST_LAG:
-            yield f'the clock of the robot went on by {passed:.3f} s'
+    def _jump(self, last: RobotState, state: RobotState) -> str:
+        for motor in self._motors:
+            angle = state.positions.get(motor)
+            if angle is None:
+                continue
+            if abs(angle - last.positions.get(motor, angle)) > LARGEST_JUMP:
+                return f'motor {motor} jumped to {angle:.4g} deg'
+        for name, before, now in zip('rpy', last.attitude, state.attitude, strict=True):
+            if abs(math.remainder(now - before, 360.0)) > LARGEST_JUMP:
+                return f'attitude {name} jumped to {now:.4g} deg'
+        if last.device_time is not None and state.device_time is not None:
+            passed = math.remainder(state.device_time - last.device_time, DEVICE_TIME_WRAP)
+            if abs(passed - (state.arrival - last.arrival)) > LARGEST_LAG:
+                return f'the clock of the robot went on by {passed:.3f} s'
+        return ''

@@ -54,8 +54,8 @@ class NewDialect(Dialect):
 
     def command(self, angles: Mapping[int, float]) -> None:
         """Set the angles that are sent at the next step, in one frame."""
-        groups = (_SERVOS.pack(motor=(m,), angle=(a,)) for m, a in angles.items())
-        self._pending = Frame(Kind.WRITE, Code.SERVOS, b''.join(groups)).encode(NEW)
+        payload = _SERVOS.pack_groups(list(angles.items()))
+        self._pending = Frame(Kind.WRITE, Code.SERVOS, payload).encode(NEW)
 
     def torque(self, *, on: bool) -> None:
         """Have all servos hold their place, or let go, behind a pending command."""

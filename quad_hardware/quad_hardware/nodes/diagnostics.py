@@ -9,7 +9,7 @@ import math
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
-from ..estimation import Estimate, Estimator
+from ..estimation import Health
 from ..link import LinkState, LinkStatus, RobotState
 from ..protocol import Fault
 
@@ -77,13 +77,10 @@ def link_diagnostic(node: str, port: str, status: LinkStatus) -> DiagnosticStatu
     return _status(level, f'{node}: serial link', message, port, values)
 
 
-def robot_diagnostic(
-    node: str, port: str, state: RobotState, estimate: Estimate, estimator: Estimator
-) -> DiagnosticStatus:
+def robot_diagnostic(node: str, port: str, state: RobotState, health: Health) -> DiagnosticStatus:
     """Describe battery, servos and IMU."""
     level, message = DiagnosticStatus.OK, 'no faults'
-    error, charge = estimate.gravity_error, estimate.battery.charge
-    voltage = estimate.battery.voltage
+    error, charge, voltage = health.gravity_error, health.battery.charge, health.battery.voltage
     hot = {m: t for m, t in (state.temperatures or {}).items() if t > HOT_SERVO}
     if error is not None and error > GRAVITY_ERROR:
         level = DiagnosticStatus.WARN
@@ -106,8 +103,8 @@ def robot_diagnostic(
         'faults': state.faults,
         'gravity_error': '' if error is None else f'{error:.3f}',
         'hottest_servo': max((state.temperatures or {0: 0.0}).values()),
-        'implausible_reports': estimator.refused,
-        'last_implausible': estimator.refusal,
+        'implausible_reports': health.refused,
+        'last_implausible': health.refusal,
     }
     return _status(level, f'{node}: robot', message, port, values)
 

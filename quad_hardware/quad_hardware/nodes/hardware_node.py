@@ -9,12 +9,10 @@ import sys
 import threading
 import time
 
-from builtin_interfaces.msg import Time as TimeMessage
 from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
 from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
-from rclpy.time import Time
 from sensor_msgs.msg import BatteryState, Imu, JointState
 from std_srvs.srv import SetBool
 from tf2_msgs.msg import TFMessage
@@ -34,6 +32,7 @@ from .diagnostics import (
     robot_diagnostic,
 )
 from .parameters import declare_parameters
+from .wire import Stream
 
 COMMAND_QOS = QoSProfile(
     reliability=ReliabilityPolicy.RELIABLE, history=HistoryPolicy.KEEP_LAST, depth=1
@@ -67,11 +66,13 @@ class HardwareNode(Node):
         self._counters = CommandCounters()
         self._last_targets: tuple[float, ...] = ()
         self._limp = False
-        self._joint_states = self.create_publisher(JointState, 'joint_states', SENSOR_DEPTH)
-        self._imu = self.create_publisher(Imu, 'imu', SENSOR_DEPTH)
-        self._odom = self.create_publisher(Odometry, 'odom', SENSOR_DEPTH)
+        self._joint_states = Stream(
+            self.create_publisher(JointState, 'joint_states', SENSOR_DEPTH)
+        )
+        self._imu = Stream(self.create_publisher(Imu, 'imu', SENSOR_DEPTH))
+        self._odom = Stream(self.create_publisher(Odometry, 'odom', SENSOR_DEPTH))
         self._battery = self.create_publisher(BatteryState, 'battery_state', SENSOR_DEPTH)
-        self._tf = self.create_publisher(TFMessage, '/tf', 100)
+        self._tf = Stream(self.create_publisher(TFMessage, '/tf', 100))
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', SENSOR_DEPTH)
         self.create_subscription(JointCommand, 'joint_command', self._take, COMMAND_QOS)
         self.create_service(SetBool, '~/torque', self._set_torque)
@@ -98,21 +99,38 @@ class HardwareNode(Node):
             return self._estimator.refusal
         self._latest = state, estimate
         settings, stamp = self._settings, self._stamp(estimate.time)
-        self._joint_states.publish(messages.joint_state(estimate, stamp))
-        self._imu.publish(messages.imu(estimate, settings.deviations, settings.frames.imu, stamp))
-        self._odom.publish(
-            messages.odometry(estimate, settings.deviations, settings.frames, stamp)
+        # what a controller waits for comes first
+        self._joint_states.publish(
+            messages.JointStates(tuple(estimate.positions)),
+            stamp,
+            messages.joint_numbers(estimate),
         )
-        if settings.frames.publish:
-            self._tf.publish(messages.transforms(estimate, settings.frames, stamp))
+        self._imu.publish(
+            messages.imu_form(estimate, settings.deviations, settings.frames.imu),
+            stamp,
+            messages.imu_numbers(estimate),
+        )
+        self._publish_way(estimate, stamp)
         return ''
 
-    def _stamp(self, monotonic: float) -> TimeMessage:
-        """Return a moment of the monotonic clock on the clock of ROS."""
+    def _publish_way(self, estimate: Estimate, stamp: int) -> None:
+        """Publish where the body is."""
+        deviations, frames = self._settings.deviations, self._settings.frames
+        way = self._estimator.walk(estimate)
+        self._odom.publish(
+            messages.odometry_form(estimate, deviations, frames),
+            stamp,
+            messages.odometry_numbers(estimate, way, frames),
+        )
+        if frames.publish:
+            self._tf.publish(
+                messages.transforms_form(frames), stamp, messages.transforms_numbers(way, frames)
+            )
+
+    def _stamp(self, monotonic: float) -> int:
+        """Return a moment of the monotonic clock on the clock of ROS [ns]."""
         age = round((time.monotonic() - monotonic) * 1e9)
-        now = self.get_clock().now().nanoseconds
-        stamp: TimeMessage = Time(nanoseconds=max(now - age, 0)).to_msg()
-        return stamp
+        return max(self.get_clock().now().nanoseconds - age, 0)
 
     def _link_changed(self, state: LinkState, detail: str) -> None:
         """Say how the link is; runs in the thread of the driver."""
@@ -230,8 +248,9 @@ class HardwareNode(Node):
         ]
         if latest is not None:
             state, estimate = latest
-            array.status.append(robot_diagnostic(name, port, state, estimate, self._estimator))
-            self._battery.publish(messages.battery(estimate.battery, now))
+            health = self._estimator.health(estimate)
+            array.status.append(robot_diagnostic(name, port, state, health))
+            self._battery.publish(messages.battery(health.battery, now))
         self._diagnostics.publish(array)
 
 

@@ -1,11 +1,17 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Estimates as ROS messages (REP 103, 105, 145)."""
+"""Estimates as ROS messages (REP 103, 105, 145).
+
+What is published with every report comes as a form, which makes the message, and as the numbers
+that change from one message to the next.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 import math
+from typing import ClassVar
 
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Point, Quaternion, Transform, TransformStamped, Vector3
@@ -14,7 +20,7 @@ from sensor_msgs.msg import BatteryState, Imu, JointState
 from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
-from ..estimation import Battery, Estimate
+from ..estimation import Battery, Estimate, OdometryState
 from ..estimation.rotation import about_z, conjugate, multiply, rotate, yaw_of
 from ..estimation.rotation import Quaternion as Rotation
 from .parameters import Deviations, Frames
@@ -24,80 +30,183 @@ UNUSED = 1e6  # variance of what nobody measures
 VELOCITY_VARIANCE = 0.03**2  # [m²/s²]
 HEIGHT_VARIANCE = 0.01**2  # [m²]
 
+Numbers = Sequence[float]
 
-def joint_state(estimate: Estimate, stamp: Time) -> JointState:
-    """Return all joints that are reported, in the order of the URDF; efforts are not known."""
-    return JointState(
-        header=Header(stamp=stamp),
-        name=list(estimate.positions),
-        position=list(estimate.positions.values()),
-        velocity=[estimate.velocities[name] for name in estimate.positions],
+
+@dataclass(frozen=True, slots=True)
+class JointStates:
+    """All joints that are reported, in the order of the URDF; efforts are not known.
+
+    Attributes:
+        names: Of the joints.
+    """
+
+    names: tuple[str, ...]
+
+    @property
+    def count(self) -> int:
+        """How many numbers a message takes."""
+        return 2 * len(self.names)
+
+    def message(self, stamp: Time, numbers: Numbers) -> JointState:
+        """Make a message of positions, and velocities behind them."""
+        joints = len(self.names)
+        return JointState(
+            header=Header(stamp=stamp),
+            name=list(self.names),
+            position=numbers[:joints],
+            velocity=numbers[joints:],
+        )
+
+
+def joint_states_form(estimate: Estimate) -> JointStates:
+    """Return the form for the joints of an estimate."""
+    return JointStates(tuple(estimate.positions))
+
+
+def joint_numbers(estimate: Estimate) -> Numbers:
+    """Return what :class:`JointStates` takes."""
+    velocities = estimate.velocities
+    return [*estimate.positions.values(), *(velocities[name] for name in estimate.positions)]
+
+
+@dataclass(frozen=True, slots=True)
+class ImuForm:
+    """Attitude, angular velocity and specific force.
+
+    Attributes:
+        frame: In which they are.
+        orientation: Its standard deviation [rad].
+        acceleration: Its standard deviation [m/s²]; None where it is not measured.
+        rate: Its standard deviation [rad/s]; None where it is not published.
+    """
+
+    frame: str
+    orientation: float
+    acceleration: float | None
+    rate: float | None
+    count: ClassVar[int] = 10
+
+    def message(self, stamp: Time, numbers: Numbers) -> Imu:
+        """Make a message of a rotation (x, y, z, w), a rate and an acceleration."""
+        message = Imu(header=Header(stamp=stamp, frame_id=self.frame))
+        message.orientation = _quaternion(numbers[:4])
+        message.orientation_covariance = _diagonal3(self.orientation)
+        message.angular_velocity = _vector(numbers[4:7])
+        message.angular_velocity_covariance = _diagonal3(self.rate)
+        message.linear_acceleration = _vector(numbers[7:])
+        message.linear_acceleration_covariance = _diagonal3(self.acceleration)
+        return message
+
+
+def imu_form(estimate: Estimate, deviations: Deviations, frame: str) -> ImuForm:
+    """Return the form for what an estimate holds."""
+    return ImuForm(
+        frame,
+        deviations.orientation,
+        None if estimate.acceleration is None else deviations.acceleration,
+        _rate_deviation(estimate, deviations),
     )
 
 
-def imu(estimate: Estimate, deviations: Deviations, frame: str, stamp: Time) -> Imu:
-    """Return attitude, angular velocity and specific force."""
-    message = Imu(header=Header(stamp=stamp, frame_id=frame))
-    message.orientation = _quaternion(estimate.attitude)
-    message.orientation_covariance = _diagonal3(deviations.orientation)
-    if estimate.acceleration is None:
-        message.linear_acceleration_covariance = NOT_THERE
-    else:
-        x, y, z = estimate.acceleration
-        message.linear_acceleration = Vector3(x=x, y=y, z=z)
-        message.linear_acceleration_covariance = _diagonal3(deviations.acceleration)
-    if estimate.angular_velocity is None:
-        message.angular_velocity_covariance = NOT_THERE
-    else:
-        x, y, z = estimate.angular_velocity
-        message.angular_velocity = Vector3(x=x, y=y, z=z)
-        measured = deviations.gyro if estimate.rate_measured else deviations.rate
-        message.angular_velocity_covariance = _diagonal3(measured)
-    return message
+def imu_numbers(estimate: Estimate) -> Numbers:
+    """Return what :class:`ImuForm` takes; zeros for what is not measured."""
+    rate, force = estimate.angular_velocity or _ZERO, estimate.acceleration or _ZERO
+    return (*estimate.attitude, *rate, *force)
 
 
-def odometry(estimate: Estimate, deviations: Deviations, frames: Frames, stamp: Time) -> Odometry:
-    """Return the pose in odom and the velocity in base_link (or in the footprint)."""
-    state = estimate.odometry
-    message = Odometry(header=Header(stamp=stamp, frame_id=frames.odom))
+@dataclass(frozen=True, slots=True)
+class OdometryForm:
+    """The pose in odom and the velocity in base_link (or in the footprint).
+
+    Attributes:
+        frame: In which the pose is.
+        child: In which the velocity is.
+        tilt: Standard deviation of the rotation [rad].
+        rate: That of the angular velocity [rad/s]; None where it is not published.
+    """
+
+    frame: str
+    child: str
+    tilt: float
+    rate: float | None
+    count: ClassVar[int] = 14
+
+    def message(self, stamp: Time, numbers: Numbers) -> Odometry:
+        """Make a message: place, rotation, velocity, rate, and the variance of x and y [m²]."""
+        message = Odometry(header=Header(stamp=stamp, frame_id=self.frame))
+        message.child_frame_id = self.child
+        x, y, z = numbers[:3]
+        message.pose.pose.position = Point(x=x, y=y, z=z)
+        message.pose.pose.orientation = _quaternion(numbers[3:7])
+        place, tilt = numbers[13], self.tilt**2
+        message.pose.covariance = _diagonal6((place, place, HEIGHT_VARIANCE, tilt, tilt, tilt))
+        message.twist.twist.linear = _vector(numbers[7:10])
+        message.twist.twist.angular = _vector(numbers[10:13])
+        rate = UNUSED if self.rate is None else self.rate**2
+        message.twist.covariance = _diagonal6(
+            (VELOCITY_VARIANCE, VELOCITY_VARIANCE, UNUSED, rate, rate, rate)
+        )
+        return message
+
+
+def odometry_form(estimate: Estimate, deviations: Deviations, frames: Frames) -> OdometryForm:
+    """Return the form for what an estimate holds."""
+    child = frames.footprint if frames.footprint_is_parent else frames.base
+    rate = _rate_deviation(estimate, deviations)
+    return OdometryForm(frames.odom, child, deviations.orientation, rate)
+
+
+def odometry_numbers(estimate: Estimate, state: OdometryState, frames: Frames) -> Numbers:
+    """Return what :class:`OdometryForm` takes."""
     rotation, height = state.rotation, state.height
-    message.child_frame_id = frames.base
-    if frames.footprint_is_parent:
-        message.child_frame_id = frames.footprint
-        rotation, height = about_z(yaw_of(rotation)), 0.0
-    message.pose.pose.position = Point(x=state.x, y=state.y, z=height)
-    message.pose.pose.orientation = _quaternion(rotation)
-    place, tilt = state.position_variance, deviations.orientation**2
-    message.pose.covariance = _diagonal6((place, place, HEIGHT_VARIANCE, tilt, tilt, tilt))
     velocity = (state.velocity_x, state.velocity_y, 0.0)
-    if not frames.footprint_is_parent:  # the velocity is that over the ground, level
+    if frames.footprint_is_parent:
+        rotation, height = about_z(yaw_of(rotation)), 0.0
+    else:  # the velocity is that over the ground, level
         velocity = rotate(conjugate(_level(rotation)), velocity)
-    x, y, z = velocity
-    message.twist.twist.linear = Vector3(x=x, y=y, z=z)
-    variances = (VELOCITY_VARIANCE, VELOCITY_VARIANCE, UNUSED, UNUSED, UNUSED, UNUSED)
-    if estimate.angular_velocity is not None:
-        x, y, z = estimate.angular_velocity
-        message.twist.twist.angular = Vector3(x=x, y=y, z=z)
-        rate = (deviations.gyro if estimate.rate_measured else deviations.rate) ** 2
-        variances = (*variances[:3], rate, rate, rate)
-    message.twist.covariance = _diagonal6(variances)
-    return message
+    rate = estimate.angular_velocity or _ZERO
+    return (state.x, state.y, height, *rotation, *velocity, *rate, state.position_variance)
 
 
-def transforms(estimate: Estimate, frames: Frames, stamp: Time) -> TFMessage:
-    """Return odom to base_link and base_link to base_footprint, or the other way round."""
-    state = estimate.odometry
-    heading = about_z(yaw_of(state.rotation))
+@dataclass(frozen=True, slots=True)
+class TransformsForm:
+    """odom to base_link and base_link to base_footprint, or the other way round.
+
+    Attributes:
+        frames: From one to the next.
+    """
+
+    frames: tuple[str, str, str]
+    count: ClassVar[int] = 14
+
+    def message(self, stamp: Time, numbers: Numbers) -> TFMessage:
+        """Make a message: place and rotation (x, y, z, w) of the first, and of the second."""
+        odom, first, second = self.frames
+        return TFMessage(
+            transforms=[
+                _transform(odom, first, numbers[:7], stamp),
+                _transform(first, second, numbers[7:], stamp),
+            ]
+        )
+
+
+def transforms_form(frames: Frames) -> TransformsForm:
+    """Return the form for names and order of frames."""
+    if frames.footprint_is_parent:
+        return TransformsForm((frames.odom, frames.footprint, frames.base))
+    return TransformsForm((frames.odom, frames.base, frames.footprint))
+
+
+def transforms_numbers(state: OdometryState, frames: Frames) -> Numbers:
+    """Return what :class:`TransformsForm` takes."""
     tilt = _level(state.rotation)
     if frames.footprint_is_parent:
-        first = _transform(frames.odom, frames.footprint, (state.x, state.y, 0.0), heading, stamp)
-        second = _transform(frames.footprint, frames.base, (0.0, 0.0, state.height), tilt, stamp)
-    else:
-        place = (state.x, state.y, state.height)
-        first = _transform(frames.odom, frames.base, place, state.rotation, stamp)
-        below = rotate(conjugate(tilt), (0.0, 0.0, -state.height))
-        second = _transform(frames.base, frames.footprint, below, conjugate(tilt), stamp)
-    return TFMessage(transforms=[first, second])
+        heading = about_z(yaw_of(state.rotation))
+        return (state.x, state.y, 0.0, *heading, 0.0, 0.0, state.height, *tilt)
+    upright = conjugate(tilt)
+    below = rotate(upright, (0.0, 0.0, -state.height))
+    return (state.x, state.y, state.height, *state.rotation, *below, *upright)
 
 
 def battery(state: Battery, stamp: Time) -> BatteryState:
@@ -119,33 +228,46 @@ def battery(state: Battery, stamp: Time) -> BatteryState:
     )
 
 
+_ZERO = (0.0, 0.0, 0.0)
+
+
+def _rate_deviation(estimate: Estimate, deviations: Deviations) -> float | None:
+    if estimate.angular_velocity is None:
+        return None
+    return deviations.gyro if estimate.rate_measured else deviations.rate
+
+
 def _level(rotation: Rotation) -> Rotation:
     """Return roll and pitch of a rotation, without its yaw."""
     return multiply(about_z(-yaw_of(rotation)), rotation)
 
 
-def _transform(
-    parent: str, child: str, place: tuple[float, float, float], rotation: Rotation, stamp: Time
-) -> TransformStamped:
-    x, y, z = place
+def _transform(parent: str, child: str, pose: Numbers, stamp: Time) -> TransformStamped:
     return TransformStamped(
         header=Header(stamp=stamp, frame_id=parent),
         child_frame_id=child,
-        transform=Transform(translation=Vector3(x=x, y=y, z=z), rotation=_quaternion(rotation)),
+        transform=Transform(translation=_vector(pose[:3]), rotation=_quaternion(pose[3:])),
     )
 
 
-def _quaternion(rotation: Rotation) -> Quaternion:
-    x, y, z, w = rotation
+def _quaternion(numbers: Numbers) -> Quaternion:
+    x, y, z, w = numbers
     return Quaternion(x=x, y=y, z=z, w=w)
 
 
-def _diagonal3(deviation: float) -> list[float]:
+def _vector(numbers: Numbers) -> Vector3:
+    x, y, z = numbers
+    return Vector3(x=x, y=y, z=z)
+
+
+def _diagonal3(deviation: float | None) -> list[float]:
+    if deviation is None:
+        return NOT_THERE
     variance = deviation**2
     return [variance, 0.0, 0.0, 0.0, variance, 0.0, 0.0, 0.0, variance]
 
 
-def _diagonal6(variances: Sequence[float]) -> list[float]:
+def _diagonal6(variances: Numbers) -> list[float]:
     covariance = [0.0] * 36
     covariance[::7] = variances
     return covariance

@@ -8,7 +8,7 @@ change of the layout is a change of one row.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum, Flag, IntEnum
 import math
@@ -147,7 +147,10 @@ class Field:
 
     def unpack(self, payload: bytes, start: int = 0) -> tuple[float, ...]:
         """Decode the run of a payload that begins at a byte of a larger one."""
-        numbers = struct.unpack_from(self.layout, payload, start + self.offset)
+        return self.scaled(struct.unpack_from(self.layout, payload, start + self.offset))
+
+    def scaled(self, numbers: tuple[float, ...]) -> tuple[float, ...]:
+        """Return numbers of the wire in the unit of the value."""
         return numbers if self.scale == 1.0 else tuple(n * self.scale for n in numbers)
 
 
@@ -167,6 +170,8 @@ class Function:
         meaning: For the protocol page.
         variable: Payloads may also be shorter.
         length: Length of a payload, or of one group of it [B].
+        order: Byte order of the numbers for :mod:`struct`; empty where they are mixed.
+        layout: Format of the whole payload, or of one group of it, without the order.
     """
 
     address: int
@@ -180,11 +185,22 @@ class Function:
     unit: str = ''
     variable: bool = False
     length: int = field(init=False)
+    order: str = field(init=False)
+    layout: str = field(init=False)
 
     def __post_init__(self) -> None:
-        """Add up the length once."""
-        end = max((f.offset + f.size for f in self.fields), default=0)
-        object.__setattr__(self, 'length', max(self.size, end))
+        """Add up the length and the format once: states come and targets go 50 times a second."""
+        orders = {part.layout[0] for part in self.fields}
+        layout, end = '', 0
+        for part in self.fields:
+            if part.offset < end:
+                raise ValueError(f'{self.name}: {part.name} begins inside the field before it')
+            layout += f'{part.offset - end}x{part.layout[1:]}'
+            end = part.offset + part.size
+        length = max(self.size, end)
+        object.__setattr__(self, 'length', length)
+        object.__setattr__(self, 'order', orders.pop() if len(orders) == 1 else '')
+        object.__setattr__(self, 'layout', f'{layout}{length - end}x')
 
     def accepts(self, length: int) -> bool:
         """Tell whether a payload may have a length [B]."""
@@ -206,6 +222,26 @@ class Function:
             payload[part.offset : part.offset + part.size] = part.pack(values[part.name])
         return bytes(payload)
 
+    def pack_groups(self, groups: Sequence[Sequence[float]]) -> bytes:
+        """Encode several groups of a repeated function in one go.
+
+        Args:
+            groups: One value for each field, in their order; every field is one number.
+
+        Raises:
+            CodecError: A value does not fit.
+        """
+        steps = [None if part.scalar is Scalar.F32 else part.scale for part in self.fields]
+        try:
+            numbers = [
+                value if step is None else round(value / step)
+                for group in groups
+                for value, step in zip(group, steps, strict=True)
+            ]
+            return struct.pack(self.order + len(groups) * self.layout, *numbers)
+        except (struct.error, ValueError, OverflowError) as error:
+            raise CodecError(f'{self.name}: {groups} do not fit its fields') from error
+
     def unpack(self, payload: bytes) -> dict[str, tuple[float, ...]]:
         """Decode a payload; repeated fields are run together over all groups.
 
@@ -215,12 +251,22 @@ class Function:
         if not self.accepts(len(payload)) or len(payload) % self.length:
             raise CodecError(f'{self.name}: payload of {len(payload)} bytes, not {self.length}')
         if len(payload) == self.length:
-            return {part.name: part.unpack(payload) for part in self.fields}
+            return self._unpack_whole(payload)
         starts = range(0, len(payload), self.length)
         return {
             part.name: tuple(v for start in starts for v in part.unpack(payload, start))
             for part in self.fields
         }
+
+    def _unpack_whole(self, payload: bytes) -> dict[str, tuple[float, ...]]:
+        if not self.order:
+            return {part.name: part.unpack(payload) for part in self.fields}
+        numbers = struct.unpack(self.order + self.layout, payload)
+        values, at = {}, 0
+        for part in self.fields:
+            values[part.name] = part.scaled(numbers[at : at + part.count])
+            at += part.count
+        return values
 
 
 @dataclass(frozen=True, slots=True, eq=False)
