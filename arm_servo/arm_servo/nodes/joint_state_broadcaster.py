@@ -8,8 +8,9 @@ from control_msgs.msg import DynamicJointState, InterfaceValue
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
+from node_runner import ParameterReader
+
 from .controller_manager import Controller
-from .declare import Declarations
 from .desk import Desk
 from .trajectory_parameters import RATES
 
@@ -32,10 +33,10 @@ class JointStateBroadcaster:
         """
         self.active = active
         self._node, self._desk = node, desk
-        declare = Declarations(node)
-        self._frame = declare.text('frame_id', 'base_link', 'frame of the messages')
-        self.rate = declare.number('update_rate', 50.0, 'rate of the messages [Hz]', RATES)
-        self._is_dynamic = declare.flag(
+        read = ParameterReader(node)
+        self._frame = read.text('frame_id', 'base_link', 'frame of the messages')
+        self.rate = read.number('update_rate', 50.0, RATES, 'rate of the messages [Hz]')
+        self._is_dynamic = read.flag(
             'publish_dynamic_joint_states', 'publish /dynamic_joint_states too', default=True
         )
         self._joints = list(desk.model.joints)

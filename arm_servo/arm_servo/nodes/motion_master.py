@@ -7,22 +7,21 @@ It takes what ``ros2 run arm_canopen master`` takes, and what describes the arm.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import TimeoutError as FutureTimeoutError
+from contextlib import ExitStack
 import sys
 from typing import TYPE_CHECKING
 
-from rclpy.logging import get_logger
 from rclpy.node import Node
 
 from arm_canopen import run_master
-from arm_canopen.nodes.misspelt import refuse_misspelt
+from node_runner import destroyed_if_refused, ParameterReader, refuse_misspelt
 
 from ..core import MotionCore
 from ..core_settings import CoreSettings
 from ..exceptions import ModelError, NotReadyError, ServoError
 from .controller_manager import ControllerManager, trajectory_entry
-from .declare import Declarations
 from .desk import Desk
 from .drive_source import DriveSource
 from .joint_state_broadcaster import JointStateBroadcaster
@@ -53,21 +52,26 @@ class Motion:
             master: The process that runs the bus.
 
         Raises:
+            ParameterError: A parameter is misspelt, of another kind or out of its range.
             ModelError: The parameters do not make an arm, or it has joints without a drive.
         """
-        self._manager = manager = Node('controller_manager')
+        self._master = master
+        with ExitStack() as stack:
+            self._build(lambda name: stack.enter_context(destroyed_if_refused(Node(name))))
+
+    def _build(self, make_node: Callable[[str], Node]) -> None:
+        self._manager = manager = make_node('controller_manager')
         model = declare_robot(manager)
-        declare = Declarations(manager)
-        name = declare.text(
+        read = ParameterReader(manager)
+        name = read.text(
             'controller_name', f'{model.group}_controller', 'name of the trajectory controller'
         )
-        broadcasts = declare.flag(
+        broadcasts = read.flag(
             'publish_joint_states', 'publish /joint_states and /dynamic_joint_states', default=True
         )
-        self._check_drives(master, model.joints)
-        self._master = master
-        controller, servo = Node(name), Node('servo_node')
-        broadcaster = Node('joint_state_broadcaster')
+        self._check_drives(self._master, model.joints)
+        controller, servo = make_node(name), make_node('servo_node')
+        broadcaster = make_node('joint_state_broadcaster')
         self.nodes = [manager, controller, servo, broadcaster]
         same_robot(servo, model)
         trajectory = declare_trajectory(controller, model.joints)
@@ -83,7 +87,7 @@ class Motion:
         self._servo = Servo(servo, self._desk, jogging, self._prepare)
         self._controller = TrajectoryController(controller, self._desk, trajectory, self._prepare)
         self._broadcaster = JointStateBroadcaster(broadcaster, self._desk, active=broadcasts)
-        period = master.bus.master.sync_period
+        period = self._master.bus.master.sync_period
         self._switch = ControllerManager(
             manager,
             [
@@ -133,11 +137,7 @@ def main(argv: list[str] | None = None) -> int:
     Returns:
         The exit code of the master, 1 when the arm cannot be built.
     """
-    try:
-        return run_master(argv, extend=lambda master: Motion(master).nodes)
-    except ServoError as error:
-        get_logger('motion_master').fatal(str(error))
-        return 1
+    return run_master(argv, extend=lambda master: Motion(master).nodes, errors=[ServoError])
 
 
 if __name__ == '__main__':

@@ -8,10 +8,11 @@ from pathlib import Path
 
 from rclpy.node import Node
 
+from node_runner import ParameterReader
+
 from ..exceptions import ModelError
 from ..limits import load_limits
 from ..model import RobotModel
-from .declare import Declarations
 
 
 def declare_robot(node: Node) -> RobotModel:
@@ -54,12 +55,12 @@ def same_robot(node: Node, model: RobotModel) -> None:
 
 def _declare(node: Node) -> tuple[str, str, str, str, str]:
     """Declare URDF, SRDF, limits file, group and tip."""
-    declare = Declarations(node)
-    urdf = declare.text('robot_description', '', 'URDF of the robot as XML text')
-    srdf = declare.text('robot_description_semantic', '', 'SRDF of the robot as XML text')
-    limits = declare.text(
+    read = ParameterReader(node)
+    urdf = read.text('robot_description', '', 'URDF of the robot as XML text')
+    srdf = read.text('robot_description_semantic', '', 'SRDF of the robot as XML text')
+    limits = read.text(
         'joint_limits', '', "path of the limits file, in MoveIt's format of joint_limits.yaml"
     )
-    group = declare.text('group', '', 'group of the SRDF to move; empty takes its only one')
-    tip = declare.text('tip_link', '', "link that is moved; empty takes the group's end")
+    group = read.text('group', '', 'group of the SRDF to move; empty takes its only one')
+    tip = read.text('tip_link', '', "link that is moved; empty takes the group's end")
     return urdf, srdf, limits, group, tip

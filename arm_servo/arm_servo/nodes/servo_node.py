@@ -7,21 +7,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 import sys
 
-from rclpy.node import Node
+from node_runner import ParameterReader
 
 from ..core_settings import CoreSettings
-from .declare import Declarations
 from .motion_thread import MotionThread
 from .robot_parameters import declare_robot
 from .servo import Servo
 from .servo_parameters import declare_servo, PREFIX
-from .standalone import declare_loop, make_loop, run_standalone
+from .standalone import declare_loop, make_loop, MakeNode, run_standalone
 from .topic_output import declare_output, TRAJECTORY
 from .trajectory_parameters import declare_check
 
 
-def _build() -> tuple[Sequence[Node], MotionThread]:
-    node = Node('servo_node')
+def _build(make_node: MakeNode) -> MotionThread:
+    node = make_node('servo_node')
     model = declare_robot(node)
     servo = declare_servo(node, model.group)
     topic = f'/{model.group}_controller/joint_trajectory'
@@ -29,11 +28,11 @@ def _build() -> tuple[Sequence[Node], MotionThread]:
     settings = CoreSettings(
         servo=servo.settings,
         timeout=servo.timeout,
-        check_self_collision=declare_check(Declarations(node, PREFIX)),
+        check_self_collision=declare_check(ParameterReader(node, PREFIX)),
     )
     desk, thread = make_loop(node, model, settings, declare_loop(node, PREFIX), output)
     Servo(node, desk, servo, _nothing)
-    return [node], thread
+    return thread
 
 
 def _nothing() -> None:

@@ -9,9 +9,10 @@ from enum import Enum
 
 from rclpy.node import Node
 
+from node_runner import ParameterReader
+
 from ..exceptions import ModelError
 from ..servo import ServoSettings
-from .declare import Declarations
 
 PREFIX = 'moveit_servo.'
 
@@ -79,32 +80,32 @@ def declare_servo(node: Node, group: str) -> ServoParameters:
     Raises:
         ModelError: move_group_name is another group, or command_in_type is unknown.
     """
-    declare = Declarations(node, PREFIX)
-    named = declare.text('move_group_name', group, 'group of the SRDF that is moved')
+    read = ParameterReader(node, PREFIX)
+    named = read.text('move_group_name', group, 'group of the SRDF that is moved')
     if named != group:
         raise ModelError(f'{PREFIX}move_group_name is {named!r}, but the group is {group!r}')
     _declare_scales(node)
     scales = read_scales(node)
     return ServoParameters(
-        declare.number(
+        read.number(
             'incoming_command_timeout',
             0.1,
-            'age of a command at which the arm comes to rest [s]',
             (0.01, 10.0),
+            'age of a command at which the arm comes to rest [s]',
         ),
-        declare.flag(
+        read.flag(
             'apply_twist_commands_about_ee_frame',
             "twists turn about the tip; else about the origin of the command's frame",
             default=True,
         ),
-        declare.text(
+        read.text(
             'robot_link_command_frame', '', 'frame of commands without one; empty is the base link'
         ),
-        declare.text('cartesian_command_in_topic', '~/delta_twist_cmds', 'topic of twists'),
-        declare.text('joint_command_in_topic', '~/delta_joint_cmds', 'topic of joint jogs'),
-        declare.text('pose_command_in_topic', '~/pose_target_cmds', 'topic of poses'),
-        declare.text('status_topic', '~/status', 'topic of the status'),
-        declare.number('status_rate', 25.0, 'rate of the status [Hz]', (1.0, 500.0)),
+        read.text('cartesian_command_in_topic', '~/delta_twist_cmds', 'topic of twists'),
+        read.text('joint_command_in_topic', '~/delta_joint_cmds', 'topic of joint jogs'),
+        read.text('pose_command_in_topic', '~/pose_target_cmds', 'topic of poses'),
+        read.text('status_topic', '~/status', 'topic of the status'),
+        read.number('status_rate', 25.0, (1.0, 500.0), 'rate of the status [Hz]'),
         ServoSettings(linear_speed=scales.linear or 0.4, angular_speed=scales.rotational or 0.8),
     )
 
@@ -128,13 +129,13 @@ def read_scales(node: Node) -> Scales:
 
 
 def _declare_scales(node: Node) -> None:
-    live = Declarations(node, PREFIX, read_only=False)
+    live = ParameterReader(node, PREFIX, fixed=False)
     live.text('command_in_type', Units.UNITLESS.value, 'unitless (-1 to 1) or speed_units')
     live.number(
-        'scale.linear', 0.4, 'speed of the tool at 1, cap in speed units [m/s]', (0.0, 10.0)
+        'scale.linear', 0.4, (0.0, 10.0), 'speed of the tool at 1, cap in speed units [m/s]'
     )
     live.number(
-        'scale.rotational', 0.8, 'angular speed at 1, cap in speed units [rad/s]', (0.0, 20.0)
+        'scale.rotational', 0.8, (0.0, 20.0), 'angular speed at 1, cap in speed units [rad/s]'
     )
-    live.number('scale.joint', 0.5, 'speed of a joint at 1 [rad/s]', (0.0, 20.0))
-    live.number('override_velocity_scaling_factor', 0.0, 'factor; 0 is none', (0.0, 1.0))
+    live.number('scale.joint', 0.5, (0.0, 20.0), 'speed of a joint at 1 [rad/s]')
+    live.number('override_velocity_scaling_factor', 0.0, (0.0, 1.0), 'factor; 0 is none')

@@ -9,25 +9,18 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 import gc
 import sys
+import threading
 import time
 
-import rclpy
-from rclpy.exceptions import ParameterException
-from rclpy.logging import get_logger
 from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
-from rclpy.utilities import try_shutdown
 from sensor_msgs.msg import JointState
 
-from arm_canopen import CanopenError
-from arm_canopen.nodes.misspelt import refuse_misspelt
-from arm_canopen.nodes.spinning import spin, stop_on_signals
+from node_runner import ParameterReader, refuse_misspelt, run_program, spin
 
 from ..core import MotionCore
 from ..core_settings import CoreSettings
 from ..exceptions import ServoError
 from ..model import RobotModel
-from .declare import Declarations
 from .desk import Desk
 from .joint_feedback import JointFeedback
 from .motion_thread import MotionCycle, MotionThread
@@ -36,6 +29,9 @@ from .topic_output import OutputParameters, TopicOutput
 
 SWITCH_INTERVAL = 0.0005
 """How long a busy callback may keep the interpreter from the cycle in [s]."""
+
+MakeNode = Callable[[str], Node]
+"""Makes the node of a name; it lives until the program ends."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,18 +58,18 @@ def declare_loop(node: Node, prefix: str) -> LoopParameters:
         node: The node.
         prefix: Before each name, with its dot.
     """
-    declare = Declarations(node, prefix)
+    read = ParameterReader(node, prefix)
     return LoopParameters(
-        declare.number('publish_period', 0.01, 'period of the loop [s]', (0.001, 0.1)),
-        declare.text('joint_topic', '/joint_states', 'topic of the joint states'),
-        declare.number(
+        read.number('publish_period', 0.01, (0.001, 0.1), 'period of the loop [s]'),
+        read.text('joint_topic', '/joint_states', 'topic of the joint states'),
+        read.number(
             'joint_state_timeout',
             0.5,
-            'silence of a joint at which the arm comes to rest [s]',
             (0.02, 10.0),
+            'silence of a joint at which the arm comes to rest [s]',
         ),
-        declare.integer(
-            'thread_priority', 40, 'SCHED_FIFO priority of the loop; 0 asks for none', (0, 99)
+        read.whole(
+            'thread_priority', 40, (0, 99), 'SCHED_FIFO priority of the loop; 0 asks for none'
         ),
     )
 
@@ -115,40 +111,37 @@ def make_loop(
 
 
 def run_standalone(
-    name: str,
-    build: Callable[[], tuple[Sequence[Node], MotionThread]],
-    args: Sequence[str] | None,
+    name: str, build: Callable[[MakeNode], MotionThread], args: Sequence[str] | None
 ) -> int:
     """Run a program until Ctrl-C or SIGTERM; the arm comes to rest before it ends.
 
     Args:
         name: Name for the log.
-        build: Makes the nodes and the thread.
+        build: Makes the nodes, by their names, and the thread.
         args: Command line; None for the process's own.
 
     Returns:
         Exit code: 0, or 1 when the arm cannot be built.
     """
     sys.setswitchinterval(SWITCH_INTERVAL)
-    rclpy.init(
-        args=None if args is None else list(args), signal_handler_options=SignalHandlerOptions.NO
-    )
-    stop = stop_on_signals()
-    try:
-        nodes, thread = build()
+    return run_program(name, lambda stop: _serve(build, stop), ServoError, args=args)
+
+
+def _serve(build: Callable[[MakeNode], MotionThread], stop: threading.Event) -> None:
+    nodes: list[Node] = []
+    with ExitStack() as stack:
+
+        def make_node(name: str) -> Node:
+            node = Node(name)
+            stack.callback(node.destroy_node)
+            nodes.append(node)
+            return node
+
+        thread = build(make_node)
         for node in nodes:
             refuse_misspelt(node)
-        with ExitStack() as stack:
-            for node in nodes:
-                stack.callback(node.destroy_node)
-            gc.freeze()  # what is there now is there to stay, and need not be looked through
-            thread.start()
-            stack.callback(thread.stop)
-            nodes[0].get_logger().info('ready for commands')
-            spin(nodes, stop=stop)
-    except (ServoError, CanopenError, ParameterException) as error:
-        get_logger(name).fatal(str(error))
-        return 1
-    finally:
-        try_shutdown()
-    return 0
+        gc.freeze()  # what is there now is there to stay, and need not be looked through
+        thread.start()
+        stack.callback(thread.stop)
+        nodes[0].get_logger().info('ready for commands')
+        spin(nodes, stop)

@@ -10,9 +10,10 @@ from rclpy.node import Node
 from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
+from node_runner import ParameterReader
+
 from ..exceptions import ModelError
 from ..set_point import SetPoint
-from .declare import Declarations
 from .trajectory_messages import duration_fields
 
 TRAJECTORY = 'trajectory_msgs/JointTrajectory'
@@ -50,15 +51,13 @@ def declare_output(node: Node, prefix: str, topic: str, kind: str) -> OutputPara
     Raises:
         ModelError: The type is unknown, or does not carry what is to be in it.
     """
-    declare = Declarations(node, prefix)
+    read = ParameterReader(node, prefix)
     parameters = OutputParameters(
-        declare.text('command_out_topic', topic, 'where set-points are published'),
-        declare.text('command_out_type', kind, f'{TRAJECTORY} or {ARRAY}'),
-        declare.flag('publish_joint_positions', 'positions are in it', default=True),
-        declare.flag(
-            'publish_joint_velocities', 'velocities are in it', default=kind == TRAJECTORY
-        ),
-        declare.flag('publish_joint_accelerations', 'accelerations are in it', default=False),
+        read.text('command_out_topic', topic, 'where set-points are published'),
+        read.text('command_out_type', kind, f'{TRAJECTORY} or {ARRAY}'),
+        read.flag('publish_joint_positions', 'positions are in it', default=True),
+        read.flag('publish_joint_velocities', 'velocities are in it', default=kind == TRAJECTORY),
+        read.flag('publish_joint_accelerations', 'accelerations are in it', default=False),
     )
     if parameters.kind not in {TRAJECTORY, ARRAY}:
         raise ModelError(

@@ -9,10 +9,11 @@ from dataclasses import dataclass
 
 from rclpy.node import Node
 
+from node_runner import ParameterReader
+
 from ..exceptions import ModelError
 from ..execution import ExecutionSettings
 from ..goal import GoalRules, JointTolerance
-from .declare import Declarations
 
 RATES = (0.1, 1000.0)
 """Span of rates in [Hz]."""
@@ -52,75 +53,75 @@ def declare_trajectory(node: Node, joints: Sequence[str]) -> TrajectoryParameter
         ModelError: The parameter ``joints`` names others, or an interface is asked for that there
             is not.
     """
-    declare = Declarations(node)
-    named = declare.texts('joints', list(joints), "names of the joints: those of the arm's group")
+    read = ParameterReader(node)
+    named = read.texts('joints', list(joints), "names of the joints: those of the arm's group")
     if sorted(named) != sorted(joints):
         raise ModelError(f'joints: {named} are not those of the group, {list(joints)}')
-    _declare_interfaces(declare)
-    stopped = declare.number(
+    _declare_interfaces(read)
+    stopped = read.number(
         'constraints.stopped_velocity_tolerance',
         0.01,
-        'greatest speed of a joint at the goal [rad/s]; 0 is none',
         (0.0, 100.0),
+        'greatest speed of a joint at the goal [rad/s]; 0 is none',
     )
-    path = {name: JointTolerance(_constraint(declare, name, 'trajectory')) for name in joints}
-    goal = {name: JointTolerance(_constraint(declare, name, 'goal'), stopped) for name in joints}
+    path = {name: JointTolerance(_constraint(read, name, 'trajectory')) for name in joints}
+    goal = {name: JointTolerance(_constraint(read, name, 'goal'), stopped) for name in joints}
     rules = GoalRules(
-        partial=declare.flag(
+        partial=read.flag(
             'allow_partial_joints_goal', 'accept goals for some of the joints', default=False
         ),
-        end_velocity=declare.flag(
+        end_velocity=read.flag(
             'allow_nonzero_velocity_at_trajectory_end',
             'accept a velocity at the last point; the arm comes to rest behind it',
             default=False,
         ),
     )
-    goal_time = declare.number(
+    goal_time = read.number(
         'constraints.goal_time',
         0.0,
-        'time to come within the tolerances of the goal [s]; 0 waits without end',
         (0.0, 3600.0),
+        'time to come within the tolerances of the goal [s]; 0 waits without end',
     )
     return TrajectoryParameters(
         ExecutionSettings(rules=rules, goal=JointTolerance(0.0, stopped), goal_time=goal_time),
         path,
         goal,
-        declare.number('action_monitor_rate', 20.0, "rate of the action's feedback [Hz]", RATES),
-        declare.number('state_publish_rate', 50.0, 'rate of ~/controller_state [Hz]', RATES),
-        declare.number(
-            'speed_scaling.initial_scaling_factor', 1.0, 'speed at the start, 0 to 1', (0.0, 1.0)
+        read.number('action_monitor_rate', 20.0, RATES, "rate of the action's feedback [Hz]"),
+        read.number('state_publish_rate', 50.0, RATES, 'rate of ~/controller_state [Hz]'),
+        read.number(
+            'speed_scaling.initial_scaling_factor', 1.0, (0.0, 1.0), 'speed at the start, 0 to 1'
         ),
-        declare_check(declare),
+        declare_check(read),
     )
 
 
-def declare_check(declare: Declarations) -> bool:
+def declare_check(read: ParameterReader) -> bool:
     """Declare whether motions on whose way links meet are refused.
 
     Args:
-        declare: The node's declarations.
+        read: Declares for the node.
     """
-    return declare.flag(
+    return read.flag(
         'check_self_collision',
         'refuse trajectories and displacements on whose way links of the arm collide',
         default=True,
     )
 
 
-def _constraint(declare: Declarations, joint: str, kind: str) -> float:
+def _constraint(read: ParameterReader, joint: str, kind: str) -> float:
     where = 'on the way' if kind == 'trajectory' else 'at the goal'
-    return declare.number(
-        f'constraints.{joint}.{kind}', 0.0, f'tolerance {where} [rad]; 0 is none', (0.0, 100.0)
+    return read.number(
+        f'constraints.{joint}.{kind}', 0.0, (0.0, 100.0), f'tolerance {where} [rad]; 0 is none'
     )
 
 
-def _declare_interfaces(declare: Declarations) -> None:
+def _declare_interfaces(read: ParameterReader) -> None:
     """Take what configurations for ros2_control say, and refuse what is not offered."""
-    wanted = declare.texts('command_interfaces', ['position'], 'position is what is commanded')
+    wanted = read.texts('command_interfaces', ['position'], 'position is what is commanded')
     if set(wanted) - {'position', 'velocity'} or 'position' not in wanted:
         raise ModelError(f'command_interfaces {wanted}: positions are commanded, use [position]')
-    declare.texts('state_interfaces', ['position', 'velocity'], 'what is measured')
-    method = declare.text(
+    read.texts('state_interfaces', ['position', 'velocity'], 'what is measured')
+    method = read.text(
         'interpolation_method', 'splines', 'splines: linear, cubic or quintic by what points say'
     )
     if method != 'splines':

@@ -7,14 +7,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 import sys
 
-from rclpy.node import Node
+from node_runner import ParameterReader
 
 from ..core_settings import CoreSettings
 from .controller_manager import ControllerManager, trajectory_entry
-from .declare import Declarations
 from .motion_thread import MotionThread
 from .robot_parameters import declare_robot
-from .standalone import declare_loop, make_loop, run_standalone
+from .standalone import declare_loop, make_loop, MakeNode, run_standalone
 from .topic_output import ARRAY, declare_output
 from .trajectory_controller import TrajectoryController
 from .trajectory_parameters import declare_trajectory
@@ -23,13 +22,13 @@ OUTPUT = '/forward_position_controller/commands'
 """Default of command_out_topic, the name that ros2_controllers' examples use."""
 
 
-def _build() -> tuple[Sequence[Node], MotionThread]:
-    manager = Node('controller_manager')
+def _build(make_node: MakeNode) -> MotionThread:
+    manager = make_node('controller_manager')
     model = declare_robot(manager)
-    name = Declarations(manager).text(
+    name = ParameterReader(manager).text(
         'controller_name', f'{model.group}_controller', 'name of the trajectory controller'
     )
-    node = Node(name)
+    node = make_node(name)
     trajectory = declare_trajectory(node, model.joints)
     loop = declare_loop(node, '')
     output = declare_output(node, '', OUTPUT, ARRAY)
@@ -38,7 +37,7 @@ def _build() -> tuple[Sequence[Node], MotionThread]:
     controller = TrajectoryController(node, desk, trajectory, _nothing)
     entry = trajectory_entry(name, model.joints, loop.period, controller.set_active)
     ControllerManager(manager, [entry])
-    return [manager, node], thread
+    return thread
 
 
 def _nothing() -> None:

@@ -4,28 +4,26 @@
 
 from __future__ import annotations
 
-import difflib
 import select
+import sys
 import threading
 import time
 
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
-from operator_input import CommandStream
+from node_runner import destroyed_when_refused, ParameterReader, refuse_misspelt, run_program
+from operator_input import CommandStream, OperatorInputError
 from operator_input.command_stream import RESTS
 from operator_input.devices import InputDevices, KernelDevices
-from operator_input.gamepad import AUTO, Button, Deadman, Gamepad
+from operator_input.gamepad import AUTO, Deadman, DEADMAN_BUTTONS, Gamepad
 
-from ..nodes.declare import Declarations
-from .exceptions import SettingError
+from ..exceptions import ServoError
 from .gamepad_teleop import GamepadTeleop
 from .jog import rest_of
-from .program import refuse_misspelt, run
 from .servo_link import ServoLink
 
 LONGEST_WAIT = 0.1  # [s] for which answers of services and a signal may wait
-NO_BUTTON = 'none'
 
 
 class ServoGamepad(Node):
@@ -37,6 +35,7 @@ class ServoGamepad(Node):
         gamepad: What is read.
     """
 
+    @destroyed_when_refused
     def __init__(self, devices: InputDevices | None = None) -> None:
         """Declare the parameters and advertise the topics.
 
@@ -44,27 +43,31 @@ class ServoGamepad(Node):
             devices: Where gamepads are; those of this machine when it is None.
 
         Raises:
-            SettingError: A parameter is misspelt or makes no sense.
+            ParameterError: A parameter is misspelt or makes no sense.
             PresetError: There is no preset of that name.
         """
         super().__init__('servo_gamepad')
-        declare = Declarations(self)
-        rate = declare.number('rate', 50.0, 'commands per second [Hz]', (10.0, 500.0))
+        read = ParameterReader(self)
+        rate = read.number('rate', 50.0, (10.0, 500.0), 'commands per second [Hz]')
         self.teleop = GamepadTeleop(
-            declare.number('speed', 0.3, "share of the servo's full speed", (0.01, 1.0)),
-            declare.number('turbo_speed', 1.0, 'the same with the turbo button', (0.01, 1.0)),
+            read.number('speed', 0.3, (0.01, 1.0), "share of the servo's full speed"),
+            read.number('turbo_speed', 1.0, (0.01, 1.0), 'the same with the turbo button'),
             Deadman(
-                enable=_button(declare, 'enable_button', Button.LEFT_SHOULDER, 'held to move'),
-                turbo=_button(declare, 'turbo_button', Button.RIGHT_SHOULDER, 'held to move fast'),
+                enable=read.choice(
+                    'enable_button', 'left_shoulder', DEADMAN_BUTTONS, 'held to move'
+                ),
+                turbo=read.choice(
+                    'turbo_button', 'right_shoulder', DEADMAN_BUTTONS, 'held to move fast'
+                ),
             ),
             CommandStream(1.0 / rate, rest_of),
         )
-        servo = declare.text('servo', '/servo_node', 'name of the servo node')
-        base = declare.text('base_frame', '', "base frame; empty takes the arm's base link")
-        tool = declare.text('tool_frame', '', "tool frame; empty takes the arm's tip link")
-        preset = declare.text('preset', AUTO, 'auto, xbox, ps or generic')
-        device = declare.text('device', '', 'path, or expression for the name; empty for any')
-        dead_zone = declare.number('deadzone', 0.08, 'share of the way that is rest', (0.0, 0.9))
+        servo = read.text('servo', '/servo_node', 'name of the servo node')
+        base = read.text('base_frame', '', "base frame; empty takes the arm's base link")
+        tool = read.text('tool_frame', '', "tool frame; empty takes the arm's tip link")
+        preset = read.text('preset', AUTO, 'auto, xbox, ps or generic')
+        device = read.text('device', '', 'path, or expression for the name; empty for any')
+        dead_zone = read.number('deadzone', 0.08, (0.0, 0.9), 'share of the way that is rest')
         refuse_misspelt(self)
         say = self.get_logger().info
         self.link = ServoLink(self, servo, say, base, tool)
@@ -134,22 +137,16 @@ class Session:
         self._node.link.flush()
 
 
-def _button(declare: Declarations, name: str, default: Button, meaning: str) -> Button | None:
-    names = {button.value: button for button in Button}
-    value = declare.text(name, default.value, f'{meaning}; {", ".join(names)} or {NO_BUTTON}')
-    if value == NO_BUTTON:
-        return None
-    if value not in names:
-        close = difflib.get_close_matches(value, names, n=1)
-        wanted = f'did you mean {close[0]!r}?' if close else f'there are {", ".join(names)}'
-        raise SettingError(f'{name} is {value!r}, which is no button; {wanted}')
-    return names[value]
+def main() -> int:
+    """Run until Ctrl-C; return the exit code."""
+    return run_program('servo_gamepad', _serve, ServoError, OperatorInputError)
 
 
-def main() -> None:
-    """Entry point."""
-    run(lambda stop: Session(ServoGamepad(), stop).run())
+def _serve(stop: threading.Event) -> None:
+    node = ServoGamepad()
+    Session(node, stop).run()
+    node.destroy_node()
 
 
 if __name__ == '__main__':
-    main()
+    sys.exit(main())

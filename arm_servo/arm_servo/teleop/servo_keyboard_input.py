@@ -7,20 +7,29 @@ from __future__ import annotations
 from collections.abc import Iterable
 import os
 import signal
+import sys
 import threading
 import time
 
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
-from operator_input import AutoRepeat, CommandStream, HeldKeys, Keyboard, KeyEvent, StatusLine
+from node_runner import destroyed_when_refused, ParameterReader, refuse_misspelt, run_program
+from operator_input import (
+    AutoRepeat,
+    CommandStream,
+    HeldKeys,
+    Keyboard,
+    KeyEvent,
+    OperatorInputError,
+    StatusLine,
+)
 from operator_input.command_stream import RESTS
 
-from ..nodes.declare import Declarations
+from ..exceptions import ServoError
 from .jog import rest_of
 from .key_map import HELP
 from .keyboard_teleop import KeyboardTeleop
-from .program import refuse_misspelt, run
 from .requests import Note, Quit, Request, Suspend, SwitchType, TogglePause
 from .scales import Steps
 from .screen import status, View
@@ -40,28 +49,29 @@ class ServoKeyboardInput(Node):
         evdev: Ask this machine's keyboards for releases.
     """
 
+    @destroyed_when_refused
     def __init__(self) -> None:
         """Declare the parameters.
 
         Raises:
-            SettingError: A parameter is misspelt or makes no sense.
+            ParameterError: A parameter is misspelt or makes no sense.
         """
         super().__init__('servo_keyboard_input')
-        declare = Declarations(self)
-        first = declare.number('first_timeout', 0.5, 'First time-out of a key [s]', (0.05, 2.0))
-        repeat = declare.number('repeat_timeout', 0.15, 'Time-out of its repeats [s]', (0.05, 1.0))
-        self.kitty = declare.flag('kitty', 'Ask the terminal for true key releases', default=True)
-        self.evdev = declare.flag('evdev', "Ask this machine's keyboards for them", default=True)
-        self.servo = declare.text('servo', '/servo_node', 'name of the servo node')
+        read = ParameterReader(self)
+        first = read.number('first_timeout', 0.5, (0.05, 2.0), 'First time-out of a key [s]')
+        repeat = read.number('repeat_timeout', 0.15, (0.05, 1.0), 'Time-out of its repeats [s]')
+        self.kitty = read.flag('kitty', 'Ask the terminal for true key releases', default=True)
+        self.evdev = read.flag('evdev', "Ask this machine's keyboards for them", default=True)
+        self.servo = read.text('servo', '/servo_node', 'name of the servo node')
         self.frames = (
-            declare.text('base_frame', '', "base frame; empty takes the arm's base link"),
-            declare.text('tool_frame', '', "tool frame; empty takes the arm's tip link"),
+            read.text('base_frame', '', "base frame; empty takes the arm's base link"),
+            read.text('tool_frame', '', "tool frame; empty takes the arm's tip link"),
         )
-        speed = declare.number('speed', 0.5, "share of the servo's full speed", (0.01, 1.0))
-        rate = declare.number('rate', 50.0, 'commands per second [Hz]', (10.0, 500.0))
+        speed = read.number('speed', 0.5, (0.01, 1.0), "share of the servo's full speed")
+        rate = read.number('rate', 50.0, (10.0, 500.0), 'commands per second [Hz]')
         steps = Steps(
-            declare.number('linear_step', 1e-3, 'single step of the tool [m]', (1e-5, 0.1)),
-            declare.number('angular_step', 0.01745, 'single step [rad]', (1e-4, 0.5)),
+            read.number('linear_step', 1e-3, (1e-5, 0.1), 'single step of the tool [m]'),
+            read.number('angular_step', 0.01745, (1e-4, 0.5), 'single step [rad]'),
         )
         held = HeldKeys(AutoRepeat(max(first, repeat), repeat))
         self.teleop = KeyboardTeleop(speed, steps, held, CommandStream(1.0 / rate, rest_of))
@@ -178,16 +188,19 @@ class Session:
         self._line.end()
 
 
-def main() -> None:
-    """Entry point."""
-    run(_serve)
+def main() -> int:
+    """Run until Ctrl-C; return the exit code."""
+    errors = ServoError, OperatorInputError
+    # a second Ctrl-C must not leave the terminal as the program has it
+    return run_program('servo_keyboard_input', _serve, *errors, patient=True)
 
 
 def _serve(stop: threading.Event) -> None:
     node = ServoKeyboardInput()
     with Keyboard(kitty=node.kitty, evdev=node.evdev) as keyboard:
         Session(node, keyboard, stop).run()
+    node.destroy_node()
 
 
 if __name__ == '__main__':
-    main()
+    sys.exit(main())

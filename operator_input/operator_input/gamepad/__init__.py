@@ -3,13 +3,14 @@
 """Gamepads: presets, state, hot-plug, deadman."""
 
 from .controls import AT_REST, Axis, Button, GamepadState
-from .deadman import Deadman, Grip, is_pressed
+from .deadman import Deadman, DEADMAN_BUTTONS, Grip, is_pressed
 from .gamepad import Gamepad
 from .presets import AUTO, PRESETS
 
 __all__ = [
     'AT_REST',
     'AUTO',
+    'DEADMAN_BUTTONS',
     'PRESETS',
     'Axis',
     'Button',

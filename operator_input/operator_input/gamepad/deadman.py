@@ -4,10 +4,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
 
 from .controls import Axis, Button, GamepadState
+
+DEADMAN_BUTTONS: Mapping[str, Button | None] = {
+    **{button.value: button for button in Button},
+    'none': None,
+}
+"""What may be chosen for a button of a deadman, by its name."""
 
 TRIGGER_PRESSED = 0.5  # way of a trigger that counts as pressed
 

@@ -1,0 +1,77 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Nodes that are refused, in the process of a master or of a person."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import json
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+from input_devices import InjectedDevices
+from isolation import Isolation
+import pytest
+import rclpy
+from rclpy.node import Node
+from servo_robots import FOLDER, texts
+
+from arm_servo.exceptions import ServoError
+from arm_servo.nodes.motion_master import Motion
+from arm_servo.teleop.servo_gamepad import ServoGamepad
+from arm_servo.teleop.servo_keyboard_input import ServoKeyboardInput
+from node_runner import ParameterError
+from operator_input import OperatorInputError
+
+
+def motion() -> Motion:
+    """Make the motion nodes on a bus without drives."""
+    bus: Any = SimpleNamespace(bus=SimpleNamespace(nodes=[], file='bus.yml'))
+    return Motion(bus)
+
+
+def gamepad() -> Node:
+    """Make the node without this machine's devices."""
+    return ServoGamepad(InjectedDevices())
+
+
+def parameters(folder: Path, **values: object) -> list[str]:
+    """Write parameters for all nodes of a process, with those of an arm."""
+    urdf, srdf = texts('gp110')
+    arm = {'robot_description': urdf, 'robot_description_semantic': srdf}
+    file = folder / 'parameters.yaml'
+    whole = arm | {'joint_limits': str(FOLDER / 'gp110' / 'limits.yaml')} | values
+    file.write_text(json.dumps({'/**': {'ros__parameters': whole}}))
+    return ['--ros-args', '--params-file', str(file)]
+
+
+@pytest.mark.parametrize(
+    ('make', 'values', 'reason'),
+    [
+        (motion, {'robot_description': ''}, 'no robot_description'),
+        (motion, {'publish_joint_states': 3}, 'publish_joint_states is 3'),
+        (motion, {}, 'bus.yml has no drive'),
+        (ServoKeyboardInput, {'sped': 0.1}, "did you mean 'speed'"),
+        (ServoKeyboardInput, {'rate': 1}, 'rate is 1: it must be 10.0 to 500.0'),
+        (gamepad, {'enable_button': 'eastt'}, "did you mean 'east'"),
+        (gamepad, {'preset': 'xbux'}, "did you mean 'xbox'"),
+    ],
+)
+def test_a_refused_node_leaves_nothing_in_the_graph(
+    isolation: Isolation,
+    tmp_path: Path,
+    make: Callable[[], object],
+    values: dict[str, object],
+    reason: str,
+) -> None:
+    """Neither the node whose parameter is wrong nor those before it are left in the process."""
+    rclpy.init(args=parameters(tmp_path, **values), domain_id=isolation.domain_id)
+    try:
+        watcher = Node('watcher')
+        with pytest.raises((ParameterError, ServoError, OperatorInputError), match=reason):
+            make()
+        assert watcher.get_node_names() == ['watcher']
+        watcher.destroy_node()
+    finally:
+        rclpy.shutdown()
