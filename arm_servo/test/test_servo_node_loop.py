@@ -8,55 +8,10 @@ import math
 
 import numpy as np
 import pytest
-from servo_robots import ready, robot
+from servo_elsewhere import Elsewhere, PERIOD, swing
 
-from arm_servo.arrays import Array
-from arm_servo.core import MotionCore
 from arm_servo.exceptions import GoalCode, NotReadyError
-from arm_servo.goal import GoalPoint, TrajectoryGoal
-from arm_servo.nodes.desk import Desk
 from arm_servo.nodes.joint_feedback import JointFeedback
-from arm_servo.nodes.motion_thread import MotionCycle
-from arm_servo.set_point import SetPoint
-
-PERIOD = 0.01
-
-
-class Elsewhere:
-    """An arm whose drives take set-points, and publish their state while ``heard``."""
-
-    def __init__(self) -> None:
-        """Stand in the ready pose."""
-        model = robot('gp110')
-        self.now = 50.0
-        self.at = np.array(ready('gp110'))
-        self.heard = True
-        self.points: list[SetPoint] = []
-        self.desk = Desk(MotionCore(model), lambda: self.now)
-        self.feedback = JointFeedback(model.joints, 0.2)
-        self.cycle = MotionCycle(self.desk, self.feedback, self.take)
-
-    def take(self, point: SetPoint) -> None:
-        """Go to a set-point at once."""
-        self.points.append(point)
-        self.at = np.array(point.state.position)
-
-    def run(self, cycles: int = 1) -> None:
-        """Run some cycles."""
-        for _ in range(cycles):
-            self.now += PERIOD
-            if self.heard:
-                self.feedback.take(self.desk.model.joints, self.at.tolist(), [], self.now)
-            self.cycle.step(self.now, PERIOD)
-
-    def path(self) -> Array:
-        """Return the positions commanded so far, a row for each."""
-        return np.array([point.state.position for point in self.points])
-
-
-def swing(arm: Elsewhere, far: float = 0.3) -> TrajectoryGoal:
-    """Return a trajectory of all joints."""
-    return TrajectoryGoal(arm.desk.model.joints, [GoalPoint(2.0, (arm.at + far).tolist())])
 
 
 def test_nothing_is_sent_before_something_moves() -> None:

@@ -8,6 +8,7 @@ from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass
+import math
 import threading
 import time
 from typing import Any, Generic, TypeVar
@@ -78,6 +79,7 @@ class Desk:
 
     Attributes:
         model: The arm.
+        refused: Steady time at which a motion was refused last in [s], as the arm did not follow.
     """
 
     def __init__(self, core: MotionCore, clock: Callable[[], float] = time.monotonic) -> None:
@@ -88,6 +90,7 @@ class Desk:
             clock: Steady time in [s], the one of the cycle.
         """
         self.model: RobotModel = core.model
+        self.refused = -math.inf
         self._core = core
         self._clock = clock
         self._orders: deque[_Order[Any]] = deque()
@@ -230,11 +233,11 @@ class Desk:
             except Exception as error:  # noqa: BLE001  # whoever ordered it is told
                 order.future.set_exception(error)
 
-    @staticmethod
-    def _admit(order: _Order[Any], now: float, blocked: str) -> None:
+    def _admit(self, order: _Order[Any], now: float, blocked: str) -> None:
         if not order.moves:
             return
         if blocked:
+            self.refused = now
             raise NotReadyError(blocked)
         if (age := now - max(order.time, order.begin)) > LATEST:
             raise NotReadyError(f'the cycle stood still for {age:.2f} s')

@@ -52,6 +52,11 @@ class JointFeedback:
                 value = (float(position), float(speed) if math.isfinite(speed) else 0.0, now)
                 self._values[self._joints.index(name)] = value
 
+    @property
+    def time(self) -> float:
+        """Steady time since which every joint was heard in [s]."""
+        return min(time for _, _, time in self._values)
+
     def state(self, now: float) -> tuple[MotionState | None, str]:
         """Return the measured state, None before it is whole; and why it is no good.
 

@@ -5,18 +5,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import math
 import threading
 import time
 
-import numpy as np
-
-from ..otg import MotionState
+from ..arrays import Array
 from ..set_point import SetPoint, Source
 from .desk import Desk
+from .following import FollowingWatch
 from .joint_feedback import JointFeedback
 
 RESYNC = 0.02
 """How far the arm may have been moved by others before a motion begins at its place, in [rad]."""
+
+SILENCE = 0.3
+"""How long nobody must command an arm that did not follow, before it takes commands, in [s]."""
 
 LAST_STOP = 3.0
 """Longest time for the arm to come to rest at the end of the program in [s]."""
@@ -29,7 +32,11 @@ class MotionCycle:
     """What is done in a cycle; reads no clock."""
 
     def __init__(
-        self, desk: Desk, feedback: JointFeedback, output: Callable[[SetPoint], None]
+        self,
+        desk: Desk,
+        feedback: JointFeedback,
+        output: Callable[[SetPoint], None],
+        watch: FollowingWatch,
     ) -> None:
         """Wait for the arm.
 
@@ -37,8 +44,12 @@ class MotionCycle:
             desk: The core's desk.
             feedback: The arm's measured state.
             output: Takes the set-points while something moves, and the last at rest.
+            watch: Compares the two.
         """
         self._desk, self._feedback, self._output = desk, feedback, output
+        self._watch = watch
+        self._compared = -math.inf
+        self._failure, self._failed = '', -math.inf
         self._following = False
         self._lost = ''
         self._quiet = True
@@ -56,26 +67,44 @@ class MotionCycle:
             period: Time to the next cycle in [s].
         """
         measured, blocked = self._feedback.state(now)
+        blocked = blocked or self._kept(now)
         if not self._following and not blocked and measured is not None:
-            self._desk.begin(measured.position)
+            self._begin(measured.position)
             self._following, self._lost = True, ''
         if not self._following or measured is None:
             self._desk.idle(now, measured, blocked)
             return
-        if self._quiet and not blocked:
-            self._resync(measured)
+        if not blocked:
+            blocked = self._compare(measured.position, now)
         if blocked and not self._lost:
             self._lost = blocked
             self._desk.fail(blocked)
         self._put(self._desk.step(now, period, measured, self._lost))
 
-    def _resync(self, measured: MotionState) -> None:
-        """Begin where the arm is when others have moved it meanwhile."""
-        point = self._desk.snapshot.set_point
-        if point is None or np.abs(measured.position - point.state.position).max() > RESYNC:
-            self._desk.begin(measured.position)
+    def _kept(self, now: float) -> str:
+        """Return why the arm did not follow, as long as somebody goes on to command it."""
+        if now - max(self._failed, self._desk.refused) > SILENCE:
+            self._failure = ''
+        return self._failure
+
+    def _begin(self, position: Array) -> None:
+        self._desk.begin(position)
+        self._watch.begin(position)
+
+    def _compare(self, position: Array, now: float) -> str:
+        """Begin where others have moved the arm at rest; say when it does not follow."""
+        if self._quiet:
+            if self._watch.errors(position).max() > RESYNC:
+                self._begin(position)
+            return ''
+        if self._feedback.time == self._compared:  # nothing new was heard
+            return ''
+        self._compared = self._feedback.time
+        self._failure, self._failed = self._watch.problem(position), now
+        return self._failure
 
     def _put(self, point: SetPoint) -> None:
+        self._watch.command(point.state.position)
         idle = point.source is Source.NONE and not point.state.moving
         if not (idle and self._quiet):
             self._output(point)

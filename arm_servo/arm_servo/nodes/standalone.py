@@ -22,6 +22,7 @@ from ..core_settings import CoreSettings
 from ..exceptions import ServoError
 from ..model import RobotModel
 from .desk import Desk
+from .following import FollowingLimits, FollowingWatch
 from .joint_feedback import JointFeedback
 from .motion_thread import MotionCycle, MotionThread
 from .real_time import prefer_this_thread
@@ -43,12 +44,14 @@ class LoopParameters:
         joint_topic: Topic of the joint states.
         joint_timeout: Age at which a joint state counts no more in [s].
         priority: SCHED_FIFO priority of its thread; 0 is none.
+        following: When the arm counts as not following.
     """
 
     period: float
     joint_topic: str
     joint_timeout: float
     priority: int
+    following: FollowingLimits
 
 
 def declare_loop(node: Node, prefix: str) -> LoopParameters:
@@ -70,6 +73,18 @@ def declare_loop(node: Node, prefix: str) -> LoopParameters:
         ),
         read.whole(
             'thread_priority', 40, (0, 99), 'SCHED_FIFO priority of the loop; 0 asks for none'
+        ),
+        FollowingLimits(
+            read.number(
+                'following_error_limit',
+                0.2,
+                (0.0, 10.0),
+                'distance of a joint from where it was sent at which the arm comes to rest [rad];'
+                ' 0 is any',
+            ),
+            read.number(
+                'following_delay', 0.1, (0.0, 1.0), 'how late it may be where it was sent [s]'
+            ),
         ),
     )
 
@@ -98,7 +113,8 @@ def make_loop(
 
     node.create_subscription(JointState, loop.joint_topic, take, 10)
     publish = TopicOutput(node, output, list(model.joints), loop.period)
-    cycle = MotionCycle(desk, feedback, publish)
+    watch = FollowingWatch(model.limits, loop.following, loop.period)
+    cycle = MotionCycle(desk, feedback, publish, watch)
 
     def stop_motion() -> None:
         desk.submit(lambda core, _now: core.stop('the program ends'), moves=False)

@@ -1,0 +1,95 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Whether an arm goes where it is sent, however late its drives and its joint states are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import math
+
+import numpy as np
+
+from ..arrays import Array
+from ..limits import JointLimits
+
+TURN = 2.0 * math.pi
+"""A whole turn in [rad]."""
+
+
+@dataclass(frozen=True, slots=True)
+class FollowingLimits:
+    """When an arm counts as not following.
+
+    Attributes:
+        error: How far a joint may be from where it was sent in [rad]; 0 is any distance.
+        delay: How late it may be there in [s].
+    """
+
+    error: float = 0.2
+    delay: float = 0.1
+
+
+class FollowingWatch:
+    """Compares measured positions with all that was commanded during the delay.
+
+    An arm that follows late is somewhere between these commands, so its error is zero at any
+    speed; one that does not follow is left behind.
+    """
+
+    def __init__(self, joints: JointLimits, limits: FollowingLimits, period: float) -> None:
+        """Know no command yet.
+
+        Args:
+            joints: The arm's joints.
+            limits: When it does not follow.
+            period: Period of the cycle in [s].
+        """
+        self._joints = joints
+        self._limits = limits
+        self._commands = np.zeros((math.ceil(limits.delay / period) + 1, len(joints)))
+        self._turn = 0
+
+    def begin(self, positions: Array) -> None:
+        """Begin where the arm stands.
+
+        Args:
+            positions: Its positions in [rad].
+        """
+        self._commands[:] = positions
+
+    def command(self, positions: Array) -> None:
+        """Note the command of a cycle.
+
+        Args:
+            positions: Positions in [rad].
+        """
+        self._turn = (self._turn + 1) % len(self._commands)
+        self._commands[self._turn] = positions
+
+    def errors(self, measured: Array) -> Array:
+        """Return how far each joint is from all of its commands in [rad].
+
+        Args:
+            measured: Measured positions in [rad]; those of continuous joints up to whole turns.
+        """
+        turns = TURN * np.round((self._commands[self._turn] - measured) / TURN)
+        measured = measured + np.where(self._joints.continuous, turns, 0.0)
+        lower, upper = self._commands.min(axis=0), self._commands.max(axis=0)
+        errors: Array = np.maximum(np.maximum(lower - measured, measured - upper), 0.0)
+        return errors
+
+    def problem(self, measured: Array) -> str:
+        """Say which joint does not follow; empty when all do.
+
+        Args:
+            measured: Measured positions in [rad].
+        """
+        errors = self.errors(measured)
+        worst = int(np.argmax(errors))
+        if not 0.0 < self._limits.error < errors[worst]:
+            return ''
+        joint = self._joints.names[worst]
+        return (
+            f'{joint} does not follow: it is {errors[worst]:.3f} rad from where it was sent; does'
+            ' its controller take set-points, and is its way free? Let go, and command again'
+        )

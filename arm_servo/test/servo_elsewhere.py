@@ -1,0 +1,73 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""An ideal arm behind the standalone loop, cycle by cycle."""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+from servo_robots import ready, robot
+
+from arm_servo.arrays import Array
+from arm_servo.core import MotionCore
+from arm_servo.goal import GoalPoint, TrajectoryGoal
+from arm_servo.nodes.desk import Desk
+from arm_servo.nodes.following import FollowingLimits, FollowingWatch
+from arm_servo.nodes.joint_feedback import JointFeedback
+from arm_servo.nodes.motion_thread import MotionCycle
+from arm_servo.set_point import SetPoint
+
+PERIOD = 0.01
+
+
+class Elsewhere:
+    """An arm whose drives take set-points, and publish their state.
+
+    Attributes:
+        at: Where it is in [rad].
+        heard: Whether its state is published.
+        moves: Whether it goes to set-points.
+        delay: How many set-points it is behind.
+        points: All set-points so far.
+    """
+
+    def __init__(self, following: FollowingLimits | None = None) -> None:
+        """Stand in the ready pose."""
+        model = robot('gp110')
+        self.now = 50.0
+        self.at = np.array(ready('gp110'))
+        self.heard = True
+        self.moves = True
+        self.delay = 0
+        self.points: list[SetPoint] = []
+        self._way: deque[Array] = deque()
+        self.desk = Desk(MotionCore(model), lambda: self.now)
+        self.feedback = JointFeedback(model.joints, 0.2)
+        watch = FollowingWatch(model.limits, following or FollowingLimits(), PERIOD)
+        self.cycle = MotionCycle(self.desk, self.feedback, self.take, watch)
+
+    def take(self, point: SetPoint) -> None:
+        """Go to a set-point, at once or some cycles later."""
+        self.points.append(point)
+        self._way.append(np.array(point.state.position))
+        while len(self._way) > self.delay:
+            here = self._way.popleft()
+            self.at = here if self.moves else self.at
+
+    def run(self, cycles: int = 1) -> None:
+        """Run some cycles."""
+        for _ in range(cycles):
+            self.now += PERIOD
+            if self.heard:
+                self.feedback.take(self.desk.model.joints, self.at.tolist(), [], self.now)
+            self.cycle.step(self.now, PERIOD)
+
+    def path(self) -> Array:
+        """Return the positions commanded so far, a row for each."""
+        return np.array([point.state.position for point in self.points])
+
+
+def swing(arm: Elsewhere, far: float = 0.3) -> TrajectoryGoal:
+    """Return a trajectory of all joints."""
+    return TrajectoryGoal(arm.desk.model.joints, [GoalPoint(2.0, (arm.at + far).tolist())])
