@@ -9,10 +9,11 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 
+from node_runner import ParameterReader
+
 from ..body_pose import BodyPose
 from ..exceptions import SettingError
 from ..velocity import Velocity
-from .parameters import flag, text
 
 FLUSH_PATIENCE = Duration(nanoseconds=300_000_000)
 
@@ -31,14 +32,16 @@ class Outputs:
             node: The node.
 
         Raises:
+            ParameterError: A value is of another kind.
             SettingError: Neither kind of message is wanted.
         """
-        twist = flag(node, 'twist', True, 'Publish cmd_vel (Twist)')
-        stamped = flag(node, 'stamped', False, 'Publish cmd_vel_stamped (TwistStamped)')
+        read = ParameterReader(node)
+        twist = read.flag('twist', 'publish cmd_vel (Twist)', default=True)
+        stamped = read.flag('stamped', 'publish cmd_vel_stamped (TwistStamped)', default=False)
         if not (twist or stamped):
             raise SettingError('twist and stamped are both false: nothing would be published')
         self._node = node
-        self._frame = text(node, 'frame_id', 'base_link', 'Frame of TwistStamped')
+        self._frame = read.text('frame_id', 'base_link', 'frame of TwistStamped')
         self._pose = node.create_publisher(Pose, 'body_pose', 1)
         self._twist = node.create_publisher(Twist, 'cmd_vel', 1) if twist else None
         self._stamped = (

@@ -4,30 +4,29 @@
 
 from __future__ import annotations
 
-import difflib
 import select
+import sys
 import threading
 import time
 
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
+from node_runner import destroyed_when_refused, ParameterReader, refuse_misspelt, run_program
+from operator_input import OperatorInputError
 from operator_input.devices import InputDevices, KernelDevices
-from operator_input.gamepad import AUTO, Button, Deadman, Gamepad
+from operator_input.gamepad import AUTO, Deadman, DEADMAN_BUTTONS, Gamepad
 
 from ..command_stream import ZEROS
-from ..exceptions import SettingError
+from ..exceptions import TeleopError
 from ..gamepad_teleop import GamepadTeleop
 from ..requests import ModeRequest, PoseRequest, Request
 from ..speeds import Speeds
 from .controller import Controller
 from .outputs import Outputs
-from .parameters import number, refuse_misspelt, text
-from .program import run
 from .settings import declare_speeds, declare_steps, declare_stream
 
 LONGEST_WAIT = 0.1  # [s] for which answers of services and a signal may wait
-NO_BUTTON = 'none'
 NORMAL, TURBO = Speeds(0.15, 0.6), Speeds(0.3, 1.2)
 
 
@@ -40,6 +39,7 @@ class TeleopGamepad(Node):
         gamepad: What is read.
     """
 
+    @destroyed_when_refused
     def __init__(self, devices: InputDevices | None = None) -> None:
         """Declare the parameters and advertise the topics.
 
@@ -47,40 +47,35 @@ class TeleopGamepad(Node):
             devices: Where gamepads are; those of this machine when it is None.
 
         Raises:
-            SettingError: A parameter is misspelt or makes no sense.
+            ParameterError: A parameter is misspelt, of another kind or out of its range.
+            SettingError: Parameters make no sense together.
             PresetError: There is no preset of that name.
         """
         super().__init__('teleop_gamepad')
+        read = ParameterReader(self)
         self.outputs = Outputs(self)
         self.teleop = GamepadTeleop(
             declare_speeds(self, '', NORMAL),
             declare_speeds(self, 'turbo_', TURBO),
             Deadman(
-                enable=self._button('enable_button', Button.LEFT_SHOULDER, 'Held to move'),
-                turbo=self._button('turbo_button', Button.RIGHT_SHOULDER, 'Held to move fast'),
+                enable=read.choice(
+                    'enable_button', 'left_shoulder', DEADMAN_BUTTONS, 'held to move'
+                ),
+                turbo=read.choice(
+                    'turbo_button', 'right_shoulder', DEADMAN_BUTTONS, 'held to move fast'
+                ),
             ),
             declare_steps(self),
             declare_stream(self),
         )
-        preset = text(self, 'preset', AUTO, 'auto, xbox, ps or generic')
-        device = text(self, 'device', '', 'Path, or expression for the name; empty for any')
-        dead_zone = number(self, 'deadzone', 0.08, (0.0, 0.9), 'Share of the way that is rest')
+        preset = read.text('preset', AUTO, 'auto, xbox, ps or generic')
+        device = read.text('device', '', 'path, or expression for the name; empty for any')
+        dead_zone = read.number('deadzone', 0.08, (0.0, 0.9), 'share of the way that is rest')
         refuse_misspelt(self)
         say = self.get_logger().info
         self.gamepad = Gamepad(
             devices or KernelDevices(), preset=preset, device=device, dead_zone=dead_zone, say=say
         )
-
-    def _button(self, name: str, default: Button, meaning: str) -> Button | None:
-        names = {button.value: button for button in Button}
-        value = text(self, name, default.value, f'{meaning}; {", ".join(names)} or {NO_BUTTON}')
-        if value == NO_BUTTON:
-            return None
-        if value not in names:
-            close = difflib.get_close_matches(value, names, n=1)
-            wanted = f'did you mean {close[0]!r}?' if close else f'there are {", ".join(names)}'
-            raise SettingError(f'{name} is {value!r}, which is no button; {wanted}')
-        return names[value]
 
 
 class Session:
@@ -152,10 +147,16 @@ class Session:
         self._node.outputs.flush()
 
 
-def main() -> None:
-    """Entry point."""
-    run(lambda stop: Session(TeleopGamepad(), stop).run())
+def main() -> int:
+    """Run until Ctrl-C; return the exit code."""
+    return run_program('teleop_gamepad', _serve, TeleopError, OperatorInputError)
+
+
+def _serve(stop: threading.Event) -> None:
+    node = TeleopGamepad()
+    Session(node, stop).run()
+    node.destroy_node()
 
 
 if __name__ == '__main__':
-    main()
+    sys.exit(main())

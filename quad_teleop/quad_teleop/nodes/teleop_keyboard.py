@@ -7,23 +7,31 @@ from __future__ import annotations
 from collections.abc import Iterable
 import os
 import signal
+import sys
 import threading
 import time
 
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
-from operator_input import AutoRepeat, HeldKeys, Keyboard, KeyEvent, StatusLine
+from node_runner import destroyed_when_refused, ParameterReader, refuse_misspelt, run_program
+from operator_input import (
+    AutoRepeat,
+    HeldKeys,
+    Keyboard,
+    KeyEvent,
+    OperatorInputError,
+    StatusLine,
+)
 
 from ..command_stream import ZEROS
+from ..exceptions import TeleopError
 from ..key_map import HELP
 from ..keyboard_teleop import KeyboardTeleop
 from ..requests import ClearFault, ModeRequest, Note, PoseRequest, Quit, Request, Suspend
 from ..speeds import Speeds
 from .controller import Controller
 from .outputs import Outputs
-from .parameters import flag, number, refuse_misspelt
-from .program import run
 from .screen import hint, status, View
 from .settings import declare_speeds, declare_steps, declare_stream
 
@@ -40,17 +48,20 @@ class TeleopKeyboard(Node):
         evdev: Ask this machine's keyboards for releases.
     """
 
+    @destroyed_when_refused
     def __init__(self) -> None:
         """Declare the parameters and advertise the topics.
 
         Raises:
-            SettingError: A parameter is misspelt or makes no sense.
+            ParameterError: A parameter is misspelt, of another kind or out of its range.
+            SettingError: Parameters make no sense together.
         """
         super().__init__('teleop_keyboard')
-        first = number(self, 'first_timeout', 0.5, (0.05, 2.0), 'First time-out of a key [s]')
-        repeat = number(self, 'repeat_timeout', 0.15, (0.05, 1.0), 'Time-out of its repeats [s]')
-        self.kitty = flag(self, 'kitty', True, 'Ask the terminal for true key releases')
-        self.evdev = flag(self, 'evdev', True, 'Ask the keyboards of this machine for releases')
+        read = ParameterReader(self)
+        first = read.number('first_timeout', 0.5, (0.05, 2.0), 'first time-out of a key [s]')
+        repeat = read.number('repeat_timeout', 0.15, (0.05, 1.0), 'time-out of its repeats [s]')
+        self.kitty = read.flag('kitty', 'ask the terminal for true key releases', default=True)
+        self.evdev = read.flag('evdev', "ask this machine's keyboards for them", default=True)
         self.outputs = Outputs(self)
         self.teleop = KeyboardTeleop(
             declare_speeds(self, '', Speeds()),
@@ -172,16 +183,19 @@ class Session:
         self._line.end()
 
 
-def main() -> None:
-    """Entry point."""
-    run(_serve)
+def main() -> int:
+    """Run until Ctrl-C; return the exit code."""
+    errors = TeleopError, OperatorInputError
+    # a second Ctrl-C must not leave the terminal as the program has it
+    return run_program('teleop_keyboard', _serve, *errors, patient=True)
 
 
 def _serve(stop: threading.Event) -> None:
     node = TeleopKeyboard()
     with Keyboard(kitty=node.kitty, evdev=node.evdev) as keyboard:
         Session(node, keyboard, stop).run()
+    node.destroy_node()
 
 
 if __name__ == '__main__':
-    main()
+    sys.exit(main())

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from functools import partial
-import threading
+import sys
 import time
 from typing import Any
 
@@ -13,29 +13,29 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import Twist, TwistStamped
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from std_msgs.msg import Bool
 
-from ..exceptions import CommandError, SettingError
+from node_runner import destroyed_when_refused, ParameterReader, refuse_similar, run_node
+
+from ..exceptions import CommandError, TeleopError
 from ..mux import Input, Inputs, Multiplexer, read_inputs
-from .parameters import flag, refuse_similar
-from .program import run
 
 WATCH_PERIOD = 0.05  # [s] between two looks whether the heard source fell silent
 DIAGNOSTIC_PERIOD = 1.0  # [s]
-WAKE_PERIOD = 0.1  # [s] how late a signal may be noticed
 GROUPS = ('topics', 'locks')
 
 
 class TwistMux(Node):
     """Forwards the velocities of the source of the highest priority to ``cmd_vel_out``."""
 
+    @destroyed_when_refused
     def __init__(self) -> None:
         """Read the parameters and subscribe.
 
         Raises:
-            SettingError: A parameter is misspelt, missing or wrong.
+            ParameterError: A parameter is misspelt, or of another kind.
+            SettingError: The sources and locks make no sense.
         """
         super().__init__('twist_mux', automatically_declare_parameters_from_overrides=True)
         inputs = self._inputs()
@@ -67,12 +67,10 @@ class TwistMux(Node):
         known = {'use_stamped', 'use_sim_time', *GROUPS}
         groups = {name.partition('.')[0] for name in self.get_parameters_by_prefix('')}
         refuse_similar(groups - known, known)
-        if not self.has_parameter('use_stamped'):
-            return flag(self, 'use_stamped', False, 'TwistStamped in and out, instead of Twist')
-        value = self.get_parameter('use_stamped').value
-        if not isinstance(value, bool):
-            raise SettingError(f'use_stamped is {value!r}: it must be true or false')
-        return value
+        if self.has_parameter('use_stamped'):  # of any kind: declared because it was given
+            self.undeclare_parameter('use_stamped')
+        meaning = 'TwistStamped in and out, instead of Twist'
+        return ParameterReader(self).flag('use_stamped', meaning, default=False)
 
     def _velocity(self, name: str, message: Any) -> None:  # noqa: ANN401
         twist = message.twist if isinstance(message, TwistStamped) else message
@@ -134,18 +132,10 @@ def _text(state: str, each: Input) -> str:
     return f'{state} ({each.topic}, priority {each.priority}, {timeout} time-out)'
 
 
-def main() -> None:
-    """Entry point."""
-    run(_serve)
-
-
-def _serve(stop: threading.Event) -> None:
-    executor = SingleThreadedExecutor()
-    executor.add_node(TwistMux())
-    while not stop.is_set():
-        executor.spin_once(timeout_sec=WAKE_PERIOD)
-    executor.shutdown()
+def main() -> int:
+    """Run until Ctrl-C; return the exit code."""
+    return run_node('twist_mux', TwistMux, TeleopError)
 
 
 if __name__ == '__main__':
-    main()
+    sys.exit(main())
