@@ -35,8 +35,9 @@ RESULT = FollowJointTrajectory.Result
 class TopicArm:
     """Drives that go where they are told and publish it, and one program that tells them."""
 
-    def __init__(self, isolation: Isolation, folder: Path, program: str) -> None:
+    def __init__(self, isolation: Isolation, folder: Path, program: str, *arguments: str) -> None:
         """Start the program."""
+        self.moves = True
         self.at = list(READY)
         self.arrays: list[list[float]] = []
         self.trajectories: list[JointTrajectory] = []
@@ -53,6 +54,7 @@ class TopicArm:
         self.speaking = node.create_timer(0.02, self._speak)
         parameters = str(robot_parameters(folder))
         command = [executable('arm_servo', program), '--ros-args', '--params-file', parameters]
+        command += [part for argument in arguments for part in ('-p', argument)]
         self.process = self._stack.enter_context(RunningProcess(command, isolation.env))
         self.process.wait_for('ready for commands')
 
@@ -60,8 +62,9 @@ class TopicArm:
         self._states.publish(JointState(name=JOINTS, position=self.at))
 
     def _take_array(self, message: Float64MultiArray) -> None:
-        self.at = list(message.data)
-        self.arrays.append(self.at)
+        self.arrays.append(list(message.data))
+        if self.moves:
+            self.at = self.arrays[-1]
 
     def _take_trajectory(self, message: JointTrajectory) -> None:
         assert list(message.joint_names) == JOINTS
@@ -81,7 +84,8 @@ def test_a_trajectory_goes_out_as_arrays(isolation: Isolation, tmp_path: Path) -
     """Goals are reached; the controller is listed, switched off and on; lost states stop it."""
     with TopicArm(isolation, tmp_path, 'trajectory_controller') as arm:
         run = GoalRun(arm.client, goal_to([0.3, *READY[1:]], 1.0))
-        assert run.wait()[1].error_code == RESULT.SUCCESSFUL
+        reached = run.wait()[1]
+        assert reached.error_code == RESULT.SUCCESSFUL, reached.error_string
         assert arm.at[0] == pytest.approx(0.3, abs=1e-6)
         listed = arm.client.call(
             ListControllers, '/controller_manager/list_controllers', ListControllers.Request()
@@ -100,6 +104,22 @@ def test_a_trajectory_goes_out_as_arrays(isolation: Isolation, tmp_path: Path) -
         steps = [abs(b[0] - a[0]) for a, b in pairwise(arm.arrays)]
         assert max(steps) < 0.01
         assert steps[-1] < 1e-4  # it slowed down
+
+
+def test_a_goal_that_the_arm_did_not_reach_is_no_success(
+    isolation: Isolation, tmp_path: Path
+) -> None:
+    """A stuck arm is told without any tolerance asked for: at the goal, on a long way sooner."""
+    with TopicArm(
+        isolation, tmp_path, 'trajectory_controller', 'constraints.goal_time:=0.3'
+    ) as arm:
+        arm.moves = False
+        near = GoalRun(arm.client, goal_to([0.1, *READY[1:]], 1.0)).wait()[1]
+        assert near.error_code == RESULT.GOAL_TOLERANCE_VIOLATED
+        assert 'panda_joint1' in near.error_string
+        far = GoalRun(arm.client, goal_to([1.0, *READY[1:]], 2.0)).wait()[1]
+        assert far.error_code == RESULT.PATH_TOLERANCE_VIOLATED
+        assert 'panda_joint1 does not follow' in far.error_string
 
 
 def _switch(arm: TopicArm, on: list[str], off: list[str]) -> None:

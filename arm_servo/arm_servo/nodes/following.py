@@ -26,7 +26,7 @@ class FollowingLimits:
     """
 
     error: float = 0.2
-    delay: float = 0.1
+    delay: float = 0.2
 
 
 class FollowingWatch:

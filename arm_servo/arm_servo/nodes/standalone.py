@@ -83,7 +83,7 @@ def declare_loop(node: Node, prefix: str) -> LoopParameters:
                 ' 0 is any',
             ),
             read.number(
-                'following_delay', 0.1, (0.0, 1.0), 'how late it may be where it was sent [s]'
+                'following_delay', 0.2, (0.0, 1.0), 'how late it may be where it was sent [s]'
             ),
         ),
     )

@@ -18,6 +18,12 @@ from ..goal import GoalRules, JointTolerance
 RATES = (0.1, 1000.0)
 """Span of rates in [Hz]."""
 
+GOAL = 0.05
+"""Default tolerance at the goal in [rad]: an arm that has not arrived is no success."""
+
+GOAL_TIME = 5.0
+"""Default of the time to come within it in [s]: who waits for a stuck arm is told in the end."""
+
 
 @dataclass(frozen=True, slots=True)
 class TrajectoryParameters:
@@ -64,8 +70,10 @@ def declare_trajectory(node: Node, joints: Sequence[str]) -> TrajectoryParameter
         (0.0, 100.0),
         'greatest speed of a joint at the goal [rad/s]; 0 is none',
     )
-    path = {name: JointTolerance(_constraint(read, name, 'trajectory')) for name in joints}
-    goal = {name: JointTolerance(_constraint(read, name, 'goal'), stopped) for name in joints}
+    path = {name: JointTolerance(_constraint(read, name, 'trajectory', 0.0)) for name in joints}
+    goal = {
+        name: JointTolerance(_constraint(read, name, 'goal', GOAL), stopped) for name in joints
+    }
     rules = GoalRules(
         partial=read.flag(
             'allow_partial_joints_goal', 'accept goals for some of the joints', default=False
@@ -78,7 +86,7 @@ def declare_trajectory(node: Node, joints: Sequence[str]) -> TrajectoryParameter
     )
     goal_time = read.number(
         'constraints.goal_time',
-        0.0,
+        GOAL_TIME,
         (0.0, 3600.0),
         'time to come within the tolerances of the goal [s]; 0 waits without end',
     )
@@ -108,11 +116,10 @@ def declare_check(read: ParameterReader) -> bool:
     )
 
 
-def _constraint(read: ParameterReader, joint: str, kind: str) -> float:
+def _constraint(read: ParameterReader, joint: str, kind: str, default: float) -> float:
     where = 'on the way' if kind == 'trajectory' else 'at the goal'
-    return read.number(
-        f'constraints.{joint}.{kind}', 0.0, (0.0, 100.0), f'tolerance {where} [rad]; 0 is none'
-    )
+    meaning = f'tolerance {where} [rad]; 0 is none'
+    return read.number(f'constraints.{joint}.{kind}', default, (0.0, 100.0), meaning)
 
 
 def _declare_interfaces(read: ParameterReader) -> None:
