@@ -29,6 +29,7 @@ class Elsewhere:
         heard: Whether its state is published.
         moves: Whether it goes to set-points.
         delay: How many set-points it is behind.
+        sag: How far it stands below its set-points in [rad].
         points: All set-points so far.
     """
 
@@ -40,6 +41,7 @@ class Elsewhere:
         self.heard = True
         self.moves = True
         self.delay = 0
+        self.sag = 0.0
         self.points: list[SetPoint] = []
         self._way: deque[Array] = deque()
         self.desk = Desk(MotionCore(model), lambda: self.now)
@@ -60,7 +62,8 @@ class Elsewhere:
         for _ in range(cycles):
             self.now += PERIOD
             if self.heard:
-                self.feedback.take(self.desk.model.joints, self.at.tolist(), [], self.now)
+                at = (self.at - self.sag).tolist()
+                self.feedback.take(self.desk.model.joints, at, [], self.now)
             self.cycle.step(self.now, PERIOD)
 
     def path(self) -> Array:
@@ -71,3 +74,14 @@ class Elsewhere:
 def swing(arm: Elsewhere, far: float = 0.3) -> TrajectoryGoal:
     """Return a trajectory of all joints."""
     return TrajectoryGoal(arm.desk.model.joints, [GoalPoint(2.0, (arm.at + far).tolist())])
+
+
+def jog(arm: Elsewhere, cycles: int, speed: float = 0.5) -> list[str]:
+    """Jog the first joint with a command in each cycle; return why commands were refused."""
+    refusals = []
+    for _ in range(cycles):
+        future = arm.desk.submit(lambda core, now: core.jog({'joint_1_s': speed}, now))
+        arm.run()
+        if (error := future.exception(0.0)) is not None:
+            refusals.append(str(error))
+    return refusals

@@ -8,22 +8,11 @@ import math
 
 import numpy as np
 import pytest
-from servo_elsewhere import Elsewhere, PERIOD, swing
+from servo_elsewhere import Elsewhere, jog, PERIOD, swing
 
 from arm_servo.exceptions import GoalCode
 from arm_servo.limits import JointLimits
 from arm_servo.nodes.following import FollowingLimits, FollowingWatch
-
-
-def jog(arm: Elsewhere, cycles: int, speed: float = 0.5) -> list[str]:
-    """Jog the first joint with a command in each cycle; return why commands were refused."""
-    refusals = []
-    for _ in range(cycles):
-        future = arm.desk.submit(lambda core, now: core.jog({'joint_1_s': speed}, now))
-        arm.run()
-        if (error := future.exception(0.0)) is not None:
-            refusals.append(str(error))
-    return refusals
 
 
 def test_jogging_an_arm_that_stands_still_runs_no_further_than_the_limit() -> None:

@@ -4,14 +4,17 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 import math
+import threading
 
 import numpy as np
 import pytest
-from servo_elsewhere import Elsewhere, PERIOD, swing
+from servo_elsewhere import Elsewhere, jog, PERIOD, swing
 
 from arm_servo.exceptions import GoalCode, NotReadyError
 from arm_servo.nodes.joint_feedback import JointFeedback
+from arm_servo.nodes.motion_thread import MotionThread
 
 
 def test_nothing_is_sent_before_something_moves() -> None:
@@ -40,6 +43,62 @@ def test_it_begins_where_others_have_moved_the_arm() -> None:
     arm.desk.submit(lambda core, _: core.follow(goal))
     arm.run(2)
     assert np.abs(arm.path()[0] - before).max() < 1e-4
+
+
+@pytest.mark.parametrize('aside', [0.003, 0.019])
+def test_it_begins_where_others_have_moved_the_arm_by_little(aside: float) -> None:
+    """A way that is no more than a cycle's at full speed is not made in one cycle either."""
+    arm = Elsewhere()
+    arm.run(5)
+    jog(arm, 20)
+    arm.run(80)
+    arm.at = arm.at + aside
+    arm.run(2)
+    before, sent = np.array(arm.at), len(arm.points)
+    jog(arm, 2)
+    assert np.abs(arm.path()[sent] - before).max() < 1e-4
+
+
+def test_an_arm_that_stands_a_little_off_is_not_told_to_go_there() -> None:
+    """What a drive lacks to its set-point at rest does not shift the next motion."""
+    arm = Elsewhere()
+    arm.run(5)
+    jog(arm, 20)
+    arm.run(80)
+    last = arm.path()[-1]
+    arm.sag = 0.01
+    arm.run(3)
+    sent = len(arm.points)
+    jog(arm, 2)
+    assert np.abs(arm.path()[sent] - last).max() > 0.005  # it was seen to move: begins there
+    arm.run(80)
+    last = arm.path()[-1]
+    sent = len(arm.points)
+    jog(arm, 2)
+    assert np.abs(arm.path()[sent] - last).max() < 1e-4
+
+
+def test_a_cycle_that_raises_is_the_end_and_the_arm_comes_to_rest() -> None:
+    """The thread tells of the error, and brakes without the core before it ends."""
+    arm = Elsewhere()
+    arm.run(5)
+    jog(arm, 30)
+    failed = threading.Event()
+
+    def step(now: float, period: float) -> None:
+        raise ArithmeticError('no solution')
+
+    arm.cycle.step = step  # type: ignore[method-assign]
+    thread = MotionThread(arm.cycle, 0.001, lambda: None)
+    before = len(arm.points)
+    thread.start(failed.set)
+    assert failed.wait(10.0)
+    thread.stop()
+    assert isinstance(thread.error, ArithmeticError)
+    assert not arm.points[-1].state.moving
+    speeds = [point.state.velocity[0] for point in arm.points[before - 1 :]]
+    most = arm.desk.model.limits.acceleration[0]
+    assert max(a - b for a, b in pairwise(speeds)) <= 1.01 * most * 0.001
 
 
 def test_commands_are_refused_before_the_first_joint_state() -> None:

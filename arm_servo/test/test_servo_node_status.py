@@ -49,6 +49,13 @@ def test_a_refusal_comes_before_everything_else() -> None:
     assert (code, words) == (StatusCode.INVALID, 'stale')
 
 
+def test_a_cycle_that_stands_still_is_told() -> None:
+    """What the last cycle said is not repeated for ever."""
+    code, words = status_of(snapshot(MotionReport()), '', '', '', 3.0)
+    assert code == StatusCode.INVALID
+    assert 'does not run (the last was 3.0 s ago)' in words
+
+
 def test_a_blocked_arm_says_so() -> None:
     """Without drives the status is invalid, and names the remedy."""
     drives = Drives()

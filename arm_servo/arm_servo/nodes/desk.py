@@ -13,6 +13,8 @@ import threading
 import time
 from typing import Any, Generic, TypeVar
 
+import numpy as np
+
 from ..arrays import Array
 from ..core import MotionCore
 from ..exceptions import GoalCode, NotReadyError
@@ -59,6 +61,26 @@ class Snapshot:
     cycles: int = 0
     period: float = 0.01
     execution: Execution | None = None
+
+    @property
+    def reference(self) -> MotionState | None:
+        """Where the arm is to be: where it stands while it does not follow; None while unknown."""
+        if self.set_point is not None:
+            return self.set_point.state
+        if self.measured is None or not np.isfinite(self.measured.position).all():
+            return None
+        return MotionState.at_rest(self.measured.position)
+
+    def stale(self, age: float) -> str:
+        """Say that the cycle does not run; empty when it does.
+
+        Args:
+            age: Time since the cycle of this snapshot in [s].
+        """
+        if age <= LATEST:
+            return ''
+        begun = f'{age:.1f} s ago' if self.time else 'never'
+        return f'the cycle does not run (the last was {begun}); is the bus up?'
 
 
 @dataclass(slots=True)

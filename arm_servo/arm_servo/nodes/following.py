@@ -15,6 +15,12 @@ from ..limits import JointLimits
 TURN = 2.0 * math.pi
 """A whole turn in [rad]."""
 
+MOVED = 0.002
+"""How far an arm at rest may turn by itself in [rad]; more was done by others."""
+
+ARRIVING = 0.02
+"""The same while it may still be on its last way, from all that was commanded."""
+
 
 @dataclass(frozen=True, slots=True)
 class FollowingLimits:
@@ -48,6 +54,9 @@ class FollowingWatch:
         self._limits = limits
         self._commands = np.zeros((math.ceil(limits.delay / period) + 1, len(joints)))
         self._turn = 0
+        self._quiet = math.ceil(limits.delay / period)
+        self._still = 0
+        self._rest = self._commands[0]
 
     def begin(self, positions: Array) -> None:
         """Begin where the arm stands.
@@ -56,6 +65,7 @@ class FollowingWatch:
             positions: Its positions in [rad].
         """
         self._commands[:] = positions
+        self._rest = positions
 
     def command(self, positions: Array) -> None:
         """Note the command of a cycle.
@@ -72,11 +82,31 @@ class FollowingWatch:
         Args:
             measured: Measured positions in [rad]; those of continuous joints up to whole turns.
         """
-        turns = TURN * np.round((self._commands[self._turn] - measured) / TURN)
-        measured = measured + np.where(self._joints.continuous, turns, 0.0)
+        measured = self._unwound(measured, self._commands[self._turn])
         lower, upper = self._commands.min(axis=0), self._commands.max(axis=0)
         errors: Array = np.maximum(np.maximum(lower - measured, measured - upper), 0.0)
         return errors
+
+    def moved(self, measured: Array, *, quiet: bool) -> bool:
+        """Whether others have moved the arm since it came to rest; once a cycle.
+
+        Drives need not stand exactly where they were sent, so what counts is where they stood.
+
+        Args:
+            measured: Measured positions in [rad].
+            quiet: Nothing is commanded.
+        """
+        self._still = self._still + 1 if quiet else 0
+        if self._still <= self._quiet:
+            self._rest = measured
+            return quiet and bool(self.errors(measured).max() > ARRIVING)
+        aside = np.abs(self._unwound(measured, self._rest) - self._rest)
+        return bool(aside.max() > MOVED)
+
+    def _unwound(self, measured: Array, near: Array) -> Array:
+        """Add whole turns to continuous joints."""
+        turns = TURN * np.round((near - measured) / TURN)
+        return measured + np.where(self._joints.continuous, turns, 0.0)
 
     def problem(self, measured: Array) -> str:
         """Say which joint does not follow; empty when all do.

@@ -5,18 +5,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 import math
 import threading
 import time
 
+import numpy as np
+
 from ..arrays import Array
+from ..otg import hard_brake, MotionState
+from ..report import MotionReport
 from ..set_point import SetPoint, Source
 from .desk import Desk
 from .following import FollowingWatch
 from .joint_feedback import JointFeedback
-
-RESYNC = 0.02
-"""How far the arm may have been moved by others before a motion begins at its place, in [rad]."""
 
 SILENCE = 0.3
 """How long nobody must command an arm that did not follow, before it takes commands, in [s]."""
@@ -47,6 +49,7 @@ class MotionCycle:
             watch: Compares the two.
         """
         self._desk, self._feedback, self._output = desk, feedback, output
+        self._state = MotionState.at_rest(np.zeros(len(desk.model)))
         self._watch = watch
         self._compared = -math.inf
         self._failure, self._failed = '', -math.inf
@@ -81,6 +84,16 @@ class MotionCycle:
             self._desk.fail(blocked)
         self._put(self._desk.step(now, period, measured, self._lost))
 
+    def brake(self, period: float) -> None:
+        """Slow the last set-point down, without the core; for when the core has failed.
+
+        Args:
+            period: Time to the next cycle in [s].
+        """
+        self._state = hard_brake(self._state, self._desk.model.limits, period)
+        self._output(SetPoint(self._state, Source.NONE, MotionReport()))
+        self._quiet = not self._state.moving
+
     def _kept(self, now: float) -> str:
         """Return why the arm did not follow, as long as somebody goes on to command it."""
         if now - max(self._failed, self._desk.refused) > SILENCE:
@@ -93,9 +106,9 @@ class MotionCycle:
 
     def _compare(self, position: Array, now: float) -> str:
         """Begin where others have moved the arm at rest; say when it does not follow."""
+        if self._watch.moved(position, quiet=self._quiet):
+            self._begin(position)
         if self._quiet:
-            if self._watch.errors(position).max() > RESYNC:
-                self._begin(position)
             return ''
         if self._feedback.time == self._compared:  # nothing new was heard
             return ''
@@ -104,7 +117,8 @@ class MotionCycle:
         return self._failure
 
     def _put(self, point: SetPoint) -> None:
-        self._watch.command(point.state.position)
+        self._state = point.state
+        self._watch.command(self._state.position)
         idle = point.source is Source.NONE and not point.state.moving
         if not (idle and self._quiet):
             self._output(point)
@@ -114,7 +128,11 @@ class MotionCycle:
 
 
 class MotionThread:
-    """Runs cycles at absolute deadlines of the monotonic clock."""
+    """Runs cycles at absolute deadlines of the monotonic clock.
+
+    Attributes:
+        error: What a cycle has raised; the arm was braked, and no cycle follows.
+    """
 
     def __init__(
         self,
@@ -131,13 +149,21 @@ class MotionThread:
             stop_motion: Called once at the end, to bring the arm to rest.
             begin: Called once in the thread, before the first cycle.
         """
+        self.error: Exception | None = None
         self._cycle, self._period, self._stop_motion = cycle, period, stop_motion
         self._begin = begin
+        self._failed: Callable[[], None] = lambda: None
         self._ending = threading.Event()
+        self._until = math.inf
         self._thread = threading.Thread(target=self._run, name='motion', daemon=True)
 
-    def start(self) -> None:
-        """Begin to run."""
+    def start(self, failed: Callable[[], None] = lambda: None) -> None:
+        """Begin to run.
+
+        Args:
+            failed: Called in the thread when a cycle has raised, see :attr:`error`.
+        """
+        self._failed = failed
         self._thread.start()
 
     def stop(self) -> None:
@@ -148,16 +174,29 @@ class MotionThread:
             self._thread.join(LAST_STOP + 1.0)
 
     def _run(self) -> None:
-        self._begin()
+        try:
+            self._begin()
+            self._cycles(self._cycle.step, self._ends)
+        except Exception as error:  # noqa: BLE001  # the program tells it, and ends
+            self.error = error
+            self._failed()
+            with suppress(Exception):  # what has failed may be the output
+                begin = time.monotonic()
+                self._cycles(
+                    lambda _, period: self._cycle.brake(period),
+                    lambda now: self._cycle.at_rest or now > begin + LAST_STOP,
+                )
+
+    def _ends(self, now: float) -> bool:
+        if not self._ending.is_set():
+            return False
+        self._until = min(self._until, now + LAST_STOP)
+        return self._cycle.at_rest or now > self._until
+
+    def _cycles(self, step: Callable[[float, float], None], ends: Callable[[float], bool]) -> None:
         deadline = time.monotonic()
-        until = float('inf')
-        while True:
-            now = time.monotonic()
-            if self._ending.is_set():
-                until = min(until, now + LAST_STOP)
-                if self._cycle.at_rest or now > until:
-                    return
-            self._cycle.step(deadline, self._period)
+        while not ends(now := time.monotonic()):
+            step(deadline, self._period)
             deadline += self._period
             if now - deadline > LATE * self._period:
                 deadline = now

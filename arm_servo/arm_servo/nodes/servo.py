@@ -151,9 +151,9 @@ class Servo:
         refusal, since = self._refusal
         if time.monotonic() - since > REMEMBERED:
             refusal = ''
-        code, words = status_of(
-            self._desk.snapshot, refusal, self._modes.paused, self.orders.capped
-        )
+        snapshot = self._desk.snapshot
+        age = time.monotonic() - snapshot.time
+        code, words = status_of(snapshot, refusal, self._modes.paused, self.orders.capped, age)
         if refusal and refusal != self._logged:
             self._node.get_logger().warning(f'refused: {refusal}')
         self._logged = refusal or self._logged

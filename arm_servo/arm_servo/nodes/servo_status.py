@@ -48,7 +48,9 @@ def code_of(report: MotionReport) -> StatusCode:
     return StatusCode.NO_WARNING
 
 
-def status_of(snapshot: Snapshot, refusal: str, paused: str, capped: str) -> tuple[int, str]:
+def status_of(
+    snapshot: Snapshot, refusal: str, paused: str, capped: str, age: float = 0.0
+) -> tuple[int, str]:
     """Return code and message.
 
     Args:
@@ -56,9 +58,12 @@ def status_of(snapshot: Snapshot, refusal: str, paused: str, capped: str) -> tup
         refusal: Why the last command was refused, with the remedy; empty when it was not.
         paused: Why the servo is paused; empty when it is not.
         capped: What was cut off the last command.
+        age: Time since the cycle of the snapshot in [s].
     """
     if refusal:
         return int(StatusCode.INVALID), refusal
+    if stale := snapshot.stale(age):
+        return int(StatusCode.INVALID), stale
     if snapshot.set_point is None or snapshot.blocked:
         return int(StatusCode.INVALID), snapshot.blocked
     if paused:

@@ -157,7 +157,9 @@ def _serve(build: Callable[[MakeNode], MotionThread], stop: threading.Event) -> 
         for node in nodes:
             refuse_misspelt(node)
         gc.freeze()  # what is there now is there to stay, and need not be looked through
-        thread.start()
+        thread.start(failed=stop.set)
         stack.callback(thread.stop)
         nodes[0].get_logger().info('ready for commands')
         spin(nodes, stop)
+    if thread.error is not None:
+        raise thread.error
