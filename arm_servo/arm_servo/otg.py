@@ -251,9 +251,20 @@ def brakeable_velocity(distance: Array, limits: JointLimits) -> Array:
     Returns:
         Velocities in [rad/s], at most those of the limits.
     """
+    return np.minimum(brakeable(distance, limits.acceleration, limits.jerk), limits.velocity)
+
+
+def brakeable(distance: Array, acceleration: Array, jerk: Array) -> Array:
+    """Return the speed that can be braked to a standstill within a distance, of any size.
+
+    Args:
+        distance: Ways left in [rad]; negative ones count as zero.
+        acceleration: Greatest decelerations in [rad/s2].
+        jerk: Greatest jerks in [rad/s3].
+    """
     way = np.minimum(np.maximum(distance, 0.0), ENDLESS)
-    a, j = limits.acceleration, limits.jerk
-    half = 0.5 * a * a / j
-    short = np.cbrt(way * way * j)
-    long = np.sqrt(half * half + 2.0 * a * way) - half
-    return np.minimum(np.where(way <= 2.0 * half * a / j, short, long), limits.velocity)
+    half = 0.5 * acceleration * acceleration / jerk
+    short = np.cbrt(way * way * jerk)
+    long = np.sqrt(half * half + 2.0 * acceleration * way) - half
+    speeds: Array = np.where(way <= 2.0 * half * acceleration / jerk, short, long)
+    return speeds

@@ -10,7 +10,7 @@ just so much that no joint is asked for more than its share of speed. The others
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -33,6 +33,9 @@ LOST = 0.5
 
 STEP = 1e-3
 """Step of the differences that look for a way out in [rad]."""
+
+TINY = 1e-6
+"""Speed that stands for none in [rad/s]."""
 
 CURVED = 0.02
 """Least curvature of a way out, in scaled tool speed per squared joint speed."""
@@ -60,6 +63,21 @@ class Directions:
     def damped(self) -> bool:
         """Whether any direction is damped."""
         return bool(self.damping.any())
+
+    def slowed(self, command: Array, fastest: float) -> Directions:
+        """Return these with the last direction damped to a speed of the joints along it.
+
+        Args:
+            command: Scaled twist that is asked (6).
+            fastest: Greatest speed along the last joint direction in [rad/s].
+        """
+        asked, least = abs(float(command @ self.tool[:, -1])), self.least
+        needed = asked * least / max(fastest, TINY) - least * least
+        if needed <= self.damping[-1]:
+            return self
+        damping = np.append(self.damping[:-1], needed)
+        share = self.values**2 / (self.values**2 + damping)
+        return replace(self, damping=damping, share=share)
 
     @property
     def least(self) -> float:
@@ -95,6 +113,27 @@ def directions(jacobian: Array, command: Array, correction: Array, fastest: Arra
     damping = poor * np.maximum(knee * knee - values * values, 0.0) / 4.0
     share = values * values / (values * values + damping)
     return Directions(tool, joints, values, damping, share)
+
+
+def way_to_fold(
+    jacobian_at: Callable[[Array], Array], position: Array, found: Directions
+) -> float:
+    """Return how far along the last joint direction its singular value is gone, to first order.
+
+    At the border of the reach the arm folds there to one side or the other: whoever runs through
+    comes back on the other side.
+
+    Args:
+        jacobian_at: Scaled Jacobian of joint positions.
+        position: Joint positions in [rad].
+        found: The directions there.
+
+    Returns:
+        The way in [rad], below zero against the direction; infinity where there is none.
+    """
+    along, tool = found.joints[-1], found.tool[:, -1]
+    change = (float(tool @ jacobian_at(position + STEP * along) @ along) - found.least) / STEP
+    return -found.least / change if abs(change) > CURVED * STEP else float('inf')
 
 
 def way_out(

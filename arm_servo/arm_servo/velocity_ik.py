@@ -22,21 +22,16 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .arrays import Array, frozen, Mask
+from .border import Border
 from .bounds import Bounds, Brakes, BrakeSettings
 from .box_qp import Program
 from .model import RobotModel, turned_twists
-from .otg import brakeable_velocity, MotionState
+from .otg import MotionState
 from .report import Cause, Limiter, MotionReport
-from .singular import Directions, directions, LOST, way_out
+from .singular import Directions, directions
 
 AXES = ('x', 'y', 'z', 'rotation x', 'rotation y', 'rotation z')
 """Names of the axes of a twist."""
-
-FULL = 0.05
-"""Scaled twist from which on a singular pose is left at full speed in [rad/s]."""
-
-WANDER = 3.0
-"""How far a way out is followed while the asked direction stays lost in [rad]."""
 
 RIDGE = 1e-5
 """Weight of the joint speeds that keeps the program definite."""
@@ -103,7 +98,7 @@ class _Weighted:
 class VelocityIk:
     """Velocity inverse kinematics of an arm.
 
-    It remembers the sense in which it leaves a singular pose and where it began, nothing else.
+    What it remembers is in :class:`Border`.
     """
 
     def __init__(self, model: RobotModel, settings: IkSettings | None = None) -> None:
@@ -122,8 +117,8 @@ class VelocityIk:
         self._weighed = b''
         self._axis_weights = self._scale
         self._ridge = RIDGE * np.eye(len(model))
-        self._sense: Array | None = None
-        self._entered: Array | None = None
+        settings = self._settings
+        self._border = Border(model.limits, settings.escape, settings.brakes.braking)
 
     def cartesian(self, state: MotionState, task: TwistTask, period: float) -> IkAnswer:
         """Find joint speeds for a speed of the tool.
@@ -142,15 +137,20 @@ class VelocityIk:
             task.correction * weights,
         )
         found = directions(asked.jacobian, asked.command, asked.correction, self._limits.velocity)
+        position = state.position
+
+        def jacobian_at(other: Array) -> Array:
+            return self._turned(other, task.axes, weights)
+
+        found = self._border.slowed(jacobian_at, position, found, asked.command)
         hessian = asked.jacobian.T @ asked.jacobian
         if found.damped:
             hessian += (found.joints.T * found.damping) @ found.joints
         gradient = -((asked.command + asked.correction) @ asked.jacobian)
-        way = self._way_out(state, task, weights, found, asked.command)
+        way = self._border.way_out(jacobian_at, position, found, asked.command)
         if way is not None:
-            fade = 1.0 - float(found.share[-1]) / LOST
-            hessian += fade * np.outer(way, way)
-            gradient -= (fade * fade * self._escape_speed(way, asked.command)) * way
+            hessian += way.weight * np.outer(way.direction, way.direction)
+            gradient -= (way.weight * way.speed) * way.direction
         return self._answer(hessian, gradient, bounds, asked, found)
 
     def joints(
@@ -164,7 +164,7 @@ class VelocityIk:
             commanded: Mask of the joints that the command moves.
             period: Time to the next step in [s].
         """
-        self._sense = self._entered = None
+        self._border.forget()
         weight = np.where(commanded, 1.0, self._settings.hold_weight)
         asked = _Weighted(np.diag(weight), weight * velocity, np.zeros(len(weight)))
         hessian = np.diag(weight * weight)
@@ -183,48 +183,6 @@ class VelocityIk:
     def _turned(self, position: Array, axes: Array, weights: Array) -> Array:
         """Return the weighted Jacobian along a task's axes."""
         return turned_twists(axes, self._model.jacobian(position)) * weights[:, None]
-
-    def _way_out(
-        self,
-        state: MotionState,
-        task: TwistTask,
-        weights: Array,
-        found: Directions,
-        command: Array,
-    ) -> Array | None:
-        """Return the way out of a singular pose, where the command needs one and has one."""
-        if not (found.lost.any() and command.any()):
-            self._sense = self._entered = None
-            return None
-        if self._entered is None:
-            self._entered = state.position
-        if np.linalg.norm(state.position - self._entered) > WANDER:
-            return None  # it leads nowhere
-
-        def weighted(position: Array) -> Array:
-            return self._turned(position, task.axes, weights)
-
-        way = way_out(weighted, state.position, found, command)
-        self._sense = None if way is None else way * self._oriented(way, state)
-        return self._sense
-
-    def _escape_speed(self, way: Array, command: Array) -> float:
-        """Return how fast to follow a way out in [rad/s]: slower for a slow command."""
-        fastest = self._settings.escape / float(np.max(np.abs(way) / self._limits.velocity))
-        return fastest * min(1.0, float(np.linalg.norm(command)) / FULL)
-
-    def _oriented(self, way: Array, state: MotionState) -> float:
-        """Return the sense, 1 or -1: as before, else away from the nearer limits."""
-        if self._sense is not None:
-            return 1.0 if way @ self._sense >= 0 else -1.0
-        ways = np.array((self._limits.upper - state.position, state.position - self._limits.lower))
-        upper, lower = brakeable_velocity(ways, self._limits)
-        concerned = np.abs(way) > 0.1
-        forth, back = (
-            float(np.min(np.where(sense * way > 0, upper, lower)[concerned], initial=np.inf))
-            for sense in (1.0, -1.0)
-        )
-        return 1.0 if forth >= back else -1.0
 
     def _answer(
         self,

@@ -17,9 +17,8 @@ WORST_PATH = 5e-3
 """Greatest distance of a set-point from the path of a trajectory, in [rad]."""
 WORST_JERK = 1.05
 """Greatest jerk, as a share of the limit; the numbers in the messages are rounded."""
-LEAST_RETURN = 0.5
-"""Share of the way that the tool must come back from the singular pose; not all of it, since the
-elbow may fold to the other side there, where a joint limit can come sooner."""
+LEAST_RETURN = 0.9
+"""Share of the way that the tool must come back from the singular pose."""
 WORST_TRACKING = 0.2
 """A joint that was this far from its set-point in [rad] did not follow; judged only where
 every drive answered in every cycle."""

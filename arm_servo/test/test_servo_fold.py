@@ -1,0 +1,78 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""From the border of its reach an arm comes back the way it went: its elbow keeps its side."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from servo_robots import ready, robot, ROBOTS
+
+from arm_servo.core import MotionCore
+
+# place of the elbow, and the angle at which the arm is straight
+ELBOW = {
+    'panda': (3, -2.0 * math.atan2(0.0825, 0.35)),
+    'prbt': (2, 0.0),
+    'gp110': (2, math.pi / 2 - math.atan2(0.235, 1.02)),
+}
+
+STUCK = 0.05
+"""Share of the asked speed below which the tool has come to its end."""
+
+
+class Jogger:
+    """Jogs the tool of an arm along a line."""
+
+    def __init__(self, name: str, period: float, down: float) -> None:
+        """Start in the ready pose, to go away from the arm and down by an angle in [rad]."""
+        self.model, self.period, self.now = robot(name), period, 0.0
+        self.core = MotionCore(self.model)
+        self.core.reset(ready(name))
+        self.begin = self.model.pose(ready(name)).position
+        ahead = np.array([*self.begin[:2], 0.0]) / np.linalg.norm(self.begin[:2])
+        self.line = math.cos(down) * ahead - np.array([0.0, 0.0, math.sin(down)])
+
+    @property
+    def way(self) -> float:
+        """How far the tool is along the line in [m]."""
+        place = self.model.pose(self.core.state.position).position
+        return float((place - self.begin) @ self.line)
+
+    def jog(self, speed: float) -> float:
+        """Jog for a cycle; return the speed along the line in [m/s]."""
+        self.core.twist([*(speed * self.line), 0.0, 0.0, 0.0], self.now)
+        self.core.step(self.now, self.period)
+        self.now += self.period
+        state = self.core.state
+        return float((self.model.jacobian(state.position) @ state.velocity)[:3] @ self.line)
+
+    def rest(self) -> None:
+        """Let go until the arm rests."""
+        for _ in range(round(1.0 / self.period)):
+            self.core.step(self.now, self.period)
+            self.now += self.period
+
+
+@pytest.mark.parametrize('name', ROBOTS)
+@pytest.mark.parametrize('down', [0.0, 0.3, 0.5])
+@pytest.mark.parametrize(('speed', 'hold'), [(0.1, 0.0), (0.2, 0.5), (0.3, 1.5)])
+def test_an_arm_comes_back_from_the_border_on_the_same_side(
+    name: str, down: float, speed: float, hold: float
+) -> None:
+    """Out until the tool stands still, pushing on or not, a rest, and all of the way back."""
+    jogger = Jogger(name, 0.01, down)
+    place, straight = ELBOW[name]
+    side = np.sign(ready(name)[place] - straight)
+    while jogger.jog(speed) > STUCK * speed or jogger.now < 0.5:
+        assert jogger.now < 30.0
+    for _ in range(round(hold / jogger.period)):
+        jogger.jog(speed)
+    jogger.rest()
+    out, deadline = jogger.way, jogger.now + 3.0 * jogger.way / speed + 5.0
+    while jogger.way > 0.01 and jogger.now < deadline:
+        jogger.jog(-speed)
+    assert jogger.way <= 0.01, f'{out - jogger.way:.3f} of {out:.3f} m'
+    assert side * (jogger.core.state.position[place] - straight) > 0.1
