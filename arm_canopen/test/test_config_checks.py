@@ -251,6 +251,13 @@ WARNINGS = {
         r'wait 9 ms for the heartbeat of the master, which comes every 10 ms \(with a cycle\)',
         '3 is usual',
     ),
+    'drive that is kept alive and watches': Case(
+        '# joint1',
+        f'reset_communication: false {HERE}',
+        'nodes.joint1.reset_communication',
+        'shall be taken over as it runs, but watches the master',
+        'heartbeat_consumer: false',
+    ),
     'drive that does not watch': Case(
         '# joint1',
         f'heartbeat_consumer: false {HERE}',

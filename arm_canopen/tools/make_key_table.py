@@ -69,7 +69,8 @@ TEXTS: dict[str, str] = {
     'stop_all_nodes': 'the loss of a mandatory device stops all devices',
     'boot_time': 'time after which missing mandatory devices are told, 0 for never',
     'boot_timeout': 'time-out of each SDO of the boot',
-    'dcf': 'EDS or DCF of the device; a drive without one is taken as CiA 402 has it',
+    'dcf': 'EDS or DCF of the device; ParameterValues of a DCF that are not its defaults are '
+    'written at boot, before all else; a drive without a file is taken as CiA 402 has it',
     'device.dcf_path': 'folder of that file, instead of that of `options`',
     'polling': 'accepted; the cycle is that of SYNC',
     'period': 'cycle where the master sends no SYNC; else equal to it',
@@ -92,7 +93,9 @@ TEXTS: dict[str, str] = {
     'device.error_behavior': '0x1029 by sub-index',
     'boot': 'false: the device is taken as it is, neither reset nor configured nor started',
     'mandatory': 'no device is started before this one is configured',
-    'reset_communication': 'false: a device that is in operation is taken over without a reset',
+    'reset_communication': 'false: a device that is in operation is taken over without a reset; '
+    'it must not watch the master, so write `heartbeat_consumer: false`, too: else it stops by '
+    'itself while no master is there',
     'restore_configuration': 'sub-index of 0x1011 by which defaults are restored before the boot',
     'software_file': 'refused: programs are loaded with the tool of the vendor',
     'software_version': 'refused, as above',

@@ -7,10 +7,8 @@ from __future__ import annotations
 from ..master.process_image import Writer
 from ..master.remote_node import RemoteNode
 from ..standard.drive import drive_state, DriveState, OperationMode
-from ..standard.objects import Index
+from ..standard.objects import AXIS_OFFSET, Index
 from ..standard.pdo import SYNCHRONOUS_MAX
-
-AXIS_OFFSET = 0x800  # between the objects of two axes (CiA 402-2, 7.2)
 
 
 class DriveObjects:

@@ -10,7 +10,7 @@ from ..config.model import DriveConfig
 from ..exceptions import SdoError
 from ..master.remote_node import RemoteNode
 from ..master.scheduler import Scheduler, Task
-from .drive_objects import AXIS_OFFSET
+from ..standard.objects import AXIS_OFFSET
 from .parameters import DriveParameters, ParameterReader, REFRESHED
 from .units import Units
 

@@ -11,8 +11,7 @@ from ..config.model import DriveConfig
 from ..exceptions import CodecError, SdoAbortError
 from ..master.remote_node import RemoteNode
 from ..standard.drive import OperationMode
-from ..standard.objects import Index
-from .drive_objects import AXIS_OFFSET
+from ..standard.objects import AXIS_OFFSET, Index
 from .setpoint_profile import ProfileLimits
 from .units import Units
 

@@ -5,10 +5,9 @@
 from __future__ import annotations
 
 from ..standard.drive import mode_title, OperationMode
-from ..standard.objects import Index
+from ..standard.objects import AXIS_OFFSET, Index
 from ..standard.pdo import SYNCHRONOUS_MAX
 from .check_subject import CYCLIC_MODES, object_name, Subject, UsedMode
-from .device_reader import AXIS_OFFSET
 from .pdo_direction import RPDO, TPDO
 
 TARGETS: dict[OperationMode, tuple[Index, int]] = {

@@ -70,13 +70,20 @@ def check_heartbeats(subject: Subject) -> None:
 def _check_watches_master(subject: Subject) -> None:
     node = subject.node
     if node.is_drive and subject.bus.master.heartbeat_producer and not node.heartbeat_consumer:
-        capable = node.dictionary.get(Index.CONSUMER_HEARTBEAT, 1) is not None
+        if node.dictionary.get(Index.CONSUMER_HEARTBEAT, 1) is None:
+            remedy = 'its EDS has no 0x1016:01; have an emergency stop that needs no bus'
+        elif node.reset_communication:
+            remedy = 'remove heartbeat_consumer: false'
+        else:  # reset_communication: false asks for that
+            remedy = 'it waits for the next one to take it over; have an emergency stop'
+        what = 'the drive does not watch the master, and goes on when that dies'
+        subject.findings.warning(subject.place('heartbeat_consumer'), what, remedy)
+    elif node.is_drive and node.heartbeat_consumer and not node.reset_communication:
         subject.findings.warning(
-            subject.place('heartbeat_consumer'),
-            'the drive does not watch the master, and goes on when that dies',
-            'remove heartbeat_consumer: false'
-            if capable
-            else 'its EDS has no 0x1016:01; have an emergency stop that needs no bus',
+            subject.place('reset_communication'),
+            'the drive shall be taken over as it runs, but watches the master: should that die, '
+            'it stops by itself, and there is nothing to take over',
+            'write heartbeat_consumer: false, or remove reset_communication: false',
         )
 
 

@@ -4,10 +4,9 @@
 
 from __future__ import annotations
 
-from ..standard.objects import Index
+from ..standard.objects import AXIS_OFFSET, Index
 from ..standard.pdo import SYNCHRONOUS_MAX
 from .check_subject import object_name, Subject
-from .device_reader import AXIS_OFFSET
 from .model import PdoConfig
 from .pdo_direction import Direction, TPDO
 

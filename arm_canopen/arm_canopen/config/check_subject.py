@@ -10,8 +10,7 @@ from dataclasses import dataclass
 from ..exceptions import CodecError
 from ..standard.datatypes import decode
 from ..standard.drive import OperationMode
-from ..standard.objects import Index
-from .device_reader import AXIS_OFFSET
+from ..standard.objects import AXIS_OFFSET, Index
 from .findings import Findings, Place
 from .model import BusConfig, DriveConfig, NodeConfig, PdoConfig, SdoWrite
 from .pdo_direction import Direction, RPDO, TPDO

@@ -17,6 +17,7 @@ from ..standard.datatypes import DataType, encode, Value
 from ..standard.objects import Index
 from .expected import watch_entry
 from .model import BusConfig, NodeConfig, PdoConfig, SdoWrite
+from .parameter_values import is_configured
 from .pdo_direction import Direction, RPDO, TPDO
 from .shared_keys import HUNDRED_MICROSECONDS, MILLISECONDS
 
@@ -76,6 +77,7 @@ def device_writes(
         leading += 1
     writer = _Writer(config, node, complete=complete)
     return [
+        *node.parameter_writes,
         *writer.consumer_heartbeat(),
         *writer.error_control(),
         *writer.changed(node.sdo_writes[:leading]),
@@ -188,13 +190,18 @@ class _Writer:
             yield self._write(index, 0, len(pdo.mapping))
 
     def _is_given(self, direction: Direction, pdo: PdoConfig, key: str) -> bool:
-        """Tell whether bus.yml has a key; a bus from elsewhere is taken to have all."""
+        """Tell whether bus.yml or the DCF gives a key; a bus from elsewhere gives all."""
         written = self._config.written
-        return not written or (self._node.name, direction.name, str(pdo.number), key) in written
+        if not written or (self._node.name, direction.name, str(pdo.number), key) in written:
+            return True
+        objects = {'cob_id': direction.communication, 'mapping': direction.mapping}
+        return is_configured(self._node.dictionary, objects[key] + pdo.number - 1)
 
     def _default(self, index: int, subindex: int) -> int | None:
         entry = self._node.dictionary.get(index, subindex)
-        return entry.default if entry is not None and isinstance(entry.default, int) else None
+        if entry is None or entry.configured:
+            return None  # what the device has without the DCF is not known any more
+        return entry.default if isinstance(entry.default, int) else None
 
     def _changed(self, index: int, subindex: int, value: int) -> Iterator[SdoWrite]:
         if self._complete or value != self._default(index, subindex):

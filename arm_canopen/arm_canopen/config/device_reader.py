@@ -7,18 +7,18 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from ..standard.dictionary import ObjectDictionary
-from ..standard.objects import Index
+from ..standard.objects import AXIS_OFFSET, Index
 from .document import Mapping
 from .eds import Eds
 from .eds_files import EdsFiles
 from .findings import Findings, Place
 from .model import Identity, NodeConfig
+from .parameter_values import parameter_writes
 from .pdo_direction import RPDO, TPDO
 from .pdo_resolution import PdoDraft, PdoReader
 from .sdo_list import SdoReader
 from .settings import DeviceSettings, Options, read_device_settings, remappings
 
-AXIS_OFFSET = 0x800  # between the objects of two axes (CiA 402-2, 7.2)
 DRIVE_PROFILE = 'Cia402'  # in the names of the drivers of drives
 DRIVE_OBJECTS = (Index.CONTROLWORD, Index.STATUSWORD)
 
@@ -83,6 +83,7 @@ def read_device(
         sdo_timeout=settings.sdo_timeout,
         boot_timeout=settings.boot_timeout,
         sdo_writes=SdoReader(eds.dictionary, findings).read(section),
+        parameter_writes=parameter_writes(eds, findings),
         axes=axes,
         line=section.place.line,
     )

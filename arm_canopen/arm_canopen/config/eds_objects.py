@@ -114,7 +114,7 @@ class ObjectReader:
         name: str = '',
     ) -> ObjectEntry:
         data_type = self._data_type(section, code)
-        initial = self._initial(section, data_type)
+        initial, configured = self._initial(section, data_type)
         low, high = self._limits(section, data_type)
         whole = self._objects.get(index, section)
         return ObjectEntry(
@@ -130,6 +130,7 @@ class ObjectReader:
             pdo_mappable=bool(self._number(section, 'pdomapping', 0)),
             line=section.line,
             record=whole.text('parametername') if whole.title != section.title else '',
+            configured=configured,
         )
 
     def _data_type(self, section: IniSection, code: ObjectCode) -> DataType:
@@ -154,11 +155,11 @@ class ObjectReader:
             self._odd(section, 'accesstype', f'{what}, taken as rw')
             return AccessType.READ_WRITE
 
-    def _initial(self, section: IniSection, data_type: DataType) -> EdsValue | None:
-        """Read the value after a reset: a DCF's ParameterValue beats the DefaultValue."""
-        return self._value(section, 'parametervalue', data_type) or self._value(
-            section, 'defaultvalue', data_type
-        )
+    def _initial(self, section: IniSection, data_type: DataType) -> tuple[EdsValue | None, bool]:
+        """Read the value of the device, and whether it differs from the one after a reset."""
+        default = self._value(section, 'defaultvalue', data_type)
+        own = self._value(section, 'parametervalue', data_type)
+        return (default, False) if own is None else (own, own != default)
 
     def _limits(
         self, section: IniSection, data_type: DataType

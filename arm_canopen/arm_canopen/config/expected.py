@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from ..exceptions import CodecError
@@ -12,7 +12,7 @@ from ..standard.cob_id import CAN_ID_MASK, COB_ID_EXTENDED, COB_ID_INVALID
 from ..standard.datatypes import DataType, encode
 from ..standard.dictionary import ObjectDictionary
 from ..standard.objects import Index
-from .model import BusConfig, MasterConfig, NodeConfig, PdoConfig, Written
+from .model import BusConfig, MasterConfig, NodeConfig, PdoConfig, SdoWrite, Written
 from .pdo_direction import Direction, RPDO, TPDO
 from .shared_keys import HUNDRED_MICROSECONDS, MILLISECONDS
 
@@ -58,13 +58,11 @@ def expected_objects(config: BusConfig, node: NodeConfig) -> list[Expected]:
     """Return everything that bus.yml decides of a device, in the order in which it is written."""
     expected = [
         *_identity(node),
+        *_writes(node.parameter_writes),
         *_error_control(config.master, node),
         *(item for pdo in node.rpdos for item in _pdo(RPDO, pdo)),
         *(item for pdo in node.tpdos for item in _pdo(TPDO, pdo)),
-        *(
-            Expected(write.index, write.subindex, write.data, _key(write.written))
-            for write in node.sdo_writes
-        ),
+        *_writes(node.sdo_writes),
     ]
     # of two writes of an object the last one counts
     return list({(item.index, item.subindex): item for item in expected}.values())
@@ -84,6 +82,11 @@ def _defaults(dictionary: ObjectDictionary) -> Iterator[Expected]:
         except CodecError:
             continue
         yield Expected(*entry.address, data, 'EDS')
+
+
+def _writes(writes: Iterable[SdoWrite]) -> Iterator[Expected]:
+    for write in writes:
+        yield Expected(write.index, write.subindex, write.data, _key(write.written))
 
 
 def _key(written: Written) -> str:

@@ -179,6 +179,8 @@ class NodeConfig:
         rpdos: All RPDOs of the device, by ascending number.
         sdo_writes: ``error_behavior``, ``time_cob_id``, the objects of a concise DCF and the
             ``sdo`` list of bus.yml, in the order of writing.
+        parameter_writes: What its DCF wants written before all else: ParameterValues that are
+            not the defaults.
         axes: The axes of a CiA 402 drive, by ascending channel.
         line: Line of bus.yml at which the node begins.
     """
@@ -209,6 +211,7 @@ class NodeConfig:
     tpdos: tuple[PdoConfig, ...] = ()
     rpdos: tuple[PdoConfig, ...] = ()
     sdo_writes: tuple[SdoWrite, ...] = ()
+    parameter_writes: tuple[SdoWrite, ...] = ()
     axes: tuple[DriveConfig, ...] = (DriveConfig(),)
     line: int = 0
 

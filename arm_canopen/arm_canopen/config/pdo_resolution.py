@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 from ..standard.cob_id import CAN_ID_MASK, COB_ID_EXTENDED, COB_ID_INVALID
 from ..standard.objects import PDO_COUNT_MAX
@@ -14,6 +15,7 @@ from .document import Item, Listing, Mapping, Scalar
 from .eds import Eds
 from .findings import Findings, Place, RefusedError
 from .model import PdoConfig
+from .parameter_values import is_configured
 from .pdo_direction import Direction
 from .pdo_mapping import eds_mapping, is_fixed, read_mapping
 from .scalars import describe, integer, key_number
@@ -109,15 +111,29 @@ class PdoReader:
         if cob_id is None:
             cob_id = COB_ID_INVALID
         enabled = not cob_id & (COB_ID_INVALID | COB_ID_EXTENDED) and bool(cob_id & CAN_ID_MASK)
+        communication = direction.communication + number - 1
+        mapping = direction.mapping + number - 1
         config = PdoConfig(
             number,
             enabled,
             cob_id & CAN_ID_MASK,
             TRANSMISSION_DEFAULT if transmission is None else transmission & 0xFF,
             mapping=eds_mapping(direction, number, self._eds, Findings()),
+            configured=is_configured(self._eds.dictionary, communication, mapping),
             fixed_mapping=is_fixed(direction, number, self._eds.dictionary),
+            **self._times(direction, communication),
         )
         return PdoDraft(config, direction, self._name, self._device.place)
+
+    def _times(self, direction: Direction, communication: int) -> dict[str, Any]:
+        """Return the times that a DCF gives a PDO; others are left to the device."""
+        found = {}
+        for key in direction.keys:
+            subindex = SUBINDICES.get(key.field, 0)
+            entry = self._eds.dictionary.get(communication, subindex) if subindex else None
+            if entry is not None and entry.configured and isinstance(entry.default, int):
+                found[key.field] = key.to_model(entry.default)
+        return found
 
     def _parameter(self, direction: Direction, number: int, subindex: int) -> int | None:
         entry = self._eds.dictionary.get(direction.communication + number - 1, subindex)

@@ -11,11 +11,10 @@ from ..standard.cob_id import CobId, NODE_ID_MAX, NODE_ID_MIN
 from ..standard.dictionary import ObjectDictionary
 from ..standard.lss import LSS_REQUEST, UNCONFIGURED
 from ..standard.nmt import NmtCommand, NmtState
-from ..standard.objects import Index
+from ..standard.objects import AXIS_OFFSET, Index
 from ..standard.sdo import Abort
 from .drive import Drive
 from .drive_fault import SharedErrors
-from .drive_objects import AXIS_OFFSET
 from .emcy_producer import EmcyProducer
 from .fault_injector import FaultInjector
 from .fault_line import FaultLine, Service, Traffic

@@ -7,11 +7,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from ..standard.drive import OperationMode
-from ..standard.objects import Index
+from ..standard.objects import AXIS_OFFSET, Index
 from .object_store import Integer, ObjectStore
 from .profile import Limits
 
-AXIS_OFFSET = 0x800  # between the objects of two axes (CiA 402-1)
 NOMINAL_TORQUE = 1000  # [0.1 % of the rated torque]
 NO_TORQUE_LIMIT = 0xFFFF
 NO_WINDOW = 0xFFFF_FFFF  # 0x6065 and 0x6067: not monitored

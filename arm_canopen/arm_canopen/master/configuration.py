@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Iterator
 import struct
 
 from ..config.model import PdoConfig, SdoWrite
-from ..exceptions import SdoAbortError
+from ..exceptions import SdoAbortError, SdoError
 from ..standard.cob_id import CAN_ID_MASK, COB_ID_INVALID, RTR_FORBIDDEN
 from ..standard.objects import Index
 from .events import EventKind, Severity
@@ -57,11 +57,22 @@ class Configurator:
         Raises:
             SdoError: The device refused something, or does not answer.
         """
+        await self._write_parameter_values()
         await self.write_error_control()
         for pdo, communication, mapping in self._pdos():
             await self._configure(pdo, communication, mapping)
         for write in self._node.config.sdo_writes:
             await self.write(write)
+
+    async def _write_parameter_values(self) -> None:
+        config = self._node.config
+        try:
+            for write in config.parameter_writes:
+                await self.write(write)
+        except SdoAbortError as error:
+            raise SdoError(
+                f'{error}; it is a ParameterValue of {config.eds.name}: correct or remove it there'
+            ) from error
 
     async def write_error_control(self) -> None:
         """Have the device send its heartbeat or be guarded, and watch the master.

@@ -10,26 +10,12 @@ from rclpy.time import Time
 from sensor_msgs.msg import JointState
 
 from ..cia402.drive_commands import DriveCommands
-from ..cia402.drive_objects import AXIS_OFFSET
 from ..master.remote_node import RemoteNode
 from ..master.runner import NetworkThread
-from ..standard.objects import Index
+from ..standard.objects import AXIS_OFFSET, COMMANDS
 from .axis_services import AxisServices
 from .device_node import DeviceNode
 from .output_thread import OutputThread
-
-OWNED_OBJECTS = frozenset(
-    {
-        Index.CONTROLWORD,
-        Index.MODE_OF_OPERATION,
-        Index.TARGET_POSITION,
-        Index.TARGET_VELOCITY,
-        Index.VL_TARGET_VELOCITY,
-        Index.TARGET_TORQUE,
-        Index.INTERPOLATION_DATA,
-    }
-)
-"""Objects of the first axis that the drive writes itself in each cycle."""
 
 
 class DriveNode(DeviceNode):
@@ -59,9 +45,7 @@ class DriveNode(DeviceNode):
         self.axes = [commands.drive for commands in axes]
         names = [axis.name for axis in self.axes]
         self._owned = {
-            index + axis.config.channel * AXIS_OFFSET
-            for axis in self.axes
-            for index in OWNED_OBJECTS
+            index + axis.config.channel * AXIS_OFFSET for axis in self.axes for index in COMMANDS
         }
         self._joint_states = self.create_publisher(JointState, '~/joint_states', 10)
         zeros = [0.0] * len(names)

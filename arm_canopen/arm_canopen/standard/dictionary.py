@@ -52,10 +52,11 @@ class ObjectEntry:
         index: Object index.
         subindex: Sub-index, 0 for a VAR.
         name: ParameterName of the EDS.
+        configured: A DCF gives it this value, which is not the one after a reset.
         record: ParameterName of the array or record that it belongs to, empty for a VAR.
         data_type: Type of the value.
         access: Who may read or write.
-        default: Value after a reset, None when the EDS gives none.
+        default: Value after a reset, of a configured device in a DCF; None when there is none.
         node_relative: The default is to be added to the node id (``$NODEID+...``).
         low_limit: Smallest allowed value, None for the type's own.
         high_limit: Largest allowed value, None for the type's own.
@@ -75,6 +76,7 @@ class ObjectEntry:
     pdo_mappable: bool = False
     line: int = 0
     record: str = ''
+    configured: bool = False
 
     @property
     def address(self) -> tuple[int, int]:

@@ -111,3 +111,18 @@ class Index(IntEnum):
 
 PDO_COUNT_MAX = 512  # PDOs of each direction in the dictionary (CiA 301, 7.5.2.35)
 PDO_BITS_MAX = 64  # [bit] payload of a classic CAN frame
+
+COMMANDS = frozenset(
+    {
+        Index.CONTROLWORD,
+        Index.MODE_OF_OPERATION,
+        Index.TARGET_POSITION,
+        Index.TARGET_VELOCITY,
+        Index.VL_TARGET_VELOCITY,
+        Index.TARGET_TORQUE,
+        Index.INTERPOLATION_DATA,
+    }
+)
+"""Objects of the first axis of a drive by which it is commanded in each cycle."""
+
+AXIS_OFFSET = 0x800  # between the objects of two axes of a drive (CiA 402-2, 7.2)
