@@ -12,9 +12,9 @@ from arm_servo.teleop import CartesianJog, Frame, JointJog, KeyboardTeleop, Scal
 from arm_servo.teleop.exceptions import SettingError
 from arm_servo.teleop.jog import Jog, rest_of
 from arm_servo.teleop.key_map import HELP, JOINTS, TOOL
-from arm_servo.teleop.requests import CommandType, Note, Quit, SwitchType, TogglePause
+from arm_servo.teleop.requests import CommandType, SwitchType, TogglePause
 from arm_servo.teleop.scales import Steps
-from operator_input import CommandStream, HeldKeys, KeyAction, KeyEvent
+from operator_input import CommandStream, HeldKeys, KeyAction, KeyEvent, Note, Quit
 
 PERIOD = 0.02
 

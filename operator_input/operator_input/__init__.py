@@ -7,7 +7,10 @@ from .command_stream import CommandStream
 from .exceptions import DeviceError, OperatorInputError, PresetError, TerminalError
 from .held_keys import HeldKeys
 from .keyboard import Keyboard, ReleaseSource
+from .keyboard_session import KeyboardSession
 from .keys import all_released, KeyAction, KeyEvent
+from .requests import Note, Quit, Suspend
+from .session import Session
 from .terminal import StatusLine, TerminalKeyboard
 
 __all__ = [
@@ -18,10 +21,15 @@ __all__ = [
     'KeyAction',
     'KeyEvent',
     'Keyboard',
+    'KeyboardSession',
+    'Note',
     'OperatorInputError',
     'PresetError',
+    'Quit',
     'ReleaseSource',
+    'Session',
     'StatusLine',
+    'Suspend',
     'TerminalError',
     'TerminalKeyboard',
     'all_released',

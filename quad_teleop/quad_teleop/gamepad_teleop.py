@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from operator_input.gamepad import AT_REST, Axis, Button, Deadman, GamepadState, Grip
+from operator_input.gamepad import Axis, Button, Deadman, DeadmanTeleop, GamepadState, Grip
 
 from .body_pose import BodyPose, NEUTRAL, PoseSteps
 from .command_stream import CommandStream
@@ -24,7 +24,7 @@ MODE_BUTTONS = {
 NEUTRAL_BUTTON = Button.START
 
 
-class GamepadTeleop:
+class GamepadTeleop(DeadmanTeleop[Velocity]):
     """Moves while the deadman is held.
 
     Attributes:
@@ -48,40 +48,21 @@ class GamepadTeleop:
             steps: How far a press of the d-pad tilts and lifts the body.
             stream: Decides when to publish.
         """
+        super().__init__(deadman, stream)
         self.pose = NEUTRAL
         self._speeds = {Grip.HELD: normal, Grip.TURBO: turbo}
-        self._deadman = deadman
         self._steps = steps
-        self._stream = stream
-        self._state = AT_REST
 
     def wanted(self) -> Velocity | None:
         """Return the velocity that is wanted; None without the deadman.
 
         Without a deadman button, a gamepad at rest asks for nothing.
         """
-        speeds = self._speeds.get(self._deadman.grip(self._state))
+        speeds = self._speeds.get(self.grip)
         if speeds is None:
             return None
-        velocity = direction(self._state).at(speeds.linear, speeds.angular)
+        velocity = direction(self.state).at(speeds.linear, speeds.angular)
         return None if velocity == ZERO and self._deadman.enable is None else velocity
-
-    def step(self, now: float) -> Velocity | None:
-        """Say what to publish now; call it after every state and when it is due.
-
-        Args:
-            now: Time [s].
-        """
-        return self._stream.step(self.wanted(), now)
-
-    def due(self) -> float:
-        """Return when step() has to be called at the latest [s]; may be infinite."""
-        return self._stream.due()
-
-    def end(self) -> None:
-        """Let go of everything at the end of the program."""
-        self._state = AT_REST
-        self._stream.end()
 
     def feed(self, state: GamepadState) -> list[Request]:
         """Take a state of the gamepad.
@@ -93,8 +74,8 @@ class GamepadTeleop:
             What the person asks for besides a velocity. Whatever makes the robot move needs the
             deadman, as walking does; lying down needs none.
         """
-        before, self._state = self._state, state
-        allowed = self._deadman.grip(state) is not Grip.RELEASED
+        before = self.take(state)
+        allowed = self.grip is not Grip.RELEASED
         requests: list[Request] = []
         for button in state.pressed_since(before):
             mode = MODE_BUTTONS.get(button)

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from operator_input import HeldKeys, KeyAction, KeyEvent
+from operator_input import HeldKeys, KeyAction, KeyEvent, Note, Quit, Suspend
 
 from .body_pose import BodyPose, NEUTRAL, PoseSteps
 from .command_stream import CommandStream
@@ -21,7 +21,7 @@ from .key_map import (
     STOP_KEYS,
     SUSPEND_KEY,
 )
-from .requests import ClearFault, ModeRequest, Note, PoseRequest, Quit, Request, Suspend
+from .requests import ClearFault, ModeRequest, PoseRequest, Request
 from .speeds import Speeds
 from .velocity import Velocity
 

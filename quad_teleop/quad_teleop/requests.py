@@ -1,10 +1,12 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What a person can ask for besides a velocity."""
+"""What a person can ask the robot for besides a velocity."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+
+from operator_input import Note, Quit, Suspend
 
 from .body_pose import BodyPose
 from .modes import Mode
@@ -35,27 +37,6 @@ class PoseRequest:
 @dataclass(frozen=True, slots=True)
 class ClearFault:
     """Ask the controller to forget its latched faults."""
-
-
-@dataclass(frozen=True, slots=True)
-class Note:
-    """Tell the person something.
-
-    Attributes:
-        text: What.
-    """
-
-    text: str
-
-
-@dataclass(frozen=True, slots=True)
-class Quit:
-    """End the program."""
-
-
-@dataclass(frozen=True, slots=True)
-class Suspend:
-    """Give the terminal back to the shell for a while."""
 
 
 Request = ModeRequest | PoseRequest | ClearFault | Note | Quit | Suspend

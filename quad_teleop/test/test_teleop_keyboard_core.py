@@ -8,14 +8,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from operator_input import AutoRepeat, HeldKeys, KeyAction, KeyEvent
+from operator_input import AutoRepeat, HeldKeys, KeyAction, KeyEvent, Note, Quit, Suspend
 from operator_input.terminal.decoder import KeyDecoder
 from quad_teleop import BodyPose, Mode, SettingError, Speeds, Velocity
 from quad_teleop.body_pose import NEUTRAL, PoseSteps
 from quad_teleop.command_stream import CommandStream
 from quad_teleop.key_map import HELP, MODES, MOVES, NEUTRAL_KEYS, POSES, SPEEDS, STOP_KEYS
 from quad_teleop.keyboard_teleop import KeyboardTeleop
-from quad_teleop.requests import ModeRequest, Note, PoseRequest, Quit, Request, Suspend
+from quad_teleop.requests import ModeRequest, PoseRequest, Request
 from quad_teleop.velocity import ZERO
 
 V, W = 0.15, 0.6

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from operator_input import CommandStream
-from operator_input.gamepad import AT_REST, Axis, Button, Deadman, GamepadState, Grip
+from operator_input.gamepad import Axis, Button, Deadman, DeadmanTeleop, GamepadState, Grip
 
 from .jog import CartesianJog, Frame, Jog, JointJog
 
@@ -16,7 +16,7 @@ JOINT_BUTTONS = {Button.WEST: -1, Button.EAST: 1}
 """Buttons that choose the joint before and the next one."""
 
 
-class GamepadTeleop:
+class GamepadTeleop(DeadmanTeleop[Jog]):
     """Moves while the deadman is held and a stick is away from rest.
 
     At rest it asks for nothing, so that it does not overrule a trajectory.
@@ -38,41 +38,22 @@ class GamepadTeleop:
             deadman: Which buttons allow motion.
             stream: Decides when to publish.
         """
+        super().__init__(deadman, stream)
         self.frame = Frame.BASE
         self.joint = 0
         self.joints: int | None = None
         self._speeds = {Grip.HELD: speed, Grip.TURBO: turbo}
-        self._deadman = deadman
-        self._stream = stream
-        self._state = AT_REST
 
     def wanted(self) -> Jog | None:
         """Return the motion that is wanted; None without the deadman, and at rest."""
-        speed = self._speeds.get(self._deadman.grip(self._state))
+        speed = self._speeds.get(self.grip)
         if speed is None:
             return None
-        up = self._state.axis(Axis.DPAD_Y)
+        up = self.state.axis(Axis.DPAD_Y)
         if up:
             return JointJog(self.joint, up * speed)
-        jog = direction(self._state, self.frame).scaled(speed, speed)
+        jog = direction(self.state, self.frame).scaled(speed, speed)
         return jog if any(jog.linear) or any(jog.angular) else None
-
-    def step(self, now: float) -> Jog | None:
-        """Say what to publish now; call it after every state and when it is due.
-
-        Args:
-            now: Time [s].
-        """
-        return self._stream.step(self.wanted(), now)
-
-    def due(self) -> float:
-        """Return when step() has to be called at the latest [s]; may be infinite."""
-        return self._stream.due()
-
-    def end(self) -> None:
-        """Let go of everything at the end of the program."""
-        self._state = AT_REST
-        self._stream.end()
 
     def feed(self, state: GamepadState) -> str:
         """Take a state of the gamepad.
@@ -83,7 +64,7 @@ class GamepadTeleop:
         Returns:
             What was chosen, in words; empty for nothing.
         """
-        before, self._state = self._state, state
+        before = self.take(state)
         for button in state.pressed_since(before):
             if button in FRAME_BUTTONS:
                 self.frame = FRAME_BUTTONS[button]

@@ -6,7 +6,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from operator_input import CommandStream, HeldKeys, KeyAction, KeyEvent
+from operator_input import (
+    CommandStream,
+    HeldKeys,
+    KeyAction,
+    KeyEvent,
+    Note,
+    Quit,
+    Suspend,
+)
 
 from .exceptions import SettingError
 from .jog import Frame, Jog, JointJog
@@ -28,7 +36,7 @@ from .key_map import (
     TOOL_KEY,
     TWIST_TYPE_KEY,
 )
-from .requests import CommandType, Note, Quit, Request, Suspend, SwitchType, TogglePause
+from .requests import CommandType, Request, SwitchType, TogglePause
 from .scales import Scales, Steps
 
 FACTOR = 1.25  # of a speed key

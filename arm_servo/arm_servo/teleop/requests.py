@@ -1,11 +1,13 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What a person can ask for besides a motion."""
+"""What a person can ask the servo for besides a motion."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
+
+from operator_input import Note, Quit, Suspend
 
 
 class CommandType(IntEnum):
@@ -29,27 +31,6 @@ class SwitchType:
 @dataclass(frozen=True, slots=True)
 class TogglePause:
     """Pause the servo, or let it go on."""
-
-
-@dataclass(frozen=True, slots=True)
-class Note:
-    """Tell the person something.
-
-    Attributes:
-        text: What.
-    """
-
-    text: str
-
-
-@dataclass(frozen=True, slots=True)
-class Quit:
-    """End the program."""
-
-
-@dataclass(frozen=True, slots=True)
-class Suspend:
-    """Give the terminal back to the shell for a while."""
 
 
 Request = SwitchType | TogglePause | Note | Quit | Suspend

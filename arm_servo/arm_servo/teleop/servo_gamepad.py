@@ -4,26 +4,28 @@
 
 from __future__ import annotations
 
-import select
 import sys
 import threading
-import time
 
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
 from node_runner import destroyed_when_refused, ParameterReader, refuse_misspelt, run_program
 from operator_input import CommandStream, OperatorInputError
-from operator_input.command_stream import RESTS
 from operator_input.devices import InputDevices, KernelDevices
-from operator_input.gamepad import AUTO, Deadman, DEADMAN_BUTTONS, Gamepad
+from operator_input.gamepad import (
+    AUTO,
+    Deadman,
+    DEADMAN_BUTTONS,
+    Gamepad,
+    GamepadSession,
+    GamepadState,
+)
 
 from ..exceptions import ServoError
 from .gamepad_teleop import GamepadTeleop
-from .jog import rest_of
+from .jog import Jog, rest_of
 from .servo_link import ServoLink
-
-LONGEST_WAIT = 0.1  # [s] for which answers of services and a signal may wait
 
 
 class ServoGamepad(Node):
@@ -76,8 +78,8 @@ class ServoGamepad(Node):
         )
 
 
-class Session:
-    """Reads and publishes."""
+class Session(GamepadSession[Jog]):
+    """One person with one gamepad, and the servo."""
 
     def __init__(self, node: ServoGamepad, stop: threading.Event) -> None:
         """Prepare.
@@ -86,55 +88,38 @@ class Session:
             node: The node.
             stop: Ends it.
         """
+        super().__init__(node.gamepad, node.teleop, stop)
         self._node = node
-        self._stop = stop
         self._executor = SingleThreadedExecutor(context=node.context)
         self._executor.add_node(node)
 
-    def run(self) -> None:
-        """Serve until the event is set."""
-        node = self._node
-        node.gamepad.scan(time.monotonic())
-        if not node.gamepad.is_connected:
-            problem = KernelDevices().problem() or 'plug one in, or switch it on'
-            node.get_logger().warning(f'no gamepad yet: {problem}')
-        try:
-            while not self._stop.is_set():
-                self._serve()
-        finally:
-            node.gamepad.close()
-            self._end()
-            self._executor.shutdown()
+    def publish(self, command: Jog) -> None:
+        """Publish a motion."""
+        self._node.link.publish(command)
 
-    def _serve(self) -> None:
-        node, now = self._node, time.monotonic()
-        node.gamepad.scan(now)
-        wait = min(max(node.teleop.due() - now, 0.0), LONGEST_WAIT)
-        select.select(node.gamepad.filenos(), [], [], wait)
-        for state in node.gamepad.read():
-            if chosen := node.teleop.feed(state):
-                node.get_logger().info(chosen)
-            self._publish()
-        self._publish()
+    def take(self, state: GamepadState) -> None:
+        """Say what the buttons chose."""
+        if chosen := self._node.teleop.feed(state):
+            self._node.get_logger().info(chosen)
+
+    def warn(self, text: str) -> None:
+        """Log a warning."""
+        self._node.get_logger().warning(text)
+
+    def attend(self, now: float) -> None:
+        """Learn from the servo what is not known yet."""
+        node = self._node
         self._executor.spin_once(timeout_sec=0)
-        node.link.serve(time.monotonic())
+        node.link.serve(now)
         node.teleop.joints = len(node.link.names.joints) or None
 
-    def _publish(self) -> None:
-        jog = self._node.teleop.step(time.monotonic())
-        if jog is not None:
-            self._node.link.publish(jog)
-
-    def _end(self) -> None:
-        """Publish the last rests, and see them off."""
-        teleop = self._node.teleop
-        teleop.end()
-        for _ in range(RESTS):
-            self._publish()
-            pause = teleop.due() - time.monotonic()
-            if 0.0 < pause < LONGEST_WAIT:
-                time.sleep(pause)
+    def flush(self) -> None:
+        """See the last motions off."""
         self._node.link.flush()
+
+    def close(self) -> None:
+        """Serve the node no more."""
+        self._executor.shutdown()
 
 
 def main() -> int:

@@ -4,12 +4,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 import os
-import signal
 import sys
 import threading
-import time
 
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -20,22 +17,18 @@ from operator_input import (
     CommandStream,
     HeldKeys,
     Keyboard,
-    KeyEvent,
+    KeyboardSession,
     OperatorInputError,
-    StatusLine,
 )
-from operator_input.command_stream import RESTS
 
 from ..exceptions import ServoError
-from .jog import rest_of
+from .jog import Jog, rest_of
 from .key_map import HELP
 from .keyboard_teleop import KeyboardTeleop
-from .requests import Note, Quit, Request, Suspend, SwitchType, TogglePause
+from .requests import Request, SwitchType, TogglePause
 from .scales import Steps
 from .screen import status, View
 from .servo_link import ServoLink
-
-LONGEST_WAIT = 0.1  # [s] for which answers of services and a signal may wait
 
 
 class ServoKeyboardInput(Node):
@@ -78,8 +71,8 @@ class ServoKeyboardInput(Node):
         refuse_misspelt(self)
 
 
-class Session:
-    """One person at one terminal: reads, publishes, shows."""
+class Session(KeyboardSession[Jog, Request]):
+    """One person at one terminal, and the servo."""
 
     def __init__(
         self, node: ServoKeyboardInput, keyboard: Keyboard, stop: threading.Event
@@ -91,67 +84,34 @@ class Session:
             keyboard: Open keyboard.
             stop: Ends it.
         """
+        super().__init__(keyboard, node.teleop, HELP, stop)
         self._teleop = node.teleop
-        self._keyboard = keyboard
-        self._stop = stop
-        self._line: StatusLine = keyboard.status_line()
-        self._link = ServoLink(node, node.servo, self._line.say, *node.frames)
+        self._link = ServoLink(node, node.servo, self.line.say, *node.frames)
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(node)
         self._colour = not os.environ.get('NO_COLOR')
 
-    def run(self) -> None:
-        """Serve until the person quits or the event is set.
+    def publish(self, command: Jog) -> None:
+        """Publish a motion."""
+        self._link.publish(command)
 
-        Raises:
-            TerminalError: The window was closed.
-        """
-        self._line.say(HELP)
-        try:
-            while not self._stop.is_set():
-                self._serve()
-        finally:
-            self._end()
-            self._executor.shutdown()
-
-    def _serve(self) -> None:
-        now = time.monotonic()
-        self._take(self._keyboard.wait(min(self._teleop.due(now) - now, LONGEST_WAIT)))
-        now = time.monotonic()
-        self._publish(now)
-        self._executor.spin_once(timeout_sec=0)
-        self._link.serve(now)
-        self._teleop.scales = self._link.scales
-        self._teleop.joints = len(self._link.names.joints) or None
-        self._show(now)
-
-    def _take(self, events: Iterable[KeyEvent]) -> None:
-        for event in events:
-            requests = self._teleop.feed(event)
-            # at once: of a press and a release in one reading, both are published
-            self._publish(event.time)
-            for request in requests:
-                self._obey(request)
-
-    def _obey(self, request: Request) -> None:
+    def obey(self, request: Request) -> None:
+        """Ask the servo."""
         match request:
             case SwitchType(command_type):
                 self._link.switch(command_type)
             case TogglePause():
                 self._link.toggle_pause()
-            case Note(text):
-                self._line.say(text)
-            case Quit():
-                self._stop.set()
-            case Suspend():
-                self._suspend()
 
-    def _publish(self, now: float) -> None:
-        jog = self._teleop.step(now)
-        if jog is not None:
-            self._link.publish(jog)
+    def attend(self, now: float) -> None:
+        """Learn from the servo what is not known yet."""
+        self._executor.spin_once(timeout_sec=0)
+        self._link.serve(now)
+        self._teleop.scales = self._link.scales
+        self._teleop.joints = len(self._link.names.joints) or None
 
-    def _show(self, now: float) -> None:
+    def show(self, now: float) -> None:
+        """Show how it is."""
         teleop, link = self._teleop, self._link
         view = View(
             link.status(now),
@@ -163,29 +123,18 @@ class Session:
             teleop.stepping,
             link.paused,
             teleop.wanted(now),
-            self._keyboard.release_source,
+            self.keyboard.release_source,
             link.is_heard,
         )
-        self._line.show(status(view, self._colour))
+        self.line.show(status(view, self._colour))
 
-    def _suspend(self) -> None:
-        self._end()
-        with self._keyboard.paused():
-            os.killpg(0, signal.SIGTSTP)  # goes on here after the shell's fg
-        self._line.say('going on')
-
-    def _end(self) -> None:
-        """Publish the last rests, and see them off."""
-        self._teleop.end()
-        for _ in range(RESTS):
-            now = time.monotonic()
-            self._publish(now)
-            pause = self._teleop.due(now) - now
-            if 0.0 < pause < LONGEST_WAIT:
-                time.sleep(pause)
+    def flush(self) -> None:
+        """See the last motions off."""
         self._link.flush()
-        self._show(time.monotonic())
-        self._line.end()
+
+    def close(self) -> None:
+        """Serve the node no more."""
+        self._executor.shutdown()
 
 
 def main() -> int:

@@ -6,6 +6,8 @@ from .controls import AT_REST, Axis, Button, GamepadState
 from .deadman import Deadman, DEADMAN_BUTTONS, Grip, is_pressed
 from .gamepad import Gamepad
 from .presets import AUTO, PRESETS
+from .session import GamepadSession
+from .teleop import DeadmanTeleop
 
 __all__ = [
     'AT_REST',
@@ -15,7 +17,9 @@ __all__ = [
     'Axis',
     'Button',
     'Deadman',
+    'DeadmanTeleop',
     'Gamepad',
+    'GamepadSession',
     'GamepadState',
     'Grip',
     'is_pressed',

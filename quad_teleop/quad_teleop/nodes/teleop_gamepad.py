@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import select
 import sys
 import threading
 import time
@@ -15,18 +14,24 @@ from rclpy.node import Node
 from node_runner import destroyed_when_refused, ParameterReader, refuse_misspelt, run_program
 from operator_input import OperatorInputError
 from operator_input.devices import InputDevices, KernelDevices
-from operator_input.gamepad import AUTO, Deadman, DEADMAN_BUTTONS, Gamepad
+from operator_input.gamepad import (
+    AUTO,
+    Deadman,
+    DEADMAN_BUTTONS,
+    Gamepad,
+    GamepadSession,
+    GamepadState,
+)
 
-from ..command_stream import ZEROS
 from ..exceptions import TeleopError
 from ..gamepad_teleop import GamepadTeleop
 from ..requests import ModeRequest, PoseRequest, Request
 from ..speeds import Speeds
+from ..velocity import Velocity
 from .controller import Controller
 from .outputs import Outputs
 from .settings import declare_speeds, declare_steps, declare_stream
 
-LONGEST_WAIT = 0.1  # [s] for which answers of services and a signal may wait
 NORMAL, TURBO = Speeds(0.15, 0.6), Speeds(0.3, 1.2)
 
 
@@ -78,8 +83,8 @@ class TeleopGamepad(Node):
         )
 
 
-class Session:
-    """Reads, publishes, asks."""
+class Session(GamepadSession[Velocity]):
+    """One person with one gamepad, and the controller."""
 
     def __init__(self, node: TeleopGamepad, stop: threading.Event) -> None:
         """Prepare.
@@ -88,39 +93,37 @@ class Session:
             node: The node.
             stop: Ends it.
         """
+        super().__init__(node.gamepad, node.teleop, stop)
         self._node = node
-        self._stop = stop
         self._controller = Controller(node, node.get_logger().info)
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(node)
 
-    def run(self) -> None:
-        """Serve until the event is set."""
-        node = self._node
-        node.gamepad.scan(time.monotonic())
-        if not node.gamepad.is_connected:
-            problem = KernelDevices().problem() or 'plug one in, or switch it on'
-            node.get_logger().warning(f'no gamepad yet: {problem}')
-        try:
-            while not self._stop.is_set():
-                self._serve()
-        finally:
-            node.gamepad.close()
-            self._end()
-            self._executor.shutdown()
+    def publish(self, command: Velocity) -> None:
+        """Publish a velocity."""
+        self._node.outputs.publish(command)
 
-    def _serve(self) -> None:
-        node, now = self._node, time.monotonic()
-        node.gamepad.scan(now)
-        wait = min(max(node.teleop.due() - now, 0.0), LONGEST_WAIT)
-        select.select(node.gamepad.filenos(), [], [], wait)
-        for state in node.gamepad.read():
-            for request in node.teleop.feed(state):
-                self._obey(request)
-            self._publish()
-        self._publish()
+    def take(self, state: GamepadState) -> None:
+        """Do what the buttons ask for."""
+        for request in self._node.teleop.feed(state):
+            self._obey(request)
+
+    def warn(self, text: str) -> None:
+        """Log a warning."""
+        self._node.get_logger().warning(text)
+
+    def attend(self, now: float) -> None:
+        """Take answers of the controller."""
         self._executor.spin_once(timeout_sec=0)
-        self._controller.check(time.monotonic())
+        self._controller.check(now)
+
+    def flush(self) -> None:
+        """See the last velocities off."""
+        self._node.outputs.flush()
+
+    def close(self) -> None:
+        """Serve the node no more."""
+        self._executor.shutdown()
 
     def _obey(self, request: Request) -> None:
         match request:
@@ -129,22 +132,7 @@ class Session:
             case PoseRequest(pose):
                 self._node.outputs.publish_pose(pose)
             case _:
-                self._node.get_logger().warning(f'{request} is nothing that a gamepad can do')
-
-    def _publish(self) -> None:
-        velocity = self._node.teleop.step(time.monotonic())
-        if velocity is not None:
-            self._node.outputs.publish(velocity)
-
-    def _end(self) -> None:
-        """Publish the last zeros, and see them off."""
-        self._node.teleop.end()
-        for _ in range(ZEROS):
-            self._publish()
-            pause = self._node.teleop.due() - time.monotonic()
-            if 0.0 < pause < LONGEST_WAIT:
-                time.sleep(pause)
-        self._node.outputs.flush()
+                self.warn(f'{request} is nothing that a gamepad can do')
 
 
 def main() -> int:

@@ -4,9 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 import os
-import signal
 import sys
 import threading
 import time
@@ -19,23 +17,20 @@ from operator_input import (
     AutoRepeat,
     HeldKeys,
     Keyboard,
-    KeyEvent,
+    KeyboardSession,
     OperatorInputError,
-    StatusLine,
 )
 
-from ..command_stream import ZEROS
 from ..exceptions import TeleopError
 from ..key_map import HELP
 from ..keyboard_teleop import KeyboardTeleop
-from ..requests import ClearFault, ModeRequest, Note, PoseRequest, Quit, Request, Suspend
+from ..requests import ClearFault, ModeRequest, PoseRequest, Request
 from ..speeds import Speeds
+from ..velocity import Velocity
 from .controller import Controller
 from .outputs import Outputs
 from .screen import hint, status, View
 from .settings import declare_speeds, declare_steps, declare_stream
-
-LONGEST_WAIT = 0.1  # [s] for which answers of services and a signal may wait
 
 
 class TeleopKeyboard(Node):
@@ -72,8 +67,8 @@ class TeleopKeyboard(Node):
         refuse_misspelt(self)
 
 
-class Session:
-    """One person at one terminal: reads, publishes, shows."""
+class Session(KeyboardSession[Velocity, Request]):
+    """One person at one terminal, and the controller."""
 
     def __init__(self, node: TeleopKeyboard, keyboard: Keyboard, stop: threading.Event) -> None:
         """Prepare.
@@ -83,49 +78,20 @@ class Session:
             keyboard: Open keyboard.
             stop: Ends it.
         """
+        super().__init__(keyboard, node.teleop, HELP, stop)
         self._node = node
-        self._keyboard = keyboard
-        self._stop = stop
-        self._line: StatusLine = keyboard.status_line()
-        self._controller = Controller(node, self._line.say)
+        self._controller = Controller(node, self.line.say)
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(node)
         self._colour = not os.environ.get('NO_COLOR')
         self._hint = ''
 
-    def run(self) -> None:
-        """Serve until the person quits or the event is set.
+    def publish(self, command: Velocity) -> None:
+        """Publish a velocity."""
+        self._node.outputs.publish(command)
 
-        Raises:
-            TerminalError: The window was closed.
-        """
-        self._line.say(HELP)
-        try:
-            while not self._stop.is_set():
-                self._serve()
-        finally:
-            self._end()
-            self._executor.shutdown()
-
-    def _serve(self) -> None:
-        now = time.monotonic()
-        wait = min(self._node.teleop.due(now) - now, LONGEST_WAIT)
-        self._take(self._keyboard.wait(wait))
-        now = time.monotonic()
-        self._publish(now)
-        self._executor.spin_once(timeout_sec=0)
-        self._controller.check(now)
-        self._show(now)
-
-    def _take(self, events: Iterable[KeyEvent]) -> None:
-        for event in events:
-            requests = self._node.teleop.feed(event)
-            # at once: of a press and a release in one reading, both are published
-            self._publish(event.time)
-            for request in requests:
-                self._obey(request)
-
-    def _obey(self, request: Request) -> None:
+    def obey(self, request: Request) -> None:
+        """Ask the controller."""
         match request:
             case ModeRequest(mode):
                 self._controller.ask_mode(mode, time.monotonic())
@@ -133,19 +99,14 @@ class Session:
                 self._controller.clear_fault(time.monotonic())
             case PoseRequest(pose):
                 self._node.outputs.publish_pose(pose)
-            case Note(text):
-                self._line.say(text)
-            case Quit():
-                self._stop.set()
-            case Suspend():
-                self._suspend()
 
-    def _publish(self, now: float) -> None:
-        velocity = self._node.teleop.step(now)
-        if velocity is not None:
-            self._node.outputs.publish(velocity)
+    def attend(self, now: float) -> None:
+        """Take answers of the controller."""
+        self._executor.spin_once(timeout_sec=0)
+        self._controller.check(now)
 
-    def _show(self, now: float) -> None:
+    def show(self, now: float) -> None:
+        """Show how it is, and say what keeps the robot from moving."""
         teleop = self._node.teleop
         view = View(
             self._controller.mode,
@@ -153,34 +114,23 @@ class Session:
             teleop.speeds,
             teleop.wanted(now),
             teleop.pose,
-            self._keyboard.release_source,
+            self.keyboard.release_source,
             self._node.outputs.is_heard,
         )
         text = hint(view)
         if text and text != self._hint:
-            self._line.say(text)
+            self.line.say(text)
         if text or view.velocity:  # said once for each reason, and again after the next motion
             self._hint = text
-        self._line.show(status(view, self._colour))
+        self.line.show(status(view, self._colour))
 
-    def _suspend(self) -> None:
-        self._end()
-        with self._keyboard.paused():
-            os.killpg(0, signal.SIGTSTP)  # goes on here after the shell's fg
-        self._line.say('going on')
-
-    def _end(self) -> None:
-        """Publish the last zeros, and see them off."""
-        self._node.teleop.end()
-        for _ in range(ZEROS):
-            now = time.monotonic()
-            self._publish(now)
-            pause = self._node.teleop.due(now) - now
-            if 0.0 < pause < LONGEST_WAIT:
-                time.sleep(pause)
+    def flush(self) -> None:
+        """See the last velocities off."""
         self._node.outputs.flush()
-        self._show(time.monotonic())
-        self._line.end()
+
+    def close(self) -> None:
+        """Serve the node no more."""
+        self._executor.shutdown()
 
 
 def main() -> int:

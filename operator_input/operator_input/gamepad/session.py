@@ -1,0 +1,62 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""One person with one gamepad."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+import select
+import threading
+import time
+
+from ..devices import KernelDevices
+from ..session import Command, LONGEST_WAIT, Session, Teleop
+from .controls import GamepadState
+from .gamepad import Gamepad
+
+
+class GamepadSession(Session[Command]):
+    """A gamepad that may come and go."""
+
+    def __init__(self, gamepad: Gamepad, teleop: Teleop[Command], stop: threading.Event) -> None:
+        """Prepare.
+
+        Args:
+            gamepad: What is read.
+            teleop: Decides what to publish.
+            stop: Ends it.
+        """
+        super().__init__(teleop, stop)
+        self._gamepad = gamepad
+
+    @abstractmethod
+    def take(self, state: GamepadState) -> None:
+        """Hand a state of the gamepad on, and do what is asked for besides motion."""
+
+    @abstractmethod
+    def warn(self, text: str) -> None:
+        """Warn the person."""
+
+    def begin(self) -> None:
+        """Say why there is no gamepad, if there is none."""
+        self._gamepad.scan(time.monotonic())
+        if not self._gamepad.is_connected:
+            problem = KernelDevices().problem() or 'plug one in, or switch it on'
+            self.warn(f'no gamepad yet: {problem}')
+
+    def serve(self) -> None:
+        """Wait for the gamepad, publish."""
+        now = time.monotonic()
+        self._gamepad.scan(now)
+        wait = min(max(self._moves.due(now) - now, 0.0), LONGEST_WAIT)
+        select.select(self._gamepad.filenos(), [], [], wait)
+        for state in self._gamepad.read():
+            self.take(state)
+            self.step(time.monotonic())
+        self.step(time.monotonic())
+        self.attend(time.monotonic())
+
+    def end(self) -> None:
+        """Publish the last rests; nobody is listened to any more."""
+        self._gamepad.close()
+        super().end()

@@ -1,0 +1,112 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""One person at one terminal."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Iterable
+import os
+import signal
+import threading
+import time
+from typing import Generic, Protocol, TypeVar
+
+from .keyboard import Keyboard
+from .keys import KeyEvent
+from .requests import Note, Quit, Suspend
+from .session import Command, Command_co, LONGEST_WAIT, Session, Teleop
+from .terminal import StatusLine
+
+Asked = TypeVar('Asked')
+Asked_co = TypeVar('Asked_co', covariant=True)
+
+
+class KeyTeleop(Teleop[Command_co], Protocol[Command_co, Asked_co]):
+    """Decides what to publish, and what is asked for, by keys."""
+
+    def feed(self, event: KeyEvent) -> Iterable[Asked_co]:
+        """Take what happened to a key; return what the person asks for besides motion."""
+
+
+class KeyboardSession(Session[Command], Generic[Command, Asked]):
+    """Keys, a status line, and Ctrl-Z.
+
+    Attributes:
+        keyboard: What is read.
+        line: Where the person is told something.
+    """
+
+    def __init__(
+        self,
+        keyboard: Keyboard,
+        teleop: KeyTeleop[Command, Asked],
+        introduction: str,
+        stop: threading.Event,
+    ) -> None:
+        """Prepare.
+
+        Args:
+            keyboard: Open keyboard.
+            teleop: Decides what to publish, and what is asked for.
+            introduction: What the person reads first.
+            stop: Ends it.
+        """
+        super().__init__(teleop, stop)
+        self.keyboard = keyboard
+        self.line: StatusLine = keyboard.status_line()
+        self._keys = teleop
+        self._introduction = introduction
+
+    @abstractmethod
+    def obey(self, request: Asked) -> None:
+        """Do what the person asks for besides motion."""
+
+    @abstractmethod
+    def show(self, now: float) -> None:
+        """Show on the line how it is.
+
+        Args:
+            now: Time [s].
+        """
+
+    def begin(self) -> None:
+        """Say which keys there are."""
+        self.line.say(self._introduction)
+
+    def serve(self) -> None:
+        """Wait for keys, publish, show."""
+        now = time.monotonic()
+        for event in self.keyboard.wait(min(self._moves.due(now) - now, LONGEST_WAIT)):
+            requests = self._keys.feed(event)
+            # at once: of a press and a release in one reading, both are published
+            self.step(event.time)
+            for request in requests:
+                self._do(request)
+        now = time.monotonic()
+        self.step(now)
+        self.attend(now)
+        self.show(now)
+
+    def end(self) -> None:
+        """Publish the last rests, and leave the line as the last thing that was shown."""
+        super().end()
+        self.show(time.monotonic())
+        self.line.end()
+
+    def _do(self, request: Asked) -> None:
+        match request:
+            case Note(text):
+                self.line.say(text)
+            case Quit():
+                self._stop.set()
+            case Suspend():
+                self._suspend()
+            case _:
+                self.obey(request)
+
+    def _suspend(self) -> None:
+        self.end()
+        with self.keyboard.paused():
+            os.killpg(0, signal.SIGTSTP)  # goes on here after the shell's fg
+        self.line.say('going on')

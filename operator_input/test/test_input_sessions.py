@@ -1,0 +1,287 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The loops of the programs, with a robot that only writes down what it is told."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import contextmanager
+import os
+import signal
+import threading
+import time
+from typing import Any
+
+from input_devices import InjectedDevice, InjectedDevices, STICK
+from input_terminal import ScriptedTerminal
+import pytest
+
+from operator_input import (
+    CommandStream,
+    HeldKeys,
+    Keyboard,
+    KeyboardSession,
+    KeyEvent,
+    Note,
+    Quit,
+    Suspend,
+    TerminalError,
+)
+from operator_input.command_stream import RESTS
+from operator_input.gamepad import (
+    Axis,
+    Button,
+    Deadman,
+    DeadmanTeleop,
+    Gamepad,
+    GamepadSession,
+    GamepadState,
+    Grip,
+)
+
+PATIENCE = 10.0  # [s]
+PERIOD = 0.01  # [s]
+ABS_Y, LEFT_SHOULDER, SOUTH = 1, 0x136, 0x130
+STICKS = (0, ABS_Y, 3, 4)
+
+
+class Record:
+    """What a robot is told, with a bell for who waits for something."""
+
+    def __init__(self) -> None:
+        self.told: list[Any] = []
+        self._changed = threading.Condition()
+
+    def add(self, what: object) -> None:
+        """Write something down."""
+        with self._changed:
+            self.told.append(what)
+            self._changed.notify_all()
+
+    def wait_for(self, condition: Callable[[list[Any]], bool]) -> None:
+        """Wait until something was told."""
+        with self._changed:
+            assert self._changed.wait_for(lambda: condition(self.told), PATIENCE), self.told
+
+
+class Keys:
+    """Each held key is a command; some strokes are requests."""
+
+    def __init__(self) -> None:
+        self._held = HeldKeys()
+        self._stream: CommandStream[str] = CommandStream(PERIOD, lambda _: 'rest')
+
+    def feed(self, event: KeyEvent) -> list[str | Note | Quit | Suspend]:
+        """Take a key."""
+        self._held.feed(event)
+        if not event.is_stroke:
+            return []
+        asked: dict[str, str | Note | Quit | Suspend]
+        asked = {'q': Quit(), '?': Note('nobody helps'), 'z': Suspend(), 'a': 'ask'}
+        return [asked[event.key]] if event.key in asked else []
+
+    def step(self, now: float) -> str | None:
+        """Publish the held key."""
+        key = self._held.current(now)
+        return self._stream.step(key if key in {'i', 'k'} else None, now)
+
+    def due(self, now: float) -> float:
+        """Return when."""
+        return min(self._held.deadline(now), self._stream.due())
+
+    def end(self) -> None:
+        """Rest."""
+        self._held.clear()
+        self._stream.end()
+
+
+class AtTerminal(KeyboardSession[str, 'str | Note | Quit | Suspend']):
+    """Writes down."""
+
+    def __init__(self, keyboard: Keyboard, record: Record, stop: threading.Event) -> None:
+        super().__init__(keyboard, Keys(), 'press i', stop)
+        self._record = record
+        self.fails = False
+
+    def publish(self, command: str) -> None:
+        """Write it down."""
+        self._record.add(command)
+
+    def obey(self, request: str | Note | Quit | Suspend) -> None:
+        """Write it down."""
+        self._record.add(request)
+
+    def attend(self, now: float) -> None:
+        """Fail when it is to."""
+        if self.fails:
+            raise RuntimeError('the robot is gone')
+
+    def show(self, now: float) -> None:
+        """Show nothing much."""
+        self.line.show('status')
+
+    def flush(self) -> None:
+        """Write it down."""
+        self._record.add('flush')
+
+    def close(self) -> None:
+        """Write it down."""
+        self._record.add('close')
+
+
+@contextmanager
+def at_terminal() -> Any:
+    """Run a session on a scripted terminal in a thread; yield both and the record."""
+    record, stop = Record(), threading.Event()
+    with (
+        ScriptedTerminal(kitty=True) as terminal,
+        Keyboard(terminal.path, evdev=False) as keyboard,
+    ):
+        session = AtTerminal(keyboard, record, stop)
+        ended: list[BaseException] = []
+
+        def run() -> None:
+            try:
+                session.run()
+            except (RuntimeError, TerminalError) as error:
+                ended.append(error)
+
+        thread = threading.Thread(target=run)
+        thread.start()
+        terminal.wait_written(b'press i')
+        try:
+            yield terminal, session, record, ended, thread
+        finally:
+            stop.set()
+            thread.join(PATIENCE)
+
+
+END = ['rest'] * RESTS + ['flush', 'close']
+
+
+def test_a_key_moves_as_long_as_it_is_held() -> None:
+    """The command is published again and again, then rests; requests go to the robot."""
+    with at_terminal() as (terminal, _, record, _, thread):
+        terminal.key('i', 1)
+        record.wait_for(lambda told: told.count('i') >= 3)
+        terminal.key('i', 3)
+        record.wait_for(lambda told: told[-RESTS:] == ['rest'] * RESTS)
+        terminal.send('a?')
+        record.wait_for(lambda told: told[-1] == 'ask')
+        terminal.wait_written(b'nobody helps')
+        terminal.send('q')
+        thread.join(PATIENCE)
+        assert record.told[-RESTS - 2 :] == END
+
+
+@pytest.mark.parametrize('how', ['robot', 'window'])
+def test_whatever_ends_it_the_robot_rests(how: str) -> None:
+    """An error while a key is held is passed on after the rests."""
+    with at_terminal() as (terminal, session, record, ended, thread):
+        terminal.key('i', 1)
+        record.wait_for(lambda told: told.count('i') >= 2)
+        if how == 'robot':
+            session.fails = True
+        else:
+            terminal.hang_up()
+        thread.join(PATIENCE)
+        assert [type(error) for error in ended] == [
+            RuntimeError if how == 'robot' else TerminalError
+        ]
+        assert [each for each in record.told if each != 'i'] == END
+
+
+def test_ctrl_z_rests_before_the_shell_has_the_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The process group is stopped with the terminal given back, and goes on after fg."""
+    with at_terminal() as (terminal, _, record, _, _):
+        monkeypatch.setattr(os, 'killpg', lambda group, number: record.add((group, number)))
+        terminal.key('i', 1)
+        record.wait_for(lambda told: 'i' in told)
+        terminal.send('z')
+        terminal.wait_written(b'going on')
+        stopped = record.told.index((0, signal.SIGTSTP))
+        assert record.told[stopped - RESTS - 1 : stopped] == END[:-1]
+        terminal.key('k', 1)
+        record.wait_for(lambda told: 'k' in told)
+
+
+class Sticks(DeadmanTeleop[float]):
+    """The left stick, while the deadman is held."""
+
+    def wanted(self) -> float | None:
+        """Return how far the stick is away."""
+        return None if self.grip is Grip.RELEASED else self.state.axis(Axis.LEFT_Y)
+
+
+class WithPad(GamepadSession[float]):
+    """Writes down."""
+
+    def __init__(self, gamepad: Gamepad, record: Record, stop: threading.Event) -> None:
+        self._teleop = Sticks(Deadman(), CommandStream(PERIOD, lambda _: 0.0))
+        super().__init__(gamepad, self._teleop, stop)
+        self._record = record
+
+    def publish(self, command: float) -> None:
+        """Write it down."""
+        self._record.add(command)
+
+    def take(self, state: GamepadState) -> None:
+        """Write new buttons down."""
+        for button in state.pressed_since(self._teleop.take(state)):
+            self._record.add(button)
+
+    def warn(self, text: str) -> None:
+        """Write it down."""
+        self._record.add(text)
+
+    def attend(self, now: float) -> None:
+        """Look at the clock."""
+        assert now <= time.monotonic()
+
+    def flush(self) -> None:
+        """Write it down."""
+        self._record.add('flush')
+
+    def close(self) -> None:
+        """Write it down."""
+        self._record.add('close')
+
+
+@pytest.mark.parametrize('unplugged', [False, True])
+def test_a_gamepad_moves_with_its_deadman(unplugged: bool) -> None:
+    """The stick counts while the deadman is held; then, or without the gamepad, rests follow."""
+    pad = InjectedDevice(
+        'Xbox Wireless Controller',
+        range(0x130, 0x13F),
+        dict.fromkeys(STICKS, STICK),
+        vendor=0x045E,
+    )
+    record, stop = Record(), threading.Event()
+    session = WithPad(Gamepad(InjectedDevices(pad)), record, stop)
+    thread = threading.Thread(target=session.run)
+    thread.start()
+    try:
+        pad.move(ABS_Y, -32768)
+        pad.press(SOUTH)
+        record.wait_for(lambda told: told == [Button.SOUTH])
+        pad.press(LEFT_SHOULDER)
+        record.wait_for(lambda told: told.count(1.0) >= 3)
+        if unplugged:
+            pad.unplug()
+        else:
+            pad.release(LEFT_SHOULDER)
+        record.wait_for(lambda told: told[-RESTS:] == [0.0] * RESTS)
+    finally:
+        stop.set()
+        thread.join(PATIENCE)
+    assert record.told[-2:] == ['flush', 'close']
+    assert pad.is_closed
+
+
+def test_without_a_gamepad_it_says_so() -> None:
+    """The person is told what to do; nothing is published, and it ends as usual."""
+    record, stop = Record(), threading.Event()
+    stop.set()
+    WithPad(Gamepad(InjectedDevices()), record, stop).run()
+    assert record.told[0].startswith('no gamepad yet: ')
+    assert record.told[1:] == ['flush', 'close']
