@@ -132,6 +132,28 @@ def test_a_fault_latches_and_speaks(net: VirtualNetwork, mode: OperationMode) ->
     assert not net.drives[JOINT].error
 
 
+def test_a_position_that_is_not_known_is_never_told() -> None:
+    """NaN before the first one; while a drive is away or boots again, where it was."""
+    net = VirtualNetwork(bus_config(drive_config(JOINT, 2)))
+    assert math.isnan(net.drives[JOINT].feedback().position)
+    net.boot()
+    enabled(net, OperationMode.PROFILE_POSITION)
+    net.commands[JOINT].set_target(0.5)
+    net.run(3.0)
+    net.power_off(JOINT)
+    drive, told = net.drives[JOINT], []
+    for restart in (False, True):
+        if restart:
+            net.power_on(JOINT)
+        for _ in range(300):
+            net.run(PERIOD)
+            if not (drive.node.operational and drive.objects.known):
+                told.append(drive.feedback().position)
+    assert told == pytest.approx([0.5] * len(told), abs=2 / SCALE)
+    assert told
+    assert drive.feedback().position == 0.0  # the new one counts from there
+
+
 def test_a_lost_enable_stays_lost(net: VirtualNetwork) -> None:
     """Voltage that goes and comes back does not start the drive again."""
     enabled(net, OperationMode.CYCLIC_POSITION)

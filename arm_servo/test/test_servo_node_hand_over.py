@@ -7,7 +7,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import partial
 
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 import numpy as np
 import pytest
@@ -62,35 +62,37 @@ def perform(drives: Drives, kind: str, numbers: list[float]) -> None:
     drives.desk.submit(command)
 
 
+BRIEFLY_LOST = [(('trajectory', [0.3] * 7), 40), (('lose', []), 4), (('find', []), 20)]
+
+
 @given(PLANS)
+@example(BRIEFLY_LOST)
 @settings(max_examples=40)
 def test_no_hand_over_makes_the_set_points_jump(
     plan: list[tuple[tuple[str, list[float]], int]],
 ) -> None:
     """Speed changes by no more than the acceleration limit, from any source to any other.
 
-    A drive that drops out is left alone: its own set-points end where they are.
+    A drive that drops out is left alone: its own set-points end there, wherever they are. When it
+    comes back before the others rest, it waits for them.
     """
     drives = Drives()
     drives.attach()
     drives.run(2)
     begin = len(drives.path)
-    lost = False
+    losses = []
     for (kind, numbers), cycles in plan:
-        lost = lost or kind == 'lose'
+        if kind == 'lose':
+            losses.append(len(drives.path) - begin)
         perform(drives, kind, numbers)
         drives.run(cycles)
     drives.run(300)
     path = np.array(drives.path)[begin - 1 :]
-    if lost:
-        path = np.delete(path, 3, axis=1)
-    most = (
-        np.delete(drives.desk.model.limits.acceleration, 3)
-        if lost
-        else (drives.desk.model.limits.acceleration)
-    )
-    jumps = np.abs(np.diff(path, 2, axis=0)) / PERIOD**2
-    assert (jumps.max(axis=0) <= 1.02 * most + 1e-6).all()
+    rates = np.abs(np.diff(path, 2, axis=0)) / PERIOD**2
+    for loss in losses:  # an ideal drive stands still at once when nobody commands it
+        rates[max(loss - 1, 0) : loss + 1, 3] = 0.0
+    limits = drives.desk.model.limits.acceleration
+    assert (rates.max(axis=0) <= 1.02 * limits + 1e-6).all()
 
 
 @given(TWISTS)

@@ -20,7 +20,8 @@ class AxisFeedback:
         online: Booted, and its heartbeat is there.
         state: State of the power drive system.
         mode: Mode of operation as displayed in 0x6061.
-        position: Actual position in user units (rad for a revolute joint).
+        position: Actual position in user units (rad for a revolute joint); the last one of a lost
+            drive, NaN before the first.
         velocity: Actual velocity in user units per second.
         setpoint: Position last commanded in user units; equals ``position`` while disabled.
         followable: A position set-point of a source would be obeyed this cycle: the drive is

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+import math
+
 from ..config.model import DriveConfig
 from ..exceptions import CodecError, SdoError
 from ..master.events import EventKind, Severity
@@ -55,6 +57,7 @@ class ObservedDrive:
         self.statusword = 0
         self.halt = Halt()
         self.error = ''
+        self._position = math.nan
         self._scheduler = scheduler
         self._upkeep = ParameterUpkeep(node, config, self.units, scheduler, self.warn)
         polled = self.objects.position_is_polled
@@ -67,8 +70,8 @@ class ObservedDrive:
 
     @property
     def position(self) -> float:
-        """Actual position in user units."""
-        return self.units.position_from_device(self.objects.position)
+        """Actual position in user units: the last one of a lost drive, NaN before the first."""
+        return self._position
 
     @property
     def velocity(self) -> float:
@@ -156,6 +159,7 @@ class ObservedDrive:
         if not self.node.operational or not self.objects.known:
             self._lose_sight()
             return
+        self._position = self.units.position_from_device(self.objects.position)
         self._estimate.note(self._scheduler.now, self.objects.position)
         self.state, self.statusword = self.objects.state, self.objects.statusword
 

@@ -40,6 +40,7 @@ class DriveSource:
         self._axes = list(desk.model.joints)
         self._released: dict[str, str] = dict.fromkeys(self._axes, 'it was not attached yet')
         self._following = False
+        self._left: set[str] = set()  # drives that dropped out since all of them followed
         self._lost = ''
 
     @property
@@ -100,15 +101,11 @@ class DriveSource:
     def _update(
         self, now: float, period: float, feedback: Sequence[AxisFeedback]
     ) -> Sequence[Setpoint | None]:
-        measured = MotionState(
-            frozen([axis.position for axis in feedback]),
-            frozen([axis.velocity for axis in feedback]),
-            np.zeros(len(feedback)),
-        )
+        measured = measured_state(feedback)
         blocked = why_not(feedback, self._released)
         if not self._following and not blocked:
             self._take_over(feedback)
-        if not self._following:
+        if not self._following or measured is None:
             self._desk.idle(now, measured, self._lost or blocked)
             return [None] * len(feedback)
         if blocked and not self._lost:
@@ -117,9 +114,10 @@ class DriveSource:
         point = self._desk.step(now, period, measured, self._lost)
         if self._lost and point.source is Source.NONE and not point.state.moving:
             self._following, self._lost = False, ''
+        self._left.update(axis.name for axis in feedback if not axis.followable)
         rows = zip(point.state.position, point.state.velocity, feedback, strict=True)
         return [
-            self._make(float(position), float(velocity)) if axis.followable else None
+            None if axis.name in self._left else self._make(float(position), float(velocity))
             for position, velocity, axis in rows
         ]
 
@@ -127,3 +125,17 @@ class DriveSource:
         """Begin at rest at the set-points of the drives."""
         self._desk.begin(frozen([axis.setpoint for axis in feedback]))
         self._following, self._lost = True, ''
+        self._left.clear()
+
+
+def measured_state(feedback: Sequence[AxisFeedback]) -> MotionState | None:
+    """Return what the drives measure; None while one of them has told nothing yet.
+
+    Args:
+        feedback: State of each drive.
+    """
+    positions = frozen([axis.position for axis in feedback])
+    if not np.isfinite(positions).all():
+        return None
+    velocities = frozen([axis.velocity for axis in feedback])
+    return MotionState(positions, velocities, np.zeros(len(feedback)))
