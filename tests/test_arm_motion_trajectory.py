@@ -19,6 +19,7 @@ from sensor_msgs.msg import JointState
 from simulated_arm import JOINTS
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
     from isolation import Isolation
@@ -34,16 +35,29 @@ def test_an_arm_follows_goals_and_says_why_not(isolation: Isolation, tmp_path: P
         states = arm.client.listen(
             JointTrajectoryControllerState, f'{CONTROLLER}/controller_state'
         )
+        _tells_where_it_stands(arm, states)
         _refuses_before_init(arm)
         arm.follow()
         _refuses_what_is_wrong(arm)
         _reaches_a_goal(arm)
-        assert states
         _is_listed_and_switched(arm)
         _takes_a_goal_from_the_command_line(arm)
         _cancels_on_the_path(arm)
         _slows_down(arm)
         _names_the_lost_drives(arm)
+
+
+def _tells_where_it_stands(
+    arm: MovingArm, states: Sequence[JointTrajectoryControllerState]
+) -> None:
+    """Before any command, and before the drives are enabled."""
+    arm.client.spin_until(lambda: bool(states), 10.0, 'state of the controller')
+    assert list(states[0].reference.positions) == list(states[0].feedback.positions)
+    assert not any(states[0].error.positions)
+    service = f'{CONTROLLER}/query_state'
+    answer = arm.client.call(QueryTrajectoryState, service, QueryTrajectoryState.Request())
+    assert answer.success, answer.message
+    assert list(answer.position) == pytest.approx(list(states[-1].feedback.positions), abs=1e-3)
 
 
 def _refuses_before_init(arm: MovingArm) -> None:

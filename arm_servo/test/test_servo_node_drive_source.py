@@ -170,3 +170,21 @@ def test_settings_are_taken_while_the_arm_does_not_follow() -> None:
     drives.run()
     future.result(0.0)
     assert drives.desk.snapshot.speed == 0.3
+
+
+def test_where_the_arm_is_to_be_is_known_before_it_follows() -> None:
+    """It is where the drives stand, at rest; later what is commanded."""
+    drives = Drives()
+    assert drives.desk.snapshot.reference is None
+    drives.attach()
+    drives.axes[0] = replace(drives.axes[0], followable=False, position=0.3)
+    drives.run()
+    reference = drives.desk.snapshot.reference
+    assert reference is not None
+    assert reference.position[0] == 0.3
+    assert not reference.moving
+    drives.axes[0] = replace(drives.axes[0], followable=True)
+    drives.run()
+    point = drives.desk.snapshot.set_point
+    assert point is not None
+    assert drives.desk.snapshot.reference is point.state

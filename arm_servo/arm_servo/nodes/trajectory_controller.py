@@ -138,11 +138,12 @@ class TrajectoryController:
         self, request: QueryTrajectoryState.Request, response: QueryTrajectoryState.Response
     ) -> QueryTrajectoryState.Response:
         snapshot, execution = self._desk.snapshot, self._execution
-        if snapshot.set_point is None:
-            response.message = snapshot.blocked
+        state = snapshot.reference
+        response.message = snapshot.stale(time.monotonic() - snapshot.time)
+        if state is None or response.message:
+            response.message = response.message or snapshot.blocked
             return response
         ahead = seconds(request.time) - self._now if seconds(request.time) else 0.0
-        state = snapshot.set_point.state
         if snapshot.source is Source.TRAJECTORY and execution is not None:
             state = execution.foreseen(ahead)
         response.success = True
@@ -156,9 +157,9 @@ class TrajectoryController:
         while self._news:
             self._node.get_logger().warning(self._news.popleft())
         snapshot = self._desk.snapshot
-        if snapshot.set_point is None or snapshot.measured is None:
-            return  # as a controller that is not active
-        wanted, measured = snapshot.set_point.state, snapshot.measured
+        wanted, measured = snapshot.reference, snapshot.measured
+        if wanted is None or measured is None:
+            return
         message = JointTrajectoryControllerState(
             joint_names=list(self._desk.model.joints),
             reference=point_of(wanted),
