@@ -15,13 +15,16 @@ from geometry_msgs.msg import Pose
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
+from rclpy.serialization import serialize_message
 from sensor_msgs.msg import BatteryState, Imu, JointState
 
+from node_runner.wire import Reader
 from quad_controller.gait.parameters import GaitParameters
+from quad_controller.model.quadruped import Targets
 from quad_controller.nodes.control_loop import ControlLoop
 from quad_controller.nodes.diagnostics import state_diagnostic
 from quad_controller.nodes.joint_reader import CommandScope, JointReader
-from quad_controller.nodes.messages import body_pose, charge, imu_sample
+from quad_controller.nodes.messages import body_pose, charge, IMU_NUMBERS, imu_sample
 from quad_controller.policy.observation import gravity
 from quad_controller.policy.options import GravitySource
 from quad_controller.states.controller import Controller
@@ -34,6 +37,17 @@ PATIENCE = 10.0  # [s]
 angles = st.floats(-1.2, 1.2)
 
 
+def joints(reader: JointReader, message: JointState, sent: Targets) -> JointSample:
+    """Read a message as it comes from a raw subscription."""
+    known, numbers = Reader(JointState, 'position', 'velocity').read(serialize_message(message))
+    return reader.read(known, numbers, sent)
+
+
+def sample(message: Imu) -> ImuSample:
+    """Read a message as it comes from a raw subscription."""
+    return imu_sample(*Reader(Imu, *IMU_NUMBERS).read(serialize_message(message)))
+
+
 @given(st.permutations(range(14)))
 def test_joints_are_found_by_name(order: list[int]) -> None:
     """Whatever the order of a message, and whatever else is in it, values go to their names."""
@@ -43,7 +57,7 @@ def test_joints_are_found_by_name(order: list[int]) -> None:
         position=[index * 0.1 for index in order],
         velocity=[index * 1.0 for index in order],
     )
-    sample = JointReader(ROBOT).read(message, FOLDED)
+    sample = joints(JointReader(ROBOT), message, FOLDED)
     assert sample.positions == pytest.approx([index * 0.1 for index in range(12)])
     assert sample.velocities == pytest.approx([float(index) for index in range(12)])
 
@@ -52,10 +66,10 @@ def test_odd_joint_states_are_refused_and_the_next_good_one_is_taken() -> None:
     """A missing joint and a wrong length are named; missing velocities are no zeros."""
     reader = JointReader(ROBOT)
     with pytest.raises(ValueError, match='without fl_hip_joint'):
-        reader.read(JointState(name=list(ROBOT.names[1:]), position=[0.0] * 11), FOLDED)
+        joints(reader, JointState(name=list(ROBOT.names[1:]), position=[0.0] * 11), FOLDED)
     with pytest.raises(ValueError, match='11 positions for 12 names'):
-        reader.read(JointState(name=list(ROBOT.names), position=[0.0] * 11), FOLDED)
-    sample = reader.read(JointState(name=list(ROBOT.names), position=[0.5] * 12), FOLDED)
+        joints(reader, JointState(name=list(ROBOT.names), position=[0.0] * 11), FOLDED)
+    sample = joints(reader, JointState(name=list(ROBOT.names), position=[0.5] * 12), FOLDED)
     assert sample == JointSample((0.5,) * 12, None)
 
 
@@ -63,14 +77,14 @@ def test_a_joint_of_the_arm_that_is_never_reported_is_where_it_is_sent() -> None
     """The old protocol does not tell of one; once it was told of, it may not get lost."""
     reader, sent = JointReader(ARM_ROBOT), (*FOLDED, 0.4)
     legs = JointState(name=list(ROBOT.names), position=[0.5] * 12, velocity=[1.0] * 12)
-    assert reader.read(legs, sent) == JointSample((*[0.5] * 12, 0.4), (*[1.0] * 12, 0.0))
+    assert joints(reader, legs, sent) == JointSample((*[0.5] * 12, 0.4), (*[1.0] * 12, 0.0))
     assert reader.unreported == ('arm_yaw_joint',)
     names = list(ARM_ROBOT.names)
     whole = JointState(name=names, position=[0.5] * 13, velocity=[1.0] * 13)
-    assert reader.read(whole, sent) == JointSample((0.5,) * 13, (1.0,) * 13)
+    assert joints(reader, whole, sent) == JointSample((0.5,) * 13, (1.0,) * 13)
     assert not reader.unreported
     with pytest.raises(ValueError, match='without arm_yaw_joint'):
-        reader.read(legs, sent)
+        joints(reader, legs, sent)
 
 
 def test_a_joint_that_nobody_measures_is_left_alone_until_it_is_to_move() -> None:
@@ -98,11 +112,11 @@ def imu(attitude: float = 0.0, rate: float = 0.0, force: float = 0.0) -> Imu:
 
 def test_what_an_imu_does_not_measure_is_not_taken_for_zero() -> None:
     """REP 145: a first covariance of -1 says that there is no such measurement."""
-    assert imu_sample(imu()) == ImuSample((0.0, 0.0, 0.0, 1.0), (0.2, 0.0, 0.0), (0.0, 0.0, 9.8))
+    assert sample(imu()) == ImuSample((0.0, 0.0, 0.0, 1.0), (0.2, 0.0, 0.0), (0.0, 0.0, 9.8))
     with pytest.raises(ValueError, match='has no orientation'):
-        imu_sample(imu(attitude=-1.0))
-    assert imu_sample(imu(rate=-1.0)).angular_velocity is None
-    assert gravity(imu_sample(imu(force=-1.0)), GravitySource.ACCEL) == (0.0, 0.0, -1.0)
+        sample(imu(attitude=-1.0))
+    assert sample(imu(rate=-1.0)).angular_velocity is None
+    assert gravity(sample(imu(force=-1.0)), GravitySource.ACCEL) == (0.0, 0.0, -1.0)
 
 
 @given(angles, angles, angles, st.floats(0.1, 3.0))

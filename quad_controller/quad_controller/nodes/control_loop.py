@@ -87,7 +87,8 @@ class ControlLoop:
     def figures(self) -> LoopFigures:
         """Return how well the time is kept."""
         with self._arrived:
-            return self._statistics.figures(self._pacer.overruns)
+            statistics, overruns = self._statistics.copy(), self._pacer.overruns
+        return statistics.figures(overruns)  # the thread need not wait for the sorting
 
     def _guarded(self) -> None:
         try:

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import gc
 import sys
 import threading
 
@@ -24,6 +25,7 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from node_runner import destroyed_when_refused, run_program, spin
+from node_runner.wire import Reader, Stream
 from quad_msgs.msg import JointCommand
 from quad_msgs.srv import SetMode
 
@@ -46,6 +48,7 @@ COMMAND_QOS = QoSProfile(
 )
 LATCHED_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 REQUEST_QOS = 1  # only the newest velocity and pose count
+SWITCH_INTERVAL = 0.0005  # [s] how long one thread may keep another one from the interpreter
 WARN_PERIOD = 2.0  # [s] between two warnings of the same kind
 
 
@@ -84,6 +87,8 @@ class ControllerNode(Node):
         self._loop = ControlLoop(
             self._controller, settings.states.period, self._publish, self._give_up
         )
+        self._joint_states = Reader(JointState, 'position', 'velocity')
+        self._imu = Reader(Imu, *messages.IMU_NUMBERS)
         self._joints = JointReader(settings.robot)
         self._scope = CommandScope(
             settings.robot, others_move=bool(settings.arm_pose) or policy is not None
@@ -93,8 +98,10 @@ class ControllerNode(Node):
         self._title = ''
         self._ready = False
         self._stop, self.failure = stop, ''
-        self._commands = self.create_publisher(JointCommand, 'joint_command', COMMAND_QOS)
-        self._shadow = self.create_publisher(JointCommand, 'joint_command_shadow', COMMAND_QOS)
+        self._commands, self._shadow = (
+            Stream(self.create_publisher(JointCommand, topic, COMMAND_QOS))
+            for topic in ('joint_command', 'joint_command_shadow')
+        )
         self._state = self.create_publisher(String, '~/state', LATCHED_QOS)
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self._subscribe()
@@ -140,8 +147,11 @@ class ControllerNode(Node):
 
     def _subscribe(self) -> None:
         sensor = qos_profile_sensor_data
-        self.create_subscription(JointState, 'joint_states', self._take_joints, sensor)
-        self.create_subscription(Imu, 'imu', self._take_imu, sensor)
+        for kind, topic, take in (
+            (JointState, 'joint_states', self._take_joints),
+            (Imu, 'imu', self._take_imu),
+        ):
+            self.create_subscription(kind, topic, take, sensor, raw=True)
         self.create_subscription(BatteryState, 'battery_state', self._take_battery, sensor)
         self.create_subscription(Twist, 'cmd_vel', self._take_twist, REQUEST_QOS)
         self.create_subscription(
@@ -151,9 +161,10 @@ class ControllerNode(Node):
 
     # --- in: callbacks of the executor
 
-    def _take_joints(self, message: JointState) -> None:
+    def _take_joints(self, data: bytes) -> None:
+        message, numbers = self._joint_states.read(data)
         try:
-            self._loop.offer_joints(self._joints.read(message, self._targets))
+            self._loop.offer_joints(self._joints.read(message, numbers, self._targets))
         except ValueError as error:
             self.get_logger().warning(str(error), throttle_duration_sec=WARN_PERIOD)
             return
@@ -162,9 +173,9 @@ class ControllerNode(Node):
             names = ', '.join(self._unreported) or 'none'
             self.get_logger().info(f'joints that nobody measures, which are left alone: {names}')
 
-    def _take_imu(self, message: Imu) -> None:
+    def _take_imu(self, data: bytes) -> None:
         try:
-            self._loop.offer_imu(messages.imu_sample(message))
+            self._loop.offer_imu(messages.imu_sample(*self._imu.read(data)))
         except ValueError as error:
             self.get_logger().warning(str(error), throttle_duration_sec=WARN_PERIOD)
 
@@ -232,12 +243,12 @@ class ControllerNode(Node):
     def _publish(self, output: Output) -> None:
         logger = self.get_logger()
         if output.targets is not None:
-            stamp = self.get_clock().now().to_msg()
+            now = self.get_clock().now().nanoseconds
             self._targets = output.targets
             sent = self._scope.cut(output.targets, output.title, self._joints.unreported)
-            self._commands.publish(messages.joint_command(sent, stamp))
-            if output.shadow is not None:
-                self._shadow.publish(messages.joint_command(output.shadow, stamp))
+            self._commands.publish(messages.JointCommands(len(sent)), now, sent)
+            if shadow := output.shadow:
+                self._shadow.publish(messages.JointCommands(len(shadow)), now, shadow)
         if output.ready and not self._ready:
             self._ready = True
             logger.info('ready: joints and attitude are known; set_mode makes the robot move')
@@ -278,8 +289,10 @@ def main() -> int:
 
 
 def _serve(stop: threading.Event) -> int:
+    sys.setswitchinterval(SWITCH_INTERVAL)
     node = ControllerNode(stop)
     node.begin()
+    gc.freeze()  # what is there now is there to stay, and need not be looked through
     try:
         spin([node], stop)
     finally:

@@ -37,11 +37,14 @@ class JointReader:
         self._places: list[int | None] = []
         self.unreported: tuple[str, ...] = ()
 
-    def read(self, message: JointState, sent: Sequence[float]) -> JointSample:
+    def read(
+        self, message: JointState, numbers: Sequence[float], sent: Sequence[float]
+    ) -> JointSample:
         """Return the joints of a message.
 
         Args:
-            message: What was measured.
+            message: What was measured, but for its numbers.
+            numbers: Positions [rad], and velocities [rad/s] behind them.
             sent: Where all joints were sent [rad], for those that are never reported.
 
         Raises:
@@ -54,8 +57,9 @@ class JointReader:
             )
         if message.name != self._seen:
             self._find(list(message.name))
-        position, velocity = message.position, message.velocity
-        known = len(velocity) == len(position)
+        count = len(message.position)
+        position, velocity = numbers[:count], numbers[count:]
+        known = len(velocity) == count
         return JointSample(
             tuple(
                 target if place is None else position[place]

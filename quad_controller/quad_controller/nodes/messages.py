@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 import math
 
 from builtin_interfaces.msg import Time
@@ -21,8 +22,24 @@ from ..states.measurement import ImuSample
 UNMEASURED = -1.0  # first covariance of what an IMU does not measure (sensor_msgs/Imu, REP 145)
 
 
-def imu_sample(message: Imu) -> ImuSample:
+IMU_NUMBERS = tuple(
+    f'{part}.{axis}'
+    for part, axes in (
+        ('orientation', 'xyzw'),
+        ('angular_velocity', 'xyz'),
+        ('linear_acceleration', 'xyz'),
+    )
+    for axis in axes
+)
+"""What :func:`imu_sample` reads of a message."""
+
+
+def imu_sample(message: Imu, numbers: Sequence[float]) -> ImuSample:
     """Return the attitude of a message; imu_link has the axes of base_link.
+
+    Args:
+        message: What was measured, but for its numbers.
+        numbers: As :data:`IMU_NUMBERS` names them.
 
     Raises:
         ValueError: The orientation is not measured.
@@ -32,18 +49,15 @@ def imu_sample(message: Imu) -> ImuSample:
             'the imu has no orientation (orientation_covariance[0] is -1), which walking needs; '
             'filter it, or set require_imu to false'
         )
-    attitude, rate, force = (
-        message.orientation,
-        message.angular_velocity,
-        message.linear_acceleration,
-    )
+    x, y, z, w, *rest = numbers
+    (rx, ry, rz), (fx, fy, fz) = rest[:3], rest[3:]
     return ImuSample(
-        (attitude.x, attitude.y, attitude.z, attitude.w),
-        None if message.angular_velocity_covariance[0] == UNMEASURED else (rate.x, rate.y, rate.z),
+        (x, y, z, w),
+        None if message.angular_velocity_covariance[0] == UNMEASURED else (rx, ry, rz),
         # no force at all is no gravity, so nobody believes it
         (0.0, 0.0, 0.0)
         if message.linear_acceleration_covariance[0] == UNMEASURED
-        else (force.x, force.y, force.z),
+        else (fx, fy, fz),
     )
 
 
@@ -75,6 +89,16 @@ def body_pose(message: Pose) -> BodyPose:
     )
 
 
-def joint_command(targets: Sequence[float], stamp: Time) -> JointCommand:
-    """Return the targets of all joints."""
-    return JointCommand(header=Header(stamp=stamp), position=targets)
+@dataclass(frozen=True, slots=True)
+class JointCommands:
+    """Targets of joints.
+
+    Attributes:
+        count: How many joints.
+    """
+
+    count: int
+
+    def message(self, stamp: Time, numbers: Sequence[float]) -> JointCommand:
+        """Make a message of targets [rad]."""
+        return JointCommand(header=Header(stamp=stamp), position=numbers)

@@ -67,6 +67,15 @@ class LoopStatistics:
         if latency is not None:
             self._latencies.append(latency)
 
+    def copy(self) -> LoopStatistics:
+        """Return what was collected so far, which no later step changes."""
+        other = LoopStatistics(self._period)
+        other._intervals = self._intervals.copy()
+        other._durations = self._durations.copy()
+        other._latencies = self._latencies.copy()
+        other._steps = self._steps
+        return other
+
     def figures(self, overruns: int) -> LoopFigures:
         """Return the figures of now.
 

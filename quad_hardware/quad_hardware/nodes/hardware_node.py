@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+import gc
 import math
 import sys
 import threading
@@ -18,6 +20,7 @@ from std_srvs.srv import SetBool
 from tf2_msgs.msg import TFMessage
 
 from node_runner import destroyed_when_refused, run_program, spin
+from node_runner.wire import Reader, Stream
 from quad_msgs.msg import JointCommand
 
 from ..estimation import Estimate, Estimator
@@ -32,12 +35,12 @@ from .diagnostics import (
     robot_diagnostic,
 )
 from .parameters import declare_parameters
-from .wire import Stream
 
 COMMAND_QOS = QoSProfile(
     reliability=ReliabilityPolicy.RELIABLE, history=HistoryPolicy.KEEP_LAST, depth=1
 )
 SENSOR_DEPTH = 10  # reliable, which best-effort subscribers can hear as well
+SWITCH_INTERVAL = 0.0005  # [s] how long one thread may keep another one from the interpreter
 WARN_PERIOD = 2.0  # [s] between two warnings of the same kind
 
 
@@ -74,7 +77,8 @@ class HardwareNode(Node):
         self._battery = self.create_publisher(BatteryState, 'battery_state', SENSOR_DEPTH)
         self._tf = Stream(self.create_publisher(TFMessage, '/tf', 100))
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', SENSOR_DEPTH)
-        self.create_subscription(JointCommand, 'joint_command', self._take, COMMAND_QOS)
+        self._reader = Reader(JointCommand, 'position', 'velocity', 'effort')
+        self.create_subscription(JointCommand, 'joint_command', self._take, COMMAND_QOS, raw=True)
         self.create_service(SetBool, '~/torque', self._set_torque)
         self.create_timer(settings.diagnostics_period, self._diagnose)
         count = len(self._joints.names)
@@ -146,18 +150,20 @@ class HardwareNode(Node):
         else:
             self.get_logger().info(f'{state.value}: {detail}')
 
-    def _take(self, message: JointCommand) -> None:
+    def _take(self, data: bytes) -> None:
         self._counters.received += 1
         now = time.monotonic()
+        message, numbers = self._reader.read(data)
+        positions = numbers[: len(message.position)]
         try:
-            self._check_rest(message)
-            self._limiter.check(message.position)
+            self._check_rest(message, numbers[len(positions) :])
+            self._limiter.check(positions)
             place = self._place(now)
             if not place:
                 self._drop(self._driver.status().detail)
                 return
             measured = [place.get(name) for name in self._joints.names]
-            command = self._limiter.step(message.position, measured, now)
+            command = self._limiter.step(positions, measured, now)
         except CommandError as error:
             self._counters.refused += 1
             self._trouble(f'joint command refused: {error}')
@@ -201,7 +207,7 @@ class HardwareNode(Node):
         self.get_logger().info(response.message)
         return response
 
-    def _check_rest(self, message: JointCommand) -> None:
+    def _check_rest(self, message: JointCommand, rest: Sequence[float]) -> None:
         """Refuse velocities and efforts that do not fit the positions; servos take neither."""
         for name, values in (('velocity', message.velocity), ('effort', message.effort)):
             if values and len(values) != len(message.position):
@@ -209,8 +215,8 @@ class HardwareNode(Node):
                     f'{len(values)} values of {name} for {len(message.position)} positions; '
                     'leave them out or give one for each'
                 )
-            if not all(map(math.isfinite, values)):
-                raise CommandError(f'{name} holds what is no finite number')
+        if not all(map(math.isfinite, rest)):
+            raise CommandError('velocity or effort holds what is no finite number')
 
     def _count(self, command: Command) -> None:
         counters, legs = self._counters, self._joints.leg_count
@@ -260,8 +266,10 @@ def main() -> int:
 
 
 def _serve(stop: threading.Event) -> None:
+    sys.setswitchinterval(SWITCH_INTERVAL)
     node = HardwareNode()
     node.begin()
+    gc.freeze()  # what is there now is there to stay, and need not be looked through
     try:
         spin([node], stop)
     finally:

@@ -6,18 +6,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import TimeoutError as NotDoneError
+import gc
 import math
+import sys
 import threading
 
 from geometry_msgs.msg import Vector3
 from nav_msgs.msg import Odometry
 import rclpy
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import ok, try_shutdown
 from std_srvs.srv import Trigger
 
+from node_runner import make_executor
 from quad_msgs.srv import InjectFault, Push
 
 from .board import POSE_TIME
@@ -30,6 +33,7 @@ from .state import Vector
 TRUTH_PERIOD = 0.05  # [s]
 PATIENCE = 1.0  # [s] the loop answers within milliseconds
 END_ALL = 'none'
+SWITCH_INTERVAL = 0.0005  # [s] how long a callback may keep the robot from the interpreter
 
 
 class FakeXgoNode(Node):
@@ -139,9 +143,11 @@ def serve_with_ros(
     rclpy.init(args=list(ros_arguments), signal_handler_options=SignalHandlerOptions.NO)
     ended: list[BaseException] = []
     thread = threading.Thread(target=_live, args=(server, ended), name='fake_xgo')
-    executor = SingleThreadedExecutor()
+    executor = make_executor()
     node = FakeXgoNode(server, simulation)
     executor.add_node(node)
+    sys.setswitchinterval(SWITCH_INTERVAL)
+    gc.freeze()  # what is there now is there to stay, and need not be looked through
     thread.start()
     announce()
     try:

@@ -1,0 +1,240 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Messages that come and go often: serialized once, and only their numbers looked at.
+
+To make a message object of ROS, or to have rclpy take one apart, costs several times as much as
+everything that a controller computes for it. So one message of a form is serialized with marks in
+place of its numbers; where the marks are found, the numbers of all others stand.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterator, Sequence
+from copy import deepcopy
+from dataclasses import dataclass
+from functools import reduce
+from operator import itemgetter
+import struct
+from typing import Any, Protocol
+
+from builtin_interfaces.msg import Time
+from rclpy.publisher import Publisher
+from rclpy.serialization import deserialize_message, serialize_message
+
+NANOSECONDS = 1_000_000_000  # in a second
+PATIENCE = 3  # messages of another form one after the other, until forms are not looked for
+_MARK = -1.2345678901234567e30  # times 1, 2, 3...: numbers that no message holds by itself
+_SECONDS_MARK, _NANOSECONDS_MARK = 0x5EC0ABCD, 0xA0ABCDEF
+_ENCAPSULATION, _LITTLE_ENDIAN = 1, 1  # byte of a serialized message that tells its order [B]
+
+
+class Form(Hashable, Protocol):
+    """What messages that differ by their numbers have in common."""
+
+    @property
+    def count(self) -> int:
+        """How many numbers a message takes."""
+
+    def message(self, stamp: Time, numbers: Sequence[float]) -> Any:  # noqa: ANN401  any message
+        """Make a message; each number stands in it as it is, once or several times."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Gap:
+    """A number in the bytes of a message."""
+
+    place: int  # [B]
+    letter: str  # of its format
+    index: int  # among the numbers
+
+
+class _Pieces:
+    """The bytes of a message, cut into numbers and what stands between them.
+
+    Attributes:
+        layout: All pieces in the order of the bytes.
+        gaps: The numbers, in this order; all other pieces are constant.
+    """
+
+    def __init__(self, data: bytes, gaps: Sequence[_Gap]) -> None:
+        order, at, layout = _order(data), 0, ''
+        self.constants: list[bytes] = []
+        self.sources: list[int | None] = []  # which number a piece is; None for a constant
+        for gap in sorted(gaps, key=lambda gap: gap.place):
+            if gap.place > at:
+                layout += self._constant(data[at : gap.place])
+            layout += gap.letter
+            self.sources.append(gap.index)
+            at = gap.place + struct.calcsize(order + gap.letter)
+        if len(data) > at:
+            layout += self._constant(data[at:])
+        self.layout = struct.Struct(order + layout)
+
+    def _constant(self, data: bytes) -> str:
+        self.constants.append(data)
+        self.sources.append(None)
+        return f'{len(data)}s'
+
+
+def _order(data: bytes) -> str:
+    return '<' if data[_ENCAPSULATION] == _LITTLE_ENDIAN else '>'
+
+
+def _marks(count: int) -> list[float]:
+    return [_MARK * (index + 1) for index in range(count)]
+
+
+def _gaps(data: bytes, count: int) -> list[_Gap]:
+    """Find marks of a stamp, and of so many numbers, which count from 2 on."""
+    values = [('i', _SECONDS_MARK), ('I', _NANOSECONDS_MARK), *(('df', m) for m in _marks(count))]
+    gaps = []
+    for index, (letters, mark) in enumerate(values):
+        found = [
+            _Gap(place, letter, index)
+            for letter in letters
+            for place in _places(data, struct.pack(_order(data) + letter, mark))
+        ]
+        if not found:
+            raise ValueError(f'number {index - 2} of {count} is not in the message')
+        gaps += found
+    return gaps
+
+
+def _places(data: bytes, mark: bytes) -> Iterator[int]:
+    at = data.find(mark)
+    while at >= 0:
+        yield at
+        at = data.find(mark, at + len(mark))
+
+
+class Template:
+    """The bytes of a message, with gaps for its stamp and numbers."""
+
+    def __init__(self, form: Form) -> None:
+        """Make the first message and find its numbers.
+
+        Raises:
+            ValueError: The form does not put its stamp or one of its numbers into the message.
+        """
+        stamp = Time(sec=_SECONDS_MARK, nanosec=_NANOSECONDS_MARK)
+        data = bytes(serialize_message(form.message(stamp, _marks(form.count))))
+        pieces = _Pieces(data, _gaps(data, form.count))
+        constants = iter(range(form.count + 2, form.count + 2 + len(pieces.constants)))
+        order = [next(constants) if source is None else source for source in pieces.sources]
+        self._constants, self._pack = pieces.constants, pieces.layout.pack
+        self._arrange = itemgetter(*order)
+
+    def fill(self, time: int, numbers: Sequence[float]) -> bytes:
+        """Return the serialized message of a time [ns] and numbers.
+
+        Raises:
+            OverflowError: A number does not fit a float32.
+        """
+        values = (*divmod(time, NANOSECONDS), *numbers, *self._constants)
+        return self._pack(*self._arrange(values))
+
+
+class Stream:
+    """A topic on which messages of few forms are published often."""
+
+    def __init__(self, publisher: Publisher) -> None:
+        """Publish there."""
+        self._publisher = publisher
+        self._templates: dict[Form, Template] = {}
+
+    def publish(self, form: Form, time: int, numbers: Sequence[float]) -> None:
+        """Publish a message of a form, with a time [ns] and numbers.
+
+        Raises:
+            ValueError: The form does not put its stamp or one of its numbers into the message.
+        """
+        template = self._templates.get(form)
+        if template is None:
+            template = self._templates[form] = Template(form)
+        self._publisher.publish(template.fill(time, numbers))
+
+
+class Reader:
+    """Reads serialized messages, of a subscription with ``raw=True``, with a header.
+
+    As long as nothing but stamp and numbers changes, only these are looked at; everything else
+    is read in full. Publishers that never send the same form twice are read in full always.
+    """
+
+    def __init__(self, kind: type, *paths: str) -> None:
+        """Know where the numbers are.
+
+        Args:
+            kind: Class of the messages.
+            *paths: Attributes that are a float or a sequence of these, as ``twist.linear.x``.
+        """
+        self._kind = kind
+        self._paths = [path.split('.') for path in paths]
+        self._message: Any = None
+        self._constants: tuple[bytes, ...] = ()
+        self._unpack: struct.Struct | None = None
+        self._misses = 0
+
+    def read(self, data: bytes) -> tuple[Any, Sequence[float]]:
+        """Read a message.
+
+        Args:
+            data: As a raw subscription gives it.
+
+        Returns:
+            A message that is right but for its stamp and numbers, the same one as long as these
+            alone change; and the numbers, path by path.
+        """
+        if self._unpack is not None and len(data) == self._unpack.size:
+            pieces = self._unpack.unpack(data)
+            if self._still(pieces) == self._constants:
+                self._misses = 0
+                return self._message, self._numbers(pieces)
+        return self._read_anew(data)
+
+    def _read_anew(self, data: bytes) -> tuple[Any, Sequence[float]]:
+        message = deserialize_message(data, self._kind)
+        numbers = [number for path in self._paths for number in _floats(message, path)]
+        self._misses += 1
+        if self._misses <= PATIENCE:
+            self._learn(data, message, len(numbers))
+        return message, numbers
+
+    def _learn(self, data: bytes, message: Any, count: int) -> None:  # noqa: ANN401
+        """Remember where the numbers are, if our own serialization has them at the same places."""
+        marked, marks = deepcopy(message), iter(_marks(count))
+        marked.header.stamp = Time(sec=_SECONDS_MARK, nanosec=_NANOSECONDS_MARK)
+        for path in self._paths:
+            _mark(marked, path, marks)
+        ours = bytes(serialize_message(marked))
+        if count < 1 or len(ours) != len(data) or _order(ours) != _order(data):
+            return
+        pieces = _Pieces(data, _gaps(ours, count))
+        places = {source: place for place, source in enumerate(pieces.sources)}
+        still = [place for place, source in enumerate(pieces.sources) if source is None]
+        self._still = _getter(still)
+        self._numbers = _getter([places[index + 2] for index in range(count)])
+        self._message, self._constants, self._unpack = (
+            message,
+            tuple(pieces.constants),
+            pieces.layout,
+        )
+
+
+def _getter(places: Sequence[int]) -> Any:  # noqa: ANN401  itemgetter has no type for this
+    if len(places) == 1:
+        return itemgetter(slice(places[0], places[0] + 1))  # a tuple, too
+    return itemgetter(*places)
+
+
+def _floats(message: Any, path: Sequence[str]) -> Sequence[float]:  # noqa: ANN401
+    value = reduce(getattr, path, message)
+    return [value] if isinstance(value, float) else value
+
+
+def _mark(message: Any, path: Sequence[str], marks: Iterator[float]) -> None:  # noqa: ANN401
+    *way, last = path
+    owner = reduce(getattr, way, message)
+    value = getattr(owner, last)
+    single = isinstance(value, float)
+    setattr(owner, last, next(marks) if single else [next(marks) for _ in value])
