@@ -11,9 +11,11 @@ from .keyboard_session import KeyboardSession
 from .keys import all_released, KeyAction, KeyEvent
 from .requests import Note, Quit, Suspend
 from .session import Session
+from .status_text import RELEASE_WORDS, status_text, Style
 from .terminal import StatusLine, TerminalKeyboard
 
 __all__ = [
+    'RELEASE_WORDS',
     'AutoRepeat',
     'CommandStream',
     'DeviceError',
@@ -29,8 +31,10 @@ __all__ = [
     'ReleaseSource',
     'Session',
     'StatusLine',
+    'Style',
     'Suspend',
     'TerminalError',
     'TerminalKeyboard',
     'all_released',
+    'status_text',
 ]

@@ -35,6 +35,7 @@ class KeyboardSession(Session[Command], Generic[Command, Asked]):
     Attributes:
         keyboard: What is read.
         line: Where the person is told something.
+        colour: Whether the person likes colours (https://no-color.org).
     """
 
     def __init__(
@@ -55,6 +56,7 @@ class KeyboardSession(Session[Command], Generic[Command, Asked]):
         super().__init__(teleop, stop)
         self.keyboard = keyboard
         self.line: StatusLine = keyboard.status_line()
+        self.colour = not os.environ.get('NO_COLOR')
         self._keys = teleop
         self._introduction = introduction
 

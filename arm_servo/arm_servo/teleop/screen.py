@@ -6,21 +6,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from operator_input import ReleaseSource
+from operator_input import RELEASE_WORDS, ReleaseSource, status_text, Style
 
 from .jog import CartesianJog, Frame, Jog, JointJog, Vector
 from .names import ArmNames
 from .scales import Scales
 
-BOLD, DIM, GREEN, YELLOW = '\x1b[1m', '\x1b[2m', '\x1b[32m', '\x1b[33m'
-RED, RESET = '\x1b[1;31m', '\x1b[0m'
 AXES = ('x', 'y', 'z')
-
-SOURCES = {
-    ReleaseSource.TERMINAL: 'true releases',
-    ReleaseSource.KEYBOARD: 'true releases (evdev)',
-    ReleaseSource.TIME_OUT: 'timed releases',
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,16 +69,16 @@ def status(view: View, colour: bool) -> str:
     scales, joints = view.scales, '+' if view.sign > 0 else '-'
     parts = [
         _servo(view),
-        (motion(view.jog, view.names) or f'{"idle":<12}', GREEN if view.jog else DIM),
-        (f'{view.frame.value} frame, joints {joints}', BOLD),
-        (f'{view.speed * 100:.0f} %: {view.speed * scales.linear:.3f} m/s', BOLD),
+        (motion(view.jog, view.names) or f'{"idle":<12}', Style.GREEN if view.jog else Style.DIM),
+        (f'{view.frame.value} frame, joints {joints}', Style.BOLD),
+        (f'{view.speed * 100:.0f} %: {view.speed * scales.linear:.3f} m/s', Style.BOLD),
     ]
     if view.stepping:
-        parts.append(('steps', YELLOW))
+        parts.append(('steps', Style.YELLOW))
     if not view.is_heard:
-        parts.append(('nobody listens', YELLOW))
-    parts.append((SOURCES[view.source], DIM))
-    return ' | '.join(f'{code}{text}{RESET}' if colour and code else text for text, code in parts)
+        parts.append(('nobody listens', Style.YELLOW))
+    parts.append((RELEASE_WORDS[view.source], Style.DIM))
+    return status_text(parts, colour=colour)
 
 
 def motion(jog: Jog | None, names: ArmNames) -> str:
@@ -113,11 +105,11 @@ def _signs(word: str, vector: Vector) -> list[str]:
     ]
 
 
-def _servo(view: View) -> tuple[str, str]:
+def _servo(view: View) -> tuple[str, Style]:
     if view.paused:
-        return 'paused', YELLOW
+        return 'paused', Style.YELLOW
     if view.servo is None:
-        return 'servo ?', YELLOW
+        return 'servo ?', Style.YELLOW
     if view.servo.code == 0:
-        return 'servo ok', BOLD
-    return view.servo.message, RED if view.servo.code < 0 else YELLOW
+        return 'servo ok', Style.BOLD
+    return view.servo.message, Style.RED if view.servo.code < 0 else Style.YELLOW

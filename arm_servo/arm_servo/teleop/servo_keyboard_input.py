@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 import threading
 
@@ -89,7 +88,6 @@ class Session(KeyboardSession[Jog, Request]):
         self._link = ServoLink(node, node.servo, self.line.say, *node.frames)
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(node)
-        self._colour = not os.environ.get('NO_COLOR')
 
     def publish(self, command: Jog) -> None:
         """Publish a motion."""
@@ -126,7 +124,7 @@ class Session(KeyboardSession[Jog, Request]):
             self.keyboard.release_source,
             link.is_heard,
         )
-        self.line.show(status(view, self._colour))
+        self.line.show(status(view, self.colour))
 
     def flush(self) -> None:
         """See the last motions off."""

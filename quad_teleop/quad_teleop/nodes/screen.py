@@ -7,22 +7,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 import math
 
-from operator_input import ReleaseSource
+from operator_input import RELEASE_WORDS, ReleaseSource, status_text, Style
 
 from ..body_pose import BodyPose, NEUTRAL
 from ..controller_report import ControllerReport
 from ..modes import Mode
 from ..speeds import Speeds
 from ..velocity import Velocity
-
-BOLD, DIM, GREEN, YELLOW = '\x1b[1m', '\x1b[2m', '\x1b[32m', '\x1b[33m'
-RED, RESET = '\x1b[1;31m', '\x1b[0m'
-
-SOURCES = {
-    ReleaseSource.TERMINAL: 'true releases',
-    ReleaseSource.KEYBOARD: 'true releases (evdev)',
-    ReleaseSource.TIME_OUT: 'timed releases',
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,15 +48,15 @@ def status(view: View, colour: bool) -> str:
     """
     parts = [
         _state(view),
-        (f'{view.speeds.linear:.2f} m/s {view.speeds.angular:.2f} rad/s', BOLD),
-        (_motion(view.velocity), GREEN if view.velocity else DIM),
+        (f'{view.speeds.linear:.2f} m/s {view.speeds.angular:.2f} rad/s', Style.BOLD),
+        (_motion(view.velocity), Style.GREEN if view.velocity else Style.DIM),
     ]
     if not view.is_heard:
-        parts.append(('nobody listens', YELLOW))
+        parts.append(('nobody listens', Style.YELLOW))
     if view.pose != NEUTRAL:
-        parts.append((_body(view.pose), ''))
-    parts.append((SOURCES[view.source], DIM))
-    return ' | '.join(f'{code}{text}{RESET}' if colour and code else text for text, code in parts)
+        parts.append((_body(view.pose), Style.PLAIN))
+    parts.append((RELEASE_WORDS[view.source], Style.DIM))
+    return status_text(parts, colour=colour)
 
 
 def hint(view: View) -> str:
@@ -85,10 +76,10 @@ def hint(view: View) -> str:
     return f'the robot does not walk now ({_state(view)[0]}): press 2 to walk, 3 to turn'
 
 
-def _state(view: View) -> tuple[str, str]:
+def _state(view: View) -> tuple[str, Style]:
     if view.report is not None:
-        return view.report.state, RED if view.report.has_fault else BOLD
-    return view.mode.value if view.mode else 'mode ?', BOLD
+        return view.report.state, Style.RED if view.report.has_fault else Style.BOLD
+    return view.mode.value if view.mode else 'mode ?', Style.BOLD
 
 
 def _motion(velocity: Velocity | None) -> str:

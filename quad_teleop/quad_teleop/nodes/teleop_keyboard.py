@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 import threading
 import time
@@ -83,7 +82,6 @@ class Session(KeyboardSession[Velocity, Request]):
         self._controller = Controller(node, self.line.say)
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(node)
-        self._colour = not os.environ.get('NO_COLOR')
         self._hint = ''
 
     def publish(self, command: Velocity) -> None:
@@ -122,7 +120,7 @@ class Session(KeyboardSession[Velocity, Request]):
             self.line.say(text)
         if text or view.velocity:  # said once for each reason, and again after the next motion
             self._hint = text
-        self.line.show(status(view, self._colour))
+        self.line.show(status(view, self.colour))
 
     def flush(self) -> None:
         """See the last velocities off."""
