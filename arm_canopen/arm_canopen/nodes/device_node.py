@@ -81,7 +81,7 @@ class DeviceNode(Node):
         self.admit: Callable[[], None] = lambda: None
         self._deferred = DeferredServices(output)
         fixed = ParameterDescriptor(description='CANopen node id', read_only=True)
-        self.declare_parameter('node_id', config.node_id, fixed)
+        self.declare_parameter('node_id', config.node_id, fixed, ignore_override=True)
         self._nmt_state = self.create_publisher(String, '~/nmt_state', LATCHED)
         self._rpdo = self.create_publisher(COData, '~/rpdo', 10)
         self.create_subscription(COData, '~/tpdo', self._write_pdo, 10)

@@ -9,6 +9,8 @@ from collections.abc import Sequence
 from rclpy.time import Time
 from sensor_msgs.msg import JointState
 
+from node_runner import destroyed_when_refused
+
 from ..cia402.drive_commands import DriveCommands
 from ..master.remote_node import RemoteNode
 from ..master.runner import NetworkThread
@@ -26,6 +28,7 @@ class DriveNode(DeviceNode):
         listened: Somebody listens to ``~/joint_states``.
     """
 
+    @destroyed_when_refused
     def __init__(
         self,
         device: RemoteNode,
