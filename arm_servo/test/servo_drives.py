@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import Future
 from dataclasses import replace
 
 import numpy as np
@@ -44,7 +45,13 @@ class Drives:
 
     def attach(self) -> None:
         """Give the source its drives."""
-        self.source.attach(self.attachments.append)
+        self.source.attach(self._attached)
+
+    def _attached(self, source: MotionSource) -> Future[None]:
+        self.attachments.append(source)
+        future = Future[None]()
+        future.set_result(None)
+        return future
 
     def run(self, cycles: int = 1) -> Sequence[Setpoint | None]:
         """Run some cycles; return the set-points of the last."""

@@ -38,7 +38,6 @@ from .output_thread import OutputThread
 
 LISTENER_PERIOD = 0.1  # [s] how soon a new subscriber hears something
 LAST_WORD_TIMEOUT = 0.5  # [s] for the last /diagnostics
-ATTACH_TIMEOUT = 1.0  # [s] for what the next cycle does
 STOP_TIMEOUT = SHUTDOWN_MAX + 2.0  # [s] for all drives to stop; each has its own shorter limits
 
 JointSample = tuple[DriveNode, list[tuple[float, float, float]]]
@@ -149,17 +148,22 @@ class MasterProcess:
         self._thread.stop()
         self._output.stop()
 
-    def attach(self, source: MotionSource) -> None:
-        """Let a motion source command its axes, from any thread.
+    def attach(self, source: MotionSource) -> Future[None]:
+        """Let a motion source command its axes, from any thread; nothing waits.
 
-        Raises:
-            KeyError: An axis is no drive of this bus.
+        Returns:
+            Done before the next cycle; or KeyError: an axis is no drive of this bus, BusError: the
+            cycle has ended.
         """
-        self._thread.call(lambda: self._group.attach(source)).result(ATTACH_TIMEOUT)
+        return self._thread.call(lambda: self._group.attach(source))
 
-    def detach(self, source: MotionSource) -> None:
-        """End a motion source, from any thread; drives that it moved are braked."""
-        self._thread.call(lambda: self._group.detach(source)).result(ATTACH_TIMEOUT)
+    def detach(self, source: MotionSource) -> Future[None]:
+        """End a motion source, from any thread; drives that it moved are braked.
+
+        Returns:
+            Done before the next cycle.
+        """
+        return self._thread.call(lambda: self._group.detach(source))
 
     def _build_drives(self) -> MotionGroup:
         scheduler = self._network.scheduler

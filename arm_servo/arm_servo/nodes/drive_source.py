@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import Future
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -53,20 +54,21 @@ class DriveSource:
         """Whether a drive was taken away, so that it has to be attached again; any thread."""
         return bool(self._released)
 
-    def attach(self, attach: Callable[[MotionSource], None]) -> None:
-        """Get back the drives that were taken away; any thread.
+    def attach(self, attach: Callable[[MotionSource], Future[None]]) -> None:
+        """Get back the drives that were taken away; any thread, and it waits for nothing.
 
         Args:
-            attach: What attaches a source to the bus; what it raises is passed on, and the next
-                command tries again.
+            attach: What attaches a source to the bus before the next cycle. When that fails, the
+                drives are away as before, and the next command tries again.
         """
         before = self._released
         self._released = {}  # before, so that a drive which is taken away right after is known
-        try:
-            attach(self)
-        except Exception:
-            self._released = {**before, **self._released}
-            raise
+
+        def finish(future: Future[None]) -> None:
+            if future.cancelled() or future.exception() is not None:
+                self._released = {**before, **self._released}
+
+        attach(self).add_done_callback(finish)
 
     def released(self, axis: str, reason: str) -> None:
         """Come to rest, and leave the drives alone until attached again.

@@ -8,7 +8,6 @@ It takes what ``ros2 run arm_canopen master`` takes, and what describes the arm.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import TimeoutError as FutureTimeoutError
 from contextlib import ExitStack
 import sys
 from typing import TYPE_CHECKING
@@ -20,7 +19,7 @@ from node_runner import destroyed_if_refused, ParameterReader, refuse_misspelt
 
 from ..core import MotionCore
 from ..core_settings import CoreSettings
-from ..exceptions import ModelError, NotReadyError, ServoError
+from ..exceptions import ModelError, ServoError
 from .controller_manager import ControllerManager, trajectory_entry
 from .desk import Desk
 from .drive_source import DriveSource
@@ -112,20 +111,14 @@ class Motion:
             )
 
     def _attach_first(self) -> None:
-        try:
-            self._prepare()
-        except NotReadyError:
-            return
-        self._manager.destroy_timer(self._attaching)
+        self._prepare()
+        if self._desk.snapshot.time:  # the cycle asks for set-points
+            self._manager.destroy_timer(self._attaching)
 
     def _prepare(self) -> None:
         """Get back the drives that were taken away, for the motion that follows."""
-        if not self._source.detached:
-            return
-        try:
+        if self._source.detached:
             self._source.attach(self._master.attach)
-        except FutureTimeoutError as error:
-            raise NotReadyError('the cycle does not run; is the bus up?') from error
 
 
 def main(argv: list[str] | None = None) -> int:
