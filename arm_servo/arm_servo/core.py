@@ -9,6 +9,7 @@ is no event: positions, velocities and accelerations go on from where they are.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+import math
 
 import numpy as np
 
@@ -210,52 +211,58 @@ class MotionCore:
         self._turn += 1
         self._sources.follow(execution)
 
-    def move_to(self, positions: Mapping[str, float]) -> None:
+    def move_to(self, positions: Mapping[str, float], fastest: float = math.inf) -> None:
         """Move joints to positions in the shortest time, and rest there.
 
         Args:
             positions: Targets in [rad] by joint; the others come to rest.
+            fastest: Greatest speed of a joint in [rad/s].
 
         Raises:
             CommandError: A joint is unknown, a number is not finite or beyond a limit, or links
                 meet on the way.
             NotReadyError: The position of the arm is not known yet.
         """
-        way = self.way_to(positions)
+        way = self.way_to(positions, fastest)
         self.check(way)
         self.go(way)
 
-    def nudge(self, displacements: Mapping[str, float]) -> None:
+    def nudge(self, displacements: Mapping[str, float], fastest: float = math.inf) -> None:
         """Move joints on by amounts, and rest there; nudges add up while they are carried out.
 
         Args:
             displacements: How far in [rad] by joint.
+            fastest: Greatest speed of a joint in [rad/s].
 
         Raises:
             CommandError: A joint is unknown, the end is not finite or beyond a limit, or links
                 meet on the way.
             NotReadyError: The position of the arm is not known yet.
         """
-        way = self.way_by(displacements)
+        way = self.way_by(displacements, fastest)
         self.check(way)
         self.go(way)
 
-    def way_to(self, positions: Mapping[str, float]) -> Way:
+    def way_to(self, positions: Mapping[str, float], fastest: float = math.inf) -> Way:
         """Return the way of :meth:`move_to`, for :meth:`check` and :meth:`go`; nothing moves."""
         values, moved = by_joint(self._model, positions, 'positions')
         rest, limits = self._generator.brake(self.state), self._limits
         stay = self.state.position if rest is None else rest.at(rest.duration).position
         # where a joint comes to rest was not asked for: it need not be refused
-        return self._way(np.where(moved, values, np.clip(stay, limits.lower, limits.upper)))
+        target = np.where(moved, values, np.clip(stay, limits.lower, limits.upper))
+        return self._way(target, fastest)
 
-    def way_by(self, displacements: Mapping[str, float]) -> Way:
+    def way_by(self, displacements: Mapping[str, float], fastest: float = math.inf) -> Way:
         """Return the way of :meth:`nudge`, for :meth:`check` and :meth:`go`; nothing moves."""
         values, moved = by_joint(self._model, displacements, 'displacements')
         pending = self._sources.target
         if pending is not None:
-            return self._way(pending + values)  # what other nudges are on their way to stays
+            return self._way(
+                pending + values, fastest
+            )  # what other nudges are on their way to stays
         ends, names = self.state.position + values, self._limits.names
-        return self.way_to({names[place]: float(ends[place]) for place in np.flatnonzero(moved)})
+        asked = {names[place]: float(ends[place]) for place in np.flatnonzero(moved)}
+        return self.way_to(asked, fastest)
 
     def check(self, way: Way) -> None:
         """Look for collisions on a way, see :class:`Planning`; for any one thread.
@@ -279,7 +286,7 @@ class MotionCore:
         """
         if way.turn != self._turn:
             raise CommandError('another command came before this one had begun; give it again')
-        self._sources.aim(way.target)
+        self._sources.aim(way.target, way.fastest)
 
     def stop(self, reason: str = 'stopped') -> None:
         """Come to rest: a trajectory on its path, anything else in the shortest time.
@@ -348,9 +355,11 @@ class MotionCore:
         self._turn += 1
         self._sources.jog(command, now + counts)
 
-    def _way(self, target: Array) -> Way:
+    def _way(self, target: Array, fastest: float) -> Way:
+        if not fastest > 0.0:
+            raise CommandError(f'greatest speed of a joint {fastest} rad/s: it must be above 0')
         self._sources.check_target(target)
-        return Way(self.state, target, self._turn)
+        return Way(self.state, target, fastest, self._turn)
 
 
 def _with(report: MotionReport, limiter: Limiter | None) -> MotionReport:

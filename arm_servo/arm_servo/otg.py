@@ -166,11 +166,12 @@ class Generator:
         demand.minimum_duration = shortest
         return self._plan(demand)
 
-    def slowed(self, share: float) -> Generator:
+    def slowed(self, share: float, fastest: float = np.inf) -> Generator:
         """Return a generator with a share of the velocities.
 
         Args:
             share: Above 0, at most 1.
+            fastest: Greatest speed of any joint in [rad/s], before the share is taken.
         """
         limits = self._limits
         return Generator(
@@ -178,7 +179,7 @@ class Generator:
                 limits.names,
                 limits.lower,
                 limits.upper,
-                frozen(limits.velocity * share),
+                frozen(np.minimum(limits.velocity, fastest) * share),
                 limits.acceleration,
                 limits.jerk,
             )

@@ -25,11 +25,13 @@ class Way:
     Attributes:
         state: The commanded state where it begins.
         target: Positions to rest at in [rad].
+        fastest: Greatest speed of a joint in [rad/s].
         turn: Number of commands before it; another one makes it void.
     """
 
     state: MotionState
     target: Array
+    fastest: float
     turn: int
 
 

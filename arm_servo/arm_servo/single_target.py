@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from .arrays import Array
@@ -23,6 +25,7 @@ class SingleTarget:
 
     Attributes:
         target: Positions in [rad]; None without one.
+        fastest: Greatest speed of a joint on the way there in [rad/s].
     """
 
     def __init__(self, limits: JointLimits, generator: Generator) -> None:
@@ -34,8 +37,9 @@ class SingleTarget:
         """
         self._limits = limits
         self._full = self._planner = generator
-        self._speed = 1.0
+        self._planned_for = (1.0, math.inf)
         self.target: Array | None = None
+        self.fastest = math.inf
 
     def check(self, target: Array) -> None:
         """Make sure that a target is within the limits.
@@ -64,8 +68,9 @@ class SingleTarget:
         """
         if self.target is None or speed == 0.0:
             return None
-        if speed != self._speed:
-            self._speed, self._planner = speed, self._full.slowed(max(speed, SLOWEST))
+        if (speed, self.fastest) != self._planned_for:
+            self._planned_for = speed, self.fastest
+            self._planner = self._full.slowed(max(speed, SLOWEST), self.fastest)
         there = MotionState.at_rest(self.target)
         plan = self._planner.to_state(state, there)
         if plan is None:

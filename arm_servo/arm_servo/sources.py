@@ -80,15 +80,17 @@ class Sources:
         self.release('a new trajectory took over')
         self.active, self.execution = Source.TRAJECTORY, execution
 
-    def aim(self, target: Array) -> None:
+    def aim(self, target: Array, fastest: float) -> None:
         """Let a single target move the arm.
 
         Args:
             target: Positions in [rad], within the limits.
+            fastest: Greatest speed of a joint in [rad/s].
         """
         if self.active is not Source.TARGET:
             self.release('a single target took over')
-        self.active, self._single.target = Source.TARGET, frozen(target)
+        self.active = Source.TARGET
+        self._single.target, self._single.fastest = frozen(target), fastest
 
     def stop(self, reason: str) -> None:
         """Come to rest: a trajectory on its path, anything else in the shortest time.

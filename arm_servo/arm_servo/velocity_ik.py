@@ -226,4 +226,5 @@ def _losses(found: Directions, command: Array, factor: float) -> list[Limiter]:
     if kept > 0.99:
         return []
     axis = AXES[int(np.argmax(np.abs(command)))]
-    return [Limiter(Cause.SINGULARITY, f'{axis} is lost here', found.least, max(kept, 0.0))]
+    left = min(max(min(kept, factor), 0.0), 1.0)
+    return [Limiter(Cause.SINGULARITY, f'{axis} is lost here', found.least, left)]

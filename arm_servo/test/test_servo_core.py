@@ -252,6 +252,20 @@ def test_a_target_goes_at_the_overridden_speed() -> None:
     assert fastest == pytest.approx(0.2 * 1.57, rel=1e-3)
 
 
+def test_a_nudge_goes_at_its_own_speed() -> None:
+    """As fast as it was given and no faster, also with the speed override on top."""
+    for speed in (1.0, 0.5):
+        core = core_of('prbt')
+        core.override(speed)
+        core.nudge({'prbt_joint_1': 0.5}, 0.25)
+        points = stream(core, 6.0)
+        fastest = max(float(np.abs(point.state.velocity).max()) for point in points)
+        assert fastest == pytest.approx(0.25 * speed, rel=1e-3)
+        assert points[-1].state.position[0] - ready('prbt')[0] == pytest.approx(0.5, abs=1e-9)
+    with pytest.raises(CommandError, match='above 0'):
+        core.nudge({'prbt_joint_1': 0.5}, 0.0)
+
+
 def test_a_pause_holds_everything() -> None:
     """Paused, a target waits and jogging is refused; then both go on."""
     core = core_of('prbt')

@@ -11,6 +11,7 @@ import pytest
 from servo_robots import ready, robot, ROBOTS
 
 from arm_servo.core import MotionCore
+from arm_servo.report import Cause, MotionReport
 
 # place of the elbow, and the angle at which the arm is straight
 ELBOW = {
@@ -31,6 +32,7 @@ class Jogger:
         self.model, self.period, self.now = robot(name), period, 0.0
         self.core = MotionCore(self.model)
         self.core.reset(ready(name))
+        self.report = MotionReport()
         self.begin = self.model.pose(ready(name)).position
         ahead = np.array([*self.begin[:2], 0.0]) / np.linalg.norm(self.begin[:2])
         self.line = math.cos(down) * ahead - np.array([0.0, 0.0, math.sin(down)])
@@ -44,7 +46,7 @@ class Jogger:
     def jog(self, speed: float) -> float:
         """Jog for a cycle; return the speed along the line in [m/s]."""
         self.core.twist([*(speed * self.line), 0.0, 0.0, 0.0], self.now)
-        self.core.step(self.now, self.period)
+        self.report = self.core.step(self.now, self.period).report
         self.now += self.period
         state = self.core.state
         return float((self.model.jacobian(state.position) @ state.velocity)[:3] @ self.line)
@@ -76,3 +78,18 @@ def test_an_arm_comes_back_from_the_border_on_the_same_side(
         jogger.jog(-speed)
     assert jogger.way <= 0.01, f'{out - jogger.way:.3f} of {out:.3f} m'
     assert side * (jogger.core.state.position[place] - straight) > 0.1
+
+
+@pytest.mark.parametrize('name', ROBOTS)
+def test_what_is_told_at_the_border_is_what_happens(name: str) -> None:
+    """Pushing on, the tool stands still, and the report says that nothing is left of its speed."""
+    jogger = Jogger(name, 0.01, 0.0)
+    while jogger.jog(0.1) > STUCK * 0.1 or jogger.now < 0.5:
+        assert jogger.now < 30.0
+    for _ in range(300):
+        speed = jogger.jog(0.1)
+    assert abs(speed) < 0.01
+    lost = [each for each in jogger.report.limiters if each.cause is Cause.SINGULARITY]
+    assert lost
+    assert max(each.factor for each in lost) < 0.15
+    assert jogger.report.factor < 0.15

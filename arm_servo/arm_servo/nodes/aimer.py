@@ -8,6 +8,7 @@ from collections import deque
 from collections.abc import Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from concurrent.futures import TimeoutError as FutureTimeoutError
+import math
 from typing import TypeVar
 
 from ..exceptions import NotReadyError
@@ -35,11 +36,12 @@ class Aimer:
         self._worker = ThreadPoolExecutor(1, thread_name_prefix='target check')
         self._waiting: deque[Future[None]] = deque()
 
-    def nudge(self, displacements: Mapping[str, float]) -> Future[None]:
+    def nudge(self, displacements: Mapping[str, float], fastest: float = math.inf) -> Future[None]:
         """Have joints moved on; for one thread.
 
         Args:
             displacements: How far in [rad] by joint.
+            fastest: Greatest speed of a joint in [rad/s].
 
         Returns:
             Nothing once the motion began, or why it is refused.
@@ -52,7 +54,7 @@ class Aimer:
                 NotReadyError(f'{MOST} displacements wait already; send them more slowly')
             )
             return refused
-        future = self._worker.submit(self._carry_out, displacements)
+        future = self._worker.submit(self._carry_out, displacements, fastest)
         self._waiting.append(future)
         return future
 
@@ -61,8 +63,8 @@ class Aimer:
         while self._waiting:
             self._waiting.popleft().cancel()
 
-    def _carry_out(self, displacements: Mapping[str, float]) -> None:
-        way = _answer(self._desk.submit(lambda core, _now: core.way_by(displacements)))
+    def _carry_out(self, displacements: Mapping[str, float], fastest: float) -> None:
+        way = _answer(self._desk.submit(lambda core, _now: core.way_by(displacements, fastest)))
         self._desk.check(way)
         _answer(self._desk.submit(lambda core, _now: core.go(way)))
 

@@ -91,7 +91,7 @@ class Servo:
             return
         self._last = begin
         if isinstance(order, Displacements):
-            future = self._aimer.nudge(order.by_joint)
+            future = self._aimer.nudge(order.by_joint, order.fastest)
         else:
             self._aimer.cancel()
             future = self._desk.submit(order)

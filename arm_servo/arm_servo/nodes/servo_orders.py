@@ -27,9 +27,11 @@ class Displacements:
 
     Attributes:
         by_joint: How far in [rad] by joint.
+        fastest: Greatest speed of a joint in [rad/s].
     """
 
     by_joint: Mapping[str, float]
+    fastest: float
 
 
 LONGEST = 60.0
@@ -102,7 +104,7 @@ class ServoOrders:
         if message.displacements:
             ways = _by_name(names, message.displacements, 'displacements')
             self.capped = ''
-            return Displacements(ways)
+            return Displacements(ways, self.scales.joint * self.scales.override)
         if not 0.0 <= message.duration <= LONGEST:
             raise CommandError(f'duration {message.duration} s: 0 (the time-out) to {LONGEST:g}')
         speeds = _by_name(names, message.velocities, 'velocities')
