@@ -22,6 +22,7 @@ from ..exceptions import ModelError, NotReadyError, ServoError
 from ..set_point import Source
 from .aimer import Aimer
 from .desk import Desk
+from .refusals import Refusals
 from .ros_numbers import seconds
 from .servo_modes import CommandKind, ServoModes
 from .servo_orders import Displacements, Order, ServoOrders
@@ -33,9 +34,6 @@ Convert = Callable[[Any], Order | Displacements]
 
 FRESH = 0.5
 """Silence after which a command begins a new motion, which may take drives back, in [s]."""
-
-REMEMBERED = 0.5
-"""How long a refusal is told in the status in [s]."""
 
 FUTURE = 0.1
 """How far ahead of this clock a stamp may be in [s]."""
@@ -65,8 +63,7 @@ class Servo:
         self._modes = ServoModes(node, self._stop)
         self.orders = ServoOrders(TfListener(node, desk.model), parameters, read_scales(node))
         self._last = -FRESH
-        self._refusal = ('', 0.0)
-        self._logged = ''
+        self._refusals = Refusals()
         self._status = node.create_publisher(ServoStatus, parameters.status_topic, 10)
         for kind, message, topic, convert in (
             (CommandKind.TWIST, TwistStamped, parameters.twist_topic, self.orders.twist),
@@ -116,10 +113,10 @@ class Servo:
         if error is not None:
             self._refuse(str(error))
         else:
-            self._refusal = ('', 0.0)
+            self._refusals.clear()
 
     def _refuse(self, reason: str) -> None:
-        self._refusal = (reason, time.monotonic())
+        self._refusals.note(reason, time.monotonic())
 
     def _stop(self, reason: str) -> None:
         def stop(core: MotionCore, _now: float) -> None:
@@ -148,13 +145,14 @@ class Servo:
             return self.orders.scales
 
     def _publish_status(self) -> None:
-        refusal, since = self._refusal
-        if time.monotonic() - since > REMEMBERED:
-            refusal = ''
-        snapshot = self._desk.snapshot
-        age = time.monotonic() - snapshot.time
-        code, words = status_of(snapshot, refusal, self._modes.paused, self.orders.capped, age)
-        if refusal and refusal != self._logged:
-            self._node.get_logger().warning(f'refused: {refusal}')
-        self._logged = refusal or self._logged
+        now, snapshot = time.monotonic(), self._desk.snapshot
+        code, words = status_of(
+            snapshot,
+            self._refusals.fresh(now),
+            self._modes.paused,
+            self.orders.capped,
+            now - snapshot.time,
+        )
+        if reason := self._refusals.to_log(now):
+            self._node.get_logger().warning(f'refused: {reason}')
         self._status.publish(ServoStatus(code=code, message=words))

@@ -1,0 +1,61 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Why the last command was refused: for the status as long as it is fresh, for the log once."""
+
+from __future__ import annotations
+
+import math
+import re
+
+REMEMBERED = 0.5
+"""How long a refusal is told in the status in [s]."""
+
+FORGOTTEN = 5.0
+"""Time without a refusal after which one that was logged is logged again in [s]."""
+
+NUMBERS = re.compile(r'\d+(\.\d+)?')
+"""What differs from message to message of one stream, such as the age of its stamps."""
+
+
+class Refusals:
+    """Remembers the last refusal; any thread may note one, a single thread tells."""
+
+    def __init__(self) -> None:
+        """Nothing was refused yet."""
+        self._last = ('', -math.inf)
+        self._logged = ('', -math.inf)
+
+    def note(self, reason: str, now: float) -> None:
+        """Note why a command was refused.
+
+        Args:
+            reason: Why, with the remedy.
+            now: Steady time in [s].
+        """
+        self._last = (reason, now)
+
+    def clear(self) -> None:
+        """Note that a command was taken."""
+        self._last = ('', -math.inf)
+
+    def fresh(self, now: float) -> str:
+        """Return the refusal for the status; empty when there is none.
+
+        Args:
+            now: Steady time in [s].
+        """
+        reason, since = self._last
+        return reason if now - since <= REMEMBERED else ''
+
+    def to_log(self, now: float) -> str:
+        """Return the refusal if it is not in the log; one that differs in numbers only is.
+
+        Args:
+            now: Steady time in [s].
+        """
+        reason = self.fresh(now)
+        if not reason:
+            return ''
+        kind, (logged, seen) = NUMBERS.sub('', reason), self._logged
+        self._logged = (kind, now)
+        return '' if kind == logged and now - seen < FORGOTTEN else reason
