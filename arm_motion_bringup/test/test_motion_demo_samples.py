@@ -40,6 +40,13 @@ def sample(time: float, jerk: Array, stamp: float | None = None, late: float = 0
     )
 
 
+def state(cycle: int, position: float, velocity: float, acceleration: float) -> Sample:
+    """Return a state of one joint."""
+    rest = np.zeros(1)
+    values = np.array([[position], [velocity], [acceleration]])
+    return Sample(cycle * PERIOD, values[0], values[1], values[2], rest, 1.0, rest, rest)
+
+
 @given(
     jerk=st.lists(st.floats(1.0, 90.0), min_size=1, max_size=7).map(np.array),
     begin=st.integers(1, 40),
@@ -47,12 +54,14 @@ def sample(time: float, jerk: Array, stamp: float | None = None, late: float = 0
     delay=st.floats(-0.009, 0.3),
 )
 def test_late_stamps_do_not_matter(jerk: Array, begin: int, cycles: int, delay: float) -> None:
-    """The motion tells how many cycles lie between two states, and so its jerk."""
+    """The motion tells how many cycles lie between two states; none is taken for a jump."""
     first = sample(begin * PERIOD, jerk)
     end = (begin + cycles) * PERIOD
     second = sample(end, jerk, end + delay)
     assert cycles_between(first, second, PERIOD) == cycles
     limits = 2.0 * jerk
+    assert peak_jerk([first, second], PERIOD, limits) < 1.0
+    second = sample(end, jerk)
     assert peak_jerk([first, second], PERIOD, limits) == pytest.approx(0.5, rel=1e-6)
 
 
@@ -62,10 +71,46 @@ def test_too_much_jerk_is_seen() -> None:
     assert peak_jerk(states, PERIOD, np.array([100.0, 5.0])) == pytest.approx(2.0)
 
 
+@pytest.mark.parametrize(
+    ('what', 'jump'), [('position', 0.1), ('velocity', 0.3), ('acceleration', 20.0)]
+)
+@pytest.mark.parametrize('speed', [0.0, 0.5])
+def test_a_set_point_that_jumps_is_seen(what: str, jump: float, speed: float) -> None:
+    """A jump of the position, a stop at once, and an acceleration out of nothing."""
+    states = []
+    position = 0.0
+    for n in range(20):
+        now = {'position': position, 'velocity': speed, 'acceleration': 0.0}
+        if n == 10:
+            now[what] += jump
+        states.append(state(n, now['position'], now['velocity'], now['acceleration']))
+        position += speed * PERIOD
+    limit = np.array([100.0])
+    jumps = [n for n in range(19) if peak_jerk(states[n : n + 2], PERIOD, limit) > 1.0]
+    assert jumps == [9, 10]
+
+
+@given(
+    jerks=st.lists(st.floats(-50.0, 50.0), min_size=6, max_size=30),
+    skipped=st.sets(st.integers(0, 29)),
+)
+def test_a_motion_within_its_jerk_is_within_it(jerks: list[float], skipped: set[int]) -> None:
+    """Whatever the jerk is from cycle to cycle, and whichever states get lost."""
+    position = velocity = acceleration = 0.0
+    states = []
+    for n, jerk in enumerate(jerks):
+        if n not in skipped:
+            states.append(state(n, position, velocity, acceleration))
+        position += velocity * PERIOD + acceleration * PERIOD**2 / 2 + jerk * PERIOD**3 / 6
+        velocity += acceleration * PERIOD + jerk * PERIOD**2 / 2
+        acceleration += jerk * PERIOD
+    assert peak_jerk(states, PERIOD, np.array([50.0])) <= 1.0 + 1e-6
+
+
 def test_the_same_cycle_twice_is_no_jerk() -> None:
     """A state that is published again says nothing new."""
-    state = sample(0.1, np.array([10.0]))
-    assert peak_jerk([state, state], PERIOD, np.array([1.0])) == 0.0
+    same = sample(0.1, np.array([10.0]))
+    assert peak_jerk([same, same], PERIOD, np.array([1.0])) == 0.0
 
 
 @given(
