@@ -11,8 +11,22 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from quad_bringup.demo.itinerary import itinerary, one_round, SHORTEST, STANDSTILL, Velocity
+from quad_bringup.demo.itinerary import (
+    itinerary,
+    one_round,
+    share_of,
+    SHORTEST,
+    STANDSTILL,
+    Velocity,
+)
 from quad_bringup.demo.rhythm import Beat
+from quad_controller.gait.body import BodyPose
+from quad_controller.gait.generator import GaitGenerator
+from quad_controller.gait.parameters import GaitParameters
+from quad_controller.gait.schedule import Gait
+from quad_controller.gait.velocity import Velocity as GaitVelocity
+from quad_controller.model.quadruped import quadruped
+from quad_description import robot_urdf
 
 
 @given(st.floats(SHORTEST, 1000.0))
@@ -31,6 +45,22 @@ def test_without_an_end_there_is_round_after_round() -> None:
     names = [each.name for each in itertools.islice(itinerary(None), 9)]
     assert names[:4] == names[4:8]
     assert names[8] == 'walk'
+
+
+@pytest.mark.parametrize('gait', list(Gait))
+def test_no_gait_is_asked_for_more_than_it_can(gait: Gait) -> None:
+    """The controller walks every velocity of a round as it is asked for."""
+    robot, parameters = quadruped(robot_urdf()), GaitParameters()
+    for stretch in one_round(20.0, share_of(gait.value)):
+        generator = GaitGenerator(robot, parameters)
+        generator.choose(gait)
+        wanted = stretch.velocity
+        generator.step(
+            GaitVelocity(wanted.forward, wanted.left, wanted.turn), BodyPose(), None, 0.02
+        )
+        assert (generator.gait, generator.clamped) == (gait, False)
+    walk = one_round(20.0, share_of(gait.value))[0].velocity
+    assert walk.forward > 0.6 * parameters.top_speed(gait)
 
 
 @pytest.mark.parametrize('duration', [0.0, -1.0, SHORTEST - 0.1, math.nan])

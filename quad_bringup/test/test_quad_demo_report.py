@@ -56,6 +56,14 @@ def test_a_robot_that_moves_as_told_is_no_problem() -> None:
         assert words in text
 
 
+def test_a_slow_robot_that_stands_has_not_walked() -> None:
+    """What may be missing of a crawl is less than the whole of it."""
+    crawl = Stretch('walk', Velocity(forward=0.04), 8.0)
+    stands, walks = (Measured(crawl, Velocity(forward=speed), None) for speed in (0.0, 0.03))
+    assert 'walk: commanded +0.040' in problems(GOOD, [stands])[0]
+    assert problems(GOOD, [walks]) == []
+
+
 @pytest.mark.parametrize(
     ('moved', 'words'),
     [

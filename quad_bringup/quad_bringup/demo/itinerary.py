@@ -8,6 +8,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 import itertools
 
+from quad_controller.gait.parameters import GaitParameters
+from quad_controller.gait.schedule import Gait
+
 SHORTEST = 6.0
 """Least duration in [s] in which every stretch can show something."""
 SETTLING = 1.0
@@ -31,6 +34,10 @@ class Velocity:
     forward: float = 0.0
     left: float = 0.0
     turn: float = 0.0
+
+    def scaled(self, share: float) -> Velocity:
+        """Return a share of it."""
+        return Velocity(share * self.forward, share * self.left, share * self.turn)
 
 
 STANDSTILL = Velocity()
@@ -62,29 +69,43 @@ SHARES = (
     ('strafe', Velocity(left=0.1), 0.25),
     ('stop', STANDSTILL, 0.1),
 )
-"""Stretches of a round, with their share of its time; speeds that the XGO's gait is made for."""
+"""Stretches of a round, with their share of its time; speeds that the XGO's trot is made for."""
 
 
-def one_round(duration: float) -> list[Stretch]:
+def share_of(gait: str) -> float:
+    """Return how fast a gait is, compared with a trot.
+
+    Args:
+        gait: Its name.
+    """
+    top_speed = GaitParameters().top_speed
+    return top_speed(Gait(gait)) / top_speed(Gait.TROT)
+
+
+def one_round(duration: float, share: float = 1.0) -> list[Stretch]:
     """Plan a round.
 
     Args:
         duration: Its time in [s].
+        share: Of the velocities of a trot.
 
     Raises:
         ValueError: That is too short to show anything.
     """
     if not duration >= SHORTEST:
         raise ValueError(f'{duration:g} s is too short; the demo needs {SHORTEST:g} s')
-    return [Stretch(name, velocity, share * duration) for name, velocity, share in SHARES]
+    return [
+        Stretch(name, velocity.scaled(share), part * duration) for name, velocity, part in SHARES
+    ]
 
 
-def itinerary(duration: float | None) -> Iterator[Stretch]:
+def itinerary(duration: float | None, share: float = 1.0) -> Iterator[Stretch]:
     """Say what comes after what.
 
     Args:
         duration: Time in [s] for one round; None for rounds without end.
+        share: Of the velocities of a trot.
     """
     if duration is not None:
-        return iter(one_round(duration))
-    return itertools.cycle(one_round(USUAL))
+        return iter(one_round(duration, share))
+    return itertools.cycle(one_round(USUAL, share))

@@ -17,7 +17,7 @@ from quad_description import LEGS
 from ..exceptions import BringupError
 from ..session import add_arguments, Session, session
 from .figures import Figures
-from .itinerary import SHORTEST
+from .itinerary import share_of, SHORTEST
 from .play import Client, Play
 from .view import QuadView
 
@@ -73,13 +73,14 @@ def commands(port: str) -> list[str]:
     ]
 
 
-def run(quad: Session, mode: str, duration: float | None) -> int:
+def run(quad: Session, mode: str, duration: float | None, share: float) -> int:
     """Run the demo.
 
     Args:
         quad: The quadruped, prepared.
         mode: Mode in which it walks.
         duration: How long it walks in [s]; None until Ctrl-C.
+        share: Of the velocities of a trot.
 
     Returns:
         0, or 1 when something went wrong.
@@ -89,7 +90,7 @@ def run(quad: Session, mode: str, duration: float | None) -> int:
         view=QuadView(quad.title, LEGS),
         figures=Figures(),
         commands=commands(quad.port),
-        make_play=lambda display: Play(display, mode, duration),
+        make_play=lambda display: Play(display, mode, duration, share),
         make_client=partial(join_ros, quad.joints),
         endless=duration is None,
     )
@@ -105,10 +106,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         0 when all went well, 1 when something did not, 2 when nothing was started.
     """
     arguments = parse(argv)
-    mode = 'walk' if arguments.policy is None else 'policy'
+    geometric = arguments.policy is None
+    mode, share = ('walk', share_of(arguments.gait)) if geometric else ('policy', 1.0)
     try:
         with session(arguments, None) as quad:
-            return run(quad, mode, arguments.duration)
+            return run(quad, mode, arguments.duration, share)
     except (BringupError, SupervisorError) as error:
         sys.stderr.write(f'{error}\n')
         return USAGE_ERROR

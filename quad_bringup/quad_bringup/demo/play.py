@@ -67,15 +67,19 @@ class Client(play.Client, Protocol):
 class Play(play.Play[Client]):
     """Lets the robot walk."""
 
-    def __init__(self, display: Display[Figures], mode: str, duration: float | None) -> None:
+    def __init__(
+        self, display: Display[Figures], mode: str, duration: float | None, share: float = 1.0
+    ) -> None:
         """Prepare; nothing happens yet.
 
         Args:
             display: Where it is shown.
             mode: Mode in which it walks.
             duration: How long it walks in [s]; None until :meth:`leave`.
+            share: Of the velocities of a trot.
         """
         super().__init__(display)
+        self._share = share
         self._mode = mode
         self._duration = duration
         self._measured: list[Measured] = []
@@ -87,7 +91,7 @@ class Play(play.Play[Client]):
         self._moving.set()
         client.watch_tilt()
         self._reach(client, self._mode, self._mode)
-        for stretch in itinerary(self._duration):
+        for stretch in itinerary(self._duration, self._share):
             if self.left:
                 break
             self._go(client, stretch)

@@ -15,6 +15,8 @@ LINEAR_TOLERANCE = 0.04
 """Greatest difference of commanded and measured speed in [m/s]."""
 TURN_TOLERANCE = 0.2
 """Greatest difference of commanded and measured rate in [rad/s]."""
+TOLERANCE_SHARE = 0.5
+"""The same as a share of what was commanded: a slow robot that stands has not walked."""
 TILT_LIMIT = math.radians(15.0)
 """A body that leaned more than this in [rad] did not walk, it stumbled."""
 LOWEST_RATE = 45.0
@@ -136,8 +138,14 @@ def _wrong_speed(each: Measured) -> Iterator[str]:
         yield f'{name}: nobody says how the robot moved, neither ground truth nor /odom'
         return
     linear = math.hypot(speed.forward - wanted.forward, speed.left - wanted.left)
-    if not linear <= LINEAR_TOLERANCE or not abs(speed.turn - wanted.turn) <= TURN_TOLERANCE:
+    linear_tolerance = _tolerance(LINEAR_TOLERANCE, math.hypot(wanted.forward, wanted.left))
+    turn_tolerance = _tolerance(TURN_TOLERANCE, abs(wanted.turn))
+    if not linear <= linear_tolerance or not abs(speed.turn - wanted.turn) <= turn_tolerance:
         yield f'{name}: commanded {velocity_text(wanted)}, but moved {velocity_text(speed)}'
+
+
+def _tolerance(most: float, wanted: float) -> float:
+    return min(most, TOLERANCE_SHARE * wanted) if wanted else most
 
 
 def _wrong_body(figures: Figures) -> Iterator[str]:
