@@ -45,7 +45,7 @@ def test_without_feedback_steps_are_on_schedule() -> None:
 @settings(max_examples=30)
 @given(
     offset=st.floats(0.0, 0.019),
-    jitter=st.lists(st.floats(0.0, 0.0015), min_size=200, max_size=220),
+    jitter=st.lists(st.floats(0.0, 0.0012), min_size=200, max_size=220),
 )
 def test_with_feedback_steps_follow_arrivals(offset: float, jitter: list[float]) -> None:
     """After a second of getting in step, every arrival is used at once."""

@@ -10,7 +10,7 @@ stays the nominal one, within a few per cent of a feedback that is faster or slo
 
 from __future__ import annotations
 
-WINDOW = 0.1  # periods before and after its time in which feedback makes a step
+WINDOW = 0.08  # periods before and after its time in which feedback makes a step
 GAIN = 0.2  # share of its distance from the schedule that an arrival draws the schedule by
 
 
