@@ -81,7 +81,7 @@ class CyclicPosition(Mode):
         self._units.position_to_device(setpoint)
         self._streamed = setpoint
 
-    def step(self, now: float, period: float, statusword: int) -> Controlword:
+    def step(self, now: float, period: float, statusword: int) -> int:
         """Write the streamed set-point, or the profile's; a stream that ends is braked."""
         if self._streamed is not None:
             self._profile.follow(self._streamed, period)
@@ -96,4 +96,4 @@ class InterpolatedPosition(CyclicPosition):
     """Mode 7: as mode 8, into 0x60C1:1, with bit 4 enabling the interpolation."""
 
     number = OperationMode.INTERPOLATED_POSITION
-    bits = Controlword.ENABLE_INTERPOLATION
+    bits = int(Controlword.ENABLE_INTERPOLATION)

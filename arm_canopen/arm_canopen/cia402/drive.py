@@ -11,7 +11,7 @@ from ..exceptions import DriveError, SdoError
 from ..master.events import Severity
 from ..master.remote_node import RemoteNode
 from ..master.scheduler import Scheduler, Task
-from ..standard.drive import Controlword, DriveState, mode_title, OperationMode, Statusword
+from ..standard.drive import DriveState, mode_title, OperationMode, Statusword
 from .cyclic_position import CyclicPosition
 from .feed_forward import FeedForward
 from .moded_drive import ModedDrive
@@ -20,6 +20,8 @@ from .motion import AxisFeedback, Setpoint
 from .observed_drive import FAULTY
 from .state_machine import Command, fault_reset, next_command
 from .target_limits import check_feed_forward
+
+FOLLOWS_COMMAND = int(Statusword.FOLLOWS_COMMAND)
 
 
 class Drive(ModedDrive):
@@ -179,8 +181,8 @@ class Drive(ModedDrive):
         self.halt.release()
         self._streamed = True
 
-    def _send(self, command: Command, bits: Controlword = NO_BITS) -> None:
-        self._controlword = int(command) | int(bits)
+    def _send(self, command: Command, bits: int = NO_BITS) -> None:
+        self._controlword = int(command) | bits
         self.objects.controlword.write(self._controlword)
         self.objects.mode.write(int(self.mode.number))
 
@@ -194,10 +196,12 @@ class Drive(ModedDrive):
 
     def _watch_following(self) -> None:
         """Bit 12 of the cyclic modes: a drive that has followed and does not any more is said."""
-        cyclic = self.mode.cyclic
-        bit = bool(self.objects.statusword & Statusword.FOLLOWS_COMMAND)
-        before, self._follows = self._follows, self.obeys and cyclic and bit
-        if before and not bit and self.obeys and cyclic:
+        if not (self.mode.cyclic and self.obeys):
+            self._follows = False
+            return
+        bit = bool(self.statusword & FOLLOWS_COMMAND)
+        before, self._follows = self._follows, bit
+        if before and not bit:
             self.released('the drive does not follow its set-points (bit 12)')
             self.warn(f'does not follow its set-points any more (bit 12): {self.describe()}')
 

@@ -35,6 +35,16 @@ class DriveObjects:
         """Return the index of an object of the profile for this axis."""
         return index + self._offset
 
+    def observe(self) -> tuple[int, float] | None:
+        """Return statusword and position in [inc], None before the drive has sent its state.
+
+        For the cycle: everything is looked at once.
+        """
+        word, position = self._statusword.value, self._position.value
+        if word is None or position is None or self._mode.value is None:
+            return None
+        return int(word), position
+
     @property
     def known(self) -> bool:
         """Whether the drive has sent its state, mode and position."""

@@ -7,6 +7,7 @@ from __future__ import annotations
 from ..standard.drive import Controlword, OperationMode
 from .modes import Mode, NO_BITS
 
+HALT_BIT = int(Controlword.HALT)
 RESUME_TIMEOUT = 2.5  # [s] for which a halted drive may take to acknowledge a set-point
 
 
@@ -48,9 +49,9 @@ class Halt:
         if self.held:
             self._ends_in = mode
 
-    def bits(self, mode: Mode) -> Controlword:
+    def bits(self, mode: Mode) -> int:
         """Return bit 8 for a drive that is moved, or was moved last, by a mode."""
-        return Controlword.HALT if self.held and mode.halts_by_bit else NO_BITS
+        return HALT_BIT if self.held and mode.halts_by_bit else NO_BITS
 
     def advance(self, now: float, mode: Mode) -> bool:
         """End it where that is due, for a drive that obeys a mode.

@@ -7,7 +7,7 @@ from __future__ import annotations
 from ..config.model import DriveConfig
 from ..master.remote_node import RemoteNode
 from ..master.scheduler import Scheduler
-from ..standard.drive import Controlword, DriveState, OperationMode
+from ..standard.drive import DriveState, OperationMode
 from .cyclic_position import CyclicPosition
 from .mode_table import build_modes
 from .modes import Mode, NO_BITS
@@ -110,9 +110,9 @@ class ModedDrive(ObservedDrive):
         """
         check_target(self.name, self.mode, self.parameters, target)
 
-    def _step_mode(self, now: float, period: float) -> Controlword:
+    def _step_mode(self, now: float, period: float) -> int:
         """Advance the mode by a cycle, and the halt; return their bits of the controlword."""
-        bits = self.mode.step(now, period, self.objects.statusword)
+        bits = self.mode.step(now, period, self.statusword)
         if not self.halt.advance(now, self.mode):
             self.mode.brake()
             self.warn(
@@ -124,7 +124,7 @@ class ModedDrive(ObservedDrive):
             self.mode.preload(self._actual())  # from there it goes on
         return bits | halt
 
-    def _hold_without_target(self) -> Controlword:
+    def _hold_without_target(self) -> int:
         """Preload what may act on the drive later, and keep up a halt while modes change."""
         held = self.holding_mode
         if not self._keeps_target:

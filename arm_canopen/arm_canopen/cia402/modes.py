@@ -16,7 +16,7 @@ from typing import NamedTuple
 from ..exceptions import DriveError
 from ..standard.drive import Controlword, OperationMode
 
-NO_BITS = Controlword(0)
+NO_BITS = 0  # bits are plain numbers in the cycle, where operators of IntFlag cost too much
 
 
 class Actual(NamedTuple):
@@ -62,7 +62,7 @@ class Mode(ABC):
         """
 
     @abstractmethod
-    def step(self, now: float, period: float, statusword: int) -> Controlword:
+    def step(self, now: float, period: float, statusword: int) -> int:
         """Advance one cycle in which the drive obeys, and return the bits of this mode.
 
         Args:
@@ -102,7 +102,7 @@ class NoMode(Mode):
         """Refuse every target."""
         raise DriveError('no mode of operation is selected; call ~/position_mode or another first')
 
-    def step(self, now: float, period: float, statusword: int) -> Controlword:
+    def step(self, now: float, period: float, statusword: int) -> int:
         """Command nothing."""
         return NO_BITS
 
@@ -128,6 +128,6 @@ class Homing(Mode):
         """Refuse every target."""
         raise DriveError('the drive is homing and takes no target')
 
-    def step(self, now: float, period: float, statusword: int) -> Controlword:
+    def step(self, now: float, period: float, statusword: int) -> int:
         """Keep bit 4 while homing runs."""
         return Controlword.HOMING_START if self.started else NO_BITS

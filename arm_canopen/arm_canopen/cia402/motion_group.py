@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -84,20 +84,19 @@ class MotionGroup:
             now: Steady time in [s].
             period: Time to the next cycle in [s].
         """
+        # whatever is wrong with one drive is told, and stops it; the others are served
         for drive in self.drives.values():
-            self._guard(drive, drive.read)
+            try:
+                drive.read()
+            except Exception as error:  # noqa: BLE001, PERF203
+                drive.fail(error)
         for attachment in list(self._attachments):
             self._run(attachment, now, period)
         for drive in self.drives.values():
-            self._guard(drive, partial(drive.write, now, period))
-
-    @staticmethod
-    def _guard(drive: Drive, step: Callable[[], None]) -> None:
-        """Take a step of one drive; whatever is wrong with it, the others are served."""
-        try:
-            step()
-        except Exception as error:  # noqa: BLE001  # told, and the drive is stopped
-            drive.fail(error)
+            try:
+                drive.write(now, period)
+            except Exception as error:  # noqa: BLE001, PERF203
+                drive.fail(error)
 
     def _run(self, attachment: Attachment, now: float, period: float) -> None:
         feedback = [drive.feedback() for drive in attachment.drives]

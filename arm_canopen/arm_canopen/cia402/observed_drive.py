@@ -11,7 +11,7 @@ from ..exceptions import CodecError, SdoError
 from ..master.events import EventKind, Severity
 from ..master.remote_node import RemoteNode
 from ..master.scheduler import Scheduler
-from ..standard.drive import DriveState, mode_title, statusword_text
+from ..standard.drive import drive_state, DriveState, mode_title, statusword_text
 from ..standard.emcy import error_code_text
 from ..standard.objects import Index
 from .drive_objects import DriveObjects
@@ -156,12 +156,15 @@ class ObservedDrive:
 
     def _observe(self) -> None:
         """Take state and position from the process image."""
-        if not self.node.operational or not self.objects.known:
+        seen = self.objects.observe() if self.node.operational else None
+        if seen is None:
             self._lose_sight()
             return
-        self._position = self.units.position_from_device(self.objects.position)
-        self._estimate.note(self._scheduler.now, self.objects.position)
-        self.state, self.statusword = self.objects.state, self.objects.statusword
+        word, position_inc = seen
+        self._position = self.units.position_from_device(position_inc)
+        self._estimate.note(self._scheduler.now, position_inc)
+        if word != self.statusword or self.state is DriveState.UNKNOWN:
+            self.state, self.statusword = drive_state(word), word
 
     def _lose_sight(self) -> None:
         self.state, self.statusword = DriveState.UNKNOWN, 0

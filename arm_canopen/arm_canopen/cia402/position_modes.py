@@ -13,9 +13,12 @@ import math
 from ..exceptions import DriveError
 from ..master.process_image import Writer
 from ..standard.drive import Controlword, OperationMode, Statusword
-from .modes import Actual, Mode, NO_BITS
+from .modes import Actual, Mode
 from .units import Units
 
+ACKNOWLEDGE = int(Statusword.SET_POINT_ACKNOWLEDGE)
+NEW_SET_POINT = int(Controlword.NEW_SET_POINT)
+CHANGE_IMMEDIATELY = int(Controlword.CHANGE_IMMEDIATELY)
 ACKNOWLEDGE_TIMEOUT = 1.0  # [s] a drive acknowledges a set-point within a few cycles
 QUEUE_MAX = 16  # moves that may wait for the drive
 EDGE_CYCLES = 3  # of SYNC in which a drive sees bit 4 change
@@ -39,16 +42,16 @@ class Move:
     blend: bool = False
 
     @property
-    def bits(self) -> Controlword:
+    def bits(self) -> int:
         """Bits of the controlword that say so."""
-        bits = NO_BITS
+        bits = Controlword(0)
         if self.relative:
             bits |= Controlword.RELATIVE
         if self.immediate:
             bits |= Controlword.CHANGE_IMMEDIATELY
         if self.blend:
             bits |= Controlword.CHANGE_ON_SET_POINT
-        return bits
+        return int(bits)
 
 
 class Handshake(Enum):
@@ -109,7 +112,7 @@ class ProfilePosition(Mode):
         self._target = target
         self._warn = warn
         self._queue: deque[Waiting] = deque()
-        self._bits = Controlword.CHANGE_IMMEDIATELY
+        self._bits = CHANGE_IMMEDIATELY
         self._offered_at = 0.0
         self._full_since: float | None = None
         self._imposed: Waiting | None = None
@@ -137,7 +140,7 @@ class ProfilePosition(Mode):
     def preload(self, actual: Actual) -> None:
         """Write the actual position as the target, without announcing it."""
         self._forget()
-        self._bits = Controlword.CHANGE_IMMEDIATELY
+        self._bits = CHANGE_IMMEDIATELY
         self._setpoint = self._reference = self._units.position_commanded(actual.position_inc)
         self._target.write(actual.position_inc)
 
@@ -184,9 +187,9 @@ class ProfilePosition(Mode):
             )
         self._queue.append(waiting)
 
-    def step(self, now: float, period: float, statusword: int) -> Controlword:
+    def step(self, now: float, period: float, statusword: int) -> int:
         """Advance the handshake."""
-        acknowledged = bool(statusword & Statusword.SET_POINT_ACKNOWLEDGE)
+        acknowledged = bool(statusword & ACKNOWLEDGE)
         if self.handshake is Handshake.OFFERED:
             self._watch_acknowledge(now, acknowledged=acknowledged)
         elif self.handshake is Handshake.WRITTEN:
@@ -202,7 +205,7 @@ class ProfilePosition(Mode):
             self._full_since = self._imposed = None
             self._hand_over(now, acknowledged=False)
         if self.handshake in (Handshake.OFFERED, Handshake.IMPOSED):
-            return self._bits | Controlword.NEW_SET_POINT
+            return self._bits | NEW_SET_POINT
         return self._bits
 
     def _forget(self) -> None:

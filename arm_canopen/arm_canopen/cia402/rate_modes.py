@@ -12,11 +12,11 @@ from abc import abstractmethod
 from collections.abc import Callable
 
 from ..master.process_image import Writer
-from ..standard.drive import Controlword, OperationMode
+from ..standard.drive import OperationMode
 from .modes import Actual, Mode, NO_BITS
 from .units import Units
 
-VL_RAMP = Controlword(0x70)
+VL_RAMP = 0x70
 """Bits 4 to 6 of the velocity mode: ramp enabled, not locked, reference used (CiA 402-2, 16.3)."""
 
 
@@ -43,7 +43,7 @@ class DriveRamped(Mode):
         """Command standstill; the drive makes the ramp."""
         self._target.write(0)
 
-    def step(self, now: float, period: float, statusword: int) -> Controlword:
+    def step(self, now: float, period: float, statusword: int) -> int:
         """Leave all to the drive."""
         return self.bits
 
@@ -119,7 +119,7 @@ class MasterRamped(Mode):
         """Ramp to zero."""
         self._goal = 0.0
 
-    def step(self, now: float, period: float, statusword: int) -> Controlword:
+    def step(self, now: float, period: float, statusword: int) -> int:
         """Advance the ramp."""
         change = self._slope() * period
         self._value += max(-change, min(change, self._goal - self._value))

@@ -31,6 +31,7 @@ from .scheduler import Scheduler, Task
 from .sdo_client import SdoClient
 from .startup import Startup
 
+WATCH_PERIOD = 0.005  # [s] between two looks at the life signs, which come at most so often
 DROP_PAUSE = 0.5  # [s] before a device that left Operational by itself is booted again
 
 CycleHook: TypeAlias = Callable[[float, float], None]
@@ -89,6 +90,7 @@ class Network:
         self._sync = SyncRound(self._feedback_complete, master.sync_window)
         self._sync_time = 0.0
         self._feedback_due = False
+        self._watch_at = 0.0
         self._sync_counter = SyncCounter(master.sync_overflow)
         self._heartbeat = HeartbeatProducer(master.node_id, master.heartbeat_producer, self.send)
         self._time = TimeProducer(
@@ -143,6 +145,9 @@ class Network:
     def advance(self, now: float) -> None:
         """Let time pass: timers, conditions, heartbeats that are overdue."""
         self.scheduler.advance(now)
+        if now < self._watch_at:
+            return
+        self._watch_at = now + WATCH_PERIOD
         for node in self.nodes.values():
             if node.watch(now):
                 self._start_boot(node, announced=False)
@@ -163,10 +168,11 @@ class Network:
         self._time.advance(now)
         if self.state is not NmtState.OPERATIONAL:
             return
+        send = self.send
         for node in self.nodes.values():
             if node.online:
                 for output in node.image.outputs:
-                    self.send(output.frame())
+                    send(output.frame())
         if self.config.master.sync_period > 0:
             self._send_sync(now)
 

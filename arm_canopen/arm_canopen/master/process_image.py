@@ -141,10 +141,12 @@ class Output:
         self.config = config
         self.codec = PdoCodec(config.mapping)
         self.values: list[Number] = [start(mapped) for mapped in config.mapping]
+        self._cob_id = config.cob_id
+        self._pack = self.codec.pack
 
     def frame(self) -> Frame:
         """Return the frame that carries the present values."""
-        return Frame(self.config.cob_id, self.codec.pack(self.values))
+        return Frame(self._cob_id, self._pack(self.values))
 
 
 class Reader(Protocol):

@@ -110,18 +110,22 @@ class PdoCodec:
         Raises:
             CodecError: A value does not fit its type, or their number is wrong.
         """
-        if len(values) != len(self.objects):
-            raise CodecError(f'the PDO has {len(self.objects)} objects, got {len(values)} values')
         if self._struct is not None:
             try:
-                return self._struct.pack(*values)
+                return self._struct.pack(*values)  # in each cycle, so nothing is checked twice
             except (struct.error, OverflowError) as error:
+                self._check_count(values)
                 raise CodecError(f'{list(values)} does not fit the mapping: {error}') from error
+        self._check_count(values)
         word, shift = 0, 0
         for entry, value in zip(self.objects, values, strict=True):
             word |= _to_bits(entry.data_type, value) << shift
             shift += entry.bits
         return word.to_bytes(self.size, 'little')
+
+    def _check_count(self, values: Sequence[Number]) -> None:
+        if len(values) != len(self.objects):
+            raise CodecError(f'the PDO has {len(self.objects)} objects, got {len(values)} values')
 
 
 def _from_bits(data_type: DataType, bits: int) -> Number:
