@@ -157,19 +157,34 @@ def _cancels_on_the_path(arm: MovingArm) -> None:
 
 
 def _slows_down(arm: MovingArm) -> None:
-    latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-    publisher = arm.client.node.create_publisher(
-        SpeedScalingFactor, f'{CONTROLLER}/speed_scaling_input', latched
-    )
-    publisher.publish(SpeedScalingFactor(factor=0.5))
     states = arm.client.listen(JointTrajectoryControllerState, f'{CONTROLLER}/controller_state')
-    arm.client.spin_until(
-        lambda: bool(states) and states[-1].speed_scaling_factor == 0.5, 10.0, 'half speed'
-    )
+    _scales(arm, states, 0.8, DurabilityPolicy.VOLATILE)
+    _scales(arm, states, 0.5, DurabilityPolicy.TRANSIENT_LOCAL)
     run = arm.send(goal_to(READY, 1.0))
     assert run.wait()[0] == GoalStatus.STATUS_SUCCEEDED
     times = [f.header.stamp.sec + 1e-9 * f.header.stamp.nanosec for f in run.feedback]
     assert times[-1] - times[0] > 1.5  # of 2 s
+
+
+def _scales(
+    arm: MovingArm,
+    states: Sequence[JointTrajectoryControllerState],
+    factor: float,
+    durability: DurabilityPolicy,
+) -> None:
+    """Set the speed as a controller that latches it does, or a person in a shell."""
+    publisher = arm.client.node.create_publisher(
+        SpeedScalingFactor,
+        f'{CONTROLLER}/speed_scaling_input',
+        QoSProfile(depth=1, durability=durability),
+    )
+    arm.client.spin_until(
+        lambda: publisher.get_subscription_count() > 0, 10.0, 'match of the publisher'
+    )
+    publisher.publish(SpeedScalingFactor(factor=factor))
+    arm.client.spin_until(
+        lambda: bool(states) and states[-1].speed_scaling_factor == factor, 10.0, f'{factor}'
+    )
 
 
 def _names_the_lost_drives(arm: MovingArm) -> None:

@@ -13,7 +13,7 @@ REMEMBERED = 0.5
 FORGOTTEN = 5.0
 """Time without a refusal after which one that was logged is logged again in [s]."""
 
-NUMBERS = re.compile(r'\d+(\.\d+)?')
+NUMBERS = re.compile(r'(?<![\w.])\d+(\.\d+)?')
 """What differs from message to message of one stream, such as the age of its stamps."""
 
 

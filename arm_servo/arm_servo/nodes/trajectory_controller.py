@@ -72,7 +72,8 @@ class TrajectoryController:
             JointTrajectoryControllerState, '~/controller_state', 10
         )
         node.create_subscription(JointTrajectory, '~/joint_trajectory', self._take, 10)
-        node.create_subscription(SpeedScalingFactor, '~/speed_scaling_input', self._scale, LATCHED)
+        for qos in (LATCHED, 1):  # who publishes it once from a shell does not latch it
+            node.create_subscription(SpeedScalingFactor, '~/speed_scaling_input', self._scale, qos)
         node.create_service(QueryTrajectoryState, '~/query_state', self._query)
         node.create_timer(1.0 / parameters.state_rate, self._publish_state)
         self._action = TrajectoryAction(
