@@ -17,7 +17,7 @@ from quad_description import movable_joints, robot_urdf
 from quad_hardware.doctor import Finding, Severity
 from quad_hardware.doctor.graph_checks import check_graph, Observation
 from quad_hardware.doctor.host_checks import check_environment, check_memory
-from quad_hardware.doctor.port_checks import check_port
+from quad_hardware.doctor.port_checks import check_port, port_users
 from quad_hardware.doctor.tree import links_without_place
 from quad_hardware.link import SerialPort
 from quad_hardware.protocol import OLD
@@ -121,6 +121,7 @@ def test_a_port_is_judged_by_what_answers(tmp_path: Path) -> None:
     with PtyPeer(tmp_path / 'port', OLD) as peer:
         path = str(peer.link)
         assert 'L-2.0.0, old protocol at 115200' in str(found(check_port(path), 'robot'))
+        assert 'at 80 %' in str(found(check_port(path), 'battery'))
         peer.behaviour.silent = True
         assert found(check_port(path), 'robot').severity is Severity.ERROR
         peer.behaviour.silent = False
@@ -145,6 +146,19 @@ def test_a_port_in_use_is_left_alone(isolation: Isolation, tmp_path: Path) -> No
                 assert '/joint_states: ' in process.output
                 assert 'controller_node, robot_state_publisher not running' in process.output
             assert running.is_running()
+
+
+def test_a_simulated_robot_is_asked(isolation: Isolation, tmp_path: Path) -> None:
+    """It keeps its own port open, which is no reason to leave it alone."""
+    link = tmp_path / 'xgo'
+    command = [executable('quad_hardware', 'fake_xgo'), '--no-ros', '--link', str(link)]
+    with RunningProcess(command, isolation.env) as robot:
+        robot.wait_for(f'at {link}')
+        assert list(port_users(os.path.realpath(link))) == []
+        findings = list(check_port(str(link)))
+        assert 'new protocol at 2000000 baud' in found(findings, 'robot').message
+        assert found(findings, 'battery').severity is Severity.GOOD
+        assert robot.is_running()
 
 
 def test_a_port_that_may_not_be_used(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

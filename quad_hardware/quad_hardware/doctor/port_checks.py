@@ -7,16 +7,20 @@ from __future__ import annotations
 from collections.abc import Iterator
 import os
 from pathlib import Path
+import re
 import stat
 
 from serial.tools import list_ports
 
+from ..estimation.battery import LOW_BATTERY
 from ..exceptions import LinkError, NoAnswerError
-from ..link import connect
+from ..link import ask_battery, connect
 from ..protocol import model_of_firmware, OLD
 from .finding import error, Finding, good, note, warning
 
 GROUP = 'dialout'
+PSEUDO_TERMINALS = Path('/dev/pts')
+_TERMINAL = re.compile(r'^tty-index:\s*(\d+)$', re.MULTILINE)
 
 
 def check_port(path: str) -> Iterator[Finding]:
@@ -45,7 +49,10 @@ def check_port(path: str) -> Iterator[Finding]:
 
 
 def port_users(device: str) -> Iterator[str]:
-    """Yield the programs that have a device open, as far as we may see them."""
+    """Yield the programs that have a device open, as far as we may see them.
+
+    A simulated robot that keeps its own port open is no user of it, but what answers there.
+    """
     for process in Path('/proc').glob('[0-9]*'):
         if int(process.name) == os.getpid():
             continue
@@ -54,8 +61,22 @@ def port_users(device: str) -> Iterator[str]:
             words = (process / 'cmdline').read_bytes().split(b'\0')
         except OSError:  # it ended, or is another user's
             continue
-        if device in files:
+        if device in files and not _makes(process, device):
             yield f'{_program(words)} (process {process.name})'
+
+
+def _makes(process: Path, device: str) -> bool:
+    """Tell whether a process has the other end of a pseudo-terminal: the robot's."""
+    number = Path(device).name
+    for entry in (process / 'fdinfo').iterdir():
+        try:
+            # proc(5): the number of the terminal that a multiplexer's descriptor leads to
+            found = _TERMINAL.search(entry.read_text(encoding='ascii'))
+        except OSError:  # it was closed meanwhile
+            continue
+        if found and Path(device).parent == PSEUDO_TERMINALS and found[1] == number:
+            return True
+    return False
 
 
 def _program(words: list[bytes]) -> str:
@@ -68,6 +89,8 @@ def _program(words: list[bytes]) -> str:
 def _ask(path: str) -> Iterator[Finding]:
     try:
         connection = connect(path)
+        with connection.port as port:
+            charge = ask_battery(port, connection.protocol)
     except NoAnswerError as problem:
         yield error(
             'robot',
@@ -79,10 +102,18 @@ def _ask(path: str) -> Iterator[Finding]:
     except LinkError as problem:
         yield error('robot', str(problem), 'see the message')
         return
-    protocol, port = connection.protocol, connection.port
-    port.close()
+    protocol = connection.protocol
     yield good('robot', f'{connection.firmware}, {protocol.name} protocol at {port.baud} baud')
     model = model_of_firmware(connection.firmware)
     if model is None and protocol is OLD:
         remedy = 'set the parameter model of hardware_node to mini, lite or wheeled'
         yield warning('firmware', 'its first letter names no quadruped', remedy)
+    yield _judge_battery(charge)
+
+
+def _judge_battery(charge: int | None) -> Finding:
+    if charge is None:
+        return warning('battery', 'the robot does not tell its charge', 'try once more')
+    if charge < LOW_BATTERY:
+        return warning('battery', f'at {charge} %', 'charge it: a weak robot falls')
+    return good('battery', f'at {charge} %')

@@ -12,6 +12,7 @@ from ..link.state import RobotState
 
 REPORTS = 25  # that the median is taken of: half a second
 EMPTY, FULL = 0.0, 100.0  # [%]
+LOW_BATTERY, EMPTY_BATTERY = 20.0, 10.0  # [%] below which it is to be charged, and useless
 
 
 @dataclass(frozen=True, slots=True)

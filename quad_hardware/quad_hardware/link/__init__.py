@@ -5,7 +5,7 @@
 from .dialect import DialectCounters
 from .driver import Driver, STALE_TIME
 from .port import SerialPort
-from .probe import ask, ask_firmware, connect, Connection
+from .probe import ask, ask_battery, ask_firmware, connect, Connection
 from .session import LinkOptions
 from .state import RobotState
 from .status import LinkState, LinkStatus
@@ -21,6 +21,7 @@ __all__ = [
     'RobotState',
     'SerialPort',
     'ask',
+    'ask_battery',
     'ask_firmware',
     'connect',
 ]

@@ -25,7 +25,7 @@ from .port import SerialPort
 
 ANSWER_TIME = 0.15  # [s] a robot takes a few milliseconds
 ATTEMPTS = 2
-FIRMWARE_SIZE = 10  # [B]
+FIRMWARE_SIZE, BATTERY_SIZE = 10, 1  # [B]
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,6 +91,22 @@ def ask_firmware(port: SerialPort, protocol: Protocol) -> str | None:
         answer = ask(port, protocol, request, FIRMWARE_SIZE, ANSWER_TIME)
         if answer is not None:
             return answer.rstrip(b'\0').decode('ascii', 'replace')
+    return None
+
+
+def ask_battery(port: SerialPort, protocol: Protocol) -> int | None:
+    """Return the charge of a robot [%], None when it does not answer.
+
+    Raises:
+        LinkError: The port was lost.
+    """
+    request = Frame(Kind.READ, Register.BATTERY, bytes((BATTERY_SIZE,)))
+    if protocol is NEW:
+        request = Frame(Kind.READ, Code.BATTERY)
+    for _ in range(ATTEMPTS):
+        answer = ask(port, protocol, request, BATTERY_SIZE, ANSWER_TIME)
+        if answer is not None:
+            return answer[0]
     return None
 
 

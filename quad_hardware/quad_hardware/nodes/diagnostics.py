@@ -10,10 +10,10 @@ import math
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
 from ..estimation import Health
+from ..estimation.battery import EMPTY_BATTERY, LOW_BATTERY
 from ..link import LinkState, LinkStatus, RobotState
 from ..protocol import Fault
 
-LOW_BATTERY, EMPTY_BATTERY = 20.0, 10.0  # [%]
 HOT_SERVO = 65.0  # [°C]
 GRAVITY_ERROR = math.radians(15.0)  # [rad] between accelerometer and attitude
 DAMAGE_SHARE = 0.01  # of the frames, above which a cable is bad
