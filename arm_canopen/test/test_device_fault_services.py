@@ -5,12 +5,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-import os
 import time
 from typing import Any
 
 from can_addresses import free_virtual
 from device_rig import drive_dictionary
+from isolation import Isolation
 import pytest
 
 from arm_canopen.can import Bus, open_bus
@@ -80,9 +80,9 @@ class Services:
 
 
 @pytest.fixture
-def services() -> Iterator[Services]:
+def services(isolation: Isolation) -> Iterator[Services]:
     """Three drives with their services."""
-    rclpy.init(domain_id=1 + os.getpid() % 90)
+    rclpy.init(domain_id=isolation.domain_id)
     name = free_virtual()
     try:
         with open_bus(name) as bus, open_bus(name) as other:

@@ -15,6 +15,7 @@ import time
 
 from can_addresses import free_multicast
 from device_rig import EDS
+from isolation import Isolation
 import pytest
 
 from arm_canopen.can import open_bus
@@ -24,6 +25,13 @@ rclpy = pytest.importorskip('rclpy')
 PACKAGE = Path(__file__).parents[1]
 ARTICLE = Path(__file__).parent / 'data' / 'panda' / 'bus.yml'
 ARRIVAL = 30.0  # [s] a deadline, no measure
+
+
+@pytest.fixture(autouse=True)
+def own_domain(isolation: Isolation, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let the processes have a ROS domain of their own."""
+    for name, value in isolation.env.items():
+        monkeypatch.setenv(name, value)
 
 
 @pytest.fixture
@@ -40,8 +48,6 @@ def start(node: str, **parameters: str | int) -> subprocess.Popen[str]:
     environment = {
         **os.environ,
         'PYTHONPATH': os.pathsep.join((str(PACKAGE), os.environ.get('PYTHONPATH', ''))),
-        'ROS_DOMAIN_ID': str(1 + os.getpid() % 90),
-        'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
     }
     return subprocess.Popen(
         [sys.executable, '-m', f'arm_canopen.nodes.{node}', '--ros-args', *arguments],

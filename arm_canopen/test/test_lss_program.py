@@ -12,6 +12,7 @@ import sys
 
 from can_addresses import free_multicast, free_virtual
 from device_rig import EDS, with_defaults
+from isolation import Isolation
 import pytest
 
 from arm_canopen.can import Bus, Frame, open_bus
@@ -56,6 +57,21 @@ def states(runner: DeviceRunner) -> list[LssState]:
     return runner.call(lambda: [device._lss.state for device in runner.host.devices]).result(
         DEADLINE
     )
+
+
+@pytest.mark.usefixtures('runner')
+def test_a_scan_of_the_bus_mentions_devices_without_node_id(
+    name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """They answer nothing else; once all have a node id, nothing is said."""
+    assert main(['scan', '--can', name, '--listen', '0.2']) == 0
+    captured = capsys.readouterr()
+    assert 'canopen lss scan tells which' in captured.err
+    assert [line.split()[0] for line in captured.out.splitlines()] == ['node', '5', '1']
+    assert main(['lss', 'set', '--node-id', '6', '--can', name]) == 0
+    capsys.readouterr()
+    assert main(['scan', '--can', name, '--listen', '0.2']) == 0
+    assert 'lss' not in capsys.readouterr().err
 
 
 def test_a_device_is_found_and_numbered(
@@ -153,6 +169,13 @@ def test_wrong_usage(
     assert message in capsys.readouterr().err
 
 
+@pytest.fixture(autouse=True)
+def own_domain(isolation: Isolation, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let the processes have a ROS domain of their own."""
+    for name, value in isolation.env.items():
+        monkeypatch.setenv(name, value)
+
+
 class Slave:
     """The program fake_slave without a node id."""
 
@@ -164,8 +187,6 @@ class Slave:
             env={
                 **os.environ,
                 'PYTHONPATH': os.pathsep.join((str(PACKAGE), os.environ.get('PYTHONPATH', ''))),
-                'ROS_DOMAIN_ID': str(1 + os.getpid() % 90),
-                'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
             },
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
