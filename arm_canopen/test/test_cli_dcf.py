@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import canopen
+from concise_reading import decode_concise, IncompleteError
 from config_samples import eds_text, load_text, write_bus
 from device_rig import drive_dictionary, Rig
 from hypothesis import given
@@ -17,7 +18,6 @@ import pytest
 from arm_canopen.cli.main import main
 from arm_canopen.config import BusConfig, load_bus, load_eds
 from arm_canopen.config.dcf_concise import (
-    decode_concise,
     device_writes,
     encode_concise,
     master_writes,
@@ -26,7 +26,6 @@ from arm_canopen.config.dcf_master import master_dcf
 from arm_canopen.config.eds_lint import lint_eds
 from arm_canopen.config.expected import expected_objects
 from arm_canopen.config.model import SdoWrite
-from arm_canopen.exceptions import CodecError
 
 REPOSITORY = Path(__file__).parents[2]
 PANDA = REPOSITORY / 'arm_bringup' / 'robots' / 'panda' / 'bus.yml'
@@ -243,9 +242,9 @@ def test_what_is_encoded_is_decoded(writes: list[SdoWrite]) -> None:
     data = encode_concise(writes)
     assert decode_concise(data) == writes
     for length in range(len(data)):
-        with pytest.raises(CodecError):
+        with pytest.raises(IncompleteError):
             decode_concise(data[:length])
-    with pytest.raises(CodecError, match='1 bytes stand behind'):
+    with pytest.raises(IncompleteError, match='1 bytes stand behind'):
         decode_concise(data + b'\0')
 
 

@@ -6,12 +6,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from concise_reading import decode_concise
 from config_samples import eds_text
 import pytest
 from virtual_network import bus_config, VirtualNetwork
 
 from arm_canopen.config import BusConfig, load_bus
-from arm_canopen.config.dcf_concise import decode_concise, device_writes, encode_concise
+from arm_canopen.config.dcf_concise import device_writes, encode_concise
 from arm_canopen.config.expected import expected_objects
 from arm_canopen.config.model import NodeConfig
 from arm_canopen.master.events import Severity

@@ -58,33 +58,41 @@ def add_parser(parsers: SubParsers) -> None:
         description='Give a device a node id or a bit rate. Without --address and --only it is '
         'the first one without node id that fast scan finds.',
     )
-    setting.add_argument(
-        '--node-id', type=node_id, metavar='N', help='1 to 127; it must not be taken'
-    )
-    setting.add_argument('--bitrate', type=bitrate, help='in bit/s, e.g. 500000 or 500k')
-    setting.add_argument('--store', action='store_true', help='keep it without power')
-    setting.add_argument(
-        '--activate',
-        type=seconds,
-        metavar='S',
-        help='have the device take the bit rate after so many seconds of silence',
-    )
     setting.set_defaults(run=run_set)
+    _add_settings(setting)
     for verb in (scan, inquire, setting):
         add_bus_argument(verb)
         verb.add_argument(
             '--timeout', type=seconds, default=TIMEOUT, metavar='S', help='for an answer, in s'
         )
-    for verb in (inquire, setting):
-        which = verb.add_mutually_exclusive_group(required=verb is inquire)
-        which.add_argument(
-            '--address',
-            type=whole_number,
-            nargs=4,
-            metavar=('VENDOR', 'PRODUCT', 'REVISION', 'SERIAL'),
-            help='the device with these numbers',
-        )
-        which.add_argument('--only', action='store_true', help='the only device on the bus')
+    _add_choice(inquire, required=True)
+    _add_choice(setting, required=False)
+
+
+def _add_settings(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        '--node-id', type=node_id, metavar='N', help='1 to 127; it must not be taken'
+    )
+    parser.add_argument('--bitrate', type=bitrate, help='in bit/s, e.g. 500000 or 500k')
+    parser.add_argument('--store', action='store_true', help='keep it without power')
+    parser.add_argument(
+        '--activate',
+        type=seconds,
+        metavar='S',
+        help='have the device take the bit rate after so many seconds of silence',
+    )
+
+
+def _add_choice(parser: argparse.ArgumentParser, *, required: bool) -> None:
+    which = parser.add_mutually_exclusive_group(required=required)
+    which.add_argument(
+        '--address',
+        type=whole_number,
+        nargs=4,
+        metavar=('VENDOR', 'PRODUCT', 'REVISION', 'SERIAL'),
+        help='the device with these numbers',
+    )
+    which.add_argument('--only', action='store_true', help='the only device on the bus')
 
 
 def run_scan(options: argparse.Namespace) -> int:

@@ -12,6 +12,7 @@ from ..can import Frame, open_bus
 from ..config import load_bus
 from ..config.model import BusConfig, Identity, NodeConfig
 from ..exceptions import SdoError
+from ..master.lss_master import LssMaster
 from ..standard.cob_id import CobId, NODE_ID_MAX, NODE_ID_MIN
 from ..standard.nmt import NmtState
 from ..standard.objects import Index
@@ -107,6 +108,7 @@ def run(options: argparse.Namespace) -> int:
             _find_silent(session, found)
             for device in found.values():
                 _identify(session, device)
+            _ask_for_unnumbered(session)
         return _show(found, config, asked=options.ask or not session.masters)
 
 
@@ -156,6 +158,15 @@ def _find_silent(session: Session, found: dict[int, Found]) -> None:
     session.listeners.remove(note)
     for node_id in sorted(answered & set(asked)):
         found.setdefault(node_id, Found(node_id, session.states.get(node_id))).answers = True
+
+
+def _ask_for_unnumbered(session: Session) -> None:
+    """Say it when there is a device that no node id reaches, as it has none (CiA 305)."""
+    master = LssMaster(session.scheduler, session.send)
+    session.listeners.append(master.receive)
+    if session.run(master.has_unconfigured()):
+        remark('there is a device without node id; canopen lss scan tells which')
+    session.listeners.remove(master.receive)
 
 
 def _identify(session: Session, device: Found) -> None:

@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 import struct
 
-from ..exceptions import CodecError
 from ..standard.cob_id import COB_ID_INVALID
 from ..standard.datatypes import DataType, encode, Value
 from ..standard.objects import Index
@@ -34,31 +33,6 @@ def encode_concise(writes: Iterable[SdoWrite]) -> bytes:
     """Return a concise DCF."""
     entries = [ENTRY.pack(w.index, w.subindex, len(w.data)) + w.data for w in writes]
     return COUNT.pack(len(entries)) + b''.join(entries)
-
-
-def decode_concise(data: bytes) -> list[SdoWrite]:
-    """Read a concise DCF.
-
-    Raises:
-        CodecError: It ends too early, or goes on behind its end.
-    """
-    if len(data) < COUNT.size:
-        raise CodecError(f'a concise DCF has at least {COUNT.size} bytes, got {len(data)}')
-    (count,) = COUNT.unpack_from(data)
-    position = COUNT.size
-    writes: list[SdoWrite] = []
-    while len(writes) < count:
-        start = position + ENTRY.size
-        if start > len(data):
-            raise CodecError(f'the concise DCF ends within entry {len(writes) + 1} of {count}')
-        index, subindex, size = ENTRY.unpack_from(data, position)
-        position = start + size
-        if position > len(data):
-            raise CodecError(f'the concise DCF ends within the data of 0x{index:04X}')
-        writes.append(SdoWrite(index, subindex, data[start:position]))
-    if position != len(data):
-        raise CodecError(f'{len(data) - position} bytes stand behind the last of {count} entries')
-    return writes
 
 
 def device_writes(
