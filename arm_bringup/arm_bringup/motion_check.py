@@ -32,7 +32,7 @@ def check_motion(robot: Robot, urdf: str, joints: Sequence[str]) -> list[Finding
         joints: Names of the movable joints in it.
     """
     try:
-        from arm_servo import load_limits, RobotModel, ServoError
+        from arm_servo import LimitsError, load_limits, ModelError, RobotModel
     except ImportError as problem:
         return [
             warning(
@@ -43,11 +43,20 @@ def check_motion(robot: Robot, urdf: str, joints: Sequence[str]) -> list[Finding
         ]
     try:
         limits = load_limits(robot.limits)
-        findings = list(_limits(robot, limits, joints))
+    except LimitsError as problem:
+        return [error(robot.limits.name, str(problem), 'write it as robots/gp110/limits.yaml is')]
+    findings = list(_limits(robot, limits, joints))
+    try:
         model = RobotModel(urdf, robot.semantic.read_text(encoding='utf-8'), limits)
-    except ServoError as problem:
-        remedy = 'description, SRDF and limits must name the same joints; see robots/gp110/'
-        return [error(f'{robot.semantic.name} and {robot.limits.name}', str(problem), remedy)]
+    except LimitsError as problem:
+        remedy = (
+            'give each joint of the group max_velocity, max_acceleration and max_jerk, none wider'
+            f' than in {robot.description.name}'
+        )
+        return [*findings, error(robot.limits.name, str(problem), remedy)]
+    except ModelError as problem:
+        remedy = f'name links and joints as {robot.description.name} does; see robots/gp110/'
+        return [*findings, error(robot.semantic.name, str(problem), remedy)]
     findings += [
         warning(robot.semantic.name, note, 'mend it, or leave it') for note in model.notes
     ]
@@ -101,6 +110,8 @@ def _start(robot: Robot, model: RobotModel) -> Iterable[Finding]:
 
 
 def _controllers(robot: Robot, model: RobotModel) -> Iterable[Finding]:
+    from arm_servo import check_parameters
+
     if not robot.controllers.is_file():
         return
     place = robot.controllers.name
@@ -109,7 +120,8 @@ def _controllers(robot: Robot, model: RobotModel) -> Iterable[Finding]:
         manager = table.get('controller_manager', {}).get('ros__parameters', {})
         name = manager.get('controller_name', f'{model.group}_controller')
         constraints = table.get(name, {}).get('ros__parameters', {}).get('constraints', {})
-    except (yaml.YAMLError, AttributeError) as problem:
+        refused = check_parameters(model, table)
+    except (yaml.YAMLError, AttributeError, TypeError) as problem:
         yield error(place, f'not a parameter file: {problem}', 'see robots/gp110/controllers.yaml')
         return
     if name not in table:
@@ -122,3 +134,6 @@ def _controllers(robot: Robot, model: RobotModel) -> Iterable[Finding]:
                 f'group {model.group} has no joint {joint!r}',
                 f'joints: {", ".join(model.joints)}',
             )
+    for node, reason in refused:
+        remedy = 'mend it: the node would end with these words; README of arm_servo has them all'
+        yield error(f'{place}, {node}', reason, remedy)

@@ -54,8 +54,18 @@ def test_nothing_is_wrong_with_our_robots(name: str) -> None:
             '',
             [(ERROR, 'collide')],
         ),
+        ('gp110.srdf', 'name="joint_5_b" v', 'name="joint_5" v', [(WARNING, 'has joint_5,')]),
         ('controllers.yaml', 'joint_6_t:', 'joint_6:', [(ERROR, "no joint 'joint_6'")]),
         ('controllers.yaml', 'gp110_arm_controller:\n', 'arm:\n', [(WARNING, 'no parameters')]),
+        ('controllers.yaml', 'goal_time: 0', 'goal_tim: 0', [(ERROR, "'constraints.goal_time'")]),
+        ('controllers.yaml', ' linear: 0.4', ' linea: 0.4', [(ERROR, "'moveit_servo.scale.lin")]),
+        ('controllers.yaml', 'state_publish_rate', 'state_publish_rat', [(ERROR, 'publish_rate')]),
+        ('controllers.yaml', '{trajectory: 0.1', '{trajectory: fast', [(ERROR, "'fast'")]),
+        ('controllers.yaml', 'goal_time: 0.6', 'goal_time: -1', [(ERROR, 'goal_time is -1')]),
+        ('controllers.yaml', 'in_type: unitless', 'in_type: knots', [(ERROR, "'knots'")]),
+        ('controllers.yaml', '  ros__parameters:', '  - ros__parameters:', [(ERROR, 'file')]),
+        ('limits.yaml', 'max_jerk', 'max_jrk', [(ERROR, "'max_jrk'")]),
+        ('limits.yaml', 'joint_limits:', 'joint_limits: [', [(ERROR, 'limits.yaml')]),
     ],
 )
 def test_each_mistake_is_found(
@@ -67,6 +77,25 @@ def test_each_mistake_is_found(
     for severity, words in expected:
         assert any(each.severity is severity and words in str(each) for each in found), found
     assert all(each.place and each.remedy for each in found)
+
+
+@pytest.mark.parametrize(
+    ('file', 'old', 'new', 'remedy'),
+    [
+        ('limits.yaml', 'max_velocity: 2.44', 'max_velocity: 9.', 'none wider'),
+        ('limits.yaml', 'max_jerk:', 'max_speed:', 'max_jerk'),
+        ('limits.yaml', 'joint_limits:', 'limits:', 'robots/gp110/limits.yaml'),
+        ('gp110.srdf', '"tool0"', '"tool9"', 'links and joints'),
+    ],
+)
+def test_the_remedy_is_for_the_file_that_is_the_matter(
+    robot: Robot, file: str, old: str, new: str, remedy: str
+) -> None:
+    """A person is sent to the file to be mended."""
+    replace(robot.folder / file, old, new)
+    (found,) = check_robot(robot)
+    assert found.place == file
+    assert remedy in found.remedy
 
 
 def test_without_the_files_of_motion(robot: Robot) -> None:

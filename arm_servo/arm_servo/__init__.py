@@ -7,12 +7,21 @@ from __future__ import annotations
 from .bounds import BrakeSettings
 from .core import MotionCore
 from .core_settings import CoreSettings
-from .exceptions import CommandError, GoalCode, GoalError, ModelError, NotReadyError, ServoError
+from .exceptions import (
+    CommandError,
+    GoalCode,
+    GoalError,
+    LimitsError,
+    ModelError,
+    NotReadyError,
+    ServoError,
+)
 from .execution import Execution, ExecutionSettings, Feedback, Outcome, Phase
 from .goal import GoalPoint, GoalRules, JointTolerance, TrajectoryGoal
 from .limits import JointLimits, load_limits
 from .model import Pose, RobotModel
 from .otg import MotionState
+from .parameter_check import check_parameters
 from .report import Cause, Limiter, MotionReport
 from .servo import ServoSettings
 from .set_point import SetPoint, Source
@@ -34,6 +43,7 @@ __all__ = [
     'JointLimits',
     'JointTolerance',
     'Limiter',
+    'LimitsError',
     'ModelError',
     'MotionCore',
     'MotionReport',
@@ -48,5 +58,6 @@ __all__ = [
     'SetPoint',
     'Source',
     'TrajectoryGoal',
+    'check_parameters',
     'load_limits',
 ]

@@ -6,6 +6,7 @@
 
     ServoError
     ├── ModelError (ValueError)     description, SRDF and limits do not make an arm
+    │   └── LimitsError             the limits file is the matter
     ├── CommandError (ValueError)   a command is refused before anything moves
     │   └── GoalError               a trajectory is refused; carries the code of the action
     └── NotReadyError               nothing can be commanded before the arm's position is known
@@ -38,6 +39,14 @@ class ModelError(ServoError, ValueError):
 
     Scenarios: a joint of the group has no acceleration limit, the group is unknown, the tip link
     is misspelt, a pose of the SRDF is beyond a limit.
+    """
+
+
+class LimitsError(ModelError):
+    """The limits file cannot be read, or does not have what it must.
+
+    Scenarios: a joint without max_jerk, a speed that is wider than the description's, a number
+    that is none.
     """
 
 

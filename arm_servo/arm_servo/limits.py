@@ -29,7 +29,7 @@ import numpy as np
 import yaml
 
 from .arrays import Array, frozen, Mask
-from .exceptions import ModelError
+from .exceptions import LimitsError
 
 KEYS = {
     'velocity': ('max_velocity',),
@@ -95,22 +95,22 @@ class JointRange:
     velocity: float
 
 
-def load_limits(path: Path) -> Mapping[str, Any]:
+def load_limits(path: Path | str) -> Mapping[str, Any]:
     """Read the ``joint_limits`` of a limits file.
 
     Args:
         path: The file.
 
     Raises:
-        ModelError: The file cannot be read, or has no table ``joint_limits``.
+        LimitsError: The file cannot be read, or has no table ``joint_limits``.
     """
     try:
-        document = yaml.safe_load(path.read_text(encoding='utf-8'))
+        document = yaml.safe_load(Path(path).read_text(encoding='utf-8'))
     except (OSError, yaml.YAMLError) as error:
-        raise ModelError(f'{path}: {error}') from error
+        raise LimitsError(f'{path}: {error}') from error
     table = document.get('joint_limits') if isinstance(document, dict) else None
     if not isinstance(table, dict):
-        raise ModelError(f'{path}: there is no table joint_limits')
+        raise LimitsError(f'{path}: there is no table joint_limits')
     return table
 
 
@@ -125,7 +125,7 @@ def merge_limits(
         table: The limits file's entries by joint; others than the group's are passed over.
 
     Raises:
-        ModelError: A joint is missing, a number is missing, not positive, misspelt or wider than
+        LimitsError: A joint is missing, a number is missing, not positive, misspelt or wider than
             the description's.
     """
     rows = [_row(name, ranges[name], table) for name in names]
@@ -141,12 +141,12 @@ def _row(
     entry = table.get(name)
     if not isinstance(entry, dict):
         known = ', '.join(table) or 'none'
-        raise ModelError(f'joint {name} is missing in the limits file, which has: {known}')
+        raise LimitsError(f'joint {name} is missing in the limits file, which has: {known}')
     if unknown := sorted(set(entry) - KNOWN):
-        raise ModelError(f'joint {name}: unknown key {unknown[0]!r} in the limits file')
+        raise LimitsError(f'joint {name}: unknown key {unknown[0]!r} in the limits file')
     velocity = _positive(name, entry, 'velocity', span.velocity)
     if velocity > span.velocity * (1 + SLACK):
-        raise ModelError(
+        raise LimitsError(
             f'joint {name}: max_velocity {velocity:g} is wider than the description'
             f' ({span.velocity:g}); a limits file may only narrow'
         )
@@ -165,7 +165,7 @@ def _positive(name: str, entry: Mapping[str, Any], kind: str, default: float | N
     if not entry.get(f'has_{kind}_limits', key in entry):
         if default is not None:
             return default
-        raise ModelError(f'joint {name}: the limits file lacks {key}; motion is limited in it')
+        raise LimitsError(f'joint {name}: the limits file lacks {key}; motion is limited in it')
     return _number(name, entry, key, least=0.0)
 
 
@@ -174,12 +174,12 @@ def _span(name: str, entry: Mapping[str, Any], span: JointRange) -> tuple[float,
         return span.lower, span.upper
     lower, upper = (_number(name, entry, key) for key in KEYS['position'])
     if lower < span.lower - SLACK or upper > span.upper + SLACK:
-        raise ModelError(
+        raise LimitsError(
             f'joint {name}: positions {lower:g}..{upper:g} are wider than the description'
             f' ({span.lower:g}..{span.upper:g}); a limits file may only narrow'
         )
     if lower >= upper:
-        raise ModelError(
+        raise LimitsError(
             f'joint {name}: min_position {lower:g} is not below max_position {upper:g}'
         )
     return lower, upper
@@ -188,7 +188,7 @@ def _span(name: str, entry: Mapping[str, Any], span: JointRange) -> tuple[float,
 def _number(name: str, entry: Mapping[str, Any], key: str, least: float = -math.inf) -> float:
     value = entry.get(key)
     if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise ModelError(f'joint {name}: {key} is {value!r}, a number is needed')
+        raise LimitsError(f'joint {name}: {key} is {value!r}, a number is needed')
     if not math.isfinite(value) or value <= least:
-        raise ModelError(f'joint {name}: {key} is {value}, a positive number is needed')
+        raise LimitsError(f'joint {name}: {key} is {value}, a positive number is needed')
     return float(value)

@@ -281,7 +281,9 @@ def _poses(
     found: dict[str, Array] = {}
     for name, pose in poses.items():
         if missing := [joint for joint in limits.names if joint not in pose]:
-            notes.append(f'pose {name!r} of the SRDF lacks joint {missing[0]}; left out')
+            other = ', '.join(sorted(set(pose) - set(limits.names)))
+            has = f', and has {other}, which the group has not' if other else ''
+            notes.append(f'pose {name!r} of the SRDF lacks joint {missing[0]}{has}; left out')
             continue
         values = frozen([pose[joint] for joint in limits.names])
         outside = (values < limits.lower) | (values > limits.upper)

@@ -15,6 +15,22 @@ from .desk import Desk
 from .trajectory_parameters import RATES
 
 
+def declare_broadcaster(node: Node) -> tuple[str, float, bool]:
+    """Declare frame and rate [Hz] of the messages, and whether dynamic ones are published.
+
+    Args:
+        node: The node.
+    """
+    read = ParameterReader(node)
+    return (
+        read.text('frame_id', 'base_link', 'frame of the messages'),
+        read.number('update_rate', 50.0, RATES, 'rate of the messages [Hz]'),
+        read.flag(
+            'publish_dynamic_joint_states', 'publish /dynamic_joint_states too', default=True
+        ),
+    )
+
+
 class JointStateBroadcaster:
     """Publishes what the drives measure.
 
@@ -33,12 +49,7 @@ class JointStateBroadcaster:
         """
         self.active = active
         self._node, self._desk = node, desk
-        read = ParameterReader(node)
-        self._frame = read.text('frame_id', 'base_link', 'frame of the messages')
-        self.rate = read.number('update_rate', 50.0, RATES, 'rate of the messages [Hz]')
-        self._is_dynamic = read.flag(
-            'publish_dynamic_joint_states', 'publish /dynamic_joint_states too', default=True
-        )
+        self._frame, self.rate, self._is_dynamic = declare_broadcaster(node)
         self._joints = list(desk.model.joints)
         self._states = node.create_publisher(JointState, '/joint_states', 10)
         self._dynamic = node.create_publisher(DynamicJointState, '/dynamic_joint_states', 10)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from rclpy.node import Node
 
 from arm_canopen import run_master
-from node_runner import destroyed_if_refused, ParameterReader, refuse_misspelt
+from node_runner import destroyed_if_refused, refuse_misspelt
 
 from ..core import MotionCore
 from ..core_settings import CoreSettings
@@ -24,7 +24,7 @@ from .controller_manager import ControllerManager, trajectory_entry
 from .desk import Desk
 from .drive_source import DriveSource
 from .joint_state_broadcaster import JointStateBroadcaster
-from .robot_parameters import declare_robot, same_robot
+from .robot_parameters import declare_manager, declare_robot, same_robot
 from .servo import Servo
 from .servo_parameters import declare_servo
 from .trajectory_controller import TrajectoryController
@@ -61,13 +61,7 @@ class Motion:
     def _build(self, make_node: Callable[[str], Node]) -> None:
         self._manager = manager = make_node('controller_manager')
         model = declare_robot(manager)
-        read = ParameterReader(manager)
-        name = read.text(
-            'controller_name', f'{model.group}_controller', 'name of the trajectory controller'
-        )
-        broadcasts = read.flag(
-            'publish_joint_states', 'publish /joint_states and /dynamic_joint_states', default=True
-        )
+        name, broadcasts = declare_manager(manager, model)
         self._check_drives(self._master, model.joints)
         controller, servo = make_node(name), make_node('servo_node')
         broadcaster = make_node('joint_state_broadcaster')

@@ -7,12 +7,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 import sys
 
-from node_runner import ParameterReader
-
 from ..core_settings import CoreSettings
 from .controller_manager import ControllerManager, trajectory_entry
 from .motion_thread import MotionThread
-from .robot_parameters import declare_robot
+from .robot_parameters import declare_manager, declare_robot
 from .standalone import declare_loop, make_loop, MakeNode, run_standalone
 from .topic_output import ARRAY, declare_output
 from .trajectory_controller import TrajectoryController
@@ -25,9 +23,7 @@ OUTPUT = '/forward_position_controller/commands'
 def _build(make_node: MakeNode) -> MotionThread:
     manager = make_node('controller_manager')
     model = declare_robot(manager)
-    name = ParameterReader(manager).text(
-        'controller_name', f'{model.group}_controller', 'name of the trajectory controller'
-    )
+    name, _ = declare_manager(manager, model)
     node = make_node(name)
     trajectory = declare_trajectory(node, model.joints)
     loop = declare_loop(node, '')
