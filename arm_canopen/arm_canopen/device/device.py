@@ -9,39 +9,35 @@ from collections.abc import Callable, Mapping
 from ..can.frame import Frame
 from ..standard.cob_id import CobId, NODE_ID_MAX, NODE_ID_MIN
 from ..standard.dictionary import ObjectDictionary
-from ..standard.lss import LSS_REQUEST, UNCONFIGURED
+from ..standard.lss import UNCONFIGURED
 from ..standard.nmt import NmtCommand, NmtState
 from ..standard.objects import AXIS_OFFSET, Index
 from ..standard.sdo import Abort
+from .contact import Contact
 from .drive import Drive
 from .drive_fault import SharedErrors
 from .emcy_producer import EmcyProducer
 from .fault_injector import FaultInjector
-from .fault_line import FaultLine, Service, Traffic
-from .guarding import GuardedNode
-from .heartbeat import HeartbeatConsumer, HeartbeatProducer
+from .fault_line import FaultLine, Traffic
+from .heartbeat import HeartbeatProducer
 from .lss_slave import LssSlave
 from .nmt_slave import boot_up_frame, NmtSlave
 from .object_store import ObjectStore
 from .parameter_memory import ParameterMemory
 from .parameter_storage import ParameterStorage
-from .rpdo import RpdoEngine
+from .rpdo import Handler, RpdoEngine
 from .sdo_servers import SdoServers
+from .services import Services
 from .servo import ServoModel
 from .sync_consumer import SyncConsumer
 from .time_consumer import TimeConsumer
 from .timed import Timed
 from .tpdo import TpdoEngine
 
-Handler = Callable[[Frame, float], None]
-
-HEARTBEAT_ERROR = 0x8130
 SYNC_LENGTH_ERROR = 0x8240
 COMMUNICATION_OBJECTS = (0x1000, 0x1FFF)
 AXES_MAX = 8  # in a device (CiA 402-1)
 ALL_OBJECTS = (0x0000, 0xFFFF)
-ERROR_STATES: dict[int, NmtState] = {0: NmtState.PRE_OPERATIONAL, 2: NmtState.STOPPED}
-"""Where a communication error leads from Operational (CiA 301, 7.5.2.33); 1 leads nowhere."""
 
 
 class Device:
@@ -91,55 +87,66 @@ class Device:
             raise ValueError(f'node id {node_id} is not {NODE_ID_MIN} to {NODE_ID_MAX}')
         self._memory = memory or ParameterMemory()
         self._dictionary = dictionary
-        self.first_id = node_id
-        node_id = self._memory.node_id or node_id
-        self.node_id = node_id
-        self.handlers: Mapping[int, Handler] = {}
-        self.store = ObjectStore(dictionary.for_node(node_id))
-        self._line = FaultLine(send, self._send_abort, self._identify)
-        self._send = send = self._line.send
         self._handlers_changed = handlers_changed
-        store = self.store
-        self._nmt = NmtSlave(node_id, self, boot_time)
-        self._errors = EmcyProducer(store, send)
-        self._sync = SyncConsumer(store, self._on_sync, self._on_sync_length, self._subscribe)
+        self.first_id = node_id
+        self.node_id = self._memory.node_id or node_id
+        self.handlers: Mapping[int, Handler] = {}
+        self.store = ObjectStore(dictionary.for_node(self.node_id))
+        self._line = FaultLine(send, self._send_abort, self._identify)
+        self._send = self._line.send
+        self._nmt = NmtSlave(self.node_id, self, boot_time)
+        self._errors = EmcyProducer(self.store, self._send)
+        self._sync = SyncConsumer(self.store, self._on_sync, self._on_sync_length, self._subscribe)
+        self.drives = self._build_drives(servo or ServoModel())
+        self._build_services()
+        self.faults = FaultInjector(self, self._line)
+        self._powered_parts: list[Timed] = [
+            self.faults,
+            self._nmt,
+            self._sdo,
+            self._errors,
+            self._contact.consumer,
+            self._producer,
+            self._contact.guarding,
+            self._rpdos,
+            self._tpdos,
+            *self.drives,
+        ]
+        self._parts = self._powered_parts
+
+    def _build_drives(self, servo: ServoModel) -> tuple[Drive, ...]:
         shared = SharedErrors(self._errors)
-        self.drives: tuple[Drive, ...] = tuple(
-            Drive(store, shared, self._sync, servo or ServoModel(), number=axis)
+        return tuple(
+            Drive(self.store, shared, self._sync, servo, number=axis)
             for axis in range(AXES_MAX)
-            if (Index.CONTROLWORD + axis * AXIS_OFFSET, 0) in store
+            if (Index.CONTROLWORD + axis * AXIS_OFFSET, 0) in self.store
         )
+
+    def _build_services(self) -> None:
+        node_id, store, send, nmt = self.node_id, self.store, self._send, self._nmt
         self._sdo = SdoServers(node_id, store, send, self._subscribe)
-        self._producer = HeartbeatProducer(node_id, store, lambda: self._nmt.state, send)
-        self._consumer = HeartbeatConsumer(
-            store, self._on_heartbeat_lost, self._on_heartbeat_back, self._subscribe
-        )
-        self._guarding = GuardedNode(
-            node_id, store, lambda: self._nmt.state, send, self._on_guarding
+        self._producer = HeartbeatProducer(node_id, store, lambda: nmt.state, send)
+        self._contact = Contact(
+            store, nmt, self._errors, self.drives, send=send, subscribe=self._subscribe
         )
         self._storage = ParameterStorage(store, self._memory)
         self._storage.load()
-        self._lss = LssSlave(node_id, store, self._memory, send, self._nmt.initialise)
-        self._error_behaviour = store.integer(Index.ERROR_BEHAVIOUR, 1)
+        self._lss = LssSlave(node_id, store, self._memory, send, nmt.initialise)
         self.clock = TimeConsumer(store, self._subscribe)
         self._rpdos = RpdoEngine(
             store, self._on_pdo_changed, self._on_error, self._sync.window_closed
         )
         self._tpdos = TpdoEngine(store, self._on_pdo_changed, send)
-        self.faults = FaultInjector(self, self._line)
-        parts: list[Timed] = [
-            self.faults,
-            self._nmt,
+        self._services = Services(
+            nmt,
+            self._lss,
             self._sdo,
-            self._errors,
-            self._consumer,
-            self._producer,
-            self._guarding,
+            self._sync,
+            self.clock,
+            self._contact,
             self._rpdos,
             self._tpdos,
-        ]
-        self._powered_parts = [*parts, *self.drives]
-        self._parts: list[Timed] = self._powered_parts
+        )
 
     @property
     def drive(self) -> Drive | None:
@@ -200,7 +207,7 @@ class Device:
         self._tpdos.stop()
         for drive in self.drives:
             drive.reset(now)
-        self._guarding.reset()
+        self._contact.guarding.reset()
         self._lss.pending_id = self._memory.node_id or self.first_id
         self._nmt.switch_off()
         self._parts = [self.faults]
@@ -251,8 +258,7 @@ class Device:
                 drive.connection_lost(now)
                 for code in sorted(drive.faults):
                     self._errors.report(code, now)
-        self._consumer.reset()
-        self._guarding.reset()
+        self._contact.reset()
         self._subscribe()
 
     def nmt_changed(self, previous: NmtState, now: float) -> None:
@@ -277,20 +283,8 @@ class Device:
         self._subscribe()
 
     def _subscribe(self) -> None:
-        """Offer the services of the present NMT state (CiA 301, table 46)."""
-        state = self._nmt.state
-        handlers: dict[int, Handler] = {}
-        if self.powered:
-            handlers = {CobId.NMT: self._nmt.receive, LSS_REQUEST: self._lss.receive}
-        if state is not NmtState.BOOT_UP:
-            handlers.update(dict.fromkeys(self._consumer.can_ids, self._consumer.receive))
-        if state in (NmtState.PRE_OPERATIONAL, NmtState.OPERATIONAL):
-            handlers.update((can_id, self._on_sdo) for can_id in self._sdo.can_ids)
-            handlers[self._sync.can_id] = self._sync.receive
-            if self.clock.can_id is not None:
-                handlers[self.clock.can_id] = self.clock.receive
-        if state is NmtState.OPERATIONAL:
-            handlers.update(self._pdo_handlers())
+        """Offer the services of the present NMT state."""
+        handlers = self._services.handlers(self._on_sdo) if self.powered else {}
         if self._line.faults:
             guarded = self._line.guarded
             handlers = {can_id: guarded(handler) for can_id, handler in handlers.items()}
@@ -302,22 +296,9 @@ class Device:
         """Take another node id; all that follows from it is read again by the reset."""
         self.node_id = node_id
         self.store.renumber(self._dictionary.for_node(node_id))
-        for part in (self._nmt, self._sdo, self._producer, self._guarding, self._lss):
+        guarding = self._contact.guarding
+        for part in (self._nmt, self._sdo, self._producer, guarding, self._lss):
             part.node_id = node_id
-
-    def _pdo_handlers(self) -> dict[int, Handler]:
-        receivers: dict[int, list[Handler]] = {}
-        for rpdo in self._rpdos.active:
-            receivers.setdefault(rpdo.can_id, []).append(rpdo.receive)
-        return {can_id: self._rpdo_handler(*chain) for can_id, chain in receivers.items()}
-
-    def _rpdo_handler(self, *receivers: Handler) -> Handler:
-        def handle(frame: Frame, now: float) -> None:
-            for receive in receivers:
-                receive(frame, now)
-            self._tpdos.poll(now)
-
-        return handle
 
     def _refresh(self, now: float) -> None:
         """Let the objects hold the values of this time."""
@@ -326,20 +307,12 @@ class Device:
 
     def _on_remote(self, frame: Frame, now: float) -> None:
         if frame.can_id == CobId.HEARTBEAT + self.node_id:
-            self._guarding.request(now)
+            self._contact.guarding.request(now)
             return
         self._tpdos.request(frame.can_id, now)
 
     def _identify(self, frame: Frame, outgoing: bool) -> Traffic:
-        """Say what a frame is, for the faults of the line."""
-        can_id = frame.can_id
-        if can_id in (self._sdo.response_ids if outgoing else self._sdo.can_ids):
-            return Traffic(Service.SDO, outgoing)
-        if can_id == CobId.HEARTBEAT + self.node_id and any(frame.data):  # 0 says boot-up
-            return Traffic(Service.HEARTBEAT, outgoing)
-        engine = self._tpdos if outgoing else self._rpdos
-        number = 0 if frame.is_remote else engine.number_of(can_id)
-        return Traffic(Service.PDO if number else Service.OTHER, outgoing, number)
+        return self._services.identify(frame, outgoing)
 
     def _send_abort(self, abort: Abort) -> None:
         self._send(Frame(self._sdo.default.response_id, abort.encode()))
@@ -369,29 +342,3 @@ class Device:
 
     def _on_pdo_changed(self, _now: float) -> None:
         self._subscribe()
-
-    def _on_heartbeat_lost(self, node_id: int, now: float) -> None:
-        self._lose_contact(now, node_id)
-
-    def _on_guarding(self, lost: bool, now: float) -> None:
-        if lost:
-            self._lose_contact(now)
-        else:
-            self._regain_contact(now)
-
-    def _lose_contact(self, now: float, node_id: int = 0) -> None:
-        """React to a communication error as 0x1029:01 and the drive's 0x6007 say."""
-        self._errors.report(HEARTBEAT_ERROR, now, bytes((node_id, 0, 0, 0, 0)))
-        for drive in self.drives:
-            drive.connection_lost(now)
-        target = ERROR_STATES.get(self._error_behaviour.value)
-        if target is not None and self._nmt.state is NmtState.OPERATIONAL:
-            self._nmt.enter(target, now)
-
-    def _on_heartbeat_back(self, _node_id: int, now: float) -> None:
-        self._regain_contact(now)
-
-    def _regain_contact(self, now: float) -> None:
-        latched = any(HEARTBEAT_ERROR in drive.faults for drive in self.drives)
-        if not (latched or self._consumer.missing or self._guarding.lost):
-            self._errors.clear(HEARTBEAT_ERROR, now)

@@ -10,8 +10,9 @@ from collections.abc import Callable
 from ..can.frame import Frame
 from ..standard.dictionary import ObjectDictionary
 from ..standard.lss import UNCONFIGURED
-from .device import Device, Handler
+from .device import Device
 from .parameter_memory import ParameterMemory
+from .rpdo import Handler
 from .servo import ServoModel
 from .timed import NEVER, Timed
 

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from ..can.frame import Frame
 from ..standard.datatypes import DataType
@@ -17,6 +17,7 @@ from .timed import NEVER
 
 LENGTH_ERROR = 0x8210  # EMCY: PDO not processed due to length error
 TIMEOUT_ERROR = 0x8250  # EMCY: RPDO timeout
+Handler = Callable[[Frame, float], None]
 ErrorReport = Callable[[int, bool, float], None]
 ChannelReport = Callable[[PdoChannel, int, bool, float], None]
 
@@ -149,6 +150,15 @@ DUMMIES: dict[int, ObjectEntry] = {
 """Data types that may stand in the mapping of an RPDO for bytes to be skipped (CiA 301, 7.4.7)."""
 
 
+def _chained(receivers: Sequence[Handler], finished: Callable[[float], None]) -> Handler:
+    def handle(frame: Frame, now: float) -> None:
+        for receive in receivers:
+            receive(frame, now)
+        finished(now)
+
+    return handle
+
+
 class RpdoEngine:
     """All receive PDOs of a device.
 
@@ -225,6 +235,17 @@ class RpdoEngine:
     def number_of(self, can_id: int) -> int:
         """Return the number of the active PDO with an identifier, 0 when there is none."""
         return next((rpdo.number for rpdo in self.active if rpdo.can_id == can_id), 0)
+
+    def handlers(self, finished: Callable[[float], None]) -> dict[int, Handler]:
+        """Return what takes the frames of each identifier; several PDOs may share one.
+
+        Args:
+            finished: Called with the time when the objects have their new values.
+        """
+        receivers: dict[int, list[Handler]] = {}
+        for rpdo in self.active:
+            receivers.setdefault(rpdo.can_id, []).append(rpdo.receive)
+        return {can_id: _chained(chain, finished) for can_id, chain in receivers.items()}
 
     def _select(self) -> None:
         self.active = [rpdo for rpdo in self.channels if self._running and rpdo.enabled]
