@@ -29,16 +29,18 @@ READY = [0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785]
 CONTROLLER = '/panda_arm_controller'
 
 
-def robot_parameters(folder: Path) -> Path:
+def robot_parameters(folder: Path, semantic: str = '') -> Path:
     """Write what describes the Panda as a parameter file.
 
     Args:
         folder: Where to.
+        semantic: What is to stand in its SRDF besides.
     """
     robot = Path(get_package_share_directory('arm_bringup')) / 'robots' / 'panda'
+    srdf = (robot / 'panda.srdf').read_text(encoding='utf-8')
     values = {
         'robot_description': expand_xacro(robot / 'panda.urdf.xacro'),
-        'robot_description_semantic': (robot / 'panda.srdf').read_text(encoding='utf-8'),
+        'robot_description_semantic': srdf.replace('</robot>', f'{semantic}</robot>'),
         'joint_limits': str(robot / 'limits.yaml'),
     }
     path = folder / 'panda.json'  # JSON is YAML
@@ -49,11 +51,13 @@ def robot_parameters(folder: Path) -> Path:
 class MovingArm(SimulatedArm):
     """The Panda's drives and ``motion_master``, whose drives follow from :meth:`follow` on."""
 
-    def __init__(self, isolation: Isolation, folder: Path, *arguments: str) -> None:
-        """Start the processes and wait until all drives are booted."""
+    def __init__(
+        self, isolation: Isolation, folder: Path, *arguments: str, bus: Path | None = None
+    ) -> None:
+        """Start the processes and wait until all drives are booted; by default the Panda's bus."""
         self._parameters = robot_parameters(folder)
         self._extra = arguments
-        super().__init__(isolation)
+        super().__init__(isolation, bus)
 
     def start(self, name: str, *arguments: str) -> RunningProcess:
         """Start an executable; the master is the one with the motion core."""
