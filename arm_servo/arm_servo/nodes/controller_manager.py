@@ -75,7 +75,8 @@ class ControllerManager:
             if name not in self._controllers
         ]
         problems += [f'{name} is to be both active and inactive' for name in on if name in off]
-        strict = request.strictness != SwitchController.Request.BEST_EFFORT
+        # not set, it is 0, which upstream takes for best effort
+        strict = request.strictness not in {0, SwitchController.Request.BEST_EFFORT}
         response.message = '; '.join(problems)
         response.ok = not problems or not strict
         if not response.ok:

@@ -105,6 +105,8 @@ def make_loop(
         loop: How the loop runs.
         output: What is published.
     """
+    for note in model.notes:
+        node.get_logger().warning(note)
     desk = Desk(MotionCore(model, settings))
     feedback = JointFeedback(model.joints, loop.joint_timeout)
 
@@ -140,7 +142,10 @@ def run_standalone(
         Exit code: 0, or 1 when the arm cannot be built.
     """
     sys.setswitchinterval(SWITCH_INTERVAL)
-    return run_program(name, lambda stop: _serve(build, stop), ServoError, args=args)
+    code = run_program(name, lambda stop: _serve(build, stop), ServoError, args=args)
+    gc.unfreeze()
+    gc.collect()  # ruckig would list what is still there when the interpreter ends
+    return code
 
 
 def _serve(build: Callable[[MakeNode], MotionThread], stop: threading.Event) -> None:
