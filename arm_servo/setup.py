@@ -21,6 +21,7 @@ setup(
     license='Apache-2.0',
     entry_points={
         'console_scripts': [
+            'motion_controller = arm_servo.nodes.motion_controller:main',
             'motion_master = arm_servo.nodes.motion_master:main',
             'servo_node = arm_servo.nodes.servo_node:main',
             'trajectory_controller = arm_servo.nodes.trajectory_program:main',

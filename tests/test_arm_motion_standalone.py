@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack
 from itertools import pairwise
 import signal
 from typing import TYPE_CHECKING
@@ -12,79 +11,25 @@ from typing import TYPE_CHECKING
 from control_msgs.action import FollowJointTrajectory
 from control_msgs.msg import JointJog
 from controller_manager_msgs.srv import ListControllers, SwitchController
-from moving_arm import CONTROLLER, goal_to, GoalRun, READY, robot_parameters
-from processes import executable, RunningProcess
+from moving_arm import goal_to, GoalRun, READY
+from processes import RunningProcess
 import pytest
-from ros_client import RosClient
-from sensor_msgs.msg import JointState
-from simulated_arm import JOINTS
-from std_msgs.msg import Float64MultiArray
-from trajectory_msgs.msg import JointTrajectory
+from topic_arm import standalone, TopicArm
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from isolation import Isolation
-    from typing_extensions import Self
 
 pytestmark = pytest.mark.scenario
 
 RESULT = FollowJointTrajectory.Result
-
-
-class TopicArm:
-    """Drives that go where they are told and publish it, and one program that tells them."""
-
-    def __init__(
-        self, isolation: Isolation, folder: Path, program: str, *arguments: str, semantic: str = ''
-    ) -> None:
-        """Start the program, with more in its SRDF."""
-        self.moves = True
-        self.at = list(READY)
-        self.arrays: list[list[float]] = []
-        self.trajectories: list[JointTrajectory] = []
-        self._stack = ExitStack()
-        self.client = self._stack.enter_context(RosClient(isolation.domain_id))
-        node = self.client.node
-        self._states = node.create_publisher(JointState, '/joint_states', 10)
-        node.create_subscription(
-            Float64MultiArray, '/forward_position_controller/commands', self._take_array, 10
-        )
-        node.create_subscription(
-            JointTrajectory, f'{CONTROLLER}/joint_trajectory', self._take_trajectory, 10
-        )
-        self.speaking = node.create_timer(0.02, self._speak)
-        parameters = str(robot_parameters(folder, semantic))
-        command = [executable('arm_servo', program), '--ros-args', '--params-file', parameters]
-        command += [part for argument in arguments for part in ('-p', argument)]
-        self.process = self._stack.enter_context(RunningProcess(command, isolation.env))
-        self.process.wait_for('ready for commands')
-
-    def _speak(self) -> None:
-        self._states.publish(JointState(name=JOINTS, position=self.at))
-
-    def _take_array(self, message: Float64MultiArray) -> None:
-        self.arrays.append(list(message.data))
-        if self.moves:
-            self.at = self.arrays[-1]
-
-    def _take_trajectory(self, message: JointTrajectory) -> None:
-        assert list(message.joint_names) == JOINTS
-        self.at = list(message.points[0].positions)
-        self.trajectories.append(message)
-
-    def __enter__(self) -> Self:
-        """Use it in a with statement."""
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Stop the program."""
-        self._stack.close()
+READY_WORDS = 'ready for commands'
 
 
 def test_a_trajectory_goes_out_as_arrays(isolation: Isolation, tmp_path: Path) -> None:
     """Goals are reached; the controller is listed, switched off and on; lost states stop it."""
-    with TopicArm(isolation, tmp_path, 'trajectory_controller') as arm:
+    with TopicArm(isolation, standalone(tmp_path, 'trajectory_controller'), READY_WORDS) as arm:
         run = GoalRun(arm.client, goal_to([0.3, *READY[1:]], 1.0))
         reached = run.wait()[1]
         assert reached.error_code == RESULT.SUCCESSFUL, reached.error_string
@@ -112,9 +57,8 @@ def test_a_goal_that_the_arm_did_not_reach_is_no_success(
     isolation: Isolation, tmp_path: Path
 ) -> None:
     """A stuck arm is told without any tolerance asked for: at the goal, on a long way sooner."""
-    with TopicArm(
-        isolation, tmp_path, 'trajectory_controller', 'constraints.goal_time:=0.3'
-    ) as arm:
+    command = standalone(tmp_path, 'trajectory_controller', 'constraints.goal_time:=0.3')
+    with TopicArm(isolation, command, READY_WORDS) as arm:
         arm.moves = False
         near = GoalRun(arm.client, goal_to([0.1, *READY[1:]], 1.0)).wait()[1]
         assert near.error_code == RESULT.GOAL_TOLERANCE_VIOLATED
@@ -148,7 +92,8 @@ def test_jogging_goes_out_as_trajectories(isolation: Isolation, tmp_path: Path) 
     What is left out of the description is told, and at the end there are no words of libraries.
     """
     odd = '<group_state name="odd" group="panda_arm"><joint name="elbow" value="0"/></group_state>'
-    with TopicArm(isolation, tmp_path, 'servo_node', semantic=odd) as arm:
+    command = standalone(tmp_path, 'servo_node', semantic=odd)
+    with TopicArm(isolation, command, READY_WORDS) as arm:
         assert "pose 'odd' of the SRDF lacks joint panda_joint1, and has elbow" in (
             arm.process.output
         )
@@ -185,9 +130,7 @@ def test_a_program_that_cannot_begin_says_why(
     isolation: Isolation, tmp_path: Path, program: str, arguments: list[str], words: str
 ) -> None:
     """A wrong parameter ends it with exit code 1, and what is wrong is named."""
-    parameters = ['--params-file', str(robot_parameters(tmp_path))]
-    given = [part for argument in arguments for part in ('-p', argument)]
-    command = [executable('arm_servo', program), '--ros-args', *parameters, *given]
+    command = standalone(tmp_path, program, *arguments)
     with RunningProcess(command, isolation.env) as process:
         assert process.wait() == 1
         assert words in process.output

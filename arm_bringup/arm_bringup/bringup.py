@@ -32,7 +32,7 @@ from .session import (
     session,
     SIMULATED_BUS,
 )
-from .stack import controller_processes, MASTER
+from .stack import controller_process, MASTER
 
 
 def parse(argv: Sequence[str] | None) -> argparse.Namespace:
@@ -121,8 +121,8 @@ def _controllers(arguments: argparse.Namespace) -> int:
         write_parameters(parameters, expand_xacro(robot.description))
         files = motion_files(robot, Path(folder))
         _say(f'{robot.name}: trajectories and jogging for drives of another process')
-        processes = controller_processes(files, parameters, arguments.timeout, find_executable)
-        return supervise(processes).exit_code
+        process = controller_process(files, parameters, arguments.timeout, find_executable)
+        return supervise([process]).exit_code
 
 
 def _say(text: str) -> None:

@@ -23,6 +23,8 @@ MASTER = Executable('arm_canopen', 'master')
 """What runs the bus unless something else is asked for."""
 MOTION_MASTER = Executable('arm_servo', 'motion_master')
 """The master with the motion core inside: trajectories, jogging and /joint_states."""
+MOTION_CONTROLLER = Executable('arm_servo', 'motion_controller')
+"""Trajectories and jogging for drives that another process has."""
 MASTER_READY = r'all \d+ devices operational'
 """What the master logs when every drive of the bus has booted."""
 SLAVES_READY = r'\d+ simulated drives.* on '
@@ -30,7 +32,7 @@ SLAVES_READY = r'\d+ simulated drives.* on '
 PUBLISHER_READY = r'publishing \d+ joints'
 """What the publisher of /joint_states logs when it has subscribed to the drives."""
 CONTROLLER_READY = 'ready for commands'
-"""What trajectory_controller and servo_node log."""
+"""What motion_controller logs."""
 
 STATE_PUBLISHERS = (
     Executable('robot_state_publisher', 'robot_state_publisher'),
@@ -120,36 +122,28 @@ def _master(
     )
 
 
-def controller_processes(
+def controller_process(
     files: Sequence[Path], parameters: Path, ready_timeout: float, find: FindExecutable
-) -> list[ProcessSpec]:
-    """Say which processes move drives that another process has.
+) -> ProcessSpec:
+    """Say which process moves drives that another process has; that one makes /tf, too.
 
     Args:
         files: Parameter files of the nodes that move the arm.
         parameters: The file of :func:`process_supervisor.write_parameters`.
-        ready_timeout: How long each process may take to be ready in [s].
+        ready_timeout: How long it may take to be ready in [s].
         find: Finds executables.
 
     Raises:
         StartError: An executable is missing.
     """
-    specs = [
-        ProcessSpec(
-            name=name,
-            argv=(
-                *node_argv(Executable('arm_servo', program), find, {}, parameters),
-                *parameter_files(files),
-            ),
-            environment=LOG_FORMAT,
-            ready=CONTROLLER_READY,
-            ready_timeout=ready_timeout,
-            stop_order=MASTER_FIRST,
-        )
-        for name, program in (('controller', 'trajectory_controller'), ('servo', 'servo_node'))
-    ]
-    state_publisher = _state_publisher(parameters, find)
-    return specs if state_publisher is None else [*specs, state_publisher]
+    return ProcessSpec(
+        name='controller',
+        argv=(*node_argv(MOTION_CONTROLLER, find, {}, parameters), *parameter_files(files)),
+        environment=LOG_FORMAT,
+        ready=CONTROLLER_READY,
+        ready_timeout=ready_timeout,
+        stop_order=MASTER_FIRST,
+    )
 
 
 def parameter_files(files: Sequence[Path]) -> list[str]:

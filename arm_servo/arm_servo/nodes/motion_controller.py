@@ -1,0 +1,64 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""``ros2 run arm_servo motion_controller``: trajectories and jogging for drives elsewhere.
+
+On one motion core, so that they hand over to each other as in motion_master.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import sys
+
+from ..core_settings import CoreSettings
+from .controller_manager import ControllerManager, trajectory_entry
+from .motion_thread import MotionThread
+from .robot_parameters import declare_manager, declare_robot, same_robot
+from .servo import Servo
+from .servo_parameters import declare_servo
+from .standalone import declare_loop, make_loop, MakeNode, run_standalone
+from .topic_output import ARRAY, declare_output
+from .trajectory_controller import TrajectoryController
+from .trajectory_parameters import declare_trajectory
+from .trajectory_program import OUTPUT
+
+
+def _build(make_node: MakeNode) -> MotionThread:
+    manager = make_node('controller_manager')
+    model = declare_robot(manager)
+    name, _ = declare_manager(manager, model)
+    node, servo = make_node(name), make_node('servo_node')
+    same_robot(servo, model)
+    trajectory = declare_trajectory(node, model.joints)
+    jogging = declare_servo(servo, model.group)
+    loop = declare_loop(node, '')
+    output = declare_output(node, '', OUTPUT, ARRAY)
+    settings = CoreSettings(
+        jogging.settings,
+        trajectory.execution,
+        jogging.timeout,
+        check_self_collision=trajectory.check,
+    )
+    desk, thread = make_loop(node, model, settings, loop, output)
+    Servo(servo, desk, jogging, _nothing)
+    controller = TrajectoryController(node, desk, trajectory, _nothing)
+    entry = trajectory_entry(name, model.joints, loop.period, controller.set_active)
+    ControllerManager(manager, [entry])
+    return thread
+
+
+def _nothing() -> None:
+    """Prepare nothing: whoever has the drives keeps them."""
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run until Ctrl-C.
+
+    Args:
+        args: ROS arguments; None takes those of the process.
+    """
+    return run_standalone('motion_controller', _build, args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,48 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""``bringup --controller-only``: trajectories and jogging for drives of another process."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+import signal
+from typing import TYPE_CHECKING
+
+from control_msgs.action import FollowJointTrajectory
+from control_msgs.msg import JointJog
+from moving_arm import goal_to, GoalRun, READY
+from processes import executable
+import pytest
+from topic_arm import TopicArm
+
+if TYPE_CHECKING:
+    from isolation import Isolation
+
+pytestmark = pytest.mark.scenario
+
+
+def test_a_goal_and_a_jog_move_drives_elsewhere(isolation: Isolation) -> None:
+    """A goal is reached; a jog takes over from the next one, without a jump; it ends at rest."""
+    command = [executable('arm_bringup', 'bringup'), 'panda', '--controller-only']
+    with TopicArm(isolation, command, 'all is ready') as arm:
+        reached = GoalRun(arm.client, goal_to([0.3, *READY[1:]], 2.0)).wait()[1]
+        assert reached.error_code == 0, reached.error_string
+        assert arm.at[0] == pytest.approx(0.3, abs=1e-6)
+        run = GoalRun(arm.client, goal_to([1.0, *READY[1:]], 6.0))
+        arm.client.spin_until(lambda: arm.at[0] > 0.35, 10.0, 'motion')
+        publisher = arm.client.node.create_publisher(JointJog, '/servo_node/delta_joint_cmds', 10)
+        jog = JointJog(joint_names=['panda_joint1'], velocities=[-1.0])
+        arm.client.node.create_timer(0.02, lambda: publisher.publish(jog))
+        arm.client.spin_until(lambda: arm.at[0] < 0.2, 10.0, 'motion the other way')
+        result = run.wait()[1]
+        assert result.error_code == FollowJointTrajectory.Result.INVALID_GOAL
+        assert 'jogging took over' in result.error_string
+        assert max(abs(b[0] - a[0]) for a, b in pairwise(arm.arrays)) < 0.01
+        assert not arm.trajectories  # they would go to the trajectory controller
+        names = arm.client.node.get_node_names()
+        assert 'robot_state_publisher' not in names
+        arm.process.signal(signal.SIGINT)
+        arm.client.spin_until(lambda: not arm.process.is_running(), 15.0, 'end of the bring-up')
+        assert arm.process.wait() == 0
+        steps = [abs(b[0] - a[0]) for a, b in pairwise(arm.arrays)]
+        assert steps[-1] < 1e-4

@@ -1,0 +1,89 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""An arm whose drives listen to topics, and the program that commands it."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from typing import TYPE_CHECKING
+
+from moving_arm import CONTROLLER, READY, robot_parameters
+from processes import executable, RunningProcess
+from ros_client import RosClient
+from sensor_msgs.msg import JointState
+from simulated_arm import JOINTS
+from std_msgs.msg import Float64MultiArray
+from trajectory_msgs.msg import JointTrajectory
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from isolation import Isolation
+    from typing_extensions import Self
+
+
+def standalone(folder: Path, program: str, *arguments: str, semantic: str = '') -> list[str]:
+    """Return the command of a program of arm_servo.
+
+    Args:
+        folder: Where its parameter file goes.
+        program: Its name.
+        *arguments: Further parameters, as ``name:=value``.
+        semantic: What is to stand in the SRDF besides.
+    """
+    parameters = ['--params-file', str(robot_parameters(folder, semantic))]
+    given = [part for argument in arguments for part in ('-p', argument)]
+    return [executable('arm_servo', program), '--ros-args', *parameters, *given]
+
+
+class TopicArm:
+    """Drives that go where they are told and publish it, and what tells them.
+
+    Attributes:
+        at: Where it is in [rad].
+        moves: Whether it goes where it is told.
+        arrays: Set-points as arrays so far.
+        trajectories: Set-points as trajectories so far.
+    """
+
+    def __init__(self, isolation: Isolation, command: Sequence[str], ready: str) -> None:
+        """Start the program, and wait until it says that it is ready."""
+        self.moves = True
+        self.at = list(READY)
+        self.arrays: list[list[float]] = []
+        self.trajectories: list[JointTrajectory] = []
+        self._stack = ExitStack()
+        self.client = self._stack.enter_context(RosClient(isolation.domain_id))
+        node = self.client.node
+        self._states = node.create_publisher(JointState, '/joint_states', 10)
+        node.create_subscription(
+            Float64MultiArray, '/forward_position_controller/commands', self._take_array, 10
+        )
+        node.create_subscription(
+            JointTrajectory, f'{CONTROLLER}/joint_trajectory', self._take_trajectory, 10
+        )
+        self.speaking = node.create_timer(0.02, self._speak)
+        self.process = self._stack.enter_context(RunningProcess(command, isolation.env))
+        self.process.wait_for(ready)
+
+    def _speak(self) -> None:
+        self._states.publish(JointState(name=JOINTS, position=self.at))
+
+    def _take_array(self, message: Float64MultiArray) -> None:
+        self.arrays.append(list(message.data))
+        if self.moves:
+            self.at = self.arrays[-1]
+
+    def _take_trajectory(self, message: JointTrajectory) -> None:
+        assert list(message.joint_names) == JOINTS
+        self.at = list(message.points[0].positions)
+        self.trajectories.append(message)
+
+    def __enter__(self) -> Self:
+        """Use it in a with statement."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Stop the program."""
+        self._stack.close()
