@@ -322,6 +322,18 @@ def test_an_attitude_may_be_done_without() -> None:
     assert rig.is_in(State.WALK)
 
 
+def test_a_tumbling_robot_is_told_from_a_tilted_one() -> None:
+    """A turn rate that lasts is a fault of its own words: the tilt is not what is wrong."""
+    rig = standing()
+    rig.ask('walk')
+    rig.imu = replace(UPRIGHT, angular_velocity=(0.0, 9.5, 0.0))
+    rig.run(0.5, FORWARD)
+    assert rig.is_in(State.FAULT)
+    message = rig.controller.clear_fault().message
+    assert 'turns at 9.5 rad/s, faster than 8' in message
+    assert 'tilted' not in message
+
+
 def test_a_fallen_robot_stops_moving() -> None:
     """A tilt that lasts is a fault; on its side the robot refuses to get up again."""
     rig = standing()

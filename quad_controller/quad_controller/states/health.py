@@ -108,8 +108,7 @@ class Health:
         if parameters.require_imu and self.imu_age > parameters.fault_age:
             yield Fault.IMU, _age(self.imu_age, '/imu')
         if self.imu is not None and (self._falling_for or 0.0) > parameters.fall_time:
-            angle = math.degrees(self.imu.tilt)
-            yield Fault.FALLEN, f'the body is tilted by {angle:.0f} deg; put it on its feet'
+            yield Fault.FALLEN, self._fall(self.imu)
         if self.battery is not None and (self._low_for or 0.0) > parameters.battery_time:
             yield Fault.BATTERY, f'{self.battery:.0%} left; charge it'
 
@@ -129,8 +128,18 @@ class Health:
     def _falls(self) -> bool:
         if self.imu is None or self.imu_age > self._parameters.hold_age:
             return False
-        rate = math.hypot(*(self.imu.angular_velocity or ()))
-        return self.imu.tilt > self._parameters.max_tilt or rate > self._parameters.max_turn_rate
+        turns = _turn_rate(self.imu) > self._parameters.max_turn_rate
+        return turns or self.imu.tilt > self._parameters.max_tilt
+
+    def _fall(self, imu: ImuSample) -> str:
+        most, fastest = self._parameters.max_tilt, self._parameters.max_turn_rate
+        if imu.tilt > most:
+            angles = f'{math.degrees(imu.tilt):.0f} deg, more than {math.degrees(most):.0f}'
+            return f'the body is tilted by {angles}; put it on its feet'
+        return (
+            f'the body turns at {_turn_rate(imu):.1f} rad/s, faster than {fastest:g}; when it does '
+            'not, /imu is wrong: look at the cable'
+        )
 
     def _take_joints(self, joints: JointSample | None) -> Iterator[str]:
         if joints is None:
@@ -158,3 +167,8 @@ def _age(age: float, topic: str) -> str:
     if math.isinf(age):
         return f'none yet; is the hardware node running, and does it publish {topic}?'
     return f'none for {age:.1f} s; look at the hardware node and its cable'
+
+
+def _turn_rate(imu: ImuSample) -> float:
+    """Return the greatest rate of an attitude in [rad/s], 0 when it is not measured."""
+    return math.hypot(*(imu.angular_velocity or ()))
