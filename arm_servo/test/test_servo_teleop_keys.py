@@ -185,3 +185,32 @@ def test_every_other_key_stops() -> None:
     fresh = make()
     press(fresh, 'space')
     assert [jog for _, jog in published(fresh, 0.0, 0.5)] == [CartesianJog()] * 3
+
+
+def test_a_tap_without_releases_moves_a_fifth_of_the_way() -> None:
+    """Half a second passes until a key counts as up; until it repeats it moves slowly."""
+    teleop = make()
+    teleop.feed(KeyEvent('up', KeyAction.TYPED, 0.0))
+    tap = published(teleop, 0.0, 1.0)
+    moving = [jog for _, jog in tap if isinstance(jog, CartesianJog) and jog.linear[0]]
+    assert [jog.linear[0] for jog in moving] == pytest.approx([0.1] * len(moving))
+    assert moving
+    teleop = make()
+    for number in range(10):
+        now = 0.0 if not number else 0.45 + 0.03 * number
+        teleop.feed(KeyEvent('1', KeyAction.TYPED, now))
+        jog = teleop.wanted(now)
+        assert isinstance(jog, JointJog)
+        assert jog.velocity == pytest.approx(0.5 if number else 0.1)
+
+
+def test_a_joint_that_there_is_not_is_told_once_while_its_key_repeats() -> None:
+    """Without releases each repeat is a stroke of its own; the help stays in sight."""
+    teleop = make()
+    teleop.joints = 6
+    told: list[object] = []
+    for number in range(40):
+        told += teleop.feed(KeyEvent('7', KeyAction.TYPED, 0.05 * number))
+    assert len(told) == 1
+    assert len(teleop.feed(KeyEvent('7', KeyAction.TYPED, 4.0))) == 1
+    assert len(teleop.feed(KeyEvent('8', KeyAction.TYPED, 4.1))) == 1

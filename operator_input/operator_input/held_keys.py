@@ -65,6 +65,18 @@ class HeldKeys:
         """
         return tuple(key for key, until in self._until.items() if now < until)
 
+    def is_tap(self, now: float) -> bool:
+        """Whether the newest key may be up already: it was typed once, and is not repeated yet.
+
+        Args:
+            now: Time [s].
+        """
+        key = self.current(now)
+        if key is None or self._typed is None or math.isinf(self._until[key]):
+            return False
+        _, first, last = self._typed
+        return first == last
+
     def deadline(self, now: float) -> float:
         """Return when a held key is up unless it is heard of before [s]; may be infinite.
 

@@ -41,6 +41,8 @@ from .scales import Scales, Steps
 
 FACTOR = 1.25  # of a speed key
 SLOWEST = 0.01  # share of full speed
+TAP = 0.2  # share of the speed while a key may be up already: without releases that takes 0.5 s
+SAID = 1.0  # [s] in which a stroke that moves nothing is not told again
 
 REQUESTS: dict[str, Request] = {
     HELP_KEY: Note(HELP),
@@ -96,6 +98,7 @@ class KeyboardTeleop:
         self._held = held
         self._stream = stream
         self._step: tuple[Jog, float] | None = None  # motion, end [s]
+        self._told = ('', 0.0)  # a key that moves nothing, and when it was struck last [s]
 
     def wanted(self, now: float) -> Jog | None:
         """Return the motion that is wanted; None when no key asks for one.
@@ -107,7 +110,9 @@ class KeyboardTeleop:
             jog, end = self._step
             return jog if now < end else None
         key = self._held.current(now)
-        return None if key is None else self._motion(key)
+        if key is None:
+            return None
+        return self._motion(key, TAP if self._held.is_tap(now) else 1.0)
 
     def step(self, now: float) -> Jog | None:
         """Say what to publish now; call it after every event and when it is due.
@@ -160,16 +165,22 @@ class KeyboardTeleop:
             self._step = jog, event.time + duration
         return []
 
-    def _motion(self, key: str) -> Jog:
+    def _motion(self, key: str, share: float = 1.0) -> Jog:
+        speed = share * self.speed
         if key in JOINTS:
-            return JointJog(JOINTS[key], self.sign * self.speed)
-        jog = TOOL[key].scaled(self.speed, self.speed)
+            return JointJog(JOINTS[key], self.sign * speed)
+        jog = TOOL[key].scaled(speed, speed)
         return replace(jog, frame=self.frame)
 
     def _no_joint(self, event: KeyEvent) -> list[Request]:
         self._let_go()
-        fresh = event.is_stroke and event.action is not KeyAction.REPEATED
-        return [Note(f'the arm has {self.joints} joints: there is no joint {event.key}')] * fresh
+        again = self._told[0] == event.key and event.time < self._told[1] + SAID
+        if not event.is_stroke or event.action is KeyAction.REPEATED:
+            return []
+        self._told = event.key, event.time
+        return [Note(f'the arm has {self.joints} joints: there is no joint {event.key}')] * (
+            not again
+        )
 
     def _stroke(self, key: str) -> list[Request]:
         if key == HELP_KEY:
