@@ -136,10 +136,8 @@ class Health:
         if imu.tilt > most:
             angles = f'{math.degrees(imu.tilt):.0f} deg, more than {math.degrees(most):.0f}'
             return f'the body is tilted by {angles}; put it on its feet'
-        return (
-            f'the body turns at {_turn_rate(imu):.1f} rad/s, faster than {fastest:g}; when it does '
-            'not, /imu is wrong: look at the cable'
-        )
+        rates = f'{_turn_rate(imu):.1f} rad/s, faster than {fastest:g}'
+        return f'the body turns at {rates}; when it does not, /imu is wrong: look at the cable'
 
     def _take_joints(self, joints: JointSample | None) -> Iterator[str]:
         if joints is None:
