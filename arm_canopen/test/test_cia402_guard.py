@@ -13,7 +13,7 @@ from virtual_network import bus_config, drive_config, PERIOD, SCALE, VirtualNetw
 from arm_canopen.can.frame import Frame
 from arm_canopen.cia402.motion import AxisFeedback
 from arm_canopen.cia402.units import Units
-from arm_canopen.config.model import DriveConfig
+from arm_canopen.config.drive_model import DriveConfig
 from arm_canopen.exceptions import DriveError
 from arm_canopen.master.events import Severity
 from arm_canopen.standard.drive import DriveState, OperationMode

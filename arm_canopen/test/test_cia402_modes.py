@@ -26,7 +26,8 @@ from virtual_network import (
 
 from arm_canopen.cia402.homing import HomingProgress
 from arm_canopen.cia402.position_modes import Move, QUEUE_MAX
-from arm_canopen.config.model import DriveConfig, NodeConfig, RecoveryPolicy
+from arm_canopen.config.drive_model import DriveConfig, RecoveryPolicy
+from arm_canopen.config.model import NodeConfig
 from arm_canopen.exceptions import DriveError
 from arm_canopen.master.events import Severity
 from arm_canopen.standard.drive import DriveState, OperationMode

@@ -11,7 +11,7 @@ import pytest
 from virtual_network import bus_config, drive_config, drive_dictionary, VirtualNetwork
 
 from arm_canopen.config.expected import Expected, expected_defaults, expected_objects
-from arm_canopen.config.model import Identity
+from arm_canopen.config.identity import Identity
 
 
 def test_a_booted_device_holds_what_is_expected() -> None:

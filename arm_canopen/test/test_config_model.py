@@ -14,9 +14,9 @@ import pytest
 
 from arm_canopen.config import DriveConfig, Identity, NodeConfig, PdoConfig
 from arm_canopen.config.device_keys import DEVICE_KEYS, DRIVE_KEYS, RPDO_KEYS, TPDO_KEYS
+from arm_canopen.config.drive_model import RecoveryPolicy
 from arm_canopen.config.eds import load_eds
 from arm_canopen.config.master_keys import MASTER_KEYS, OPTION_KEYS
-from arm_canopen.config.model import RecoveryPolicy
 from arm_canopen.config.schema import Key, Kind, Use
 from arm_canopen.config.settings import DeviceSettings, MasterSettings, Options
 from arm_canopen.exceptions import ConfigError

@@ -26,7 +26,7 @@ from virtual_network import (
 )
 
 from arm_canopen.can.frame import Frame
-from arm_canopen.config.model import Identity
+from arm_canopen.config.identity import Identity
 from arm_canopen.device.drive import Drive as SimulatedDrive
 from arm_canopen.exceptions import DriveError, SdoError
 from arm_canopen.master.events import Severity

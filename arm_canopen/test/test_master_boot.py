@@ -11,7 +11,8 @@ import pytest
 from scripted_device import PRE_OPERATIONAL, RESET_COMMUNICATION, ScriptedDevice, START
 from virtual_network import bus_config, drive_config, pdo, sdo_write, VirtualNetwork
 
-from arm_canopen.config.model import Identity, NodeConfig
+from arm_canopen.config.identity import Identity
+from arm_canopen.config.model import NodeConfig
 from arm_canopen.master.configuration import pdo_writes
 from arm_canopen.master.events import EventKind, Severity
 from arm_canopen.master.remote_node import BootPhase, RemoteNode

@@ -13,7 +13,8 @@ import pytest
 
 from arm_canopen.can.frame import Frame
 from arm_canopen.can.virtual import VirtualBus, VirtualWire
-from arm_canopen.config.model import BusConfig, MasterConfig
+from arm_canopen.config.master_model import MasterConfig
+from arm_canopen.config.model import BusConfig
 from arm_canopen.exceptions import BusError
 from arm_canopen.master.network import Network
 from arm_canopen.master.runner import NetworkThread

@@ -22,7 +22,8 @@ from arm_canopen.cia402.drive import Drive
 from arm_canopen.cia402.drive_commands import DriveCommands
 from arm_canopen.cia402.motion_group import MotionGroup
 from arm_canopen.config import load_eds
-from arm_canopen.config.model import BusConfig, MasterConfig, NodeConfig, PdoConfig, SdoWrite
+from arm_canopen.config.master_model import MasterConfig
+from arm_canopen.config.model import BusConfig, NodeConfig, PdoConfig, SdoWrite
 from arm_canopen.device.device import Device
 from arm_canopen.device.servo import ServoModel
 from arm_canopen.exceptions import BusError

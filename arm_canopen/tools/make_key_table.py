@@ -21,8 +21,8 @@ from arm_canopen.config.device_keys import (
     SDO_KEYS,
     TPDO_KEYS,
 )
+from arm_canopen.config.drive_model import DriveConfig
 from arm_canopen.config.master_keys import MASTER_KEYS, OPTION_KEYS
-from arm_canopen.config.model import DriveConfig
 from arm_canopen.config.schema import Key, Use
 from arm_canopen.config.settings import DeviceSettings, MasterSettings, Options
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from ..config.model import DriveConfig
+from ..config.drive_model import DriveConfig
 from ..exceptions import DriveError, SdoError
 from ..master.events import Severity
 from ..master.remote_node import RemoteNode

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from ..config.model import DriveConfig
+from ..config.drive_model import DriveConfig
 from ..master.remote_node import RemoteNode
 from ..master.scheduler import Scheduler
 from ..standard.drive import DriveState, OperationMode

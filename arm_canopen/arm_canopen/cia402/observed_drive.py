@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 
-from ..config.model import DriveConfig
+from ..config.drive_model import DriveConfig
 from ..exceptions import CodecError, SdoError
 from ..master.events import EventKind, Severity
 from ..master.remote_node import RemoteNode

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from ..config.model import DriveConfig
+from ..config.drive_model import DriveConfig
 from ..exceptions import SdoError
 from ..master.remote_node import RemoteNode
 from ..master.scheduler import Scheduler, Task

@@ -7,7 +7,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 import math
 
-from ..config.model import DriveConfig
+from ..config.drive_model import DriveConfig
 from ..exceptions import CodecError, SdoAbortError
 from ..master.remote_node import RemoteNode
 from ..standard.drive import OperationMode

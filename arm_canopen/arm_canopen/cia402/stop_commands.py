@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from ..config.model import RecoveryPolicy
+from ..config.drive_model import RecoveryPolicy
 from ..exceptions import DriveError
 from ..master.scheduler import Scheduler
 from ..standard.drive import DriveState

@@ -10,7 +10,8 @@ from dataclasses import dataclass, field
 
 from ..can import Frame, open_bus
 from ..config import load_bus
-from ..config.model import BusConfig, Identity, NodeConfig
+from ..config.identity import Identity
+from ..config.model import BusConfig, NodeConfig
 from ..exceptions import SdoError
 from ..master.lss_master import LssMaster
 from ..standard.cob_id import CobId, NODE_ID_MAX, NODE_ID_MIN

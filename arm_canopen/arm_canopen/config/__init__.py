@@ -6,18 +6,12 @@
 is wrong and raise one ``ConfigError`` whose problems name file, line, key and remedy.
 """
 
+from .drive_model import DriveConfig
 from .eds import Eds, load_eds
+from .identity import Identity
 from .load import load_bus
-from .model import (
-    BusConfig,
-    DriveConfig,
-    Identity,
-    MasterConfig,
-    NodeConfig,
-    PdoConfig,
-    Problem,
-    SdoWrite,
-)
+from .master_model import MasterConfig
+from .model import BusConfig, NodeConfig, PdoConfig, Problem, SdoWrite
 
 __all__ = [
     'BusConfig',

@@ -11,8 +11,9 @@ from ..exceptions import CodecError
 from ..standard.datatypes import decode
 from ..standard.drive import OperationMode
 from ..standard.objects import AXIS_OFFSET, Index
+from .drive_model import DriveConfig
 from .findings import Findings, Place
-from .model import BusConfig, DriveConfig, NodeConfig, PdoConfig, SdoWrite
+from .model import BusConfig, NodeConfig, PdoConfig, SdoWrite
 from .pdo_direction import Direction, RPDO, TPDO
 from .shared_keys import HUNDRED_MICROSECONDS, MILLISECONDS
 

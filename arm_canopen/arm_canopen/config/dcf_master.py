@@ -20,7 +20,8 @@ from ..standard.objects import Index, PDO_COUNT_MAX
 from ..standard.pdo import MappedObject
 from .dcf_network import network_objects
 from .dcf_text import dcf_text, DcfArray, DcfEntry, DcfObject, DcfRecord
-from .model import BusConfig, MasterConfig, NodeConfig, PdoConfig
+from .master_model import MasterConfig
+from .model import BusConfig, NodeConfig, PdoConfig
 from .pdo_direction import Direction, RPDO, TPDO
 from .shared_keys import HUNDRED_MICROSECONDS, KILOBIT, MICROSECONDS, MILLISECONDS
 

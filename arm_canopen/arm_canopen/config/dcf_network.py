@@ -9,7 +9,8 @@ from collections.abc import Iterator, Mapping
 from ..standard.datatypes import DataType
 from ..standard.dictionary import AccessType, ObjectCode
 from .dcf_text import DcfArray, DcfEntry, DcfObject, DcfRecord
-from .model import BusConfig, MasterConfig, NodeConfig
+from .master_model import MasterConfig
+from .model import BusConfig, NodeConfig
 from .shared_keys import MILLISECONDS
 
 U8, U32, DOMAIN = DataType.UNSIGNED8, DataType.UNSIGNED32, DataType.DOMAIN

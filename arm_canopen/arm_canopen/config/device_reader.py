@@ -12,7 +12,8 @@ from .document import Mapping
 from .eds import Eds
 from .eds_files import EdsFiles
 from .findings import Findings, Place
-from .model import Identity, NodeConfig
+from .identity import Identity
+from .model import NodeConfig
 from .parameter_values import parameter_writes
 from .pdo_direction import RPDO, TPDO
 from .pdo_resolution import PdoDraft, PdoReader

@@ -12,7 +12,8 @@ from ..standard.objects import Index
 from ..standard.pdo import SYNCHRONOUS_MAX
 from .device_reader import DeviceDraft
 from .findings import Findings
-from .model import MasterConfig, NodeConfig
+from .master_model import MasterConfig
+from .model import NodeConfig
 from .pdo_direction import Direction, RPDO, TPDO
 from .pdo_resolution import PdoDraft
 from .settings import MasterSettings, Options

@@ -11,8 +11,8 @@ from ..standard.drive import DriveState
 from . import scalars
 from .device_keys import CHANNEL_KEYS, SCALE_KEYS
 from .document import Item, Mapping
+from .drive_model import DriveConfig, RecoveryPolicy
 from .findings import Findings, RefusedError
-from .model import DriveConfig, RecoveryPolicy
 from .section import listing, read_section
 
 POLICIES = {policy.value: policy for policy in RecoveryPolicy}

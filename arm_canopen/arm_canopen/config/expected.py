@@ -12,7 +12,8 @@ from ..standard.cob_id import CAN_ID_MASK, COB_ID_EXTENDED, COB_ID_INVALID
 from ..standard.datatypes import DataType, encode
 from ..standard.dictionary import ObjectDictionary
 from ..standard.objects import Index
-from .model import BusConfig, MasterConfig, NodeConfig, PdoConfig, SdoWrite, Written
+from .master_model import MasterConfig
+from .model import BusConfig, NodeConfig, PdoConfig, SdoWrite, Written
 from .pdo_direction import Direction, RPDO, TPDO
 from .shared_keys import HUNDRED_MICROSECONDS, MILLISECONDS
 

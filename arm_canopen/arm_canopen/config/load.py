@@ -17,7 +17,8 @@ from .eds_files import EdsFiles
 from .findings import Findings, Place
 from .layout import lay_out, Layout
 from .master import build_master
-from .model import BusConfig, MasterConfig, Written
+from .master_model import MasterConfig
+from .model import BusConfig, Written
 from .pdo_direction import RPDO, TPDO
 from .settings import read_master_settings, read_options
 

@@ -6,7 +6,8 @@ from __future__ import annotations
 
 from .document import Mapping
 from .findings import Findings, RefusedError
-from .model import Identity, MasterConfig
+from .identity import Identity
+from .master_model import MasterConfig
 from .scalars import integer, key_number
 from .section import block
 from .settings import MasterSettings, Options, remappings
@@ -14,6 +15,24 @@ from .shared_keys import MILLISECONDS, U8_MAX, U16_MAX
 
 TIME_PRODUCER = 0x4000_0000  # bit 30 of 0x1012
 TIME_PERIOD = 1.0  # [s] when only that bit asks for it
+TAKEN_OVER = (
+    'driver',
+    'namespace',
+    'sync_period',
+    'sync_window',
+    'sync_overflow',
+    'heartbeat_producer',
+    'start',
+    'start_nodes',
+    'start_all_nodes',
+    'reset_all_nodes',
+    'stop_all_nodes',
+    'nmt_inhibit_time',
+    'emcy_inhibit_time',
+    'boot_time',
+    'boot_timeout',
+)
+"""Settings that are fields of the configuration, too."""
 HEARTBEAT_TIME_MAX = U16_MAX / MILLISECONDS  # [s] 0x1016 holds 16 bits
 
 
@@ -33,6 +52,32 @@ def build_master(
         device_periods: ``period`` of every device in [s]; they count when there is no SYNC.
         findings: Gets times that do not fit together.
     """
+    time_period = _time_period(settings)
+    same = {field: getattr(settings, field) for field in TAKEN_OVER}
+    return MasterConfig(
+        node_id=settings.node_id or 0,
+        remappings=remappings(section, findings),
+        bitrate=round(settings.bitrate),
+        time_cob_id=settings.time_cob_id | (TIME_PRODUCER if time_period else 0),
+        time_period=time_period,
+        cycle_period=settings.sync_period or min(device_periods, default=0.01),
+        heartbeat_timeout=_heartbeat_timeout(section, settings, options, findings),
+        error_behavior=_error_behaviour(section, findings),
+        identity=Identity(
+            0,
+            settings.vendor_id,
+            settings.product_code,
+            settings.revision_number,
+            settings.serial_number,
+        ),
+        **same,
+    )
+
+
+def _heartbeat_timeout(
+    section: Mapping, settings: MasterSettings, options: Options, findings: Findings
+) -> float:
+    """Return how long devices wait for the heartbeat of the master in [s]."""
     multiplier = settings.heartbeat_multiplier or options.heartbeat_multiplier
     timeout = settings.heartbeat_producer * multiplier
     if timeout > HEARTBEAT_TIME_MAX:
@@ -43,39 +88,7 @@ def build_master(
             f'most {HEARTBEAT_TIME_MAX} s',
             'make one of them smaller',
         )
-    time_period = _time_period(settings)
-    return MasterConfig(
-        node_id=settings.node_id or 0,
-        driver=settings.driver,
-        namespace=settings.namespace,
-        remappings=remappings(section, findings),
-        bitrate=round(settings.bitrate),
-        sync_period=settings.sync_period,
-        sync_window=settings.sync_window,
-        sync_overflow=settings.sync_overflow,
-        time_cob_id=settings.time_cob_id | (TIME_PRODUCER if time_period else 0),
-        time_period=time_period,
-        cycle_period=settings.sync_period or min(device_periods, default=0.01),
-        heartbeat_producer=settings.heartbeat_producer,
-        heartbeat_timeout=timeout,
-        start=settings.start,
-        start_nodes=settings.start_nodes,
-        start_all_nodes=settings.start_all_nodes,
-        reset_all_nodes=settings.reset_all_nodes,
-        stop_all_nodes=settings.stop_all_nodes,
-        nmt_inhibit_time=settings.nmt_inhibit_time,
-        emcy_inhibit_time=settings.emcy_inhibit_time,
-        error_behavior=_error_behaviour(section, findings),
-        identity=Identity(
-            0,
-            settings.vendor_id,
-            settings.product_code,
-            settings.revision_number,
-            settings.serial_number,
-        ),
-        boot_time=settings.boot_time,
-        boot_timeout=settings.boot_timeout,
-    )
+    return timeout
 
 
 def _time_period(settings: MasterSettings) -> float:

@@ -6,12 +6,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from enum import Enum
 from pathlib import Path
 
 from ..standard.dictionary import ObjectDictionary
-from ..standard.drive import DriveState
 from ..standard.pdo import MappedObject
+from .drive_model import DriveConfig
+from .identity import ANY_DEVICE, Identity
+from .master_model import MasterConfig
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,76 +75,6 @@ class SdoWrite:
 
 
 @dataclass(frozen=True, slots=True)
-class Identity:
-    """What a device says of itself in 0x1000 and 0x1018; 0 is not checked."""
-
-    device_type: int = 0
-    vendor_id: int = 0
-    product_code: int = 0
-    revision_number: int = 0
-    serial_number: int = 0
-
-
-class RecoveryPolicy(Enum):
-    """What becomes of a drive that was enabled when its device was lost and booted again."""
-
-    MANUAL = 'manual'
-    """It stays disabled until somebody calls ~/recover or ~/enable."""
-    AUTO = 'auto'
-    """It is enabled again in the mode that it had, holding where it is; it moves nowhere."""
-
-
-@dataclass(frozen=True, slots=True)
-class DriveConfig:
-    """Units and sequences of one axis of a CiA 402 drive.
-
-    Attributes:
-        name: Name of the axis: that of the device, of its channel for one with several axes.
-        channel: Number of the axis from 0; its objects lie 0x800 * channel above those of the
-            first (CiA 402-2, 7.2).
-        units_from_device: bus.yml has no scale, so units are those of the drive's factor group
-            (0x608F, 0x6091, 0x6092, 0x6096), one revolution being 2 pi rad.
-        scale_pos_to_dev: Device increments per user unit (usually rad).
-        scale_vel_to_dev: Device velocity units per user unit per second.
-        scale_pos_from_dev: User units per device increment.
-        scale_vel_from_dev: User units per second per device velocity unit.
-        scale_eff_to_dev: Device units of torque per user unit of effort.
-        scale_eff_from_dev: User units of effort per device unit of torque.
-        offset_pos_to_dev: Added to a target after scaling, in [inc].
-        offset_pos_from_dev: Added to a position after scaling, in user units.
-        switching_state: State in which 0x6060 is written.
-        homing_timeout: Longest time for homing in [s].
-        position_mode: Mode number for position commands, None when bus.yml names none.
-        velocity_mode: Mode number for velocity commands, None when bus.yml names none.
-        effort_mode: Mode number for effort commands, None when bus.yml names none.
-        target_timeout: How long a stream of targets on ~/target may pause before it counts as
-            ended in [s].
-        recovery: What becomes of the axis when its device comes back.
-        quirks: Name of the drive's entry in the table of quirks, empty for none.
-    """
-
-    name: str = ''
-    channel: int = 0
-    units_from_device: bool = False
-    scale_pos_to_dev: float = 1000.0
-    scale_vel_to_dev: float = 1000.0
-    scale_pos_from_dev: float = 0.001
-    scale_vel_from_dev: float = 0.001
-    scale_eff_to_dev: float = 1.0
-    scale_eff_from_dev: float = 0.001
-    offset_pos_to_dev: float = 0.0
-    offset_pos_from_dev: float = 0.0
-    switching_state: DriveState = DriveState.OPERATION_ENABLED
-    homing_timeout: float = 10.0
-    position_mode: int | None = None
-    velocity_mode: int | None = None
-    effort_mode: int | None = None
-    target_timeout: float = 0.2
-    recovery: RecoveryPolicy = RecoveryPolicy.MANUAL
-    quirks: str = ''
-
-
-@dataclass(frozen=True, slots=True)
 class NodeConfig:
     """A device of the bus.
 
@@ -192,7 +123,7 @@ class NodeConfig:
     dictionary: ObjectDictionary
     namespace: str = ''
     remappings: dict[str, str] = field(default_factory=dict)
-    identity: Identity = Identity()
+    identity: Identity = ANY_DEVICE
     heartbeat_producer: float = 0.0
     heartbeat_timeout: float = 0.0
     heartbeat_consumer: bool = False
@@ -234,73 +165,6 @@ class NodeConfig:
     def is_drive(self) -> bool:
         """The device is driven by the CiA 402 driver."""
         return 'Cia402' in self.driver
-
-
-@dataclass(frozen=True, slots=True)
-class MasterConfig:
-    """The master's own settings.
-
-    Attributes:
-        node_id: CANopen node id, 1 to 127.
-        name: Key in bus.yml; also the name of its ROS node.
-        driver: Driver class as bus.yml names it.
-        namespace: ROS namespace, empty for none.
-        remappings: ROS remappings, from name to name.
-        bitrate: Bit rate in [bit/s], for the bus load.
-        sync_period: SYNC period in [s]; 0 sends none.
-        sync_window: Time after SYNC within which synchronous PDOs are sent in [s]; 0 for no limit.
-        sync_overflow: Highest SYNC counter value, 0 for a SYNC without counter.
-        time_cob_id: 0x1012 of the master: CAN identifier of TIME, with bit 30 when it sends it.
-        time_period: Period of TIME in [s]; 0 sends none.
-        cycle_period: Period of the control cycle in [s]: that of SYNC, without one the shortest
-            ``period`` of a device.
-        heartbeat_producer: Period of the master's own heartbeat in [s]; 0 for none.
-        heartbeat_timeout: How long a device that watches the master waits for its heartbeat in
-            [s], for 0x1016; 0 when there is none.
-        start: The master runs its cycle from the start; false waits for NMT start with SYNC and
-            RPDOs.
-        start_nodes: The master starts devices when they are booted.
-        start_all_nodes: Devices are started by one broadcast, when all mandatory ones are booted.
-        reset_all_nodes: The loss of a mandatory device resets all devices.
-        stop_all_nodes: The loss of a mandatory device stops all devices.
-        nmt_inhibit_time: Shortest time between two NMT commands in [s].
-        emcy_inhibit_time: Shortest time between two EMCY frames of the master in [s].
-        error_behavior: 0x1029 of the master by sub-index: what it does when it loses a device.
-        identity: 0x1018 of the master, for the files of other tools.
-        boot_time: How long mandatory devices may take to boot in [s]; 0 for ever.
-        boot_timeout: SDO timeout during boot in [s].
-    """
-
-    node_id: int
-    name: str = 'master'
-    driver: str = 'ros2_canopen::MasterDriver'
-    namespace: str = ''
-    remappings: dict[str, str] = field(default_factory=dict)
-    bitrate: int = 1_000_000
-    sync_period: float = 0.0
-    sync_window: float = 0.0
-    sync_overflow: int = 0
-    time_cob_id: int = 0x100
-    time_period: float = 0.0
-    cycle_period: float = 0.01
-    heartbeat_producer: float = 0.0
-    heartbeat_timeout: float = 0.0
-    start: bool = True
-    start_nodes: bool = True
-    start_all_nodes: bool = False
-    reset_all_nodes: bool = False
-    stop_all_nodes: bool = False
-    nmt_inhibit_time: float = 0.0
-    emcy_inhibit_time: float = 0.0
-    error_behavior: dict[int, int] = field(default_factory=dict)
-    identity: Identity = Identity()
-    boot_time: float = 0.0
-    boot_timeout: float = 2.0
-
-    @property
-    def is_lifecycle(self) -> bool:
-        """The master and its devices are lifecycle nodes."""
-        return 'Lifecycle' in self.driver
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,10 +10,10 @@ import re
 from .device_keys import DEVICE_KEYS, DRIVE_KEYS
 from .document import Mapping
 from .drive_axes import read_axes, read_drive
+from .drive_model import DriveConfig
 from .drivers import check_driver
 from .findings import Findings, Place
 from .master_keys import MASTER_KEYS, OPTION_KEYS
-from .model import DriveConfig
 from .section import read_section, texts
 
 ROS_NAME = re.compile(r'[A-Za-z_][A-Za-z0-9_]*')

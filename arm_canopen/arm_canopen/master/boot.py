@@ -6,7 +6,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from ..config.model import Identity, SdoWrite
+from ..config.identity import Identity
+from ..config.model import SdoWrite
 from ..exceptions import BootError, SdoAbortError, SdoError, SdoTimeoutError
 from ..standard.nmt import NmtCommand, NmtState
 from ..standard.objects import Index

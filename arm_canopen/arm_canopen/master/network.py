@@ -8,31 +8,29 @@ a function. See ``runner.py`` for the thread that does so on a real bus.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 import itertools
 from typing import TypeAlias
 
 from ..can.frame import Frame
 from ..config.model import BusConfig
-from ..exceptions import BusError, SdoError
 from ..standard.cob_id import CAN_ID_MASK, CobId
 from ..standard.nmt import ALL_NODES, COMMANDED_STATES, NmtCommand, NmtState, parse_nmt
-from .boot import BootProcess
+from .boots import Boots
+from .bus_sender import BusSender
 from .controller_watch import ControllerWatch
 from .emergency_id import emergency_can_id
 from .events import Event, EventKind, Report, Severity
-from .guarding import guarding_request
 from .nmt_sender import NmtSender
 from .process_image import SyncRound
 from .producers import HeartbeatProducer, SyncCounter, TimeProducer, utc_now, WallClock
 from .remote_node import RemoteNode
 from .rivals import RivalWatch
-from .scheduler import Scheduler, Task
+from .scheduler import Scheduler
 from .sdo_client import SdoClient
 from .startup import Startup
 
 WATCH_PERIOD = 0.005  # [s] between two looks at the life signs, which come at most so often
-DROP_PAUSE = 0.5  # [s] before a device that left Operational by itself is booted again
 
 CycleHook: TypeAlias = Callable[[float, float], None]
 
@@ -48,6 +46,7 @@ class Network:
         on_feedback: Called when all TPDOs of a SYNC have come, or at the next cycle at the latest,
             with the time of that SYNC in [s].
         on_frame: Called with each received frame, for statistics.
+        send: Sends a frame; a bus that refuses it is told once until it works again.
         missed_pdos: TPDOs that did not answer a SYNC, over all devices.
         controller: The CAN controller as its error frames show it.
         unknown_frames: Frames with an identifier that nobody on this bus should use.
@@ -83,9 +82,8 @@ class Network:
         self.missed_pdos = 0
         self.controller = ControllerWatch(report)
         self.unknown_frames = 0
-        self._send_raw = send
+        self.send = BusSender(send, report).send
         self._report = report
-        self._send_failed = False
         self.state = NmtState.OPERATIONAL if master.start else NmtState.PRE_OPERATIONAL
         self._sync = SyncRound(self._feedback_complete, master.sync_window)
         self._sync_time = 0.0
@@ -104,16 +102,11 @@ class Network:
         }
         nodes = list(self.nodes.values())
         self._startup = Startup(master, nodes, self.scheduler, self.send_nmt, report)
-        self._boots = {name: self._boot_process(node) for name, node in self.nodes.items()}
-        self._boot_tasks: dict[str, Task[None]] = {}
-        self._handlers: dict[int, Callable[[Frame], None]] = {}
-        self._handlers[CobId.NMT] = self._hear_nmt
-        rivals = RivalWatch(config, report, expected=beside_master)
-        for can_id in (CobId.HEARTBEAT + master.node_id, CobId.SYNC):
-            self._handlers[can_id] = rivals.receive
+        self._boots = Boots(
+            master, nodes, self.scheduler, self._startup, send=self.send, send_nmt=self.send_nmt
+        )
         self._strangers: dict[int, SdoClient] = {}
-        for node in self.nodes.values():
-            self._connect(node)
+        self._handlers = dict(self._connect(RivalWatch(config, report, expected=beside_master)))
 
     def start(self, now: float) -> None:
         """Reset the devices and begin to boot them, all at the same time."""
@@ -127,7 +120,7 @@ class Network:
             for node in itertools.compress(nodes, resets):
                 self.send_nmt(NmtCommand.RESET_COMMUNICATION, node.config.node_id)
         for node in self.nodes.values():
-            self._start_boot(node, announced=False)
+            self._boots.start(node)
 
     def receive(self, frame: Frame) -> None:
         """Take a frame from the bus."""
@@ -150,7 +143,7 @@ class Network:
         self._watch_at = now + WATCH_PERIOD
         for node in self.nodes.values():
             if node.watch(now):
-                self._start_boot(node, announced=False)
+                self._boots.start(node)
 
     def cycle(self, now: float, period: float) -> None:
         """Run one cycle: image, drives, RPDOs, SYNC (DESIGN: one time base).
@@ -175,19 +168,6 @@ class Network:
                     send(output.frame())
         if self.config.master.sync_period > 0:
             self._send_sync(now)
-
-    def send(self, frame: Frame) -> None:
-        """Send a frame; a bus that refuses it is reported once until it works again."""
-        try:
-            self._send_raw(frame)
-        except BusError as error:
-            if not self._send_failed:
-                self._send_failed = True
-                self._report(Event(EventKind.BUS, Severity.ERROR, '', str(error)))
-        else:
-            if self._send_failed:
-                self._send_failed = False
-                self._report(Event(EventKind.BUS, Severity.INFO, '', 'the bus takes frames again'))
 
     def send_nmt(self, command: NmtCommand, node_id: int) -> None:
         """Send an NMT command to one device, or to all with id 0; our own id commands the master.
@@ -233,31 +213,20 @@ class Network:
         text = f'a defect in the CANopen master: {type(error).__name__}: {error}'
         self._report(Event(EventKind.BUS, Severity.ERROR, '', text))
 
-    def _boot_process(self, node: RemoteNode) -> BootProcess:
-        master = self.config.master
-        return BootProcess(
-            node,
-            self.scheduler,
-            self.send_nmt,
-            self._startup,
-            ask_state=lambda node_id: self.send(guarding_request(node_id)),
-            sdo_timeout=master.boot_timeout,
-            start=master.start_nodes,
-            master_id=master.node_id,
-            master_heartbeat_timeout=master.heartbeat_timeout,
-        )
-
-    def _connect(self, node: RemoteNode) -> None:
-        node_id = node.config.node_id
-        self._handlers[CobId.HEARTBEAT + node_id] = node.receive_heartbeat
-        emergency_id = emergency_can_id(node.config)
-        if emergency_id is not None:
-            self._handlers[emergency_id] = node.emergencies.receive
-        self._handlers[CobId.SDO_RESPONSE + node_id] = node.sdo.receive
-        for entry in node.image.inputs:
-            self._handlers[entry.config.cob_id] = entry.receive
-        node.on_boot_up = lambda: self._booted(node)
-        node.on_dropped_out = lambda: self._start_boot(node, announced=False, pause=DROP_PAUSE)
+    def _connect(self, rivals: RivalWatch) -> Iterator[tuple[int, Callable[[Frame], None]]]:
+        """Say who takes the frames of which identifier."""
+        yield CobId.NMT, self._hear_nmt
+        yield CobId.HEARTBEAT + self.config.master.node_id, rivals.receive
+        yield CobId.SYNC, rivals.receive
+        for node in self.nodes.values():
+            node_id = node.config.node_id
+            yield CobId.HEARTBEAT + node_id, node.receive_heartbeat
+            emergency_id = emergency_can_id(node.config)
+            if emergency_id is not None:
+                yield emergency_id, node.emergencies.receive
+            yield CobId.SDO_RESPONSE + node_id, node.sdo.receive
+            for entry in node.image.inputs:
+                yield entry.config.cob_id, entry.receive
 
     def _hear_nmt(self, frame: Frame) -> None:
         """Note what another master or a tool commands, so that it is not worked against."""
@@ -280,22 +249,6 @@ class Network:
         for node in self.nodes.values():
             if node_id in (ALL_NODES, node.config.node_id):
                 node.note_command(command)
-
-    def _booted(self, node: RemoteNode) -> None:
-        self._end_boot(node)
-        node.restarted()
-        self._start_boot(node, announced=True)
-
-    def _end_boot(self, node: RemoteNode) -> None:
-        running = self._boot_tasks.get(node.name)
-        if running is not None:
-            running.cancel(SdoError('the boot starts again'))
-
-    def _start_boot(self, node: RemoteNode, *, announced: bool, pause: float = 0.0) -> None:
-        self._end_boot(node)
-        boot = self._boots[node.name].run(announced=announced, pause=pause)
-        task = self.scheduler.background(boot)
-        self._boot_tasks[node.name] = task
 
     def _send_sync(self, now: float) -> None:
         self._sync.start(now)

@@ -16,7 +16,8 @@ import time
 
 from ..can.bus import Bus
 from ..can.frame import Frame
-from ..config.model import BusConfig, MasterConfig
+from ..config.master_model import MasterConfig
+from ..config.model import BusConfig
 from ..exceptions import BusError, RivalError
 from ..standard.cob_id import CobId
 from ..standard.nmt import ALL_NODES, parse_nmt

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from ..config.model import MasterConfig
+from ..config.master_model import MasterConfig
 from ..standard.nmt import ALL_NODES, NmtCommand
 from .events import Event, EventKind, Report, Severity
 from .remote_node import RemoteNode

@@ -1,0 +1,83 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The boots of all devices of a bus, which run side by side; each device has one at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from functools import partial
+
+from ..can.frame import Frame
+from ..config.master_model import MasterConfig
+from ..exceptions import SdoError
+from .boot import BootProcess
+from .guarding import guarding_request
+from .remote_node import RemoteNode
+from .scheduler import Scheduler, Task
+from .startup import SendNmt, Startup
+
+DROP_PAUSE = 0.5  # [s] before a device that left Operational by itself is booted again
+
+
+class Boots:
+    """Begins the boot of a device when it appears, restarts or drops out."""
+
+    def __init__(
+        self,
+        master: MasterConfig,
+        nodes: Iterable[RemoteNode],
+        scheduler: Scheduler,
+        startup: Startup,
+        *,
+        send: Callable[[Frame], None],
+        send_nmt: SendNmt,
+    ) -> None:
+        """Listen to the devices; nothing is booted before :meth:`start`.
+
+        Args:
+            master: The master.
+            nodes: All devices.
+            scheduler: Time.
+            startup: Says when a device may be started.
+            send: Hands a frame to the bus.
+            send_nmt: Sends an NMT command to a node id.
+        """
+        self._scheduler = scheduler
+        self._tasks: dict[str, Task[None]] = {}
+        self._processes: dict[str, BootProcess] = {}
+        for node in nodes:
+            self._processes[node.name] = BootProcess(
+                node,
+                scheduler,
+                send_nmt,
+                startup,
+                ask_state=lambda node_id: send(guarding_request(node_id)),
+                sdo_timeout=master.boot_timeout,
+                start=master.start_nodes,
+                master_id=master.node_id,
+                master_heartbeat_timeout=master.heartbeat_timeout,
+            )
+            node.on_boot_up = partial(self._restarted, node)
+            node.on_dropped_out = partial(self.start, node, pause=DROP_PAUSE)
+
+    def start(self, node: RemoteNode, *, announced: bool = False, pause: float = 0.0) -> None:
+        """Boot a device, anew if a boot is on its way.
+
+        Args:
+            node: The device.
+            announced: A boot-up message came, so there is no need to look for the device.
+            pause: Time to wait before in [s].
+        """
+        self._end(node)
+        boot = self._processes[node.name].run(announced=announced, pause=pause)
+        self._tasks[node.name] = self._scheduler.background(boot)
+
+    def _restarted(self, node: RemoteNode) -> None:
+        self._end(node)
+        node.restarted()
+        self.start(node, announced=True)
+
+    def _end(self, node: RemoteNode) -> None:
+        running = self._tasks.get(node.name)
+        if running is not None:
+            running.cancel(SdoError('the boot starts again'))

@@ -1,0 +1,39 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The way of all frames of the master to the bus."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from ..can.frame import Frame
+from ..exceptions import BusError
+from .events import Event, EventKind, Report, Severity
+
+
+class BusSender:
+    """Sends frames; a bus that refuses them is told once, until it works again."""
+
+    def __init__(self, send: Callable[[Frame], None], report: Report) -> None:
+        """Begin with a bus that works.
+
+        Args:
+            send: Hands a frame to the bus; may raise BusError.
+            report: Takes events.
+        """
+        self._send = send
+        self._report = report
+        self._failed = False
+
+    def send(self, frame: Frame) -> None:
+        """Send a frame."""
+        try:
+            self._send(frame)
+        except BusError as error:
+            if not self._failed:
+                self._failed = True
+                self._report(Event(EventKind.BUS, Severity.ERROR, '', str(error)))
+        else:
+            if self._failed:
+                self._failed = False
+                self._report(Event(EventKind.BUS, Severity.INFO, '', 'the bus takes frames again'))
