@@ -15,6 +15,9 @@ from .exceptions import CommandError
 Array = NDArray[np.float64]
 """Numbers in double precision; the shape stands in the docstring of each use."""
 
+Places = NDArray[np.int_]
+"""Numbers of rows, from 0."""
+
 Mask = NDArray[np.bool_]
 """Yes or no for each joint or axis."""
 

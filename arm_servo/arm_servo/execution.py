@@ -10,6 +10,7 @@ from enum import Enum
 
 import numpy as np
 
+from .arrays import Array
 from .exceptions import GoalCode, GoalError
 from .follower import Follower
 from .goal import GoalRules, JointTolerance, TrajectoryGoal
@@ -22,6 +23,15 @@ from .tolerances import tolerances
 
 ARRIVED = 1e-6
 """How near to the end the set-points must be to have arrived in [rad]."""
+
+CHASING = 0.7
+"""Pace at most while the arm catches up with the path."""
+
+MET = 1e-3
+"""How near to the path the set-points must be to have met it in [rad]."""
+
+ASTRAY = 0.02
+"""How far from the path the set-points may be once they have met it in [rad]."""
 
 
 class Phase(Enum):
@@ -120,7 +130,8 @@ class Execution:
         self._limits, self._settings = limits, settings
         self._waiting = max(-goal.age, 0.0)
         begin = MotionState.at_rest(state.position) if self._waiting else state
-        self._path = build_path(self._goal, limits, begin, settings.rules)
+        planned = build_path(self._goal, limits, begin, settings.rules)
+        self._path, self._late = planned.path, planned.late
         # an arm that moves goes on as it does, and takes up the pace from there
         self._clock = PathClock(limits, 1.0 if state.moving else pace)
         self._follower = Follower(limits, generator)
@@ -128,9 +139,12 @@ class Execution:
         self._goal_tolerance = tolerances(limits, goal.goal_tolerance, settings.goal)
         self._goal_time = goal.goal_time or settings.goal_time
         self._settling = 0.0
+        self._off = 0.0
+        self._met = False
         self.ending: Outcome | None = None
         self.phase = Phase.FOLLOWING
-        self.feedback = Feedback(0.0, state, state, pace)
+        begin_point = self._path.at(0.0)
+        self.feedback = Feedback(0.0, MotionState.at_rest(begin_point.position), state, pace)
 
     @property
     def path(self) -> Path:
@@ -192,7 +206,11 @@ class Execution:
             self._wait(state, period)
             return None
         self._check(state, measured, period)
-        self._clock.step(self._path, 0.0 if self.phase is Phase.STOPPING else pace, period)
+        if self.phase is Phase.STOPPING:
+            pace = 0.0
+        elif self._off > MET:  # joints that give their utmost for the path cannot catch up
+            pace = min(pace, CHASING)
+        self._clock.step(self._path, pace, period)
         following = self._follower.step(state, self._ahead(period), period)
         desired = self._ahead(period)(period)
         self.feedback = Feedback(self._clock.time, desired, measured, self._clock.pace)
@@ -207,9 +225,11 @@ class Execution:
         if self._waiting > 0.0 or self.phase is Phase.DONE:
             return
         try:
-            self._path = build_path(self._goal, self._limits, state, self._settings.rules)
+            planned = build_path(self._goal, self._limits, state, self._settings.rules)
         except GoalError as error:
             self.abandon(Outcome(error.code, str(error)))
+        else:
+            self._path, self._late = planned.path, planned.late
 
     def _ahead(self, period: float) -> Callable[[float], MotionState]:
         """Return where the path will be, by the time from now in [s]."""
@@ -232,18 +252,30 @@ class Execution:
         error = desired.position - measured.position
         speed_error = desired.velocity - measured.velocity
         if self.phase is Phase.FOLLOWING:
-            violation = self._path_tolerance.violation(limits, error, speed_error)
+            violation = self._astray(desired.position - state.position)
+            violation = violation or self._path_tolerance.violation(limits, error, speed_error)
             if violation is not None:
                 where = f'{violation}, at {self.feedback.time:.3f} s of the trajectory'
                 self.stop(Outcome(GoalCode.PATH_TOLERANCE_VIOLATED, where))
         elif self.phase is Phase.SETTLING:
             self._settle(state, self._goal_tolerance.violation(limits, error, speed_error), period)
 
+    def _astray(self, error: Array) -> str | None:
+        """Return how far the set-points are from the path that they had met, if it is too far."""
+        joint = int(np.argmax(np.abs(error)))
+        self._off = float(abs(error[joint]))
+        self._met = self._met or self._off < MET
+        if not self._met or self._off <= ASTRAY:
+            return None
+        name = self._limits.names[joint]
+        return f'{name}: the set-point is {error[joint]:+.4f} rad off the path'
+
     def _settle(self, state: MotionState, violation: str | None, period: float) -> None:
         """Wait at the end until the arm has arrived, or the time for that is over."""
         arrived = np.allclose(state.position, self._path.end.position, atol=ARRIVED)
         if violation is None and arrived and not state.moving:
-            self.ending = Outcome(GoalCode.SUCCESSFUL, 'the goal is reached')
+            late = f', {self._late}' if self._late else ''
+            self.ending = Outcome(GoalCode.SUCCESSFUL, f'the goal is reached{late}')
             self.phase = Phase.DONE
             return
         self._settling += period

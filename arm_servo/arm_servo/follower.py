@@ -11,17 +11,26 @@ import numpy as np
 from .limits import JointLimits
 from .otg import Generator, MotionState, Plan
 
-TURNS = 6
-"""How often the time of the meeting is improved."""
+SOON = (4, 10, 25, 60, 150)
+"""Cycles after which a meeting is tried."""
 
-NEAR = 1e-6
+TURNS = 3
+"""How often the time of a later meeting is improved."""
+
+NEAR = 1e-7
 """How exactly a meeting must still be where it was planned in [rad], and 100 times in [rad/s]."""
 
 WITHIN = 1.0 + 1e-6
 """Rounding of velocities and accelerations that is let pass."""
 
 JOLT = 0.1
-"""Change of speed within a cycle, beyond that of an even jerk, that still counts as even."""
+"""Changes of speed and place in a cycle, beyond those of an even jerk, that still count as even.
+
+As shares of j T^2 and j T^3.
+"""
+
+OWN_JOLT = (0.25, 0.129)
+"""The same where the state that is followed goes on: a limited jerk that turns makes as much."""
 
 
 class Follower:
@@ -43,6 +52,7 @@ class Follower:
         self._generator = generator
         self._plan: Plan | None = None
         self._elapsed = 0.0
+        self._exact = False
 
     def step(
         self, state: MotionState, ahead: Callable[[float], MotionState], period: float
@@ -59,8 +69,9 @@ class Follower:
         """
         wanted = ahead(period)
         if self._allowed(state, wanted, period):
-            self._plan = None
+            self._plan, self._exact = None, True
             return wanted
+        self._exact = False
         kept = self._kept(state, ahead)
         if kept and self._plan is not None and self._elapsed + period >= self._plan.duration:
             self._plan, kept = None, False  # met within this period
@@ -86,12 +97,13 @@ class Follower:
         if not self._soft(state, wanted, period):
             return False
         most = self._limits.jerk * period
+        jolt, shift = OWN_JOLT if self._exact else (JOLT, JOLT)
         mean = 0.5 * (state.acceleration + wanted.acceleration) * period
-        if np.any(np.abs(wanted.velocity - state.velocity - mean) > JOLT * most * period):
+        if np.any(np.abs(wanted.velocity - state.velocity - mean) > jolt * most * period):
             return False
         bend = (2.0 * state.acceleration + wanted.acceleration) / 6.0 * period
         way = wanted.position - state.position - (state.velocity + bend) * period
-        return bool(np.all(np.abs(way) <= JOLT * most * period**2))
+        return bool(np.all(np.abs(way) <= shift * most * period**2))
 
     def _soft(self, state: MotionState, wanted: MotionState, period: float) -> bool:
         """Whether a state is within the limits, and its acceleration near the present one."""
@@ -106,8 +118,12 @@ class Follower:
     def _meeting(
         self, state: MotionState, ahead: Callable[[float], MotionState], period: float
     ) -> Plan | None:
-        """Plan to where the state will be when it is met."""
-        time, best = period, None
+        """Plan to where the state will be when it is met: soon where that can be, else later."""
+        for cycles in SOON:
+            plan = self._planned(state, self._within(ahead(cycles * period)), cycles * period)
+            if plan is not None and plan.duration <= cycles * period * (1.0 + 1e-9):
+                return plan
+        time, best = SOON[-1] * period, None
         for _ in range(TURNS):
             plan = self._planned(state, self._within(ahead(time)), time)
             if plan is None:

@@ -11,21 +11,17 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise, zip_longest
+import math
 
 import numpy as np
 
-from .arrays import Array
-from .limits import JointLimits
+from .arrays import Array, Places
 
 # d^k/dt^k of the powers 0 to 5, as factors and exponents
 _POWERS = np.arange(6.0)
 
-ROOM = 1.25
-"""How much longer than its peaks need the rounding of a corner takes: segments bend too."""
-
-BRIEFEST = 0.02
-"""Least half time of a rounding in [s]: a few cycles, so that sampling does not see a corner."""
+# how often the power of the row comes out of that of the column when a polynomial is moved
+_BINOMIAL = np.array([[math.comb(column, row) for column in range(6)] for row in range(6)])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,6 +61,17 @@ class Segment:
         second = np.concatenate(((0.0, 0.0), _POWERS[2:] * _POWERS[1:-1] * powers[:-2]))
         c = self.coefficients
         return PathPoint(powers @ c, first @ c, second @ c)
+
+
+def shifted(coefficients: Array, by: float) -> Array:
+    """Return the coefficients of a polynomial (6, n) whose time begins later.
+
+    Args:
+        coefficients: Those of the polynomial (6, n).
+        by: How much later in [s].
+    """
+    moved: Array = (_BINOMIAL * by ** np.maximum(_POWERS - _POWERS[:, None], 0.0)) @ coefficients
+    return moved
 
 
 def linear(start: float, duration: float, begin: Array, end: Array) -> Segment:
@@ -107,17 +114,36 @@ def quintic(start: float, duration: float, begin: PathPoint, end: PathPoint) -> 
         begin: Its begin.
         end: Its end.
     """
-    t = duration
-    way = end.position - begin.position - (begin.velocity + 0.5 * begin.acceleration * t) * t
-    gain = (end.velocity - begin.velocity - begin.acceleration * t) * t
-    bend = (end.acceleration - begin.acceleration) * t**2
-    coefficients = np.zeros((6, len(way)))
-    coefficients[0], coefficients[1] = begin.position, begin.velocity
-    coefficients[2] = 0.5 * begin.acceleration
-    coefficients[3] = (10 * way - 4 * gain + 0.5 * bend) / t**3
-    coefficients[4] = (-15 * way + 7 * gain - bend) / t**4
-    coefficients[5] = (6 * way - 3 * gain + 0.5 * bend) / t**5
-    return Segment(start, duration, coefficients)
+    ends = (np.array(pair) for pair in zip(_fields(begin), _fields(end), strict=True))
+    return Segment(start, duration, quintics(np.array([duration]), *ends)[0])
+
+
+def quintics(durations: Array, positions: Array, velocities: Array, accelerations: Array) -> Array:
+    """Return the coefficients (k, 6, n) of the quintics from each place to the next.
+
+    Args:
+        durations: How long they last in [s] (k).
+        positions: Positions in [rad] (k + 1, n).
+        velocities: Velocities in [rad/s] (k + 1, n).
+        accelerations: Accelerations in [rad/s2] (k + 1, n).
+    """
+    t, p, v, a = durations[:, None], positions[:-1], velocities[:-1], accelerations[:-1]
+    way = positions[1:] - p - (v + 0.5 * a * t) * t
+    gain = (velocities[1:] - v - a * t) * t
+    bend = (accelerations[1:] - a) * t**2
+    rows = (
+        p,
+        v,
+        0.5 * a,
+        (10 * way - 4 * gain + 0.5 * bend) / t**3,
+        (-15 * way + 7 * gain - bend) / t**4,
+        (6 * way - 3 * gain + 0.5 * bend) / t**5,
+    )
+    return np.stack(rows, axis=1)
+
+
+def _fields(point: PathPoint) -> tuple[Array, Array, Array]:
+    return point.position, point.velocity, point.acceleration
 
 
 class Path:
@@ -125,6 +151,8 @@ class Path:
 
     Attributes:
         segments: The segments, without gaps.
+        starts: When they begin in [s] (k).
+        coefficients: Their coefficients (k, 6, n).
         duration: How long all of it lasts in [s].
         end: Its last place; beyond it the arm rests there.
         joined: Whether it begins with the velocity and acceleration that the arm has.
@@ -139,8 +167,9 @@ class Path:
         """
         self.joined = joined
         self.segments = tuple(segments)
-        self._starts = [segment.start for segment in self.segments]
-        self._coefficients = np.array([segment.coefficients for segment in self.segments])
+        self._starts = [segment.start for segment in self.segments]  # bisect is quicker on a list
+        self.starts: Array = np.array(self._starts)
+        self.coefficients: Array = np.array([each.coefficients for each in self.segments])
         last = self.segments[-1]
         self.duration = last.start + last.duration
         self.end = last.at(self.duration)
@@ -156,111 +185,26 @@ class Path:
     def positions(self, times: Array) -> Array:
         """Return the positions (k, n) in [rad] at times of the path (k) in [s]."""
         within = np.clip(times, 0.0, self.duration)
-        places = np.maximum(np.searchsorted(self._starts, within, side='right') - 1, 0)
-        powers = (within - np.array(self._starts)[places])[:, None] ** _POWERS
-        positions: Array = np.einsum('kp,kpn->kn', powers, self._coefficients[places])
-        return positions
+        places = np.maximum(np.searchsorted(self.starts, within, side='right') - 1, 0)
+        return self.derived(0, places, within - self.starts[places])
 
+    @property
+    def durations(self) -> Array:
+        """How long the segments last in [s] (k)."""
+        lasts: Array = np.array([segment.duration for segment in self.segments])
+        return lasts
 
-def rounded(path: Path, limits: JointLimits) -> Path:
-    """Round the corners of a path, its begin and its end among them.
+    def derived(self, order: int, places: Places, times: Array) -> Array:
+        """Return a derivative (m, n) by the path's time.
 
-    Where velocity or acceleration jump by D or E, the path goes over smoothly within a time 2 d
-    that keeps the peaks 3/4 D/d of acceleration, 3/2 D/d^2 and 9/8 E/d of jerk within the limits,
-    where the segments are long enough. It leaves a corner of straight segments by 3/16 D d,
-    and is back on the path at the times that this says. Where it does not begin or end at rest it
-    is given the time for that: it gets longer by d there.
-
-    Args:
-        path: Segments, of which neighbours may meet in a corner.
-        limits: Limits of the joints.
-    """
-    segments = _with_rests(path, limits)
-    halves = [_half(a, b, limits) for a, b in pairwise(segments)]
-    out: list[Segment] = []
-    begin = segments[0].start
-    for segment, half, following in zip_longest(segments, halves, segments[1:]):
-        end, blend = segment.start + segment.duration, half or 0.0
-        room = end - blend - begin
-        if room > 1e-9:
-            out.append(_part(segment, begin, room))
-        if blend > 0.0:
-            ends = (segment.at(end - blend), following.at(end + blend))
-            out.append(quintic(end - blend, 2 * blend, *ends))
-        begin = end + blend
-    return Path(_from_zero(out))
-
-
-def with_run_out(path: Path, limits: JointLimits) -> Path:
-    """Let a path that ends with a velocity come to rest behind its end.
-
-    Args:
-        path: The path.
-        limits: Limits of the joints.
-    """
-    end = path.end
-    still = np.zeros_like(end.velocity)
-    duration = 2.0 * _needed(np.abs(end.velocity), still, limits)
-    if duration == 0.0:
-        return path
-    behind = PathPoint(end.position + 0.5 * duration * end.velocity, still, still)
-    out = quintic(path.duration, duration, PathPoint(end.position, end.velocity, still), behind)
-    return Path([*path.segments, out])
-
-
-def _with_rests(path: Path, limits: JointLimits) -> list[Segment]:
-    """Put a rest in front of a path that begins with a jump, and behind one that ends so."""
-    segments = list(path.segments)
-    first, last = segments[0], segments[-1]
-    begin, end = first.at(first.start), path.end
-    half = _needed(np.abs(begin.velocity), np.abs(begin.acceleration), limits)
-    if half > 0.0 and not path.joined:
-        segments.insert(0, _rest(first.start - half, half, begin.position))
-    half = _needed(np.abs(end.velocity), np.abs(end.acceleration), limits)
-    if half > 0.0:
-        segments.append(_rest(last.start + last.duration, half, end.position))
-    return segments
-
-
-def _rest(start: float, duration: float, position: Array) -> Segment:
-    coefficients = np.zeros((6, len(position)))
-    coefficients[0] = position
-    return Segment(start, duration, coefficients)
-
-
-def _needed(jump: Array, bend: Array, limits: JointLimits) -> float:
-    """Return half the time that jumps of velocity and acceleration need in [s], 0 for none."""
-    if (
-        max(float(np.max(jump / limits.velocity)), float(np.max(bend / limits.acceleration)))
-        < 1e-6
-    ):
-        return 0.0
-    by_acceleration = float(np.max(0.75 * jump / limits.acceleration))
-    by_jerk = float(np.max(np.sqrt(1.5 * jump / limits.jerk)))
-    by_bend = float(np.max(1.125 * bend / limits.jerk))
-    return max(ROOM * max(by_acceleration, by_jerk, by_bend), BRIEFEST)
-
-
-def _half(first: Segment, second: Segment, limits: JointLimits) -> float:
-    """Return half the time of the blend between two segments in [s]; 0 without a corner."""
-    corner = first.start + first.duration
-    before, after = first.at(corner), second.at(corner)
-    jump = np.abs(after.velocity - before.velocity)
-    bend = np.abs(after.acceleration - before.acceleration)
-    room = [s.duration if _resting(s) else s.duration / 2 for s in (first, second)]
-    return min(_needed(jump, bend, limits), *room)
-
-
-def _resting(segment: Segment) -> bool:
-    return not segment.coefficients[1:].any()
-
-
-def _part(segment: Segment, start: float, duration: float) -> Segment:
-    """Return a part of a segment."""
-    return quintic(start, duration, segment.at(start), segment.at(start + duration))
-
-
-def _from_zero(segments: Sequence[Segment]) -> list[Segment]:
-    """Move segments in time so that the first begins at zero."""
-    shift = segments[0].start
-    return [Segment(each.start - shift, each.duration, each.coefficients) for each in segments]
+        Args:
+            order: How often to derive: 0 is the position in [rad].
+            places: Numbers of the segments (m).
+            times: Times since their begin in [s] (m).
+        """
+        factors, exponents = np.ones(6), np.arange(6.0)
+        for _ in range(order):
+            factors, exponents = factors * exponents, np.maximum(exponents - 1.0, 0.0)
+        powers = factors * times[:, None] ** exponents
+        derived: Array = np.einsum('mp,mpn->mn', powers, self.coefficients[places])
+        return derived

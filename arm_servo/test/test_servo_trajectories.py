@@ -94,10 +94,11 @@ def test_a_trajectory_is_followed_to_its_end(name: str, kind: str) -> None:
 
 @pytest.mark.parametrize('kind', ['l', 'c', 'q'])
 def test_a_trajectory_beyond_the_limits_is_followed_within_them(kind: str) -> None:
-    """Where a trajectory asks more acceleration than there is, the arm is late, not rough."""
+    """Where a trajectory asks more acceleration than there is, the arm is late, on its path."""
     core = core_of('panda')
     goal = wave(robot('panda'), ready('panda'), kind, step=0.7)
     states = follow_to_the_end(core, core.follow(goal))
+    assert off_the_path(states, path_of(core)) < 1e-3
     assert states[-1].position == pytest.approx(goal.points[-1].positions, abs=1e-6)
     kept(robot('panda').limits, states)
 

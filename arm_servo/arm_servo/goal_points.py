@@ -1,0 +1,209 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Points of goals: checked, and put in the order of the arm's joints."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+import math
+
+import numpy as np
+
+from .arrays import Array
+from .exceptions import GoalCode, GoalError
+from .goal import GoalPoint, GoalRules, TrajectoryGoal
+from .limits import JointLimits
+from .otg import MotionState
+from .path import PathPoint
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Points:
+    """A checked trajectory in the arm's order: times (k), the rest (k, n) or None."""
+
+    times: Array
+    positions: Array
+    velocities: Array | None
+    accelerations: Array | None
+
+    def at(self, place: int) -> PathPoint:
+        """Return the place that a point is; at rest where it does not say."""
+        still = np.zeros(self.positions.shape[1])
+        return PathPoint(
+            self.positions[place],
+            still if self.velocities is None else self.velocities[place],
+            still if self.accelerations is None else self.accelerations[place],
+        )
+
+    def slowed(self, factor: float) -> Points:
+        """Return the same points with more time.
+
+        Args:
+            factor: How many times the time.
+        """
+        return Points(
+            self.times * factor,
+            self.positions,
+            None if self.velocities is None else self.velocities / factor,
+            None if self.accelerations is None else self.accelerations / factor**2,
+        )
+
+    def delayed(self, by: float) -> Points:
+        """Return the same points later.
+
+        Args:
+            by: How much later in [s].
+        """
+        return replace(self, times=self.times + by)
+
+
+def upcoming_points(
+    goal: TrajectoryGoal, limits: JointLimits, state: MotionState, rules: GoalRules
+) -> Points:
+    """Check a goal, and return its points from now on.
+
+    Args:
+        goal: The trajectory.
+        limits: Limits of the joints.
+        state: Commanded state of the arm.
+        rules: What is accepted.
+
+    Raises:
+        GoalError: It is refused.
+    """
+    points = _upcoming(_ordered(goal, limits, state, rules), goal.age)
+    points = _by_the_short_way(points, limits, state)
+    for number, positions in enumerate(points.positions):
+        _check_span(positions, limits, f'point {number}')
+    _check_end(points, limits, rules)
+    return points
+
+
+def refuse(reason: str, code: GoalCode = GoalCode.INVALID_GOAL) -> GoalError:
+    """Return the refusal of a goal.
+
+    Args:
+        reason: Why, and the remedy.
+        code: Code of the action's result.
+    """
+    return GoalError(code, reason)
+
+
+def _ordered(
+    goal: TrajectoryGoal, limits: JointLimits, state: MotionState, rules: GoalRules
+) -> Points:
+    """Check names, lengths, numbers and times, and put the joints in the arm's order."""
+    _check_joints(goal.joints, limits, rules)
+    if not goal.points:
+        raise refuse('the trajectory has no points')
+    for number, point in enumerate(goal.points):
+        _check_point(number, point, goal)
+    times = np.array([point.time for point in goal.points], dtype=np.float64)
+    for number, (before, after) in enumerate(pairwise(times)):
+        if after <= before:
+            raise refuse(
+                f'point {number + 1} is at {after:g} s and point {number} at {before:g} s;'
+                ' time_from_start must increase'
+            )
+    places = [limits.names.index(name) for name in goal.joints]
+    still = np.zeros(len(limits))
+    has_velocities = all(len(point.velocities) for point in goal.points)
+    has_accelerations = has_velocities and all(len(point.accelerations) for point in goal.points)
+    return Points(
+        times,
+        _filled([point.positions for point in goal.points], places, state.position),
+        _filled([p.velocities for p in goal.points], places, still) if has_velocities else None,
+        _filled([p.accelerations for p in goal.points], places, still)
+        if has_accelerations
+        else None,
+    )
+
+
+def _check_joints(joints: Sequence[str], limits: JointLimits, rules: GoalRules) -> None:
+    invalid = GoalCode.INVALID_JOINTS
+    known = ', '.join(limits.names)
+    for name in joints:
+        if name not in limits.names:
+            raise refuse(f'there is no joint {name!r}; joints: {known}', invalid)
+        if list(joints).count(name) > 1:
+            raise refuse(f'joint {name} is named twice', invalid)
+    missing = [name for name in limits.names if name not in joints]
+    if not joints or (missing and not rules.partial):
+        raise refuse(
+            f'joint {missing[0]} is missing; name all of {known},'
+            ' or set allow_partial_joints_goal',
+            invalid,
+        )
+
+
+def _check_point(number: int, point: GoalPoint, goal: TrajectoryGoal) -> None:
+    if not (math.isfinite(point.time) and point.time >= 0.0):
+        raise refuse(f'point {number}: time_from_start {point.time} s; it must be 0 or more')
+    if len(point.positions) == 0:
+        raise refuse(f'point {number} has no positions')
+    fields = {
+        'positions': point.positions,
+        'velocities': point.velocities,
+        'accelerations': point.accelerations,
+    }
+    for name, values in fields.items():
+        if len(values) not in {0, len(goal.joints)}:
+            raise refuse(f'point {number}: {len(values)} {name} for {len(goal.joints)} joints')
+        for joint, value in zip(goal.joints, values, strict=False):
+            if not math.isfinite(value):
+                raise refuse(f'point {number}: {name} of {joint} is {value}; it must be finite')
+
+
+def _filled(rows: Sequence[Sequence[float]], places: Sequence[int], default: Array) -> Array:
+    """Return rows for all joints; those that are not given have a default."""
+    filled = np.tile(default, (len(rows), 1))
+    filled[:, places] = np.array(rows, dtype=np.float64)
+    return filled
+
+
+def _upcoming(points: Points, age: float) -> Points:
+    """Leave out the points that have passed."""
+    times = points.times - age
+    if times[-1] < 0.0:
+        raise refuse(
+            f'the trajectory ended {-times[-1]:.3f} s ago; header.stamp is too old, or the clocks'
+            ' differ (a stamp of 0 begins at once)',
+            GoalCode.OLD_HEADER_TIMESTAMP,
+        )
+    left = slice(int(np.searchsorted(times, 0.0)), None)
+    return Points(
+        times[left],
+        points.positions[left],
+        None if points.velocities is None else points.velocities[left],
+        None if points.accelerations is None else points.accelerations[left],
+    )
+
+
+def _by_the_short_way(points: Points, limits: JointLimits, state: MotionState) -> Points:
+    """Move continuous joints by whole turns: the first point is at most half a turn off."""
+    turn = 2 * math.pi
+    turns = np.round((state.position - points.positions[0]) / turn) * turn
+    shifted = points.positions + np.where(limits.continuous, turns, 0.0)
+    return Points(points.times, shifted, points.velocities, points.accelerations)
+
+
+def _check_span(positions: Array, limits: JointLimits, place: str) -> None:
+    beyond = (positions < limits.lower - 1e-6) | (positions > limits.upper + 1e-6)
+    if beyond.any():
+        joint = int(np.argmax(beyond))
+        raise refuse(
+            f'{place}: {limits.names[joint]} at {positions[joint]:.4f} is beyond its limits'
+            f' {limits.lower[joint]:.4f}..{limits.upper[joint]:.4f}'
+        )
+
+
+def _check_end(points: Points, limits: JointLimits, rules: GoalRules) -> None:
+    end = np.abs(points.at(-1).velocity)
+    joint = int(np.argmax(end / limits.velocity))
+    if not rules.end_velocity and end[joint] > 1e-3 * limits.velocity[joint]:
+        raise refuse(
+            f'{limits.names[joint]} has {end[joint]:.4f} rad/s at the last point; end at rest, or'
+            ' set allow_nonzero_velocity_at_trajectory_end'
+        )

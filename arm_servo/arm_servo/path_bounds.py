@@ -1,0 +1,68 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Where a path leaves a range of positions, between its points too."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import math
+
+import numpy as np
+
+from .arrays import Array
+from .path import Path
+
+# control values of a polynomial of fifth degree on 0..1, in whose hull it lies, by its
+# coefficients: Farin, "Curves and Surfaces for CAGD", Bernstein form
+_CONTROL = np.array(
+    [[math.comb(row, power) / math.comb(5, power) for power in range(6)] for row in range(6)]
+)
+
+EXACT = 1e-6
+"""Rounding that is let pass in [rad]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Excess:
+    """A place beyond a range.
+
+    Attributes:
+        joint: Number of the joint.
+        position: Where it is in [rad].
+        time: When on the path in [s].
+    """
+
+    joint: int
+    position: float
+    time: float
+
+
+def farthest_beyond(path: Path, lower: Array, upper: Array) -> Excess | None:
+    """Return the place where a path is farthest beyond a range; None where it keeps within.
+
+    Args:
+        path: The path.
+        lower: Least positions in [rad].
+        upper: Greatest positions in [rad].
+    """
+    scaled = path.coefficients * (path.durations[:, None] ** np.arange(6.0))[:, :, None]
+    control = np.einsum('cp,kpn->kcn', _CONTROL, scaled)
+    outside = (control < lower - EXACT).any(axis=1) | (control > upper + EXACT).any(axis=1)
+    worst, most = None, EXACT
+    for place, joint in np.argwhere(outside).tolist():
+        for share, position in _extremes(scaled[place, :, joint]):
+            beyond = max(lower[joint] - position, position - upper[joint])
+            if beyond > most:
+                most = beyond
+                time = path.starts[place] + share * path.durations[place]
+                worst = Excess(joint, position, float(time))
+    return worst
+
+
+def _extremes(coefficients: Array) -> list[tuple[float, float]]:
+    """Return the ends and turning points of a polynomial on 0..1, and its values there."""
+    slopes = coefficients[1:] * np.arange(1.0, 6.0)
+    turning = np.roots(slopes[::-1])
+    inner = turning.real[(np.abs(turning.imag) < EXACT) & (turning.real > 0) & (turning.real < 1)]
+    shares = [0.0, *inner.tolist(), 1.0]
+    return [(share, float(np.polyval(coefficients[::-1], share))) for share in shares]

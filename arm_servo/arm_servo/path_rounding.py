@@ -1,0 +1,201 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Corners of paths rounded, their begin and their end among them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .arrays import Array
+from .limits import JointLimits
+from .path import Path, PathPoint, quintic, Segment, shifted
+
+ROOM = 1.25
+"""How much longer than its peaks need the rounding of a corner takes: segments bend too."""
+
+BRIEFEST = 0.02
+"""Least half time of a rounding in [s]: a few cycles, so that sampling does not see a corner."""
+
+CUT = 0.005
+"""How far roundings that overlap may lead off the path in [rad]."""
+
+BULGE = 0.007
+"""Greatest way off the path of a rounded step of acceleration, as a share of E d^2."""
+
+MERGED = 1e-7
+"""Changes of the polynomial that are nearer than this count as one in [s]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Corners:
+    """Places where velocities or accelerations jump.
+
+    Attributes:
+        times: When in [s] (k).
+        jumps: Jumps of the velocities in [rad/s] (k, n).
+        bends: Jumps of the accelerations in [rad/s2] (k, n).
+        rooms: Half of the shorter neighbour in [s] (k).
+    """
+
+    times: Array
+    jumps: Array
+    bends: Array
+    rooms: Array
+
+
+def rounded(path: Path, limits: JointLimits) -> Path:
+    """Round the corners of a path, its begin and its end among them.
+
+    Where velocity or acceleration jump by D or E, the path goes over smoothly within a time 2 d
+    that keeps the peaks 3/4 D/d of acceleration, 3/2 D/d^2 and 9/8 E/d of jerk within the limits.
+    It leaves a corner of straight segments by 3/16 D d, a step of acceleration by 0.007 E d^2.
+    Where points are so dense that roundings overlap, they add up, and what is followed is their
+    smooth mean; d is less than needed where that would lead too far off. A path that does not
+    begin or end at rest gets longer by d there.
+
+    Args:
+        path: Segments, of which neighbours may meet in a corner.
+        limits: Limits of the joints.
+    """
+    corners = _corners(path)
+    halves = _halves(corners, path, limits)
+    if not halves.any():
+        return path
+    lead = 0.0 if path.joined else max(float(np.max(halves - corners.times)), 0.0)
+    tail = max(float(np.max(corners.times + halves)) - path.duration, 0.0)
+    base = _between_rests(path, lead, tail)
+    starts = _breaks(base, corners.times, halves)
+    pieces = _cut(base, starts)
+    for corner in np.flatnonzero(halves):
+        _round(pieces, starts, corners, int(corner), float(halves[corner]))
+    return Path(
+        [
+            Segment(float(start) + lead, float(end - start), piece)
+            for start, end, piece in zip(starts[:-1], starts[1:], pieces, strict=True)
+        ],
+        joined=path.joined,
+    )
+
+
+def with_run_out(path: Path, limits: JointLimits) -> Path:
+    """Let a path that ends with a velocity come to rest behind its end.
+
+    Args:
+        path: The path.
+        limits: Limits of the joints.
+    """
+    end = path.end
+    still = np.zeros_like(end.velocity)
+    duration = 2.0 * float(_needed(end.velocity[None], still[None], limits)[0])
+    if duration == 0.0:
+        return path
+    behind = PathPoint(end.position + 0.5 * duration * end.velocity, still, still)
+    out = quintic(path.duration, duration, PathPoint(end.position, end.velocity, still), behind)
+    return Path([*path.segments, out], path.joined)
+
+
+def _corners(path: Path) -> _Corners:
+    """Return the joints of the segments, and begin and end against rest."""
+    places, lasts = np.arange(len(path.segments)), path.durations
+    at_rest = np.zeros((1, path.coefficients.shape[2]))
+    jumps, bends = (
+        np.concatenate((path.derived(order, places, 0.0 * lasts), at_rest))
+        - np.concatenate((at_rest, path.derived(order, places, lasts)))
+        for order in (1, 2)
+    )
+    if path.joined:
+        jumps[0], bends[0] = 0.0, 0.0
+    rooms = 0.5 * np.minimum(np.append(lasts, np.inf), np.insert(lasts, 0, np.inf))
+    return _Corners(np.append(path.starts, path.duration), jumps, bends, rooms)
+
+
+def _needed(jumps: Array, bends: Array, limits: JointLimits) -> Array:
+    """Return half the time that jumps of velocity and acceleration need in [s], 0 for none."""
+    jump, bend = np.abs(jumps), np.abs(bends)
+    by_acceleration = np.max(0.75 * jump / limits.acceleration, axis=1)
+    by_jerk = np.max(np.sqrt(1.5 * jump / limits.jerk), axis=1)
+    by_bend = np.max(1.125 * bend / limits.jerk, axis=1)
+    needed = ROOM * np.maximum(np.maximum(by_acceleration, by_jerk), by_bend)
+    none = np.maximum((jump / limits.velocity).max(1), (bend / limits.acceleration).max(1)) < 1e-6
+    halves: Array = np.where(none, 0.0, np.maximum(needed, BRIEFEST))
+    return halves
+
+
+def _halves(corners: _Corners, path: Path, limits: JointLimits) -> Array:
+    """Return half the time of each rounding in [s]; 0 without a corner."""
+    jump = np.maximum(np.abs(corners.jumps).max(axis=1), 1e-12)
+    bend = np.maximum(np.abs(corners.bends).max(axis=1), 1e-12)
+    harmless = np.minimum(CUT / (3.0 / 16.0 * jump), np.sqrt(CUT / (BULGE * bend)))
+    halves = np.minimum(
+        _needed(corners.jumps, corners.bends, limits), np.maximum(corners.rooms, harmless)
+    )
+    if path.joined:  # the begin stays as it is
+        halves = np.minimum(halves, corners.times)
+    rounds: Array = halves
+    return rounds
+
+
+def _between_rests(path: Path, lead: float, tail: float) -> Path:
+    """Put rests in front of a path and behind it."""
+    segments = list(path.segments)
+    if lead > 0.0:
+        segments.insert(0, _rest(-lead, lead, path.at(0.0).position))
+    if tail > 0.0:
+        segments.append(_rest(path.duration, tail, path.end.position))
+    return Path(segments, path.joined)
+
+
+def _rest(start: float, duration: float, position: Array) -> Segment:
+    coefficients = np.zeros((6, len(position)))
+    coefficients[0] = position
+    return Segment(start, duration, coefficients)
+
+
+def _breaks(base: Path, times: Array, halves: Array) -> Array:
+    """Return the times between which the rounded path is one polynomial in [s]."""
+    rounds = halves > 0.0
+    begin, end = base.starts[0], base.duration
+    ends = (times[rounds] - halves[rounds], times[rounds], times[rounds] + halves[rounds])
+    inner = np.sort(np.concatenate((base.starts[1:], *ends)))
+    inner = inner[(inner > begin + MERGED) & (inner < end - MERGED)]
+    apart = np.diff(inner, prepend=begin) > MERGED
+    breaks: Array = np.concatenate(((begin,), inner[apart], (end,)))
+    return breaks
+
+
+def _cut(base: Path, starts: Array) -> Array:
+    """Return the coefficients of a path between other times (k, 6, n)."""
+    middles = 0.5 * (starts[:-1] + starts[1:])
+    places = np.searchsorted(base.starts, middles, side='right') - 1
+    return np.array(
+        [
+            shifted(base.coefficients[place], start - base.starts[place])
+            for place, start in zip(places.tolist(), starts[:-1].tolist(), strict=True)
+        ]
+    )
+
+
+def _round(pieces: Array, starts: Array, corners: _Corners, corner: int, half: float) -> None:
+    """Add the rounding of a corner to the polynomials about it."""
+    time, jump, bend = corners.times[corner], corners.jumps[corner], corners.bends[corner]
+    d = half
+    smooth = np.array(
+        [
+            0.0 * jump,
+            0.0 * jump,
+            0.0 * jump,
+            jump / (4 * d**2) - bend / (8 * d),
+            -jump / (16 * d**3) + 2.5 * bend / (16 * d**2),
+            -bend / (32 * d**3),
+        ]
+    )
+    sharp = np.zeros_like(smooth)
+    sharp[1], sharp[2] = jump, 0.5 * bend
+    middles = 0.5 * (starts[:-1] + starts[1:])
+    first, last = np.searchsorted(middles, (time - half, time + half)).tolist()
+    for piece in range(first, last):
+        pieces[piece] += shifted(smooth, starts[piece] - (time - half))
+        if middles[piece] > time:
+            pieces[piece] -= shifted(sharp, starts[piece] - time)

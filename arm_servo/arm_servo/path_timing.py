@@ -1,0 +1,249 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Paths walked slower where joints could not follow: the same places, more time.
+
+Planners know speeds and accelerations, seldom jerks, and only at their points; what lies between
+may ask more. The path q(s) is walked as q(s(t)) with ds/dt = 1/r. The stretch r(s) >= 1 is a
+cubic B-spline, so the path stays smooth to the acceleration, and what it asks is, by the chain
+rule with u = 1/r, derivatives by s written as primes::
+
+    velocity      q' u
+    acceleration  q'' u^2 + q' u u'
+    jerk          q''' u^3 + 3 q'' u^2 u' + q' u (u'^2 + u u'')
+
+Where that is too much, the coefficients of the spline there grow, until nothing is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import math
+
+import numpy as np
+
+from .arrays import Array, Places
+from .limits import JointLimits
+from .path import Path, quintics, Segment
+
+SPACING = 0.01
+"""Greatest distance of the places that are looked at in [s]."""
+
+MOST = 4000
+"""Places in about a path: long ones are looked at less densely."""
+
+INNER = 4
+"""Least number of parts in which each segment is looked at."""
+
+KNOTS = (0.06, 0.15, 0.4)
+"""Distances of the spline's knots that are tried in [s]: short ones lose less time."""
+
+TURNS = 60
+"""How often the spline is improved at most."""
+
+FULL = (0.99, 0.96, 0.9)
+"""Shares of the limits that stretches aim at, until what lies between the places is within too."""
+
+BETWEEN = (1.0, 1.01, 1.03)
+"""How much greater velocity, acceleration and jerk may be between the places, as factors."""
+
+PIECE = 0.02
+"""Greatest length of the new segments in [s] of the given path."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Demand:
+    """What a path asks most.
+
+    Attributes:
+        share: Factor of time that it takes to come within the limits; 1 or less is within.
+        joint: Number of the joint that asks it.
+        quantity: 0 velocity, 1 acceleration, 2 jerk.
+        time: When in [s].
+        value: How much in [rad/s], [rad/s2] or [rad/s3].
+    """
+
+    share: float
+    joint: int
+    quantity: int
+    time: float
+    value: float
+
+
+class Timing:
+    """What a path asks of the joints, and the stretch that brings it within their limits."""
+
+    def __init__(self, path: Path, limits: JointLimits) -> None:
+        """Look at a path.
+
+        Args:
+            path: A path without corners.
+            limits: Limits of the joints.
+        """
+        self._path = path
+        self._limits = limits
+        places, offsets = _places(path)
+        self._times: Array = path.starts[places] + offsets
+        self._rates = [path.derived(order, places, offsets) for order in (1, 2, 3)]
+
+    @property
+    def fastest(self) -> Demand:
+        """The greatest speed that the path asks, measured by the limits."""
+        return self._most(self._shares(self._rates, 1.0)[:1])
+
+    @property
+    def demand(self) -> Demand:
+        """What the path asks most, measured by the limits."""
+        return self._most(self._shares(self._rates, 1.0))
+
+    def _most(self, shares: Array) -> Demand:
+        quantity, place, joint = np.unravel_index(int(shares.argmax()), shares.shape)
+        value = float(abs(self._rates[quantity][place, joint]))
+        return Demand(
+            float(shares.max()), int(joint), int(quantity), float(self._times[place]), value
+        )
+
+    def stretched(self) -> Path | None:
+        """Return the path within the limits, as quick as a spline makes it; None for no way.
+
+        A path that joins a motion begins with its speed; what is asked there cannot be changed.
+        """
+        if self.demand.share <= 1.0:
+            return self._path
+        for full in FULL:
+            found = [each for knots in KNOTS if (each := self._solved(knots, full)) is not None]
+            if not found:
+                return None
+            path = _walked(self._path, min(found, key=lambda stretch: stretch.duration))
+            if Timing(path, self._limits).demand.share <= 1.0:
+                return path
+        return None
+
+    def _solved(self, knots: float, full: float) -> _Stretch | None:
+        """Return the stretch with knots about a distance apart, if there is one."""
+        count = max(math.ceil(self._path.duration / knots), 1)
+        stretch = _Stretch(np.ones(count + 3), self._path.duration)
+        pinned = 3 if self._path.joined else 0
+        cells, basis = stretch.basis(self._times)
+        for _ in range(TURNS):
+            r, slope, bend = (stretch.derived(cells, row) for row in basis)
+            needed = self._needed(r, slope, bend, full)
+            if needed.max() <= 1.0:
+                return stretch
+            most = np.ones(count)
+            np.maximum.at(most, cells, needed)
+            wide = np.concatenate((np.ones(3), most, np.ones(3)))
+            growth = np.max([wide[shift : shift + count + 3] for shift in range(4)], axis=0)
+            growth[:pinned] = 1.0
+            stretch = _Stretch(stretch.coefficients * growth, stretch.length)
+        return None
+
+    def _needed(self, r: Array, slope: Array, bend: Array, full: float) -> Array:
+        """Return the greatest factor of time at each place under a stretch."""
+        u = 1.0 / r
+        first = -slope * u**2
+        second = (2.0 * slope**2 * u - bend) * u**2
+        rate, change, jolt = u, u * first, u * (first**2 + u * second)
+        speed, acceleration, jerk = self._rates
+        walked = [
+            speed * rate[:, None],
+            acceleration * (rate**2)[:, None] + speed * change[:, None],
+            jerk * (rate**3)[:, None]
+            + 3.0 * acceleration * (rate * change)[:, None]
+            + speed * jolt[:, None],
+        ]
+        needed: Array = self._shares(walked, full).max(axis=(0, 2))
+        return needed
+
+    def _shares(self, rates: list[Array], full: float) -> Array:
+        """Return the factors of time (3, m, n) by velocity, acceleration and jerk."""
+        limits = self._limits
+        speed, acceleration, jerk = (
+            np.abs(rate) * (more / full) for rate, more in zip(rates, BETWEEN, strict=True)
+        )
+        return np.array(
+            (
+                speed / limits.velocity,
+                np.sqrt(acceleration / limits.acceleration),
+                np.cbrt(jerk / limits.jerk),
+            )
+        )
+
+
+class _Stretch:
+    """A cubic B-spline over a path: seconds for each second of it."""
+
+    def __init__(self, coefficients: Array, length: float) -> None:
+        self.coefficients = coefficients
+        self.length = length
+        self._width = length / (len(coefficients) - 3)
+
+    @property
+    def duration(self) -> float:
+        """How long the stretched path lasts in [s]."""
+        return float(self.times(np.array([0.0, self.length]))[-1])
+
+    def basis(self, times: Array) -> tuple[Places, Array]:
+        """Return the cells (m) of times, and the weights of their four coefficients (3, m, 4)."""
+        last = len(self.coefficients) - 4
+        cells = np.clip((times / self._width).astype(int), 0, last)
+        f = (times / self._width - cells)[:, None]
+        g, h = 1.0 - f, self._width
+        value = np.hstack((g**3, 3 * f**3 - 6 * f**2 + 4, 3 * g**3 - 6 * g**2 + 4, f**3)) / 6
+        slope = np.hstack((-(g**2), 3 * f**2 - 4 * f, 4 * g - 3 * g**2, f**2)) / (2 * h)
+        bend = np.hstack((g, 3 * f - 2, 3 * g - 2, f)) / h**2
+        return cells, np.array([value, slope, bend])
+
+    def derived(self, cells: Places, weights: Array) -> Array:
+        """Return the spline, or a derivative of it, by weights of :meth:`basis`."""
+        near = self.coefficients[cells[:, None] + np.arange(4)]
+        derived: Array = np.sum(near * weights, axis=1)
+        return derived
+
+    def times(self, places: Array) -> Array:
+        """Return the stretched times of places of the path that begin at 0 in [s]."""
+        knots = np.arange(1, len(self.coefficients) - 3) * self._width
+        fine = np.unique(np.concatenate((places, knots)))
+        middle, half = 0.5 * (fine[:-1] + fine[1:]), 0.5 * np.diff(fine)
+        ways = np.zeros(len(half))
+        for root in (-math.sqrt(1 / 3), math.sqrt(1 / 3)):  # Gauss: exact for cubics
+            cells, basis = self.basis(middle + root * half)
+            ways = ways + half * self.derived(cells, basis[0])
+        along = np.concatenate(((0.0,), np.cumsum(ways)))
+        times: Array = along[np.searchsorted(fine, places)]
+        return times
+
+
+def _places(path: Path) -> tuple[Places, Array]:
+    """Return segments and times in them, at which a path is looked at."""
+    spacing = max(SPACING, path.duration / MOST)
+    lasts = path.durations
+    counts = np.maximum(np.ceil(lasts / spacing).astype(int), INNER) + 1
+    places = np.repeat(np.arange(len(counts)), counts)
+    number = np.arange(len(places)) - np.repeat(np.cumsum(counts) - counts, counts)
+    return places, lasts[places] * number / (counts[places] - 1)
+
+
+def _walked(path: Path, stretch: _Stretch) -> Path:
+    """Return a path as the stretch makes it."""
+    lasts = path.durations
+    counts = np.ceil(lasts / PIECE).astype(int)
+    places = np.repeat(np.arange(len(counts)), counts)
+    number = np.arange(len(places)) - np.repeat(np.cumsum(counts) - counts, counts)
+    offsets = lasts[places] * number / counts[places]
+    places, offsets = np.append(places, len(counts) - 1), np.append(offsets, lasts[-1])
+    given = path.starts[places] + offsets
+    cells, basis = stretch.basis(given)
+    r, slope = (stretch.derived(cells, row) for row in basis[:2])
+    q, speed, bend = (path.derived(order, places, offsets) for order in range(3))
+    velocity = speed / r[:, None]
+    acceleration = bend / (r**2)[:, None] - speed * (slope / r**3)[:, None]
+    times = stretch.times(given)
+    lengths = np.diff(times)
+    pieces = quintics(lengths, q, velocity, acceleration)
+    return Path(
+        [
+            Segment(*each)
+            for each in zip(times[:-1].tolist(), lengths.tolist(), pieces, strict=True)
+        ],
+        path.joined,
+    )

@@ -1,0 +1,295 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Trajectories that ask more than joints can do: exactly on their path, later or refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+import math
+import re
+
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+import numpy as np
+import pytest
+from servo_robots import ready, robot, ROBOTS
+from servo_streams import kept, PERIOD
+
+from arm_servo.arrays import Array
+from arm_servo.core import MotionCore
+from arm_servo.core_settings import CoreSettings
+from arm_servo.exceptions import GoalCode, GoalError
+from arm_servo.execution import Execution, ExecutionSettings, Phase
+from arm_servo.goal import GoalPoint, TrajectoryGoal
+from arm_servo.limits import JointLimits
+from arm_servo.otg import Generator, MotionState
+from arm_servo.path import linear, Path
+from arm_servo.path_rounding import rounded
+from arm_servo.path_timing import Timing
+
+EXACT = 5e-4
+"""What counts as on the path in [rad]: a cycle sees a step of the jerk as one."""
+
+FREE = CoreSettings(check_self_collision=False)
+
+
+def core_of(name: str) -> MotionCore:
+    """Return a core of a robot in its pose to start from, without a look at collisions."""
+    core = MotionCore(robot(name), FREE)
+    core.reset(ready(name))
+    return core
+
+
+def slowed(goal: TrajectoryGoal, factor: float) -> TrajectoryGoal:
+    """Return a trajectory of positions with more time."""
+    points = [replace(point, time=point.time * factor) for point in goal.points]
+    return replace(goal, points=points)
+
+
+def time_optimal(
+    limits: JointLimits, begin: Array, end: Array, kind: str, step: float
+) -> TrajectoryGoal:
+    """Return the straight way as planners give it: without a thought of jerk, sampled.
+
+    Args:
+        limits: Its speeds and accelerations are used to the full.
+        begin: Positions at the begin.
+        end: Positions at the end.
+        kind: p, pv or pva: what the points have.
+        step: Time from point to point.
+    """
+    way = end - begin
+    most = np.maximum(np.abs(way), 1e-9)
+    speed, gain = np.min(limits.velocity / most), np.min(limits.acceleration / most)
+    rising = min(speed / gain, math.sqrt(1.0 / gain))
+    speed = gain * rising
+    cruising = (1.0 - speed * rising) / speed
+    total = 2.0 * rising + cruising
+
+    def share(time: float) -> tuple[float, float, float]:
+        if time < rising:
+            return 0.5 * gain * time**2, gain * time, gain
+        if time < rising + cruising:
+            return 0.5 * speed * rising + speed * (time - rising), speed, 0.0
+        left = max(total - time, 0.0)
+        return 1.0 - 0.5 * gain * left**2, gain * left, -gain
+
+    points = []
+    for time in [*np.arange(0.0, total - 1e-3, step).tolist(), total]:
+        row = [begin, 0.0 * way, 0.0 * way]
+        row = [start + way * each for start, each in zip(row, share(time), strict=True)]
+        filled = [
+            tuple(values) if each in kind else () for values, each in zip(row, 'pva', strict=True)
+        ]
+        points.append(GoalPoint(time, *filled))
+    return TrajectoryGoal(limits.names, points)
+
+
+def follow(core: MotionCore, execution: Execution) -> tuple[list[MotionState], float]:
+    """Follow a trajectory to its end; return the states, and how far off its path they were."""
+    states, off = [core.state], 0.0
+    for step in range(round(30.0 / PERIOD)):
+        states.append(core.step(step * PERIOD, PERIOD).state)
+        error = execution.feedback.desired.position - states[-1].position
+        off = max(off, float(np.abs(error).max()))
+        if execution.phase is Phase.DONE:
+            return states, off
+    raise AssertionError('the trajectory is not done after 30 s')
+
+
+@pytest.mark.parametrize('name', ROBOTS)
+@pytest.mark.parametrize('kind', ['p', 'pv', 'pva'])
+@settings(max_examples=3, deadline=None)
+@given(seed=st.integers(0, 10**6), step=st.sampled_from([0.02, 0.1, 0.25]))
+def test_time_optimal_plans_are_followed_exactly(
+    name: str, kind: str, seed: int, step: float
+) -> None:
+    """A plan that uses speed and acceleration to the full is followed on its path."""
+    core, limits = core_of(name), robot(name).limits
+    begin = ready(name)
+    end = begin + np.random.default_rng(seed).uniform(-0.8, 0.8, len(begin))
+    end = np.clip(end, limits.lower + 0.01, limits.upper - 0.01)
+    goal = time_optimal(limits, begin, end, kind, step)
+    if kind == 'p':  # corners at full speed are more than joints can do
+        goal = slowed(goal, 2.0)
+    execution = core.follow(goal)
+    states, off = follow(core, execution)
+    assert execution.ending is not None
+    assert execution.ending.code is GoalCode.SUCCESSFUL
+    assert off < EXACT
+    assert states[-1].position == pytest.approx(goal.points[-1].positions, abs=1e-6)
+    kept(limits, states)
+
+
+def swinging(name: str, size: float, frequency: float) -> TrajectoryGoal:
+    """Return 4 s of a sine of the first joint in points 0.01 s apart, faded in and out."""
+    points = []
+    for time in np.arange(0.01, 4.0, 0.01).tolist():
+        fade = math.sin(0.5 * math.pi * min(1.0, time, 4.0 - time)) ** 2
+        positions = ready(name).copy()
+        positions[0] += size * fade * math.sin(2 * math.pi * frequency * time)
+        points.append(GoalPoint(time, tuple(positions)))
+    return TrajectoryGoal(robot(name).joints, points)
+
+
+@pytest.mark.parametrize(('size', 'frequency'), [(0.14, 2.4), (0.1, 2.0)])
+def test_too_much_acceleration_is_refused(size: float, frequency: float) -> None:
+    """A swing far beyond the acceleration limit is refused with joint, amount and limit."""
+    core = core_of('panda')
+    with pytest.raises(GoalError, match=r'panda_joint1 would need .* times the time') as refused:
+        core.follow(swinging('panda', size, frequency))
+    assert 'acceleration' in str(refused.value) or 'jerk' in str(refused.value)
+
+
+def test_a_swing_within_the_limits_is_followed_exactly() -> None:
+    """Dense points without speeds are followed as the smooth curve that they are samples of."""
+    core, goal = core_of('panda'), swinging('panda', 0.05, 1.0)
+    execution = core.follow(goal)
+    states, off = follow(core, execution)
+    assert off < EXACT
+    asked = {round(point.time / PERIOD): point.positions[0] for point in goal.points[:-1]}
+    late = round((len(states) * PERIOD - goal.points[-1].time) / PERIOD)
+    found = min(
+        max(abs(states[number + shift].position[0] - at) for number, at in asked.items())
+        for shift in range(late + 1)
+    )
+    assert found < 2e-3
+    kept(robot('panda').limits, states)
+
+
+def quick(name: str, end: Array, time: float) -> TrajectoryGoal:
+    """Return a trajectory to an end in a time."""
+    return TrajectoryGoal(robot(name).joints, [GoalPoint(time, tuple(end))])
+
+
+@pytest.mark.parametrize('name', ROBOTS)
+@settings(max_examples=4, deadline=None)
+@given(seed=st.integers(0, 10**6), time=st.floats(0.02, 0.5), count=st.integers(1, 4))
+def test_the_factor_of_a_refusal_suffices(name: str, seed: int, time: float, count: int) -> None:
+    """What was refused for its time is accepted with as much more of it as the words say."""
+    rng, limits = np.random.default_rng(seed), robot(name).limits
+    rows = ready(name) + rng.uniform(-1.0, 1.0, (count, len(limits)))
+    rows = np.clip(rows, limits.lower, limits.upper)
+
+    points = [GoalPoint(time * (number + 1), tuple(row)) for number, row in enumerate(rows)]
+    goal, core = TrajectoryGoal(limits.names, points), core_of(name)
+    reason = refusal(core, goal)
+    assume(reason)
+    found = re.search(r'give the trajectory (\S+) times the time', reason)
+    assert found is not None, reason
+    _, off = follow(core, core.follow(slowed(goal, float(found[1]))))
+    assert off < EXACT
+
+
+def refusal(core: MotionCore, goal: TrajectoryGoal) -> str:
+    """Return why a trajectory is refused; empty when it is not."""
+    try:
+        core.follow(goal)
+    except GoalError as error:
+        return str(error)
+    return ''
+
+
+def test_a_little_haste_is_late_and_says_so() -> None:
+    """What takes a little longer than asked is followed, and the end says how late and why."""
+    core, begin = core_of('panda'), ready('panda')
+    end = begin + np.eye(7)[0] * 0.3
+    execution = core.follow(quick('panda', end, 0.5))
+    states, off = follow(core, execution)
+    assert off < EXACT
+    assert execution.ending is not None
+    assert execution.ending.code is GoalCode.SUCCESSFUL
+    assert re.search(
+        r'reached, 0\.\d\d s later than asked, for the acceleration of panda_joint1',
+        execution.ending.reason,
+    )
+    kept(robot('panda').limits, states)
+
+
+def test_a_bulge_beyond_a_limit_is_refused() -> None:
+    """Points within the limits whose speeds lead beyond one between them are refused."""
+    limits, core = robot('panda').limits, core_of('panda')
+    begin = ready('panda').copy()
+    begin[0] = limits.upper[0] - 0.15
+    core.reset(begin)
+    turn, speeds = begin.copy(), np.zeros(7)
+    turn[0], speeds[0] = limits.upper[0] - 0.02, 1.0
+    points = [GoalPoint(0.5, tuple(turn), tuple(speeds)), GoalPoint(2.0, tuple(begin), (0.0,) * 7)]
+    with pytest.raises(GoalError, match=r'panda_joint1 would be at 3\.0\d+ at 0\.\d+ s, beyond'):
+        core.follow(TrajectoryGoal(limits.names, points))
+
+
+@pytest.mark.parametrize('name', ROBOTS)
+@settings(max_examples=4, deadline=None)
+@given(seed=st.integers(0, 10**6))
+def test_goals_replace_each_other_on_their_paths(name: str, seed: int) -> None:
+    """A goal that takes over from another in motion is met at once, and kept to."""
+    rng, core = np.random.default_rng(seed), core_of(name)
+    limits, begin = robot(name).limits, ready(name)
+    states = [core.state]
+    execution = core.follow(quick(name, begin + rng.uniform(-0.5, 0.5, len(begin)), 1.2))
+    count = int(rng.integers(20, 300))
+    states.extend(core.step(number * PERIOD, PERIOD).state for number in range(count))
+    try:
+        execution = core.follow(quick(name, begin + rng.uniform(-0.5, 0.5, len(begin)), 1.0))
+    except GoalError as error:
+        assert re.search('times the time|beyond', str(error))  # noqa: PT017
+        return
+    more, off = follow(core, execution)
+    assert off < EXACT
+    kept(limits, states + more[1:])
+
+
+@settings(max_examples=20, deadline=None)
+@given(seed=st.integers(0, 10**6), step=st.sampled_from([0.01, 0.1, 1.0]))
+def test_rounded_paths_are_smooth(seed: int, step: float) -> None:
+    """Positions, speeds and accelerations are continuous, however dense the corners are."""
+    limits = robot('prbt').limits
+    rows = np.cumsum(np.random.default_rng(seed).normal(size=(12, 6)), axis=0) * 0.1 * step
+    lines = [linear(n * step, step, rows[n], rows[n + 1]) for n in range(len(rows) - 1)]
+    path = rounded(Path(lines), limits)
+    for before, after in zip(path.segments, path.segments[1:], strict=False):
+        one, other = before.at(after.start), after.at(after.start)
+        assert other.position == pytest.approx(one.position, abs=1e-9)
+        assert other.velocity == pytest.approx(one.velocity, abs=1e-8)
+        assert other.acceleration == pytest.approx(one.acceleration, abs=1e-6)
+    assert path.at(0.0).position == pytest.approx(rows[0])
+    assert path.end.position == pytest.approx(rows[-1])
+
+
+@settings(max_examples=20, deadline=None)
+@given(seed=st.integers(0, 10**6))
+def test_stretched_paths_lead_through_the_same_places(seed: int) -> None:
+    """A path that is walked slower is the same path, within the limits."""
+    limits = robot('gp110').limits
+    rows = np.random.default_rng(seed).uniform(-0.3, 0.3, (5, 6))
+    lines = [linear(0.25 * n, 0.25, rows[n], rows[n + 1]) for n in range(4)]
+    given_path = rounded(Path(lines), limits)
+    stretched = Timing(given_path, limits).stretched()
+    assume(stretched is not None and stretched is not given_path)
+    assert stretched is not None
+    assert Timing(stretched, limits).demand.share <= 1.0
+    there = given_path.positions(np.linspace(0.0, given_path.duration, 3000))
+    for place in stretched.positions(np.linspace(0.0, stretched.duration, 60)):
+        assert np.abs(there - place).max(axis=1).min() < 2e-3  # as dense as the places are
+
+
+def test_set_points_that_leave_the_path_end_the_trajectory() -> None:
+    """Whatever takes the set-points off the path that they had met, it does not go on."""
+    limits, begin = robot('prbt').limits, ready('prbt')
+    execution = Execution(
+        quick('prbt', begin + 0.3, 2.0),
+        limits=limits,
+        generator=Generator(limits),
+        state=MotionState.at_rest(begin),
+        pace=1.0,
+        settings=ExecutionSettings(),
+    )
+    state = MotionState.at_rest(begin)
+    for step in range(300):
+        held = state if step < 150 else MotionState.at_rest(state.position)
+        after = execution.step(held, held, 1.0, PERIOD)
+        state = after if step < 150 and after is not None else held
+    assert execution.ending is not None
+    assert execution.ending.code is GoalCode.PATH_TOLERANCE_VIOLATED
+    assert re.search(r'prbt_joint_\d: the set-point is \+0\.02', execution.ending.reason)
