@@ -33,7 +33,7 @@ from quad_hardware.nodes import messages
 from quad_hardware.nodes.diagnostics import (
     command_diagnostic,
     CommandCounters,
-    link_diagnostic,
+    LinkDiagnostic,
     robot_diagnostic,
 )
 from quad_hardware.nodes.parameters import Deviations, Frames
@@ -184,7 +184,20 @@ def link_status(**changes: object) -> LinkStatus:
 )
 def test_the_level_of_the_link(status: LinkStatus, level: bytes) -> None:
     """A damaged line is a warning, a silent one stale, none an error."""
-    assert link_diagnostic('hardware_node', '/dev/x', status).level == level
+    assert LinkDiagnostic().describe('hardware_node', '/dev/x', status).level == level
+
+
+def test_damage_is_told_as_long_as_it_lasts() -> None:
+    """A cable that was put right is no warning, and one that breaks late is one at once."""
+    link = LinkDiagnostic()
+    levels = []
+    for frames, damaged in [(5000, 0), (5050, 20), (5100, 20), (10, 0), (60, 30)]:
+        counters = ParserCounters(frames=frames, bad_checksum=damaged)
+        told = link.describe('hardware_node', '/dev/x', link_status(parser=counters))
+        levels.append(told.level)
+    ok, warn = DiagnosticStatus.OK, DiagnosticStatus.WARN
+    assert levels == [ok, warn, ok, ok, warn]
+    assert '30 damaged and 50 good frames lately' in told.message
 
 
 @pytest.mark.parametrize(
@@ -206,7 +219,7 @@ def test_the_level_of_the_link(status: LinkStatus, level: bytes) -> None:
             80.0,
             0.01,
             DiagnosticStatus.ERROR,
-            'overload, imu',
+            'overload: free its legs, or let it lie down; IMU',
         ),
         ({'faults': 0x8000}, 80.0, 0.01, DiagnosticStatus.OK, 'no faults'),
     ],

@@ -12,11 +12,20 @@ from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from ..estimation import Health
 from ..estimation.battery import EMPTY_BATTERY, LOW_BATTERY
 from ..link import LinkState, LinkStatus, RobotState
-from ..protocol import Fault
+from ..protocol import Fault, ParserCounters
 
 HOT_SERVO = 65.0  # [°C]
 GRAVITY_ERROR = math.radians(15.0)  # [rad] between accelerometer and attitude
 DAMAGE_SHARE = 0.01  # of the frames, above which a cable is bad
+
+FAULTS = {
+    Fault.LOW_BATTERY: 'low battery: charge it',
+    Fault.OVERLOAD: 'overload: free its legs, or let it lie down',
+    Fault.OVERHEATED: 'overheated: let it lie down and cool',
+    Fault.SERVO_SILENT: 'servo silent: look at the cable of the leg that hangs limp',
+    Fault.IMU: 'IMU: its attitude is not to be trusted, switch the robot off and on',
+}
+"""What a fault is called, and what to do."""
 
 _LINK_LEVELS = {
     LinkState.CONNECTING: DiagnosticStatus.ERROR,
@@ -54,27 +63,48 @@ class CommandCounters:
     largest_step: float = 0.0
 
 
-def link_diagnostic(node: str, port: str, status: LinkStatus) -> DiagnosticStatus:
-    """Describe the serial link."""
-    level, message = _LINK_LEVELS[status.state], status.detail
-    parser = status.parser
-    if level == DiagnosticStatus.OK and parser.damaged > DAMAGE_SHARE * max(parser.frames, 100):
-        level = DiagnosticStatus.WARN
-        message = f'{parser.damaged} damaged frames of {parser.frames}; is the cable loose?'
-    values = {
-        'state': status.state.value,
-        'protocol': status.protocol,
-        'baud': status.baud,
-        'firmware': status.firmware,
-        'connections': status.connections,
-        'report_age': '' if math.isinf(status.age) else f'{status.age:.3f}',
-        'reports_refused': status.refused,
-        'commands_sent': status.commands,
-        'commands_dropped': status.dropped,
-        **asdict(parser),
-        **asdict(status.dialect),
-    }
-    return _status(level, f'{node}: serial link', message, port, values)
+class LinkDiagnostic:
+    """Describes the serial link, look by look: damage is judged since the last one."""
+
+    def __init__(self) -> None:
+        """Nothing was seen yet."""
+        self._frames = self._damaged = 0
+
+    def describe(self, node: str, port: str, status: LinkStatus) -> DiagnosticStatus:
+        """Describe the link, and begin to look anew.
+
+        Args:
+            node: Name of the node.
+            port: Its serial port.
+            status: The link.
+        """
+        level, message = _LINK_LEVELS[status.state], status.detail
+        parser = status.parser
+        frames, damaged = self._since(parser)
+        if level == DiagnosticStatus.OK and damaged > DAMAGE_SHARE * max(frames, 100):
+            level = DiagnosticStatus.WARN
+            message = f'{damaged} damaged and {frames} good frames lately; is the cable loose?'
+        values = {
+            'state': status.state.value,
+            'protocol': status.protocol,
+            'baud': status.baud,
+            'firmware': status.firmware,
+            'connections': status.connections,
+            'report_age': '' if math.isinf(status.age) else f'{status.age:.3f}',
+            'reports_refused': status.refused,
+            'commands_sent': status.commands,
+            'commands_dropped': status.dropped,
+            **asdict(parser),
+            **asdict(status.dialect),
+        }
+        return _status(level, f'{node}: serial link', message, port, values)
+
+    def _since(self, parser: ParserCounters) -> tuple[int, int]:
+        """Return the valid and the damaged frames since the last look."""
+        since = parser.frames - self._frames, parser.damaged - self._damaged
+        self._frames, self._damaged = parser.frames, parser.damaged
+        # another connection counts from 0
+        return since if min(since) >= 0 else (parser.frames, parser.damaged)
 
 
 def robot_diagnostic(node: str, port: str, state: RobotState, health: Health) -> DiagnosticStatus:
@@ -95,8 +125,7 @@ def robot_diagnostic(node: str, port: str, state: RobotState, health: Health) ->
     faults = Fault(state.faults & sum(Fault))
     if faults:
         level = DiagnosticStatus.ERROR
-        names = (str(fault.name).lower().replace('_', ' ') for fault in Fault if fault in faults)
-        message = f'the robot reports {", ".join(names)}'
+        message = f'the robot reports {"; ".join(FAULTS[f] for f in Fault if f in faults)}'
     values = {
         'battery': '' if charge is None else f'{charge:.0f}',
         'voltage': '' if voltage is None else f'{voltage:.2f}',

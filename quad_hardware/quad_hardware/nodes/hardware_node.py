@@ -31,7 +31,7 @@ from . import messages
 from .diagnostics import (
     command_diagnostic,
     CommandCounters,
-    link_diagnostic,
+    LinkDiagnostic,
     robot_diagnostic,
 )
 from .parameters import declare_parameters
@@ -76,6 +76,7 @@ class HardwareNode(Node):
         self._odom = Stream(self.create_publisher(Odometry, 'odom', SENSOR_DEPTH))
         self._battery = self.create_publisher(BatteryState, 'battery_state', SENSOR_DEPTH)
         self._tf = Stream(self.create_publisher(TFMessage, '/tf', 100))
+        self._link = LinkDiagnostic()
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', SENSOR_DEPTH)
         self._reader = Reader(JointCommand, 'position', 'velocity', 'effort')
         self.create_subscription(JointCommand, 'joint_command', self._take, COMMAND_QOS, raw=True)
@@ -249,7 +250,7 @@ class HardwareNode(Node):
         array = DiagnosticArray()
         array.header.stamp = now
         array.status = [
-            link_diagnostic(name, port, self._driver.status()),
+            self._link.describe(name, port, self._driver.status()),
             command_diagnostic(name, port, self._counters),
         ]
         if latest is not None:
