@@ -7,9 +7,9 @@ from __future__ import annotations
 import math
 
 from quad_controller.gait.body import BodyPose, feet_in_body
+from quad_controller.gait.lift import arc, hermite, SwingLift
 from quad_controller.gait.parameters import GaitParameters
 from quad_controller.gait.schedule import Gait
-from quad_controller.gait.stepping import hermite
 from quad_controller.gait.velocity import Velocity
 from quad_controller.model.quadruped import Quadruped, Targets
 from quad_controller.model.urdf import Vector
@@ -23,6 +23,7 @@ class GaitTeacher:
         self._robot, self._parameters = robot, parameters
         self.schedule = parameters.schedule(Gait.TROT)
         self._neutral = robot.footprint(parameters.nominal_height, [0.0] * len(robot.names))
+        self._lift = SwingLift(robot, self._neutral, self.schedule, parameters.swing_height)
 
     @property
     def stand(self) -> Targets:
@@ -61,7 +62,7 @@ class GaitTeacher:
             for over in (over_x, over_y)
         )
         scale = min(1.0, math.hypot(over_x, over_y) / 0.03)
-        lift = self._parameters.swing_height * scale * 0.5 * (1.0 - math.cos(math.tau * part))
+        lift = self._lift.height(over_x, over_y) * scale * arc(part)
         return place[0] + x, place[1] + y, place[2] + lift
 
 

@@ -12,6 +12,7 @@ from ..model.quadruped import Feet, Quadruped, Targets
 from ..model.urdf import Vector
 from .body import BodyPose, feet_in_body, Leveller, UPRIGHT
 from .heading import HeadingHold
+from .lift import SwingLift
 from .parameters import GaitParameters
 from .schedule import Gait, Schedule
 from .servo_compensation import ServoCompensation
@@ -20,7 +21,6 @@ from .velocity import REST, Velocity
 
 CLAMP_LINEAR = 0.005  # [m/s] that may be lacking before it is told; rounding is no clamp
 CLAMP_YAW = 0.02  # [rad/s]
-LEAST_LIFT = 0.001  # [m] over which the speed of a lift is measured
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,12 +71,17 @@ class GaitGenerator:
         self._centre = robot.hip_centre
         self._neutral = self._stance()
         self.gait = self.wanted_gait = Gait.TROT
+        self._lifts = {
+            gait: SwingLift(
+                robot, self._neutral, parameters.schedule(gait), parameters.swing_height
+            )
+            for gait in Gait
+        }
         self._stepper = Stepper(
             parameters.schedule(self.gait),
             self._neutral,
-            parameters.swing_height,
+            self._lifts[self.gait].height,
             parameters.stance_depth,
-            self._lift_speed(),
         )
         self._leveller = Leveller(parameters.level_gain)
         self._heading = HeadingHold(parameters.heading_gain)
@@ -153,6 +158,7 @@ class GaitGenerator:
             if self.standing:
                 self.gait = self.wanted_gait
                 self._stepper.schedule = self._parameters.schedule(self.gait)
+                self._stepper.lift = self._lifts[self.gait].height
             velocity = REST
         self.goal = goal = self._within_schedule(self._limits.clamp(velocity))
         lost = math.hypot(velocity.x - goal.x, velocity.y - goal.y)
@@ -171,19 +177,6 @@ class GaitGenerator:
     @property
     def _schedule(self) -> Schedule:
         return self._stepper.schedule
-
-    def _lift_speed(self) -> float:
-        """Return how fast the joints of the slowest leg can lift its foot [m/s]."""
-        height = max(self._parameters.swing_height, LEAST_LIFT)
-        low = self._robot.solve(self._neutral)
-        high = self._robot.solve([(x, y, z + height) for x, y, z in self._neutral])
-        limits = self._robot.limits
-        times = [
-            abs(up - down) / limits[index].velocity
-            for indices, lower, upper in zip(self._robot.leg_indices, low, high, strict=True)
-            for index, down, up in zip(indices, lower.angles, upper.angles, strict=True)
-        ]
-        return height / max(times)
 
     def _stance(self) -> Feet:
         shift = self._parameters.com_x_translation

@@ -62,7 +62,7 @@ class Schedule:
 
 
 SCHEDULES = {
-    Gait.TROT: Schedule((0.0, 0.5, 0.5, 0.0), 0.154, 0.55, 0.0, 0.45),
+    Gait.TROT: Schedule((0.0, 0.5, 0.5, 0.0), 0.1456, 0.52, 0.0, 0.45),
     Gait.CRAWL: Schedule((0.0, 0.5, 0.75, 0.25), 0.8, 0.8, 0.012, 0.06),
     Gait.PACE: Schedule((0.0, 0.5, 0.0, 0.5), 0.12, 0.6, 0.0, 0.13),
 }

@@ -10,11 +10,13 @@ not scuff. It lands half a stroke ahead of its neutral place (Raibert's neutral 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 import math
 
 from ..model.quadruped import Feet
 from ..model.urdf import Vector
+from .lift import arc, hermite
 from .schedule import Schedule
 from .velocity import Velocity
 
@@ -40,30 +42,28 @@ class Stepper:
 
     Attributes:
         schedule: The gait; may be exchanged while the feet stand.
+        lift: How high a foot is lifted [m] in it, by its velocity over the ground [m/s].
     """
 
     def __init__(
         self,
         schedule: Schedule,
         neutral: Feet,
-        swing_height: float,
+        lift: Callable[[float, float], float],
         depth: float,
-        lift_speed: float = math.inf,
     ) -> None:
         """Start with all feet at their neutral places.
 
         Args:
             schedule: The gait.
             neutral: Where the feet are without motion, in the body's frame in [m].
-            swing_height: How high a foot is lifted in [m].
+            lift: How high a foot is lifted [m], by its velocity over the ground [m/s].
             depth: How far a standing foot is pushed below the ground in [m].
-            lift_speed: How fast a leg lifts its foot in [m/s]; a short swing is lifted less.
         """
         self.schedule = schedule
         self._neutral = neutral
-        self._swing_height = swing_height
+        self.lift = lift
         self._depth = depth
-        self._lift_speed = lift_speed
         self._feet = [_Foot() for _ in neutral]
         self._phase = 0.0
         self._walking = False
@@ -156,8 +156,8 @@ class Stepper:
         if not foot.swings:
             foot.swings = True
             stood = max(dt - (phase - schedule.duty) * schedule.period, 0.0)
-            foot.start_x = foot.x - hip_x * stood
-            foot.start_y = foot.y - hip_y * stood
+            foot.start_x = foot.x - (hip_x - velocity.yaw * foot.y) * stood
+            foot.start_y = foot.y - (hip_y + velocity.yaw * foot.x) * stood
         part = (phase - schedule.duty) / (1.0 - schedule.duty)
         half, duration, yaw = 0.5 * schedule.stance_duration, schedule.swing_duration, velocity.yaw
         end_x, end_y = half * hip_x, half * hip_y
@@ -174,26 +174,10 @@ class Stepper:
         travel = math.hypot(end_x - foot.start_x, end_y - foot.start_y)
         speed = math.hypot(hip_x, hip_y)
         scale = min(1.0, max(speed / FULL_LIFT_SPEED, travel / FULL_LIFT_TRAVEL))
-        # the fastest moment of the cosine is pi / 2 times its mean
-        lift = min(self._swing_height, self._lift_speed * duration / math.pi)
-        foot.z = lift * scale * 0.5 * (1.0 - math.cos(math.tau * part))
+        foot.z = self.lift(hip_x, hip_y) * scale * arc(part)
 
     def _all_at_place(self) -> bool:
         return all(
             abs(foot.x) < AT_PLACE and abs(foot.y) < AT_PLACE and abs(foot.z) < AT_PLACE
             for foot in self._feet
         )
-
-
-def hermite(start: tuple[float, float], end: tuple[float, float], part: float) -> float:
-    """Return a cubic between two values.
-
-    Args:
-        start: Value and change per part at part 0.
-        end: The same at part 1.
-        part: How much of the way is done, 0 to 1.
-    """
-    rest = 1.0 - part
-    rise = part * part * (3.0 - 2.0 * part)
-    bend = part * rest * (start[1] * rest - end[1] * part)
-    return start[0] + (end[0] - start[0]) * rise + bend
