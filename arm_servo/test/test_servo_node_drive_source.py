@@ -18,6 +18,7 @@ from arm_servo.core import MotionCore
 from arm_servo.exceptions import GoalCode, NotReadyError
 from arm_servo.execution import Execution, Phase
 from arm_servo.goal import GoalPoint, TrajectoryGoal
+from arm_servo.nodes.drive_reasons import why_not
 from arm_servo.set_point import Source
 
 Change = Callable[[AxisFeedback], AxisFeedback]
@@ -184,3 +185,17 @@ def test_where_the_arm_is_to_be_is_known_before_it_follows() -> None:
     point = drives.desk.snapshot.set_point
     assert point is not None
     assert drives.desk.snapshot.reference is point.state
+
+
+def test_drives_with_the_same_trouble_are_named_together() -> None:
+    """In one sentence, with the verb of several; others have their own."""
+    drives = Drives()
+    off = [replace(axis, followable=False, online=False) for axis in drives.axes[:2]]
+    disabled = replace(drives.axes[2], followable=False, state=DriveState.SWITCH_ON_DISABLED)
+    assert why_not([*off, disabled], {}) == (
+        'panda_joint1, panda_joint2 are offline; look after their power and their cable;'
+        ' panda_joint3 is in state Switch on disabled; call its ~/init'
+    )
+    assert why_not(drives.axes[:2], dict.fromkeys(drives.source.axes, 'was not attached yet')) == (
+        'panda_joint1, panda_joint2 were not attached yet; the next command takes them back'
+    )

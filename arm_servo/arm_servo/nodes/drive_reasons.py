@@ -17,6 +17,10 @@ FAULTS = frozenset({'FAULT', 'FAULT_REACTION_ACTIVE'})
 """Names of the states of a faulted drive."""
 
 
+PLURAL = {'is': 'are', 'has': 'have', 'was': 'were'}
+"""Words with which reasons begin, as they are said of several drives."""
+
+
 def why_not(feedback: Sequence[AxisFeedback], released: Mapping[str, str]) -> str:
     """Say why the arm cannot follow; empty when it can.
 
@@ -53,4 +57,13 @@ def _joined(reasons: Sequence[tuple[str, str]]) -> list[str]:
     names: dict[str, list[str]] = {}
     for name, reason in reasons:
         names.setdefault(reason, []).append(name)
-    return [f'{", ".join(axes)} {reason}' for reason, axes in names.items()]
+    return [
+        f'{", ".join(axes)} {reason if len(axes) == 1 else _of_several(reason)}'
+        for reason, axes in names.items()
+    ]
+
+
+def _of_several(reason: str) -> str:
+    """Return what is said of one drive, said of several."""
+    verb, rest = reason.split(' ', 1)
+    return f'{PLURAL[verb]} {rest.replace(" its ", " their ")}'.replace('takes it', 'takes them')

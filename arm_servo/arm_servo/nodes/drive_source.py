@@ -39,7 +39,7 @@ class DriveSource:
         self._make: type[Setpoint] = Setpoint
         self._desk = desk
         self._axes = list(desk.model.joints)
-        self._released: dict[str, str] = dict.fromkeys(self._axes, 'it was not attached yet')
+        self._released: dict[str, str] = dict.fromkeys(self._axes, 'was not attached yet')
         self._following = False
         self._left: set[str] = set()  # drives that dropped out since all of them followed
         self._lost = ''
