@@ -5,13 +5,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from enum import Enum
 
 import numpy as np
 
 from .arrays import Array
-from .exceptions import GoalCode, GoalError
+from .exceptions import GoalCode
 from .follower import Follower
 from .goal import GoalRules, JointTolerance, TrajectoryGoal
 from .goal_path import build_path
@@ -112,6 +112,7 @@ class Execution:
         state: MotionState,
         pace: float,
         settings: ExecutionSettings,
+        wait: float = 0.0,
     ) -> None:
         """Accept a trajectory.
 
@@ -119,18 +120,16 @@ class Execution:
             goal: The trajectory.
             limits: Limits of the joints.
             generator: Plans how to catch up.
-            state: Commanded state of the arm.
+            state: Commanded state of the arm where it begins.
             pace: Pace to start with, 0 to 1.
             settings: How it is followed.
+            wait: How long to wait at rest in [s]; the state is one of rest then.
 
         Raises:
             GoalError: It is refused.
         """
-        self._goal = replace(goal, age=max(goal.age, 0.0))
-        self._limits, self._settings = limits, settings
-        self._waiting = max(-goal.age, 0.0)
-        begin = MotionState.at_rest(state.position) if self._waiting else state
-        planned = build_path(self._goal, limits, begin, settings.rules)
+        self._limits, self._waiting = limits, wait
+        planned = build_path(goal, limits, state, settings.rules)
         self._path, self._late = planned.path, planned.late
         # an arm that moves goes on as it does, and takes up the pace from there
         self._clock = PathClock(limits, 1.0 if state.moving else pace)
@@ -163,7 +162,7 @@ class Execution:
             ahead: Time from the last step in [s]; less than 0 is the past.
         """
         feedback, path = self.feedback, self._path
-        here = path.at(feedback.time + feedback.pace * ahead)
+        here = path.at(feedback.time + feedback.pace * max(ahead - self._waiting, 0.0))
         return MotionState(
             here.position, here.velocity * feedback.pace, here.acceleration * feedback.pace**2
         )
@@ -199,12 +198,10 @@ class Execution:
             period: Time to the next step in [s].
 
         Returns:
-            The state to command next; None to come to rest: it does not begin yet, or there is no
-            way to follow.
+            The state to command next; None to come to rest: there is no way to follow.
         """
         if self._waiting > 0.0:
-            self._wait(state, period)
-            return None
+            return self._wait(state, period)
         self._check(state, measured, period)
         if self.phase is Phase.STOPPING:
             pace = 0.0
@@ -217,19 +214,14 @@ class Execution:
         self._advance(following)
         return following
 
-    def _wait(self, state: MotionState, period: float) -> None:
-        """Wait for the begin, and then plan from where the arm is."""
+    def _wait(self, state: MotionState, period: float) -> MotionState | None:
+        """Come to rest where the path begins, and wait there; all is planned already."""
         self._waiting -= period
         if self.phase is Phase.STOPPING:
             self.phase = Phase.DONE
-        if self._waiting > 0.0 or self.phase is Phase.DONE:
-            return
-        try:
-            planned = build_path(self._goal, self._limits, state, self._settings.rules)
-        except GoalError as error:
-            self.abandon(Outcome(error.code, str(error)))
-        else:
-            self._path, self._late = planned.path, planned.late
+            return None
+        rest = MotionState.at_rest(self._path.at(0.0).position)
+        return self._follower.step(state, lambda _: rest, period)
 
     def _ahead(self, period: float) -> Callable[[float], MotionState]:
         """Return where the path will be, by the time from now in [s]."""

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -66,13 +66,15 @@ class Planning:
         Raises:
             GoalError: It is refused.
         """
+        goal, begin, wait = self._begin(goal, state)
         execution = Execution(
             goal,
             limits=self._limits,
             generator=self._follower,
-            state=state,
+            state=begin,
             pace=pace,
             settings=self._settings.execution,
+            wait=wait,
         )
         path = execution.path
         found = self._check and self._check.contact(path.positions, path.duration)
@@ -83,6 +85,24 @@ class Planning:
                 ' trajectory; lead it around that (check_self_collision switches this off)',
             )
         return execution
+
+    def _begin(
+        self, goal: TrajectoryGoal, state: MotionState
+    ) -> tuple[TrajectoryGoal, MotionState, float]:
+        """Return a goal that begins now or after a wait, where it begins, and the wait in [s].
+
+        What begins later begins where the arm will have come to rest; where there is no time for
+        that, the motion goes over into it, so that its points are met at their times.
+        """
+        wait = max(-goal.age, 0.0)
+        if wait == 0.0 or not state.moving:
+            return replace(goal, age=max(goal.age, 0.0)), state, wait
+        stop = self._generator.brake(state)
+        if stop is not None and stop.duration <= wait:
+            there = stop.at(stop.duration).position
+            return replace(goal, age=0.0), MotionState.at_rest(there), wait
+        points = [replace(point, time=point.time + wait) for point in goal.points]
+        return replace(goal, points=points, age=0.0), state, 0.0
 
     def check(self, way: Way) -> None:
         """Make sure that no links meet on the way to a single target.

@@ -234,6 +234,29 @@ def test_a_trajectory_may_begin_later() -> None:
     assert execution.ending.code is GoalCode.SUCCESSFUL
 
 
+@pytest.mark.parametrize('name', ROBOTS)
+@settings(max_examples=5, deadline=None)
+@given(seed=st.integers(0, 10**6), ahead=st.floats(0.002, 1.5))
+def test_a_later_begin_is_planned_before_it(name: str, seed: int, ahead: float) -> None:
+    """A stamp ahead plans nothing in the cycle, whatever moves; the end is met at its time."""
+    rng, core = np.random.default_rng(seed), core_of(name)
+    if seed % 2:
+        core.follow(wave(robot(name), ready(name), 'q'))
+    else:
+        core.jog({robot(name).joints[0]: 0.3}, 0.0, 30.0)
+    states = [point.state for point in stream(core, float(rng.uniform(0.05, 1.0)))]
+    goal = replace(wave(robot(name), ready(name), 'q'), age=-ahead)
+    execution = core.follow(goal)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr('arm_servo.execution.build_path', None)
+        followed = follow_to_the_end(core, execution)
+    assert execution.ending is not None
+    assert execution.ending.code is GoalCode.SUCCESSFUL, execution.ending
+    assert len(followed) * PERIOD == pytest.approx(4.5 + ahead, abs=0.1)
+    assert followed[-1].position == pytest.approx(goal.points[-1].positions, abs=1e-6)
+    kept(robot(name).limits, states + followed[1:])
+
+
 def test_a_trajectory_that_has_begun_is_joined() -> None:
     """Points that have passed are left out; the next one is met in its time."""
     core = core_of('prbt')
