@@ -34,6 +34,9 @@ ASIDE = 1e-3
 STEEPEST = 3.0
 """Greatest change of a scaled singular value with a joint in [1/rad], to save a closer look."""
 
+FADE = 4.0
+"""Greatest speed towards a fold per way that is left in [1/s]."""
+
 LEAST_PART = 1e-5
 """Part of a joint in a direction that counts for none."""
 
@@ -95,16 +98,22 @@ class Border:
         """
         self._remember(position, good=bool(command.any()) and not found.damped)
         asked = float(command @ found.tool[:, -1])
-        parts = np.maximum(np.abs(found.joints[-1]), LEAST_PART)
-        acceleration = self._braking * np.min(self._limits.acceleration / parts)
-        jerk = self._braking * np.min(self._limits.jerk / parts)
-        nearest = np.asarray(found.least / STEEPEST)
-        if abs(asked) <= found.least * brakeable(nearest, acceleration, jerk):
+        if abs(asked) <= found.least * self._stoppable(found, found.least / STEEPEST):
             return found  # slow enough for a fold that is as near as can be
         way = float(np.sign(asked)) * way_to_fold(jacobian_at, position, found)
         if not 0.0 < way < np.inf:
             return found
-        return found.slowed(command, float(brakeable(np.asarray(way), acceleration, jerk)))
+        return found.slowed(command, self._stoppable(found, way))
+
+    def _stoppable(self, found: Directions, way: float) -> float:
+        """Return the speed along the last joint direction that ends within a way in [rad/s].
+
+        The last of the way fades, so that the arm rests there and does not hunt about it.
+        """
+        parts = np.maximum(np.abs(found.joints[-1]), LEAST_PART)
+        acceleration = self._braking * np.min(self._limits.acceleration / parts)
+        jerk = self._braking * np.min(self._limits.jerk / parts)
+        return min(float(brakeable(np.asarray(way), acceleration, jerk)), FADE * way)
 
     def way_out(
         self, jacobian_at: JacobianAt, position: Array, found: Directions, command: Array
