@@ -100,18 +100,7 @@ class Device:
         self.drives = self._build_drives(servo or ServoModel())
         self._build_services()
         self.faults = FaultInjector(self, self._line)
-        self._powered_parts: list[Timed] = [
-            self.faults,
-            self._nmt,
-            self._sdo,
-            self._errors,
-            self._contact.consumer,
-            self._producer,
-            self._contact.guarding,
-            self._rpdos,
-            self._tpdos,
-            *self.drives,
-        ]
+        self._powered_parts = self._timed_parts()
         self._parts = self._powered_parts
 
     def _build_drives(self, servo: ServoModel) -> tuple[Drive, ...]:
@@ -134,7 +123,7 @@ class Device:
         self._lss = LssSlave(node_id, store, self._memory, send, nmt.initialise)
         self.clock = TimeConsumer(store, self._subscribe)
         self._rpdos = RpdoEngine(
-            store, self._on_pdo_changed, self._on_error, self._sync.window_closed
+            store, self._on_pdo_changed, self._errors.tell, self._sync.window_closed
         )
         self._tpdos = TpdoEngine(store, self._on_pdo_changed, send)
         self._services = Services(
@@ -147,6 +136,20 @@ class Device:
             self._rpdos,
             self._tpdos,
         )
+
+    def _timed_parts(self) -> list[Timed]:
+        return [
+            self.faults,
+            self._nmt,
+            self._sdo,
+            self._errors,
+            self._contact.consumer,
+            self._producer,
+            self._contact.guarding,
+            self._rpdos,
+            self._tpdos,
+            *self.drives,
+        ]
 
     @property
     def drive(self) -> Drive | None:
@@ -332,13 +335,7 @@ class Device:
         self._tpdos.poll(now)
 
     def _on_sync_length(self, wrong: bool, now: float) -> None:
-        self._on_error(SYNC_LENGTH_ERROR, wrong, now)
-
-    def _on_error(self, code: int, present: bool, now: float) -> None:
-        if present:
-            self._errors.report(code, now)
-        else:
-            self._errors.clear(code, now)
+        self._errors.tell(SYNC_LENGTH_ERROR, wrong, now)
 
     def _on_pdo_changed(self, _now: float) -> None:
         self._subscribe()

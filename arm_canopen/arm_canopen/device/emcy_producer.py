@@ -103,6 +103,13 @@ class EmcyProducer:
         self._record(code)
         self._queue(Emergency(code, self._register.value, vendor), now)
 
+    def tell(self, code: int, present: bool, now: float) -> None:
+        """Report an error that is present at a time in [s], or clear one that is not."""
+        if present:
+            self.report(code, now)
+        else:
+            self.clear(code, now)
+
     def clear(self, code: int, now: float) -> None:
         """Say that an error is gone; the message tells in its register what remains."""
         if code not in self._active:
