@@ -187,7 +187,9 @@ class MotionCore:
         return execution
 
     def plan(self, goal: TrajectoryGoal, state: MotionState) -> Execution:
-        """Check a trajectory and plan its execution, see :class:`Planning`; for any one thread.
+        """Check a trajectory and plan its execution, see :class:`Planning`.
+
+        For any one thread at a time: only the execution's steps use what belongs to the cycle.
 
         Args:
             goal: The trajectory.

@@ -18,6 +18,9 @@ from .limits import JointLimits
 from .otg import MotionState
 from .path import PathPoint
 
+MOST = 5000
+"""Points of a trajectory at most: they take a second to plan, for which others wait."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Points:
@@ -98,6 +101,8 @@ def _ordered(
     _check_joints(goal.joints, limits, rules)
     if not goal.points:
         raise refuse('the trajectory has no points')
+    if len(goal.points) > MOST:
+        raise refuse(f'{len(goal.points)} points; at most {MOST} are planned, leave some out')
     for number, point in enumerate(goal.points):
         _check_point(number, point, goal)
     times = np.array([point.time for point in goal.points], dtype=np.float64)

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import Future
+from dataclasses import replace
 import time
 
 import numpy as np
@@ -99,6 +100,38 @@ def test_a_trajectory_that_was_cancelled_before_it_began_does_not_begin() -> Non
     planner._worker.submit(lambda: None).result(5.0)  # the planning before is done
     drives.run(50)
     assert drives.desk.snapshot.source is Source.NONE
+
+
+def test_a_jog_that_ends_while_a_long_goal_is_planned_does_no_harm() -> None:
+    """It comes to rest first, and the trajectory begins there: nobody can foresee a jog."""
+    drives, planner = ready()
+    goal = wave(drives, 300)
+    drives.desk.submit(lambda core, now: core.jog({'panda_joint1': 0.4}, now, 0.5))
+    drives.run(45)
+    future = planner.follow(goal)
+    run_until(drives, future.done)
+    execution = future.result(0.0)
+    off = 0.0
+    for _ in range(300):
+        drives.run()
+        desired = execution.feedback.desired.position
+        off = max(off, float(np.abs(drives.path[-1] - desired).max()))
+    assert off < 1e-3
+
+
+def test_a_goal_that_is_refused_does_not_stop_a_jog() -> None:
+    """What moves the arm goes on."""
+    drives, planner = ready()
+    goal = wave(drives, 300)
+    drives.desk.submit(lambda core, now: core.jog({'panda_joint1': 0.4}, now, 30.0))
+    drives.run(45)
+    wrong = replace(goal, joints=['elbow', *goal.joints[1:]])
+    future = planner.follow(wrong)
+    run_until(drives, future.done)
+    with pytest.raises(GoalError, match='elbow'):
+        future.result(0.0)
+    drives.run(5)
+    assert drives.desk.snapshot.source is Source.JOG
 
 
 def test_refusals_reach_whoever_asked() -> None:

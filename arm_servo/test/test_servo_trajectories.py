@@ -358,6 +358,7 @@ REFUSED = {
     'beyond': (spoiled(1, positions=(9.0,) * 6), -1, 'prbt_joint_1 at 9.0000 is beyond'),
     'too fast': (spoiled(1, time=1.6), -1, 'times the time'),
     'no points': (replace(GOOD, points=[]), -1, 'no points'),
+    'too many points': (replace(GOOD, points=[GoalPoint(1.0, ())] * 5001), -1, 'at most 5000'),
     'unknown joint': (replace(GOOD, joints=['elbow', *GOOD.joints[1:]]), -2, "'elbow'"),
     'twice': (replace(GOOD, joints=[GOOD.joints[1], *GOOD.joints[1:]]), -2, 'twice'),
     'missing joint': (replace(GOOD, joints=GOOD.joints[1:]), -2, 'prbt_joint_1 is missing'),

@@ -9,6 +9,7 @@ from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
 from concurrent.futures import TimeoutError as FutureTimeoutError
 from dataclasses import replace
 import math
+import time
 
 from ..core import MotionCore
 from ..exceptions import NotReadyError
@@ -18,11 +19,17 @@ from ..otg import MotionState
 from ..set_point import Source
 from .desk import Desk, Snapshot
 
-PER_POINT = 1e-3
-"""Time that planning may take for each point in [s]; twice what was measured."""
+AT_LEAST = 5e-3
+"""Time that planning may take for any trajectory in [s]; this and the next: see core.plan."""
+
+PER_POINT = 5e-4
+"""Time that planning may take for each point in [s]."""
 
 PER_SECOND = 5e-3
-"""Time that looking for collisions may take for each second of the path in [s]; the same."""
+"""Time that looking for collisions may take for each second of the path in [s]."""
+
+SHORT = 0.03
+"""Time over which a jog or a single target is foreseen in [s]; for longer it may end or turn."""
 
 PATIENCE = 1.0
 """Time in which the cycle must answer in [s]."""
@@ -37,10 +44,10 @@ LEAST = 3
 class Planner:
     """Plans trajectories one after another.
 
-    Planning takes 0.4 ms a point and 3 ms for a second of motion, and MoveIt's plans have tens to
-    hundreds of points: the cycle has no time for that. Where the arm moves, the trajectory is
-    planned from where it will be some cycles later, and begins then; what the foresight was off,
-    the core catches up smoothly.
+    MoveIt's plans have tens to hundreds of points: the cycle has no time to plan them. Where the
+    arm moves, a trajectory is planned from where it will be some cycles later, and begins then;
+    what the foresight was off, the core catches up smoothly. Where nobody can know, since the arm
+    is jogged and the planning takes long, it comes to rest first.
     """
 
     def __init__(self, desk: Desk, check: Callable[[], None]) -> None:
@@ -98,13 +105,35 @@ class Planner:
         state = snapshot.set_point.state
         if not state.moving and snapshot.source is Source.NONE:
             return self._desk.plan(goal, state), 0.0
-        needed = PER_POINT * len(goal.points) + PER_SECOND * _duration(goal)
+        needed = AT_LEAST + PER_POINT * len(goal.points) + PER_SECOND * _duration(goal)
+        if snapshot.source is not Source.TRAJECTORY and needed > SHORT:
+            return self._planned_at_rest(goal, state), 0.0
         cycles = max(LEAST, math.ceil(needed / snapshot.period) + 1)
         lead = (cycles - 1) * snapshot.period
         if goal.age:
             goal = replace(goal, age=goal.age + lead)
         execution = self._desk.plan(goal, _foreseen(snapshot, state, lead))
         return execution, snapshot.time + (cycles - 0.5) * snapshot.period
+
+    def _planned_at_rest(self, goal: TrajectoryGoal, state: MotionState) -> Execution:
+        """Bring the arm to rest, and plan from there; a goal that is refused does not stop it."""
+        began = time.monotonic()
+        self._desk.plan(goal, MotionState.at_rest(state.position))
+        stop = self._desk.submit(lambda core, _now: core.stop('a trajectory takes over'))
+        while True:
+            snapshot = self._desk.snapshot
+            point, idle = snapshot.set_point, snapshot.source is Source.NONE
+            if stop.done():
+                stop.result()
+            if stop.done() and point is not None and idle and not point.state.moving:
+                age = goal.age and goal.age + time.monotonic() - began
+                return self._desk.plan(replace(goal, age=age), point.state)
+            if time.monotonic() - began > PATIENCE:
+                raise NotReadyError(
+                    'the arm does not come to rest for the trajectory; end the commands that'
+                    ' jog it'
+                )
+            time.sleep(snapshot.period)
 
     def _state(self) -> MotionState:
         """Ask the cycle for the commanded state: the arm may follow from now on."""
