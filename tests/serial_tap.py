@@ -81,6 +81,11 @@ class SerialTap:
         self._thread = threading.Thread(target=self._run, name='tap')
         self._thread.start()
 
+    @property
+    def thread_id(self) -> int:
+        """The system's id of the thread that passes the bytes on."""
+        return self._thread.native_id or 0
+
     def forget(self) -> None:
         """Begin anew with nothing seen."""
         self.targets, self.reports = [], []
