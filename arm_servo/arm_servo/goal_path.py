@@ -33,7 +33,13 @@ DENSE = 1e-3
 """Bulge of a segment that counts as straight where its ends do not fit together in [rad]."""
 
 APPROACHES = (0.2, 0.5, 1.0, 2.0, 4.0)
-"""Shares by which the way to the first point is tried longer, for an arm that moves."""
+"""Shares by which the way to the first point is tried longer."""
+
+LEAST = 0.25
+"""Time that such a way has beside its own in [s]: a trajectory may be joined late."""
+
+BESIDE = 1e-3
+"""How far from a first point without time the arm may be before it is taken there in [rad]."""
 
 TURNS = 8
 """How often the time that suffices is improved."""
@@ -81,24 +87,23 @@ def build_path(
         GoalError: It is refused; the message names the joint, the point and the remedy.
     """
     points = upcoming_points(goal, limits, state, rules)
-    answer = _tried(points, limits, state, rules)
+    points = _from_here(points, limits, state, rules)
+    answer = _tried(points, limits, state)
     if isinstance(answer, GoalPath):
         return answer
-    factor = _sufficient(points, limits, state, rules, answer.factor)
+    factor = _sufficient(points, limits, state, answer.factor)
     raise refuse(f'{answer.reason}; give the trajectory {factor:.2f} times the time')
 
 
-def _tried(
-    points: Points, limits: JointLimits, state: MotionState, rules: GoalRules
-) -> GoalPath | _Haste:
+def _tried(points: Points, limits: JointLimits, state: MotionState) -> GoalPath | _Haste:
     """Return the path through points, or why there is too little time for it."""
-    answer = _walkable(points, 0.0, limits, state, rules)
-    if isinstance(answer, GoalPath) or not (state.moving and points.times[0] > 0.0):
+    answer = _walkable(points, 0.0, limits, state)
+    if isinstance(answer, GoalPath) or points.times[0] == 0.0:
         return answer
     for share in APPROACHES:  # only the way from the present motion to the first point is longer
-        more = share * float(points.times[0])
+        more = share * (float(points.times[0]) + LEAST)
         try:
-            later = _walkable(points.delayed(more), more, limits, state, rules)
+            later = _walkable(points.delayed(more), more, limits, state)
         except GoalError:  # it would swing out beyond a limit
             return answer
         if isinstance(later, GoalPath):
@@ -107,10 +112,10 @@ def _tried(
 
 
 def _walkable(
-    points: Points, delay: float, limits: JointLimits, state: MotionState, rules: GoalRules
+    points: Points, delay: float, limits: JointLimits, state: MotionState
 ) -> GoalPath | _Haste:
     """Return the path through points that were delayed, or why there is too little time."""
-    path = _given(points, limits, state, rules)
+    path = _given(points, limits, state)
     demand = Timing(path, limits).fastest
     if demand.share > OVER:
         return _Haste(_words(demand, limits), demand.share)
@@ -129,14 +134,12 @@ def _walkable(
     return GoalPath(stretched, f'{late:.2f} s later than asked, for the {cause}')
 
 
-def _sufficient(
-    points: Points, limits: JointLimits, state: MotionState, rules: GoalRules, guess: float
-) -> float:
+def _sufficient(points: Points, limits: JointLimits, state: MotionState, guess: float) -> float:
     """Return how many times the time suffices, in hundredths."""
     factor = _hundredths(guess)
     for _ in range(TURNS):
         try:
-            answer = _tried(points.slowed(factor), limits, state, rules)
+            answer = _tried(points.slowed(factor), limits, state)
         except GoalError:  # slower, an arm in motion would swing out beyond a limit
             return factor
         if isinstance(answer, GoalPath):
@@ -158,10 +161,10 @@ def _words(demand: Demand, limits: JointLimits) -> str:
     )
 
 
-def _given(points: Points, limits: JointLimits, state: MotionState, rules: GoalRules) -> Path:
+def _given(points: Points, limits: JointLimits, state: MotionState) -> Path:
     """Return the path as it is given, with its corners, once it keeps within the limits."""
     joined = bool(points.times[0] > 0.0) and state.moving
-    segments = [*_first(points, state, rules), *_between(points, limits)]
+    segments = [*_first(points, state), *_between(points, limits)]
     if not segments:  # one point, at once, where the arm is
         segments.append(linear(0.0, 1e-3, points.positions[0], points.positions[0]))
     path = Path(segments, joined)
@@ -184,7 +187,28 @@ def _given(points: Points, limits: JointLimits, state: MotionState, rules: GoalR
     )
 
 
-def _first(points: Points, state: MotionState, rules: GoalRules) -> list[Segment]:
+def _from_here(
+    points: Points, limits: JointLimits, state: MotionState, rules: GoalRules
+) -> Points:
+    """Give a first point without time the time to get there, where the arm is beside it."""
+    off = np.abs(points.positions[0] - state.position)
+    if points.times[0] > 0.0 or float(off.max()) < BESIDE:
+        return points
+    if float(off.max()) > rules.start:
+        raise refuse(
+            f'the first point is {off.max():.3f} rad away from where the arm is and has no'
+            ' time_from_start; give it time, or plan from the present state'
+        )
+    # as a part of the path it heeds the speed override; peaks of a quintic from rest to rest
+    needed = (
+        1.875 * off / limits.velocity,
+        np.sqrt(5.774 * off / limits.acceleration),
+        np.cbrt(60.0 * off / limits.jerk),
+    )
+    return points if state.moving else points.delayed(float(np.max(needed)))
+
+
+def _first(points: Points, state: MotionState) -> list[Segment]:
     """Return the segment from the commanded state to the first point, unless it is there."""
     if points.times[0] > 0.0:
         toward = points.at(0)
@@ -194,12 +218,6 @@ def _first(points: Points, state: MotionState, rules: GoalRules) -> list[Segment
             toward = PathPoint(toward.position, line, toward.acceleration)
         here = PathPoint(state.position, state.velocity, state.acceleration)
         return [quintic(0.0, float(points.times[0]), here, toward)]
-    off = np.abs(points.positions[0] - state.position)
-    if float(off.max()) > rules.start:
-        raise refuse(
-            f'the first point is {off.max():.3f} rad away from where the arm is and has no'
-            ' time_from_start; give it time, or plan from the present state'
-        )
     return []
 
 

@@ -22,6 +22,10 @@ MOST = 5000
 """Points of a trajectory at most: they take a second to plan, for which others wait."""
 
 
+NEAREST = 0.05
+"""Time in which a trajectory that has begun already must not be joined yet in [s]."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Points:
     """A checked trajectory in the arm's order: times (k), the rest (k, n) or None."""
@@ -114,6 +118,7 @@ def _ordered(
             )
     places = [limits.names.index(name) for name in goal.joints]
     still = np.zeros(len(limits))
+    _check_fields(goal)
     has_velocities = all(len(point.velocities) for point in goal.points)
     has_accelerations = has_velocities and all(len(point.accelerations) for point in goal.points)
     return Points(
@@ -161,6 +166,23 @@ def _check_point(number: int, point: GoalPoint, goal: TrajectoryGoal) -> None:
                 raise refuse(f'point {number}: {name} of {joint} is {value}; it must be finite')
 
 
+def _check_fields(goal: TrajectoryGoal) -> None:
+    """Make sure that all points say the same: what some leave out would have to be invented."""
+    for name, values in (
+        ('velocities', [point.velocities for point in goal.points]),
+        ('accelerations', [point.accelerations for point in goal.points]),
+    ):
+        given = [len(each) > 0 for each in values]
+        if any(given) and not all(given):
+            raise refuse(
+                f'point {given.index(False)} has no {name} and point {given.index(True)} has;'
+                ' give them at all points or at none'
+            )
+    first = goal.points[0]
+    if len(first.accelerations) and not len(first.velocities):
+        raise refuse('points have accelerations and no velocities; give both, or positions only')
+
+
 def _filled(rows: Sequence[Sequence[float]], places: Sequence[int], default: Array) -> Array:
     """Return rows for all joints; those that are not given have a default."""
     filled = np.tile(default, (len(rows), 1))
@@ -177,7 +199,9 @@ def _upcoming(points: Points, age: float) -> Points:
             ' differ (a stamp of 0 begins at once)',
             GoalCode.OLD_HEADER_TIMESTAMP,
         )
-    left = slice(int(np.searchsorted(times, 0.0)), None)
+    # a point that passes in a moment cannot be met; the next one can, and the last one is the goal
+    soonest = NEAREST if age > 0.0 else 0.0
+    left = slice(min(int(np.searchsorted(times, soonest)), len(times) - 1), None)
     return Points(
         times[left],
         points.positions[left],

@@ -43,11 +43,18 @@ class Tolerances:
             excess = np.abs(error) / tolerance
             joint = int(np.argmax(excess))
             if excess[joint] > 1.0:
-                return (
-                    f'{limits.names[joint]}: {what} off by {error[joint]:+.4f} {unit},'
-                    f' tolerance {tolerance[joint]:.4f}'
-                )
+                off, most = _distinct(float(error[joint]), float(tolerance[joint]))
+                return f'{limits.names[joint]}: {what} off by {off} {unit}, tolerance {most}'
         return None
+
+
+def _distinct(error: float, tolerance: float) -> tuple[str, str]:
+    """Return an error and the tolerance that it exceeds, with digits that show that."""
+    for digits in range(4, 12):
+        off, most = f'{error:+.{digits}f}', f'{tolerance:.{digits}f}'
+        if abs(float(off)) > float(most) > 0.0:
+            break
+    return off, most
 
 
 def tolerances(

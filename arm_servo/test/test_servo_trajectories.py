@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 import math
+import re
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -22,6 +23,7 @@ from arm_servo.execution import ExecutionSettings, Outcome, Phase
 from arm_servo.goal import GoalPoint, GoalRules, JointTolerance, TrajectoryGoal
 from arm_servo.otg import MotionState
 from arm_servo.path import cubic, linear, Path, PathPoint, quintic
+from arm_servo.tolerances import tolerances
 
 
 def core_of(name: str, execution: ExecutionSettings | None = None) -> MotionCore:
@@ -198,6 +200,28 @@ def test_a_first_point_without_time_is_caught_up_with() -> None:
     kept(robot('gp110').limits, states)
 
 
+def test_the_way_to_a_first_point_heeds_the_speed_override() -> None:
+    """Where the arm begins beside a path, it gets there at the pace that is set."""
+    core, start = core_of('panda'), ready('panda')
+    core.override(0.05)
+    points = [GoalPoint(0.0, tuple(start + 0.049)), GoalPoint(5.0, tuple(start + 0.15))]
+    core.follow(TrajectoryGoal(robot('panda').joints, points))
+    states = [point.state for point in stream(core, 8.0)]
+    speeds = np.max([np.abs(state.velocity) for state in states], axis=0)
+    assert np.all(speeds <= 0.051 * robot('panda').limits.velocity)
+    assert np.all(states[-1].position > start + 0.04)
+
+
+@pytest.mark.parametrize('age', [0.999, 0.9999, 1.4, 2.9999])
+def test_a_trajectory_is_joined_at_any_time(age: float) -> None:
+    """A point that passes in a moment is no reason to refuse the rest."""
+    core = core_of('prbt')
+    goal = wave(robot('prbt'), ready('prbt'), 'q', step=1.0)
+    states = follow_to_the_end(core, core.follow(replace(goal, age=age)))
+    assert states[-1].position == pytest.approx(goal.points[-1].positions, abs=1e-6)
+    kept(robot('prbt').limits, states)
+
+
 def test_continuous_joints_take_the_short_way() -> None:
     """A goal a turn away is half a turn away at most, and goes on from there."""
     model = chain('cyyzyz')
@@ -312,6 +336,19 @@ def test_a_path_violation_names_joint_amount_and_time() -> None:
     assert not core.state.moving
 
 
+@settings(max_examples=30, deadline=None)
+@given(tolerance=st.floats(1e-6, 1.0), share=st.floats(1.0001, 2.0))
+def test_the_words_of_a_violation_show_it(tolerance: float, share: float) -> None:
+    """The amount reads greater than its tolerance, however small both are."""
+    limits = robot('prbt').limits
+    bound = tolerances(limits, None, JointTolerance(tolerance))
+    words = bound.violation(limits, np.full(6, -tolerance * share), np.zeros(6))
+    assert words is not None
+    found = re.search(r'off by -(\S+) rad, tolerance (\S+)$', words)
+    assert found is not None, words
+    assert float(found[1]) > float(found[2]) > 0.0
+
+
 def test_a_goals_own_tolerance_counts() -> None:
     """A tolerance of the goal replaces the default, and -1 takes it away."""
     goal = wave(robot('prbt'), ready('prbt'), 'q')
@@ -359,6 +396,12 @@ REFUSED = {
     'too fast': (spoiled(1, time=1.6), -1, 'times the time'),
     'no points': (replace(GOOD, points=[]), -1, 'no points'),
     'too many points': (replace(GOOD, points=[GoalPoint(1.0, ())] * 5001), -1, 'at most 5000'),
+    'velocities here and there': (spoiled(1, velocities=()), -1, 'point 1 has no velocities and'),
+    'accelerations alone': (
+        replace(GOOD, points=[replace(point, velocities=()) for point in GOOD.points]),
+        -1,
+        'accelerations and no velocities',
+    ),
     'unknown joint': (replace(GOOD, joints=['elbow', *GOOD.joints[1:]]), -2, "'elbow'"),
     'twice': (replace(GOOD, joints=[GOOD.joints[1], *GOOD.joints[1:]]), -2, 'twice'),
     'missing joint': (replace(GOOD, joints=GOOD.joints[1:]), -2, 'prbt_joint_1 is missing'),
