@@ -53,6 +53,21 @@ def test_a_trajectory_goes_out_as_arrays(isolation: Isolation, tmp_path: Path) -
         assert steps[-1] < 1e-4  # it slowed down
 
 
+def test_a_goal_is_told_that_the_program_ends(isolation: Isolation, tmp_path: Path) -> None:
+    """Ctrl-C in the middle of it: the arm comes to rest on the path, the client gets a result."""
+    command = standalone(tmp_path, 'trajectory_controller')
+    with TopicArm(isolation, command, READY_WORDS) as arm:
+        run = GoalRun(arm.client, goal_to([1.0, *READY[1:]], 5.0))
+        arm.client.spin_until(lambda: arm.at[0] > 0.1, 10.0, 'motion')
+        arm.process.signal(signal.SIGINT)
+        result = run.wait()[1]
+        assert result.error_code != RESULT.SUCCESSFUL
+        assert 'the program ends' in result.error_string
+        assert arm.process.wait() == 0
+        steps = [abs(b[0] - a[0]) for a, b in pairwise(arm.arrays)]
+        assert steps[-1] < 1e-4
+
+
 def test_a_goal_that_the_arm_did_not_reach_is_no_success(
     isolation: Isolation, tmp_path: Path
 ) -> None:

@@ -199,3 +199,20 @@ def test_drives_with_the_same_trouble_are_named_together() -> None:
     assert why_not(drives.axes[:2], dict.fromkeys(drives.source.axes, 'was not attached yet')) == (
         'panda_joint1, panda_joint2 were not attached yet; the next command takes them back'
     )
+
+
+def test_a_trajectory_ends_at_once_when_no_drive_is_left() -> None:
+    """As at the end of the master: there is nothing to be brought to rest on the path."""
+    drives = attached()
+    future = swing(drives)
+    drives.run(60)
+    whole = drives.axes
+    drives.axes = [replace(axis, followable=False, state=DriveState.FAULT) for axis in whole]
+    assert drives.run() == [None] * 7
+    ending = future.result(0.0).ending
+    assert future.result(0.0).phase is Phase.DONE
+    assert ending is not None
+    assert 'have a fault' in ending.reason
+    drives.axes = [replace(axis, setpoint=axis.position) for axis in whole]
+    before = [axis.position for axis in drives.axes]
+    assert [point.position for point in drives.run() if point] == pytest.approx(before, abs=1e-12)

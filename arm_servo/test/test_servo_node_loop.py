@@ -89,7 +89,7 @@ def test_a_cycle_that_raises_is_the_end_and_the_arm_comes_to_rest() -> None:
         raise ArithmeticError('no solution')
 
     arm.cycle.step = step  # type: ignore[method-assign]
-    thread = MotionThread(arm.cycle, 0.001, lambda: None)
+    thread = MotionThread(arm.cycle, 0.001)
     before = len(arm.points)
     thread.start(failed.set)
     assert failed.wait(10.0)

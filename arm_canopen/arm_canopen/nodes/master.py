@@ -112,19 +112,36 @@ def _serve(
 ) -> None:
     with ExitStack() as stack:
         nodes = [node for process in processes for node in process.nodes]
+        others: list[Node] = []
         if extend is not None:
             for node in (node for process in processes for node in extend(process)):
                 stack.callback(node.destroy_node)
-                nodes.append(node)
+                others.append(node)
         try:
             with ThreadPoolExecutor() as pool:  # all buses before the first word on any of them
                 list(pool.map(MasterProcess.listen, processes))
             for process in processes:
                 process.start()
-            spin(nodes, stop)
+            spin([*nodes, *others], stop)
         finally:
+            _stop(processes, others)
+
+
+def _stop(processes: Sequence[MasterProcess], others: Sequence[Node]) -> None:
+    """Stop the drives; meanwhile the other nodes tell their clients how what they do ends."""
+    stopped = threading.Event()
+
+    def stop() -> None:
+        try:
             with ThreadPoolExecutor() as pool:  # no bus waits for the drives of another to stop
                 list(pool.map(MasterProcess.stop, processes))
+        finally:
+            stopped.set()
+
+    with ThreadPoolExecutor(1) as pool:
+        stopping = pool.submit(stop)
+        spin(others, stopped)
+        stopping.result()
 
 
 def _check_names(configs: Sequence[BusConfig]) -> None:

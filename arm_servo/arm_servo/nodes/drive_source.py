@@ -113,10 +113,14 @@ class DriveSource:
         if blocked and not self._lost:
             self._lost = blocked
             self._desk.fail(blocked)
+        self._left.update(axis.name for axis in feedback if not axis.followable)
+        if len(self._left) == len(feedback):  # nothing is left to be brought to rest
+            self._desk.idle(now, measured, self._lost)
+            self._following, self._lost = False, ''
+            return [None] * len(feedback)
         point = self._desk.step(now, period, measured, self._lost)
         if self._lost and point.source is Source.NONE and not point.state.moving:
             self._following, self._lost = False, ''
-        self._left.update(axis.name for axis in feedback if not axis.followable)
         rows = zip(point.state.position, point.state.velocity, feedback, strict=True)
         return [
             None if axis.name in self._left else self._make(float(position), float(velocity))

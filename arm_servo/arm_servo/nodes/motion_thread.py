@@ -31,7 +31,11 @@ LATE = 10
 
 
 class MotionCycle:
-    """What is done in a cycle; reads no clock."""
+    """What is done in a cycle; reads no clock.
+
+    Attributes:
+        closing: Why the arm comes to rest for good; empty before the end.
+    """
 
     def __init__(
         self,
@@ -51,6 +55,7 @@ class MotionCycle:
         self._desk, self._feedback, self._output = desk, feedback, output
         self._state = MotionState.at_rest(np.zeros(len(desk.model)))
         self._watch = watch
+        self.closing = ''
         self._compared = -math.inf
         self._failure, self._failed = '', -math.inf
         self._following = False
@@ -70,7 +75,7 @@ class MotionCycle:
             period: Time to the next cycle in [s].
         """
         measured, blocked = self._feedback.state(now)
-        blocked = blocked or self._kept(now)
+        blocked = self.closing or blocked or self._kept(now)
         if not self._following and not blocked and measured is not None:
             self._begin(measured.position)
             self._following, self._lost = True, ''
@@ -138,7 +143,6 @@ class MotionThread:
         self,
         cycle: MotionCycle,
         period: float,
-        stop_motion: Callable[[], None],
         begin: Callable[[], None] = lambda: None,
     ) -> None:
         """Prepare.
@@ -146,11 +150,10 @@ class MotionThread:
         Args:
             cycle: The cycle.
             period: Its period in [s].
-            stop_motion: Called once at the end, to bring the arm to rest.
             begin: Called once in the thread, before the first cycle.
         """
         self.error: Exception | None = None
-        self._cycle, self._period, self._stop_motion = cycle, period, stop_motion
+        self._cycle, self._period = cycle, period
         self._begin = begin
         self._failed: Callable[[], None] = lambda: None
         self._ending = threading.Event()
@@ -166,10 +169,19 @@ class MotionThread:
         self._failed = failed
         self._thread.start()
 
-    def stop(self) -> None:
-        """Bring the arm to rest, then end."""
-        self._stop_motion()
+    def end(self) -> None:
+        """Bring the arm to rest and take no more commands; the thread ends then."""
+        self._cycle.closing = 'the program ends'
         self._ending.set()
+
+    @property
+    def ended(self) -> bool:
+        """Whether the thread has ended."""
+        return not self._thread.is_alive()
+
+    def stop(self) -> None:
+        """Bring the arm to rest, and wait for the end."""
+        self.end()
         if self._thread.is_alive():
             self._thread.join(LAST_STOP + 1.0)
 

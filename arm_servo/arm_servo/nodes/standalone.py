@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 import gc
+import math
 import sys
 import threading
 import time
@@ -30,6 +31,9 @@ from .topic_output import OutputParameters, TopicOutput
 
 SWITCH_INTERVAL = 0.0005
 """How long a busy callback may keep the interpreter from the cycle in [s]."""
+
+LAST_WORDS = 0.2
+"""How long clients are answered after the arm has come to rest at the end in [s]."""
 
 MakeNode = Callable[[str], Node]
 """Makes the node of a name; it lives until the program ends."""
@@ -118,14 +122,11 @@ def make_loop(
     watch = FollowingWatch(model.limits, loop.following, loop.period)
     cycle = MotionCycle(desk, feedback, publish, watch)
 
-    def stop_motion() -> None:
-        desk.submit(lambda core, _now: core.stop('the program ends'), moves=False)
-
     def begin() -> None:
         if words := prefer_this_thread(loop.priority):
             node.get_logger().info(words)
 
-    return desk, MotionThread(cycle, loop.period, stop_motion, begin)
+    return desk, MotionThread(cycle, loop.period, begin)
 
 
 def run_standalone(
@@ -148,6 +149,23 @@ def run_standalone(
     return code
 
 
+class Farewell(threading.Event):
+    """Set a moment after the arm has come to rest, so that goals are told how they end."""
+
+    def __init__(self, thread: MotionThread) -> None:
+        """Wait for a thread that ends."""
+        super().__init__()
+        self._thread = thread
+        self._since = math.inf
+
+    def is_set(self) -> bool:
+        """Whether nothing is left to be said."""
+        now = time.monotonic()
+        if self._thread.ended:
+            self._since = min(self._since, now)
+        return now > self._since + LAST_WORDS
+
+
 def _serve(build: Callable[[MakeNode], MotionThread], stop: threading.Event) -> None:
     nodes: list[Node] = []
     with ExitStack() as stack:
@@ -166,5 +184,7 @@ def _serve(build: Callable[[MakeNode], MotionThread], stop: threading.Event) -> 
         stack.callback(thread.stop)
         nodes[0].get_logger().info('ready for commands')
         spin(nodes, stop)
+        thread.end()
+        spin(nodes, Farewell(thread))
     if thread.error is not None:
         raise thread.error
