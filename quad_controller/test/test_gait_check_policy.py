@@ -29,11 +29,32 @@ def test_the_shipped_policy_passes_and_walks(capsys: pytest.CaptureFixture[str])
 def test_a_policy_that_only_stands_walks_nowhere(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The walk tells what happened, and not what was commanded."""
+    """The walk tells what happened, and not what was commanded; that is no success."""
     path = write_policy(tmp_path / 'still.onnx', metadata())
-    assert run([str(path), '--walk', '0.2', '0', '0', '--duration', '2']) == 0
-    went = capsys.readouterr().out.rpartition('went ')[2]
+    assert run([str(path), '--walk', '0.2', '0', '0', '--duration', '2']) == 1
+    output = capsys.readouterr().out
+    went = output.partition(' went ')[2]
     assert float(went.split()[0]) == pytest.approx(0.0, abs=0.02)
+    assert '% of its way; is it made for other servos' in output
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'words'),
+    [
+        (['--walk', 'nan', '0', '0'], 'nan is no finite number'),
+        (['--duration', '0'], 'must be 0.5 to 600'),
+        (['--duration', '-1'], 'must be 0.5 to 600'),
+        (['--phase-period', '-0.1'], 'must be 0 or more'),
+    ],
+)
+def test_senseless_numbers_are_refused(
+    arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Before anything is loaded."""
+    with pytest.raises(SystemExit) as ended:
+        run([SHIPPED, *arguments])
+    assert ended.value.code == 2
+    assert words in capsys.readouterr().err
 
 
 def test_what_does_not_fit_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

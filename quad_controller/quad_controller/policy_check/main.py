@@ -22,6 +22,13 @@ from ..policy.shipped import find_policy
 from ..states.parameters import StateParameters
 from .walk import SERVOS, walk
 
+SHORTEST, LONGEST = 0.5, 600.0
+"""Times of a walk in [s]."""
+LEAST_SHARE = 0.5
+"""Share of the commanded way below which a policy does not walk."""
+REACH = 0.1
+"""Distance of a foot from the middle in [m], which weighs turning beside walking."""
+
 
 def run(arguments: Sequence[str]) -> int:
     """Check a policy and print what was found; return 0 when it may be followed."""
@@ -54,9 +61,12 @@ def run(arguments: Sequence[str]) -> int:
         f'{_text(velocity)}, went {_text(walked.velocity)}, '
         f'tilt at most {math.degrees(walked.tilt):.1f} deg'
     )
-    if walked.trouble:
-        _print(f'it did not go well: {walked.trouble}')
-    return 1 if walked.trouble else 0
+    trouble = walked.trouble
+    if not trouble and (share := _share(walked.velocity, velocity)) < LEAST_SHARE:
+        trouble = f'it went {100 * share:.0f} % of its way; is it made for other servos (--servo)?'
+    if trouble:
+        _print(f'it did not go well: {trouble}')
+    return 1 if trouble else 0
 
 
 def main() -> None:
@@ -73,7 +83,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument('--preset', choices=list(PRESETS), default='lite', help='the robot')
     parser.add_argument('--arm', action='store_true', help='the robot has its arm')
     parser.add_argument(
-        '--phase-period', type=float, default=0.0, help='[s]; 0: what the file says'
+        '--phase-period', type=_time, default=0.0, help='[s]; 0: what the file says'
     )
     parser.add_argument('--imu-frame', choices=[each.value for each in ImuFrame], default='auto')
     parser.add_argument(
@@ -81,11 +91,45 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument('--hold-missing', action='store_true', help='joints that are lacking')
     parser.add_argument(
-        '--walk', nargs=3, type=float, metavar=('X', 'Y', 'YAW'), help='[m/s], [m/s], [rad/s]'
+        '--walk', nargs=3, type=_finite, metavar=('X', 'Y', 'YAW'), help='[m/s], [m/s], [rad/s]'
     )
     parser.add_argument('--servo', choices=SERVOS, default=SERVOS[0], help='of the simulation')
-    parser.add_argument('--duration', type=float, default=10.0, help='of the walk [s]')
+    parser.add_argument('--duration', type=_duration, default=10.0, help='of the walk [s]')
     return parser
+
+
+def _finite(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f'{text} is no finite number')
+    return value
+
+
+def _time(text: str) -> float:
+    value = _finite(text)
+    if value < 0.0:
+        raise argparse.ArgumentTypeError(f'{text} is no time in [s]: it must be 0 or more')
+    return value
+
+
+def _duration(text: str) -> float:
+    value = _finite(text)
+    if not SHORTEST <= value <= LONGEST:
+        raise argparse.ArgumentTypeError(
+            f'{text} is no time of a walk in [s]: it must be {SHORTEST:g} to {LONGEST:g}'
+        )
+    return value
+
+
+def _share(went: Velocity, commanded: Velocity) -> float:
+    """Return which share of what was commanded was gone; 1 where nothing was."""
+    pairs = [
+        (went.x, commanded.x),
+        (went.y, commanded.y),
+        (went.yaw * REACH, commanded.yaw * REACH),
+    ]
+    asked = sum(want**2 for _, want in pairs)
+    return sum(got * want for got, want in pairs) / asked if asked else 1.0
 
 
 def _text(velocity: Velocity) -> str:
