@@ -5,16 +5,25 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
+from typing import Any, cast, TYPE_CHECKING
 
+from geometry_msgs.msg import TransformStamped
 from hypothesis import given
 from hypothesis import strategies as st
 import numpy as np
 import pinocchio as pin
 import pytest
+from servo_robots import robot
+from tf2_msgs.msg import TFMessage
 
 from arm_servo.exceptions import CommandError
 from arm_servo.model import Pose
 from arm_servo.nodes.frame_tree import combined, FrameTree, inverse, rotation_of
+from arm_servo.nodes.tf_listener import TfListener
+
+if TYPE_CHECKING:
+    from rclpy.node import Node
 
 ANGLES = st.lists(st.floats(-3.0, 3.0), min_size=6, max_size=6)
 
@@ -59,3 +68,43 @@ def test_a_quaternion_that_is_none_is_refused(numbers: list[float]) -> None:
     """Its length is told."""
     with pytest.raises(CommandError, match='length'):
         rotation_of(numbers)
+
+
+class TfNode:
+    """What a TfListener needs of a node, with a clock of its own."""
+
+    def __init__(self) -> None:
+        """Remember who listens."""
+        self.heard: dict[str, Any] = {}
+
+    def create_subscription(self, _kind: object, topic: str, take: object, _qos: object) -> None:
+        """Remember it."""
+        self.heard[topic] = take
+
+    def get_clock(self) -> Any:
+        """Return a clock that stands at 100 s."""
+        return SimpleNamespace(now=lambda: SimpleNamespace(nanoseconds=100_000_000_000))
+
+    def publish(self, sec: int, x: float) -> None:
+        """Publish where the cup is."""
+        transform = TransformStamped(child_frame_id='cup')
+        transform.header.frame_id = 'base_link'
+        transform.header.stamp.sec = sec
+        transform.transform.translation.x = x
+        self.heard['/tf'](TFMessage(transforms=[transform]))
+
+
+def test_transforms_that_come_late_or_are_no_numbers_do_not_count() -> None:
+    """A frame is where a fresh message says; the stamp counts, not the arrival."""
+    node = TfNode()
+    frames = TfListener(cast('Node', node), robot('gp110'))
+    with pytest.raises(CommandError, match='connected to base_link'):
+        frames.pose('cup')
+    node.publish(90, 0.1)
+    with pytest.raises(CommandError, match='connected to base_link'):
+        frames.pose('cup')
+    node.publish(100, 0.2)
+    node.publish(100, math.nan)
+    assert frames.pose('cup').position.tolist() == [0.2, 0.0, 0.0]
+    node.publish(101, 0.3)  # of a clock a little ahead
+    assert frames.pose('cup').position.tolist() == [0.3, 0.0, 0.0]

@@ -7,14 +7,16 @@ from __future__ import annotations
 import math
 import time
 
+from geometry_msgs.msg import TransformStamped
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from tf2_msgs.msg import TFMessage
 
+from ..arrays import checked
 from ..exceptions import CommandError
 from ..model import Pose, RobotModel
 from .frame_tree import FrameTree, rotation_of
-from .ros_numbers import xyz, xyzw
+from .ros_numbers import seconds, xyz, xyzw
 
 STATIC = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 """How /tf_static is published."""
@@ -68,18 +70,21 @@ class TfListener:
         self._node.create_subscription(TFMessage, '/tf_static', self._take_static, STATIC)
 
     def _take(self, message: TFMessage) -> None:
-        self._learn(message, time.monotonic())
+        now, clock = time.monotonic(), float(self._node.get_clock().now().nanoseconds) * 1e-9
+        for transform in message.transforms:
+            # what comes late is as old as its stamp says
+            self._learn(transform, now - max(clock - seconds(transform.header.stamp), 0.0))
 
     def _take_static(self, message: TFMessage) -> None:
-        self._learn(message, math.inf)
-
-    def _learn(self, message: TFMessage, now: float) -> None:
-        if self._tree is None:
-            return
         for transform in message.transforms:
-            try:
-                rotation = rotation_of(xyzw(transform.transform.rotation))
-            except CommandError:
-                continue  # whoever publishes it is told by others that use TF
-            pose = Pose(rotation, xyz(transform.transform.translation))
-            self._tree.learn(transform.child_frame_id, transform.header.frame_id, pose, now)
+            self._learn(transform, math.inf)
+
+    def _learn(self, transform: TransformStamped, when: float) -> None:
+        try:
+            rotation = rotation_of(xyzw(transform.transform.rotation))
+            position = checked(xyz(transform.transform.translation), 3, 'translation')
+        except CommandError:
+            return  # whoever publishes it is told by others that use TF
+        if self._tree is not None:
+            child, parent = transform.child_frame_id, transform.header.frame_id
+            self._tree.learn(child, parent, Pose(rotation, position), when)
