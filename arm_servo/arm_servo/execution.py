@@ -140,6 +140,7 @@ class Execution:
         self._settling = 0.0
         self._off = 0.0
         self._met = False
+        self._rested = False
         self.ending: Outcome | None = None
         self.phase = Phase.FOLLOWING
         begin_point = self._path.at(0.0)
@@ -198,7 +199,8 @@ class Execution:
             period: Time to the next step in [s].
 
         Returns:
-            The state to command next; None to come to rest: there is no way to follow.
+            The state to command next; None to come to rest: it does not begin yet, or there is no
+            way to follow.
         """
         if self._waiting > 0.0:
             return self._wait(state, period)
@@ -220,6 +222,9 @@ class Execution:
         if self.phase is Phase.STOPPING:
             self.phase = Phase.DONE
             return None
+        self._rested = self._rested or not state.moving
+        if not self._rested:
+            return None  # the joints slow down in step
         rest = MotionState.at_rest(self._path.at(0.0).position)
         return self._follower.step(state, lambda _: rest, period)
 

@@ -121,9 +121,9 @@ def _walkable(
         return _Haste(_words(demand, limits), demand.share)
     path = rounded(path, limits)
     timing = Timing(path, limits)
-    stretched, demand = timing.stretched(), timing.demand
+    stretched, demand = timing.stretched(), timing.plainest
     if stretched is None:
-        return _Haste(_words(demand, limits), demand.share)
+        return _Haste(_words(demand, limits), timing.demand.share)
     most = LONGER[0] * (path.duration - delay) + LONGER[1]
     if stretched.duration > most:
         return _Haste(_words(demand, limits), stretched.duration / most)

@@ -95,6 +95,13 @@ class Timing:
         """What the path asks most, measured by the limits."""
         return self._most(self._shares(self._rates, 1.0))
 
+    @property
+    def plainest(self) -> Demand:
+        """What says best that the path asks too much: speed before acceleration before jerk."""
+        shares = self._shares(self._rates, 1.0)
+        beyond = [row for row in range(3) if shares[row].max() > 1.0]
+        return self._most(shares[: beyond[0] + 1]) if beyond else self._most(shares)
+
     def _most(self, shares: Array) -> Demand:
         quantity, place, joint = np.unravel_index(int(shares.argmax()), shares.shape)
         value = float(abs(self._rates[quantity][place, joint]))

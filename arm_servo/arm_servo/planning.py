@@ -97,7 +97,7 @@ class Planning:
         wait = max(-goal.age, 0.0)
         if wait == 0.0 or not state.moving:
             return replace(goal, age=max(goal.age, 0.0)), state, wait
-        stop = self._generator.brake(state)
+        stop = self._generator.to_velocity(state, np.zeros(len(self._limits)))
         if stop is not None and stop.duration <= wait:
             there = stop.at(stop.duration).position
             return replace(goal, age=0.0), MotionState.at_rest(there), wait

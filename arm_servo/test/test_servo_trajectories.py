@@ -281,6 +281,19 @@ def test_a_later_begin_is_planned_before_it(name: str, seed: int, ahead: float) 
     kept(robot(name).limits, states + followed[1:])
 
 
+def test_an_arm_that_waits_for_a_later_begin_slows_down_on_its_line() -> None:
+    """Joints in motion along a straight line come to rest on it, before the new path begins."""
+    core, start = core_of('panda'), ready('panda')
+    line = np.array([0.6, 0.3, -0.2, 0.1, 0.5, -0.3, 0.2])
+    core.follow(TrajectoryGoal(robot('panda').joints, [GoalPoint(2.0, tuple(start + line))]))
+    stream(core, 1.0)
+    end = tuple(start + 0.1)
+    core.follow(TrajectoryGoal(robot('panda').joints, [GoalPoint(2.0, end)], age=-1.0))
+    ways = np.array([point.state.position - start for point in stream(core, 0.99)])
+    off = ways - np.outer(ways @ line, line) / float(line @ line)
+    assert float(np.abs(off).max()) < 2e-3
+
+
 def test_a_trajectory_that_has_begun_is_joined() -> None:
     """Points that have passed are left out; the next one is met in its time."""
     core = core_of('prbt')
