@@ -14,7 +14,7 @@ from .report import Cause, Limiter
 TOUCH = 1e-4
 """Change of a distance that is let pass, in all, in [m]: sliding along is no approach."""
 
-LOOKS = 8
+LOOKS = 6
 """Places of a stop at which distances are looked at."""
 
 EXACT = 1e-7
@@ -86,6 +86,9 @@ class Guard:
                 self._remember(stop)
                 return wanted, limiter
             limiter = Limiter(Cause.STOP_CHECK, 'distance of links', room, 0.0)
+            eased = self._eased(state, period)
+            if eased is not None:
+                return eased, limiter
         return self._brake(state, period), limiter
 
     def _beyond(self, wanted: MotionState) -> tuple[Mask, Plan | None]:
@@ -135,6 +138,18 @@ class Guard:
         times = np.linspace(0.0, stop.duration, LOOKS + 1)[1:].tolist()
         places = np.array([stop.at(time).position for time in times])
         return self._model.least_clearance(places, self._clearance)
+
+    def _eased(self, state: MotionState, period: float) -> MotionState | None:
+        """Brake with the joints in step, which keeps the direction, where that is clear too."""
+        plan = self._generator.to_velocity(state, np.zeros(len(self._limits)))
+        if plan is None or self._floor is None or period >= plan.duration:
+            return None
+        after = plan.at(period)
+        beyond, stop = self._beyond(after)
+        if stop is None or beyond.any() or self._distance(plan) < self._floor - TOUCH:
+            return None
+        self._remember(stop)
+        return after
 
     def _brake(self, state: MotionState, period: float) -> MotionState:
         stop = self._generator.brake(state)

@@ -169,7 +169,8 @@ class RobotModel:
             places: Joint positions in [rad] (m, n).
             within: Distance of interest in [m]; where it is more, a lower bound is good enough.
         """
-        return min(self.clearance(positions, within) for positions in places)
+        proven = self._clearances.proven(places, within)
+        return min((self.clearance(each, within) for each in places[proven:]), default=within)
 
     def stays_apart(self, lower: Array, upper: Array, within: float) -> bool:
         """Whether no shapes are as near at any positions between bounds, as far as is known.

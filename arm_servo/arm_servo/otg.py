@@ -62,10 +62,16 @@ class Plan:
         upper: Greatest position of each joint on it in [rad].
     """
 
-    __slots__ = ('_lower', '_trajectory', '_upper', 'duration')
+    __slots__ = ('_begin', '_lower', '_trajectory', '_upper', 'duration')
 
-    def __init__(self, trajectory: Native) -> None:
-        """Wrap a trajectory of ruckig."""
+    def __init__(self, trajectory: Native, begin: Array | None = None) -> None:
+        """Wrap a trajectory of ruckig.
+
+        Args:
+            trajectory: The trajectory.
+            begin: Where it begins in [rad], for one that was planned from zero.
+        """
+        self._begin = begin
         self._trajectory = trajectory
         self.duration = float(trajectory.duration)
         self._lower: Array | None = None
@@ -78,7 +84,10 @@ class Plan:
             time: Time in [s].
         """
         position, velocity, acceleration = self._trajectory.at_time(time)
-        return MotionState(np.array(position), np.array(velocity), np.array(acceleration))
+        places = np.array(position)
+        if self._begin is not None:
+            places += self._begin
+        return MotionState(places, np.array(velocity), np.array(acceleration))
 
     @property
     def extremes(self) -> tuple[Array, Array]:
@@ -87,6 +96,8 @@ class Plan:
             bounds = self._trajectory.position_extrema
             self._lower = np.array([bound.min for bound in bounds])
             self._upper = np.array([bound.max for bound in bounds])
+            if self._begin is not None:
+                self._lower, self._upper = self._lower + self._begin, self._upper + self._begin
         return self._lower, self._upper
 
 
@@ -113,6 +124,7 @@ class Generator:
         )
         self._to_standstill = self._input(velocity, apart)
         self._to_standstill.target_velocity = np.zeros(count)
+        self._to_standstill.current_position = np.zeros(count)
 
     def to_velocity(self, state: MotionState, velocity: Array) -> Plan | None:
         """Plan to a velocity, the joints in step so that the direction is kept.
@@ -142,11 +154,15 @@ class Generator:
     def brake(self, state: MotionState) -> Plan | None:
         """Plan the shortest way to a standstill, each joint for itself.
 
+        It is planned from zero, since ruckig counts zero among the extremes of such a motion.
+
         Args:
             state: Where to start.
         """
-        _start(self._to_standstill, state)
-        return self._plan(self._to_standstill)
+        demand = self._to_standstill
+        demand.current_velocity = state.velocity
+        demand.current_acceleration = state.acceleration
+        return self._plan(demand, state.position)
 
     def to_state(
         self, state: MotionState, target: MotionState, shortest: float | None = None
@@ -194,7 +210,7 @@ class Generator:
         demand.max_jerk = self._limits.jerk
         return demand
 
-    def _plan(self, demand: Native) -> Plan | None:
+    def _plan(self, demand: Native, begin: Array | None = None) -> Plan | None:
         trajectory = ruckig.Trajectory(len(self._limits))
         try:
             result = self._otg.calculate(demand, trajectory)
@@ -202,7 +218,7 @@ class Generator:
             return None
         if result not in {ruckig.Result.Working, ruckig.Result.Finished}:
             return None
-        return Plan(trajectory)
+        return Plan(trajectory, begin)
 
 
 def _start(demand: Native, state: MotionState) -> None:

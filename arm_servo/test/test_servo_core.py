@@ -179,7 +179,7 @@ def test_without_an_answer_of_the_generator_the_arm_brakes(
     core = core_of('prbt')
     core.jog({'prbt_joint_1': 0.8, 'prbt_joint_4': -0.5}, 0.0, duration=1.0)
     stream(core, 0.6)
-    monkeypatch.setattr(Generator, '_plan', lambda self, demand: None)
+    monkeypatch.setattr(Generator, '_plan', lambda *_: None)
     before = core.state
     states = [point.state for point in stream(core, 0.4)]
     assert not states[-1].moving

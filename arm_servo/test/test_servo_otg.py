@@ -79,6 +79,25 @@ def test_what_is_brakeable_can_be_braked(share: float) -> None:
     assert np.all(upper <= way + 1e-9)
 
 
+@settings(max_examples=60, deadline=None)
+@given(seed=st.integers(0, 10**6))
+def test_the_extremes_of_a_stop_are_those_of_its_places(seed: int) -> None:
+    """Wherever it begins, also far from zero, and in whatever motion."""
+    limits, rng = robot('panda').limits, np.random.default_rng(seed)
+    state = MotionState(
+        rng.uniform(limits.lower, limits.upper),
+        rng.uniform(-1.0, 1.0, 7) * limits.velocity,
+        rng.uniform(-1.0, 1.0, 7) * limits.acceleration,
+    )
+    stop = Generator(limits).brake(state)
+    assert stop is not None
+    places = np.array([stop.at(time).position for time in np.linspace(0, stop.duration, 400)])
+    assert places[0] == pytest.approx(state.position, abs=1e-12)
+    lower, upper = stop.extremes
+    assert lower == pytest.approx(places.min(axis=0), abs=1e-4)
+    assert upper == pytest.approx(places.max(axis=0), abs=1e-4)
+
+
 def test_a_plan_to_a_state_arrives() -> None:
     """Position, velocity and acceleration of the target are met at the end."""
     limits = robot('prbt').limits
