@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+import math
 
 import numpy as np
 
@@ -76,6 +77,8 @@ class Border:
         """
         self._limits = limits
         self._escape, self._braking = escape, braking
+        self._least_acceleration = braking * float(limits.acceleration.min())
+        self._least_jerk = braking * float(limits.jerk.min())
         self._sense: Array | None = None
         self._entered: Array | None = None
         self._good: Array | None = None
@@ -98,7 +101,8 @@ class Border:
         """
         self._remember(position, good=bool(command.any()) and not found.damped)
         asked = float(command @ found.tool[:, -1])
-        if abs(asked) <= found.least * self._stoppable(found, found.least / STEEPEST):
+        nearest = found.least / STEEPEST
+        if abs(asked) <= found.least * min(self._surely_stoppable(nearest), FADE * nearest):
             return found  # slow enough for a fold that is as near as can be
         way = float(np.sign(asked)) * way_to_fold(jacobian_at, position, found)
         if not 0.0 < way < np.inf:
@@ -114,6 +118,14 @@ class Border:
         acceleration = self._braking * np.min(self._limits.acceleration / parts)
         jerk = self._braking * np.min(self._limits.jerk / parts)
         return min(float(brakeable(np.asarray(way), acceleration, jerk)), FADE * way)
+
+    def _surely_stoppable(self, way: float) -> float:
+        """Return a speed in any joint direction that ends within a way in [rad/s], quickly."""
+        half = 0.5 * self._least_acceleration**2 / self._least_jerk
+        return min(
+            math.sqrt(half * half + 2.0 * self._least_acceleration * way) - half,
+            math.pow(way * way * self._least_jerk, 1.0 / 3.0),
+        )
 
     def way_out(
         self, jacobian_at: JacobianAt, position: Array, found: Directions, command: Array

@@ -90,11 +90,12 @@ def test_gradients_of_distances_are_differences(name: str, seed: int) -> None:
             every = model.nearest(positions, math.inf, len(model.pairs))
             return next(each.distance for each in every if each.pair == pair)
 
-        quotient = [
-            (distance(at + step * unit) - distance(at - step * unit)) / (2 * step)
-            for unit in np.eye(len(model))
-        ]
-        assert near.gradient == pytest.approx(quotient, abs=0.02)
+        ahead = np.array([distance(at + step * unit) for unit in np.eye(len(model))])
+        behind = np.array([distance(at - step * unit) for unit in np.eye(len(model))])
+        # deep in contact, two ways out may be equally short
+        smooth = np.abs(ahead + behind - 2.0 * near.distance) < 0.02 * step
+        quotient = (ahead - behind) / (2.0 * step)
+        assert near.gradient[smooth] == pytest.approx(quotient[smooth], abs=0.02)
 
 
 def test_a_tip_other_than_the_groups() -> None:
