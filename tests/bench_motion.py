@@ -307,7 +307,6 @@ def loop(period: float) -> Rows:
     thread = MotionThread(
         Timed(desk, feedback, put, watch),
         period,
-        lambda: None,
         lambda: words.append(prefer_this_thread(40)),
     )
     thread.start()
