@@ -32,6 +32,7 @@ from std_msgs.msg import Float64MultiArray
 
 from arm_bringup.description import expand_xacro
 from arm_bringup.robots import installed_robots_folder
+from arm_canopen.can import Frame
 from arm_canopen.standard.cob_id import CobId
 from arm_servo import load_limits, MotionCore, RobotModel, SetPoint
 from arm_servo.arrays import Array
@@ -87,7 +88,7 @@ def on_the_bus(period: int) -> Rows:
             ended(arm, READY, 3.0)
             begin = len(recorder.frames)
             ended(arm, FAR, 2.0)
-            errors, later = tracking(Seen(recorder, begin))
+            errors, later = tracking(Seen(recorder.frames[begin:]))
             delays, cpu = reaction(arm, recorder), jogging(arm)
     head = f'SYNC {period} ms: '
     cycles = [delay / period * 1e3 for delay in delays]
@@ -135,16 +136,15 @@ def ended(arm: MovingArm, positions: Sequence[float], duration: float) -> None:
 
 @dataclass(slots=True)
 class Seen:
-    """What the drives were told and told, cycle by cycle, from a frame on."""
+    """What the drives were told and told, cycle by cycle, in some frames."""
 
-    recorder: BusRecorder
-    begin: int
+    frames: Sequence[Frame]
 
     def positions(self, pdo: tuple[int, slice]) -> Array:
         """Return the positions (cycles, joints) in [rad] of PDOs."""
         (first, place), rows = pdo, []
         row = [math.nan] * len(JOINTS)
-        for frame in self.recorder.frames[self.begin :]:
+        for frame in self.frames:
             if frame.can_id == CobId.SYNC:
                 rows.append(list(row))
             joint = frame.can_id - first - FIRST_NODE_ID
