@@ -9,9 +9,9 @@ import signal
 from typing import TYPE_CHECKING
 
 from control_msgs.action import FollowJointTrajectory
-from control_msgs.msg import JointJog
+from control_msgs.msg import JointJog, JointTrajectoryControllerState
 from controller_manager_msgs.srv import ListControllers, SwitchController
-from moving_arm import goal_to, GoalRun, READY
+from moving_arm import CONTROLLER, goal_to, GoalRun, READY
 from processes import RunningProcess
 import pytest
 from topic_arm import standalone, TopicArm
@@ -53,6 +53,33 @@ def test_a_trajectory_goes_out_as_arrays(isolation: Isolation, tmp_path: Path) -
         assert steps[-1] < 1e-4  # it slowed down
 
 
+def test_a_goal_is_held_on_its_path_and_goes_on(isolation: Isolation, tmp_path: Path) -> None:
+    """A pause holds the arm, with speed 0 in the state; the goal is reached behind it."""
+    with TopicArm(isolation, standalone(tmp_path, 'motion_controller'), READY_WORDS) as arm:
+        states = arm.client.listen(
+            JointTrajectoryControllerState, f'{CONTROLLER}/controller_state'
+        )
+        idle = arm.client.trigger(f'{CONTROLLER}/resume')
+        assert (idle.success, idle.message) == (True, 'was not paused')
+        run = GoalRun(arm.client, goal_to([0.5, *READY[1:]], 1.5))
+        arm.client.spin_until(lambda: arm.at[0] > 0.1, 10.0, 'motion')
+        held = arm.client.trigger(f'{CONTROLLER}/pause')
+        assert held.success
+        assert 'the trajectory comes to rest on its path' in held.message
+        assert 'already' in arm.client.trigger(f'{CONTROLLER}/pause').message
+        arm.client.spin_until(lambda: _rests(arm), 10.0, 'rest')
+        states.clear()
+        arm.client.spin_until(lambda: len(states) > 5, 10.0, 'state of the controller')
+        assert {state.speed_scaling_factor for state in states} == {0.0}
+        assert arm.at[0] < 0.45
+        assert not run.done
+        on = arm.client.trigger(f'{CONTROLLER}/resume')
+        assert (on.success, on.message) == (True, 'the trajectory goes on')
+        result = run.wait()[1]
+        assert result.error_code == RESULT.SUCCESSFUL, result.error_string
+        assert arm.at[0] == pytest.approx(0.5, abs=1e-6)
+
+
 def test_a_goal_is_told_that_the_program_ends(isolation: Isolation, tmp_path: Path) -> None:
     """Ctrl-C in the middle of it: the arm comes to rest on the path, the client gets a result."""
     command = standalone(tmp_path, 'trajectory_controller')
@@ -81,6 +108,11 @@ def test_a_goal_that_the_arm_did_not_reach_is_no_success(
         far = GoalRun(arm.client, goal_to([1.0, *READY[1:]], 2.0)).wait()[1]
         assert far.error_code == RESULT.PATH_TOLERANCE_VIOLATED
         assert 'panda_joint1 does not follow' in far.error_string
+
+
+def _rests(arm: TopicArm) -> bool:
+    places = [each[0] for each in arm.arrays[-50:]]
+    return max(places) - min(places) < 1e-9
 
 
 def _switch(arm: TopicArm, on: list[str], off: list[str]) -> None:

@@ -353,7 +353,9 @@ class MotionCore:
         _ = self.state
         counts = duration_of(duration, self._settings.timeout)
         if self._paused:
-            raise CommandError('jogging is paused; resume first')
+            raise CommandError(
+                'the arm is paused; resume first (~/resume of the trajectory controller)'
+            )
         self._turn += 1
         self._sources.jog(command, now + counts)
 

@@ -63,6 +63,11 @@ class Snapshot:
     execution: Execution | None = None
 
     @property
+    def pace(self) -> float:
+        """Speed override that counts, 0 to 1: none while it is paused."""
+        return 0.0 if self.paused else self.speed
+
+    @property
     def reference(self) -> MotionState | None:
         """Where the arm is to be: where it stands while it does not follow; None while unknown."""
         if self.set_point is not None:

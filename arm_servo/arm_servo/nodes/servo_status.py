@@ -68,6 +68,8 @@ def status_of(
         return int(StatusCode.INVALID), snapshot.blocked
     if paused:
         return int(StatusCode.NO_WARNING), paused
+    if snapshot.paused:
+        return int(StatusCode.NO_WARNING), 'the arm is held; ~/resume of the trajectory controller'
     if snapshot.source is not Source.JOG:
         return int(StatusCode.NO_WARNING), _idle(snapshot.source)
     report = snapshot.set_point.report

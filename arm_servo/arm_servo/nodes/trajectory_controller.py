@@ -33,6 +33,7 @@ from .trajectory_messages import (
     point_of,
 )
 from .trajectory_parameters import TrajectoryParameters
+from .trajectory_pause import TrajectoryPause
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 """For a value that counts until the next one."""
@@ -75,6 +76,7 @@ class TrajectoryController:
         for qos in (LATCHED, 1):  # who publishes it once from a shell does not latch it
             node.create_subscription(SpeedScalingFactor, '~/speed_scaling_input', self._scale, qos)
         node.create_service(QueryTrajectoryState, '~/query_state', self._query)
+        TrajectoryPause(node, desk)
         node.create_timer(1.0 / parameters.state_rate, self._publish_state)
         self._action = TrajectoryAction(
             node, desk, parameters.monitor_rate, self._convert, self._follow
@@ -148,6 +150,7 @@ class TrajectoryController:
         if snapshot.source is Source.TRAJECTORY and execution is not None:
             state = execution.foreseen(ahead)
         response.success = True
+        response.message = 'paused; ~/resume goes on' if snapshot.paused else ''
         response.name = list(self._desk.model.joints)
         response.position = state.position.tolist()
         response.velocity = state.velocity.tolist()
@@ -167,7 +170,7 @@ class TrajectoryController:
             feedback=point_of(measured),
             error=point_of(difference(wanted, measured)),
             output=point_of(wanted),
-            speed_scaling_factor=snapshot.speed,
+            speed_scaling_factor=snapshot.pace,
         )
         age = Duration(nanoseconds=round((time.monotonic() - snapshot.time) * 1e9))
         message.header.stamp = (self._node.get_clock().now() - age).to_msg()  # that of the cycle
