@@ -17,6 +17,7 @@ from arm_servo.exceptions import GoalCode, GoalError, NotReadyError
 from arm_servo.execution import Execution
 from arm_servo.goal import GoalPoint, TrajectoryGoal
 from arm_servo.nodes.planner import Planner
+from arm_servo.otg import MotionState
 from arm_servo.set_point import Source
 
 Done = Callable[[], bool]
@@ -117,6 +118,43 @@ def test_a_jog_that_ends_while_a_long_goal_is_planned_does_no_harm() -> None:
         desired = execution.feedback.desired.position
         off = max(off, float(np.abs(drives.path[-1] - desired).max()))
     assert off < 1e-3
+
+
+@pytest.mark.parametrize('always', [False, True])
+def test_an_arm_that_was_moved_meanwhile_is_planned_for_again(
+    always: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The way from elsewhere is another, and not looked at; if it never rests, words say so."""
+    drives, planner = ready()
+    plan = drives.desk.plan
+    goal = TrajectoryGoal(
+        drives.desk.model.joints, [GoalPoint(4.0, wave(drives, 2).points[0].positions)]
+    )
+    begins: list[float] = []
+
+    def slow(goal: TrajectoryGoal, state: MotionState) -> Execution:
+        begins.append(float(state.position[0]))
+        execution = plan(goal, state)
+        if always or len(begins) == 1:
+            drives.desk.submit(lambda core, now: core.jog({'panda_joint1': 0.5}, now, 0.3))
+            until = time.monotonic() + 10.0
+            while abs(drives.axes[0].setpoint - begins[-1]) < 0.1 and time.monotonic() < until:
+                time.sleep(PERIOD)
+        return execution
+
+    monkeypatch.setattr(drives.desk, 'plan', slow)
+    future = planner.follow(goal)
+    run_until(drives, future.done)
+    if always:
+        with pytest.raises(GoalError, match='panda_joint1 was moved by'):
+            future.result(0.0)
+        assert drives.desk.snapshot.source is not Source.TRAJECTORY
+        return
+    assert len(begins) == 2
+    assert begins[1] - begins[0] > 0.05
+    execution = future.result(0.0)
+    drives.run(5)
+    assert drives.path[-1] == pytest.approx(execution.feedback.desired.position, abs=0.02)
 
 
 def test_a_goal_that_is_refused_does_not_stop_a_jog() -> None:

@@ -11,8 +11,10 @@ from dataclasses import replace
 import math
 import time
 
+import numpy as np
+
 from ..core import MotionCore
-from ..exceptions import NotReadyError
+from ..exceptions import GoalCode, GoalError, NotReadyError
 from ..execution import Execution
 from ..goal import TrajectoryGoal
 from ..otg import MotionState
@@ -36,6 +38,12 @@ PATIENCE = 1.0
 
 LONGEST = 100.0
 """Part of a trajectory for whose check a begin in motion waits in [s]."""
+
+DISPLACED = 0.05
+"""How far the arm may be from where a trajectory was planned in [rad]: its way was looked at."""
+
+ATTEMPTS = 3
+"""How often a trajectory is planned at most, where others move the arm meanwhile."""
 
 LEAST = 3
 """Least cycles from the begin of the planning to that of the motion, where the arm moves."""
@@ -74,15 +82,19 @@ class Planner:
         self._worker.submit(self._plan, goal, answer)
         return answer
 
-    def _plan(self, goal: TrajectoryGoal, answer: Future[Execution]) -> None:
+    def _plan(
+        self, goal: TrajectoryGoal, answer: Future[Execution], attempts: int = ATTEMPTS
+    ) -> None:
+        began = time.monotonic()
         try:
-            execution, begin = self._planned(goal)
+            execution, state, begin = self._planned(goal)
         except Exception as error:  # noqa: BLE001  # whoever ordered it is told
             _refuse(answer, error)
             return
 
         def start(core: MotionCore, _now: float) -> Execution:
             self._check()
+            _check_place(core, state)
             if not answer.set_running_or_notify_cancel():
                 raise CancelledError
             core.begin(execution)
@@ -90,32 +102,39 @@ class Planner:
 
         def finish(order: Future[Execution]) -> None:
             error = order.exception()
-            if error is None:
+            if isinstance(error, _DisplacedError) and attempts > 1 and not answer.cancelled():
+                age = goal.age and goal.age + time.monotonic() - began
+                self._worker.submit(self._plan, replace(goal, age=age), answer, attempts - 1)
+            elif error is None:
                 answer.set_result(order.result())
             else:
                 _refuse(answer, error)
 
         self._desk.submit(start, begin=begin).add_done_callback(finish)
 
-    def _planned(self, goal: TrajectoryGoal) -> tuple[Execution, float]:
-        """Return the execution, and the steady time in [s] at which it begins."""
+    def _planned(self, goal: TrajectoryGoal) -> tuple[Execution, MotionState, float]:
+        """Return the execution, the state and the steady time in [s] at which it begins."""
         snapshot = self._desk.snapshot
         if snapshot.set_point is None or snapshot.blocked:
-            return self._desk.plan(goal, self._state()), 0.0
+            state = self._state()
+            return self._desk.plan(goal, state), state, 0.0
         state = snapshot.set_point.state
         if not state.moving and snapshot.source is Source.NONE:
-            return self._desk.plan(goal, state), 0.0
+            return self._desk.plan(goal, state), state, 0.0
         needed = AT_LEAST + PER_POINT * len(goal.points) + PER_SECOND * _duration(goal)
         if snapshot.source is not Source.TRAJECTORY and needed > SHORT:
-            return self._planned_at_rest(goal, state), 0.0
+            return (*self._planned_at_rest(goal, state), 0.0)
         cycles = max(LEAST, math.ceil(needed / snapshot.period) + 1)
         lead = (cycles - 1) * snapshot.period
         if goal.age:
             goal = replace(goal, age=goal.age + lead)
-        execution = self._desk.plan(goal, _foreseen(snapshot, state, lead))
-        return execution, snapshot.time + (cycles - 0.5) * snapshot.period
+        state = _foreseen(snapshot, state, lead)
+        execution = self._desk.plan(goal, state)
+        return execution, state, snapshot.time + (cycles - 0.5) * snapshot.period
 
-    def _planned_at_rest(self, goal: TrajectoryGoal, state: MotionState) -> Execution:
+    def _planned_at_rest(
+        self, goal: TrajectoryGoal, state: MotionState
+    ) -> tuple[Execution, MotionState]:
         """Bring the arm to rest, and plan from there; a goal that is refused does not stop it."""
         began = time.monotonic()
         self._desk.plan(goal, MotionState.at_rest(state.position))
@@ -127,7 +146,7 @@ class Planner:
                 stop.result()
             if stop.done() and point is not None and idle and not point.state.moving:
                 age = goal.age and goal.age + time.monotonic() - began
-                return self._desk.plan(replace(goal, age=age), point.state)
+                return self._desk.plan(replace(goal, age=age), point.state), point.state
             if time.monotonic() - began > PATIENCE:
                 raise NotReadyError(
                     'the arm does not come to rest for the trajectory; end the commands that'
@@ -143,6 +162,23 @@ class Planner:
         except FutureTimeoutError as error:
             order.cancel()
             raise NotReadyError('the cycle does not run; is the bus up?') from error
+
+
+class _DisplacedError(GoalError):
+    """The arm is elsewhere than where a trajectory was planned."""
+
+
+def _check_place(core: MotionCore, planned: MotionState) -> None:
+    """Make sure that the arm is where a trajectory was planned; else its way is another one."""
+    off = np.abs(core.state.position - planned.position)
+    joint = int(np.argmax(off))
+    if off[joint] > DISPLACED:
+        raise _DisplacedError(
+            GoalCode.INVALID_GOAL,
+            f'{core.model.joints[joint]} was moved by {off[joint]:.3f} rad while the trajectory'
+            ' was planned, and its way was looked at from there only; end what moves the arm, and'
+            ' send it again',
+        )
 
 
 def _foreseen(snapshot: Snapshot, state: MotionState, ahead: float) -> MotionState:
