@@ -4,14 +4,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import pinocchio as pin
 
 from .arrays import Array, Native
 from .description import Shape
-from .srdf import Pair
 
 
 class CollisionModel:
@@ -29,13 +28,15 @@ class CollisionModel:
             the arm is.
     """
 
-    def __init__(self, model: Native, shapes: Sequence[Shape], disabled: frozenset[Pair]) -> None:
+    def __init__(
+        self, model: Native, shapes: Sequence[Shape], checks: Callable[[str, str], bool]
+    ) -> None:
         """Attach the shapes and pair them.
 
         Args:
             model: A pinocchio model of one chain; links are frames of it.
             shapes: Shapes of the links.
-            disabled: Pairs of links that are not checked.
+            checks: Tells whether two links are checked.
         """
         self.model = model
         self.geometry = pin.GeometryModel()
@@ -47,7 +48,7 @@ class CollisionModel:
         for first in range(len(joints)):
             for second in range(first + 1, len(joints)):
                 names = (shapes[first].link, shapes[second].link)
-                if joints[first] == joints[second] or frozenset(names) in disabled:
+                if joints[first] == joints[second] or not checks(*names):
                     continue
                 self.geometry.addCollisionPair(pin.CollisionPair(first, second))
                 pairs.append(names)

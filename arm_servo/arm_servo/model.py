@@ -91,7 +91,7 @@ class RobotModel:
         self._tip_frame = self._model.getFrameId(self.tip)
         self._base_frame = self._model.getFrameId(self.base)
         self._at = b''  # positions of the kinematics that are cached
-        self._shapes = CollisionModel(self._model, description.shapes, semantic.disabled)
+        self._shapes = CollisionModel(self._model, description.shapes, semantic.checks)
         self._clearances = Clearances(self._shapes)
         self.reach = self._reach()
 

@@ -39,11 +39,22 @@ class SemanticDescription:
         groups: Groups by name.
         poses: Positions in [rad] or [m] by joint, by pose, by group.
         disabled: Pairs of links that need no collision check.
+        unchecked: Links that need none with any other (``disable_default_collisions``).
+        enabled: Pairs of them that are checked all the same (``enable_collisions``).
     """
 
     groups: Mapping[str, Group]
     poses: Mapping[str, Mapping[str, Mapping[str, float]]]
     disabled: frozenset[Pair]
+    unchecked: frozenset[str] = frozenset()
+    enabled: frozenset[Pair] = frozenset()
+
+    def checks(self, first: str, second: str) -> bool:
+        """Tell whether two links are checked for collision with each other."""
+        pair = frozenset((first, second))
+        if pair in self.disabled:  # which has the last word, as in MoveIt
+            return False
+        return pair in self.enabled or not pair & self.unchecked
 
     def group(self, name: str) -> Group:
         """Return a group.
@@ -77,11 +88,17 @@ def parse_srdf(text: str) -> SemanticDescription:
     poses: dict[str, dict[str, Mapping[str, float]]] = {name: {} for name in groups}
     for state in root.findall('group_state'):
         poses.setdefault(state.get('group', ''), {})[state.get('name', '')] = _pose(state)
-    disabled = frozenset(
-        frozenset((each.get('link1', ''), each.get('link2', '')))
-        for each in root.findall('disable_collisions')
+    unchecked = frozenset(
+        each.get('link', '') for each in root.findall('disable_default_collisions')
     )
-    return SemanticDescription(groups, poses, disabled)
+    disabled, enabled = _pairs(root, 'disable_collisions'), _pairs(root, 'enable_collisions')
+    return SemanticDescription(groups, poses, disabled, unchecked, enabled)
+
+
+def _pairs(root: ET.Element, tag: str) -> frozenset[Pair]:
+    return frozenset(
+        frozenset((each.get('link1', ''), each.get('link2', ''))) for each in root.findall(tag)
+    )
 
 
 def _group(element: ET.Element) -> Group:

@@ -233,3 +233,29 @@ def test_a_limits_file_that_is_none(tmp_path: Any) -> None:
     path.write_text('joints: {}\n', encoding='utf-8')
     with pytest.raises(ModelError, match='joint_limits'):
         load_limits(path)
+
+
+def test_links_may_be_checked_by_name_only() -> None:
+    """A link without default checks is checked in the pairs that are enabled, and no others."""
+    urdf, srdf, limits = chain_texts('zyyy')
+    everything = set(map(frozenset, RobotModel(urdf, srdf, limits).pairs))
+    words = (
+        '<disable_default_collisions link="link_1"/>'
+        '<enable_collisions link1="link_4" link2="link_1"/>'
+        '<enable_collisions link1="link_1" link2="link_3"/>'
+        '<disable_collisions link1="link_1" link2="link_3"/></robot>'
+    )
+    model = RobotModel(urdf, srdf.replace('</robot>', words), limits)
+    left = {pair for pair in everything if 'link_1' not in pair}
+    assert set(map(frozenset, model.pairs)) == left | {frozenset(('link_1', 'link_4'))}
+    assert left < everything
+
+
+@pytest.mark.parametrize(
+    ('name', 'pair'),
+    [('panda', ('panda_link2', 'panda_link6')), ('gp110', ('link_4_r', 'link_6_t'))],
+)
+def test_links_that_can_meet_are_checked(name: str, pair: tuple[str, str]) -> None:
+    """Though their distance is seldom small; the pose to start from is clear."""
+    assert frozenset(pair) in set(map(frozenset, robot(name).pairs))
+    assert robot(name).clearance(ready(name)) > 0.01
