@@ -338,7 +338,7 @@ class MotionCore:
         )
         # the ways of trajectories and targets were looked at; but not from out of a jog
         self._loose = self._sources.active in {Source.JOG, Source.NONE} or (
-            self._loose and state.moving and self._sources.active is Source.TARGET
+            self._loose and state.moving and self._sources.brakes
         )
         after, limiter = self._guard.step(state, wanted, period, clearances=self._loose)
         self._state = after

@@ -202,7 +202,7 @@ class Execution:
             The state to command next; None to come to rest: it does not begin yet, or there is no
             way to follow.
         """
-        if self._waiting > 0.0:
+        if self.waits:
             return self._wait(state, period)
         self._check(state, measured, period)
         if self.phase is Phase.STOPPING:
@@ -215,6 +215,11 @@ class Execution:
         self.feedback = Feedback(self._clock.time, desired, measured, self._clock.pace)
         self._advance(following)
         return following
+
+    @property
+    def waits(self) -> bool:
+        """Whether it is yet to begin."""
+        return self._waiting > 0.0
 
     def _wait(self, state: MotionState, period: float) -> MotionState | None:
         """Come to rest where the path begins, and wait there; all is planned already."""

@@ -71,6 +71,13 @@ class Sources:
         self.active = Source.JOG
         self._jogging.take(command, fresh_until)
 
+    @property
+    def brakes(self) -> bool:
+        """Whether what was ordered may still bring the arm to rest out of another motion."""
+        if self.active is Source.TRAJECTORY:
+            return self.execution is not None and self.execution.waits
+        return self.active is Source.TARGET
+
     def follow(self, execution: Execution) -> None:
         """Let a trajectory move the arm.
 
