@@ -14,8 +14,11 @@ from .report import Cause, Limiter
 TOUCH = 1e-4
 """Change of a distance that is let pass, in all, in [m]: sliding along is no approach."""
 
-LOOKS = 6
-"""Places of a stop at which distances are looked at."""
+LOOKS, MOST_LOOKS = 6, 40
+"""How many places of a stop distances are looked at, at least and at most."""
+
+STRIDE = 0.1
+"""Way of all joints between two looks in [rad]."""
 
 EXACT = 1e-7
 """Rounding of ruckig's positions that is let pass in [rad]."""
@@ -135,7 +138,9 @@ class Guard:
         """Return the least distance between links on a stop in [m], if it is small."""
         if self._model.stays_apart(*stop.extremes, self._clearance):
             return self._clearance
-        times = np.linspace(0.0, stop.duration, LOOKS + 1)[1:].tolist()
+        way = np.ptp(np.stack(stop.extremes), axis=0).sum()
+        looks = min(max(LOOKS, round(way / STRIDE)), MOST_LOOKS)
+        times = np.linspace(0.0, stop.duration, looks + 1)[1:].tolist()
         places = np.array([stop.at(time).position for time in times])
         return self._model.least_clearance(places, self._clearance)
 

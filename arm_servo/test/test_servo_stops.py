@@ -81,3 +81,18 @@ def test_no_end_of_a_jog_leads_into_contact(name: str, end: str) -> None:
             assert core.model.clearance(state.position) > least
             if not state.moving:
                 break
+
+
+def test_a_long_stop_stays_clear_all_along() -> None:
+    """At full speed all joints go far until they rest; nothing in between is overlooked."""
+    core = MotionCore(robot('gp110'))
+    core.reset(ready('gp110'))
+    speeds = [-2.383, 0.79, -0.943, 1.404, 1.689, 1.695]
+    jog = dict(zip(core.model.joints, speeds, strict=True))
+    for cycle in range(250):
+        if cycle < 143:
+            core.jog(jog, cycle * PERIOD)
+        elif cycle == 143:
+            core.stop()
+        state = core.step(cycle * PERIOD, PERIOD).state
+        assert core.model.clearance(state.position) > 0.0
