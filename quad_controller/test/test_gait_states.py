@@ -18,6 +18,7 @@ from quad_controller.gait.parameters import GaitParameters
 from quad_controller.gait.velocity import Velocity
 from quad_controller.model.urdf import Vector
 from quad_controller.states.controller import Controller
+from quad_controller.states.faults import Fault
 from quad_controller.states.measurement import JointSample, Measurement
 from quad_controller.states.modes import MODES, State
 from quad_controller.states.parameters import StateParameters
@@ -320,6 +321,22 @@ def test_an_attitude_may_be_done_without() -> None:
     standing(rig).ask('walk')
     rig.run(1.0, FORWARD)
     assert rig.is_in(State.WALK)
+
+
+def test_messages_of_no_use_are_the_reason_of_the_silence() -> None:
+    """A fault after joint states without a joint names it, and not the cable."""
+    rig = standing()
+    rig.ask('walk')
+    rig.run(0.5, FORWARD)
+    rig.joints = False
+    for _ in range(50):
+        rig.controller.refuse(Fault.JOINTS, 'joint states without fl_hip_joint')
+        rig.run(0.02, FORWARD)
+    assert rig.is_in(State.FAULT)
+    assert rig.controller.status.faults == ('joint states: joint states without fl_hip_joint',)
+    rig.joints = True
+    rig.run(0.1)
+    assert rig.controller.clear_fault().accepted
 
 
 def test_a_tumbling_robot_is_told_from_a_tilted_one() -> None:

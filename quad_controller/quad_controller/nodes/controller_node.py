@@ -35,6 +35,7 @@ from ..policy.interface import Policy
 from ..policy.load import load_policy
 from ..policy.shipped import find_policy
 from ..states.controller import Controller
+from ..states.faults import Fault
 from ..states.modes import Answer
 from ..states.status import EventKind, Output, Status
 from . import messages
@@ -166,7 +167,7 @@ class ControllerNode(Node):
         try:
             self._loop.offer_joints(self._joints.read(message, numbers, self._targets))
         except ValueError as error:
-            self.get_logger().warning(str(error), throttle_duration_sec=WARN_PERIOD)
+            self._refuse(Fault.JOINTS, str(error))
             return
         if self._joints.unreported != self._unreported:
             self._unreported = self._joints.unreported
@@ -177,7 +178,12 @@ class ControllerNode(Node):
         try:
             self._loop.offer_imu(messages.imu_sample(*self._imu.read(data)))
         except ValueError as error:
-            self.get_logger().warning(str(error), throttle_duration_sec=WARN_PERIOD)
+            self._refuse(Fault.IMU, str(error))
+
+    def _refuse(self, what: Fault, reason: str) -> None:
+        with self._loop.lock:
+            self._controller.refuse(what, reason)
+        self.get_logger().warning(reason, throttle_duration_sec=WARN_PERIOD)
 
     def _take_battery(self, message: BatteryState) -> None:
         self._loop.offer_battery(messages.charge(message))

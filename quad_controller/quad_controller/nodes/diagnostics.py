@@ -19,7 +19,8 @@ def state_diagnostic(node: str, status: Status) -> DiagnosticStatus:
     if status.state is State.FAULT:
         level, message = DiagnosticStatus.ERROR, '; '.join(status.faults)
     elif math.isinf(status.joints_age):
-        level, message = DiagnosticStatus.STALE, 'waiting for /joint_states'
+        words = ('waiting for /joint_states', *status.warnings)
+        level, message = DiagnosticStatus.STALE, '; '.join(words)
     elif status.warnings:
         level, message = DiagnosticStatus.WARN, '; '.join(status.warnings)
     velocity = status.velocity

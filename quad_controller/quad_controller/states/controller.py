@@ -175,6 +175,15 @@ class Controller:
             unreachable=self._unreachable,
         )
 
+    def refuse(self, what: Fault, reason: str) -> None:
+        """Hear that joint states or attitudes come which are of no use.
+
+        Args:
+            what: JOINTS or IMU.
+            reason: In words; it is told as long as nothing better comes.
+        """
+        self._health.refuse(what, reason)
+
     def step(self, measurement: Measurement, dt: float) -> Output:
         """Advance.
 

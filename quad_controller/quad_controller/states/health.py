@@ -40,6 +40,7 @@ class Health:
         self.battery: float | None = None
         self.joints_age = self.imu_age = math.inf
         self.refused = 0
+        self._refusals: dict[Fault, str] = {}
         self._late = False
         self._falling_for: float | None = None
         self._low_for: float | None = None
@@ -67,6 +68,15 @@ class Health:
         self._low_for = _longer(self._low_for, waited) if low else None
         self._falling_for = _longer(self._falling_for, waited) if self._falls() else None
         return problems
+
+    def refuse(self, what: Fault, reason: str) -> None:
+        """Remember why what comes cannot be used, until something comes that can.
+
+        Args:
+            what: JOINTS or IMU.
+            reason: In words.
+        """
+        self._refusals[what] = reason
 
     @property
     def tilt(self) -> tuple[float, float] | None:
@@ -98,19 +108,27 @@ class Health:
             texts.append(f'the attitude is {self.imu_age * 1e3:.0f} ms old')
         if self.imu is not None and self.imu.angular_velocity is None:
             texts.append('/imu has no angular velocity, so max_turn_rate is not watched')
-        return tuple(texts)
+        return (*texts, *self._refusals.values())
 
     def faults(self) -> Iterator[tuple[Fault, str]]:
         """Yield what keeps the robot from moving its legs, each with its reason and remedy."""
         parameters = self._parameters
         if self.joints_age > parameters.fault_age:
-            yield Fault.JOINTS, _age(self.joints_age, '/joint_states')
+            yield Fault.JOINTS, self._silence(Fault.JOINTS, self.joints_age, '/joint_states')
         if parameters.require_imu and self.imu_age > parameters.fault_age:
-            yield Fault.IMU, _age(self.imu_age, '/imu')
+            yield Fault.IMU, self._silence(Fault.IMU, self.imu_age, '/imu')
         if self.imu is not None and (self._falling_for or 0.0) > parameters.fall_time:
             yield Fault.FALLEN, self._fall(self.imu)
         if self.battery is not None and (self._low_for or 0.0) > parameters.battery_time:
             yield Fault.BATTERY, f'{self.battery:.0%} left; charge it'
+
+    def _silence(self, what: Fault, age: float, topic: str) -> str:
+        """Say why nothing was heard for a time [s]."""
+        if reason := self._refusals.get(what):
+            return reason
+        if math.isinf(age):
+            return f'none yet; is the hardware node running, and does it publish {topic}?'
+        return f'none for {age:.1f} s; look at the hardware node and its cable'
 
     def _waited(self, dt: float, *, heard: bool) -> float:
         """Return how much of a step counts [s].
@@ -143,28 +161,26 @@ class Health:
         if joints is None:
             return
         if problem := joints.problem(self._count):
+            self.refuse(Fault.JOINTS, problem)
             yield f'refused {problem}'
         else:
             self.joints, self.joints_age = joints, 0.0
+            self._refusals.pop(Fault.JOINTS, None)
 
     def _take_imu(self, imu: ImuSample | None) -> Iterator[str]:
         if imu is None:
             return
         if problem := imu.problem():
+            self.refuse(Fault.IMU, problem)
             yield f'refused {problem}'
         else:
             self.imu, self.imu_age = imu, 0.0
+            self._refusals.pop(Fault.IMU, None)
 
 
 def _longer(time: float | None, dt: float) -> float:
     """Return how long something has been so [s]; it begins with the first time it is seen."""
     return 0.0 if time is None else time + dt
-
-
-def _age(age: float, topic: str) -> str:
-    if math.isinf(age):
-        return f'none yet; is the hardware node running, and does it publish {topic}?'
-    return f'none for {age:.1f} s; look at the hardware node and its cable'
 
 
 def _turn_rate(imu: ImuSample) -> float:
