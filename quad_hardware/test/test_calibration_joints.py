@@ -117,7 +117,7 @@ def test_a_wrong_motor_is_noticed(tmp_path: Path) -> None:
         answers = ('', '', (turn(21), ''), 'n', 's')
         script = Script(*answers)
         command = ['joints', '--joint', 'fl_calf_joint', '--output', str(output)]
-        assert run_calibrate([*command, '--port', str(peer.link)], script) == 0
+        assert run_calibrate([*command, '--port', str(peer.link)], script) == 1  # skipped
     text = '\n'.join(script.said)
     assert 'motor 21 turned by 30 degrees, not 11' in text
     assert 'Is this the right joint?' in text
@@ -180,3 +180,22 @@ def test_a_number_is_asked_for_until_there_is_one() -> None:
     script = Script('far', '', '-1', 'inf', '0,95')
     assert ask_number(script, 'How far?') == 0.95
     assert len(script.said) == 9
+
+
+def test_joints_that_nobody_has_are_refused(tmp_path: Path) -> None:
+    """Before any torque is taken away, with the names that there are."""
+    script = Script()
+    command = ['joints', '--port', str(tmp_path / 'none'), '--joint', 'fl_femur']
+    assert run_calibrate(command, script) == 1
+    assert script.said[0].startswith("no joint is called 'fl_femur'; there are fl_hip_joint")
+
+
+def test_skipped_joints_write_no_file(tmp_path: Path) -> None:
+    """What was there before is not written as if it had been found."""
+    output = tmp_path / 'found.yaml'
+    script = Script('', 's')
+    with PtyPeer(tmp_path / 'port', NEW):
+        command = ['joints', '--port', str(tmp_path / 'port'), '--joint', 'fl_calf_joint']
+        assert run_calibrate([*command, '--output', str(output)], script) == 1
+    assert script.said[-1] == 'every joint was skipped; nothing was written'
+    assert not output.exists()

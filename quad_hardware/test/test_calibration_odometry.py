@@ -94,6 +94,19 @@ def test_the_scale_is_what_the_tape_says(walking_robot: WalkingRobot, tmp_path: 
     assert scale == pytest.approx(1.25 * 0.15 / said, rel=2e-3)
 
 
+def test_a_way_in_another_unit_is_asked_for_again(
+    walking_robot: WalkingRobot, tmp_path: Path
+) -> None:
+    """Centimetres would make a scale that the bridge refuses."""
+    output = tmp_path / 'found.yaml'
+    script = Script('', '15', '0.15')
+    command = ['odometry', '--distance', '0.1', '--speed', '0.5', '--output', str(output)]
+    assert run_calibrate(command, script) == 0, script.said
+    assert any('was it in metres?' in text for text in script.said)
+    assert read_parameters(output)['odometry']['scale_x'] < 10.0  # type: ignore[index]
+    assert walking_robot.velocity.linear.x == 0.0
+
+
 @pytest.mark.parametrize('option', ['--speed', '--distance'])
 @pytest.mark.parametrize('value', ['0', '-1', 'nan', 'inf', 'far'])
 def test_a_way_that_cannot_be_walked_is_refused(

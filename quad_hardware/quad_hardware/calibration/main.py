@@ -12,7 +12,7 @@ import sys
 
 from quad_description import movable_joints, PRESETS, robot_urdf
 
-from ..exceptions import HardwareError
+from ..exceptions import CommandError, HardwareError
 from ..joints import servo_of
 from ..link import LinkOptions
 from ..protocol import Model, Protocol, PROTOCOLS
@@ -58,6 +58,9 @@ def main() -> None:
 
 def _joints(options: argparse.Namespace, console: Console) -> None:
     servos = [servo_of(joint) for joint in movable_joints(robot_urdf(options.preset, options.arm))]
+    names = [servo.joint for servo in servos]
+    if unknown := [name for name in options.joint if name not in names]:
+        raise CommandError(f'no joint is called {unknown[0]!r}; there are {", ".join(names)}')
     chosen = [servo for servo in servos if not options.joint or servo.joint in options.joint]
     console.say(f'{len(chosen)} joints. The servos will let go: support the robot.')
     motors = [servo.motor for servo in servos]
@@ -73,6 +76,8 @@ def _joints(options: argparse.Namespace, console: Console) -> None:
             else:
                 found = calibrate_joints(console, robot, chosen, limits=options.limits)
         console.say('the servos hold again, where they are')
+    if found == chosen and not options.zero_only:
+        raise CancelledError('every joint was skipped; nothing was written')
     write_parameters(options.output, servo_parameters(found))
 
 
@@ -82,8 +87,8 @@ def _odometry(options: argparse.Namespace, console: Console) -> None:
     key, axis = f'scale_{options.axis}', Axis(options.axis)
     with Walker() as walker:
         before = walker.scale(axis)
-        factor = calibrate_odometry(console, walker, axis, options.distance, options.speed)
-    scale = round(before * factor, 4)
+        found = calibrate_odometry(console, walker, axis, options.distance, options.speed)
+    scale = round(found, 4)
     console.say(f'odometry.{key}: {before:.4f} -> {scale:.4f}')
     write_parameters(options.output, {'odometry': {key: scale}})
 

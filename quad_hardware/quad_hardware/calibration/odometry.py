@@ -18,6 +18,7 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
+from ..estimation import SCALES
 from ..exceptions import NoAnswerError
 from .console import ask_number, Console
 
@@ -156,7 +157,7 @@ class Walker:
 def calibrate_odometry(
     console: Console, walker: Walker, axis: Axis, distance: float, speed: float
 ) -> float:
-    """Let the robot walk, ask how far it came, and return by what its scale is to be multiplied.
+    """Let the robot walk, ask how far it came, and return the scale that its odometry should have.
 
     Raises:
         NoAnswerError: The robot does not walk.
@@ -164,5 +165,9 @@ def calibrate_odometry(
     console.ask('Mark where the robot stands, and stand clear. Enter')
     said = walker.walk(distance, speed, axis)
     console.say(f'odometry says {said:.3f} m')
-    true = ask_number(console, 'How far did it really come [m]?')
-    return true / said
+    before = walker.scale(axis)
+    while True:
+        scale = before * ask_number(console, 'How far did it really come [m]?') / said
+        if SCALES[0] <= scale <= SCALES[1]:
+            return scale
+        console.say(f'that makes a scale of {scale:.3g}, which is none; was it in metres?')

@@ -4,9 +4,10 @@
 
 from .battery import Battery
 from .estimator import Estimate, Estimator, EstimatorSettings, Health, RateSource
-from .odometry import OdometrySettings, OdometryState
+from .odometry import OdometrySettings, OdometryState, SCALES
 
 __all__ = [
+    'SCALES',
     'Battery',
     'Estimate',
     'Estimator',

@@ -27,6 +27,10 @@ KEPT_COMMANDS = 32
 REST = (0.0, 0.0)
 
 
+SCALES = (0.1, 10.0)
+"""What a scale of odometry may be; beyond, a way was given in another unit."""
+
+
 @dataclass(frozen=True, slots=True)
 class OdometrySettings:
     """How the legs are read.

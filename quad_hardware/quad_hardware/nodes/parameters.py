@@ -12,7 +12,7 @@ from rclpy.node import Node
 from node_runner import ParameterReader, refuse_misspelt
 from quad_description import DescriptionError, Joint, movable_joints, PRESETS, robot_urdf
 
-from ..estimation import EstimatorSettings, OdometrySettings, RateSource
+from ..estimation import EstimatorSettings, OdometrySettings, RateSource, SCALES
 from ..exceptions import CommandError
 from ..joints import JointMap, JointServo, LimiterSettings, servo_of
 from ..link import LinkOptions
@@ -198,10 +198,8 @@ def _estimator(read: ParameterReader) -> EstimatorSettings:
             margin=read.number(
                 'odometry.margin', default.margin, (0.0, 0.1), 'around a swing, not counted [s]'
             ),
-            scale_x=read.number('odometry.scale_x', 1.0, (0.1, 10.0), 'factor of the way forward'),
-            scale_y=read.number(
-                'odometry.scale_y', 1.0, (0.1, 10.0), 'factor of the way sideways'
-            ),
+            scale_x=read.number('odometry.scale_x', 1.0, SCALES, 'factor of the way forward'),
+            scale_y=read.number('odometry.scale_y', 1.0, SCALES, 'factor of the way sideways'),
         ),
     )
 
