@@ -14,7 +14,7 @@ from ..link.state import RobotState
 from .battery import Battery, BatteryFilter
 from .feet import Feet
 from .filters import AttitudeRate, JointRate
-from .gravity import disagreement
+from .gravity import GravityCheck
 from .odometry import LegOdometry, OdometrySettings, OdometryState
 from .plausibility import Plausibility
 from .rotation import from_roll_pitch_yaw, Quaternion, Vector
@@ -110,6 +110,7 @@ class Estimator:
         self._rate = AttitudeRate(settings.rate_cutoff)
         self._joint_rate = JointRate(settings.joint_cutoff)
         self._battery = BatteryFilter()
+        self._gravity = GravityCheck()
         self._odometry = LegOdometry(settings.odometry, self._feet.radius)
 
     def command(self, time: float, targets: Sequence[float]) -> None:
@@ -136,6 +137,7 @@ class Estimator:
         if not velocities:
             velocities = self._joint_rate.update(time, positions)
         self._battery.take(state)
+        self._gravity.take(attitude, state.acceleration)
         rate, measured = self._angular_velocity(time, attitude, state)
         return Estimate(
             time=time,
@@ -153,14 +155,9 @@ class Estimator:
         placed = [positions.get(name, 0.0) for name in self._joints.names]
         return self._odometry.update(estimate.time, self._feet.poses(placed), estimate.attitude)
 
-    def health(self, estimate: Estimate) -> Health:
-        """Return how the robot is, by its newest estimate."""
-        return Health(
-            self._battery.state,
-            disagreement(estimate.attitude, estimate.acceleration),
-            self._refused,
-            self.refusal,
-        )
+    def health(self) -> Health:
+        """Return how the robot is, by its latest reports."""
+        return Health(self._battery.state, self._gravity.error, self._refused, self.refusal)
 
     def _angular_velocity(
         self, time: float, attitude: Quaternion, state: RobotState

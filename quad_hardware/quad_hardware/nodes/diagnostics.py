@@ -114,7 +114,10 @@ def robot_diagnostic(node: str, port: str, state: RobotState, health: Health) ->
     hot = {m: t for m, t in (state.temperatures or {}).items() if t > HOT_SERVO}
     if error is not None and error > GRAVITY_ERROR:
         level = DiagnosticStatus.WARN
-        message = f'accelerometer and attitude disagree by {math.degrees(error):.0f} degrees'
+        angle = f'{math.degrees(error):.0f} degrees'
+        message = (
+            f'accelerometer and attitude disagree by {angle}; restart the robot on level ground'
+        )
     if hot:
         level = DiagnosticStatus.WARN
         message = f'hot servos: {", ".join(map(str, hot))}'

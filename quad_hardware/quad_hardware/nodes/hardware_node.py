@@ -254,8 +254,8 @@ class HardwareNode(Node):
             command_diagnostic(name, port, self._counters),
         ]
         if latest is not None:
-            state, estimate = latest
-            health = self._estimator.health(estimate)
+            state, _ = latest
+            health = self._estimator.health()
             array.status.append(robot_diagnostic(name, port, state, health))
             self._battery.publish(messages.battery(health.battery, now))
         self._diagnostics.publish(array)
