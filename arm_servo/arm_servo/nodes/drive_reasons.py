@@ -46,7 +46,7 @@ def _reason(axis: AxisFeedback, released: str) -> tuple[str, str] | None:
             ' ~/interpolated_position_mode'
         )
     if not axis.followable:
-        return axis.name, 'is moved or halted by another client'
+        return axis.name, 'is moved or halted by another client, or the master ends'
     if released:
         return axis.name, f'{released}; the next command takes it back'
     return None
