@@ -339,6 +339,20 @@ def test_messages_of_no_use_are_the_reason_of_the_silence() -> None:
     assert rig.controller.clear_fault().accepted
 
 
+def test_a_silence_after_a_message_of_no_use_is_a_silence() -> None:
+    """One bad message before the cable is pulled is not the reason for what follows."""
+    rig = standing()
+    rig.ask('walk')
+    rig.run(0.5, FORWARD)
+    rig.joints = False
+    rig.run(0.1, FORWARD)
+    rig.controller.refuse(Fault.JOINTS, 'joint states without fl_hip_joint')
+    rig.run(5.0, FORWARD)
+    assert rig.is_in(State.FAULT)
+    assert 'look at the hardware node and its cable' in rig.controller.clear_fault().message
+    assert 'fl_hip_joint' not in '; '.join(rig.controller.status.warnings)
+
+
 def test_a_tumbling_robot_is_told_from_a_tilted_one() -> None:
     """A turn rate that lasts is a fault of its own words: the tilt is not what is wrong."""
     rig = standing()

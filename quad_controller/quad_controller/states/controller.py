@@ -180,7 +180,7 @@ class Controller:
 
         Args:
             what: JOINTS or IMU.
-            reason: In words; it is told as long as nothing better comes.
+            reason: In words.
         """
         self._health.refuse(what, reason)
 

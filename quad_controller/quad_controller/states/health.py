@@ -11,6 +11,8 @@ from .faults import Fault
 from .measurement import ImuSample, JointSample, Measurement
 from .parameters import StateParameters
 
+REFUSAL_LIFE = 0.2
+"""How long a message of no use is a reason for silence in [s]; then nothing comes at all."""
 LONGEST_PAUSE = 0.1  # [s] that counts of a single step that came late
 
 
@@ -40,7 +42,7 @@ class Health:
         self.battery: float | None = None
         self.joints_age = self.imu_age = math.inf
         self.refused = 0
-        self._refusals: dict[Fault, str] = {}
+        self._refusals: dict[Fault, tuple[str, float]] = {}  # reason, and its age [s]
         self._late = False
         self._falling_for: float | None = None
         self._low_for: float | None = None
@@ -58,6 +60,11 @@ class Health:
         waited = self._waited(dt, heard=measurement.joints is not None)
         self.joints_age += waited
         self.imu_age += waited
+        self._refusals = {
+            what: (reason, age + waited)
+            for what, (reason, age) in self._refusals.items()
+            if age + waited <= REFUSAL_LIFE
+        }
         problems = [*self._take_joints(measurement.joints), *self._take_imu(measurement.imu)]
         self.refused += len(problems)
         battery = measurement.battery
@@ -70,13 +77,13 @@ class Health:
         return problems
 
     def refuse(self, what: Fault, reason: str) -> None:
-        """Remember why what comes cannot be used, until something comes that can.
+        """Remember why what comes cannot be used, for a while, or until something comes that can.
 
         Args:
             what: JOINTS or IMU.
             reason: In words.
         """
-        self._refusals[what] = reason
+        self._refusals[what] = reason, 0.0
 
     @property
     def tilt(self) -> tuple[float, float] | None:
@@ -108,7 +115,7 @@ class Health:
             texts.append(f'the attitude is {self.imu_age * 1e3:.0f} ms old')
         if self.imu is not None and self.imu.angular_velocity is None:
             texts.append('/imu has no angular velocity, so max_turn_rate is not watched')
-        return (*texts, *self._refusals.values())
+        return (*texts, *(reason for reason, _ in self._refusals.values()))
 
     def faults(self) -> Iterator[tuple[Fault, str]]:
         """Yield what keeps the robot from moving its legs, each with its reason and remedy."""
@@ -124,8 +131,8 @@ class Health:
 
     def _silence(self, what: Fault, age: float, topic: str) -> str:
         """Say why nothing was heard for a time [s]."""
-        if reason := self._refusals.get(what):
-            return reason
+        if what in self._refusals:
+            return self._refusals[what][0]
         if math.isinf(age):
             return f'none yet; is the hardware node running, and does it publish {topic}?'
         return f'none for {age:.1f} s; look at the hardware node and its cable'
