@@ -9,6 +9,7 @@ import time
 from typing import Any, TYPE_CHECKING
 
 import rclpy
+from rclpy.action.client import ActionClient
 from rclpy.context import Context
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
@@ -74,5 +75,8 @@ class RosClient:
     ) -> None:
         """Leave the domain."""
         self._executor.shutdown()
+        for waitable in list(self.node.waitables):
+            if isinstance(waitable, ActionClient):  # rclpy leaves it, and it keeps the node alive
+                waitable.destroy()
         self.node.destroy_node()
         rclpy.shutdown(context=self._context)
