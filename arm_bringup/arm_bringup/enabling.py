@@ -59,7 +59,7 @@ def _enable(
         else:
             say(f'all {len(drives)} drives are enabled, in {mode_service}')
     except GivenUpError:
-        pass
+        pass  # the bring-up ends, and says why
     finally:
         client.close()
 

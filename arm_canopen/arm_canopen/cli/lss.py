@@ -240,7 +240,7 @@ def _refuse_taken(session: Session, wanted: int) -> None:
         except SdoTimeoutError:
             return
         except SdoAbortError:
-            pass
+            pass  # a refusal is an answer, too
         taken = True
     if taken:
         raise LssError(f'node id {wanted} is taken: a device answers there; choose another one')

@@ -11,16 +11,14 @@ from collections.abc import Sequence
 import sys
 
 from ..core_settings import CoreSettings
-from .controller_manager import ControllerManager, trajectory_entry
 from .motion_thread import MotionThread
 from .robot_parameters import declare_manager, declare_robot, same_robot
 from .servo import Servo
 from .servo_parameters import declare_servo
-from .standalone import declare_loop, make_loop, MakeNode, run_standalone
+from .standalone import declare_loop, keep_drives, make_loop, MakeNode, run_standalone
 from .topic_output import ARRAY, declare_output
-from .trajectory_controller import TrajectoryController
 from .trajectory_parameters import declare_trajectory
-from .trajectory_program import OUTPUT
+from .trajectory_program import offer_trajectories, OUTPUT
 
 
 def _build(make_node: MakeNode) -> MotionThread:
@@ -40,15 +38,9 @@ def _build(make_node: MakeNode) -> MotionThread:
         check_self_collision=trajectory.check,
     )
     desk, thread = make_loop(node, model, settings, loop, output)
-    Servo(servo, desk, jogging, _nothing)
-    controller = TrajectoryController(node, desk, trajectory, _nothing)
-    entry = trajectory_entry(name, model.joints, loop.period, controller.set_active)
-    ControllerManager(manager, [entry])
+    Servo(servo, desk, jogging, keep_drives)
+    offer_trajectories(manager, node, desk, trajectory, loop.period)
     return thread
-
-
-def _nothing() -> None:
-    """Prepare nothing: whoever has the drives keeps them."""
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -14,7 +14,7 @@ from .motion_thread import MotionThread
 from .robot_parameters import declare_robot
 from .servo import Servo
 from .servo_parameters import declare_servo, PREFIX
-from .standalone import declare_loop, make_loop, MakeNode, run_standalone
+from .standalone import declare_loop, keep_drives, make_loop, MakeNode, run_standalone
 from .topic_output import declare_output, TRAJECTORY
 from .trajectory_parameters import declare_check
 
@@ -31,12 +31,8 @@ def _build(make_node: MakeNode) -> MotionThread:
         check_self_collision=declare_check(ParameterReader(node, PREFIX)),
     )
     desk, thread = make_loop(node, model, settings, declare_loop(node, PREFIX), output)
-    Servo(node, desk, servo, _nothing)
+    Servo(node, desk, servo, keep_drives)
     return thread
-
-
-def _nothing() -> None:
-    """Prepare nothing: whoever has the drives keeps them."""
 
 
 def main(args: Sequence[str] | None = None) -> int:

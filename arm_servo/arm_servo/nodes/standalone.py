@@ -129,6 +129,10 @@ def make_loop(
     return desk, MotionThread(cycle, loop.period, begin)
 
 
+def keep_drives() -> None:
+    """Prepare nothing before a motion: whoever has the drives keeps them."""
+
+
 def run_standalone(
     name: str, build: Callable[[MakeNode], MotionThread], args: Sequence[str] | None
 ) -> int:

@@ -7,14 +7,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 import sys
 
+from rclpy.node import Node
+
 from ..core_settings import CoreSettings
 from .controller_manager import ControllerManager, trajectory_entry
+from .desk import Desk
 from .motion_thread import MotionThread
 from .robot_parameters import declare_manager, declare_robot
-from .standalone import declare_loop, make_loop, MakeNode, run_standalone
+from .standalone import declare_loop, keep_drives, make_loop, MakeNode, run_standalone
 from .topic_output import ARRAY, declare_output
 from .trajectory_controller import TrajectoryController
-from .trajectory_parameters import declare_trajectory
+from .trajectory_parameters import declare_trajectory, TrajectoryParameters
 
 OUTPUT = '/forward_position_controller/commands'
 """Default of command_out_topic, the name that ros2_controllers' examples use."""
@@ -30,14 +33,26 @@ def _build(make_node: MakeNode) -> MotionThread:
     output = declare_output(node, '', OUTPUT, ARRAY)
     settings = CoreSettings(execution=trajectory.execution, check_self_collision=trajectory.check)
     desk, thread = make_loop(node, model, settings, loop, output)
-    controller = TrajectoryController(node, desk, trajectory, _nothing)
-    entry = trajectory_entry(name, model.joints, loop.period, controller.set_active)
-    ControllerManager(manager, [entry])
+    offer_trajectories(manager, node, desk, trajectory, loop.period)
     return thread
 
 
-def _nothing() -> None:
-    """Prepare nothing: whoever has the drives keeps them."""
+def offer_trajectories(
+    manager: Node, node: Node, desk: Desk, parameters: TrajectoryParameters, period: float
+) -> None:
+    """Offer trajectories, and tell the controller manager's clients of it.
+
+    Args:
+        manager: The node ``controller_manager``.
+        node: The node of the trajectory controller.
+        desk: The core's desk.
+        parameters: Of the controller.
+        period: Period of the cycle in [s].
+    """
+    controller = TrajectoryController(node, desk, parameters, keep_drives)
+    joints = desk.model.joints
+    entry = trajectory_entry(node.get_name(), joints, period, controller.set_active)
+    ControllerManager(manager, [entry])
 
 
 def main(args: Sequence[str] | None = None) -> int:
