@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-import itertools
 
 import pytest
 from scripted_device import (
@@ -230,20 +229,6 @@ def test_the_loss_of_a_mandatory_device(
     network.net.run(0.6)
     assert any(message in text for text in network.net.told(Severity.ERROR))
     assert other.commands[:1] == ([] if command is None else [command])
-
-
-def test_nmt_commands_keep_their_distance() -> None:
-    """`nmt_inhibit_time`: in their order, and none is lost."""
-    network = Network(io_config(), nmt_inhibit_time=0.05)
-    network.start(1.0)
-    sent = [
-        (sent.time, sent.frame.data[0])
-        for sent in network.net.wire.log
-        if sent.frame.can_id == 0x000
-    ]
-    assert [command for _, command in sent] == [RESET_COMMUNICATION, PRE_OPERATIONAL, START]
-    times = [time for time, _ in sent]
-    assert all(later - time >= 0.0499 for time, later in itertools.pairwise(times))
 
 
 def test_a_master_that_shall_not_start_waits_for_its_command() -> None:

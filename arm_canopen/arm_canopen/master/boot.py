@@ -14,9 +14,10 @@ from ..standard.objects import Index
 from .boot_fault import BootFault
 from .configuration import Configurator
 from .events import EventKind, Severity
+from .nmt_sender import SendNmt
 from .remote_node import BootPhase, RemoteNode
 from .scheduler import Scheduler
-from .startup import SendNmt, Startup
+from .startup import Startup
 from .takeover import preset_outputs
 
 IDENTITY_SUBINDICES: tuple[tuple[str, int, str, BootFault], ...] = (
@@ -137,7 +138,7 @@ class BootProcess:
         self._enter(BootPhase.IDENTITY)
         await self._check_identity(node.config.identity)
         # PDO parameters may only be written while the device does not process PDOs
-        self._send_nmt(NmtCommand.ENTER_PRE_OPERATIONAL, node.config.node_id)
+        await self._command(NmtCommand.ENTER_PRE_OPERATIONAL)
         if node.life.owed and node.config.guarded:
             await self._await_answer_to_guarding()
         self._fault = BootFault.CONFIGURATION
@@ -152,11 +153,19 @@ class BootProcess:
         started = await self._admitted()
         self._enter(BootPhase.STARTING)
         if self._start and not started:
-            self._send_nmt(NmtCommand.START, node.config.node_id)
+            await self._command(NmtCommand.START)
         self._restored = False
         self._go_online(
             'operational' if self._start else 'configured; start_nodes is false in bus.yml'
         )
+
+    async def _command(self, command: NmtCommand) -> None:
+        """Send an NMT command and wait until it has left; a boot that ends before withdraws it."""
+        sent = self._send_nmt(command, self._node.config.node_id)
+        try:
+            await sent
+        finally:
+            sent.abandon()
 
     async def _admitted(self) -> bool:
         if not self._startup.complete:
@@ -170,7 +179,7 @@ class BootProcess:
             SdoWrite(Index.RESTORE_PARAMETERS, subindex, RESTORE_SIGNATURE)
         )
         self._restored = True
-        self._send_nmt(NmtCommand.RESET_NODE, node.config.node_id)
+        await self._command(NmtCommand.RESET_NODE)
         # the boot-up message ends this boot and begins the next
         await self._scheduler.timer(node.config.boot_timeout)
         raise BootError(

@@ -12,9 +12,10 @@ from ..config.master_model import MasterConfig
 from ..exceptions import SdoError
 from .boot import BootProcess
 from .guarding import guarding_request
+from .nmt_sender import SendNmt
 from .remote_node import RemoteNode
 from .scheduler import Scheduler, Task
-from .startup import SendNmt, Startup
+from .startup import Startup
 
 DROP_PAUSE = 0.5  # [s] before a device that left Operational by itself is booted again
 

@@ -9,7 +9,6 @@ a function. See ``runner.py`` for the thread that does so on a real bus.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-import itertools
 from typing import TypeAlias
 
 from ..can.frame import Frame
@@ -26,7 +25,7 @@ from .process_image import SyncRound
 from .producers import HeartbeatProducer, SyncCounter, TimeProducer, utc_now, WallClock
 from .remote_node import RemoteNode
 from .rivals import RivalWatch
-from .scheduler import Scheduler
+from .scheduler import completed, Promise, Scheduler
 from .sdo_client import SdoClient
 from .startup import Startup
 
@@ -95,7 +94,7 @@ class Network:
             master.time_cob_id & CAN_ID_MASK, master.time_period, wall_clock, self.send
         )
         self._broadcasts = not beside_master
-        self._nmt = NmtSender(self.scheduler, self.send, master.nmt_inhibit_time)
+        self._nmt = NmtSender(self.scheduler, self.send, master.nmt_inhibit_time, self._note_nmt)
         self.nodes = {
             node.name: RemoteNode(node, self.scheduler, self._sync, self.send, report)
             for node in config.nodes
@@ -116,11 +115,12 @@ class Network:
         resets = [node.config.reset_communication and node.config.boot for node in nodes]
         if all(resets):
             self.send_nmt(NmtCommand.RESET_COMMUNICATION, ALL_NODES)
-        else:
-            for node in itertools.compress(nodes, resets):
-                self.send_nmt(NmtCommand.RESET_COMMUNICATION, node.config.node_id)
-        for node in self.nodes.values():
-            self._boots.start(node)
+        for node, reset in zip(nodes, resets, strict=True):
+            if all(resets) or not reset:
+                self._boots.start(node)
+                continue
+            sent = self.send_nmt(NmtCommand.RESET_COMMUNICATION, node.config.node_id)
+            sent.when_done(lambda _, node=node: self._boots.start(node))  # type: ignore[misc]
 
     def receive(self, frame: Frame) -> None:
         """Take a frame from the bus."""
@@ -169,20 +169,23 @@ class Network:
         if self.config.master.sync_period > 0:
             self._send_sync(now)
 
-    def send_nmt(self, command: NmtCommand, node_id: int) -> None:
+    def send_nmt(self, command: NmtCommand, node_id: int) -> Promise[None]:
         """Send an NMT command to one device, or to all with id 0; our own id commands the master.
 
         A master that is not operational sends neither SYNC nor RPDOs.
+
+        Returns:
+            Done when the command has left; abandoned before, it does not leave.
         """
         if node_id == self.config.master.node_id:
             self._set_state(command)
-            return
-        self._note_nmt(command, node_id)
+            return completed()
         if node_id == ALL_NODES and not self._broadcasts:
+            sent = completed()
             for node in self.nodes.values():
-                self._nmt.send(command, node.config.node_id)
-        else:
-            self._nmt.send(command, node_id)
+                sent = self._nmt.send(command, node.config.node_id)
+            return sent
+        return self._nmt.send(command, node_id)
 
     def _set_state(self, command: NmtCommand) -> None:
         before = self.state

@@ -6,18 +6,30 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
+from typing import TypeAlias
 
 from ..can.frame import Frame
 from ..standard.cob_id import CobId
 from ..standard.nmt import nmt_frame, NmtCommand
-from .scheduler import Scheduler
+from .scheduler import Promise, Scheduler
+
+SendNmt: TypeAlias = Callable[[NmtCommand, int], Promise[None]]
+"""Sends a command to a node id, or to all with 0; the promise is resolved when it has left."""
 
 
 class NmtSender:
-    """Sends NMT commands; with an inhibit time those that come too early wait in order."""
+    """Sends NMT commands; with an inhibit time those that come too early wait in order.
+
+    A command counts as sent when its frame leaves, not when it is queued. One whose promise was
+    abandoned meanwhile does not leave any more.
+    """
 
     def __init__(
-        self, scheduler: Scheduler, send: Callable[[Frame], None], inhibit_time: float
+        self,
+        scheduler: Scheduler,
+        send: Callable[[Frame], None],
+        inhibit_time: float,
+        on_sent: Callable[[NmtCommand, int], None],
     ) -> None:
         """Begin with nothing sent.
 
@@ -25,26 +37,32 @@ class NmtSender:
             scheduler: Time.
             send: Hands a frame to the bus.
             inhibit_time: Shortest time between two commands in [s]; 0 for none.
+            on_sent: Called with each command and its node id when it leaves.
         """
         self._scheduler = scheduler
         self._send = send
         self._inhibit_time = inhibit_time
-        self._waiting: deque[Frame] = deque()
+        self._on_sent = on_sent
+        self._waiting: deque[tuple[NmtCommand, int, Promise[None]]] = deque()
         self._busy = False
 
-    def send(self, command: NmtCommand, node_id: int) -> None:
-        """Send a command to one device, or to all with id 0."""
-        frame = Frame(CobId.NMT, nmt_frame(command, node_id))
-        if self._inhibit_time <= 0.0:
-            self._send(frame)
-            return
-        self._waiting.append(frame)
+    def send(self, command: NmtCommand, node_id: int) -> Promise[None]:
+        """Send a command to one device, or to all with id 0; done when it has left."""
+        sent: Promise[None] = Promise()
+        self._waiting.append((command, node_id, sent))
         if not self._busy:
             self._scheduler.background(self._empty())
+        return sent
 
     async def _empty(self) -> None:
         self._busy = True
         while self._waiting:
-            self._send(self._waiting.popleft())
-            await self._scheduler.timer(self._inhibit_time)
+            command, node_id, sent = self._waiting.popleft()
+            if sent.done:
+                continue  # withdrawn
+            self._on_sent(command, node_id)
+            self._send(Frame(CobId.NMT, nmt_frame(command, node_id)))
+            sent.resolve(None)
+            if self._inhibit_time > 0.0:
+                await self._scheduler.timer(self._inhibit_time)
         self._busy = False

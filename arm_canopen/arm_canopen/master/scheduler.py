@@ -79,6 +79,13 @@ class Promise(Generic[T]):
             callback(self)
 
 
+def completed() -> Promise[None]:
+    """Return the promise of something that is done already."""
+    promise: Promise[None] = Promise()
+    promise.resolve(None)
+    return promise
+
+
 class Task(Promise[T]):
     """A running coroutine; its result is what the coroutine returns.
 

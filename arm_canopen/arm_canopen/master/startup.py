@@ -4,15 +4,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 from ..config.master_model import MasterConfig
 from ..standard.nmt import ALL_NODES, NmtCommand
 from .events import Event, EventKind, Report, Severity
+from .nmt_sender import SendNmt
 from .remote_node import RemoteNode
 from .scheduler import Promise, Scheduler
-
-SendNmt = Callable[[NmtCommand, int], None]
 
 
 class Startup:
@@ -98,11 +97,16 @@ class Startup:
         self.complete = True
         # one frame starts who is there: a device that is still being configured must not hear it
         together = self._config.start_all_nodes and len(self._waiting) == len(self._nodes)
-        if together and self._config.start_nodes:
-            self._send_nmt(NmtCommand.START, ALL_NODES)
         waiting, self._waiting = self._waiting, {}
-        for promise in waiting.values():
-            promise.resolve(together)
+
+        def admit(_: Promise[None] | None) -> None:
+            for promise in waiting.values():
+                promise.resolve(together)
+
+        if together and self._config.start_nodes:
+            self._send_nmt(NmtCommand.START, ALL_NODES).when_done(admit)
+        else:
+            admit(None)
 
     def _lost(self, node: RemoteNode) -> None:
         if not self.complete:

@@ -190,11 +190,11 @@ class DeviceNode(Node):
     def _offer_nmt(self, name: str, command: NmtCommand) -> None:
         node_id = self.device.config.node_id
 
-        def send() -> str:
-            self._thread.network.send_nmt(command, node_id)
+        async def send() -> str:
+            await self._thread.network.send_nmt(command, node_id)
             return f'NMT {command.name} sent to node {node_id}'
 
-        self.offer_trigger(f'~/{name}', lambda: self._thread.call(send))
+        self.offer_trigger(f'~/{name}', lambda: self._thread.run_coroutine(send))
 
     def _read(self, request: CORead.Request) -> Future[int]:
         device, index, subindex = self.device, request.index, request.subindex

@@ -87,12 +87,12 @@ class MasterServices:
         return self._thread.run(write)
 
     def _set_nmt(self, request: CONmtID.Request) -> Future[None]:
-        def send() -> None:
+        def send() -> Promise[None]:
             self.admit()
             node_id = request.nodeid if request.nodeid == ALL_NODES else _node_id(request.nodeid)
-            self._thread.network.send_nmt(_nmt_command(request.nmtcommand), node_id)
+            return self._thread.network.send_nmt(_nmt_command(request.nmtcommand), node_id)
 
-        return self._thread.call(send)
+        return self._thread.run(send)
 
     def _answer_read(self, response: Any, future: Future[int]) -> None:  # noqa: ANN401
         answer_read(self._node, response, future)
