@@ -4,9 +4,10 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
+from dataclasses import fields, MISSING
 from operator import attrgetter
 from pathlib import Path
+from typing import Any
 
 from config_cases import added
 from config_samples import BUS, DRIVE_ROWS, eds_text, errors_of, load_text, Row, write_bus
@@ -17,6 +18,7 @@ from arm_canopen.config.device_keys import DEVICE_KEYS, DRIVE_KEYS, RPDO_KEYS, T
 from arm_canopen.config.drive_model import RecoveryPolicy
 from arm_canopen.config.eds import load_eds
 from arm_canopen.config.master_keys import MASTER_KEYS, OPTION_KEYS
+from arm_canopen.config.master_model import MasterConfig
 from arm_canopen.config.schema import Key, Kind, Use
 from arm_canopen.config.settings import DeviceSettings, MasterSettings, Options
 from arm_canopen.exceptions import ConfigError
@@ -40,6 +42,7 @@ TWO_AXES_EDS = Path(__file__).parents[1] / 'eds' / 'cia402_two_axes.eds'
         ('reset_communication: false', 'reset_communication', False),
         ('sdo_timeout_ms: 50', 'sdo_timeout', 0.05),
         ('boot_timeout_ms: 2500', 'boot_timeout', 2.5),
+        ('period: 40', 'poll_period', 0.04),
         ('heartbeat_producer: 50', 'heartbeat_producer', 0.05),
         ('heartbeat_producer: 50', 'heartbeat_timeout', pytest.approx(0.15)),
         ('heartbeat_producer: 50\nheartbeat_multiplier: 2', 'heartbeat_timeout', 0.1),
@@ -51,7 +54,9 @@ TWO_AXES_EDS = Path(__file__).parents[1] / 'eds' / 'cia402_two_axes.eds'
         ('serial_number: 77', 'identity.serial_number', 77),
         ('scale_pos_to_dev: 2\nscale_pos_from_dev: 0.5', 'drive.scale_pos_to_dev', 2.0),
         ('scale_vel_to_dev: 2\nscale_vel_from_dev: 0.5', 'drive.scale_vel_from_dev', 0.5),
-        ('scale_eff_from_dev: 0.5', 'drive.scale_eff_from_dev', 0.5),
+        ('scale_eff_from_dev: 0.5\nscale_eff_to_dev: 2', 'drive.scale_eff_from_dev', 0.5),
+        ('effort_mode: 4', 'drive.scale_eff_from_dev', 1.0),
+        ('scale_eff_to_dev: 8', 'drive.scale_eff_from_dev', 0.125),
         ('offset_pos_from_dev: -1', 'drive.offset_pos_from_dev', -1.0),
         ('switching_state: 2', 'drive.switching_state', DriveState.SWITCH_ON_DISABLED),
         ('homing_timeout_seconds: 30', 'drive.homing_timeout', 30.0),
@@ -357,3 +362,20 @@ def test_a_heartbeat_replaces_guarding(tmp_path: Path) -> None:
     config = load_text(tmp_path, added('joint1', 'heartbeat_producer: 100\nguard_time: 150'))
     assert (config.nodes[0].guard_time, config.nodes[0].guarded) == (0.0, False)
     assert any('sends a heartbeat every 100 ms' in str(warning) for warning in config.warnings)
+
+
+@pytest.mark.parametrize(
+    ('settings', 'model'), [(DeviceSettings, NodeConfig), (MasterSettings, MasterConfig)]
+)
+def test_a_default_has_one_value(settings: Any, model: Any) -> None:
+    """A device that is built by a program has the defaults of one that bus.yml names."""
+    read = {field.name: field.default for field in fields(settings)}
+    built = {field.name: field.default for field in fields(model)}
+    same = {
+        name
+        for name in read.keys() & built.keys()
+        if read[name] not in (None, '') and built[name] is not MISSING
+    }
+    assert len(same) > 5
+    assert {name: read[name] for name in same} == {name: built[name] for name in same}
+    assert [key.name for key in DEVICE_KEYS if key.field and key.default is not None] == []

@@ -19,6 +19,7 @@ import pytest
         ('joint1', 'package: wrong', 'package', "is in the package 'canopen_402_driver'"),
         ('joint1', 'scale_pos_to_dev: 57.3', 'scale_pos_to_dev', 'is 0.0573, not 1'),
         ('joint1', 'scale_vel_from_dev: 2', 'scale_vel_from_dev', 'is 2000, not 1'),
+        ('joint1', 'scale_eff_from_dev: 0.001', 'scale_eff_from_dev', 'is 0.001, not 1'),
         ('master', 'vendor_id: 0x360', 'vendor_id', 'known, not used yet'),
         ('master', 'error_behavior: {1: 1}', 'error_behavior', 'known, not used yet'),
     ],

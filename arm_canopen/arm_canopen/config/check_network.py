@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 import math
 
 from ..standard.cob_id import CAN_ID_MASK, COB_ID_INVALID, CobId, SYNC_PRODUCER
+from ..standard.nmt import ConsumerHeartbeatTime
 from ..standard.objects import Index
 from .check_subject import Subject
 from .findings import Findings, Place
@@ -96,9 +97,10 @@ def _check_consumers(subject: Subject) -> None:
         entry = subject.value(Index.CONSUMER_HEARTBEAT, subindex)
         if not entry or (subindex == 1 and subject.write_of(Index.CONSUMER_HEARTBEAT, 1) is None):
             continue
-        node_id, time = entry >> 16 & 0xFF, (entry & 0xFFFF) / MILLISECONDS
-        if not time or not node_id:
+        consumer = ConsumerHeartbeatTime.parse(entry)
+        if not consumer.used:
             continue
+        node_id, time = consumer.node_id, consumer.time_ms / MILLISECONDS
         period = producers.get(node_id, 0.0)
         if time >= LATE_FACTOR * period > 0:
             continue
@@ -112,7 +114,7 @@ def _check_consumers(subject: Subject) -> None:
             subject.object_place(Index.CONSUMER_HEARTBEAT, subindex),
             f'the device waits {time * 1e3:g} ms for the heartbeat of {what}: it will take it for '
             'lost',
-            'correct node id (bits 16 to 22) and time (bits 0 to 15, in ms), or remove the entry',
+            'correct node id (bits 16 to 23) and time (bits 0 to 15, in ms), or remove the entry',
         )
 
 

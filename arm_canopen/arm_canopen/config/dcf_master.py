@@ -16,6 +16,7 @@ from ..exceptions import CodecError
 from ..standard.cob_id import COB_ID_INVALID, CobId, SYNC_PRODUCER
 from ..standard.datatypes import DataType
 from ..standard.dictionary import AccessType
+from ..standard.nmt import ConsumerHeartbeatTime
 from ..standard.objects import Index, PDO_COUNT_MAX
 from ..standard.pdo import MappedObject
 from .dcf_network import network_objects
@@ -23,7 +24,7 @@ from .dcf_text import dcf_text, DcfArray, DcfEntry, DcfObject, DcfRecord
 from .master_model import MasterConfig
 from .model import BusConfig, NodeConfig, PdoConfig
 from .pdo_direction import Direction, RPDO, TPDO
-from .shared_keys import HUNDRED_MICROSECONDS, KILOBIT, MICROSECONDS, MILLISECONDS
+from .shared_keys import HUNDRED_MICROSECONDS, KILOBIT, MICROSECONDS, MILLISECONDS, U16_MAX
 
 U8, U16, U32 = DataType.UNSIGNED8, DataType.UNSIGNED16, DataType.UNSIGNED32
 RO, RW, CONST = AccessType.READ_ONLY, AccessType.READ_WRITE, AccessType.CONSTANT
@@ -181,10 +182,14 @@ def _identity(master: MasterConfig) -> DcfRecord:
 def _watched(nodes: Iterable[NodeConfig]) -> list[str]:
     """Return the entries of 0x1016: node id and consumer time in [ms]."""
     return [
-        f'0x{node.node_id << 16 | min(round(node.heartbeat_timeout * MILLISECONDS), 0xFFFF):08X}'
+        f'0x{ConsumerHeartbeatTime(node.node_id, _milliseconds(node.heartbeat_timeout)).word:08X}'
         for node in nodes
         if node.heartbeat_timeout > 0
     ]
+
+
+def _milliseconds(time: float) -> int:
+    return min(round(time * MILLISECONDS), U16_MAX)
 
 
 def _emergencies(nodes: Iterable[NodeConfig]) -> Iterator[tuple[int, str]]:

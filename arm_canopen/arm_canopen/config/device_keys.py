@@ -56,7 +56,7 @@ DEVICE_KEYS: tuple[Key, ...] = (
     Key('dcf', Kind.TEXT, 'dcf'),
     Key('dcf_path', Kind.TEXT, 'dcf_path'),
     Key('polling', Kind.BOOLEAN, use=Use.NEEDLESS),
-    Key('period', Kind.NUMBER, 'period', per_unit=MILLISECONDS, low=1, high=60_000),
+    Key('period', Kind.NUMBER, 'poll_period', per_unit=MILLISECONDS, low=1, high=60_000),
     Key('non_transmit_timeout', Kind.NUMBER, use=Use.NEEDLESS),
     Key(
         'sdo_timeout_ms',
@@ -65,8 +65,6 @@ DEVICE_KEYS: tuple[Key, ...] = (
         per_unit=MILLISECONDS,
         low=1,
         high=60_000,
-        default=200,
-        why='not 20, which many devices exceed',
     ),
     Key(
         'boot_timeout_ms', Kind.NUMBER, 'boot_timeout', per_unit=MILLISECONDS, low=1, high=600_000

@@ -83,6 +83,7 @@ def read_device(
         restore_configuration=settings.restore_configuration,
         sdo_timeout=settings.sdo_timeout,
         boot_timeout=settings.boot_timeout,
+        poll_period=settings.poll_period,
         sdo_writes=SdoReader(eds.dictionary, findings).read(section),
         parameter_writes=parameter_writes(eds, findings),
         axes=axes,

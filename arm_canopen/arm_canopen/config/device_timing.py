@@ -148,12 +148,12 @@ def _heartbeat_consumer(
 
 
 def _check_period(draft: DeviceDraft, master: MasterConfig, findings: Findings) -> None:
-    period = draft.settings.period
+    period = draft.settings.poll_period
     if 'period' in draft.section.entries and master.sync_period not in (0.0, period):
         findings.warning(
             draft.place_of('period'),
-            f'SYNC is the clock: the device is served every {master.sync_period * 1e3:g} ms, not '
-            f'every {period * 1e3:g} ms',
+            f'SYNC is the clock: PDOs come every {master.sync_period * 1e3:g} ms, not every '
+            f'{period * 1e3:g} ms; only objects that no PDO carries are read so often',
             'make period equal to sync_period',
         )
 

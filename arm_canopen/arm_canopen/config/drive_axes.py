@@ -31,7 +31,7 @@ def read_drive(section: Mapping, values: dict[str, Any], findings: Findings) -> 
     if 'recovery' in values:
         values['recovery'] = _policy(section.entries['recovery'], values['recovery'], findings)
     scaled = any(key in section.entries for key in SCALE_KEYS)
-    return DriveConfig(**values, units_from_device=not scaled)
+    return DriveConfig(**_with_inverse_effort(values), units_from_device=not scaled)
 
 
 def read_axes(
@@ -79,9 +79,15 @@ def _axis(drive: DriveConfig, part: Item | None, findings: Findings) -> DriveCon
             "write '- {scale_pos_to_dev: 1000.0}' and the like",
         )
         return drive
-    values = read_section(part, CHANNEL_KEYS, findings)
+    values = _with_inverse_effort(read_section(part, CHANNEL_KEYS, findings))
     scaled = any(key in part.entries for key in SCALE_KEYS)
     return replace(drive, **values, units_from_device=drive.units_from_device and not scaled)
+
+
+def _with_inverse_effort(values: dict[str, Any]) -> dict[str, Any]:
+    """Let an effort be read in the unit in which it is commanded, unless bus.yml says both."""
+    scale = values.get('scale_eff_to_dev')
+    return values if scale is None else {'scale_eff_from_dev': 1.0 / scale} | values
 
 
 def _policy(item: Item, text: str, findings: Findings) -> RecoveryPolicy:

@@ -56,7 +56,7 @@ class DriveConfig:
     scale_pos_from_dev: float = 0.001
     scale_vel_from_dev: float = 0.001
     scale_eff_to_dev: float = 1.0
-    scale_eff_from_dev: float = 0.001
+    scale_eff_from_dev: float = 1.0
     offset_pos_to_dev: float = 0.0
     offset_pos_from_dev: float = 0.0
     switching_state: DriveState = DriveState.OPERATION_ENABLED

@@ -70,7 +70,7 @@ def read_bus(
         read_device(name, section, options, eds_files, findings)
         for name, section in layout.devices.items()
     ]
-    periods = [draft.settings.period for draft in drafts]
+    periods = [draft.settings.poll_period for draft in drafts]
     master = build_master(layout.master, settings, options, periods, findings)
     unique = _check_node_ids(layout.master, settings.node_id, drafts, findings)
     _check_lifecycle(master, drafts, findings)

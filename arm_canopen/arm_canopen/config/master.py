@@ -8,6 +8,7 @@ from .document import Mapping
 from .findings import Findings, RefusedError
 from .identity import Identity
 from .master_model import MasterConfig
+from .model import POLL_PERIOD
 from .scalars import integer, key_number
 from .section import block
 from .settings import MasterSettings, Options, remappings
@@ -60,7 +61,7 @@ def build_master(
         bitrate=round(settings.bitrate),
         time_cob_id=settings.time_cob_id | (TIME_PRODUCER if time_period else 0),
         time_period=time_period,
-        cycle_period=settings.sync_period or min(device_periods, default=0.01),
+        cycle_period=settings.sync_period or min(device_periods, default=POLL_PERIOD),
         heartbeat_timeout=_heartbeat_timeout(section, settings, options, findings),
         error_behavior=_error_behaviour(section, findings),
         identity=Identity(

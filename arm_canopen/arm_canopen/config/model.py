@@ -14,6 +14,11 @@ from .drive_model import DriveConfig
 from .identity import ANY_DEVICE, Identity
 from .master_model import MasterConfig
 
+SDO_TIMEOUT = 0.2  # [s] not the 20 ms of ros2_canopen, which many devices exceed
+BOOT_TIMEOUT = 1.0  # [s]
+POLL_PERIOD = 0.01  # [s]
+RETRY_FACTOR = 3
+
 
 @dataclass(frozen=True, slots=True)
 class Written:
@@ -129,16 +134,16 @@ class NodeConfig:
     heartbeat_consumer: bool = False
     guard_time: float = 0.0
     life_time_factor: int = 0
-    retry_factor: int = 3
+    retry_factor: int = RETRY_FACTOR
     boot: bool = True
     mandatory: bool = False
     reset_communication: bool = True
     restore_configuration: int = 0
     software_file: Path | None = None
     software_version: int = 0
-    sdo_timeout: float = 0.02
-    boot_timeout: float = 1.0
-    poll_period: float = 0.01
+    sdo_timeout: float = SDO_TIMEOUT
+    boot_timeout: float = BOOT_TIMEOUT
+    poll_period: float = POLL_PERIOD
     tpdos: tuple[PdoConfig, ...] = ()
     rpdos: tuple[PdoConfig, ...] = ()
     sdo_writes: tuple[SdoWrite, ...] = ()

@@ -14,6 +14,7 @@ from .drive_model import DriveConfig
 from .drivers import check_driver
 from .findings import Findings, Place
 from .master_keys import MASTER_KEYS, OPTION_KEYS
+from .model import BOOT_TIMEOUT, POLL_PERIOD, RETRY_FACTOR, SDO_TIMEOUT
 from .section import read_section, texts
 
 ROS_NAME = re.compile(r'[A-Za-z_][A-Za-z0-9_]*')
@@ -33,7 +34,7 @@ class Options:
 
     dcf_path: str = ''
     heartbeat_multiplier: float = 3.0
-    retry_factor: int = 3
+    retry_factor: int = RETRY_FACTOR
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +82,7 @@ class DeviceSettings:
     Attributes:
         dcf: EDS or DCF file, empty when not given.
         dcf_path: Its folder, None for that of the options.
-        period: Cycle in [s] when there is no SYNC.
+        poll_period: ``period``; without SYNC it is the cycle, too.
         num_channels: Number of axes.
     """
 
@@ -90,9 +91,9 @@ class DeviceSettings:
     namespace: str = ''
     dcf: str = ''
     dcf_path: str | None = None
-    period: float = 0.01
-    sdo_timeout: float = 0.2
-    boot_timeout: float = 1.0
+    poll_period: float = POLL_PERIOD
+    sdo_timeout: float = SDO_TIMEOUT
+    boot_timeout: float = BOOT_TIMEOUT
     revision_number: int = 0
     serial_number: int = 0
     heartbeat_producer: float | None = None
@@ -162,6 +163,7 @@ def _check_scales(section: Mapping, drive: DriveConfig, findings: Findings) -> N
     scales = {
         'pos': drive.scale_pos_to_dev * drive.scale_pos_from_dev,
         'vel': drive.scale_vel_to_dev * drive.scale_vel_from_dev,
+        'eff': drive.scale_eff_to_dev * drive.scale_eff_from_dev,
     }
     for axis, product in scales.items():
         if abs(product - 1) > SCALE_TOLERANCE:

@@ -8,9 +8,9 @@ from collections.abc import Callable
 from functools import partial
 
 from ..can.frame import Frame
-from ..standard.cob_id import CobId, NODE_ID_MAX, NODE_ID_MIN
+from ..standard.cob_id import CobId
 from ..standard.datatypes import Value
-from ..standard.nmt import NmtState, parse_heartbeat
+from ..standard.nmt import ConsumerHeartbeatTime, NmtState, parse_heartbeat
 from ..standard.objects import Index
 from ..standard.sdo_abort import AbortCode
 from .object_store import Integer, ObjectStore, refusal
@@ -121,7 +121,7 @@ class HeartbeatConsumer:
 
     def reset(self) -> None:
         """Watch what 0x1016 says, from the next heartbeats on."""
-        entries = (_split(variable.value) for variable in self._entries)
+        entries = (_consumer(variable.value) for variable in self._entries)
         self._periods = {node_id: period for node_id, period in entries if period}
         self._deadlines.clear()
         self.missing.clear()
@@ -156,15 +156,14 @@ class HeartbeatConsumer:
         self.reset()
 
     def _check(self, variable: Integer, value: Value) -> None:
-        node_id, period = _split(int(value)) if isinstance(value, int) else (0, 0.0)
-        others = (_split(other.value) for other in self._entries if other is not variable)
+        node_id, period = _consumer(int(value)) if isinstance(value, int) else (0, 0.0)
+        others = (_consumer(other.value) for other in self._entries if other is not variable)
         # one device cannot have two consumer times (CiA 301, 7.5.2.17)
         if period and any(node_id == other and time for other, time in others):
             raise refusal(AbortCode.PARAMETER_INCOMPATIBLE, variable.entry)
 
 
-def _split(value: int) -> tuple[int, float]:
+def _consumer(word: int) -> tuple[int, float]:
     """Return node id and time in [s] of an entry of 0x1016; time 0 when it is not used."""
-    node_id, milliseconds = value >> 16 & 0xFF, value & 0xFFFF
-    used = NODE_ID_MIN <= node_id <= NODE_ID_MAX
-    return node_id, milliseconds * MILLISECOND if used else 0.0
+    entry = ConsumerHeartbeatTime.parse(word)
+    return entry.node_id, entry.time_ms * MILLISECOND if entry.used else 0.0

@@ -11,6 +11,7 @@ from ..standard.cob_id import CAN_ID_MASK, COB_ID_INVALID
 from ..standard.datatypes import byte_length, DataType, decode, Value
 from ..standard.drive import Controlword, drive_state, mode_title
 from ..standard.emcy import error_code_text, error_register_text
+from ..standard.nmt import ConsumerHeartbeatTime
 from ..standard.objects import Index, PDO_COUNT_MAX
 
 CONTROLWORD_COMMANDS: tuple[tuple[int, int, str], ...] = (
@@ -100,9 +101,13 @@ _TEXTS: dict[int, Callable[[int], str]] = {
 _RECORD_TEXTS: dict[int, Callable[[int], str]] = {
     Index.PREDEFINED_ERROR_FIELD: lambda code: error_code_text(code & 0xFFFF),
     Index.IDENTITY: _hex_text,
-    Index.CONSUMER_HEARTBEAT: lambda word: f'node {word >> 16 & 0x7F}, {word & 0xFFFF} ms',
+    Index.CONSUMER_HEARTBEAT: lambda word: _consumer_text(ConsumerHeartbeatTime.parse(word)),
 }
 """The same for sub-indices from 1."""
+
+
+def _consumer_text(entry: ConsumerHeartbeatTime) -> str:
+    return f'node {entry.node_id}, {entry.time_ms} ms'
 
 
 def value_text(index: int, subindex: int, value: Value) -> str:

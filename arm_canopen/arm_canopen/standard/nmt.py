@@ -5,6 +5,9 @@
 from __future__ import annotations
 
 from enum import IntEnum
+from typing import NamedTuple
+
+from .cob_id import NODE_ID_MAX, NODE_ID_MIN
 
 
 class NmtCommand(IntEnum):
@@ -24,6 +27,33 @@ class NmtState(IntEnum):
     STOPPED = 0x04
     OPERATIONAL = 0x05
     PRE_OPERATIONAL = 0x7F
+
+
+class ConsumerHeartbeatTime(NamedTuple):
+    """An entry of 0x1016: whose heartbeat is awaited, and how long (CiA 301, 7.5.2.17).
+
+    Attributes:
+        node_id: Node id of the producer, bits 16 to 23.
+        time_ms: Time after which it counts as lost in [ms], bits 0 to 15.
+    """
+
+    node_id: int
+    time_ms: int
+
+    @classmethod
+    def parse(cls, word: int) -> ConsumerHeartbeatTime:
+        """Split the value of an entry."""
+        return cls(word >> 16 & 0xFF, word & 0xFFFF)
+
+    @property
+    def word(self) -> int:
+        """The value of the entry."""
+        return self.node_id << 16 | self.time_ms
+
+    @property
+    def used(self) -> bool:
+        """Whether it awaits anybody; no time, or no node id, is an entry that is not used."""
+        return bool(self.time_ms) and NODE_ID_MIN <= self.node_id <= NODE_ID_MAX
 
 
 ALL_NODES = 0
