@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 
 NO_OBJECT = 0x0602_0000
 TOGGLE_BIT = 0x0503_0000
+OF_WRITES = (0x0601_0002, 0x0609_0030, 0x0609_0031, 0x0609_0032)
+"""Abort codes that only a download gets: read-only, and values out of range."""
 COMMAND_SPECIFIER = 0x0504_0001
 
 
@@ -38,8 +40,9 @@ class SdoByteServer:
         if specifier in (1, 2, 5, 6):
             self._address = (request[1] | request[2] << 8, request[3])
             self._toggle = 0
-            if self._address in self.refuses:
-                return self._abort(self.refuses[self._address])
+            code = self.refuses.get(self._address)
+            if code is not None and (specifier in (1, 6) or code not in OF_WRITES):
+                return self._abort(code)
         if specifier == 1:
             return self._initiate_download(request)
         if specifier == 2:

@@ -516,3 +516,19 @@ def test_damaged_files_can_be_checked(tmp_path: Path, seed: int) -> None:
         for problem in report.errors + report.warnings:
             assert problem.message
             assert problem.remedy
+
+
+def test_a_consumer_time_that_the_eds_does_not_allow(tmp_path: Path) -> None:
+    """What boot would write to 0x1016 is compared with its limit; the way out is named."""
+    limited = EDS.replace(
+        'ParameterName=Consumer heartbeat time\n',
+        'ParameterName=Consumer heartbeat time\nHighLimit=0x00010100\n',
+    )
+    assert limited != EDS
+    path = write_bus(tmp_path, CLEAN, eds=limited)
+    warnings = check_file(path).warnings
+    assert len(warnings) == 2  # one for each device
+    assert all('heartbeat_consumer: false' in warning.remedy for warning in warnings)
+    assert all('0x1016:01' in warning.message for warning in warnings)
+    shorter = CLEAN.replace('  # master\n', '  heartbeat_producer: 50\n')
+    assert check_file(write_bus(tmp_path, shorter, eds=limited)).warnings == ()

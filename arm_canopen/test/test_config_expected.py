@@ -10,7 +10,8 @@ from device_rig import Rig
 import pytest
 from virtual_network import bus_config, drive_config, drive_dictionary, VirtualNetwork
 
-from arm_canopen.config.expected import Expected, expected_defaults, expected_objects
+from arm_canopen.config.boot_plan import BootWrite
+from arm_canopen.config.expected import expected_defaults, expected_objects
 from arm_canopen.config.identity import Identity
 
 
@@ -29,7 +30,7 @@ def test_a_booted_device_holds_what_is_expected() -> None:
     network = VirtualNetwork(config)
     device = network.network.nodes['joint1'].sdo
 
-    def held(item: Expected) -> bytes:
+    def held(item: BootWrite) -> bytes:
         data = network.result(device.read(item.index, item.subindex, 0.5))
         assert isinstance(data, bytes)
         return data
@@ -56,7 +57,7 @@ def test_a_booted_device_holds_what_is_expected() -> None:
 )
 def test_comparison(data: bytes, mask: int | None, device: bytes, fits: bool) -> None:
     """Padding of expedited answers and bits that do not count make no difference."""
-    assert Expected(0x2000, 0, data, '', mask).fits(device) is fits
+    assert BootWrite(0x2000, 0, data, '', mask=mask).fits(device) is fits
 
 
 def test_defaults_are_of_objects_that_can_be_written() -> None:

@@ -138,7 +138,7 @@ def test_a_value_that_the_device_refuses_names_the_dcf(tmp_path: Path) -> None:
     net = VirtualNetwork(bus_config(node), dictionaries={NAME: without})
     net.start()
     net.run_until(lambda: bool(net.told(Severity.WARNING)))
-    assert 'it is a ParameterValue of device.dcf' in net.told(Severity.WARNING)[0]
+    assert 'ParameterValue of device.dcf' in net.told(Severity.WARNING)[0]
 
 
 def test_the_other_tools_know_them_too(tmp_path: Path) -> None:

@@ -13,7 +13,6 @@ from virtual_network import bus_config, drive_config, pdo, sdo_write, VirtualNet
 
 from arm_canopen.config.identity import Identity
 from arm_canopen.config.model import NodeConfig
-from arm_canopen.master.configuration import pdo_writes
 from arm_canopen.master.events import EventKind, Severity
 from arm_canopen.master.remote_node import BootPhase, RemoteNode
 from arm_canopen.standard.dictionary import AccessType, ObjectDictionary
@@ -120,8 +119,7 @@ def test_the_whole_configuration_in_its_order() -> None:
         (0x1600, 2, 0x6060_0008),
         (0x1600, 0, 2),
         (0x1400, 1, 0x205),
-        # RPDO 2 shall not exist
-        (0x1401, 1, INVALID | 0x300 + NODE_ID),
+        # RPDO 2 shall not exist, and does not
         # TPDO 1 of a device that knows no remote frames
         (0x1800, 1, INVALID | 0x4000_0180 + NODE_ID),
         (0x1800, 2, 1),
@@ -171,8 +169,10 @@ def test_what_bus_yml_does_not_name_is_left_alone() -> None:
 def test_a_mapping_for_ever_is_not_written() -> None:
     """A device with a read-only mapping gets its parameters only."""
     fixed = replace(io_config().tpdos[0], fixed_mapping=True)
-    writes = [(write.index, write.subindex) for write in pdo_writes(fixed, 0x1800, 0x1A00)]
-    assert writes == [(0x1800, 2), (0x1800, 3), (0x1800, 5), (0x1800, 6), (0x1800, 1)]
+    scene = Scene(io_config(rpdos=(), tpdos=(fixed,), sdo_writes=()))
+    scene.boot()
+    writes = [(0x1017, 0), (0x1800, 1), (0x1800, 2), (0x1800, 3), (0x1800, 5), (0x1800, 6)]
+    assert [write[:2] for write in scene.device.writes] == [*writes, (0x1800, 1)]
 
 
 def test_constant_error_control_objects_are_not_written() -> None:
@@ -347,8 +347,7 @@ def test_a_restart_in_the_middle_of_a_boot_starts_it_again(after: int) -> None:
     assert restarted
     undisturbed = Scene()
     undisturbed.boot()
-    expected = [write[:2] for write in undisturbed.device.writes]
-    assert [write[:2] for write in scene.device.writes][-len(expected) :] == expected
+    assert scene.device.values == undisturbed.device.values
     assert scene.device.state is NmtState.OPERATIONAL
     assert scene.told(EventKind.BOOT_FAILED) == []
     assert scene.node.online

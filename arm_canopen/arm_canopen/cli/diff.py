@@ -8,7 +8,8 @@ import argparse
 from dataclasses import dataclass
 
 from ..can import open_bus
-from ..config.expected import Expected, expected_defaults, expected_objects
+from ..config.boot_plan import BootWrite
+from ..config.expected import expected_defaults, expected_objects
 from ..exceptions import SdoAbortError
 from ..monitor.object_names import ObjectNames
 from ..monitor.value_text import data_text
@@ -29,7 +30,7 @@ class Row:
         is_equal: It is what it should be.
     """
 
-    expected: Expected
+    expected: BootWrite
     device: str
     is_equal: bool
 
@@ -73,13 +74,13 @@ def run(options: argparse.Namespace) -> int:
     return 1 if different else 0
 
 
-def _objects(target: Target, *, defaults: bool) -> list[Expected]:
+def _objects(target: Target, *, defaults: bool) -> list[BootWrite]:
     """Return what to compare.
 
     Raises:
         UsageError: No file says anything of the device.
     """
-    configured: list[Expected] = []
+    configured: list[BootWrite] = []
     if target.bus is not None and target.config is not None:
         configured = expected_objects(target.bus, target.config)
     if not configured and not target.described:
@@ -97,7 +98,7 @@ def _objects(target: Target, *, defaults: bool) -> list[Expected]:
     ]
 
 
-def _compare(session: Session, target: Target, expected: Expected) -> Row:
+def _compare(session: Session, target: Target, expected: BootWrite) -> Row:
     async def upload() -> bytes:
         client = session.client(target.node_id, target.name)
         return await client.read(expected.index, expected.subindex, target.timeout)
@@ -123,7 +124,7 @@ def _cells(target: Target, names: ObjectNames, row: Row) -> tuple[str, ...]:
     )
 
 
-def _text(target: Target, expected: Expected, data: bytes) -> str:
+def _text(target: Target, expected: BootWrite, data: bytes) -> str:
     entry = target.dictionary.get(expected.index, expected.subindex)
     return data_text(
         expected.index, expected.subindex, entry.data_type if entry is not None else None, data

@@ -10,6 +10,7 @@ import math
 from ..standard.cob_id import CAN_ID_MASK, COB_ID_INVALID, CobId, SYNC_PRODUCER
 from ..standard.nmt import ConsumerHeartbeatTime
 from ..standard.objects import Index
+from .boot_plan import boot_writes, WATCH_KEY
 from .check_subject import Subject
 from .findings import Findings, Place
 from .model import BusConfig
@@ -65,6 +66,7 @@ def check_heartbeats(subject: Subject) -> None:
             'take a larger heartbeat_multiplier, 3 is usual',
         )
     _check_watches_master(subject)
+    _check_consumer_limit(subject)
     _check_consumers(subject)
 
 
@@ -86,6 +88,24 @@ def _check_watches_master(subject: Subject) -> None:
             'it stops by itself, and there is nothing to take over',
             'write heartbeat_consumer: false, or remove reset_communication: false',
         )
+
+
+def _check_consumer_limit(subject: Subject) -> None:
+    """Compare what boot writes to 0x1016 with what the EDS says that the device takes."""
+    node = subject.node
+    for write in boot_writes(subject.bus, node):
+        entry = node.dictionary.get(*write.address)
+        value = int.from_bytes(write.data, 'little')
+        highest = entry.high_limit if entry is not None else None
+        if write.key == WATCH_KEY and highest is not None and value > highest:
+            subject.findings.warning(
+                subject.place(WATCH_KEY),
+                f'the device will refuse to watch the master: {write.place} takes at most '
+                f'0x{int(highest):X} by its EDS, and 0x{value:X} is written (node id in bits 16 '
+                'to 23, time in ms in bits 0 to 15)',
+                'make heartbeat_producer or heartbeat_multiplier of the master smaller, or write '
+                'heartbeat_consumer: false',
+            )
 
 
 def _check_consumers(subject: Subject) -> None:

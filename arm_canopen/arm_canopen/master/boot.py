@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from ..config.identity import Identity
-from ..config.model import SdoWrite
+from ..config.model import BusConfig, SdoWrite
 from ..exceptions import BootError, SdoAbortError, SdoError, SdoTimeoutError
 from ..standard.nmt import NmtCommand, NmtState
 from ..standard.objects import Index
@@ -42,41 +42,32 @@ class BootProcess:
     def __init__(
         self,
         node: RemoteNode,
+        bus: BusConfig,
         scheduler: Scheduler,
         send_nmt: SendNmt,
         startup: Startup,
         *,
         ask_state: Callable[[int], None],
-        sdo_timeout: float,
-        start: bool,
-        master_id: int,
-        master_heartbeat_timeout: float,
     ) -> None:
         """Take what is needed of the network.
 
         Args:
             node: The device.
+            bus: The bus that it belongs to.
             scheduler: Time.
             send_nmt: Sends an NMT command to a node id.
             startup: Says when a device may be started.
             ask_state: Asks a node id for its NMT state, as node guarding does.
-            sdo_timeout: How long each SDO answer may take in [s].
-            start: Start the device when it is configured.
-            master_id: Node id of the master, which the device shall watch.
-            master_heartbeat_timeout: How long the device waits for the master's heartbeat in [s];
-                0 when the master sends none.
         """
         self._node = node
         self._scheduler = scheduler
         self._send_nmt = send_nmt
         self._startup = startup
         self._ask_state = ask_state
-        self._start = start
+        self._start = bus.master.start_nodes
         self._configurator = Configurator(
             node,
-            sdo_timeout=sdo_timeout,
-            master_id=master_id,
-            master_heartbeat_timeout=master_heartbeat_timeout,
+            bus,
             on_write=lambda place: self._enter(BootPhase.CONFIGURING, place),
         )
         self._told = ''

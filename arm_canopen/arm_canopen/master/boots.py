@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable
 from functools import partial
 
 from ..can.frame import Frame
-from ..config.master_model import MasterConfig
+from ..config.model import BusConfig
 from ..exceptions import SdoError
 from .boot import BootProcess
 from .guarding import guarding_request
@@ -25,7 +25,7 @@ class Boots:
 
     def __init__(
         self,
-        master: MasterConfig,
+        bus: BusConfig,
         nodes: Iterable[RemoteNode],
         scheduler: Scheduler,
         startup: Startup,
@@ -36,7 +36,7 @@ class Boots:
         """Listen to the devices; nothing is booted before :meth:`start`.
 
         Args:
-            master: The master.
+            bus: The bus.
             nodes: All devices.
             scheduler: Time.
             startup: Says when a device may be started.
@@ -49,14 +49,11 @@ class Boots:
         for node in nodes:
             self._processes[node.name] = BootProcess(
                 node,
+                bus,
                 scheduler,
                 send_nmt,
                 startup,
                 ask_state=lambda node_id: send(guarding_request(node_id)),
-                sdo_timeout=master.boot_timeout,
-                start=master.start_nodes,
-                master_id=master.node_id,
-                master_heartbeat_timeout=master.heartbeat_timeout,
             )
             node.on_boot_up = partial(self._restarted, node)
             node.on_dropped_out = partial(self.start, node, pause=DROP_PAUSE)

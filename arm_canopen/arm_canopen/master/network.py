@@ -102,7 +102,7 @@ class Network:
         nodes = list(self.nodes.values())
         self._startup = Startup(master, nodes, self.scheduler, self.send_nmt, report)
         self._boots = Boots(
-            master, nodes, self.scheduler, self._startup, send=self.send, send_nmt=self.send_nmt
+            config, nodes, self.scheduler, self._startup, send=self.send, send_nmt=self.send_nmt
         )
         self._strangers: dict[int, SdoClient] = {}
         self._handlers = dict(self._connect(RivalWatch(config, report, expected=beside_master)))

@@ -1,0 +1,276 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What is written to a device at boot, once: boot downloads it, diff compares it, DCFs hold it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from ..standard.cob_id import CAN_ID_MASK, COB_ID_EXTENDED, COB_ID_INVALID
+from ..standard.datatypes import DataType, encode
+from ..standard.nmt import ConsumerHeartbeatTime
+from ..standard.objects import Index
+from .model import BusConfig, NodeConfig, PdoConfig, SdoWrite, Written
+from .parameter_values import is_configured
+from .pdo_direction import Direction, RPDO, TPDO
+from .shared_keys import HUNDRED_MICROSECONDS, MILLISECONDS
+
+COB_ID_BITS = COB_ID_INVALID | COB_ID_EXTENDED | CAN_ID_MASK
+"""Bits that bus.yml decides of a COB-ID; the device has bit 30 as it can."""
+BEFORE_PDOS = (Index.TIME_COB_ID, Index.ERROR_BEHAVIOUR)
+"""Objects whose keys of their own are written before the PDOs, as dcfgen does."""
+ERROR_CONTROL = (
+    (Index.PRODUCER_HEARTBEAT, DataType.UNSIGNED16, 'heartbeat_producer'),
+    (Index.GUARD_TIME, DataType.UNSIGNED16, 'guard_time'),
+    (Index.LIFE_TIME_FACTOR, DataType.UNSIGNED8, 'life_time_factor'),
+)
+WATCH_KEY = 'heartbeat_consumer'
+
+
+@dataclass(frozen=True, slots=True)
+class BootWrite:
+    """An object that is written to a device at boot.
+
+    Attributes:
+        index: Object index.
+        subindex: Sub-index.
+        data: Its value as an SDO carries it.
+        key: Key of bus.yml, or file, that says so.
+        requested: bus.yml asks for it; what nobody asks for is tried.
+        mask: Bits that count, None for all; the device keeps the others.
+        temporary: It makes room for the writes that follow, and does not stay.
+        unless_default: An exported DCF leaves it out where the EDS has it as default.
+    """
+
+    index: int
+    subindex: int
+    data: bytes
+    key: str
+    requested: bool = True
+    mask: int | None = None
+    temporary: bool = False
+    unless_default: bool = False
+
+    @property
+    def address(self) -> tuple[int, int]:
+        """Index and sub-index."""
+        return self.index, self.subindex
+
+    @property
+    def place(self) -> str:
+        """The object, for messages."""
+        return f'0x{self.index:04X}:{self.subindex:02X}'
+
+    def over(self, present: int) -> bytes:
+        """Return the data with the bits that do not count as they are in a present value."""
+        if self.mask is None:
+            return self.data
+        value = present & ~self.mask | int.from_bytes(self.data, 'little') & self.mask
+        return value.to_bytes(len(self.data), 'little')
+
+    def fits(self, held: bytes) -> bool:
+        """Tell whether a value of the device is what is wanted; padding does not matter."""
+        if len(self.data) <= 4 and len(held) == 4:
+            held = held[: len(self.data)]
+        if self.mask is None or len(held) != len(self.data):
+            return held == self.data
+        return self.over(int.from_bytes(held, 'little')) == held
+
+
+def boot_writes(bus: BusConfig, node: NodeConfig) -> list[BootWrite]:
+    """Return everything that is written to a device at boot, in this order."""
+    return list(_Plan(bus, node).writes())
+
+
+def final_values(writes: list[BootWrite]) -> list[BootWrite]:
+    """Return what the objects hold after the writes: of two writes of an object the last one."""
+    return list({write.address: write for write in writes}.values())
+
+
+def is_requested(bus: BusConfig, node: NodeConfig, *keys: str) -> bool:
+    """Tell whether bus.yml has a key of a device; a bus that was built by a program has all."""
+    return not bus.written or (node.name, *keys) in bus.written
+
+
+def watch_slots(node: NodeConfig) -> list[int]:
+    """Return the entries of 0x1016 that may be the master's: those that bus.yml does not write."""
+    others = {w.subindex for w in node.sdo_writes if w.index == Index.CONSUMER_HEARTBEAT}
+    return [
+        entry.subindex
+        for entry in node.dictionary.subindices(Index.CONSUMER_HEARTBEAT)
+        if entry.subindex and entry.access.writable and entry.subindex not in others
+    ]
+
+
+def choose_slot(entries: Mapping[int, int], master_id: int) -> tuple[int, bool]:
+    """Choose the entry of 0x1016 for the master: its own, or else the first that is not used.
+
+    Returns:
+        Its sub-index, 0 for none, and whether it names the master.
+    """
+    times = {sub: ConsumerHeartbeatTime.parse(word) for sub, word in entries.items()}
+    own = next((sub for sub, time in times.items() if time.node_id == master_id), 0)
+    return own or next((sub for sub, time in times.items() if not time.used), 0), own > 0
+
+
+def watch_word(bus: BusConfig, node: NodeConfig) -> int:
+    """Return what the entry of 0x1016 for the master shall hold; 0 for not to watch it."""
+    time = round(bus.master.heartbeat_timeout * MILLISECONDS)
+    watched = node.heartbeat_consumer and time
+    return ConsumerHeartbeatTime(bus.master.node_id, time).word if watched else 0
+
+
+class _Plan:
+    """Lists the writes for one device."""
+
+    def __init__(self, bus: BusConfig, node: NodeConfig) -> None:
+        self._bus = bus
+        self._node = node
+
+    def writes(self) -> Iterator[BootWrite]:
+        node = self._node
+        yield from map(_written, node.parameter_writes)
+        yield from self._watch()
+        yield from self._error_control()
+        leading = 0
+        while leading < len(node.sdo_writes) and node.sdo_writes[leading].index in BEFORE_PDOS:
+            leading += 1
+        for write in node.sdo_writes[:leading]:
+            yield _written(write, unless_default=True)
+        for direction, pdos in ((RPDO, node.rpdos), (TPDO, node.tpdos)):
+            for pdo in pdos:
+                if pdo.configured:
+                    yield from self._pdo(direction, pdo)
+        yield from map(_written, node.sdo_writes[leading:])
+
+    def _watch(self) -> Iterator[BootWrite]:
+        """Have the device watch the master, or no longer, by what its EDS has in 0x1016."""
+        defaults = {
+            entry.subindex: entry.default if isinstance(entry.default, int) else 0
+            for entry in self._node.dictionary.subindices(Index.CONSUMER_HEARTBEAT)
+            if entry.subindex in watch_slots(self._node)
+        }
+        slot, is_ours = choose_slot(defaults, self._bus.master.node_id)
+        word = watch_word(self._bus, self._node)
+        if slot and (word or is_ours):
+            yield _number(
+                (Index.CONSUMER_HEARTBEAT, slot),
+                word,
+                DataType.UNSIGNED32,
+                WATCH_KEY,
+                requested=is_requested(self._bus, self._node, WATCH_KEY),
+            )
+
+    def _error_control(self) -> Iterator[BootWrite]:
+        """Set the heartbeat of the device, and node guarding (CiA 301, 7.2.8)."""
+        node = self._node
+        values = {
+            Index.PRODUCER_HEARTBEAT: round(node.heartbeat_producer * MILLISECONDS),
+            Index.GUARD_TIME: round(node.guard_time * MILLISECONDS),
+            Index.LIFE_TIME_FACTOR: node.life_time_factor,
+        }
+        for index, data_type, key in ERROR_CONTROL:
+            entry = node.dictionary.get(index)
+            if entry is None or not entry.access.writable:
+                continue
+            heartbeat = index is Index.PRODUCER_HEARTBEAT
+            if heartbeat or node.guarded or values[index] != (entry.default or 0):
+                yield _number(
+                    (index, 0),
+                    values[index],
+                    data_type,
+                    key,
+                    requested=is_requested(self._bus, node, key),
+                    unless_default=True,
+                )
+
+    def _pdo(self, direction: Direction, pdo: PdoConfig) -> Iterator[BootWrite]:
+        """Configure a PDO: disable, parameters, mapping, enable (CiA 301, 7.5.2.36)."""
+        cob_id = (direction.communication + pdo.number - 1, 1)
+        key = f'{direction.name}.{pdo.number}'
+        unsigned = DataType.UNSIGNED32
+        is_given = self._is_given(direction, pdo, 'cob_id')
+        yield _number(
+            cob_id,
+            pdo.cob_id | COB_ID_INVALID,
+            unsigned,
+            f'{key}.cob_id' if pdo.enabled else f'{key}.enabled',
+            requested=is_given or not pdo.enabled,
+            mask=COB_ID_INVALID,
+            temporary=pdo.enabled,
+            unless_default=True,
+        )
+        if not pdo.enabled:
+            return
+        yield from self._parameters(direction, pdo)
+        if not pdo.fixed_mapping:
+            yield from self._mapping(direction, pdo)
+        yield _number(
+            cob_id, pdo.cob_id, unsigned, f'{key}.cob_id', requested=is_given, mask=COB_ID_BITS
+        )
+
+    def _parameters(self, direction: Direction, pdo: PdoConfig) -> Iterator[BootWrite]:
+        index = direction.communication + pdo.number - 1
+        deadline = 'event_timer' if direction is TPDO else 'event_deadline'
+        for subindex, name, data_type, value in (
+            (2, 'transmission', DataType.UNSIGNED8, pdo.transmission),
+            (3, 'inhibit_time', DataType.UNSIGNED16, _units(pdo.inhibit_time)),
+            (5, deadline, DataType.UNSIGNED16, _units(pdo.event_time, MILLISECONDS)),
+            (6, 'sync_start', DataType.UNSIGNED8, pdo.sync_start),
+        ):
+            if value is not None:
+                yield _number(
+                    (index, subindex),
+                    value,
+                    data_type,
+                    f'{direction.name}.{pdo.number}.{name}',
+                    requested=self._is_given(direction, pdo, name),
+                    unless_default=True,
+                )
+
+    def _mapping(self, direction: Direction, pdo: PdoConfig) -> Iterator[BootWrite]:
+        index = direction.mapping + pdo.number - 1
+        key = f'{direction.name}.{pdo.number}.mapping'
+        given = self._is_given(direction, pdo, 'mapping')
+        count, unsigned = len(pdo.mapping), DataType.UNSIGNED32
+        yield _number((index, 0), 0, DataType.UNSIGNED8, key, requested=given, temporary=count > 0)
+        for subindex, mapped in enumerate(pdo.mapping, start=1):
+            yield _number((index, subindex), mapped.word, unsigned, key, requested=given)
+        if count:
+            yield _number((index, 0), count, DataType.UNSIGNED8, key, requested=given)
+
+    def _is_given(self, direction: Direction, pdo: PdoConfig, key: str) -> bool:
+        """Tell whether bus.yml gives a key of a PDO, or a DCF the object."""
+        if is_requested(self._bus, self._node, direction.name, str(pdo.number), key):
+            return True
+        objects = direction.mapping if key == 'mapping' else direction.communication
+        return is_configured(self._node.dictionary, objects + pdo.number - 1)
+
+
+def _written(write: SdoWrite, *, unless_default: bool = False) -> BootWrite:
+    key = _key(write.written)
+    return BootWrite(write.index, write.subindex, write.data, key, unless_default=unless_default)
+
+
+def _key(written: Written) -> str:
+    return f'{written.key} (line {written.line})' if written.line else written.key or 'bus.yml'
+
+
+def _units(time: float | None, per_second: float = HUNDRED_MICROSECONDS) -> int | None:
+    return None if time is None else round(time * per_second)
+
+
+def _number(  # the fields of a record
+    address: tuple[int, int],
+    value: int,
+    data_type: DataType,
+    key: str,
+    *,
+    requested: bool = True,
+    mask: int | None = None,
+    temporary: bool = False,
+    unless_default: bool = False,
+) -> BootWrite:
+    data = encode(data_type, value)
+    return BootWrite(*address, data, key, requested, mask, temporary, unless_default)
