@@ -13,8 +13,10 @@ HEAR_TIMEOUT = 5.0
 """Longest time in [s] to hear what the controller is doing."""
 LIE_TIMEOUT = 10.0
 """Longest time in [s] for it to lie."""
-ON_ITS_FEET = frozenset({'stand', 'walk', 'turn', 'policy'})
-"""States of the controller in which the legs carry the body."""
+FAULT, LYING = 'fault', 'lie'
+"""States of the controller after a fault, and at the end."""
+ON_ITS_FEET = frozenset({'stand', 'walk', 'turn', 'policy', FAULT})
+"""States of the controller in which the legs may carry the body."""
 ON_THE_WAY = 'to '
 """In front of a state that is not reached yet."""
 
@@ -77,5 +79,15 @@ def _lie_down(client: Client, say: Callable[[str], None]) -> None:
     if client.state.removeprefix(ON_THE_WAY) not in ON_ITS_FEET:
         return
     say('lying down first; Ctrl-C again stops at once')
-    client.set_mode('lie', LIE_TIMEOUT)
-    client.wait_until(lambda: client.state == 'lie', LIE_TIMEOUT, 'it to lie')
+    # what fails on the way down stops it; asked once more, the robot lies down without it
+    if _try_to_lie(client, {LYING, FAULT}) == FAULT:
+        _try_to_lie(client, {LYING})
+
+
+def _try_to_lie(client: Client, ends: set[str]) -> str:
+    """Request it, wait for one of some states, and return that."""
+    before = client.state  # a fault of before is no end
+    client.set_mode(LYING, LIE_TIMEOUT)
+    client.wait_until(lambda: client.state != before, LIE_TIMEOUT, 'it to lie')
+    client.wait_until(lambda: client.state in ends, LIE_TIMEOUT, 'it to lie')
+    return client.state

@@ -20,6 +20,7 @@ class Controller:
         self.modes: list[str] = []
         self.closed = False
         self.obeys, self.refusal = True, ''
+        self.outcomes: list[str] = []  # of requests, in the place of the mode
         self.given_up: Callable[[], bool] = lambda: False
 
     def set_mode(self, mode: str, timeout: float) -> str:
@@ -27,7 +28,8 @@ class Controller:
         if self.refusal:
             raise CallError(f'the mode {mode!r} was refused: {self.refusal}')
         self.modes.append(mode)
-        self.state = mode if self.obeys else self.state
+        if self.obeys:
+            self.state = self.outcomes.pop(0) if self.outcomes else mode
         return mode
 
     def wait_until(self, condition: Callable[[], bool], timeout: float, what: str) -> None:
@@ -55,17 +57,30 @@ def leave(controller: Controller, *, given_up: bool = False) -> list[str]:
     return said
 
 
-@pytest.mark.parametrize('state', ['stand', 'walk', 'turn', 'policy', 'to stand', 'to walk'])
+@pytest.mark.parametrize(
+    'state', ['stand', 'walk', 'turn', 'policy', 'to stand', 'to walk', 'fault', 'to fault']
+)
 def test_a_robot_on_its_feet_lies_down(state: str) -> None:
-    """Also one that is on its way there; the user is told how not to wait."""
+    """Also one that is on its way there, or has a fault; the user is told how not to wait."""
     controller = Controller(state)
     said = leave(controller)
     assert controller.modes == ['lie']
     assert said == ['lying down first; Ctrl-C again stops at once']
 
 
-@pytest.mark.parametrize('state', ['relax', 'lie', 'to lie', 'fault', 'to fault'])
-def test_a_robot_that_lies_or_is_in_a_fault_is_left_as_it_is(state: str) -> None:
+def test_a_robot_that_fails_on_its_way_down_is_asked_once_more() -> None:
+    """A fault on the way stops it; the second request goes on in spite of it, a third is none."""
+    once, always = Controller('walk'), Controller('walk')
+    once.outcomes = ['fault']
+    assert leave(once) == ['lying down first; Ctrl-C again stops at once']
+    assert (once.modes, once.state) == (['lie', 'lie'], 'lie')
+    always.outcomes = ['fault', 'fault']
+    assert 'in vain' in leave(always)[-1]
+    assert always.modes == ['lie', 'lie']
+
+
+@pytest.mark.parametrize('state', ['relax', 'lie', 'to lie'])
+def test_a_robot_that_lies_is_left_as_it_is(state: str) -> None:
     """Without a word."""
     controller = Controller(state)
     assert leave(controller) == []

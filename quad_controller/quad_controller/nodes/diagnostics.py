@@ -8,7 +8,6 @@ import math
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
-from ..states.modes import State
 from ..states.status import Status
 from ..timing.statistics import LoopFigures
 
@@ -16,7 +15,7 @@ from ..timing.statistics import LoopFigures
 def state_diagnostic(node: str, status: Status) -> DiagnosticStatus:
     """Describe what the robot does."""
     level, message = DiagnosticStatus.OK, status.title
-    if status.state is State.FAULT:
+    if status.faults:
         level, message = DiagnosticStatus.ERROR, '; '.join(status.faults)
     elif math.isinf(status.joints_age):
         words = ('waiting for /joint_states', *status.warnings)

@@ -33,11 +33,11 @@ MAX_STEP = 0.05  # [s] after a longer pause the gait goes on where it was instea
 UPRIGHT_STATES = GAIT_STATES | {State.POLICY, State.FAULT}
 """States in which the robot is on its legs, and what is wrong with it is a fault."""
 
-LYING_FAULTS = frozenset({Fault.JOINTS, Fault.FALLEN})
-"""What ends lying down; without an attitude or charge that is the best that it can do."""
+WAYS_DOWN = frozenset({State.LIE, State.RELAX})
+"""Modes that no fault keeps a robot from: they need nothing but the last targets."""
 
-MATTERING = {State.RELAX: frozenset({Fault.JOINTS}), State.LIE: LYING_FAULTS}
-"""What has to be in order before a state is asked for; everything where it is not named."""
+LYING_FAULTS = frozenset({Fault.JOINTS, Fault.FALLEN})
+"""What stops a robot on its way down, if it was in order when the way down was requested."""
 
 
 class Controller:
@@ -92,6 +92,7 @@ class Controller:
         self._latch = FaultLatch()
         self._notices = Notices()
         self._unreachable = 0
+        self._tolerated: frozenset[Fault] = frozenset()  # present when the way down was requested
 
     def set_mode(self, text: str) -> Answer:
         """Ask for a mode.
@@ -107,10 +108,13 @@ class Controller:
             return Answer(False, f'stays in {state.value}: {reason}')
         if request.gait is not None:
             self._generator.choose(request.gait)
-        self._machine.goal = request.state
+        present = dict(self._health.faults()) if request.state in WAYS_DOWN else {}
+        self._tolerated = frozenset(present)
+        self._machine.request(request.state)
         gait = f' with gait {request.gait.value}' if request.gait is not None else ''
         way = '' if state is request.state else f', coming from {state.value}'
-        return Answer(True, f'{request.state.value}{gait}{way}')
+        without = ''.join(f'; in spite of {f.value}: {why}' for f, why in present.items())
+        return Answer(True, f'{request.state.value}{gait}{way}{without}')
 
     def set_velocity(self, velocity: Velocity) -> Answer:
         """Ask for a velocity; it counts until the next one or the time-out."""
@@ -123,7 +127,7 @@ class Controller:
     def clear_fault(self) -> Answer:
         """Forget the latched faults if their reasons are gone; nothing moves by this."""
         machine = self._machine
-        if machine.state is not State.FAULT:
+        if not self._latch.texts:
             return Answer(True, f'there is no fault; the mode is {machine.state.value}')
         if still := [f'{fault.value}: {reason}' for fault, reason in self._health.faults()]:
             return Answer(False, f'still {"; ".join(still)}')
@@ -208,13 +212,18 @@ class Controller:
             events.append(Event(EventKind.NEWS, f'{before.value} -> {state.value}'))
         events += self._notices.step(self._matters(state), self._over(state))
         situation, dt_motion = self._situation(), min(dt, MAX_STEP)
-        wanted = last if self._health.held else self._move(situation, dt_motion, last, events)
+        wanted = last if self._held else self._move(situation, dt_motion, last, events)
         shadow = self._shadow.step(situation, dt_motion, last) if self._shadow else None
         targets = self._limiter.step(wanted, dt)
         if self._health.joints is not None:
             self._following.step(targets, self._health.joints.positions, dt)
         ready = self._health.complete
         return Output(targets, shadow, self._machine.title, ready, tuple(events))
+
+    @property
+    def _held(self) -> bool:
+        """Whether nothing moves on, because nobody knows any more where the joints are."""
+        return self._health.held and Fault.JOINTS not in self._tolerated
 
     def _start(self) -> Targets | None:
         """Begin where the joints are, as soon as that is known."""
@@ -226,13 +235,15 @@ class Controller:
 
     def _watch(self, last: Targets) -> list[Event]:
         """Latch faults of a robot that is on its legs, or on its way down."""
-        upright = self._machine.state in UPRIGHT_STATES
-        if not upright and self._machine.motion.finished:
+        machine = self._machine
+        upright, goes_down = machine.state in UPRIGHT_STATES, machine.goal in WAYS_DOWN
+        if not upright and machine.motion.finished:
             return []
+        watched = LYING_FAULTS - self._tolerated if goes_down or not upright else frozenset(Fault)
         return [
             event
             for fault, reason in self._health.faults()
-            if upright or fault in LYING_FAULTS
+            if fault in watched
             for event in self._latch_fault(fault, reason, last)
         ]
 
@@ -241,7 +252,7 @@ class Controller:
         matters = {}
         if stale := self._commands.warning(state):
             matters['command'] = stale
-        if self._health.held and (state in UPRIGHT_STATES or not self._machine.motion.finished):
+        if self._held and (state in UPRIGHT_STATES or not self._machine.motion.finished):
             age = self._health.joints_age * 1e3
             matters['held'] = f'joint states are {age:.0f} ms old; holding the last targets'
         if self._following.text:
@@ -262,7 +273,8 @@ class Controller:
         return over
 
     def _latch_fault(self, fault: Fault, reason: str, last: Targets) -> list[Event]:
-        if not self._latch.latch(fault, reason):
+        new = self._latch.latch(fault, reason)
+        if not new and self._machine.state is State.FAULT and self._machine.goal is State.FAULT:
             return []
         reaction = self._latch.reaction
         if reaction is not None:
@@ -293,18 +305,21 @@ class Controller:
 
     def _refusal(self, request: ModeRequest) -> str:
         """Say why a mode cannot be entered, nothing when it can."""
-        if self._machine.state is State.FAULT:
-            return f'{"; ".join(self._latch.texts)}; call ~/clear_fault when that is mended'
+        if request.state in WAYS_DOWN and self._limiter.last is not None:
+            return ''
+        if self._latch.texts:
+            return (
+                f'{"; ".join(self._latch.texts)}; call ~/clear_fault when that is mended. '
+                'The modes lie and relax are possible all the same'
+            )
         if request.state is State.POLICY and self._policy is None:
             return self._policy_refusal
         if request.state is State.POLICY and self._shadow is not None:
             return 'the policy is only watched in a dry run (parameter policy_dry_run)'
-        for fault, reason in self._health.faults():
-            if fault in MATTERING.get(request.state, tuple(Fault)):
-                return f'{fault.value}: {reason}'
-        if request.state is State.POLICY:
-            return self._unmeasured()
-        return ''
+        if present := next(self._health.faults(), None):
+            fault, reason = present
+            return f'{fault.value}: {reason}'
+        return self._unmeasured() if request.state is State.POLICY else ''
 
     def _unmeasured(self) -> str:
         """Say what a policy would have to be told and nobody measures."""

@@ -7,6 +7,7 @@
     RELAX <-> LIE <-> STAND <-> WALK, TURN      (the gait comes to rest before it is left)
                         ^-----> POLICY          (eased in; winds down, or fails, back to STAND)
     any of STAND, WALK, TURN, POLICY -> FAULT   (then RELAX, LIE or STAND when it is cleared)
+    FAULT -> LIE -> RELAX                       (a way down is possible with any fault)
 
 From RELAX the robot stands up directly, from wherever its joints are.
 """
@@ -116,6 +117,11 @@ class StateMachine:
         """Stay at some targets [rad]."""
         self.motion = Hold(last, self._parameters.hold_band)
 
+    def request(self, goal: State) -> None:
+        """Go to a state from now on; out of FAULT only down."""
+        self.goal = goal
+        self._reaction = None
+
     def react(self, reaction: Reaction, last: Targets) -> None:
         """Go into FAULT, or to a stronger reaction there.
 
@@ -129,8 +135,12 @@ class StateMachine:
             self.hold(last)
 
     def clear(self) -> None:
-        """Leave FAULT for the state that the robot is in anyway."""
-        if self._reaction is Reaction.HOLD:
+        """Leave FAULT for the state that the robot is in anyway; a way down goes on."""
+        if self.state is not State.FAULT:
+            return
+        if self.goal is not State.FAULT:
+            self.state = State.STAND
+        elif self._reaction is Reaction.HOLD:
             self.state = self.goal = State.RELAX
         elif self._reaction is Reaction.LIE_DOWN:
             lies = self.motion is self._lie_down
@@ -149,7 +159,7 @@ class StateMachine:
             Why the policy was given up; empty as a rule.
         """
         failure = self.motion.failure if isinstance(self.motion, PolicyMotion) else ''
-        if self.state is State.FAULT:
+        if self.state is State.FAULT and self.goal is State.FAULT:
             self._advance_fault(last)
             return failure
         if failure:
@@ -207,7 +217,8 @@ class StateMachine:
             self.motion = self._walk
 
     def _lie(self, last: Targets) -> None:
-        self.motion = self._lie_down = self._blend(last, self._poses.lying(last))
+        if self.motion is not self._lie_down:
+            self.motion = self._lie_down = self._blend(last, self._poses.lying(last))
 
     def _stand(self, last: Targets) -> None:
         self._generator.others = self._poses.with_arm(last)
