@@ -70,6 +70,7 @@ class CommandLimiter:
         self._targets: list[float] = []
         self._began_at = 0.0
         self._last_at = -math.inf
+        self._end = self._seen_end = object()  # replaced by reset(), whichever thread it is in
 
     @property
     def largest_step(self) -> float:
@@ -77,9 +78,11 @@ class CommandLimiter:
         return self._settings.speed * LONGEST_PERIOD
 
     def reset(self) -> None:
-        """End the stream: the next command begins anew, and joints may have been moved."""
-        self._last_at = -math.inf
-        self._targets = []
+        """End the stream: the next command begins anew, and joints may have been moved.
+
+        Any thread may call it; it counts from the next :meth:`step` on.
+        """
+        self._end = object()
 
     def step(
         self, positions: Sequence[float], measured: Sequence[float | None], now: float
@@ -98,6 +101,8 @@ class CommandLimiter:
                 knows where it is; nothing is to be sent.
         """
         self.check(positions)
+        if (end := self._end) is not self._seen_end:
+            self._seen_end, self._last_at, self._targets = end, -math.inf, []
         if now - self._last_at > self._settings.stream_timeout:
             self._begin(measured, now)
         elapsed = min(max(now - self._last_at, 0.0), LONGEST_PERIOD)

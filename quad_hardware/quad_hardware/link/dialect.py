@@ -80,6 +80,11 @@ class Dialect(ABC):
     def motors(self) -> tuple[int, ...]:
         """Ids of the motors whose angles the robot reports."""
 
+    @property
+    def torque_pending(self) -> bool:
+        """Whether a change of torque has not been given to the line yet."""
+        return False
+
     @abstractmethod
     def command(self, angles: Mapping[int, float]) -> None:
         """Set the angles that are sent at the next possible moment.

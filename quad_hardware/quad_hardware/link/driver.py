@@ -15,6 +15,7 @@ import time
 from ..exceptions import LinkError
 from ..protocol import ParserCounters
 from .dialect import Dialect, DialectCounters
+from .mailbox import Mailbox
 from .session import LinkOptions, open_session, Session
 from .state import RobotState
 from .status import LinkState, LinkStatus
@@ -49,8 +50,8 @@ class Driver:
         self._thread = threading.Thread(target=self._run, name='serial', daemon=True)
         self._stopping = threading.Event()
         self._wake_read, self._wake_write = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
-        self._mailbox: Mapping[int, float] | None = None
-        self._torque: bool | None = None
+        self._mailbox = Mailbox()
+        self._torque_unsent = False  # accepted, taken from the mailbox, and not written yet
         self._state = LinkState.CONNECTING
         self._detail = 'not started'
         self._session: Session | None = None
@@ -83,26 +84,27 @@ class Driver:
         Returns:
             False when the link is not running, and nothing will be sent.
         """
-        if self._state is not LinkState.RUNNING:
+        accepted = self._mailbox.put_angles(angles)
+        if accepted:
+            self._wake()
+        else:
             self._dropped += 1
-            return False
-        self._mailbox = angles
-        self._wake()
-        return True
+        return accepted
 
     def torque(self, *, on: bool) -> bool:
         """Have all servos hold their place, or let go: the robot drops then.
 
         Returns:
-            False when the link is not running or cannot do that, and nothing will be sent.
+            False when the link is not running or cannot do that, and nothing will be sent. True
+            when it is sent with the next bytes; if the robot is lost before, the change of the
+            link's state says that it was not.
         """
         session = self._session
         able = session is not None and session.dialect.can_release
-        if self._state is not LinkState.RUNNING or not able:
-            return False
-        self._torque = on
-        self._wake()
-        return True
+        accepted = able and self._mailbox.put_torque(on=on)
+        if accepted:
+            self._wake()
+        return accepted
 
     def status(self) -> LinkStatus:
         """Return how the link is now."""
@@ -127,6 +129,11 @@ class Driver:
             os.write(self._wake_write, b'\0')
 
     def _enter(self, state: LinkState, detail: str) -> None:
+        if state is LinkState.RUNNING:
+            self._mailbox.open()
+        elif self._mailbox.close().torque is not None or self._torque_unsent:
+            self._torque_unsent = False
+            detail += '; a change of torque was not sent'
         if (state, detail) != (self._state, self._detail):
             self._state, self._detail = state, detail
             self._on_change(state, detail)
@@ -165,7 +172,6 @@ class Driver:
         except LinkError as error:
             self._enter(LinkState.CONNECTING, str(error))
         finally:
-            self._forget_orders()
             session.port.close()
 
     def _serve(self, session: Session) -> None:
@@ -188,6 +194,7 @@ class Driver:
             step = dialect.step(now)
             if step.send:
                 session.port.write(step.send)
+            self._torque_unsent = dialect.torque_pending
             timeout = min(step.wake, self._deadline(now)) - now
             if session.parser.pending:
                 timeout = min(timeout, QUIET_TIME)
@@ -203,27 +210,20 @@ class Driver:
         state = LinkState.REFUSED if refused else LinkState.STALE
         if state is not self._state:
             self._enter(state, self._silence(refused=refused))
-        # only now: from here on nobody is told that a command will be sent
-        dialect.withdraw()
-        self._forget_orders()
+        dialect.withdraw()  # only now: from here on no order is accepted
 
     def _silence(self, *, refused: bool) -> str:
         what = f'every report is refused, {self._refusal}' if refused else 'no report'
         return f'{what} for {STALE_TIME} s: the servos hold their last target, nothing is sent'
 
-    def _forget_orders(self) -> None:
-        self._mailbox = self._torque = None
-
     def _post(self, dialect: Dialect) -> None:
-        angles, self._mailbox = self._mailbox, None
-        on, self._torque = self._torque, None
-        if self._state is not LinkState.RUNNING:  # it came while the state changed
-            return
-        if angles is not None:
-            dialect.command(angles)
+        orders = self._mailbox.take()
+        if orders.angles is not None:
+            dialect.command(orders.angles)
             self._commands += 1
-        if on is not None:
-            dialect.torque(on=on)
+        if orders.torque is not None:
+            dialect.torque(on=orders.torque)
+            self._torque_unsent = True
 
     def _listen(self, session: Session, timeout: float, bytes_at: float) -> float:
         """Wait for bytes or a command; return when bytes last came [s]."""

@@ -52,6 +52,11 @@ class NewDialect(Dialect):
         """Ids of the motors whose angles the robot reports."""
         return MOTOR_ORDER
 
+    @property
+    def torque_pending(self) -> bool:
+        """Whether a change of torque has not been given to the line yet."""
+        return bool(self._torque)
+
     def command(self, angles: Mapping[int, float]) -> None:
         """Set the angles that are sent at the next step, in one frame."""
         payload = _SERVOS.pack_groups(list(angles.items()))

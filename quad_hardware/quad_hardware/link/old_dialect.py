@@ -98,6 +98,11 @@ class OldDialect(Dialect):
         """Ids of the motors whose angles the robot reports."""
         return BULK_READ_ORDER
 
+    @property
+    def torque_pending(self) -> bool:
+        """Whether a change of torque has not been given to the line yet."""
+        return bool(self._torque)
+
     def command(self, angles: Mapping[int, float]) -> None:
         """Set the angles that are sent when the line is free.
 

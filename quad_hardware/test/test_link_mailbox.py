@@ -1,0 +1,126 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Orders on their way from the node's thread to the driver's: none is lost in silence."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+import sys
+import threading
+
+from hypothesis import given
+from hypothesis import strategies as st
+import pytest
+
+from quad_description import movable_joints, robot_urdf
+from quad_hardware.joints import CommandLimiter, JointMap, servo_of
+from quad_hardware.link import Driver, LinkOptions, LinkState, RobotState
+from quad_hardware.link.mailbox import Mailbox
+from quad_pty_peer import PtyPeer
+
+ROUNDS, ORDERS = 20, 100
+COMMANDS = 5_000
+
+
+@pytest.fixture
+def hurried() -> Iterator[None]:
+    """Let threads take turns as often as can be."""
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    yield
+    sys.setswitchinterval(before)
+
+
+@given(st.lists(st.sampled_from(['open', 'close', 'take', True, False])))
+def test_an_accepted_order_is_taken_replaced_or_returned(script: list[str | bool]) -> None:
+    """Closed, it refuses; closing returns what nobody will send any more."""
+    mailbox, is_open, held = Mailbox(), False, None
+    for event in script:
+        if event == 'open':
+            mailbox.open()
+            is_open = True
+        elif event == 'close':
+            assert mailbox.close().torque is held
+            is_open, held = False, None
+        elif event == 'take':
+            assert mailbox.take().torque is held
+            held = None
+        else:
+            assert mailbox.put_torque(on=bool(event)) == is_open
+            held = bool(event) if is_open else held
+
+
+@pytest.mark.usefixtures('hurried')
+def test_the_last_accepted_order_arrives() -> None:
+    """Whatever the threads do to each other, the newest order is taken, after all others."""
+    mailbox, taken, done = Mailbox(), list[float](), threading.Event()
+    mailbox.open()
+
+    def serve() -> None:
+        while not done.is_set():
+            if (angles := mailbox.take().angles) is not None:
+                taken.append(angles[11])
+
+    for round_ in range(ROUNDS):
+        done.clear()
+        thread = threading.Thread(target=serve)
+        thread.start()
+        for number in range(ORDERS):
+            assert mailbox.put_angles({11: float(ORDERS * round_ + number)})
+        done.set()
+        thread.join()
+        if (angles := mailbox.take().angles) is not None:
+            taken.append(angles[11])
+        assert taken[-1] == ORDERS * round_ + ORDERS - 1
+    assert taken == sorted(taken)
+
+
+def test_a_change_of_torque_that_is_not_sent_is_told(tmp_path: Path) -> None:
+    """It was accepted, and then the conversation broke off: the change of the link says so."""
+    changes: list[tuple[LinkState, str]] = []
+    accepted: list[bool] = []
+
+    def fail_once(_: RobotState) -> str:
+        if not accepted and driver.status().state is LinkState.RUNNING:
+            accepted.append(driver.torque(on=False))
+            raise RuntimeError
+        return ''
+
+    found_again = threading.Event()
+
+    def note(state: LinkState, detail: str) -> None:
+        changes.append((state, detail))
+        if accepted and state is LinkState.RUNNING:
+            found_again.set()
+
+    with PtyPeer(tmp_path / 'port') as peer:
+        driver = Driver(LinkOptions(str(peer.link)), fail_once, note)
+        driver.start()
+        assert found_again.wait(15.0), changes
+        driver.stop()
+        assert accepted == [True]
+        assert peer.torque
+    (failure,) = [detail for state, detail in changes if state is LinkState.FAILED]
+    assert 'torque' in failure
+
+
+@pytest.mark.usefixtures('hurried')
+def test_a_lost_robot_may_be_told_in_the_midst_of_a_command() -> None:
+    """The driver's thread ends the stream while the node's takes a command of it."""
+    joints = JointMap(servo_of(joint) for joint in movable_joints(robot_urdf('lite')))
+    limiter, done = CommandLimiter(joints), threading.Event()
+    place = [0.5] * len(joints.names)
+
+    def lose() -> None:
+        while not done.is_set():
+            limiter.reset()
+
+    thread = threading.Thread(target=lose)
+    thread.start()
+    try:
+        for step in range(COMMANDS):
+            assert len(limiter.step(place, place, 0.02 * step).targets) == len(place)
+    finally:
+        done.set()
+        thread.join()
