@@ -9,7 +9,7 @@ PYTHON ?=
 DURATION ?=
 # a robot of arm_bringup, or the path of a robot folder
 ROBOT ?= panda
-# what pytest gets besides: make test ARGS='-k sync -x'
+# what pytest gets besides: make test ARGS='-k sync -x'; one after another: ARGS=-n0
 ARGS ?=
 
 WORKSPACE = cd tools && $(or $(PYTHON),python3) -m workspace $(if $(PYTHON),--python $(PYTHON))
@@ -45,7 +45,7 @@ demo-arm: system
 
 test: system
 	@$(WORKSPACE) build --dev
-	@$(IN_ENVIRONMENT) python -m pytest $(ARGS)
+	@$(IN_ENVIRONMENT) python -m pytest -n auto --dist loadgroup $(ARGS)
 
 build: system
 	@$(WORKSPACE) build

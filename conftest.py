@@ -9,6 +9,7 @@ name of the Python package inside it, which would then be hidden; so the real on
 
 from collections.abc import Iterator
 import importlib
+import os
 from pathlib import Path
 
 from hypothesis import settings
@@ -22,6 +23,12 @@ for _marker in Path(__file__).parent.glob('*/resource/*'):
 # how long an example takes says more about the machine than about the code
 settings.register_profile('workspace', deadline=None)
 settings.load_profile('workspace')
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers() -> int:
+    """Take two workers a core: half of the tests wait for processes, deadlines and the bus."""
+    return 2 * len(os.sched_getaffinity(0))
 
 
 @pytest.fixture

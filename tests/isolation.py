@@ -7,8 +7,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+import itertools
 import os
 import socket
+
+DOMAINS = 100  # above, DDS ports run into the ephemeral ones
+RESERVATIONS = 24500  # a TCP port for each domain; who holds it has the domain
+
+_turn = itertools.count(os.getpid())
 
 
 @dataclass(frozen=True)
@@ -17,11 +23,19 @@ class Isolation:
 
     Attributes:
         domain_id: A ROS domain that no other test of this machine uses at the moment.
-        bus: Name of a CAN bus of the same kind.
     """
 
     domain_id: int
-    bus: str
+
+    @property
+    def bus(self) -> str:
+        """Name of a CAN bus of the same kind."""
+        return f'udp_multicast:239.74.{self.domain_id}.2:{43200 + self.domain_id}'
+
+    @property
+    def second_bus(self) -> str:
+        """Name of another one."""
+        return f'udp_multicast:239.74.{self.domain_id}.3:{43300 + self.domain_id}'
 
     @property
     def env(self) -> dict[str, str]:
@@ -35,13 +49,21 @@ class Isolation:
 
 @contextmanager
 def reserve() -> Iterator[Isolation]:
-    """Reserve a ROS domain and a CAN bus, also against a suite side by side."""
+    """Reserve a ROS domain and a CAN bus, against all processes of this machine that do the same.
+
+    A domain is used again as late as possible: who comes into one right behind a test still hears
+    of that test's nodes.
+
+    Raises:
+        RuntimeError: Every domain is reserved.
+    """
     with socket.socket() as reservation:
-        for domain_id in range(1, 101):  # above, DDS ports run into the ephemeral ones
+        for _ in range(DOMAINS):
+            domain_id = 1 + next(_turn) % DOMAINS
             try:
-                reservation.bind(('127.0.0.1', 24500 + domain_id))
+                reservation.bind(('127.0.0.1', RESERVATIONS + domain_id))
             except OSError:
                 continue
-            yield Isolation(domain_id, f'udp_multicast:239.74.{domain_id}.2:{43200 + domain_id}')
+            yield Isolation(domain_id)
             return
     raise RuntimeError('all ROS domains are taken; do tests of this machine hang?')

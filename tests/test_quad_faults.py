@@ -16,7 +16,7 @@ from simulated_quad import SimulatedQuad
 from quad_bringup.demo.track import tilt_of
 from quad_msgs.msg import JointCommand
 
-pytestmark = pytest.mark.scenario
+pytestmark = [pytest.mark.scenario, pytest.mark.xdist_group('quad_faults')]
 
 LARGEST_STEP = 23.0
 """Degrees between two commands to a servo; the trot needs half of it, a jump would be more."""

@@ -62,7 +62,9 @@ def test_ranges_of_the_gp110_are_those_of_its_data_sheet() -> None:
     assert np.degrees(limits.velocity) == pytest.approx([140, 110, 130, 175, 175, 255], abs=0.01)
 
 
-@pytest.mark.parametrize('model', [*map(robot, ROBOTS), *map(chain, CHAINS)], ids=str)
+@pytest.mark.parametrize(
+    'model', [*map(robot, ROBOTS), *map(chain, CHAINS)], ids=[*ROBOTS, *CHAINS]
+)
 @settings(max_examples=15, deadline=None)
 @given(seed=st.integers(0, 10**6))
 def test_jacobians_are_differences(model: RobotModel, seed: int) -> None:

@@ -22,7 +22,7 @@ from quad_hardware.joints.command import LONGEST_PERIOD
 from quad_hardware.protocol import BULK_READ_ORDER, MOTOR_ORDER, NEW, OLD, Protocol
 from quad_node_rig import NodeRig, TIMEOUT
 
-pytestmark = pytest.mark.scenario
+pytestmark = [pytest.mark.scenario, pytest.mark.xdist_group('hardware_node')]
 
 HOME = [0.0] * 12
 POSE = [0.0, 0.6, -0.3] * 4

@@ -16,7 +16,7 @@ from quad_hardware.joints.command import LONGEST_PERIOD
 from quad_msgs.srv import InjectFault
 from quad_node_rig import TIMEOUT, XgoRig
 
-pytestmark = pytest.mark.scenario
+pytestmark = [pytest.mark.scenario, pytest.mark.xdist_group('hardware_with_xgo')]
 
 NAMES = [joint.name for joint in movable_joints(robot_urdf('lite'))]
 STAND = [pose_positions(Pose.STAND)[name] for name in NAMES]

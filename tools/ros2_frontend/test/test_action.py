@@ -16,7 +16,7 @@ from isolation import reserve
 from processes import RunningProcess
 import pytest
 
-pytestmark = pytest.mark.scenario
+pytestmark = [pytest.mark.scenario, pytest.mark.xdist_group('frontend_action')]
 
 SUCCESS = """\
 Waiting for an action server to become available...
