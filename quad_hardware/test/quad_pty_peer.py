@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from typing_extensions import Self
 
 PUSH_PERIOD = 0.02  # [s]
+PACKET = 62  # [B] that an FTDI adapter sends at once; fewer wait for its latency timer
 
 
 @dataclass
@@ -51,11 +52,13 @@ class Behaviour:
         silent: It hears, and says nothing.
         corrupt: Share of the bytes sent that are damaged.
         attitude: Roll, pitch, yaw [deg].
+        latency: Latency timer of the adapter between robot and host [s]; 0 for none.
     """
 
     silent: bool = False
     corrupt: float = 0.0
     attitude: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    latency: float = 0.0
 
 
 @dataclass
@@ -81,6 +84,8 @@ class PtyPeer:
     torque: bool = True
     _pushing: bool = False
     _sequence: int = 0
+    _adapter: bytearray = field(default_factory=bytearray)
+    _sent_at: float = 0.0
 
     def __post_init__(self) -> None:
         self._stop = threading.Event()
@@ -115,7 +120,8 @@ class PtyPeer:
         parser = StreamParser(self.protocol, HOST_KINDS)
         next_push = time.monotonic()
         while not self._stop.is_set():
-            ready, _, _ = select.select([self._master], [], [], 0.005)
+            ready, _, _ = select.select([self._master], [], [], 0.001 if self._adapter else 0.005)
+            self._deliver()
             if ready:
                 for frame in parser.feed(os.read(self._master, 4096)):
                     self._take(frame)
@@ -143,7 +149,18 @@ class PtyPeer:
         for index in range(len(wire)):
             if self._random.random() < self.behaviour.corrupt:
                 wire[index] ^= self._random.randrange(1, 256)
-        os.write(self._master, bytes(wire))
+        self._adapter += wire
+        self._deliver()
+
+    def _deliver(self) -> None:
+        """Send full packets, and the rest when it has waited long enough."""
+        now, latency = time.monotonic(), self.behaviour.latency
+        full = len(self._adapter) - len(self._adapter) % PACKET
+        size = len(self._adapter) if now - self._sent_at >= latency else full
+        if size:
+            os.write(self._master, bytes(self._adapter[:size]))
+            del self._adapter[:size]
+            self._sent_at = now
 
     def _set(self, angles: dict[int, float]) -> None:
         self.angles.update(angles)

@@ -17,9 +17,9 @@ from quad_description import movable_joints, robot_urdf
 from quad_hardware.doctor import Finding, Severity
 from quad_hardware.doctor.graph_checks import check_graph, Observation
 from quad_hardware.doctor.host_checks import check_environment, check_memory
-from quad_hardware.doctor.port_checks import check_port, port_users
+from quad_hardware.doctor.port_checks import check_latency, check_port, port_users
 from quad_hardware.doctor.tree import links_without_place
-from quad_hardware.link import SerialPort
+from quad_hardware.link import latency_timer, SerialPort
 from quad_hardware.protocol import OLD
 from quad_pty_peer import PtyPeer
 
@@ -131,6 +131,18 @@ def test_a_port_is_judged_by_what_answers(tmp_path: Path) -> None:
     plain = tmp_path / 'plain'
     plain.touch()
     assert 'is no device' in str(found(check_port(str(plain)), 'port'))
+
+
+def test_an_adapter_that_keeps_bytes_back_is_found(tmp_path: Path) -> None:
+    """By what the kernel says of its latency timer; other ports have none."""
+    timer = tmp_path / 'ttyUSB0' / 'device' / 'latency_timer'
+    timer.parent.mkdir(parents=True)
+    for text, severity in (('16\n', Severity.WARNING), ('1\n', Severity.GOOD)):
+        timer.write_text(text)
+        latency = latency_timer('/dev/ttyUSB0', tmp_path)
+        assert found(check_latency('/dev/ttyUSB0', latency), 'adapter').severity is severity
+    assert latency_timer('/dev/ttyAMA0', tmp_path) is None
+    assert list(check_latency('/dev/ttyAMA0', None)) == []
 
 
 def test_a_port_in_use_is_left_alone(isolation: Isolation, tmp_path: Path) -> None:

@@ -176,6 +176,8 @@ def link_status(**changes: object) -> LinkStatus:
         (link_status(state=LinkState.CONNECTING), DiagnosticStatus.ERROR),
         (link_status(state=LinkState.REFUSED), DiagnosticStatus.ERROR),
         (link_status(state=LinkState.FAILED), DiagnosticStatus.ERROR),
+        (link_status(latency=0.001), DiagnosticStatus.OK),
+        (link_status(latency=0.016), DiagnosticStatus.WARN),
         (
             link_status(parser=ParserCounters(frames=1000, bad_checksum=50)),
             DiagnosticStatus.WARN,

@@ -83,6 +83,15 @@ def test_a_robot_is_found_and_reports(rig: Rig) -> None:
     assert [state for state, _ in rig.changes] == [LinkState.WAITING, LinkState.RUNNING]
 
 
+def test_an_adapter_that_keeps_bytes_back_loses_no_frame(rig: Rig) -> None:
+    """The latency timer of FTDI adapters is 16 ms: the rest of a frame comes that much later."""
+    rig.peer.behaviour.latency = 0.016
+    rig.reports(20)
+    status = rig.driver.status()
+    assert status.parser.damaged == status.parser.skipped == 0
+    assert LinkState.STALE not in [state for state, _ in rig.changes]
+
+
 def test_a_command_reaches_the_servos(rig: Rig) -> None:
     """All legs in one frame, and the next reports show it."""
     rig.reports(1)

@@ -14,7 +14,7 @@ from serial.tools import list_ports
 
 from ..estimation.battery import LOW_BATTERY
 from ..exceptions import LinkError, NoAnswerError
-from ..link import ask_battery, connect
+from ..link import ask_battery, connect, latency_problem, latency_timer
 from ..protocol import model_of_firmware, OLD
 from .finding import error, Finding, good, note, warning
 
@@ -46,6 +46,18 @@ def check_port(path: str) -> Iterator[Finding]:
         yield note('port user', f'in use by {", ".join(users)}; the robot was not asked')
         return
     yield from _ask(path)
+    yield from check_latency(path, latency_timer(path))  # opening the port may have mended it
+
+
+def check_latency(path: str, latency: float | None) -> Iterator[Finding]:
+    """Judge the latency timer of an adapter [s], where the port has one."""
+    if latency is None:
+        return
+    what, _, remedy = latency_problem(path, latency).partition(': ')
+    if what:
+        yield warning('adapter', what, remedy)
+    else:
+        yield good('adapter', f'latency timer of {latency * 1e3:.0f} ms')
 
 
 def port_users(device: str) -> Iterator[str]:

@@ -4,6 +4,7 @@
 
 from .dialect import DialectCounters
 from .driver import Driver, STALE_TIME
+from .latency import latency_problem, latency_timer
 from .port import SerialPort
 from .probe import ask, ask_battery, ask_firmware, connect, Connection
 from .session import LinkOptions
@@ -24,4 +25,6 @@ __all__ = [
     'ask_battery',
     'ask_firmware',
     'connect',
+    'latency_problem',
+    'latency_timer',
 ]

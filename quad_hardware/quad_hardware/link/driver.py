@@ -15,6 +15,7 @@ import time
 from ..exceptions import LinkError
 from ..protocol import ParserCounters
 from .dialect import Dialect, DialectCounters
+from .latency import latency_problem, latency_timer
 from .mailbox import Mailbox
 from .session import LinkOptions, open_session, Session
 from .state import RobotState
@@ -23,7 +24,7 @@ from .status import LinkState, LinkStatus
 STALE_TIME = 0.5  # [s] without a report, after which nothing is sent any more
 PROBE_AGAIN = 3.0  # [s] without a report, after which the robot is looked for anew
 RETRY_PERIOD = 0.5  # [s] between attempts to open a port
-QUIET_TIME = 0.015  # [s] longer than a pause inside a frame, shorter than one between states
+QUIET_TIME = 0.03  # [s] longer than a pause inside a frame: the timer of an FTDI adapter is 16 ms
 
 _log = logging.getLogger(__name__)
 
@@ -56,6 +57,7 @@ class Driver:
         self._detail = 'not started'
         self._session: Session | None = None
         self._connections = 0
+        self._latency: float | None = None
         self._commands = 0
         self._dropped = 0
         self._refused = 0
@@ -122,6 +124,7 @@ class Driver:
             parser=session.parser.counters if session else ParserCounters(),
             dialect=session.dialect.counters if session else DialectCounters(),
             refused=self._refused,
+            latency=self._latency,
         )
 
     def _wake(self) -> None:
@@ -179,11 +182,13 @@ class Driver:
         dialect = session.dialect
         self._session = session
         self._connections += 1
-        self._enter(
-            LinkState.WAITING,
+        self._latency = latency_timer(session.port.path)
+        found = (
             f'{session.firmware} on {session.port.path} speaks the {dialect.protocol.name} '
-            f'protocol at {session.port.baud} baud',
+            f'protocol at {session.port.baud} baud'
         )
+        problem = latency_problem(session.port.path, self._latency)
+        self._enter(LinkState.WAITING, '; '.join(filter(None, (found, problem))))
         while not self._stopping.is_set():
             now = time.monotonic()
             if now - self._heard_at > PROBE_AGAIN:

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 import errno
 import os
 from pathlib import Path
@@ -69,6 +70,8 @@ class SerialPort:
             self._serial = serial.Serial(path, baud, timeout=0, exclusive=True)
         except (OSError, ValueError, termios.error) as error:  # a termios.error is no OSError
             raise LinkError(_explain(path, baud, error)) from error
+        with suppress(ValueError):  # most ports know no such mode
+            self._serial.set_low_latency_mode(True)  # an FTDI adapter keeps no bytes back then
         try:
             self._serial.reset_input_buffer()
         except (OSError, termios.error) as error:

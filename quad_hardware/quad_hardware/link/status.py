@@ -40,6 +40,7 @@ class LinkStatus:
         parser: What the parser saw in this connection.
         dialect: What the dialect saw in this connection.
         refused: Reports that could not be, and were not taken.
+        latency: Latency timer of the adapter [s]; None where there is none.
     """
 
     state: LinkState
@@ -54,3 +55,4 @@ class LinkStatus:
     parser: ParserCounters
     dialect: DialectCounters
     refused: int = 0
+    latency: float | None = None

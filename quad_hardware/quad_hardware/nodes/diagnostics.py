@@ -11,7 +11,7 @@ from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
 from ..estimation import Health
 from ..estimation.battery import EMPTY_BATTERY, LOW_BATTERY
-from ..link import LinkState, LinkStatus, RobotState
+from ..link import latency_problem, LinkState, LinkStatus, RobotState
 from ..protocol import Fault, ParserCounters
 
 HOT_SERVO = 65.0  # [°C]
@@ -84,6 +84,8 @@ class LinkDiagnostic:
         if level == DiagnosticStatus.OK and damaged > DAMAGE_SHARE * max(frames, 100):
             level = DiagnosticStatus.WARN
             message = f'{damaged} damaged and {frames} good frames lately; is the cable loose?'
+        if level == DiagnosticStatus.OK and (slow := latency_problem(port, status.latency)):
+            level, message = DiagnosticStatus.WARN, slow
         values = {
             'state': status.state.value,
             'protocol': status.protocol,
@@ -91,6 +93,7 @@ class LinkDiagnostic:
             'firmware': status.firmware,
             'connections': status.connections,
             'report_age': '' if math.isinf(status.age) else f'{status.age:.3f}',
+            'latency_timer': '' if status.latency is None else f'{status.latency:.3f}',
             'reports_refused': status.refused,
             'commands_sent': status.commands,
             'commands_dropped': status.dropped,
