@@ -201,9 +201,6 @@ def test_one_damaged_report_does_not_empty_the_battery() -> None:
 @pytest.mark.parametrize(
     ('change', 'reason'),
     [
-        ({'attitude': (0.0, 1e9, 0.0)}, 'attitude'),
-        ({'attitude': (0.0, math.nan, 0.0)}, 'not finite'),
-        ({'acceleration': (0.0, 0.0, 3e4)}, 'acceleration'),
         ({'positions': {11: 1e5}}, 'motor 11 at'),
         ({'velocities': {12: -1e5}}, 'motor 12 at'),
     ],
@@ -215,6 +212,33 @@ def test_a_report_that_cannot_be_is_refused(change: dict[str, object], reason: s
     for _ in range(PATIENCE + 3):
         assert reason in plausibility.check(replace(STATE, **change))  # type: ignore[arg-type]
     assert plausibility.check(STATE) == ''
+
+
+@pytest.mark.parametrize(
+    'change',
+    [
+        {'attitude': (0.0, 1e9, 0.0)},
+        {'attitude': (0.0, math.nan, 0.0)},
+        {'acceleration': (0.0, 0.0, 3e4)},
+        {'acceleration': (math.inf, 0.0, 0.0)},
+        {'rates': (0.0, 0.0, math.nan)},
+    ],
+)
+def test_a_dead_imu_is_no_reason_to_refuse_the_joints(
+    change: dict[str, tuple[float, float, float]],
+) -> None:
+    """A damaged frame is refused; an IMU that stays so is of no use, and its joints count."""
+    plausibility = Plausibility(LEG_MOTORS)
+    assert plausibility.check(STATE) == ''
+    dead = [replace(STATE, arrival=0.02 * tick, **change) for tick in range(1, 20)]  # type: ignore[arg-type]
+    answers = [bool(plausibility.check(state)) for state in dead]
+    assert answers == [True] * PATIENCE + [False] * (len(dead) - PATIENCE)
+    assert plausibility.imu_problem
+    beyond = replace(dead[-1], positions={11: 1e5})
+    assert 'motor 11' in plausibility.check(beyond)
+    alive = replace(STATE, arrival=0.5, attitude=(0.0, 0.0, 170.0))
+    assert plausibility.check(alive) == ''
+    assert not plausibility.imu_problem
 
 
 @given(st.floats(), st.floats())

@@ -97,7 +97,7 @@ def test_joints_keep_their_order() -> None:
 def imu(estimate: Estimate) -> Imu:
     """The message of an estimate."""
     form = messages.imu_form(estimate, DEVIATIONS, 'imu_link')
-    message: Imu = form.message(STAMP, messages.imu_numbers(estimate))
+    message: Imu = form.message(STAMP, messages.imu_numbers(estimate, IDENTITY))
     return message
 
 

@@ -84,6 +84,18 @@ def test_wrong_commands_move_nothing_and_are_told(rig: NodeRig) -> None:
     rig.client.spin_until(lambda: bool(rig.peer.commands), TIMEOUT, 'right command')
 
 
+def test_with_a_dead_imu_the_joints_are_reported_and_obey(rig: NodeRig) -> None:
+    """No /imu and no /odom, an error that says so, and a command reaches the servos."""
+    rig.peer.behaviour.attitude = (math.nan,) * 3
+    rig.wait_for_status('robot', DiagnosticStatus.ERROR, 'imu')
+    counts = len(rig.heard['/imu']), len(rig.heard['/odom'])
+    rig.stream(POSE, 1.0)
+    assert list(rig.hear('/joint_states', 3).position) == pytest.approx(POSE, abs=0.01)
+    assert (len(rig.heard['/imu']), len(rig.heard['/odom'])) == counts
+    rig.peer.behaviour.attitude = (0.0, 0.0, 0.0)
+    rig.hear('/imu')
+
+
 def test_beyond_limits_is_taken_to_them_and_told(rig: NodeRig) -> None:
     """The servo ends at the limit of the URDF."""
     rig.stream([2.0, *HOME[1:]], 1.0)

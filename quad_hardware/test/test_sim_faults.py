@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 import time
 
@@ -154,6 +155,23 @@ def test_an_empty_battery_is_told() -> None:
     assert (before.battery, after.battery) == (100, 7)
     assert not before.faults & Fault.LOW_BATTERY
     assert after.faults & Fault.LOW_BATTERY
+
+
+def test_a_dead_imu_says_no_number_and_the_servos_obey() -> None:
+    """The fault bit says so, angles go on, and a servo goes where it is told."""
+    robot = VirtualRobot(*KINEMATIC, '--fault', 'imu,at=0.5,for=1')
+    robot.send(ON)
+    before, *_, dead = (decode_feedback(frame.payload) for frame in robot.run(1.0))
+    assert not before.faults & Fault.IMU
+    assert all(map(math.isfinite, before.attitude))
+    assert dead.faults & Fault.IMU
+    assert all(map(math.isnan, dead.attitude))
+    robot.send(
+        Frame(Kind.WRITE, Code.SERVO, NEW.functions[Code.SERVO].pack(motor=(11,), angle=(20.0,)))
+    )
+    *_, after = (decode_feedback(frame.payload) for frame in robot.run(1.0))
+    assert after.position[0] == pytest.approx(20.0, abs=1.0)
+    assert not after.faults & Fault.IMU
 
 
 def test_a_limp_servo_gives_way_and_comes_back() -> None:

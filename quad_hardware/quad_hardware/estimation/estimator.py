@@ -54,7 +54,8 @@ class Estimate:
         time: When it was made, on the monotonic clock [s].
         positions: By joint [rad], of the gripper [m]; joints that are not reported are missing.
         velocities: Of the same joints [rad/s], [m/s].
-        attitude: From base_link to the world, (x, y, z, w); its yaw is the robot's.
+        attitude: From base_link to the world, (x, y, z, w); its yaw is the robot's. None while
+            the IMU is of no use; rate and acceleration are None, too.
         angular_velocity: Of the body, in base_link [rad/s]; None when it is not wanted.
         rate_measured: The angular velocity is that of a gyro.
         acceleration: Specific force in base_link [m/s²]; None where it is not reported.
@@ -63,7 +64,7 @@ class Estimate:
     time: float
     positions: dict[str, float]
     velocities: dict[str, float]
-    attitude: Quaternion
+    attitude: Quaternion | None
     angular_velocity: Vector | None
     rate_measured: bool
     acceleration: Vector | None
@@ -79,12 +80,14 @@ class Health:
             and without an accelerometer.
         refused: Reports that could not be.
         refusal: Why the last of them could not be.
+        imu_problem: Why the IMU is of no use; empty while it works.
     """
 
     battery: Battery
     gravity_error: float | None
     refused: int
     refusal: str
+    imu_problem: str = ''
 
 
 class Estimator:
@@ -130,13 +133,15 @@ class Estimator:
             self.refusal = reason
             return None
         time = self._clock.time(state)
-        roll, pitch, yaw = map(math.radians, state.attitude)
-        attitude = from_roll_pitch_yaw(roll, pitch, yaw)
         positions = self._joints.positions(state.positions)
         velocities = self._joints.velocities(state.velocities)
         if not velocities:
             velocities = self._joint_rate.update(time, positions)
         self._battery.take(state)
+        if self._plausibility.imu_problem:
+            return Estimate(time, positions, velocities, None, None, False, None)
+        roll, pitch, yaw = map(math.radians, state.attitude)
+        attitude = from_roll_pitch_yaw(roll, pitch, yaw)
         self._gravity.take(attitude, state.acceleration)
         rate, measured = self._angular_velocity(time, attitude, state)
         return Estimate(
@@ -149,15 +154,22 @@ class Estimator:
             acceleration=state.acceleration,
         )
 
-    def walk(self, estimate: Estimate) -> OdometryState:
-        """Return where the body is by an estimate, to be called once for each."""
+    def walk(self, estimate: Estimate) -> OdometryState | None:
+        """Return where the body is by an estimate, to be called once for each.
+
+        None without an attitude, for nobody knows the heading then.
+        """
+        if estimate.attitude is None:
+            return None
         positions = estimate.positions
         placed = [positions.get(name, 0.0) for name in self._joints.names]
         return self._odometry.update(estimate.time, self._feet.poses(placed), estimate.attitude)
 
     def health(self) -> Health:
         """Return how the robot is, by its latest reports."""
-        return Health(self._battery.state, self._gravity.error, self._refused, self.refusal)
+        imu_problem = self._plausibility.imu_problem
+        error = None if imu_problem else self._gravity.error
+        return Health(self._battery.state, error, self._refused, self.refusal, imu_problem)
 
     def _angular_velocity(
         self, time: float, attitude: Quaternion, state: RobotState

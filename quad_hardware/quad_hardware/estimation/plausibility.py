@@ -16,11 +16,19 @@ LARGEST_JUMP = 60.0  # [deg] between reports; a servo does 12 degrees in 20 ms
 LARGEST_LAG = 0.1  # [s] between the robot's clock and ours from one report to the next
 JUMP_TIME = 0.1  # [s] after which anything may have happened
 NOT_FINITE = 'a number is not finite'
-PATIENCE = 2  # reports in a row that are refused for a jump, before it is believed
+PATIENCE = 2  # doubtful reports in a row that are refused, before they are believed
 
 
 class Plausibility:
-    """Says what is wrong with a report, if anything, as far as the robot has these motors."""
+    """Says what is wrong with a report, if anything, as far as the robot has these motors.
+
+    A jump, or an IMU that reports what cannot be, may be a damaged frame; when it lasts it is so.
+    Joints that cannot be are never believed.
+
+    Attributes:
+        imu_problem: Why attitude and acceleration of the last report that could be are of no use;
+            empty while the IMU works.
+    """
 
     def __init__(self, motors: Collection[int]) -> None:
         """Begin without a report.
@@ -31,30 +39,24 @@ class Plausibility:
         self._motors = tuple(motors)
         self._last: RobotState | None = None
         self._refused = 0
+        self.imu_problem = ''
 
     def check(self, state: RobotState) -> str:
         """Return why a report cannot be; empty when it can."""
-        reason = self._impossible(state)
-        if reason:
+        if reason := self._joint_problem(state):
             return reason
-        last = self._last
-        if last is not None and state.arrival - last.arrival < JUMP_TIME:
-            reason = self._jump(last, state)
-        if reason and self._refused < PATIENCE:
+        imu, last = _imu_problem(state), self._last
+        doubt = '' if self.imu_problem else imu
+        if not doubt and last is not None and state.arrival - last.arrival < JUMP_TIME:
+            doubt = self._jump(last, state, attitude=not (imu or self.imu_problem))
+        if doubt and self._refused < PATIENCE:
             self._refused += 1
-            return reason
+            return doubt
         self._refused = 0
-        self._last = state
+        self._last, self.imu_problem = state, imu
         return ''
 
-    def _impossible(self, state: RobotState) -> str:
-        felt = state.acceleration or (0.0, 0.0, 0.0)
-        if not all(map(math.isfinite, (*state.attitude, *felt))):
-            return NOT_FINITE
-        if math.hypot(*felt) > LARGEST_ACCELERATION:
-            return f'acceleration {felt} m/s²'
-        if max(map(abs, state.attitude)) > 360.0:
-            return f'attitude {state.attitude} deg'
+    def _joint_problem(self, state: RobotState) -> str:
         for name, values, most in (
             ('deg', state.positions, SERVO_REACH),
             ('deg/s', state.velocities, LARGEST_SPEED),
@@ -66,7 +68,7 @@ class Plausibility:
                     return f'motor {motor} at {value:.4g} {name}' if finite else NOT_FINITE
         return ''
 
-    def _jump(self, last: RobotState, state: RobotState) -> str:
+    def _jump(self, last: RobotState, state: RobotState, *, attitude: bool) -> str:
         for motor in self._motors:
             angle = state.positions.get(motor)
             if angle is None:
@@ -74,10 +76,21 @@ class Plausibility:
             if abs(angle - last.positions.get(motor, angle)) > LARGEST_JUMP:
                 return f'motor {motor} jumped to {angle:.4g} deg'
         for name, before, now in zip('rpy', last.attitude, state.attitude, strict=True):
-            if abs(math.remainder(now - before, 360.0)) > LARGEST_JUMP:
+            if attitude and abs(math.remainder(now - before, 360.0)) > LARGEST_JUMP:
                 return f'attitude {name} jumped to {now:.4g} deg'
         if last.device_time is not None and state.device_time is not None:
             passed = math.remainder(state.device_time - last.device_time, DEVICE_TIME_WRAP)
             if abs(passed - (state.arrival - last.arrival)) > LARGEST_LAG:
                 return f'the clock of the robot went on by {passed:.3f} s'
         return ''
+
+
+def _imu_problem(state: RobotState) -> str:
+    felt = state.acceleration or (0.0, 0.0, 0.0)
+    if not all(map(math.isfinite, (*state.attitude, *felt, *(state.rates or ())))):
+        return f'imu: {NOT_FINITE}'
+    if math.hypot(*felt) > LARGEST_ACCELERATION:
+        return f'imu: acceleration {felt} m/s²'
+    if max(map(abs, state.attitude)) > 360.0:
+        return f'imu: attitude {state.attitude} deg'
+    return ''

@@ -229,12 +229,9 @@ class OldDialect(Dialect):
         if self._speed != _BOARDS_OWN:
             self._speed = _FORGOTTEN
 
-    def _report(self, imu: bytes, now: float) -> RobotState | None:
+    def _report(self, imu: bytes, now: float) -> RobotState:
         angles, self._angles = self._angles or b'', None
         values = _IMU.unpack(imu)
-        if not all(math.isfinite(value) for value in values['attitude']):
-            self._counters.unusable += 1
-            return None
         self._counters.states += 1
         pairs = zip(BULK_READ_ORDER, angles, strict=True)
         return RobotState(

@@ -19,7 +19,8 @@ class RobotState:
     Attributes:
         arrival: When its last byte came, on the monotonic clock [s].
         wire_time: How long its bytes were on the line [s].
-        attitude: Roll, pitch, yaw of the body about fixed axes x, y, z [deg].
+        attitude: Roll, pitch, yaw of the body about fixed axes x, y, z [deg]; of a dead IMU,
+            anything.
         acceleration: Specific force x, y, z [m/s²]; +9.8 upwards at rest; None where it is not
             reported.
         positions: Servo angles by motor id [deg]; of a motor that is not fitted, anything.

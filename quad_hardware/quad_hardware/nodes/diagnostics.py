@@ -129,6 +129,9 @@ def robot_diagnostic(node: str, port: str, state: RobotState, health: Health) ->
         level = DiagnosticStatus.ERROR if empty else DiagnosticStatus.WARN
         message = f'battery at {charge:.0f} %; charge it'
     faults = Fault(state.faults & sum(Fault))
+    if health.imu_problem:
+        level = DiagnosticStatus.ERROR
+        message = f'{health.imu_problem}; lie down, then switch the robot off and on'
     if faults:
         level = DiagnosticStatus.ERROR
         message = f'the robot reports {"; ".join(FAULTS[f] for f in Fault if f in faults)}'

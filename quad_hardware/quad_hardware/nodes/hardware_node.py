@@ -23,7 +23,7 @@ from node_runner import destroyed_when_refused, run_program, spin
 from node_runner.wire import Reader, Stream
 from quad_msgs.msg import JointCommand
 
-from ..estimation import Estimate, Estimator
+from ..estimation import Estimate, Estimator, OdometryState
 from ..exceptions import CommandError, HardwareError
 from ..joints import Command, CommandLimiter
 from ..link import Driver, LinkState, RobotState, STALE_TIME
@@ -110,18 +110,25 @@ class HardwareNode(Node):
             stamp,
             messages.joint_numbers(estimate),
         )
+        way = self._estimator.walk(estimate)
+        if estimate.attitude is None or way is None:
+            self.get_logger().error(
+                f'no /imu, /odom and transforms: {self._estimator.health().imu_problem}; the '
+                'joints are published, and the robot can lie down',
+                throttle_duration_sec=WARN_PERIOD,
+            )
+            return ''
         self._imu.publish(
             messages.imu_form(estimate, settings.deviations, settings.frames.imu),
             stamp,
-            messages.imu_numbers(estimate),
+            messages.imu_numbers(estimate, estimate.attitude),
         )
-        self._publish_way(estimate, stamp)
+        self._publish_odometry(estimate, way, stamp)
         return ''
 
-    def _publish_way(self, estimate: Estimate, stamp: int) -> None:
+    def _publish_odometry(self, estimate: Estimate, way: OdometryState, stamp: int) -> None:
         """Publish where the body is."""
         deviations, frames = self._settings.deviations, self._settings.frames
-        way = self._estimator.walk(estimate)
         self._odom.publish(
             messages.odometry_form(estimate, deviations, frames),
             stamp,

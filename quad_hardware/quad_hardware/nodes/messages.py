@@ -109,10 +109,10 @@ def imu_form(estimate: Estimate, deviations: Deviations, frame: str) -> ImuForm:
     )
 
 
-def imu_numbers(estimate: Estimate) -> Numbers:
+def imu_numbers(estimate: Estimate, attitude: Rotation) -> Numbers:
     """Return what :class:`ImuForm` takes; zeros for what is not measured."""
     rate, force = estimate.angular_velocity or _ZERO, estimate.acceleration or _ZERO
-    return (*estimate.attitude, *rate, *force)
+    return (*attitude, *rate, *force)
 
 
 @dataclass(frozen=True, slots=True)

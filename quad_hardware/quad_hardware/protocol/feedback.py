@@ -5,12 +5,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-import math
 
-from ..exceptions import CodecError
 from .frame import Frame
 from .function_table import SLOTS, STATE
-from .schema import Kind, Scalar
+from .schema import Kind
 
 Vector = tuple[float, float, float]
 Slots = tuple[float, ...]
@@ -76,26 +74,15 @@ class Feedback:
         return Frame(Kind.PUSH, STATE.address, payload)
 
 
-# the unfused attitude is nobody's, and a slot may be that of a motor that is not fitted
-_MAY_BE_ANYTHING = ('euler1', 'position', 'velocity')
-_MUST_BE_FINITE = [
-    field.name
-    for field in STATE.fields
-    if field.scalar is Scalar.F32 and field.name not in _MAY_BE_ANYTHING
-]
-
-
 def decode_feedback(payload: bytes) -> Feedback:
-    """Decode the payload of a state frame; a slot may hold what is no finite number.
+    """Decode the payload of a state frame.
+
+    What a dead IMU reports, or the slot of a motor that is not fitted, may be no finite number.
 
     Raises:
-        CodecError: The payload has another length, or a number of the body is not finite.
+        CodecError: The payload has another length.
     """
     values = STATE.unpack(payload)
-    for name in _MUST_BE_FINITE:
-        # a sum is not finite when one of its numbers is not
-        if not math.isfinite(sum(values[name])):
-            raise CodecError(f'state frame: {name} holds {values[name]}: no finite numbers')
     return Feedback(
         battery=int(values['battery'][0]),
         mode=int(values['mode'][0]),

@@ -48,6 +48,7 @@ class Board:
         model: Whose ranges scale bytes.
         firmware: Version as the board tells it.
         lost_time: Time that was skipped because the process was held up [s].
+        imu_failed: Whether the attitude is no number.
     """
 
     def __init__(
@@ -82,6 +83,7 @@ class Board:
         self.model = model
         self.firmware = firmware or FIRMWARE[model]
         self.lost_time = 0.0
+        self.imu_failed = False
         self._plant = plant
         self._efforts = [joint.effort for joint in joints]
         self._with_arm = len(joints) > len(pose_positions(Pose.STAND))
@@ -149,6 +151,8 @@ class Board:
 
     def attitude(self, measured: Measurement) -> Vector:
         """Return roll, pitch and yaw from the origin [deg]."""
+        if self.imu_failed:
+            return math.nan, math.nan, math.nan
         roll, pitch, yaw = measured.imu.roll_pitch_yaw
         yaw = math.remainder(yaw - self._yaw_origin, 2.0 * math.pi)
         return math.degrees(roll), math.degrees(pitch), math.degrees(yaw)
@@ -178,6 +182,8 @@ class Board:
             faults |= Fault.OVERLOAD
         if self.servos.failed is not None:
             faults |= Fault.SERVO_SILENT
+        if self.imu_failed:
+            faults |= Fault.IMU
         return faults
 
     # -- who moves the servos

@@ -27,6 +27,7 @@ class FaultKind(Enum):
     BROWN_OUT = 'brown_out'  # the supply fails: the board starts anew, its servos without torque
     UNPLUG = 'unplug'  # the serial port is gone
     LIMP = 'limp'  # a servo lets go, and the board says that one is silent
+    IMU = 'imu'  # the IMU is dead: the board reports an attitude that is no number
     BATTERY = 'battery'  # the charge is another one from now on
 
 

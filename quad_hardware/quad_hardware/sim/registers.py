@@ -121,7 +121,7 @@ class Registers:
             return function.pack(value=(degrees,))
         if address in _WHOLE_DEGREES:
             degrees = board.attitude(board.measure())[_WHOLE_DEGREES[address]]
-            return function.pack(value=(round(degrees),))
+            return function.pack(value=(round(degrees) if math.isfinite(degrees) else 0,))
         if address == _TURN:
             return b'\x00' if board.turning else b'\x01'  # 1: done
         return bytes(function.length)

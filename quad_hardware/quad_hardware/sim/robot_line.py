@@ -206,4 +206,5 @@ class RobotLine:
         limp = active(FaultKind.LIMP, now)
         if self._powered:
             self._board.servos.fail(None if limp is None else int(limp['motor']))
+        self._board.imu_failed = active(FaultKind.IMU, now) is not None
         self._plugged = active(FaultKind.UNPLUG, now) is None
