@@ -33,6 +33,7 @@ from arm_canopen.device.runner import DeviceRunner
 from arm_canopen.master.process_image import ProcessImage, SyncRound
 from arm_canopen.master.scheduler import Promise, Scheduler
 from arm_canopen.master.sdo_client import SdoClient
+from arm_canopen.standard.objects import is_controlword
 from arm_canopen.standard.pdo import MappedObject
 
 EDS = Path(__file__).parents[1] / 'eds' / 'cia402_drive.eds'
@@ -58,7 +59,10 @@ def image() -> ProcessImage:
         return PdoConfig(2, True, cob_id, 1, mapping=mapping)
 
     return ProcessImage(
-        (pdo(TPDO, FEEDBACK),), (pdo(RPDO, COMMAND),), SyncRound(lambda: None), send_last=0x6040
+        (pdo(TPDO, FEEDBACK),),
+        (pdo(RPDO, COMMAND),),
+        SyncRound(lambda: None),
+        send_last=is_controlword,
     )
 
 

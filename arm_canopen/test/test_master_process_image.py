@@ -17,6 +17,7 @@ from arm_canopen.config.model import PdoConfig
 from arm_canopen.master.process_image import Input, ProcessImage, SyncRound
 from arm_canopen.master.start_values import start_value
 from arm_canopen.standard.datatypes import DataType
+from arm_canopen.standard.objects import is_controlword
 from arm_canopen.standard.pdo import MappedObject
 
 CONTROLWORD, MODE, TARGET, VELOCITY = 0x6040, 0x6060, 0x607A, 0x60FF
@@ -36,7 +37,7 @@ def image(
     tpdos: tuple[PdoConfig, ...] = TPDOS, rpdos: tuple[PdoConfig, ...] = RPDOS
 ) -> ProcessImage:
     """Return the image of a device."""
-    return ProcessImage(tpdos, rpdos, SyncRound(lambda: None), send_last=CONTROLWORD)
+    return ProcessImage(tpdos, rpdos, SyncRound(lambda: None), send_last=is_controlword)
 
 
 @given(st.integers(0, 0xFFFF), st.integers(-128, 127), INT32, INT32)
@@ -110,8 +111,7 @@ def test_what_no_pdo_carries_has_no_place() -> None:
     assert entries.reader(CONTROLWORD) is None
     assert entries.writer(0x6041) is None
     assert entries.writer(0x60C1, 2) is None
-    assert entries.output_of(TARGET) is entries.outputs[0]
-    assert entries.output_of(0x6071) is None
+    assert entries.commanded(0x6071) is None
 
 
 def test_values_are_unknown_until_they_come_and_after_a_restart() -> None:

@@ -59,6 +59,7 @@ class Drive(ModedDrive):
         self._streamed = False
         self._failure = ''
         self._controlword = 0
+        self._mode_shown = self._mode_led = self.mode
         self._begun = False
         self._announced = False
         self._follows = False
@@ -76,9 +77,13 @@ class Drive(ModedDrive):
     @property
     def stays_enabled(self) -> bool:
         """Whether it is enabled, and no command is on its way that changes that."""
+        return self.state is DriveState.OPERATION_ENABLED and self._commands_enabled
+
+    @property
+    def _commands_enabled(self) -> bool:
+        """Whether the last controlword commands Operation Enabled."""
         enable = int(Command.ENABLE_OPERATION)
-        told = self._controlword & enable == enable
-        return self.state is DriveState.OPERATION_ENABLED and told
+        return self._controlword & enable == enable
 
     @property
     def followable(self) -> bool:
@@ -134,11 +139,11 @@ class Drive(ModedDrive):
         if self.state is DriveState.UNKNOWN:
             command = Command.DISABLE_VOLTAGE
         else:
-            command = self._command()
+            command, edge = self._lead_targets(self._command())
             if command is Command.ENABLE_OPERATION and self.obeys:
                 bits = self._step_mode(now, period)
             else:
-                bits = self._hold_without_target()
+                bits = self._hold_without_target(edge=edge)
         self._send(command, bits)
 
     def fail(self, error: Exception) -> None:
@@ -181,14 +186,36 @@ class Drive(ModedDrive):
         self.halt.release()
         self._streamed = True
 
+    def _lead_targets(self, command: Command) -> tuple[Command, bool]:
+        """Let targets leave a cycle before the mode and the command that make them act.
+
+        RPDOs carry objects in any distribution, so that of one cycle a drive may see the edge
+        before the target.
+
+        Returns:
+            The command of this cycle, and whether it, or the mode, makes targets act that have
+            left before.
+        """
+        if self._mode_led is not self.mode:
+            self._mode_led = self.mode
+            if command is Command.ENABLE_OPERATION and not self._commands_enabled:
+                return Command.SWITCH_ON, False
+            return command, False
+        switching = self._mode_shown is not self.mode
+        self._mode_shown = self.mode
+        enabling = command is Command.ENABLE_OPERATION and not self._commands_enabled
+        return command, switching or enabling
+
     def _send(self, command: Command, bits: int = NO_BITS) -> None:
         self._controlword = int(command) | bits
         self.objects.controlword.write(self._controlword)
-        self.objects.mode.write(int(self.mode.number))
+        self.objects.mode.write(int(self._mode_shown.number))
 
     def _take_over(self) -> None:
         """Go on where another master has left the drive."""
-        if self.adopt():
+        adopted = self.adopt()
+        self._mode_shown = self._mode_led = self.mode
+        if adopted:
             title = mode_title(self.mode.number)
             self.report(Severity.INFO, f'taken over enabled, in mode {title}; it holds')
         else:
@@ -251,5 +278,5 @@ class Drive(ModedDrive):
         self.halt.release()
         self.error = ''
         self._lose_sight()
-        self.mode = self.modes[OperationMode.NO_MODE]
+        self.mode = self._mode_shown = self._mode_led = self.modes[OperationMode.NO_MODE]
         self.released(reason)

@@ -8,7 +8,6 @@ from ..master.process_image import Writer
 from ..master.remote_node import RemoteNode
 from ..standard.drive import drive_state, DriveState, OperationMode
 from ..standard.objects import AXIS_OFFSET, Index
-from ..standard.pdo import SYNCHRONOUS_MAX
 
 
 class DriveObjects:
@@ -97,9 +96,7 @@ class DriveObjects:
         value = self._node.image.commanded(self.at(place[0]), place[1])
         return None if value is None else int(value)
 
-    def waits_for_sync_apart(self, index: int) -> bool:
-        """Whether an object is in a synchronous RPDO that does not carry the controlword."""
-        output = self._node.image.output_of(self.at(index))
-        if output is None or output is self._node.image.output_of(self.at(Index.CONTROLWORD)):
-            return False
-        return output.config.transmission <= SYNCHRONOUS_MAX
+    def must_lead(self, index: int, subindex: int = 0) -> bool:
+        """Whether an object has to leave a cycle before the controlword that commands it."""
+        command = self.at(Index.CONTROLWORD)
+        return not self._node.image.is_applied_first(self.at(index), subindex, command=command)

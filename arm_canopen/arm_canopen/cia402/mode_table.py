@@ -67,8 +67,8 @@ def _position_modes(
 ) -> Iterator[Mode]:
     position = objects.target_writer(Index.TARGET_POSITION)
     if position is not None:
-        apart = objects.waits_for_sync_apart(Index.TARGET_POSITION)
-        yield ProfilePosition(units, position, warn, target_waits_for_sync=apart)
+        leads = objects.must_lead(Index.TARGET_POSITION)
+        yield ProfilePosition(units, position, warn, target_leads=leads)
         yield CyclicPosition(units, position, lambda: parameters().profile)
     interpolation = objects.target_writer(Index.INTERPOLATION_DATA, 1)
     if interpolation is not None:

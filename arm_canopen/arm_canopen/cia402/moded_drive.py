@@ -113,21 +113,26 @@ class ModedDrive(ObservedDrive):
     def _step_mode(self, now: float, period: float) -> int:
         """Advance the mode by a cycle, and the halt; return their bits of the controlword."""
         bits = self.mode.step(now, period, self.statusword)
+        halt = self.halt.bits(self.mode)  # at its end bit 8 goes a cycle after the new target
         if not self.halt.advance(now, self.mode):
             self.mode.brake()
             self.warn(
                 'stays halted: it has not taken its new target (bit 12); ~/disable and ~/enable '
                 'make it forget the moves that it holds'
             )
-        halt = self.halt.bits(self.mode)
-        if halt and self.mode.cyclic:
+        if self.halt.bits(self.mode) and self.mode.cyclic:
             self.mode.preload(self._actual())  # from there it goes on
         return bits | halt
 
-    def _hold_without_target(self) -> int:
-        """Preload what may act on the drive later, and keep up a halt while modes change."""
+    def _hold_without_target(self, *, edge: bool) -> int:
+        """Preload what may act on the drive later, and keep up a halt while modes change.
+
+        Args:
+            edge: The drive is enabled, or its mode switched, by what leaves in this cycle; the
+                targets stay as they left in the one before.
+        """
         held = self.holding_mode
-        if not self._keeps_target:
+        if not edge and not self._keeps_target:
             self._preload_all()
         if held is None or self.goal is not DriveState.OPERATION_ENABLED:
             return NO_BITS

@@ -96,7 +96,7 @@ class ProfilePosition(Mode):
         target: Writer,
         warn: Callable[[str], None],
         *,
-        target_waits_for_sync: bool,
+        target_leads: bool,
     ) -> None:
         """Take the way to 0x607A.
 
@@ -104,10 +104,10 @@ class ProfilePosition(Mode):
             units: Units of the drive.
             target: Writer of 0x607A.
             warn: Takes a warning in words.
-            target_waits_for_sync: 0x607A is in a synchronous RPDO without the controlword. Which
-                of the two a drive looks at first is its own affair, so the value goes ahead.
+            target_leads: The mapping does not make sure that a drive sees 0x607A before bit 4 of
+                the same cycle, so the value leaves a cycle ahead.
         """
-        self._target_waits_for_sync = target_waits_for_sync
+        self._target_leads = target_leads
         self._units = units
         self._target = target
         self._warn = warn
@@ -193,7 +193,8 @@ class ProfilePosition(Mode):
         if self.handshake is Handshake.OFFERED:
             self._watch_acknowledge(now, acknowledged=acknowledged)
         elif self.handshake is Handshake.WRITTEN:
-            self._offer(now, acknowledged=acknowledged)
+            if self._target.delivered:
+                self._offer(now, acknowledged=acknowledged)
         elif self.handshake in (Handshake.WITHDRAWN, Handshake.IMPOSED):
             self._show_edge(now)
         elif self.handshake is Handshake.AWAITED:
@@ -226,7 +227,7 @@ class ProfilePosition(Mode):
         self._target.write(waiting.value)
         self._bits = waiting.move.bits
         self._setpoint = self._reference = waiting.destination
-        if self._target_waits_for_sync:
+        if self._target_leads or not self._target.delivered:
             self.handshake = Handshake.WRITTEN
         else:
             self._offer(now, acknowledged=acknowledged)

@@ -11,7 +11,7 @@ from ..standard.cob_id import CobId, NODE_ID_MAX, NODE_ID_MIN
 from ..standard.dictionary import ObjectDictionary
 from ..standard.lss import UNCONFIGURED
 from ..standard.nmt import NmtCommand, NmtState
-from ..standard.objects import AXIS_OFFSET, Index
+from ..standard.objects import AXES_MAX, AXIS_OFFSET, Index
 from ..standard.sdo import Abort
 from .contact import Contact
 from .drive import Drive
@@ -36,7 +36,6 @@ from .tpdo import TpdoEngine
 
 SYNC_LENGTH_ERROR = 0x8240
 COMMUNICATION_OBJECTS = (0x1000, 0x1FFF)
-AXES_MAX = 8  # in a device (CiA 402-1)
 ALL_OBJECTS = (0x0000, 0xFFFF)
 
 

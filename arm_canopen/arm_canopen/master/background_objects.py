@@ -32,12 +32,19 @@ class BackgroundWriter:
         self._address = (index, subindex)
         self._written: Number | None = None
         self._failing = False
+        self._open = 0
+
+    @property
+    def delivered(self) -> bool:
+        """Whether the device has confirmed the last value."""
+        return not self._open and not self._failing
 
     def write(self, value: Number) -> None:
         """Queue the write unless this is the value that was written last."""
         if value == self._written or not self._node.online:
             return
         self._written = value
+        self._open += 1
         self._node.write_object(*self._address, value).when_done(self._check)
 
     def forget(self) -> None:
@@ -46,6 +53,7 @@ class BackgroundWriter:
         self._failing = False
 
     def _check(self, promise: Promise[None]) -> None:
+        self._open -= 1
         failing, self._failing = self._failing, promise.error is not None
         if promise.error is None or not self._node.online:
             return

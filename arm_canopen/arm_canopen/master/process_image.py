@@ -14,7 +14,7 @@ from typing import Protocol, TypeAlias
 from ..can.frame import Frame
 from ..config.model import PdoConfig
 from ..exceptions import CodecError
-from ..standard.pdo import MappedObject, Number, PdoCodec
+from ..standard.pdo import MappedObject, Number, PdoCodec, SYNCHRONOUS_MAX
 
 EVENT_DRIVEN = 254  # transmission types from which on a PDO has an event timer (CiA 301, table 72)
 EVENT_TIMES = 3  # event times without a PDO after which it counts as stopped
@@ -144,6 +144,11 @@ class Output:
         self._cob_id = config.cob_id
         self._pack = self.codec.pack
 
+    @property
+    def synchronous(self) -> bool:
+        """The device applies it at the next SYNC."""
+        return self.config.transmission <= SYNCHRONOUS_MAX
+
     def frame(self) -> Frame:
         """Return the frame that carries the present values."""
         return Frame(self._cob_id, self._pack(self.values))
@@ -159,6 +164,10 @@ class Reader(Protocol):
 
 class Writer(Protocol):
     """Next value of an object of the device."""
+
+    @property
+    def delivered(self) -> bool:
+        """Whether the last value leaves with the PDOs of this cycle at the latest."""
 
     def write(self, value: Number) -> None:
         """Set the value; it leaves with the next PDO, or by SDO when it changed."""
@@ -186,6 +195,11 @@ class OutputWriter:
         """Point to the object: RPDOs, and its position in each."""
         self._places = [(output.values, position) for output, position in places]
 
+    @property
+    def delivered(self) -> bool:
+        """RPDOs leave in every cycle."""
+        return True
+
     def write(self, value: Number) -> None:
         """Set the value for the next PDOs."""
         for values, position in self._places:
@@ -207,7 +221,7 @@ class ProcessImage:
         sync: SyncRound,
         *,
         start: StartValue = lambda mapped: 0,
-        send_last: int | None = None,
+        send_last: Callable[[int], bool] = lambda index: False,
     ) -> None:
         """Compile the enabled PDOs.
 
@@ -216,13 +230,13 @@ class ProcessImage:
             rpdos: What it receives.
             sync: The round that all TPDOs of the bus belong to.
             start: Tells what an object in an RPDO carries until it is written.
-            send_last: Index of an object whose RPDO leaves after the others, so that a command
-                never overtakes its data.
+            send_last: Tells of an index whether RPDOs with that object leave after the others:
+                commands, which must not overtake their data.
         """
         self.inputs = [Input(pdo, sync) for pdo in tpdos if pdo.enabled and pdo.mapping]
         outputs = [Output(pdo, start) for pdo in rpdos if pdo.enabled and pdo.mapping]
         self.outputs = sorted(
-            outputs, key=lambda output: any(o.index == send_last for o in output.config.mapping)
+            outputs, key=lambda output: any(send_last(o.index) for o in output.config.mapping)
         )
 
     def clear(self) -> None:
@@ -243,11 +257,26 @@ class ProcessImage:
         places = list(self._mapped_outputs(index, subindex))
         return OutputWriter(places) if places else None
 
-    def output_of(self, index: int, subindex: int = 0) -> Output | None:
-        """Return the RPDO that carries an object, None when there is none."""
-        for entry, _ in self._mapped_outputs(index, subindex):
-            return entry
-        return None
+    def is_applied_first(self, index: int, subindex: int, *, command: int) -> bool:
+        """Tell whether a value takes effect no later than a command of the same cycle.
+
+        That is so where one RPDO alone carries the command, and each RPDO with the value is that
+        one or a faster one: event-driven, and sent before it. Several synchronous RPDOs are
+        applied at SYNC in an order that is the device's own affair.
+
+        Args:
+            index: Object with the value.
+            subindex: Its sub-index.
+            command: Object with the command, such as the controlword.
+        """
+        commands = [entry for entry, _ in self._mapped_outputs(command, 0)]
+        if len(commands) != 1:
+            return False
+        before = self.outputs[: self.outputs.index(commands[0])]
+        return all(
+            entry is commands[0] or (entry in before and not entry.synchronous)
+            for entry, _ in self._mapped_outputs(index, subindex)
+        )
 
     def commanded(self, index: int, subindex: int = 0) -> Number | None:
         """Return what the RPDOs carry for an object, None when none carries it."""

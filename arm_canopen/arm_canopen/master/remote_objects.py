@@ -12,7 +12,7 @@ from ..config.model import NodeConfig
 from ..exceptions import CodecError, SdoError
 from ..standard.datatypes import decode, encode, Value
 from ..standard.dictionary import ObjectEntry
-from ..standard.objects import Index
+from ..standard.objects import is_controlword
 from .background_objects import BackgroundReader, BackgroundWriter
 from .events import Event, EventKind, Report, Severity
 from .process_image import ProcessImage, Reader, SyncRound, Writer
@@ -56,7 +56,7 @@ class RemoteObjects:
             config.rpdos,
             sync,
             start=partial(start_value, config),
-            send_last=Index.CONTROLWORD,
+            send_last=is_controlword,
         )
         self.sdo = SdoClient(config.node_id, config.name, scheduler, send)
         self.online = False

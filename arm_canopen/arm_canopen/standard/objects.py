@@ -126,3 +126,10 @@ COMMANDS = frozenset(
 """Objects of the first axis of a drive by which it is commanded in each cycle."""
 
 AXIS_OFFSET = 0x800  # between the objects of two axes of a drive (CiA 402-2, 7.2)
+AXES_MAX = 8  # axes of one device (CiA 402-2, 7.2)
+_CONTROLWORDS = frozenset(Index.CONTROLWORD + AXIS_OFFSET * axis for axis in range(AXES_MAX))
+
+
+def is_controlword(index: int) -> bool:
+    """Tell whether an object is the controlword of one of the axes of a drive."""
+    return index in _CONTROLWORDS
