@@ -458,7 +458,7 @@ def test_units_come_from_the_drive_when_bus_yml_has_none() -> None:
         (0x6092, 2): 1,
     }
     dictionary = with_defaults(drive_dictionary().for_node(NODE_ID), factors)
-    axis = DriveConfig(name=JOINT, units_from_device=True)
+    axis = DriveConfig(name=JOINT, scale_from_factor_group=True)
     config = replace(full_drive(), axes=(axis,), dictionary=dictionary)
     net = VirtualNetwork(bus_config(config))
     net.boot()

@@ -67,8 +67,9 @@ TWO_AXES_EDS = Path(__file__).parents[1] / 'eds' / 'cia402_two_axes.eds'
         ('target_timeout_ms: 50', 'drive.target_timeout', 0.05),
         ('recovery: auto', 'drive.recovery', RecoveryPolicy.AUTO),
         ('quirks: festo_cmmp', 'drive.quirks', 'festo_cmmp'),
-        ('offset_pos_to_dev: 1', 'drive.units_from_device', True),
-        ('scale_pos_to_dev: 2\nscale_pos_from_dev: 0.5', 'drive.units_from_device', False),
+        ('offset_pos_to_dev: 1', 'drive.scale_from_factor_group', False),
+        ('offset_pos_to_dev: 1', 'drive.scale_pos_to_dev', 1000.0),
+        ('scale_from_factor_group: true', 'drive.scale_from_factor_group', True),
     ],
 )
 def test_keys_of_a_device(tmp_path: Path, piece: str, attribute: str, value: object) -> None:
@@ -195,7 +196,7 @@ def test_a_drive_with_two_axes(tmp_path: Path) -> None:
     (node,) = load_text(tmp_path, added('joint1', TWO_AXES), eds=eds).nodes
     assert [(axis.name, axis.channel) for axis in node.axes] == [('shoulder', 0), ('elbow', 1)]
     assert [axis.scale_pos_to_dev for axis in node.axes] == [2.0, 1000.0]
-    assert [axis.units_from_device for axis in node.axes] == [False, True]
+    assert [axis.scale_from_factor_group for axis in node.axes] == [False, False]
     assert [axis.offset_pos_to_dev for axis in node.axes] == [0.0, 7.0]
     assert {axis.homing_timeout for axis in node.axes} == {3.0}
     unnamed = added('joint1', 'num_channels: 2')
@@ -304,7 +305,7 @@ TABLES: list[tuple[tuple[Key, ...], type, set[str]]] = [
     (OPTION_KEYS, Options, set()),
     (MASTER_KEYS, MasterSettings, set()),
     (DEVICE_KEYS, DeviceSettings, set()),
-    (DRIVE_KEYS, DriveConfig, {'name', 'channel', 'units_from_device'}),
+    (DRIVE_KEYS, DriveConfig, {'name', 'channel'}),
     (TPDO_KEYS, PdoConfig, {'number', 'cob_id', 'mapping', 'configured', 'fixed_mapping'}),
     (RPDO_KEYS, PdoConfig, set()),
 ]

@@ -107,6 +107,8 @@ TEXTS: dict[str, str] = {
     'scale_vel_to_dev': 'device velocity per user velocity',
     'scale_pos_from_dev': 'user units per increment',
     'scale_vel_from_dev': 'user velocity per device velocity',
+    'scale_from_factor_group': 'positions in rad by the factor group of the drive (0x608F, '
+    '0x6091, 0x6092, 0x6096), in the place of the scales (our own key)',
     'scale_eff_to_dev': 'device torque per user effort (our own key)',
     'scale_eff_from_dev': 'user effort per device torque; without: the inverse of the other',
     'offset_pos_to_dev': 'added to a target in increments',

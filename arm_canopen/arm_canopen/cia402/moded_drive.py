@@ -108,7 +108,7 @@ class ModedDrive(ObservedDrive):
         Raises:
             DriveError: It is beyond; the message names the limits.
         """
-        check_target(self.name, self.mode, self.parameters, target)
+        check_target(self.name, self.mode, self.parameters, self.units, target)
 
     def _step_mode(self, now: float, period: float) -> int:
         """Advance the mode by a cycle, and the halt; return their bits of the controlword."""

@@ -7,9 +7,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from ..config.drive_model import DriveConfig
+from ..config.drive_units import COARSE_SCALE
 from ..exceptions import SdoError
 from ..master.remote_node import RemoteNode
 from ..master.scheduler import Scheduler, Task
+from ..standard.drive import OperationMode
 from ..standard.objects import AXIS_OFFSET
 from .parameters import DriveParameters, ParameterReader, REFRESHED
 from .units import Units
@@ -45,6 +47,8 @@ class ParameterUpkeep:
         self.told = DriveParameters()
         self.known = False
         self._offset = AXIS_OFFSET * config.channel
+        self._config = config
+        self._units = units
         self._reader = ParameterReader(node, config, units)
         self._scheduler = scheduler
         self._warn = warn
@@ -89,5 +93,19 @@ class ParameterUpkeep:
             self.told = await self._reader.read()
         except SdoError as error:
             return str(error)
+        if not self.known:
+            self._warn_of_silence()
         self.known = True
         return ''
+
+    def _warn_of_silence(self) -> None:
+        """Warn, after a boot, of parameters with which targets would move nothing."""
+        used = self._config.position_mode in (None, OperationMode.PROFILE_POSITION)
+        if used and self.told.profile_velocity_inc == 0:
+            self._warn('its profile velocity (0x6081) is 0: targets of mode 1 are refused')
+        scale = abs(self._units.position_raw(1.0))
+        if self._config.scale_from_factor_group and scale < COARSE_SCALE:
+            self._warn(
+                f'1.0 rad is {scale:g} increments by its factor group: targets between two of '
+                'them are refused'
+            )

@@ -5,10 +5,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-import math
 
 from ..config.drive_model import DriveConfig
-from ..exceptions import CodecError, SdoAbortError
+from ..config.factor_group import FACTOR_OBJECTS, FactorGroup, ratio
+from ..exceptions import CodecError, SdoAbortError, SdoError
 from ..master.remote_node import RemoteNode
 from ..standard.drive import OperationMode
 from ..standard.objects import AXIS_OFFSET, Index
@@ -20,7 +20,6 @@ DEFAULT_VELOCITY = 0.5  # [unit/s] for drives without 0x6081: slow, but moving
 DEFAULT_ACCELERATION = 1.0  # [unit/s^2] for drives without 0x6083
 DEFAULT_PROFILE = ProfileLimits(DEFAULT_VELOCITY, DEFAULT_ACCELERATION, DEFAULT_ACCELERATION)
 DEFAULT_TORQUE_SLOPE_DEV = 1000.0  # [device units/s]: from 0 to the rated torque in a second
-REVOLUTION = 2.0 * math.pi  # [rad]
 
 REFRESHED = frozenset(
     {
@@ -52,6 +51,8 @@ class DriveParameters:
         quick_stop_deceleration: 0x6085 in user units per second squared.
         torque_slope: Greatest change of a torque that the master ramps, in user units per second,
             from 0x6087.
+        profile_velocity_inc: 0x6081 in device units; None when the drive has none, or a PDO
+            carries it.
         units: In words, where the units come from.
     """
 
@@ -63,6 +64,7 @@ class DriveParameters:
     profile: ProfileLimits = DEFAULT_PROFILE
     quick_stop_deceleration: float = DEFAULT_ACCELERATION
     torque_slope: float = DEFAULT_TORQUE_SLOPE_DEV
+    profile_velocity_inc: int | None = None
     units: str = 'bus.yml'
 
     def supports(self, mode: OperationMode) -> bool:
@@ -85,11 +87,11 @@ class ParameterReader:
         self._config = config
         self._units = units
         self._offset = AXIS_OFFSET * config.channel
-        self._units_from = '' if config.units_from_device else 'bus.yml'
+        self._units_from = '' if config.scale_from_factor_group else 'bus.yml'
 
     def forget(self) -> None:
         """Ask for the units again; they do not change while a device runs."""
-        self._units_from = '' if self._config.units_from_device else 'bus.yml'
+        self._units_from = '' if self._config.scale_from_factor_group else 'bus.yml'
 
     async def read(self) -> DriveParameters:
         """Read all of them.
@@ -114,8 +116,14 @@ class ParameterReader:
             profile=profile,
             quick_stop_deceleration=self._in_units(quick_stop, profile.deceleration),
             torque_slope=abs(units.effort_commanded(slope or DEFAULT_TORQUE_SLOPE_DEV)),
+            profile_velocity_inc=await self._profile_velocity(),
             units=self._units_from,
         )
+
+    async def _profile_velocity(self) -> int | None:
+        if self._node.image.output_of(Index.PROFILE_VELOCITY + self._offset) is not None:
+            return None
+        return await self._read(Index.PROFILE_VELOCITY)
 
     async def _position_limits(self) -> tuple[float, float] | None:
         lower = await self._read(Index.SOFTWARE_POSITION_LIMIT, 1)
@@ -143,17 +151,14 @@ class ParameterReader:
 
     async def _read_units(self) -> str:
         """Take the units of the factor group (CiA 402-2, clause 8); say where they are from."""
-        resolution = await self._ratio(Index.POSITION_ENCODER_RESOLUTION)
-        feed = await self._ratio(Index.FEED_CONSTANT)
-        gear = await self._ratio(Index.GEAR_RATIO)
-        # position [user] = internal [inc] * feed / (resolution * gear); without a feed constant
-        # the drive counts increments of its encoder
-        counts = feed if feed is not None else (resolution or 0.0) * (gear or 1.0)
-        if not counts:
-            return 'thousandths, as neither bus.yml nor the drive (0x608F, 0x6092) says'
-        scale = counts / REVOLUTION
-        factor = await self._ratio(Index.VELOCITY_FACTOR)
-        velocity_scale = scale * (factor or 1.0)
+        ratios = {name: await self._ratio(index) for name, index in FACTOR_OBJECTS.items()}
+        factors = FactorGroup(**ratios)
+        scale, velocity_scale = factors.position_scale, factors.velocity_scale
+        if not scale:
+            raise SdoError(
+                'scale_from_factor_group is true in bus.yml, and the drive tells neither 0x6092 '
+                'nor 0x608F; write scale_pos_to_dev and the other scales instead'
+            )
         self._units.use(
             replace(
                 self._config,
@@ -167,11 +172,7 @@ class ParameterReader:
 
     async def _ratio(self, index: int) -> float | None:
         """Read numerator and denominator; None when the drive has no such object."""
-        numerator = await self._read(index, 1)
-        denominator = await self._read(index, 2)
-        if not numerator or not denominator:
-            return None
-        return numerator / denominator
+        return ratio(await self._read(index, 1), await self._read(index, 2))
 
     async def _read(self, index: int, subindex: int = 0) -> int | None:
         profile_index = index + self._offset

@@ -4,38 +4,53 @@
 
 from __future__ import annotations
 
+import math
+
 from ..exceptions import DriveError
 from ..standard.drive import OperationMode
 from .modes import Mode
 from .motion import Setpoint
 from .parameters import DriveParameters
+from .units import Units
 
 VELOCITY_MODES = (
     OperationMode.VELOCITY,
     OperationMode.PROFILE_VELOCITY,
     OperationMode.CYCLIC_VELOCITY,
 )
+EXPRESSIBLE = 0.01  # share by which a coarse target may be rounded
 TORQUE_MODES = (OperationMode.PROFILE_TORQUE, OperationMode.CYCLIC_TORQUE)
 
 
-def check_target(name: str, mode: Mode, told: DriveParameters, target: float) -> None:
-    """Refuse a target beyond the limits that the drive has in a mode.
+def check_target(
+    name: str, mode: Mode, told: DriveParameters, units: Units, target: float
+) -> None:
+    """Refuse a target that the drive would not go to: beyond its limits, or without any effect.
 
     Args:
         name: Name of the drive.
         mode: The mode.
         told: What the drive told about itself.
+        units: Its units.
         target: The target in user units.
 
     Raises:
-        DriveError: It is beyond; the message names the limits.
+        DriveError: It is such a target; the message says why.
     """
     if mode.setpoint is not None:
         _check_position(name, told.position_limits, target)
+        _check_expressible(name, units.position_raw(target), target, 'scale_pos_to_dev')
+        if mode.number is OperationMode.PROFILE_POSITION and told.profile_velocity_inc == 0:
+            raise DriveError(
+                f'{name}: its profile velocity (0x6081) is 0, so it would not move; write it, for '
+                'good in the sdo list of bus.yml'
+            )
     elif mode.number in VELOCITY_MODES:
         _check_size(name, told.speed_limit, target, 'velocity {:g} (0x607F)')
+        _check_expressible(name, units.velocity_raw(target), target, 'scale_vel_to_dev')
     elif mode.number in TORQUE_MODES:
         _check_size(name, told.effort_limit, target, 'torque {:g} (0x6072)')
+        _check_expressible(name, units.effort_raw(target), target, 'scale_eff_to_dev')
 
 
 def check_feed_forward(name: str, told: DriveParameters, setpoint: Setpoint) -> None:
@@ -50,6 +65,18 @@ def _check_position(name: str, limits: tuple[float, float] | None, target: float
             f'{name}: target {target:g} is beyond the software limits '
             f'{limits[0]:g} to {limits[1]:g} (0x607D)'
         )
+
+
+def _check_expressible(name: str, scaled: float, target: float, key: str) -> None:
+    """Refuse what the object cannot express where one of its units is more than a user unit."""
+    if math.isfinite(scaled) and abs(scaled) < abs(target):
+        rounded = round(scaled)
+        if abs(scaled - rounded) > EXPRESSIBLE * abs(rounded):
+            raise DriveError(
+                f'{name}: target {target:g} is {scaled:g} device units, of which the object has '
+                f'whole ones only, so the drive would go to another one; is {key} in bus.yml '
+                'right? It is device units per user unit'
+            )
 
 
 def _check_size(name: str, limit: float | None, target: float, what: str) -> None:

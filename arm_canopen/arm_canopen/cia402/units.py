@@ -49,6 +49,14 @@ class Units:
         scaled = position * config.scale_pos_to_dev + config.offset_pos_to_dev
         return _to_integer(position, scaled, INT32_MAX)
 
+    def position_raw(self, position: float) -> float:
+        """Convert a position to increments without its offset, and without rounding."""
+        return position * self._config.scale_pos_to_dev
+
+    def effort_raw(self, effort: float) -> float:
+        """Convert a torque to device units, whether or not an object can hold it."""
+        return effort * self._config.scale_eff_to_dev
+
     def distance_to_device(self, distance: float) -> int:
         """Convert a distance to the nearest increment; errors as for positions."""
         return _to_integer(distance, distance * self._config.scale_pos_to_dev, INT32_MAX)

@@ -10,6 +10,7 @@ from itertools import groupby
 from pathlib import Path
 
 from ..config.checks import check_file
+from ..config.drive_units import AxisUnits
 from ..config.traffic import LoadEstimate, Traffic
 from .arguments import bitrate, SubParsers
 from .output import counted, RED, say, say_problem, say_table, YELLOW
@@ -42,11 +43,28 @@ def run(options: argparse.Namespace) -> int:
         say_problem(problem, 'error', RED)
     for problem in report.warnings:
         say_problem(problem, 'warning', YELLOW)
+    if report.units:
+        _say_units(report.units)
     if report.load is not None and report.load.traffic:
         _say_load(report.load, each=options.frames)
     errors, warnings = len(report.errors), len(report.warnings)
     say(f'{options.bus_yml}: {counted(errors, "error")}, {counted(warnings, "warning")}')
     return 1 if errors or (options.strict and warnings) else 0
+
+
+def _say_units(units: Iterable[AxisUnits]) -> None:
+    rows = [
+        (
+            axis.name,
+            f'{axis.increments:g}',
+            '?' if axis.radians is None else f'{axis.radians:.4g}',
+            f'{axis.velocity:g}',
+            axis.rule.value,
+        )
+        for axis in units
+    ]
+    head = ('1.0 of', 'increments', 'rad', 'velocity units', 'by')
+    say_table(head, rows, right='increments,rad,velocity units')
 
 
 def _say_load(load: LoadEstimate, *, each: bool) -> None:

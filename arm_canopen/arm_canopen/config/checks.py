@@ -23,6 +23,7 @@ from .check_network import (
 )
 from .check_pdos import check_pdos
 from .check_subject import Subject
+from .drive_units import axis_units, AxisUnits, check_units
 from .findings import Findings, Place
 from .load import read_bus
 from .model import BusConfig, Problem
@@ -33,6 +34,7 @@ HIGH_LOAD = 0.7
 
 DEVICE_CHECKS: tuple[Callable[[Subject], None], ...] = (
     check_drive,
+    check_units,
     check_pdos,
     check_heartbeats,
     check_sync,
@@ -48,11 +50,13 @@ class Report:
         errors: What cannot work.
         warnings: What works, and probably not as it was meant.
         load: What the bus will carry, None when the file could not be read.
+        units: What 1.0 means for each axis of a drive.
     """
 
     errors: tuple[Problem, ...]
     warnings: tuple[Problem, ...]
     load: LoadEstimate | None = None
+    units: tuple[AxisUnits, ...] = ()
 
 
 def check_bus(config: BusConfig, bitrate: int | None = None) -> Report:
@@ -89,7 +93,13 @@ def _report(config: BusConfig, bitrate: int | None, findings: Findings) -> Repor
     load = estimate_load(config, bitrate)
     _check_load(config, load, findings)
     warnings = sorted(findings.warnings, key=lambda problem: (str(problem.file), problem.line))
-    return Report(findings.errors, tuple(warnings), load)
+    units = tuple(
+        axis_units(subject, axis)
+        for subject in subjects
+        if subject.node.is_drive
+        for axis in subject.node.axes
+    )
+    return Report(findings.errors, tuple(warnings), load, units)
 
 
 def _check_load(config: BusConfig, load: LoadEstimate, findings: Findings) -> None:

@@ -3,8 +3,9 @@
 """The keys of a device that ros2_canopen and Lely's dcfgen know.
 
 Names, units and defaults are theirs, so that their files can be read unchanged. Where a default
-differs, ``why`` says the reason. Four keys are our own: ``scale_eff_to_dev``,
-``target_timeout_ms``, ``recovery`` and ``quirks``; of the master ``time_period_ms``.
+differs, ``why`` says the reason. Five keys are our own: ``scale_eff_to_dev``,
+``scale_from_factor_group``, ``target_timeout_ms``, ``recovery`` and ``quirks``; of the master
+``time_period_ms``.
 """
 
 from __future__ import annotations
@@ -127,6 +128,7 @@ DRIVE_KEYS: tuple[Key, ...] = (
     Key('scale_vel_to_dev', Kind.NUMBER, 'scale_vel_to_dev', zero=False),
     Key('scale_pos_from_dev', Kind.NUMBER, 'scale_pos_from_dev', zero=False),
     Key('scale_vel_from_dev', Kind.NUMBER, 'scale_vel_from_dev', zero=False),
+    Key('scale_from_factor_group', Kind.BOOLEAN, 'scale_from_factor_group'),
     Key('scale_eff_to_dev', Kind.NUMBER, 'scale_eff_to_dev', zero=False),
     Key('scale_eff_from_dev', Kind.NUMBER, 'scale_eff_from_dev', zero=False),
     Key('offset_pos_to_dev', Kind.NUMBER, 'offset_pos_to_dev'),
@@ -149,7 +151,7 @@ DRIVE_KEYS: tuple[Key, ...] = (
 )
 
 SCALE_KEYS = ('scale_pos_to_dev', 'scale_pos_from_dev', 'scale_vel_to_dev', 'scale_vel_from_dev')
-"""Without any of them units are those of the drive's factor group."""
+"""What ``scale_from_factor_group`` takes the place of."""
 
 CHANNEL_KEYS: tuple[Key, ...] = tuple(
     key for key in DRIVE_KEYS if key.name.startswith(('scale_', 'offset_'))

@@ -30,8 +30,8 @@ def read_drive(section: Mapping, values: dict[str, Any], findings: Findings) -> 
         values['switching_state'] = DriveState(values['switching_state'])
     if 'recovery' in values:
         values['recovery'] = _policy(section.entries['recovery'], values['recovery'], findings)
-    scaled = any(key in section.entries for key in SCALE_KEYS)
-    return DriveConfig(**_with_inverse_effort(values), units_from_device=not scaled)
+    _check_one_rule(section, values, findings)
+    return DriveConfig(**_with_inverse_effort(values))
 
 
 def read_axes(
@@ -80,8 +80,21 @@ def _axis(drive: DriveConfig, part: Item | None, findings: Findings) -> DriveCon
         )
         return drive
     values = _with_inverse_effort(read_section(part, CHANNEL_KEYS, findings))
-    scaled = any(key in part.entries for key in SCALE_KEYS)
-    return replace(drive, **values, units_from_device=drive.units_from_device and not scaled)
+    _check_one_rule(part, values, findings)
+    if any(key in part.entries for key in SCALE_KEYS):
+        values['scale_from_factor_group'] = False
+    return replace(drive, **values)
+
+
+def _check_one_rule(section: Mapping, values: dict[str, Any], findings: Findings) -> None:
+    """Refuse scales beside those of the factor group."""
+    given = [key for key in SCALE_KEYS if key in section.entries]
+    if given and values.get('scale_from_factor_group'):
+        findings.error(
+            section.entries['scale_from_factor_group'].place,
+            f'the units are given twice: by the factor group of the drive, and by {given[0]}',
+            'remove one of them',
+        )
 
 
 def _with_inverse_effort(values: dict[str, Any]) -> dict[str, Any]:

@@ -27,8 +27,8 @@ class DriveConfig:
         name: Name of the axis: that of the device, of its channel for one with several axes.
         channel: Number of the axis from 0; its objects lie 0x800 * channel above those of the
             first (CiA 402-2, 7.2).
-        units_from_device: bus.yml has no scale, so units are those of the drive's factor group
-            (0x608F, 0x6091, 0x6092, 0x6096), one revolution being 2 pi rad.
+        scale_from_factor_group: Positions are in rad and velocities in rad/s by the drive's factor
+            group (0x608F, 0x6091, 0x6092, 0x6096); the scales are read from the drive.
         scale_pos_to_dev: Device increments per user unit (usually rad).
         scale_vel_to_dev: Device velocity units per user unit per second.
         scale_pos_from_dev: User units per device increment.
@@ -50,7 +50,7 @@ class DriveConfig:
 
     name: str = ''
     channel: int = 0
-    units_from_device: bool = False
+    scale_from_factor_group: bool = False
     scale_pos_to_dev: float = 1000.0
     scale_vel_to_dev: float = 1000.0
     scale_pos_from_dev: float = 0.001
