@@ -39,7 +39,7 @@ LAUNCH_ARGUMENTS = (
     LaunchArgument('gait', '', 'trot, crawl or pace'),
     LaunchArgument('policy', '', 'ONNX policy to load'),
     LaunchArgument('servo', '', 'servo model of a simulated robot'),
-    LaunchArgument('protocol', '', 'auto, new or old'),
+    LaunchArgument('protocol', '', 'auto, new, old or vendor'),
     LaunchArgument('calibration', '', 'parameters of the serial bridge'),
 )
 """What the launch file takes; the port is that of the robot's computer."""

@@ -27,8 +27,8 @@ from .stack import quad_processes, Stack
 
 GAITS = ('trot', 'crawl', 'pace')
 """Gaits of quad_controller."""
-AUTO, NEW = 'auto', 'new'
-PROTOCOLS = (AUTO, NEW, 'old')
+AUTO, NEW, VENDOR = 'auto', 'new', 'vendor'
+PROTOCOLS = (AUTO, NEW, 'old', VENDOR)
 """Serial protocols of quad_hardware."""
 REMEDY = 'another --port and another ROS_DOMAIN_ID'
 """What a second bring-up is told to take."""
@@ -88,7 +88,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         choices=PROTOCOLS,
         default=AUTO,
         help='what is spoken on the serial line; auto asks a real robot, and is new with a '
-        'simulated one (default: %(default)s)',
+        "simulated one; vendor goes through the vendor's xgo_lib2, whose vendor_servo_method is "
+        'given in --calibration (default: %(default)s)',
     )
     add_timeout(parser)
 
@@ -141,6 +142,8 @@ def session(arguments: argparse.Namespace, port: str | None) -> Iterator[Session
 
 
 def _protocol(wanted: str, *, simulate: bool) -> str:
+    if simulate and wanted == VENDOR:
+        raise ArgumentError('--protocol vendor is for a real robot; leave it out, or --simulate')
     # a simulated robot may answer late on a busy machine, which is no reason for the slow protocol
     return NEW if simulate and wanted == AUTO else wanted
 

@@ -118,11 +118,20 @@ def test_shapes_and_answers_are_looked_at() -> None:
 
 
 def test_what_the_file_leaves_open_is_told() -> None:
-    """Without phase period and frame the vendor's are taken, with a warning in the table."""
-    report = str(check(FakeNetwork(metadata(phase_period=None, imu_frame=None))).report)
+    """Without a phase period the vendor's is taken, with a warning in the table."""
+    report = str(check(FakeNetwork(metadata(phase_period=None))).report)
     assert "0.4 s, the vendor's" in report
-    assert "yawed, the vendor's" in report
     assert 'warn' in report
+
+
+def test_the_frame_of_the_imu_is_not_guessed() -> None:
+    """A file that does not say it is refused, with the parameter; the parameter decides."""
+    silent = FakeNetwork(metadata(imu_frame=None))
+    with pytest.raises(PolicyError) as refusal:
+        check(silent)
+    assert 'policy_imu_frame' in refusal.value.reason
+    for frame in (ImuFrame.BASE, ImuFrame.YAWED):
+        assert check(silent, PolicyOptions(imu_frame=frame)).runner.name
 
 
 @pytest.mark.parametrize(

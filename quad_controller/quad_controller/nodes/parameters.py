@@ -182,7 +182,7 @@ def _policy_options(read: ParameterReader) -> PolicyOptions:
             'policy_imu_frame',
             default.imu_frame.value,
             {frame.value: frame for frame in ImuFrame},
-            'frame of the angular velocity; yawed: turned by 180 degrees',
+            'frame of the angular velocity; yawed: turned by 180 degrees; auto: as the file says',
         ),
         gravity_source=read.choice(
             'policy_gravity_source',

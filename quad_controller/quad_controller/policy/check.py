@@ -255,7 +255,7 @@ def _observation(names: tuple[str, ...]) -> Row:
 
 
 def _assumptions(metadata: PolicyMetadata, options: PolicyOptions) -> Iterator[Row]:
-    """Yield what the file does not say and is assumed to be the vendor's."""
+    """Yield what a file may leave open: some of it is assumed to be the vendor's."""
     known = metadata.phase_period if metadata.phase_period is not None else VENDOR_PHASE_PERIOD
     period = options.phase_period or known
     said = bool(options.phase_period) or metadata.phase_period is not None
@@ -271,10 +271,9 @@ def _assumptions(metadata: PolicyMetadata, options: PolicyOptions) -> Iterator[R
         yield _row('phase threshold', f'0 to {MAX_THRESHOLD:g}', f'{threshold:g}', fits)
     frame = metadata.imu_frame if options.imu_frame is ImuFrame.AUTO else options.imu_frame.value
     known_frames = {ImuFrame.BASE.value, ImuFrame.YAWED.value}
-    if frame is None:
-        yield Row('imu frame', 'known', "yawed, the vendor's", Verdict.WARN)
-    else:
-        yield _row('imu frame', 'base or yawed', frame, frame in known_frames)
+    # nothing measured tells which it is, and with the wrong one the policy falls
+    found = 'not in the file: set policy_imu_frame' if frame is None else frame
+    yield _row('imu frame', 'base or yawed', found, frame in known_frames)
 
 
 def _row(subject: str, expected: str, found: str, fits: bool) -> Row:

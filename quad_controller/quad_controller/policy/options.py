@@ -26,7 +26,7 @@ class ImuFrame(Enum):
     """Frame in which the policy expects the angular velocity.
 
     ``YAWED`` is turned by 180 degrees about z: in the vendor's training environment (luwu_mjlab)
-    the IMU sits so on the body. ``AUTO`` is what the file says, and the vendor's when it does not.
+    the IMU sits so on the body. ``AUTO`` is what the file says; one that does not is refused.
     """
 
     AUTO = 'auto'

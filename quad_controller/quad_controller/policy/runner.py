@@ -60,7 +60,8 @@ class PolicyRunner:
         Args:
             name: How it is called in messages.
             network: What answers.
-            metadata: What its file says; checked before.
+            metadata: What its file says; checked before. It has the frame of the IMU where the
+                options leave it open.
             robot: The robot.
             options: How to run it.
         """
@@ -74,7 +75,7 @@ class PolicyRunner:
         threshold = metadata.phase_threshold
         frame = options.imu_frame
         if frame is ImuFrame.AUTO:
-            frame = ImuFrame(metadata.imu_frame or ImuFrame.YAWED.value)
+            frame = ImuFrame(metadata.imu_frame)
         self._builder = ObservationBuilder(
             self._defaults,
             options.phase_period or metadata.phase_period or VENDOR_PHASE_PERIOD,

@@ -85,7 +85,12 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         '--phase-period', type=_time, default=0.0, help='[s]; 0: what the file says'
     )
-    parser.add_argument('--imu-frame', choices=[each.value for each in ImuFrame], default='auto')
+    parser.add_argument(
+        '--imu-frame',
+        choices=[each.value for each in ImuFrame],
+        default='auto',
+        help='of the angular velocity (policy_imu_frame); needed where the file does not say',
+    )
     parser.add_argument(
         '--gravity-source', choices=[each.value for each in GravitySource], default='blend'
     )

@@ -26,7 +26,6 @@ from .old_dialect import OldDialect
 from .port import Port
 from .probe import connect, Connection
 from .vendor import VendorDialect, VendorParser, VendorPort
-from .vendor_library import WRITE_AUTO
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,8 +38,8 @@ class LinkOptions:
         baud: Speed [bit/s]; 0 takes each protocol's own.
         model: Whose ranges scale bytes in the old protocol; None asks the firmware.
         rate: Reports a second [Hz].
-        vendor: Try the vendor's own library first.
-        vendor_method: Name of its method that writes a servo angle; ``auto`` looks for it.
+        vendor: Go through the vendor's own library, and try nothing else.
+        vendor_method: Name of its method that writes a servo angle.
     """
 
     path: str
@@ -49,7 +48,7 @@ class LinkOptions:
     model: Model | None = None
     rate: int = 50
     vendor: bool = False
-    vendor_method: str = WRITE_AUTO
+    vendor_method: str = ''
 
 
 class FrameParser(Interface):
@@ -98,18 +97,9 @@ def open_session(options: LinkOptions) -> Session:
     Raises:
         LinkError: There is no robot, or it is none that walks; the message says what was tried.
     """
-    vendors = ''
     if options.vendor:
-        try:
-            return _open_vendor(options)
-        except LinkError as error:
-            if not options.protocols:
-                raise
-            vendors = f'{error}; then without it: '
-    try:
-        connection = connect(options.path, options.protocols, options.baud)
-    except LinkError as error:
-        raise type(error)(f'{vendors}{error}') from error
+        return _open_vendor(options)
+    connection = connect(options.path, options.protocols, options.baud)
     try:
         dialect = _make_dialect(connection, options)
     except LinkError:

@@ -4,9 +4,9 @@
 
 It knows the layout of the new protocol, which is not public. What is public of it is used as it
 is: ``client.XgoDog(port)``, ``read_version``, ``system_set_feedback``,
-``feedback.SendStateParser.feed_bytes``, and the names in its states. What is not public is looked
-for, and told when it is not found: the serial port inside XgoDog, the method that writes a servo
-angle by motor id, and the name of the acceleration.
+``feedback.SendStateParser.feed_bytes``, and the names in its states. The method that writes a
+servo angle by motor id is not public, and has to be named. Looked for, and told when they are not
+found, are the serial port inside XgoDog and the name of the acceleration.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from .dialect import Step
 from .new_dialect import ASK_AGAIN, NewDialect
 from .port import CHUNK
 from .state import RobotState, Vector
-from .vendor_library import Dog, find_serial, find_write_method, StateParser, WRITE_AUTO
+from .vendor_library import Dog, find_serial, find_write_method, StateParser
 
 VENDOR = Protocol(
     name='vendor',
@@ -61,7 +61,7 @@ class VendorPort:
         if port is None:
             self.close()
             raise LinkError(
-                'xgo_lib2 is installed, and no serial port is found in its XgoDog; '
+                'no serial port is found in the XgoDog of xgo_lib2; '
                 'set protocol to new or old to do without it'
             )
         self._descriptor = int(port.fileno())
@@ -168,7 +168,7 @@ class VendorParser:
 class VendorDialect(NewDialect):
     """States as in the new protocol; commands by the vendor's methods."""
 
-    def __init__(self, dog: Dog, now: float, method: str = WRITE_AUTO) -> None:
+    def __init__(self, dog: Dog, now: float, method: str) -> None:
         """Begin a conversation.
 
         Args:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What is known of the vendor's xgo_lib2, and what has to be looked for in it."""
+"""What is known of the vendor's xgo_lib2, and what has to be named or looked for in it."""
 
 from __future__ import annotations
 
@@ -11,10 +11,6 @@ import inspect
 from typing import Protocol as Interface
 
 from ..exceptions import LinkError
-
-WRITE_AUTO = 'auto'
-_WRITE_WORDS, _SERVO_WORDS = ('write', 'set', 'move'), ('servo', 'motor', 'joint')
-_OTHER_WORDS = ('speed', 'load', 'torque', 'offset', 'zero', 'id', 'feedback', 'angles')
 
 WriteAngle = Callable[[int, float], object]
 
@@ -54,7 +50,8 @@ class Descriptor:
 
 def find_serial(dog: object, depth: int = 2) -> Descriptor | None:
     """Return the open serial port among the attributes of an object, or of what it holds."""
-    for value in list(getattr(dog, '__dict__', {}).values()):
+    slots = (getattr(dog, name, None) for name in getattr(dog, '__slots__', ()))
+    for value in (*getattr(dog, '__dict__', {}).values(), *slots):
         if callable(getattr(value, 'fileno', None)) and callable(getattr(value, 'write', None)):
             return Descriptor(value.fileno)
         if depth > 1 and (found := find_serial(value, depth - 1)) is not None:
@@ -65,33 +62,20 @@ def find_serial(dog: object, depth: int = 2) -> Descriptor | None:
 def find_write_method(dog: object, name: str) -> WriteAngle:
     """Return the method that writes a servo angle.
 
+    Nothing public says its name, and a wrong one would move servos in another unit or not at all.
+
     Args:
         dog: The vendor's XgoDog.
-        name: Of the method; ``auto`` looks for the one whose name says so.
+        name: Of the method.
 
     Raises:
-        LinkError: There is none of that name, or not exactly one that fits.
+        LinkError: It has no method of that name; the message lists what there is.
     """
     methods = dict(inspect.getmembers(dog, callable))
-    if name != WRITE_AUTO:
-        if name not in methods:
-            raise LinkError(f'the XgoDog of xgo_lib2 has no method {name!r}')
+    if name in methods and not name.startswith('_'):
         return methods[name]
-    fitting = [method for method in methods if _writes_an_angle(method)]
-    if len(fitting) == 1:
-        return methods[fitting[0]]
     public = ', '.join(method for method in methods if not method.startswith('_'))
     raise LinkError(
-        f'which method of xgo_lib2’s XgoDog writes one servo angle? {len(fitting)} names fit; set '
-        f'vendor_servo_method to one of {public}'
-    )
-
-
-def _writes_an_angle(method: str) -> bool:
-    words = method.lower().split('_')
-    return (
-        not method.startswith('_')
-        and any(word in words for word in _WRITE_WORDS)
-        and any(word in words for word in _SERVO_WORDS)
-        and not any(word in words for word in _OTHER_WORDS)
+        f'the XgoDog of xgo_lib2 has no method {name!r}; set vendor_servo_method to the one that '
+        f'writes the angle [deg] of a motor by its id, one of {public}'
     )

@@ -101,18 +101,17 @@ def declare_parameters(node: Node) -> NodeSettings:
     """
     read = ParameterReader(node)
     protocols = read.choice(
-        'protocol', AUTO, _PROTOCOLS, 'auto: the vendor’s library where it is installed, or asks'
+        'protocol', AUTO, _PROTOCOLS, 'auto: asks the robot; vendor: by the vendor’s xgo_lib2'
     )
+    method = read.text('vendor_servo_method', '', 'of the vendor’s XgoDog, writes one servo angle')
     link = LinkOptions(
         path=read.text('port', '/dev/ttyAMA0', 'serial port of the robot'),
         protocols=protocols,
         baud=read.whole('baud', 0, (0, 4_000_000), 'speed [bit/s]; 0: that of the protocol'),
         model=read.choice('model', AUTO, _MODELS, 'ranges of the old protocol; auto: by firmware'),
         rate=read.whole('rate', 50, (10, 100), 'reports a second [Hz]'),
-        vendor=_vendor(protocols),
-        vendor_method=read.text(
-            'vendor_servo_method', AUTO, 'of the vendor’s XgoDog, writes one servo angle'
-        ),
+        vendor=_vendor(protocols, method),
+        vendor_method=method,
     )
     urdf = _urdf(read)
     settings = NodeSettings(
@@ -134,15 +133,25 @@ def declare_parameters(node: Node) -> NodeSettings:
     return settings
 
 
-def _vendor(protocols: tuple[Protocol, ...]) -> bool:
-    """Tell whether to try the vendor's library."""
-    installed = len(protocols) != 1 and is_installed()
-    if not protocols and not installed:
+def _vendor(protocols: tuple[Protocol, ...], method: str) -> bool:
+    """Tell whether to go through the vendor's library; nothing is guessed where it is there."""
+    installed, wanted = is_installed(), not protocols
+    if wanted and not installed:
         raise CommandError(
             'protocol vendor: xgo_lib2 of the vendor is not installed for this Python; '
             'install it, or choose auto'
         )
-    return installed
+    if wanted and not method:
+        raise CommandError(
+            'protocol vendor: set vendor_servo_method to the name of the method of xgo_lib2’s '
+            'XgoDog that writes the angle [deg] of a motor by its id'
+        )
+    if installed and len(protocols) > 1:
+        raise CommandError(
+            'protocol auto: xgo_lib2 of the vendor is installed for this Python, and which way to '
+            'the robot is meant is not guessed; set protocol to vendor, new or old'
+        )
+    return wanted
 
 
 def _urdf(read: ParameterReader) -> str:
