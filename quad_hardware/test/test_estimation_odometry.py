@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import cache
 import math
 import random
@@ -14,10 +15,14 @@ from numpy.typing import NDArray
 import pytest
 
 from quad_description import movable_joints, Pose, pose_positions, robot_urdf
+from quad_hardware.estimation import Estimator, EstimatorSettings
 from quad_hardware.estimation.feet import Feet, FootPose, FootPoses
 from quad_hardware.estimation.odometry import LegOdometry, OdometrySettings, OdometryState
-from quad_hardware.estimation.rotation import from_roll_pitch_yaw, IDENTITY, rotate
+from quad_hardware.estimation.rotation import from_roll_pitch_yaw, IDENTITY, rotate, yaw_of
 from quad_hardware.exceptions import CommandError
+from quad_hardware.joints import JointMap, servo_of
+from quad_hardware.link import RobotState
+from quad_hardware.protocol import LEG_MOTORS
 from quad_hardware.sim.physics import Robot
 
 Array = NDArray[np.float64]
@@ -171,6 +176,39 @@ def test_a_gap_is_no_way() -> None:
     odometry.update(0.0, feet.poses([0.0] * 12), IDENTITY)
     state = odometry.update(2.0, feet.poses([0.2] * 12), IDENTITY)
     assert (state.x, state.y, state.velocity_x) == (0.0, 0.0, 0.0)
+
+
+def yaws(reports: Iterable[tuple[float, float | None, float]]) -> list[float]:
+    """Headings of /odom for reports of arrival [s], clock of the board [s] and yaw [deg]."""
+    joints = JointMap(servo_of(joint) for joint in movable_joints(URDF))
+    estimator = Estimator(URDF, joints, EstimatorSettings())
+    headings = []
+    for arrival, device_time, yaw in reports:
+        state = RobotState(
+            arrival=arrival, wire_time=0.001, attitude=(0.0, 0.0, yaw), acceleration=None,
+            positions=dict.fromkeys(LEG_MOTORS, 0.0), velocities={}, device_time=device_time,
+        )  # fmt: skip
+        estimate = estimator.update(state)
+        assert estimate is not None, estimator.refusal
+        place = estimator.walk(estimate)
+        assert place is not None
+        headings.append(yaw_of(place.rotation))
+    return headings
+
+
+@pytest.mark.parametrize('clock', [True, False], ids=['board with a clock', 'board without'])
+def test_a_board_that_begins_anew_turns_nobody(clock: bool) -> None:
+    """Its yaw begins at zero again; that of /odom goes on from where it was (REP 105)."""
+    before = [(tick * PERIOD, 30.0 + tick * PERIOD, 50.0 + tick) for tick in range(20)]
+    after = [(2.0 + tick * PERIOD, 0.1 + tick * PERIOD, float(tick)) for tick in range(20)]
+    found = yaws((at, device if clock else None, yaw) for at, device, yaw in (*before, *after))
+    assert np.degrees(found) == pytest.approx([*range(20), *range(19, 39)], abs=1e-6)
+
+
+def test_a_robot_that_was_turned_while_its_cable_was_out_is_turned() -> None:
+    """The clock of the board tells that its yaw still counts from the same heading."""
+    found = yaws([(0.0, 10.0, 0.0), (0.02, 10.02, 0.0), (3.0, 13.0, 90.0), (3.02, 13.02, 90.0)])
+    assert np.degrees(found) == pytest.approx([0.0, 0.0, 90.0, 90.0])
 
 
 def test_feet_are_where_physics_has_them() -> None:

@@ -46,6 +46,7 @@ DEVIATIONS = Deviations(orientation=0.02, rate=0.15, gyro=0.02, acceleration=0.3
 PLACE = OdometryState(1.0, 2.0, 0.11, IDENTITY, 0.2, 0.05, 3.0, (True,) * 4)
 ESTIMATE = Estimate(
     time=0.0,
+    joints_time=0.0,
     positions={'b': 0.1, 'a': 0.2},
     velocities={'a': 2.0, 'b': 1.0},
     attitude=IDENTITY,
@@ -118,6 +119,21 @@ def test_a_differentiated_rate_says_so_by_its_covariance() -> None:
     assert gyro.angular_velocity_covariance[8] == pytest.approx(0.02**2)
     assert none.angular_velocity_covariance[0] == -1.0
     assert differentiated.linear_acceleration.z == 9.8
+
+
+@given(ROTATIONS)
+def test_both_children_turn_and_go_the_same_way(rotation: Rotation) -> None:
+    """Turn rate and velocity of base_link and of base_footprint are one vector of the world."""
+    found = []
+    for frames in (FRAMES, PARENT):
+        message = odometry(replace(PLACE, rotation=rotation), frames)
+        turn, twist = message.pose.pose.orientation, message.twist.twist
+        child = (turn.x, turn.y, turn.z, turn.w)
+        found.extend(
+            rotate(child, (part.x, part.y, part.z)) for part in (twist.linear, twist.angular)
+        )
+    assert found[:2] == [pytest.approx(vector, abs=1e-9) for vector in found[2:]]
+    assert found[1] == pytest.approx(rotate(rotation, (0.1, 0.2, 0.3)), abs=1e-9)
 
 
 def test_odometry_is_less_sure_the_farther_it_went() -> None:

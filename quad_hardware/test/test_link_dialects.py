@@ -59,6 +59,7 @@ class OldRig:
         self._asked = 0
         self.sent: list[tuple[float, Frame]] = []
         self.states: list[RobotState] = []
+        self.angles_at: list[float] = []  # [s] when half an answer about the motors was there
         self._answers: list[tuple[float, Frame]] = []
         self._parser = StreamParser(OLD, HOST_KINDS)
 
@@ -81,11 +82,24 @@ class OldRig:
                     self._answers.append((self.now + wire + self.latency, reply))
             if self._answers and self._answers[0][0] <= max(step.wake, self.now):
                 self.now, reply = self._answers.pop(0)
+                if reply.address == Register.MOTORS:
+                    self.angles_at.append(self.now - OLD.wire_time(len(reply.encode(OLD))) / 2)
                 state = self.dialect.hear(reply, self.now)
                 self.states += [state] if state else []
             else:
                 assert step.wake > self.now or step.send, 'it would spin'
                 self.now = max(step.wake, self.now)
+
+
+@pytest.mark.parametrize('latency', [0.001, 0.006])
+def test_the_angles_of_a_report_are_older_than_its_attitude(latency: float) -> None:
+    """They were asked for before; their time is that of their own answer."""
+    rig = OldRig(latency)
+    rig.run(1.0)
+    assert len(rig.states) > 20
+    for state, measured in zip(rig.states, rig.angles_at, strict=False):
+        assert state.arrival - state.wire_time / 2 - state.joints_age == pytest.approx(measured)
+        assert state.joints_age > latency
 
 
 def test_the_old_protocol_is_polled_at_50_hz() -> None:

@@ -12,6 +12,7 @@ import math
 from ..joints import JointMap
 from ..link.state import RobotState
 from .battery import Battery, BatteryFilter
+from .board_watch import BoardWatch
 from .feet import Feet
 from .filters import AttitudeRate, JointRate
 from .gravity import GravityCheck
@@ -52,6 +53,7 @@ class Estimate:
 
     Attributes:
         time: When it was made, on the monotonic clock [s].
+        joints_time: When the joints were measured [s]; the old protocol asks for them before.
         positions: By joint [rad], of the gripper [m]; joints that are not reported are missing.
         velocities: Of the same joints [rad/s], [m/s].
         attitude: From base_link to the world, (x, y, z, w); its yaw is the robot's. None while
@@ -62,6 +64,7 @@ class Estimate:
     """
 
     time: float
+    joints_time: float
     positions: dict[str, float]
     velocities: dict[str, float]
     attitude: Quaternion | None
@@ -109,6 +112,7 @@ class Estimator:
         self._settings = settings
         self._feet = Feet(urdf, joints.names)
         self._clock = SampleClock()
+        self._boards = BoardWatch()
         self._plausibility = Plausibility([servo.motor for servo in joints.servos])
         self._rate = AttitudeRate(settings.rate_cutoff)
         self._joint_rate = JointRate(settings.joint_cutoff)
@@ -133,19 +137,23 @@ class Estimator:
             self.refusal = reason
             return None
         time = self._clock.time(state)
+        joints_time = time - state.joints_age
         positions = self._joints.positions(state.positions)
         velocities = self._joints.velocities(state.velocities)
         if not velocities:
-            velocities = self._joint_rate.update(time, positions)
+            velocities = self._joint_rate.update(joints_time, positions)
         self._battery.take(state)
         if self._plausibility.imu_problem:
-            return Estimate(time, positions, velocities, None, None, False, None)
+            return Estimate(time, joints_time, positions, velocities, None, None, False, None)
+        if self._boards.restarted(state):
+            self._odometry.keep_heading()
         roll, pitch, yaw = map(math.radians, state.attitude)
         attitude = from_roll_pitch_yaw(roll, pitch, yaw)
         self._gravity.take(attitude, state.acceleration)
         rate, measured = self._angular_velocity(time, attitude, state)
         return Estimate(
             time=time,
+            joints_time=joints_time,
             positions=positions,
             velocities=velocities,
             attitude=attitude,
@@ -163,7 +171,8 @@ class Estimator:
             return None
         positions = estimate.positions
         placed = [positions.get(name, 0.0) for name in self._joints.names]
-        return self._odometry.update(estimate.time, self._feet.poses(placed), estimate.attitude)
+        feet = self._feet.poses(placed)
+        return self._odometry.update(estimate.joints_time, feet, estimate.attitude)
 
     def health(self) -> Health:
         """Return how the robot is, by its latest reports."""

@@ -95,6 +95,8 @@ class LegOdometry:
         self._commands: tuple[tuple[float, list[Vector]], ...] = ()
         self._last: tuple[float, FootPoses, Flags] | None = None
         self._yaw0: float | None = None
+        self._heading = 0.0  # [rad] of the last update
+        self._keeps_heading = False
         self._place = self._held = self._smooth = REST  # the velocities in the body turned level
         self._distance = 0.0
 
@@ -108,6 +110,10 @@ class LegOdometry:
         places = [foot.position for foot in feet]
         self._commands = (*self._commands, (time, places))[-KEPT_COMMANDS:]
 
+    def keep_heading(self) -> None:
+        """Go on with the last heading: the next attitude counts its yaw from elsewhere."""
+        self._keeps_heading = True
+
     def update(self, time: float, feet: FootPoses, attitude: Quaternion) -> OdometryState:
         """Take a measurement.
 
@@ -117,15 +123,17 @@ class LegOdometry:
             attitude: From base_link to the world.
         """
         yaw = yaw_of(attitude)
-        if self._yaw0 is None:
-            self._yaw0 = yaw
+        if self._yaw0 is None or self._keeps_heading:
+            self._yaw0 = yaw - self._heading
+            self._keeps_heading = False
+        self._heading = yaw - self._yaw0
         rotation = multiply(about_z(-self._yaw0), attitude)
         standing = self._standing(time, feet, rotation)
         turned = [
             FootPose(rotate(rotation, foot.position), multiply(rotation, foot.rotation))
             for foot in feet
         ]
-        self._integrate(time, turned, standing, yaw - self._yaw0)
+        self._integrate(time, turned, standing, self._heading)
         self._last = time, turned, standing
         return OdometryState(
             *self._place,

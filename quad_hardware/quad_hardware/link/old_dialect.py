@@ -91,6 +91,7 @@ class OldDialect(Dialect):
         self._unseen: dict[int, UnseenServo] = {}
         self._speed = _BOARDS_OWN  # of single servos
         self._angles: bytes | None = None
+        self._angles_at = now  # [s] when they were measured
         self._charges: deque[int] = deque(maxlen=3)
 
     @property
@@ -153,6 +154,7 @@ class OldDialect(Dialect):
             self._charges.append(frame.payload[0])
         elif waiting is _READ_MOTORS:
             self._angles = frame.payload
+            self._angles_at = now - _on_the_line(frame.payload) / 2
         elif self._angles is not None:
             return self._report(frame.payload, now)
         return None
@@ -234,9 +236,10 @@ class OldDialect(Dialect):
         values = _IMU.unpack(imu)
         self._counters.states += 1
         pairs = zip(BULK_READ_ORDER, angles, strict=True)
+        wire_time = _on_the_line(imu)
         return RobotState(
             arrival=now,
-            wire_time=OLD.wire_time(OLD.overhead + len(imu)),
+            wire_time=wire_time,
             attitude=_vector(values['attitude']),
             acceleration=_vector(values['acceleration']),
             positions={motor: self._spans[motor].decode(byte) for motor, byte in pairs},
@@ -244,7 +247,13 @@ class OldDialect(Dialect):
             rates=_vector(values['rate']),
             # each answer stands for many reports: one damaged answer must not
             battery=float(median_high(self._charges)) if self._charges else None,
+            joints_age=now - wire_time / 2 - self._angles_at,
         )
+
+
+def _on_the_line(payload: bytes) -> float:
+    """Return how long the answer with a payload takes [s]."""
+    return OLD.wire_time(OLD.overhead + len(payload))
 
 
 def _vector(values: tuple[float, ...]) -> Vector:

@@ -33,6 +33,7 @@ class RobotState:
             :data:`DEVICE_TIME_WRAP`; None where it is not reported.
         faults: Fault bits of the new protocol.
         temperatures: Of the servos by motor id [°C]; empty where they are not reported.
+        joints_age: By how much the angles were measured before the rest [s].
     """
 
     arrival: float
@@ -47,3 +48,4 @@ class RobotState:
     device_time: float | None = None
     faults: int = 0
     temperatures: Mapping[int, float] | None = None
+    joints_age: float = 0.0

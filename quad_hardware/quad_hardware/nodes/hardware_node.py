@@ -107,7 +107,7 @@ class HardwareNode(Node):
         # what a controller waits for comes first
         self._joint_states.publish(
             messages.JointStates(tuple(estimate.positions)),
-            stamp,
+            self._stamp(estimate.joints_time),
             messages.joint_numbers(estimate),
         )
         way = self._estimator.walk(estimate)

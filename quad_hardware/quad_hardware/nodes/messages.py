@@ -160,12 +160,13 @@ def odometry_form(estimate: Estimate, deviations: Deviations, frames: Frames) ->
 def odometry_numbers(estimate: Estimate, state: OdometryState, frames: Frames) -> Numbers:
     """Return what :class:`OdometryForm` takes."""
     rotation, height = state.rotation, state.height
-    velocity = (state.velocity_x, state.velocity_y, 0.0)
+    velocity = (state.velocity_x, state.velocity_y, 0.0)  # over the ground, level
+    rate = estimate.angular_velocity or _ZERO  # in the body
     if frames.footprint_is_parent:
+        rate = rotate(_level(rotation), rate)
         rotation, height = about_z(yaw_of(rotation)), 0.0
-    else:  # the velocity is that over the ground, level
+    else:
         velocity = rotate(conjugate(_level(rotation)), velocity)
-    rate = estimate.angular_velocity or _ZERO
     return (state.x, state.y, height, *rotation, *velocity, *rate, state.position_variance)
 
 
