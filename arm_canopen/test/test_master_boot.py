@@ -45,6 +45,8 @@ DEVICE_VALUES = {
     **{place: getattr(IDENTITY, name) for name, place in IDENTITY_PLACES.items()},
     **DEFAULT_COB_IDS,
     (0x1016, 1): 0,
+    (0x6040, 0): 0,
+    (0x6060, 0): 0,
 }
 
 

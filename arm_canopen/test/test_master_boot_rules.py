@@ -19,6 +19,7 @@ from test_master_boot import DEVICE_VALUES, io_config, NODE, NODE_ID
 from virtual_network import bus_config, VirtualNetwork
 
 from arm_canopen.config.model import NodeConfig
+from arm_canopen.exceptions import CanopenError
 from arm_canopen.master.events import Severity
 from arm_canopen.master.remote_node import BootPhase
 from arm_canopen.standard.nmt import NmtCommand, NmtState
@@ -87,7 +88,7 @@ def running(**changes: object) -> tuple[Network, ScriptedDevice]:
 
 
 def test_a_device_in_operation_is_taken_over_without_a_word() -> None:
-    """No NMT command, no PDO object written; the first RPDO brings what the device has."""
+    """No NMT command, no PDO object written; an RPDO carries what the device has beside."""
     network, device = running(reset_communication=False)
     network.start(1.0)
     node = network.net.network.nodes[NODE]
@@ -95,7 +96,9 @@ def test_a_device_in_operation_is_taken_over_without_a_word() -> None:
     assert node.taken_over
     assert device.commands == []
     assert {index for index, _, _ in device.writes} == {0x1017}
-    assert network.net.frames(0x205)[0] == b'\x0f\x00\x08'
+    assert network.net.frames(0x205) == []
+    network.net.network.publish_object(node, 0x6060, 0, 9)
+    assert network.net.frames(0x205) == [b'\x0f\x00\x09']
     assert any('L: taken over' in text for text in network.net.told())
 
 
@@ -235,8 +238,12 @@ def test_a_master_that_shall_not_start_waits_for_its_command() -> None:
     """`start: false`: no SYNC and no RPDO before NMT start to its own id."""
     network = Network(io_config(), start=False)
     network.start(1.0)
-    assert network.net.frames(0x080) == network.net.frames(0x205) == []
+    assert network.net.frames(0x080) == []
+    node = network.net.network.nodes[NODE]
+    with pytest.raises(CanopenError, match='the master is not operational'):
+        network.net.network.publish_object(node, 0x6060, 0, 1)
     network.net.network.send_nmt(NmtCommand.START, network.net.network.config.master.node_id)
     network.net.run(0.1)
     assert network.net.frames(0x080)
+    network.net.network.publish_object(node, 0x6060, 0, 1)
     assert network.net.frames(0x205)

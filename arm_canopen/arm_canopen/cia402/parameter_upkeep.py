@@ -67,7 +67,7 @@ class ParameterUpkeep:
         if self._asking is not None:
             self._asking.cancel(SdoError(reason))
 
-    def _object_written(self, index: int, subindex: int) -> None:
+    def _object_written(self, index: int, subindex: int, data: bytes) -> None:
         """One of the objects may have been changed through this master, by whomever."""
         if not self.known or index - self._offset not in REFRESHED:
             return

@@ -121,7 +121,7 @@ class ParameterReader:
         )
 
     async def _profile_velocity(self) -> int | None:
-        if self._node.image.output_of(Index.PROFILE_VELOCITY + self._offset) is not None:
+        if self._node.image.mapped_output(Index.PROFILE_VELOCITY + self._offset) is not None:
             return None
         return await self._read(Index.PROFILE_VELOCITY)
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from ..standard.dictionary import ObjectDictionary
+from ..standard.objects import AXIS_OFFSET, COMMANDS
 from ..standard.pdo import MappedObject
 from .drive_model import DriveConfig
 from .identity import ANY_DEVICE, Identity
@@ -165,6 +166,15 @@ class NodeConfig:
     def is_lifecycle(self) -> bool:
         """Its node is a lifecycle node."""
         return 'Lifecycle' in self.driver
+
+    @property
+    def commanded_indices(self) -> frozenset[int]:
+        """Objects that the driver of the device writes in each cycle."""
+        if not self.is_drive:
+            return frozenset()
+        return frozenset(
+            index + AXIS_OFFSET * axis.channel for axis in self.axes for index in COMMANDS
+        )
 
     @property
     def is_drive(self) -> bool:

@@ -134,6 +134,8 @@ def _rate(subject: Subject, direction: Direction, pdo: PdoConfig) -> tuple[float
     """Return how often a PDO is sent in [1/s], and why."""
     master = subject.bus.master
     if direction is not TPDO:
+        if not subject.node.is_drive:
+            return 0.0, 'when ~/tpdo publishes it'
         return 1 / master.cycle_period, 'every cycle'
     if pdo.transmission <= SYNCHRONOUS_MAX:
         if not master.sync_period:

@@ -18,7 +18,7 @@ from .nmt_sender import SendNmt
 from .remote_node import BootPhase, RemoteNode
 from .scheduler import Scheduler
 from .startup import Startup
-from .takeover import preset_outputs
+from .takeover import preset_outputs, read_outputs
 
 IDENTITY_SUBINDICES: tuple[tuple[str, int, str, BootFault], ...] = (
     ('vendor_id', 1, 'vendor id', BootFault.VENDOR),
@@ -65,6 +65,7 @@ class BootProcess:
         self._startup = startup
         self._ask_state = ask_state
         self._start = bus.master.start_nodes
+        self._sdo_timeout = bus.master.boot_timeout
         self._configurator = Configurator(
             node,
             bus,
@@ -141,6 +142,7 @@ class BootProcess:
         # same, and only a device that once was without it has to show it first
         if node.life.owed and not node.config.guarded:
             await self._await_heartbeat(configured_at)
+        await read_outputs(node, self._sdo_timeout)
         started = await self._admitted()
         self._enter(BootPhase.STARTING)
         if self._start and not started:

@@ -13,8 +13,10 @@ from typing import TypeAlias
 
 from ..can.frame import Frame
 from ..config.model import BusConfig
+from ..exceptions import CanopenError
 from ..standard.cob_id import CAN_ID_MASK, CobId
 from ..standard.nmt import ALL_NODES, COMMANDED_STATES, NmtCommand, NmtState, parse_nmt
+from ..standard.pdo import Number
 from .boots import Boots
 from .bus_sender import BusSender
 from .controller_watch import ControllerWatch
@@ -165,7 +167,8 @@ class Network:
         for node in self.nodes.values():
             if node.online:
                 for output in node.image.outputs:
-                    send(output.frame())
+                    if output.leaves(now):
+                        send(output.frame())
         if self.config.master.sync_period > 0:
             self._send_sync(now)
 
@@ -186,6 +189,28 @@ class Network:
                 sent = self._nmt.send(command, node.config.node_id)
             return sent
         return self._nmt.send(command, node_id)
+
+    def publish_object(self, node: RemoteNode, index: int, subindex: int, value: Number) -> None:
+        """Send an object by the RPDOs that carry it, as ``~/tpdo`` asks.
+
+        An event-driven RPDO leaves at once, one that waits for SYNC with the next cycle, and those
+        of a drive in every cycle anyway.
+
+        Raises:
+            CanopenError: The device or the master is not operational, or no RPDO carries it.
+        """
+        if not node.online or self.state is not NmtState.OPERATIONAL:
+            what = node.name if not node.online else 'the master'
+            raise CanopenError(f'{what} is not operational, so no RPDO is sent')
+        outputs = node.image.store(index, subindex, value)
+        if not outputs:
+            raise CanopenError(f'0x{index:04X}:{subindex:02X} is in no RPDO of {node.name}')
+        for output in outputs:
+            if output.cyclic or output.synchronous:
+                output.due = True
+            else:
+                output.left(self.scheduler.now)
+                self.send(output.frame())
 
     def _set_state(self, command: NmtCommand) -> None:
         before = self.state

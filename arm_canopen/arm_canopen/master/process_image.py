@@ -17,6 +17,7 @@ from ..exceptions import CodecError
 from ..standard.pdo import MappedObject, Number, PdoCodec, SYNCHRONOUS_MAX
 
 EVENT_DRIVEN = 254  # transmission types from which on a PDO has an event timer (CiA 301, table 72)
+REPEAT_SHARE = 0.5  # of the deadline of an RPDO, after which it is repeated
 EVENT_TIMES = 3  # event times without a PDO after which it counts as stopped
 
 StartValue: TypeAlias = Callable[[MappedObject], Number]
@@ -134,11 +135,17 @@ class Output:
         config: Its configuration.
         codec: Its compiled mapping.
         values: Next values in mapping order.
+        cyclic: It leaves in every cycle; otherwise when somebody published one of its objects.
+        due: It was published, and leaves with the next cycle.
     """
 
-    def __init__(self, config: PdoConfig, start: StartValue) -> None:
+    def __init__(self, config: PdoConfig, start: StartValue, *, cyclic: bool = True) -> None:
         """Start with the values that the device has."""
         self.config = config
+        self.cyclic = cyclic
+        self.due = False
+        self._repeat_time = REPEAT_SHARE * (config.event_time or 0.0)
+        self._left_at: float | None = None
         self.codec = PdoCodec(config.mapping)
         self.values: list[Number] = [start(mapped) for mapped in config.mapping]
         self._cob_id = config.cob_id
@@ -148,6 +155,27 @@ class Output:
     def synchronous(self) -> bool:
         """The device applies it at the next SYNC."""
         return self.config.transmission <= SYNCHRONOUS_MAX
+
+    def leaves(self, now: float) -> bool:
+        """Tell whether it leaves in this cycle, at a time in [s].
+
+        One with a deadline is repeated within it, once somebody has published it.
+        """
+        if self.cyclic:
+            return True
+        repeat = self._left_at is not None and 0.0 < self._repeat_time <= now - self._left_at
+        if not self.due and not repeat:
+            return False
+        self.left(now)
+        return True
+
+    def left(self, now: float) -> None:
+        """It was sent because it was published, at a time in [s]."""
+        self.due, self._left_at = False, now
+
+    def reset(self) -> None:
+        """The device is another one than before: nothing was published to it."""
+        self.due, self._left_at = False, None
 
     def frame(self) -> Frame:
         """Return the frame that carries the present values."""
@@ -221,6 +249,7 @@ class ProcessImage:
         sync: SyncRound,
         *,
         start: StartValue = lambda mapped: 0,
+        cyclic: bool = True,
         send_last: Callable[[int], bool] = lambda index: False,
     ) -> None:
         """Compile the enabled PDOs.
@@ -230,11 +259,14 @@ class ProcessImage:
             rpdos: What it receives.
             sync: The round that all TPDOs of the bus belong to.
             start: Tells what an object in an RPDO carries until it is written.
+            cyclic: RPDOs leave in every cycle; otherwise when they are published.
             send_last: Tells of an index whether RPDOs with that object leave after the others:
                 commands, which must not overtake their data.
         """
         self.inputs = [Input(pdo, sync) for pdo in tpdos if pdo.enabled and pdo.mapping]
-        outputs = [Output(pdo, start) for pdo in rpdos if pdo.enabled and pdo.mapping]
+        outputs = [
+            Output(pdo, start, cyclic=cyclic) for pdo in rpdos if pdo.enabled and pdo.mapping
+        ]
         self.outputs = sorted(
             outputs, key=lambda output: any(send_last(o.index) for o in output.config.mapping)
         )
@@ -243,6 +275,15 @@ class ProcessImage:
         """Forget what the device sent."""
         for entry in self.inputs:
             entry.clear()
+        for output in self.outputs:
+            output.reset()
+
+    def store(self, index: int, subindex: int, value: Number) -> list[Output]:
+        """Let the RPDOs carry a value of an object; return those that do."""
+        places = list(self._mapped_outputs(index, subindex))
+        for output, position in places:
+            output.values[position] = value
+        return [output for output, _ in places]
 
     def reader(self, index: int, subindex: int = 0) -> InputReader | None:
         """Return a reader for an object, None when no TPDO carries it."""

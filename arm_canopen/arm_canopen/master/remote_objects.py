@@ -56,9 +56,11 @@ class RemoteObjects:
             config.rpdos,
             sync,
             start=partial(start_value, config),
+            cyclic=config.is_drive,
             send_last=is_controlword,
         )
         self.sdo = SdoClient(config.node_id, config.name, scheduler, send)
+        self.sdo.on_written.append(self._object_written)
         self.online = False
         self._scheduler = scheduler
         self._report = report
@@ -140,6 +142,18 @@ class RemoteObjects:
             refused.reject(error)
             return refused
         return self.sdo.write(index, subindex, data, self.config.sdo_timeout)
+
+    def _object_written(self, index: int, subindex: int, data: bytes) -> None:
+        """An SDO has changed an object: an RPDO that carries it must not change it back."""
+        mapped = self.image.mapped_output(index, subindex)
+        if mapped is None or index in self.config.commanded_indices:
+            return
+        try:
+            value = decode(mapped.data_type, data)
+        except CodecError:
+            return
+        if isinstance(value, (int, float)):
+            self.image.store(index, subindex, value)
 
     def _forget_objects(self, reason: str) -> None:
         """The device went away, or restarted: what it said and was told is no longer true."""

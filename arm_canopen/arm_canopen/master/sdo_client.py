@@ -39,7 +39,7 @@ class SdoClient:
 
     Attributes:
         node_id: The device.
-        on_written: Called with index and sub-index after each download that succeeded.
+        on_written: Called with index, sub-index and data after each download that succeeded.
     """
 
     def __init__(
@@ -47,7 +47,7 @@ class SdoClient:
     ) -> None:
         """Take the way to the bus; arguments as of :class:`SdoChannel`."""
         self.node_id = node_id
-        self.on_written: list[Callable[[int, int], None]] = []
+        self.on_written: list[Callable[[int, int, bytes], None]] = []
         self._name = name
         self._scheduler = scheduler
         self._channel = SdoChannel(node_id, name, scheduler, send)
@@ -93,7 +93,7 @@ class SdoClient:
             Promise of the end; rejected with SdoAbortError or SdoTimeoutError.
         """
         promise = self._enqueue(self._download(index, subindex, data, timeout, repeat=repeat))
-        promise.when_done(lambda done: self._note_write(index, subindex, done))
+        promise.when_done(lambda done: self._note_write(index, subindex, data, done))
         return promise
 
     def cancel_all(self, reason: str) -> None:
@@ -112,10 +112,10 @@ class SdoClient:
         """Take an answer of the device."""
         self._channel.receive(frame.data)
 
-    def _note_write(self, index: int, subindex: int, done: Promise[None]) -> None:
+    def _note_write(self, index: int, subindex: int, data: bytes, done: Promise[None]) -> None:
         if done.error is None:
             for callback in self.on_written:
-                callback(index, subindex)
+                callback(index, subindex, data)
 
     def _enqueue(self, transfer: Transfer[T]) -> Promise[T]:
         promise: Promise[T] = Promise()

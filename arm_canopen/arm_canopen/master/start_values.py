@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What an RPDO carries before anybody commanded anything."""
+"""What an RPDO carries before the device was asked, or of an object that cannot be read."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from ..standard.pdo import MappedObject, Number, PdoCodec
 
 
 def start_value(config: NodeConfig, mapped: MappedObject) -> Number:
-    """Return the value that an object has in the device when it is booted.
+    """Return the value that the files say an object has when the device is booted.
 
-    RPDOs leave in every cycle, so an object that nobody commands (a torque limit, a profile
-    velocity, digital outputs) must keep what bus.yml wrote or else what its EDS has as default.
+    An object that nobody commands (a torque limit, a profile velocity, digital outputs) must keep
+    what bus.yml wrote or else what its EDS has as default.
 
     Args:
         config: The device.

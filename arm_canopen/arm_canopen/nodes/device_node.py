@@ -175,8 +175,7 @@ class DeviceNode(Node):
             return
         place = f'0x{message.index:04X}:{message.subindex:02X}'
         mapped = self.device.image.mapped_output(message.index, message.subindex)
-        writer = self.device.image.writer(message.index, message.subindex)
-        if mapped is None or writer is None:
+        if mapped is None:
             self.get_logger().warning(f'~/tpdo: {place} is in no RPDO of the device; map it')
             return
         try:
@@ -185,7 +184,20 @@ class DeviceNode(Node):
         except CanopenError as error:
             self.get_logger().warning(f'~/tpdo: {place}: {error}')
             return
-        self._thread.call(partial(writer.write, value))
+        publish = partial(
+            self._thread.network.publish_object,
+            self.device,
+            message.index,
+            message.subindex,
+            value,
+        )
+        sent = self._thread.call(publish)
+        sent.add_done_callback(self._tell_unsent)
+
+    def _tell_unsent(self, sent: Future[None]) -> None:
+        error = sent.exception()
+        if error is not None:
+            self.get_logger().warning(f'~/tpdo: {error}')
 
     def _offer_nmt(self, name: str, command: NmtCommand) -> None:
         node_id = self.device.config.node_id

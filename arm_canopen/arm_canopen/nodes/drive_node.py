@@ -14,7 +14,6 @@ from node_runner import destroyed_when_refused
 from ..cia402.drive_commands import DriveCommands
 from ..master.remote_node import RemoteNode
 from ..master.runner import NetworkThread
-from ..standard.objects import AXIS_OFFSET, COMMANDS
 from .axis_services import AxisServices
 from .device_node import DeviceNode
 from .output_thread import OutputThread
@@ -47,9 +46,7 @@ class DriveNode(DeviceNode):
         super().__init__(device, thread, output)
         self.axes = [commands.drive for commands in axes]
         names = [axis.name for axis in self.axes]
-        self._owned = {
-            index + axis.config.channel * AXIS_OFFSET for axis in self.axes for index in COMMANDS
-        }
+        self._owned = device.config.commanded_indices
         self._joint_states = self.create_publisher(JointState, '~/joint_states', 10)
         zeros = [0.0] * len(names)
         self._message = JointState(name=names, position=zeros, velocity=zeros, effort=zeros)

@@ -124,6 +124,8 @@ COMMANDS = frozenset(
     }
 )
 """Objects of the first axis of a drive by which it is commanded in each cycle."""
+OFFSETS = frozenset({Index.POSITION_OFFSET, Index.VELOCITY_OFFSET, Index.TORQUE_OFFSET})
+"""Objects of the first axis of a drive that are added to its targets."""
 
 AXIS_OFFSET = 0x800  # between the objects of two axes of a drive (CiA 402-2, 7.2)
 AXES_MAX = 8  # axes of one device (CiA 402-2, 7.2)
