@@ -15,7 +15,7 @@ from .wave import quintic_step, stop_duration, Swing, WaveStyle
 from .wave_axis import AxisReport, WaveAxis
 
 if TYPE_CHECKING:
-    from arm_canopen import AxisFeedback
+    from arm_canopen import AxisFeedback, Refusal
 
 REPORT_PERIOD = 0.2
 """Time between two reports in [s]."""
@@ -104,14 +104,14 @@ class WaveSource:
         """Slow down on the path and stand still."""
         self._commands.append(Command.STOP)
 
-    def released(self, axis: str, reason: str) -> None:
+    def released(self, axis: str, refusal: Refusal) -> None:
         """Leave an axis alone until the next start.
 
         Args:
             axis: Name of the drive.
-            reason: Why it was taken away.
+            refusal: Why it was taken away.
         """
-        self._commands.append(_Release(axis, reason))
+        self._commands.append(_Release(axis, f'it {refusal}'))
 
     def update(
         self, now: float, period: float, feedback: Sequence[AxisFeedback]
@@ -134,8 +134,8 @@ class WaveSource:
             self._obey(self._commands.popleft(), feedback)
         for axis, state in zip(self._axes, feedback, strict=True):
             axis.measure(state.position)
-            if axis.active and not state.followable:
-                axis.leave('the drive can no longer follow')
+            if axis.active and state.refusal is not None:
+                axis.leave(f'it {state.refusal}')
         setpoints = self._advance(period)
         self._since_report += period
         if self._since_report >= REPORT_PERIOD:
@@ -164,7 +164,7 @@ class WaveSource:
         for axis, state in zip(self._axes, feedback, strict=True):
             if fresh:
                 axis.clear()
-            if state.followable and not axis.active:
+            if state.refusal is None and not axis.active:
                 axis.enter(state.setpoint, self._style)
         self._state = WaveState.RUNNING
 

@@ -24,9 +24,11 @@ from arm_bringup.wave import (
     WaveStyle,
 )
 from arm_bringup.wave_source import WaveSource, WaveState
+from arm_canopen import Refusal, RefusalCause
 
 CYCLE = 0.01  # [s]
 STYLE = WaveStyle()
+HALTED = Refusal(RefusalCause.HALTED)
 
 
 @dataclass(frozen=True)
@@ -36,7 +38,7 @@ class Feedback:
     name: str
     position: float
     setpoint: float
-    followable: bool = True
+    refusal: Refusal | None = None
 
 
 class Arm:
@@ -56,7 +58,7 @@ class Arm:
         """Go on for some time in [s]."""
         for _ in range(round(duration / CYCLE)):
             feedback = [
-                Feedback(name, track[-1], track[-1], name not in self.held)
+                Feedback(name, track[-1], track[-1], HALTED if name in self.held else None)
                 for name, track in self.tracks.items()
             ]
             setpoints = self.source.update(0.0, CYCLE, feedback)  # type: ignore[arg-type]
@@ -180,7 +182,7 @@ def test_a_released_axis_stays_out_and_the_others_go_on() -> None:
     arm = panda()
     arm.source.start()
     arm.run(8.0)
-    arm.source.released('joint1', 'target')
+    arm.source.released('joint1', Refusal(RefusalCause.SINGLE_TARGET))
     arm.run(1.0)
     tracks = arm.tracks
     assert len(set(tracks['joint1'][-90:])) == 1

@@ -12,6 +12,7 @@ from typing import Any, TYPE_CHECKING
 
 from .can import open_bus
 from .cia402.motion import AxisFeedback, MotionSource, Setpoint
+from .cia402.refusal import Refusal, RefusalCause
 from .config import load_bus
 from .config.model import BusConfig, NodeConfig
 from .exceptions import CanopenError
@@ -27,6 +28,8 @@ __all__ = [
     'MasterProcess',
     'MotionSource',
     'NodeConfig',
+    'Refusal',
+    'RefusalCause',
     'Setpoint',
     'load_bus',
     'open_bus',

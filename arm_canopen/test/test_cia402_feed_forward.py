@@ -12,7 +12,7 @@ import struct
 import pytest
 from virtual_network import bus_config, drive_config, pdo, PERIOD, SCALE, sdo_write, VirtualNetwork
 
-from arm_canopen import AxisFeedback, Setpoint
+from arm_canopen import AxisFeedback, Refusal, RefusalCause, Setpoint
 from arm_canopen.standard.drive import OperationMode
 
 JOINT = 'joint1'
@@ -30,7 +30,7 @@ class Ramp:
 
     def __init__(self, velocity: float = SPEED, effort: float = EFFORT) -> None:
         """Take the feed-forward."""
-        self.losses: list[str] = []
+        self.losses: list[Refusal] = []
         self.pauses = False
         self._velocity = velocity
         self._effort = effort
@@ -48,9 +48,9 @@ class Ramp:
         )
         return [Setpoint(self._position, self._velocity, self._effort)]
 
-    def released(self, axis: str, reason: str) -> None:
-        """Keep the reason."""
-        self.losses.append(reason)
+    def released(self, axis: str, refusal: Refusal) -> None:
+        """Keep the cause."""
+        self.losses.append(refusal)
 
 
 def follow(source: Ramp, *, mapped: bool = True, mode: OperationMode = MODE) -> VirtualNetwork:
@@ -152,7 +152,7 @@ def test_a_feed_forward_that_cannot_be_is_refused(velocity: float, effort: float
     source = Ramp(velocity, effort)
     net = follow(source)
     assert len(source.losses) == 1
-    assert 'set-point refused' in source.losses[0]
+    assert source.losses[0].cause is RefusalCause.SETPOINT_REFUSED
     assert net.drives[JOINT].velocity == pytest.approx(0.0, abs=0.005)
     assert {data[:6] for data in net.frames(OFFSET_PDO)} == {bytes(6)}
 

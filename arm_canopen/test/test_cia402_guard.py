@@ -12,6 +12,7 @@ from virtual_network import bus_config, drive_config, PERIOD, SCALE, VirtualNetw
 
 from arm_canopen.can.frame import Frame
 from arm_canopen.cia402.motion import AxisFeedback
+from arm_canopen.cia402.refusal import Refusal, RefusalCause
 from arm_canopen.cia402.units import Units
 from arm_canopen.config.drive_model import DriveConfig
 from arm_canopen.exceptions import DriveError
@@ -169,7 +170,7 @@ class Careless:
         """Hold the axis."""
         return [feedback[0].setpoint]
 
-    def released(self, axis: str, reason: str) -> None:
+    def released(self, axis: str, refusal: Refusal) -> None:
         """Fail."""
         raise ZeroDivisionError('a defect')
 
@@ -193,7 +194,7 @@ class Script:
 
     def __init__(self, *answers: float) -> None:
         """Take what it answers beyond the set-point of before, from its tenth cycle on."""
-        self.losses: list[str] = []
+        self.losses: list[Refusal] = []
         self._answers = answers
         self._position: float | None = None
         self._cycle = 0
@@ -209,9 +210,9 @@ class Script:
             return [self._position]
         return [self._position + answer for answer in self._answers]
 
-    def released(self, axis: str, reason: str) -> None:
-        """Keep the reason."""
-        self.losses.append(reason)
+    def released(self, axis: str, refusal: Refusal) -> None:
+        """Keep the cause."""
+        self.losses.append(refusal)
 
 
 @pytest.mark.parametrize('jump', [5.0, -0.2])
@@ -224,7 +225,8 @@ def test_a_stream_that_jumps_on_its_way_is_refused(jump: float) -> None:
     net.run(0.5)
     assert motor(net, GOOD) == pytest.approx(begin, abs=1e-3)
     assert len(source.losses) == 1
-    assert 'jumps' in source.losses[0]
+    assert source.losses[0].cause is RefusalCause.SETPOINT_REFUSED
+    assert 'jumps' in source.losses[0].detail
     assert_served(net)
 
 

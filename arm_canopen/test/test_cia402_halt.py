@@ -318,7 +318,7 @@ def test_homing_that_is_cancelled_leaves_the_axis_at_rest(cycles: int) -> None:
     net.run(0.5)
     assert abs(motor(net) - begin) < BRAKING_MAX
     assert_rests(net)
-    net.run_until(lambda: net.drives[JOINT].obeys)
+    net.run_until(lambda: net.drives[JOINT].accepts_targets)
     net.commands[JOINT].set_target(begin)
     net.run(2.0)
     assert net.drives[JOINT].position == pytest.approx(begin, abs=2e-3)

@@ -12,6 +12,7 @@ import pytest
 from virtual_network import bus_config, drive_config, PERIOD, SCALE, sdo_write, VirtualNetwork
 
 from arm_canopen.cia402.motion import AxisFeedback
+from arm_canopen.cia402.refusal import Refusal, RefusalCause
 from arm_canopen.exceptions import DriveError
 from arm_canopen.master.events import Severity
 from arm_canopen.standard.drive import DriveState, OperationMode
@@ -147,7 +148,7 @@ def test_a_position_that_is_not_known_is_never_told() -> None:
             net.power_on(JOINT)
         for _ in range(300):
             net.run(PERIOD)
-            if not (drive.node.operational and drive.objects.known):
+            if not drive.fresh:
                 told.append(drive.feedback().position)
     assert told == pytest.approx([0.5] * len(told), abs=2 / SCALE)
     assert told
@@ -315,7 +316,7 @@ class Ramp:
     def __init__(self, speed: float, jump: float = 0.0) -> None:
         """Begin at rest."""
         self.axes = [JOINT]
-        self.losses: list[str] = []
+        self.losses: list[Refusal] = []
         self._speed = speed
         self._jump = jump
         self._position: float | None = None
@@ -332,9 +333,9 @@ class Ramp:
         self._position += self._speed * period
         return [self._position]
 
-    def released(self, axis: str, reason: str) -> None:
-        """Keep the reason."""
-        self.losses.append(reason)
+    def released(self, axis: str, refusal: Refusal) -> None:
+        """Keep the cause."""
+        self.losses.append(refusal)
 
 
 def test_a_stream_is_followed_and_braked_at_its_end(net: VirtualNetwork) -> None:
@@ -364,7 +365,7 @@ def test_a_stream_that_jumps_at_the_start_is_refused(net: VirtualNetwork) -> Non
     net.group.attach(source)
     net.run(0.5)
     assert position_inc(net) == pytest.approx(rest, abs=1)
-    assert 'must start where the drive is' in source.losses[0]
+    assert source.losses[0].cause is RefusalCause.SETPOINT_REFUSED
 
 
 def test_a_single_target_takes_the_axis_from_its_source(net: VirtualNetwork) -> None:
@@ -375,7 +376,7 @@ def test_a_single_target_takes_the_axis_from_its_source(net: VirtualNetwork) -> 
     net.run(0.5)
     net.commands[JOINT].set_target(0.0)
     net.run(3.0)
-    assert source.losses == ['a single target was commanded']
+    assert [loss.cause for loss in source.losses] == [RefusalCause.SINGLE_TARGET]
     assert net.drives[JOINT].position == pytest.approx(0.0, abs=2 / SCALE)
 
 
@@ -393,7 +394,7 @@ def test_a_source_attached_again_goes_on(net: VirtualNetwork) -> None:
     assert all(b - a == pytest.approx(0.4 * PERIOD, abs=2 / SCALE) for a, b in pairwise(targets))
     net.group.attach(Ramp(0.0))
     net.run(0.1)
-    assert source.losses == ['another motion source took over']
+    assert [loss.cause for loss in source.losses] == [RefusalCause.OTHER_SOURCE]
 
 
 class Broken(Ramp):

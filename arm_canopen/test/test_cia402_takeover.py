@@ -54,7 +54,7 @@ def test_a_drive_that_holds_goes_on_holding(mode: OperationMode) -> None:
     drive = net.drives['a']
     assert net.network.nodes['a'].taken_over
     assert drive.state is DriveState.OPERATION_ENABLED
-    assert drive.obeys
+    assert drive.accepts_targets
     assert max(abs(position - at_rest) for position in seen) <= 1
     assert all(word & 0x0F == 0x0F for word in net.controlwords('a', since=begin))
     assert any('taken over enabled' in text for text in net.told())

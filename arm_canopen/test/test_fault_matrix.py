@@ -331,6 +331,54 @@ def assert_obeys(arm: Arm, mode: OperationMode) -> None:
     assert arm.motor(FAULTY) == pytest.approx(-0.2, abs=0.01)
 
 
+TPDOS, RPDOS = (0x180, 0x280, 0x380), (0x200, 0x300, 0x400)
+STREAMED = (OperationMode.INTERPOLATED_POSITION, OperationMode.CYCLIC_POSITION)
+
+
+@pytest.mark.parametrize('mode', MODES, ids=lambda mode: mode.name)
+@pytest.mark.parametrize('names', [(FAULTY,), (FAULTY, WITNESS)], ids=['one', 'all'])
+@pytest.mark.parametrize(
+    'lost', [TPDOS, RPDOS, (*TPDOS, *RPDOS)], ids=['TPDOs lost', 'RPDOs lost', 'both lost']
+)
+def test_lost_pdos_in_motion(
+    lost: tuple[int, ...], names: tuple[str, ...], mode: OperationMode
+) -> None:
+    """A drive that cannot be seen is halted and refuses targets, one that cannot be led is told.
+
+    Neither is disabled, and when the PDOs come again nothing moves before a new target.
+    """
+    arm = Arm()
+    arm.move(mode)
+    silent, deaf = set(TPDOS) <= set(lost), set(RPDOS) <= set(lost)
+    arm.lose(
+        *(base + arm.net.network.nodes[name].config.node_id for name in names for base in lost)
+    )
+    for name in {FAULTY, WITNESS} - set(names):
+        arm.stop(name, mode)
+    arm.net.run(1.0)
+    for name in names:
+        drive = arm.net.drives[name]
+        causes = {text for text in arm.net.told(Severity.ERROR) if f'{name}: stopped' in text}
+        assert drive.accepts_targets is not silent
+        assert drive.halted is bool(causes) is (silent or mode in STREAMED), arm.net.story()
+        if silent:
+            with pytest.raises(DriveError, match='TPDOs'):
+                arm.net.commands[name].set_target(0.1)
+    if not deaf or mode in POSITION_MODES:  # else nothing that the master sends reaches them
+        arm.stands(*names, duration=1.0)
+    elif not silent:
+        halts = [arm.net.begin(name, 'halt', preempt=True) for name in names]
+        arm.net.run(1.0)
+        assert not any(halt.done for halt in halts)  # none is told to stand while it moves
+    mend_bus(arm)
+    arm.net.run(1.0)
+    arm.stands(FAULTY, WITNESS, duration=1.0)
+    for name in (FAULTY, WITNESS):
+        assert arm.state(name) is DriveState.OPERATION_ENABLED
+        assert arm.net.drives[name].accepts_targets
+    assert_obeys(arm, mode)
+
+
 @pytest.mark.parametrize('mode', MODES, ids=lambda mode: mode.name)
 def test_sdo_time_outs_do_not_disturb_motion(mode: OperationMode) -> None:
     """The cycle needs no SDO: only who asks for one hears of it, with object and device."""

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from servo_drives import Drives, PERIOD
 
-from arm_canopen import AxisFeedback, CanopenError
+from arm_canopen import AxisFeedback, CanopenError, Refusal, RefusalCause
 from arm_canopen.standard.drive import DriveState
 from arm_servo.core import MotionCore
 from arm_servo.exceptions import GoalCode, NotReadyError
@@ -96,10 +96,30 @@ def test_the_others_stop_on_the_path_when_a_drive_drops_out(change: Change, word
     assert np.abs(speeds[-1]).max() == 0.0
 
 
+def test_a_silent_drive_is_led_to_rest_on_the_path_with_the_others() -> None:
+    """Its set-points are still sent: the whole arm stops in step, and the trajectory names it."""
+    drives = attached()
+    begin = drives.path[-1]
+    future = swing(drives)
+    drives.run(60)
+    before = len(drives.path)
+    silent = Refusal(RefusalCause.SILENT, 'the last is 0.5 s old')
+    drives.axes[2] = replace(drives.axes[2], refusal=silent, age=0.5)
+    assert None not in drives.run()
+    drives.run(200)
+    ending = future.result(0.0).ending
+    assert ending is not None
+    assert ending.reason.startswith('panda_joint3 does not send its TPDOs')
+    path = np.array(drives.path) - begin
+    ratio = path[before:] / path[before:, :1]
+    assert np.abs(np.abs(ratio) - 1.0).max() < 1e-6
+    assert np.abs(np.diff(path, axis=0)[-1]).max() == 0.0
+
+
 def test_a_drive_that_was_taken_away_comes_back_when_attached_again() -> None:
     """Another client's target is left alone until the next attach; then all goes on from there."""
     drives = attached()
-    drives.source.released('panda_joint5', 'a single target')
+    drives.source.released('panda_joint5', Refusal(RefusalCause.SINGLE_TARGET))
     assert drives.run(3) == [None] * 7
     assert 'single target' in drives.desk.snapshot.blocked
     assert drives.source.detached

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from servo_drives import Drives, PERIOD
 
+from arm_canopen import Refusal, RefusalCause
 from arm_servo.exceptions import GoalCode, GoalError, NotReadyError
 from arm_servo.execution import Execution
 from arm_servo.goal import GoalPoint, TrajectoryGoal
@@ -179,7 +180,7 @@ def test_refusals_reach_whoever_asked() -> None:
     run_until(drives, wrong.done)
     with pytest.raises(GoalError, match='elbow'):
         wrong.result(0.0)
-    drives.source.released('panda_joint1', 'a single target')
+    drives.source.released('panda_joint1', Refusal(RefusalCause.SINGLE_TARGET))
     drives.run(3)
     blocked = planner.follow(wave(drives, 40))
     run_until(drives, blocked.done)

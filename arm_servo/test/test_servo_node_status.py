@@ -7,6 +7,7 @@ from __future__ import annotations
 import pytest
 from servo_drives import Drives
 
+from arm_canopen import Refusal, RefusalCause
 from arm_servo.nodes.desk import Snapshot
 from arm_servo.nodes.servo_status import code_of, status_of, StatusCode
 from arm_servo.otg import MotionState
@@ -60,7 +61,7 @@ def test_a_blocked_arm_says_so() -> None:
     """Without drives the status is invalid, and names the remedy."""
     drives = Drives()
     drives.attach()
-    drives.source.released('panda_joint1', 'a single target')
+    drives.source.released('panda_joint1', Refusal(RefusalCause.SINGLE_TARGET))
     drives.run()
     code, words = status_of(drives.desk.snapshot, '', '', '')
     assert code == StatusCode.INVALID

@@ -14,14 +14,17 @@ from ..master.scheduler import Scheduler, Task
 from ..standard.drive import DriveState, mode_title, OperationMode, Statusword
 from .cyclic_position import CyclicPosition
 from .feed_forward import FeedForward
+from .following_watch import FollowingWatch
 from .moded_drive import ModedDrive
 from .modes import NO_BITS
 from .motion import AxisFeedback, Setpoint
 from .observed_drive import FAULTY
+from .refusal import Refusal, RefusalCause
 from .state_machine import Command, fault_reset, next_command
 from .target_limits import check_feed_forward
 
 FOLLOWS_COMMAND = int(Statusword.FOLLOWS_COMMAND)
+UNSEEN_STOP_TIME = 1.0  # [s] in which a motion source may lead a silent drive to rest on its path
 
 
 class Drive(ModedDrive):
@@ -35,7 +38,7 @@ class Drive(ModedDrive):
         period: Length of the last cycle in [s].
         interrupted: Mode in which it was enabled when its device was lost, None otherwise.
         feed_forward: What a motion source tells ahead.
-        released: Called with a reason when a motion source loses the drive.
+        released: Called with the cause when a motion source loses the drive.
         on_ready: Called when state and parameters are known after each boot.
     """
 
@@ -50,7 +53,7 @@ class Drive(ModedDrive):
             config: Settings of the axis; None for the first one.
         """
         super().__init__(node, scheduler, config or node.config.drive)
-        self.released: Callable[[str], None] = lambda reason: None
+        self.released: Callable[[Refusal], None] = lambda refusal: None
         self.on_ready: Callable[[], None] = lambda: None
         self.resetting = False
         self.period = 0.0
@@ -63,6 +66,9 @@ class Drive(ModedDrive):
         self._begun = False
         self._announced = False
         self._follows = False
+        self._following = FollowingWatch()
+        self._led = False  # by a motion source, in the last cycle
+        self._unseen_since: float | None = None
         self._polling: Task[None] | None = None
         node.on_lost.append(self._on_lost)
 
@@ -85,16 +91,9 @@ class Drive(ModedDrive):
         enable = int(Command.ENABLE_OPERATION)
         return self._controlword & enable == enable
 
-    @property
-    def followable(self) -> bool:
-        """Whether a stream of positions would be obeyed in this cycle."""
-        mode = self.mode
-        if not self.obeys or not isinstance(mode, CyclicPosition) or mode.goes_to_single_target:
-            return False
-        return mode.braked or not self.halted
-
     def feedback(self) -> AxisFeedback:
         """Return the state for motion sources."""
+        refusal = self.stream_refusal
         return AxisFeedback(
             name=self.name,
             online=self.node.online,
@@ -103,7 +102,9 @@ class Drive(ModedDrive):
             position=self.position,
             velocity=self.velocity,
             setpoint=self.setpoint,
-            followable=self.followable,
+            followable=refusal is None or self._is_led_to_rest(),
+            refusal=refusal,
+            age=self.age,
         )
 
     def read(self) -> None:
@@ -122,6 +123,7 @@ class Drive(ModedDrive):
             self._take_over()
         if self.state is not before:
             self._state_changed(before)
+        self._watch_sight()
         self._watch_following()
         if not self._announced and self.ready:
             self._announced = True
@@ -132,7 +134,7 @@ class Drive(ModedDrive):
         self.period = period
         if not self._streamed:
             self.feed_forward.end()
-        self._streamed = False
+        self._led, self._streamed = self._streamed, False
         bits = NO_BITS
         if self.state is DriveState.UNKNOWN and self.node.taken_over:
             return  # its RPDOs go on to carry what another master had commanded
@@ -140,7 +142,7 @@ class Drive(ModedDrive):
             command = Command.DISABLE_VOLTAGE
         else:
             command, edge = self._lead_targets(self._command())
-            if command is Command.ENABLE_OPERATION and self.obeys:
+            if command is Command.ENABLE_OPERATION and self.acts:
                 bits = self._step_mode(now, period)
             else:
                 bits = self._hold_without_target(edge=edge)
@@ -163,7 +165,7 @@ class Drive(ModedDrive):
             text = f'a defect in the CANopen master: {type(error).__name__}: {error}'
         if text != self._failure:
             self._failure = text
-            self.released('its cycle failed')
+            self.released(Refusal(RefusalCause.CYCLE_FAILED, text))
             self.report(Severity.ERROR, f'stopped: {text}')
 
     def resume(self) -> None:
@@ -221,16 +223,59 @@ class Drive(ModedDrive):
         else:
             self.warn(f'is not enabled by the new master: {self.describe()}')
 
+    def _watch_sight(self) -> None:
+        """Bring a drive to rest that acts on targets and has stopped to send its state."""
+        if self.fresh or not self.acts:
+            self._unseen_since = None
+            return
+        if self._unseen_since is None:
+            self._unseen_since = self._scheduler.now
+        if self._is_led_to_rest() or (self.halted and not self.halt.leaving):
+            return
+        self.hold()
+        self.released(Refusal(RefusalCause.SILENT, f'the last is {self.age:.1f} s old'))
+        self.report(
+            Severity.ERROR,
+            f'stopped: no TPDOs for {self.age:.1f} s; it stays halted until the first target '
+            'after they have come again',
+        )
+
+    def _is_led_to_rest(self) -> bool:
+        """Whether a motion source may still lead a silent drive, to stop it on its path."""
+        since = self._unseen_since
+        return self._led and since is not None and self._scheduler.now - since < UNSEEN_STOP_TIME
+
     def _watch_following(self) -> None:
-        """Bit 12 of the cyclic modes: a drive that has followed and does not any more is said."""
-        if not (self.mode.cyclic and self.obeys):
+        """Stop a drive that is left behind by the set-points of a cyclic mode."""
+        mode = self.mode
+        if not (mode.cyclic and self.accepts_targets):
             self._follows = False
+            self._following.clear()
             return
         bit = bool(self.statusword & FOLLOWS_COMMAND)
         before, self._follows = self._follows, bit
         if before and not bit:
-            self.released('the drive does not follow its set-points (bit 12)')
+            self.released(Refusal(RefusalCause.NOT_FOLLOWING, 'bit 12'))
             self.warn(f'does not follow its set-points any more (bit 12): {self.describe()}')
+        if isinstance(mode, CyclicPosition):
+            self._watch_position(mode)
+
+    def _watch_position(self, mode: CyclicPosition) -> None:
+        setpoint = mode.setpoint
+        position = self.units.position_commanded(self.objects.position or 0)
+        velocity = self.parameters.profile.velocity
+        if self._following.follows(self._scheduler.now, setpoint, position, velocity):
+            return
+        self._following.clear()
+        self.hold()
+        mode.preload(self._actual())  # so that it does not jump when set-points reach it again
+        where = f'commanded to {setpoint:g}, it is at {position:g}'
+        self.released(Refusal(RefusalCause.NOT_FOLLOWING, where))
+        self.report(
+            Severity.ERROR,
+            f'stopped: it does not follow its set-points ({where}). Do its RPDOs arrive, and is '
+            'the axis free?',
+        )
 
     def _command(self) -> Command:
         if self.resetting and self.state is DriveState.FAULT:
@@ -247,19 +292,19 @@ class Drive(ModedDrive):
             self.halt.release()
         if self.state in FAULTY and before not in FAULTY:
             self.goal = DriveState.SWITCH_ON_DISABLED
-            self.released('fault')
+            self.released(Refusal(RefusalCause.FAULT, self.error))
             self._scheduler.background(self._report_fault())
         elif left and self.goal is DriveState.OPERATION_ENABLED:
             # a drive that lost its enable must not start again when the cause goes away
             self.goal = DriveState.SWITCH_ON_DISABLED
-            self.released('the drive left Operation enabled')
+            self.released(Refusal(RefusalCause.NOT_ENABLED, 'it left Operation enabled by itself'))
             self.report(
                 Severity.ERROR,
                 f'left Operation enabled by itself: {self.describe()}; is the voltage or the '
                 'safe torque off gone? Call ~/enable when it is safe',
             )
         elif left:
-            self.released(f'the drive is {self.state.title}')
+            self.released(Refusal(RefusalCause.NOT_ENABLED, self.state.title))
 
     async def _report_fault(self) -> None:
         await self.know_error()
@@ -275,8 +320,13 @@ class Drive(ModedDrive):
         self.feed_forward.end()
         self.goal = None
         self.resetting = self._follows = self._begun = self._announced = False
+        self._unseen_since = None
+        self._following.clear()
         self.halt.release()
         self.error = ''
         self._lose_sight()
         self.mode = self._mode_shown = self._mode_led = self.modes[OperationMode.NO_MODE]
-        self.released(reason)
+        cause = RefusalCause.OFFLINE
+        if self.node.left_operational:
+            cause = RefusalCause.NOT_OPERATIONAL
+        self.released(Refusal(cause, reason))

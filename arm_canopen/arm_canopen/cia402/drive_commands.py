@@ -17,6 +17,7 @@ from .mode_table import REQUIRED_OBJECTS
 from .modes import NoMode
 from .position_modes import Move, ProfilePosition
 from .recovery import Recovery
+from .refusal import Refusal, RefusalCause
 from .stop_commands import StopCommands
 from .streaming import TargetStream
 
@@ -117,7 +118,7 @@ class DriveCommands(StopCommands):
         """Reset a fault, enable, home where bus.yml asks for it, and select no mode."""
         drive, steps = self.drive, self._steps
         await steps.ready()
-        drive.released('the drive is initialised')
+        drive.released(Refusal(RefusalCause.COMMANDED, 'init'))
         await steps.reset_fault()
         await steps.reach(DriveState.OPERATION_ENABLED)
         await steps.come_to_rest()
@@ -223,18 +224,18 @@ class DriveCommands(StopCommands):
         drive, steps = self.drive, self._steps
         if self._busy:
             raise steps.refused(f'takes no target while {self._running} is running')
-        if not drive.node.online:
-            raise steps.refused('takes no target')
-        if drive.state is not DriveState.OPERATION_ENABLED:
+        refusal = drive.refusal
+        if refusal is None:
+            return
+        if refusal.cause in (RefusalCause.FAULT, RefusalCause.NOT_ENABLED):
             raise steps.refused(f'takes no target; call {steps.way_to_enable()}')
-        if not drive.node.answers:
-            raise steps.refused('takes no target, because it does not answer SYNC')
-        if not isinstance(drive.mode, NoMode) and not drive.obeys:
-            raise steps.refused('takes no target now')
+        if refusal.cause is RefusalCause.MODE_CHANGE and isinstance(drive.mode, NoMode):
+            return  # which says itself that it has no target
+        raise steps.refused(f'takes no target: it {refusal}')
 
     def _resume(self) -> None:
         self.drive.resume()
-        self.drive.released('a single target was commanded')
+        self.drive.released(Refusal(RefusalCause.SINGLE_TARGET))
 
     async def _enable_in(self, mode: OperationMode) -> str:
         await self._steps.ready()

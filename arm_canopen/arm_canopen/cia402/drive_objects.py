@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from ..master.process_image import Writer
+from ..master.process_image import Reader, Writer
 from ..master.remote_node import RemoteNode
 from ..standard.drive import drive_state, DriveState, OperationMode
 from ..standard.objects import AXIS_OFFSET, Index
@@ -27,6 +27,11 @@ class DriveObjects:
         self._position = node.reader(self.at(Index.POSITION_ACTUAL))
         self._velocity = node.image.reader(self.at(Index.VELOCITY_ACTUAL))
         self._torque = node.image.reader(self.at(Index.TORQUE_ACTUAL))
+        polled_mode = node.image.reader(self.at(Index.MODE_OF_OPERATION_DISPLAY)) is None
+        state: list[Reader] = [self._statusword, self._position]
+        state += [] if polled_mode else [self._mode]
+        state += [reader for reader in (self._velocity, self._torque) if reader is not None]
+        self._state = state
         self.controlword = node.writer(self.at(Index.CONTROLWORD))
         self.mode = node.writer(self.at(Index.MODE_OF_OPERATION))
 
@@ -44,10 +49,17 @@ class DriveObjects:
             return None
         return int(word), position
 
+    def fresh(self, now: float) -> bool:
+        """Tell whether the state is known and young enough to act on, at a steady time in [s].
+
+        A mode of operation that is read by SDO does not count: the cycle needs no SDO.
+        """
+        return self._mode.value is not None and not any(o.stale(now) for o in self._state)
+
     @property
-    def known(self) -> bool:
-        """Whether the drive has sent its state, mode and position."""
-        return None not in (self._statusword.value, self._mode.value, self._position.value)
+    def timestamp(self) -> float:
+        """Steady time of the oldest value of the state in [s]."""
+        return min(reader.timestamp for reader in self._state)
 
     @property
     def statusword(self) -> int:
@@ -66,9 +78,9 @@ class DriveObjects:
         return int(self._mode.value or 0)
 
     @property
-    def position(self) -> float:
-        """0x6064 in [inc]; 0 while unknown."""
-        return self._position.value or 0
+    def position(self) -> float | None:
+        """0x6064 in [inc]; None while unknown."""
+        return self._position.value
 
     @property
     def velocity(self) -> float | None:

@@ -7,11 +7,12 @@ from __future__ import annotations
 from ..config.drive_model import DriveConfig
 from ..master.remote_node import RemoteNode
 from ..master.scheduler import Scheduler
-from ..standard.drive import DriveState, OperationMode
+from ..standard.drive import DriveState, mode_title, OperationMode
 from .cyclic_position import CyclicPosition
 from .mode_table import build_modes
 from .modes import Mode, NO_BITS
-from .observed_drive import ObservedDrive
+from .observed_drive import FAULTY, ObservedDrive
+from .refusal import Refusal, RefusalCause
 from .target_limits import check_target
 
 
@@ -32,13 +33,56 @@ class ModedDrive(ObservedDrive):
         self.mode: Mode = self.modes[OperationMode.NO_MODE]
 
     @property
-    def obeys(self) -> bool:
-        """Whether the drive follows targets of its mode in this cycle."""
+    def acts(self) -> bool:
+        """Whether the target of the selected mode acts on the drive, by its last state.
+
+        It may be too old to accept targets (:attr:`refusal`), but a drive that cannot be seen is
+        braked in its mode, too.
+        """
         return (
             self.goal is DriveState.OPERATION_ENABLED
             and self.state is DriveState.OPERATION_ENABLED
             and self.objects.mode_display == self.mode.number
         )
+
+    @property
+    def accepts_targets(self) -> bool:
+        """Whether a target of the selected mode would be executed."""
+        return self.refusal is None
+
+    @property
+    def refusal(self) -> Refusal | None:
+        """Why it accepts no targets of the selected mode now; None when it does."""
+        node = self.node
+        if not node.online:
+            return Refusal(RefusalCause.OFFLINE, node.loss or node.phase_text)
+        if node.left_operational:
+            return Refusal(RefusalCause.NOT_OPERATIONAL)
+        if self.state is DriveState.UNKNOWN:
+            return Refusal(RefusalCause.STATE_UNKNOWN)
+        if not self.fresh:
+            return Refusal(RefusalCause.SILENT, f'the last is {self.age:.1f} s old')
+        if self.state in FAULTY:
+            return Refusal(RefusalCause.FAULT, self.error)
+        if not self.goal is self.state is DriveState.OPERATION_ENABLED:
+            return Refusal(RefusalCause.NOT_ENABLED, self.state.title)
+        if self.objects.mode_display != self.mode.number:
+            return Refusal(RefusalCause.MODE_CHANGE, mode_title(self.objects.mode_display))
+        return None
+
+    @property
+    def stream_refusal(self) -> Refusal | None:
+        """Why it accepts no stream of positions now; None when it does."""
+        refusal, mode = self.refusal, self.mode
+        if refusal is not None:
+            return refusal
+        if not isinstance(mode, CyclicPosition):
+            return Refusal(RefusalCause.OTHER_MODE, mode_title(mode.number))
+        if mode.goes_to_single_target:
+            return Refusal(RefusalCause.SINGLE_TARGET)
+        if self.halted and not mode.braked:
+            return Refusal(RefusalCause.HALTED)
+        return None
 
     @property
     def holding_mode(self) -> Mode | None:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from ..standard.drive import DriveState
+from .refusal import Refusal
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,8 +25,12 @@ class AxisFeedback:
             drive, NaN before the first.
         velocity: Actual velocity in user units per second.
         setpoint: Position last commanded in user units; equals ``position`` while disabled.
-        followable: A position set-point of a source would be obeyed this cycle: the drive is
-            online, Operation Enabled and in a cyclic position mode, and nothing else moves it.
+        followable: A position set-point of a source is sent in this cycle: the drive is online,
+            Operation Enabled and in a cyclic position mode, and nothing else moves it.
+        refusal: Why the drive accepts no stream of positions; None when it does. A drive that
+            moves and has stopped to send its TPDOs is followable for another second in spite of
+            it, so that the source can bring the whole arm to rest on its path; then it is halted.
+        age: Age of the oldest of these values in [s]; infinite while they are unknown.
     """
 
     name: str
@@ -36,6 +41,8 @@ class AxisFeedback:
     velocity: float
     setpoint: float
     followable: bool
+    refusal: Refusal | None = None
+    age: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,10 +90,10 @@ class MotionSource(Protocol):
             or None to leave it where it is.
         """
 
-    def released(self, axis: str, reason: str) -> None:
+    def released(self, axis: str, refusal: Refusal) -> None:
         """Learn that an axis was taken away; until attached again its set-points are ignored.
 
         Args:
             axis: Name of the drive.
-            reason: Why: a single target, another mode, a fault, a loss.
+            refusal: Why: a single target, another mode, a fault, a loss.
         """

@@ -12,6 +12,7 @@ from ..exceptions import DriveError
 from ..master.events import Event, EventKind, Report, Severity
 from .drive import Drive
 from .motion import MotionSource, Setpoint
+from .refusal import Refusal, RefusalCause
 
 HAND_OVER_MARGIN = 2.0  # cycles of profile velocity from the set-point that a stream may start
 SPEED_MARGIN = 1.5  # share of the greatest speed (0x607F) above which a step is a jump
@@ -68,7 +69,7 @@ class MotionGroup:
         kept = [drive for entry in before for drive in entry.owned]
         for drive in drives:
             if drive not in kept:
-                self._release(drive, 'another motion source took over')
+                self._release(drive, Refusal(RefusalCause.OTHER_SOURCE))
         self.detach(source)
         streaming = {name for entry in before for name in entry.streaming}
         self._attachments.append(Attachment(source, drives, list(drives), streaming))
@@ -117,7 +118,7 @@ class MotionGroup:
             try:
                 self._stream(attachment, drive, whole, period)
             except DriveError as error:
-                self._release(drive, f'set-point refused: {error}')
+                self._release(drive, Refusal(RefusalCause.SETPOINT_REFUSED, str(error)))
 
     def _stream(
         self, attachment: Attachment, drive: Drive, setpoint: Setpoint, period: float
@@ -138,16 +139,16 @@ class MotionGroup:
             )
         drive.stream(setpoint)
 
-    def _release(self, drive: Drive, reason: str) -> None:
+    def _release(self, drive: Drive, refusal: Refusal) -> None:
         for attachment in self._attachments:
             if drive in attachment.owned:
                 attachment.owned.remove(drive)
                 attachment.streaming.discard(drive.name)
-                self._tell(attachment.source, drive.name, reason)
+                self._tell(attachment.source, drive.name, refusal)
 
-    def _tell(self, source: MotionSource, axis: str, reason: str) -> None:
+    def _tell(self, source: MotionSource, axis: str, refusal: Refusal) -> None:
         try:
-            source.released(axis, reason)
+            source.released(axis, refusal)
         except Exception as error:  # noqa: BLE001  # whoever takes the drive away must not suffer
             name = type(source).__name__
             text = (

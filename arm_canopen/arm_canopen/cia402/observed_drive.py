@@ -69,9 +69,27 @@ class ObservedDrive:
         return self._upkeep.told
 
     @property
+    def fresh(self) -> bool:
+        """Whether its state is known and young enough to act on."""
+        node = self.node
+        return (
+            node.online and not node.left_operational and self.objects.fresh(self._scheduler.now)
+        )
+
+    @property
+    def age(self) -> float:
+        """Age of the oldest value of its state in [s]; infinite while there is none."""
+        if self.state is DriveState.UNKNOWN:
+            return math.inf
+        return self._scheduler.now - self.objects.timestamp
+
+    @property
     def position(self) -> float:
         """Actual position in user units: the last one of a lost drive, NaN before the first."""
-        return self._position
+        position_inc = self.objects.position
+        if position_inc is None:
+            return self._position
+        return self.units.position_from_device(position_inc)
 
     @property
     def velocity(self) -> float:
@@ -102,7 +120,7 @@ class ObservedDrive:
     @property
     def ready(self) -> bool:
         """Whether its state and its parameters are known."""
-        return self.state is not DriveState.UNKNOWN and self._upkeep.known
+        return self.state is not DriveState.UNKNOWN and self._upkeep.known and self.fresh
 
     @property
     def homing_at_init(self) -> int:
@@ -124,6 +142,8 @@ class ObservedDrive:
                 statusword_text(self.statusword),
                 f'mode {mode_title(self.objects.mode_display)}',
             ]
+        if self.state is not DriveState.UNKNOWN and not self.fresh:
+            parts.append(f'no TPDOs for {self.age:.1f} s')
         if self.halted:
             parts.append('halted')
         if self.error:
@@ -162,7 +182,10 @@ class ObservedDrive:
             return
         word, position_inc = seen
         self._position = self.units.position_from_device(position_inc)
-        self._estimate.note(self._scheduler.now, position_inc)
+        if self.fresh:
+            self._estimate.note(self._scheduler.now, position_inc)
+        else:
+            self._estimate.clear()
         if word != self.statusword or self.state is DriveState.UNKNOWN:
             self.state, self.statusword = drive_state(word), word
 
@@ -184,7 +207,7 @@ class ObservedDrive:
             share = 0.0 if shown * velocity <= 0.0 else min(1.0, velocity / shown)
             velocity, velocity_dev = share * shown, share * told
         return Actual(
-            clamp(objects.position, INT32_MAX),
+            clamp(objects.position or 0, INT32_MAX),
             velocity,
             clamp(velocity_dev, INT32_MAX),
             clamp(objects.torque, INT16_MAX),

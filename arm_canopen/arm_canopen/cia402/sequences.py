@@ -15,6 +15,7 @@ from .drive import Drive
 from .modes import Mode
 from .observed_drive import FAULTY
 from .quirks import quirks_of
+from .refusal import Refusal, RefusalCause
 from .target_limits import TORQUE_MODES
 
 BUFFER_CLEAR = 6  # sub-index of 0x60C4 (CiA 402-2, clause 12)
@@ -44,18 +45,24 @@ class DriveSequences:
         self.quirks = quirks_of(drive.config.quirks)
         self._scheduler = scheduler
 
-    async def ready(self) -> None:
+    async def ready(self, *, to_stop: bool = False) -> None:
         """Wait for state and parameters of a drive that has just come up.
+
+        Args:
+            to_stop: A drive whose state is not fresh is ready, too.
 
         Raises:
             DriveError: It is offline, or does not tell them.
         """
         drive = self.drive
         self._require_operational()
+
+        def ready() -> bool:
+            known = to_stop and drive.state is not DriveState.UNKNOWN
+            return known or drive.ready or not drive.node.operational
+
         try:
-            await self._scheduler.until(
-                lambda: drive.ready or not drive.node.operational, READY_TIMEOUT
-            )
+            await self._scheduler.until(ready, READY_TIMEOUT)
         except TimeoutError:
             raise DriveError(self._why_not_ready()) from None
         self._require_operational()
@@ -131,7 +138,7 @@ class DriveSequences:
         enabled = drive.state is DriveState.OPERATION_ENABLED
         switching_state = drive.config.switching_state
         leave = enabled and switching_state is not DriveState.OPERATION_ENABLED
-        drive.released(f'mode {mode.number.title} was selected')
+        drive.released(Refusal(RefusalCause.MODE_SELECTED, mode.number.title))
         await self.come_to_rest()
         if leave:
             await self.reach(switching_state)
@@ -235,11 +242,11 @@ class DriveSequences:
     def is_slow(self) -> bool:
         """Whether the axis stands; a real encoder is never quite still.
 
-        Both what 0x606C tells and what the position shows have to be slow.
+        Both what 0x606C tells and what the position shows have to be slow, and fresh.
         """
         drive = self.drive
         rest = max(REST_MIN, min(REST_MAX, REST_SHARE * drive.parameters.profile.velocity))
-        return drive.speed <= rest
+        return drive.fresh and drive.speed <= rest
 
     def require_no_fault(self) -> None:
         """Refuse to go on with a drive that is faulted."""
@@ -271,6 +278,8 @@ class DriveSequences:
 
     def _why_not_ready(self) -> str:
         drive = self.drive
+        if drive.state is not DriveState.UNKNOWN and not drive.fresh:
+            return f'{drive.name} does not send its TPDOs any more: {drive.describe()}'
         if drive.state is DriveState.UNKNOWN:
             return (
                 f'{drive.name} is operational, but its statusword, mode and position have not '

@@ -24,6 +24,8 @@ class DriveStatus:
         statusword: 0x6041 in words.
         warning: The statusword shows a warning or an internal limit.
         error: 0x603F in words, empty when none is known.
+        fresh: State, position and velocity are young enough to act on.
+        age: Age of the oldest of them in [s]; infinite while they are unknown.
         position: Actual position in user units.
         velocity: Actual velocity in user units per second.
         setpoint: Position last commanded in user units.
@@ -37,6 +39,8 @@ class DriveStatus:
     statusword: str
     warning: bool
     error: str
+    fresh: bool
+    age: float
     position: float
     velocity: float
     setpoint: float
@@ -69,6 +73,8 @@ def drive_status(drive: Drive, now: float) -> DriveStatus:
         statusword=statusword_text(word),
         warning=bool(word & (Statusword.WARNING | Statusword.INTERNAL_LIMIT)),
         error=drive.error,
+        fresh=drive.fresh,
+        age=drive.age,
         position=drive.position,
         velocity=drive.velocity,
         setpoint=drive.setpoint,

@@ -9,6 +9,7 @@ from ..exceptions import DriveError
 from ..master.scheduler import Scheduler
 from ..standard.drive import DriveState
 from .drive import Drive
+from .refusal import Refusal, RefusalCause
 from .sequences import DriveSequences
 
 BRAKED_TIMEOUT = 10.0  # [s] for a halt to end in standstill, beside the time of the ramp
@@ -69,7 +70,7 @@ class StopCommands:
         """Bring the drive to rest and take its power away; never raises."""
         drive, steps = self.drive, self._steps
         drive.interrupted = None
-        drive.released('shutting down')
+        drive.released(Refusal(RefusalCause.SHUTDOWN))
         ramp = steps.ramp_time()
         if drive.state is DriveState.OPERATION_ENABLED:
             drive.goal = DriveState.QUICK_STOP_ACTIVE
@@ -92,13 +93,13 @@ class StopCommands:
         returning = drive.interrupted is not None and drive.config.recovery is RecoveryPolicy.AUTO
         drive.interrupted = None
         try:
-            await self._steps.ready()
+            await self._steps.ready(to_stop=True)
         except DriveError as error:
             if not returning:
                 raise
             raise DriveError(f'{error}; it will not be enabled when it comes back') from error
         self._steps.require_no_fault()
-        drive.released(reason)
+        drive.released(Refusal(RefusalCause.COMMANDED, reason))
 
     async def _stay_disabled(self) -> None:
         """Have it enabled no more, also where the command for that is on its way already."""

@@ -66,7 +66,7 @@ class TargetStream:
         while self._scheduler.now < self._goes_on_until:
             await self._scheduler.timer(self._goes_on_until - self._scheduler.now)
         drive = self._drive
-        if not drive.obeys:
+        if not drive.accepts_targets:
             return  # what has taken it away has said so
         if not drive.mode.halts_by_bit or drive.mode.setpoint is None:
             drive.hold()  # in mode 1 it goes to the last target, and rests there

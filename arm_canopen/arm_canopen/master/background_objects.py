@@ -16,11 +16,26 @@ if TYPE_CHECKING:
 
 
 class BackgroundReader:
-    """An object that no TPDO carries; it is polled by SDO."""
+    """An object that no TPDO carries; it is polled by SDO.
 
-    def __init__(self) -> None:
-        """Start unknown."""
+    Attributes:
+        value: The value, None while unknown.
+        timestamp: Steady time of its last answer in [s].
+    """
+
+    def __init__(self, stale_after: float) -> None:
+        """Start unknown.
+
+        Args:
+            stale_after: Age in [s] from which the value is too old to act on.
+        """
         self.value: Number | None = None
+        self.timestamp = 0.0
+        self._stale_after = stale_after
+
+    def stale(self, now: float) -> bool:
+        """Tell whether it is unknown, or too old to act on, at a steady time in [s]."""
+        return self.value is None or now - self.timestamp > self._stale_after
 
 
 class BackgroundWriter:

@@ -86,7 +86,7 @@ class Network:
         self.send = BusSender(send, report).send
         self._report = report
         self.state = NmtState.OPERATIONAL if master.start else NmtState.PRE_OPERATIONAL
-        self._sync = SyncRound(self._feedback_complete, master.sync_window)
+        self._sync = SyncRound(self._feedback_complete, master.sync_window, master.sync_period)
         self._sync_time = 0.0
         self._feedback_due = False
         self._watch_at = 0.0

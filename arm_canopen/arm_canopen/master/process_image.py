@@ -9,6 +9,7 @@ are list look-ups. Objects that no PDO carries are read and written by SDO in th
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
+import math
 from typing import Protocol, TypeAlias
 
 from ..can.frame import Frame
@@ -18,7 +19,8 @@ from ..standard.pdo import MappedObject, Number, PdoCodec, SYNCHRONOUS_MAX
 
 EVENT_DRIVEN = 254  # transmission types from which on a PDO has an event timer (CiA 301, table 72)
 REPEAT_SHARE = 0.5  # of the deadline of an RPDO, after which it is repeated
-EVENT_TIMES = 3  # event times without a PDO after which it counts as stopped
+PERIODS_MISSED = 3  # periods of a TPDO, or of a poll, without a new value
+STALE_AFTER = 0.5  # [s] without a new value, where its period is shorter
 
 StartValue: TypeAlias = Callable[[MappedObject], Number]
 
@@ -30,15 +32,20 @@ class SyncRound:
         pending: How many expected TPDOs have not yet come.
         late: How many have come after the synchronous window was over.
         complete: Called when the last one has come.
+        period: Time between two SYNCs in [s]; 0 where this master sends none.
     """
 
-    def __init__(self, complete: Callable[[], None], window: float = 0.0) -> None:
+    def __init__(
+        self, complete: Callable[[], None], window: float = 0.0, period: float = 0.0
+    ) -> None:
         """Start before the first SYNC.
 
         Args:
             complete: Called when the last expected TPDO has come.
             window: Time after SYNC in which they should come in [s] (0x1007); 0 for no limit.
+            period: Time between two SYNCs in [s]; 0 where this master sends none.
         """
+        self.period = period
         self.pending = 0
         self.late = 0
         self.complete = complete
@@ -74,6 +81,8 @@ class Input:
         length_errors: Number of PDOs that were too short.
         on_short: Called with this input and the length when one is too short.
         awaited: It was expected after the last SYNC and has not come.
+        stale_after: Age in [s] from which its values are too old to act on; infinite for a TPDO
+            that comes on change only, and may well be silent.
     """
 
     def __init__(self, config: PdoConfig, sync: SyncRound) -> None:
@@ -87,6 +96,7 @@ class Input:
         self.listener: Callable[[Input], None] | None = None
         self.on_short: Callable[[Input, int], None] = lambda entry, length: None
         self.awaited = False
+        self.stale_after = self._longest_silence(sync.period)
         self._sync = sync
         self._unpack = self.codec.unpack
 
@@ -96,10 +106,21 @@ class Input:
         return self.config.transmission == 1
 
     @property
-    def deadline(self) -> float:
-        """Time in [s] after which it has stopped, by its event timer; 0 when it has none."""
+    def synchronous(self) -> bool:
+        """The device sends it after every nth SYNC."""
+        return 1 <= self.config.transmission <= SYNCHRONOUS_MAX
+
+    def stale(self, now: float) -> bool:
+        """Tell whether its values are missing, or too old to act on, at a steady time in [s]."""
+        return self.values is None or now - self.timestamp > self.stale_after
+
+    def _longest_silence(self, sync_period: float) -> float:
+        if self.synchronous:
+            period = PERIODS_MISSED * self.config.transmission * sync_period
+            return max(STALE_AFTER, period) if sync_period > 0.0 else math.inf
         event_time = self.config.event_time or 0.0
-        return EVENT_TIMES * event_time if self.config.transmission >= EVENT_DRIVEN else 0.0
+        timed = self.config.transmission >= EVENT_DRIVEN and event_time > 0.0
+        return PERIODS_MISSED * event_time if timed else math.inf
 
     def clear(self) -> None:
         """Forget the values, because the device restarted or went away."""
@@ -121,8 +142,9 @@ class Input:
             return
         self.timestamp = frame.timestamp
         self.count += 1
-        if self.listener is not None:
-            self.listener(self)
+        listener = self.listener  # read once: a ROS thread sets and clears it
+        if listener is not None:
+            listener(self)
         if self.awaited:
             self.awaited = False
             self._sync.answer(frame.timestamp)
@@ -183,11 +205,18 @@ class Output:
 
 
 class Reader(Protocol):
-    """Last known value of an object of the device."""
+    """Last known value of an object of the device, with its age."""
 
     @property
     def value(self) -> Number | None:
         """The value, None while unknown."""
+
+    @property
+    def timestamp(self) -> float:
+        """Steady time at which it came in [s]."""
+
+    def stale(self, now: float) -> bool:
+        """Tell whether it is unknown, or too old to act on, at a steady time in [s]."""
 
 
 class Writer(Protocol):
@@ -214,6 +243,15 @@ class InputReader:
         """The value, None while unknown."""
         values = self._source.values
         return None if values is None else values[self._position]
+
+    @property
+    def timestamp(self) -> float:
+        """Steady time of arrival of its TPDO in [s]."""
+        return self._source.timestamp
+
+    def stale(self, now: float) -> bool:
+        """Tell whether its TPDO has stopped at a steady time in [s]."""
+        return self._source.stale(now)
 
 
 class OutputWriter:

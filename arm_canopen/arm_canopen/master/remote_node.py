@@ -92,11 +92,6 @@ class RemoteNode(RemoteObjects):
         return self.online and not self.left_operational
 
     @property
-    def answers(self) -> bool:
-        """Whether its TPDOs come: those that answer SYNC, and those with an event time."""
-        return self.pdos.answers(self._scheduler.now)
-
-    @property
     def phase_text(self) -> str:
         """How far it has booted, in words."""
         return f'{self.phase.value} {self.phase_detail}'.rstrip()
@@ -104,11 +99,11 @@ class RemoteNode(RemoteObjects):
     def expect_answers(self) -> None:
         """A SYNC is about to be sent: await the TPDOs that answer each one."""
         if self.online:
-            self.pdos.expect(self._scheduler.now)
+            self.pdos.expect()
 
     def count_missed(self) -> int:
         """Count the TPDOs that did not answer the last SYNC, and return their number."""
-        return self.pdos.count_missed(self._scheduler.now, operational=self.operational)
+        return self.pdos.count_missed()
 
     def receive_heartbeat(self, frame: Frame) -> None:
         """Take a heartbeat or boot-up message."""
@@ -144,7 +139,6 @@ class RemoteNode(RemoteObjects):
         self.image.clear()  # what it sent before it was configured says nothing about now
         self.online = True
         self.life.start(now)
-        self.pdos.start(now)
         self.loss = ''
 
     def watch(self, now: float) -> bool:

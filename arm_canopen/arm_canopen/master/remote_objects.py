@@ -15,7 +15,14 @@ from ..standard.dictionary import ObjectEntry
 from ..standard.objects import is_controlword
 from .background_objects import BackgroundReader, BackgroundWriter
 from .events import Event, EventKind, Report, Severity
-from .process_image import ProcessImage, Reader, SyncRound, Writer
+from .process_image import (
+    PERIODS_MISSED,
+    ProcessImage,
+    Reader,
+    STALE_AFTER,
+    SyncRound,
+    Writer,
+)
 from .scheduler import Promise, Scheduler
 from .sdo_client import SdoClient
 from .start_values import start_value
@@ -76,7 +83,9 @@ class RemoteObjects:
         mapped = self.image.reader(index, subindex)
         if mapped is not None:
             return mapped
-        return self._polled.setdefault((index, subindex), BackgroundReader())
+        polled = PERIODS_MISSED * (self.config.poll_period + self.config.sdo_timeout)
+        reader = BackgroundReader(max(STALE_AFTER, polled))
+        return self._polled.setdefault((index, subindex), reader)
 
     def writer(self, index: int, subindex: int = 0) -> Writer:
         """Return a writer for an object, by RPDO when it is mapped, else by SDO on change."""
@@ -98,6 +107,7 @@ class RemoteObjects:
                         return
                     continue  # the SDO counters show it; the value stays as old as it is
                 entry.value = value if isinstance(value, (int, float)) else None
+                entry.timestamp = self._scheduler.now
             await self._scheduler.timer(period)
 
     def entry(self, index: int, subindex: int = 0) -> ObjectEntry:

@@ -69,7 +69,8 @@ def drive_diagnostic(bus: str, status: DriveStatus) -> DiagnosticStatus:
     level, message = _device_level(status.node)
     if level == DiagnosticStatus.OK:
         message = status.summary
-    if status.faulted:
+    stale = status.state is not DriveState.UNKNOWN and not status.fresh
+    if status.faulted or stale:
         level = DiagnosticStatus.ERROR
     elif level == DiagnosticStatus.OK and status.warning:
         level = DiagnosticStatus.WARN
@@ -85,6 +86,7 @@ def drive_diagnostic(bus: str, status: DriveStatus) -> DiagnosticStatus:
                 'state': status.state.title,
                 'mode': '' if unknown else status.mode,
                 'statusword': '' if unknown else status.statusword,
+                'state_age': f'{status.age:.3f}',
                 'error_code': status.error,
                 'position': f'{status.position:.6f}',
                 'velocity': f'{status.velocity:.6f}',

@@ -66,8 +66,8 @@ class DriveNode(DeviceNode):
         return index in self._owned
 
     def sample(self) -> list[tuple[float, float, float]] | None:
-        """Return position, velocity and effort of each axis; None while they are unknown."""
-        if not self.device.online or not all(axis.objects.known for axis in self.axes):
+        """Return position, velocity and effort of each axis; None while one is not fresh."""
+        if not all(axis.fresh for axis in self.axes):
             return None
         return [(axis.position, axis.velocity, axis.effort) for axis in self.axes]
 

@@ -17,7 +17,7 @@ FAULTS = frozenset({'FAULT', 'FAULT_REACTION_ACTIVE'})
 """Names of the states of a faulted drive."""
 
 
-PLURAL = {'is': 'are', 'has': 'have', 'was': 'were'}
+PLURAL = {'is': 'are', 'has': 'have', 'was': 'were', 'does': 'do'}
 """Words with which reasons begin, as they are said of several drives."""
 
 
@@ -36,6 +36,8 @@ def _reason(axis: AxisFeedback, released: str) -> tuple[str, str] | None:
     """Return what is wrong with a drive; names and remedies are apart, to join equal ones."""
     if not axis.online:
         return axis.name, 'is offline; look after its power and its cable'
+    if axis.refusal is not None and axis.refusal.cause.name == 'SILENT':
+        return axis.name, f'{axis.refusal.cause.value}; look after its power and its cable'
     if axis.state.name in FAULTS:
         return axis.name, 'has a fault; call its ~/recover'
     if axis.state.name != 'OPERATION_ENABLED':

@@ -17,7 +17,7 @@ from .desk import Desk
 from .drive_reasons import why_not
 
 if TYPE_CHECKING:
-    from arm_canopen import AxisFeedback, MotionSource, Setpoint
+    from arm_canopen import AxisFeedback, MotionSource, Refusal, Setpoint
 
 
 class DriveSource:
@@ -70,14 +70,14 @@ class DriveSource:
 
         attach(self).add_done_callback(finish)
 
-    def released(self, axis: str, reason: str) -> None:
+    def released(self, axis: str, refusal: Refusal) -> None:
         """Come to rest, and leave the drives alone until attached again.
 
         Args:
             axis: Name of the drive.
-            reason: Why it was taken away.
+            refusal: Why it was taken away.
         """
-        self._released = {**self._released, axis: f'was taken away: {reason}'}
+        self._released = {**self._released, axis: f'was taken away: it {refusal}'}
 
     def update(
         self, now: float, period: float, feedback: Sequence[AxisFeedback]
