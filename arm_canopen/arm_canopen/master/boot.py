@@ -84,7 +84,7 @@ class BootProcess:
         """
         self._startup.forget(self._node)
         if pause > 0.0:
-            self._enter(BootPhase.WAITING)
+            self._enter(BootPhase.WAITING, f'{pause:g} s, as it {self._node.loss}')
             await self._scheduler.timer(pause)
         while not await self._attempt(announced=announced):
             announced = False

@@ -17,8 +17,6 @@ from .remote_node import RemoteNode
 from .scheduler import Scheduler, Task
 from .startup import Startup
 
-DROP_PAUSE = 0.5  # [s] before a device that left Operational by itself is booted again
-
 
 class Boots:
     """Begins the boot of a device when it appears, restarts or drops out."""
@@ -56,7 +54,7 @@ class Boots:
                 ask_state=lambda node_id: send(guarding_request(node_id)),
             )
             node.on_boot_up = partial(self._restarted, node)
-            node.on_dropped_out = partial(self.start, node, pause=DROP_PAUSE)
+            node.on_dropped_out = partial(self._dropped_out, node)
 
     def start(self, node: RemoteNode, *, announced: bool = False, pause: float = 0.0) -> None:
         """Boot a device, anew if a boot is on its way.
@@ -69,6 +67,9 @@ class Boots:
         self._end(node)
         boot = self._processes[node.name].run(announced=announced, pause=pause)
         self._tasks[node.name] = self._scheduler.background(boot)
+
+    def _dropped_out(self, node: RemoteNode, pause: float) -> None:
+        self.start(node, pause=pause)
 
     def _restarted(self, node: RemoteNode) -> None:
         self._end(node)

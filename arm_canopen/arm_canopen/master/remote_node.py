@@ -12,6 +12,7 @@ from ..config.model import NodeConfig
 from ..exceptions import CodecError, SdoError
 from ..standard.nmt import COMMANDED_STATES, NmtCommand, NmtState, parse_heartbeat, RESETS
 from ..standard.objects import Index
+from .drop_backoff import DropBackoff
 from .emergency_log import EmergencyLog
 from .events import EventKind, Report, Severity
 from .life_signs import LifeSigns
@@ -42,7 +43,8 @@ class RemoteNode(RemoteObjects):
     """One device on the bus.
 
     Attributes:
-        nmt_state: NMT state as received, None before the first heartbeat or boot-up.
+        nmt_state: NMT state as received, None before the first heartbeat or boot-up and after a
+            loss; of a device without heartbeat and guarding the commanded one.
         phase: How far it has booted.
         phase_detail: What it is doing in that phase, or why it failed.
         left_operational: Online, but somebody stopped it or sent it to pre-operational.
@@ -56,7 +58,8 @@ class RemoteNode(RemoteObjects):
         pdos: Whether its TPDOs come.
         on_boot_up: Called when it has restarted.
         on_lost: Its drivers, which stop; each is told why.
-        on_dropped_out: Called when it has to be booted again, though it did not restart.
+        on_dropped_out: Called when it has to be booted again, though it did not restart, with the
+            time to leave it alone before in [s].
     """
 
     def __init__(
@@ -82,7 +85,8 @@ class RemoteNode(RemoteObjects):
         self.pdos = PdoWatch(self.image.inputs, self.report)
         self.on_boot_up: Callable[[], None] = lambda: None
         self.on_lost: list[Callable[[str], None]] = []
-        self.on_dropped_out: Callable[[], None] = lambda: None
+        self.on_dropped_out: Callable[[float], None] = lambda pause: None
+        self._backoff = DropBackoff()
         self._commanded: NmtCommand | None = None
         self._commanded_at = 0.0
 
@@ -116,17 +120,20 @@ class RemoteNode(RemoteObjects):
             self.emergencies.restarted()
             self.on_boot_up()
         elif self._dropped_out(state, frame.timestamp):
+            pause = self._backoff.dropped(frame.timestamp)
             self.lost(
-                f'left Operational by itself (NMT state {state.name}): it has missed the master '
-                'or the start, or its error behaviour 0x1029 says so; it is booted again'
+                f'left Operational by itself (NMT state {state.name}): {self._why_dropped()}; it '
+                f'is booted again in {pause:g} s{self._drops_text()}'
             )
-            self.on_dropped_out()
+            self.on_dropped_out(pause)
 
     def note_command(self, command: NmtCommand) -> None:
         """An NMT command for this device is on the bus, from us or from somebody else."""
         self.wanted = COMMANDED_STATES.get(command)
         self._commanded = command
         self._commanded_at = self._scheduler.now
+        if self.wanted is not None and self.wanted is not self.nmt_state and self._is_mute:
+            self._nmt_state_changed(self.wanted)
 
     def go_online(self, now: float, *, taken_over: bool = False) -> None:
         """The device is booted: talk to it, and watch its life signs when it is configured.
@@ -138,6 +145,7 @@ class RemoteNode(RemoteObjects):
         self.taken_over = taken_over
         self.image.clear()  # what it sent before it was configured says nothing about now
         self.online = True
+        self._backoff.booted(now)
         self.life.start(now)
         self.loss = ''
 
@@ -194,6 +202,24 @@ class RemoteNode(RemoteObjects):
         """Whether somebody on this bus has just told it to restart."""
         recent = self._scheduler.now - self._commanded_at <= RESET_TIME
         return self._commanded in RESETS and recent
+
+    @property
+    def _is_mute(self) -> bool:
+        """Whether it never tells its NMT state, so that it is taken to be in the commanded one."""
+        return not self.config.heartbeat_producer and not self.config.guarded
+
+    def _why_dropped(self) -> str:
+        emergency = self.emergencies.last
+        if emergency is not None:
+            return f'its last EMCY is {emergency}'
+        return (
+            'it sent no EMCY; it has missed the master or the start, or its error behaviour '
+            '0x1029 says so'
+        )
+
+    def _drops_text(self) -> str:
+        drops = self._backoff.drops
+        return f', as it has done so {drops} times in a row' if drops > 1 else ''
 
     def _gone(self, reason: str) -> None:
         """It is gone by itself, unless it was told to restart."""
