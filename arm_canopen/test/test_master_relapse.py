@@ -146,15 +146,20 @@ def mute() -> VirtualNetwork:
     return net
 
 
+def state(net: VirtualNetwork) -> NmtState | None:
+    """Return the NMT state of the device as the master takes it to be."""
+    return net.network.nodes[NODE].nmt_state
+
+
 def test_a_device_that_never_tells_its_state_is_in_the_commanded_one(mute: VirtualNetwork) -> None:
     """Operational after its boot, and what somebody commands afterwards."""
     node = mute.network.nodes[NODE]
-    assert node.nmt_state == NmtState.OPERATIONAL
+    assert state(mute) is NmtState.OPERATIONAL
     mute.network.send_nmt(NmtCommand.ENTER_PRE_OPERATIONAL, NODE_ID)
-    assert node.nmt_state == NmtState.PRE_OPERATIONAL
+    assert state(mute) is NmtState.PRE_OPERATIONAL
     assert node.left_operational
     mute.network.send_nmt(NmtCommand.START, NODE_ID)
-    assert node.nmt_state == NmtState.OPERATIONAL
+    assert state(mute) is NmtState.OPERATIONAL
     assert node.operational
 
 
@@ -164,8 +169,8 @@ def test_it_is_operational_again_after_a_restart(mute: VirtualNetwork) -> None:
     mute.power_off(NODE)
     mute.power_on(NODE)
     mute.run(0.01)
-    assert node.nmt_state != NmtState.OPERATIONAL
+    assert state(mute) is not NmtState.OPERATIONAL
     mute.run_until(lambda: node.online)
-    assert node.nmt_state == NmtState.OPERATIONAL
+    assert state(mute) is NmtState.OPERATIONAL
     states = [event.text for event in mute.events if event.kind is EventKind.NMT_STATE]
     assert states[-1] == 'NMT state OPERATIONAL'
