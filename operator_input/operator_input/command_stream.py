@@ -46,6 +46,10 @@ class CommandStream(Generic[T]):
         """Whether there is nothing to publish until a command is wanted."""
         return self._wanted is None and self._rests == 0
 
+    def is_rest(self, command: T) -> bool:
+        """Return whether a command moves nothing."""
+        return command == self._rest(command)
+
     def due(self) -> float:
         """Return when step() has to be called at the latest [s]; infinite when idle."""
         return math.inf if self.is_idle else self._due

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+import itertools
+
 from hypothesis import given
 from hypothesis import strategies as st
 from input_devices import BYTE_STICK, HAT, InjectedDevice, InjectedDevices, STICK, TRIGGER
@@ -73,6 +75,19 @@ def test_xbox_preset_is_found_and_its_letters_are_right() -> None:
     assert gamepad.name == 'Microsoft X-Box 360 pad (xbox)'
     device.press(BTN_NORTH)
     assert gamepad.read()[-1].buttons == {Button.WEST}
+
+
+def test_a_report_of_the_same_is_no_sign_of_life() -> None:
+    """A receiver may repeat the last state; a stick that moves within its dead zone is a hand."""
+    device = xbox()
+    gamepad = opened(device)
+    counts = []
+    for value in (0, 0, 300, 300, 301):
+        device.move(ABS_X, value)
+        counts.append([state.changes for state in gamepad.read()][-1])
+    steps = [after - before for before, after in itertools.pairwise(counts)]
+    assert steps == [0, 1, 0, 1]
+    assert gamepad.state.axis(Axis.LEFT_X) == 0.0
 
 
 def test_playstation_preset_is_found_and_its_symbols_are_right() -> None:

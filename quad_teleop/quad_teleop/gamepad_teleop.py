@@ -9,7 +9,7 @@ from operator_input.gamepad import Axis, Button, Deadman, DeadmanTeleop, Gamepad
 from .body_pose import BodyPose, NEUTRAL, PoseSteps
 from .command_stream import CommandStream
 from .modes import Mode
-from .requests import ModeRequest, PoseRequest, Request
+from .requests import ClearFault, ModeRequest, PoseRequest, Request
 from .speeds import Speeds
 from .velocity import Direction, Velocity, ZERO
 
@@ -21,7 +21,7 @@ MODE_BUTTONS = {
 }
 """Buttons that ask the controller for a mode."""
 
-NEUTRAL_BUTTON = Button.START
+NEUTRAL_BUTTON, CLEAR_BUTTON = Button.START, Button.SELECT
 
 
 class GamepadTeleop(DeadmanTeleop[Velocity]):
@@ -72,7 +72,8 @@ class GamepadTeleop(DeadmanTeleop[Velocity]):
 
         Returns:
             What the person asks for besides a velocity. Whatever makes the robot move needs the
-            deadman, as walking does; lying down needs none.
+            deadman, as walking does; lying down and clearing a fault, which moves nothing, need
+            none.
         """
         before = self.take(state)
         allowed = self.grip is not Grip.RELEASED
@@ -81,6 +82,8 @@ class GamepadTeleop(DeadmanTeleop[Velocity]):
             mode = MODE_BUTTONS.get(button)
             if mode is not None and (allowed or mode is Mode.LIE):
                 requests.append(ModeRequest(mode))
+            elif button is CLEAR_BUTTON:
+                requests.append(ClearFault())
             elif button is NEUTRAL_BUTTON and allowed:
                 self.pose = NEUTRAL
                 requests.append(PoseRequest(self.pose))

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+from dataclasses import replace
+
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
@@ -11,7 +13,7 @@ from quad_teleop import BodyPose, Mode, Speeds, Velocity
 from quad_teleop.body_pose import NEUTRAL, PoseSteps
 from quad_teleop.command_stream import CommandStream
 from quad_teleop.gamepad_teleop import GamepadTeleop, MODE_BUTTONS
-from quad_teleop.requests import ModeRequest, PoseRequest
+from quad_teleop.requests import ClearFault, ModeRequest, PoseRequest
 from quad_teleop.velocity import ZERO
 
 DEADMAN, TURBO = Button.LEFT_SHOULDER, Button.RIGHT_SHOULDER
@@ -81,6 +83,50 @@ def test_modes_that_move_need_the_deadman(button: Button, mode: Mode) -> None:
     """A button hit by accident does not make the robot stand up; lying down is always allowed."""
     assert teleop().feed(state(DEADMAN, button)) == [ModeRequest(mode)]
     assert teleop().feed(state(button)) == ([ModeRequest(mode)] if mode is Mode.LIE else [])
+
+
+def test_a_fault_is_cleared_by_a_button() -> None:
+    """Once for a press, with the deadman or without; nothing moves by it."""
+    target = teleop()
+    assert target.feed(state(Button.SELECT)) == [ClearFault()]
+    assert target.feed(state(Button.SELECT, LEFT_Y=0.5)) == []
+    assert target.step(0.0) is None
+
+
+def test_a_pad_that_does_not_change_is_no_hand() -> None:
+    """A receiver that repeats the last state, or is silent, moves the robot for 3 s at most."""
+    for repeats in (True, False):
+        target = teleop()
+        walking = state(DEADMAN, LEFT_Y=1.0)
+        target.feed(walking)
+        now, moved_until = 0.0, 0.0
+        while now < 10.0:
+            if repeats:
+                target.feed(walking)
+            moved_until = now if target.step(now) not in {None, ZERO} else moved_until
+            now += 0.02
+        assert 2.9 <= moved_until <= 3.1
+        assert target.expired
+        target.feed(state(DEADMAN, LEFT_Y=0.5))
+        assert target.step(now) is None  # it lives again, and nothing begins by itself
+        target.feed(state())
+        target.feed(walking)
+        assert target.step(now + 0.1) == Velocity(0.15, 0.0, 0.0)
+
+
+def test_a_hand_that_trembles_goes_on() -> None:
+    """Changes within the dead zone are a sign of life; a stick in the middle needs none."""
+    target = teleop()
+    for tick in range(500):
+        trembling = replace(state(DEADMAN, LEFT_Y=1.0), changes=tick // 50)
+        target.feed(trembling)
+        target.step(0.02 * tick)
+    assert not target.expired
+    resting = teleop()
+    resting.feed(state(DEADMAN))
+    assert [resting.step(float(second)) for second in range(10)] == [ZERO] * 10
+    resting.feed(state(DEADMAN, LEFT_Y=1.0))
+    assert resting.step(10.0) == Velocity(0.15, 0.0, 0.0)
 
 
 def test_held_button_asks_once() -> None:

@@ -61,6 +61,9 @@ class ServoGamepad(Node):
                 turbo=read.choice(
                     'turbo_button', 'right_shoulder', DEADMAN_BUTTONS, 'held to move fast'
                 ),
+                timeout=read.number(
+                    'deadman_timeout', 3.0, (0.5, 3600.0), 'without any change of the gamepad [s]'
+                ),
             ),
             CommandStream(1.0 / rate, rest_of),
         )

@@ -54,10 +54,13 @@ class GamepadState:
     Attributes:
         axes: Positions from -1 to 1, triggers from 0; an axis that is not there is not in it.
         buttons: What is pressed.
+        changes: How many changes the device has reported, those within a dead zone too: a sign of
+            life. States are equal whatever it is.
     """
 
     axes: Mapping[Axis, float] = field(default_factory=dict)
     buttons: frozenset[Button] = frozenset()
+    changes: int = field(default=0, compare=False)
 
     def axis(self, axis: Axis) -> float:
         """Return the position of an axis; 0 if the gamepad has none such.

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The button without which nothing moves."""
+"""The button without which nothing moves, and a pad that may have lost its person."""
 
 from __future__ import annotations
 
@@ -34,10 +34,13 @@ class Deadman:
     Attributes:
         enable: Must be held for any motion; None when none is needed.
         turbo: Held too, or alone: fast; None for no such button.
+        timeout: Time without any change of the gamepad [s] after which a motion ends: receivers of
+            wireless ones repeat the last state when the pad is out of reach or its battery empty.
     """
 
     enable: Button | None = Button.LEFT_SHOULDER
     turbo: Button | None = Button.RIGHT_SHOULDER
+    timeout: float = 3.0
 
     def grip(self, state: GamepadState) -> Grip:
         """Say what the person allows.

@@ -35,10 +35,12 @@ class GamepadReading:
         self._axes = dict.fromkeys((preset.axes[code] for code in self._ranges), 0.0)
         self._buttons: set[Button] = set()
         self._keys = info.keys
+        self._raw: dict[tuple[int, int], int] = {}  # newest value by type and code of the event
+        self._changes = 0
 
     def state(self) -> GamepadState:
         """Return the present state."""
-        return GamepadState(dict(self._axes), frozenset(self._buttons))
+        return GamepadState(dict(self._axes), frozenset(self._buttons), self._changes)
 
     def feed(self, event: InputEvent) -> None:
         """Take an event of the kernel.
@@ -46,6 +48,9 @@ class GamepadReading:
         Args:
             event: Any; what the preset does not know is passed over.
         """
+        source = event.type, event.code
+        self._changes += self._raw.get(source) != event.value
+        self._raw[source] = event.value
         if event.type == EV_ABS:
             self._move(event.code, event.value)
         elif event.type == EV_KEY and event.code in DPAD_BUTTONS:

@@ -10,15 +10,18 @@ import threading
 import time
 
 from ..devices import KernelDevices
-from ..session import Command, LONGEST_WAIT, Session, Teleop
+from ..session import Command, LONGEST_WAIT, Session
 from .controls import GamepadState
 from .gamepad import Gamepad
+from .teleop import DeadmanTeleop
 
 
 class GamepadSession(Session[Command]):
     """A gamepad that may come and go."""
 
-    def __init__(self, gamepad: Gamepad, teleop: Teleop[Command], stop: threading.Event) -> None:
+    def __init__(
+        self, gamepad: Gamepad, teleop: DeadmanTeleop[Command], stop: threading.Event
+    ) -> None:
         """Prepare.
 
         Args:
@@ -28,6 +31,8 @@ class GamepadSession(Session[Command]):
         """
         super().__init__(teleop, stop)
         self._gamepad = gamepad
+        self._deadman = teleop
+        self._had_expired = False
 
     @abstractmethod
     def take(self, state: GamepadState) -> None:
@@ -54,6 +59,12 @@ class GamepadSession(Session[Command]):
             self.take(state)
             self.step(time.monotonic())
         self.step(time.monotonic())
+        if self._deadman.expired and not self._had_expired:
+            self.warn(
+                f'the gamepad has not changed for {self._deadman.timeout:g} s (deadman_timeout), '
+                'so the motion ended; is it on, and in reach? Release and press the deadman'
+            )
+        self._had_expired = self._deadman.expired
         self.attend(time.monotonic())
 
     def end(self) -> None:

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+import math
 from typing import Generic
 
 from ..command_stream import CommandStream
@@ -16,8 +17,12 @@ from .deadman import Deadman, Grip
 class DeadmanTeleop(ABC, Generic[Command]):
     """Publishes what a gamepad wants; pure, time is handed in.
 
+    A motion ends when the gamepad has not changed for the time-out of the deadman, which has to be
+    released and pressed anew then.
+
     Attributes:
         state: What the gamepad said last.
+        expired: Whether a motion has ended so, and the deadman was not released since.
     """
 
     def __init__(self, deadman: Deadman, stream: CommandStream[Command]) -> None:
@@ -28,13 +33,21 @@ class DeadmanTeleop(ABC, Generic[Command]):
             stream: Decides when to publish.
         """
         self.state = AT_REST
+        self.expired = False
         self._deadman = deadman
         self._stream = stream
+        self._is_alive = True  # the gamepad has changed since the last step
+        self._changed_at = 0.0  # [s]
 
     @property
     def grip(self) -> Grip:
         """What the person allows at the moment."""
-        return self._deadman.grip(self.state)
+        return Grip.RELEASED if self.expired else self._deadman.grip(self.state)
+
+    @property
+    def timeout(self) -> float:
+        """Time without any change of the gamepad [s] after which a motion ends."""
+        return self._deadman.timeout
 
     @abstractmethod
     def wanted(self) -> Command | None:
@@ -43,6 +56,11 @@ class DeadmanTeleop(ABC, Generic[Command]):
     def take(self, state: GamepadState) -> GamepadState:
         """Take a state of the gamepad, at rest when there is none; return the one before."""
         before, self.state = self.state, state
+        changed = state != before or state.changes != before.changes
+        self._is_alive |= changed
+        released = self._deadman.grip(state) is Grip.RELEASED
+        if released or (changed and self._deadman.enable is None):
+            self.expired = False
         return before
 
     def step(self, now: float) -> Command | None:
@@ -51,11 +69,21 @@ class DeadmanTeleop(ABC, Generic[Command]):
         Args:
             now: Time [s].
         """
+        if self._is_alive or not self._moves:
+            self._is_alive, self._changed_at = False, now
+        elif now - self._changed_at >= self.timeout:
+            self.expired = True
         return self._stream.step(self.wanted(), now)
 
     def due(self, _now: float) -> float:
         """Return when step() has to be called at the latest [s]; may be infinite."""
-        return self._stream.due()
+        expires = self._changed_at + self.timeout if self._moves else math.inf
+        return min(self._stream.due(), expires)
+
+    @property
+    def _moves(self) -> bool:
+        command = self.wanted()
+        return command is not None and not self._stream.is_rest(command)
 
     def end(self) -> None:
         """Let go of everything at the end of the program."""

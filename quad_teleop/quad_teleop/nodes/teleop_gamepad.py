@@ -25,7 +25,7 @@ from operator_input.gamepad import (
 
 from ..exceptions import TeleopError
 from ..gamepad_teleop import GamepadTeleop
-from ..requests import ModeRequest, PoseRequest, Request
+from ..requests import ClearFault, ModeRequest, PoseRequest, Request
 from ..speeds import Speeds
 from ..velocity import Velocity
 from .controller import Controller
@@ -68,6 +68,9 @@ class TeleopGamepad(Node):
                 ),
                 turbo=read.choice(
                     'turbo_button', 'right_shoulder', DEADMAN_BUTTONS, 'held to move fast'
+                ),
+                timeout=read.number(
+                    'deadman_timeout', 3.0, (0.5, 3600.0), 'without any change of the gamepad [s]'
                 ),
             ),
             declare_steps(self),
@@ -131,6 +134,8 @@ class Session(GamepadSession[Velocity]):
                 self._controller.ask_mode(mode, time.monotonic())
             case PoseRequest(pose):
                 self._node.outputs.publish_pose(pose)
+            case ClearFault():
+                self._controller.clear_fault(time.monotonic())
             case _:
                 self.warn(f'{request} is nothing that a gamepad can do')
 
