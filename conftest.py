@@ -11,6 +11,7 @@ from collections.abc import Iterator
 import importlib
 import os
 from pathlib import Path
+import signal
 
 from hypothesis import settings
 from isolation import Isolation, reserve
@@ -19,6 +20,10 @@ import pytest
 for _marker in Path(__file__).parent.glob('*/resource/*'):
     if (_marker.parents[1] / _marker.name / '__init__.py').is_file():
         importlib.import_module(_marker.name)
+
+# A shell starts background jobs of a script with SIGINT ignored, which children inherit. Programs
+# that need a handler set it (tests start them with SIGINT ignored); those of the tests need none.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # how long an example takes says more about the machine than about the code
 settings.register_profile('workspace', deadline=None)

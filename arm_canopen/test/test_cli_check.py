@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 import os
 from pathlib import Path
 import signal
@@ -100,10 +101,10 @@ def test_wrong_usage_is_2(
     assert message in capsys.readouterr().err
 
 
-def start(*arguments: str) -> subprocess.Popen[str]:
+def start(*arguments: str, prefix: Sequence[str] = ()) -> subprocess.Popen[str]:
     """Start the program with its output in pipes."""
     return subprocess.Popen(
-        [sys.executable, '-m', 'arm_canopen.cli.main', *arguments],
+        [*prefix, sys.executable, '-m', 'arm_canopen.cli.main', *arguments],
         env=os.environ | {'PYTHONPATH': str(PACKAGE)},
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
@@ -122,9 +123,13 @@ def test_a_reader_that_goes_away_is_no_error() -> None:
     process.stderr.close()
 
 
-def test_ctrl_c_ends_a_verb() -> None:
-    """With the exit code of an interrupted program, and without a traceback."""
-    process = start('scan', '--can', free_multicast(), '--listen', '60')
+@pytest.mark.parametrize('prefix', [(), ('sh', '-c', 'trap "" INT; exec "$@"', 'sh')])
+def test_ctrl_c_ends_a_verb(prefix: tuple[str, ...]) -> None:
+    """With the code of an interrupted program and no traceback, also as a script's background job.
+
+    Shells start those with SIGINT ignored, and so does the prefix.
+    """
+    process = start('scan', '--can', free_multicast(), '--listen', '60', prefix=prefix)
     assert process.stderr
     assert 'listening on' in process.stderr.readline()
     process.send_signal(signal.SIGINT)

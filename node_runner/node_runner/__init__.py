@@ -4,6 +4,7 @@
 
 from .construction import destroyed_if_refused, destroyed_when_refused
 from .exceptions import ParameterError
+from .log_bridge import log_as, RosLogBridge
 from .misspelt import refuse_misspelt, refuse_similar
 from .parameter_reader import ParameterReader
 from .program import run_node, run_program
@@ -14,8 +15,10 @@ __all__ = [
     'WAKE_PERIOD',
     'ParameterError',
     'ParameterReader',
+    'RosLogBridge',
     'destroyed_if_refused',
     'destroyed_when_refused',
+    'log_as',
     'make_executor',
     'refuse_misspelt',
     'refuse_similar',

@@ -15,6 +15,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import try_shutdown
 
 from .exceptions import ParameterError
+from .log_bridge import log_as, RosLogBridge
 from .signals import stop_on_signals
 from .spinning import spin
 
@@ -34,7 +35,8 @@ def run_program(
     """Run a program until it returns; signals end it, and never tear it in the middle.
 
     Parameters that are refused, arguments that ROS does not understand and the errors named here
-    are told in one line of the log. Everything else is a defect, and has its traceback.
+    are told in one line of the log. Everything else is a defect, and has its traceback. Records of
+    Python's ``logging`` appear in the log of ROS, see :class:`.RosLogBridge`.
 
     Args:
         name: Name for the log.
@@ -62,12 +64,15 @@ def run_program(
         NameValidationException,
         *errors,
     )
+    bridge = RosLogBridge(name)
+    bridge.start()
     try:
         return body(stop) or 0
     except told as error:
         get_logger(name).fatal(str(error))
         return REFUSED
     finally:
+        bridge.close()
         try_shutdown()
 
 
@@ -91,6 +96,7 @@ def run_node(
 
     def body(stop: threading.Event) -> None:
         node = make()
+        log_as(node)
         try:
             spin([node], stop)
         finally:

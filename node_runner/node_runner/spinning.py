@@ -11,6 +11,8 @@ from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedE
 from rclpy.node import Node
 from rclpy.utilities import ok
 
+from .log_bridge import log_as
+
 WAKE_PERIOD = 0.1
 """How late the end may be noticed, in [s]."""
 
@@ -41,6 +43,7 @@ def spin(nodes: Iterable[Node], stop: threading.Event, executor: Executor | None
     executor = executor or make_executor()
     for node in nodes:
         executor.add_node(node)
+        log_as(node)
     try:
         # the unbounded spin() of some EventsExecutors burns a core and runs nothing
         while ok() and not stop.is_set():

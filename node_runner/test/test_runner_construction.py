@@ -99,7 +99,8 @@ def test_a_refused_node_leaves_nothing_in_the_graph(
         else:
             pytest.fail(f'{made} was not refused')
         marker = Node('marker', use_global_arguments=False)
-        assert marker.get_node_names() == ['marker'], kept
+        # the watcher is there already where the machine is slow
+        assert set(marker.get_node_names()) <= {'marker', 'watcher'}, kept
         assert not [name for name, _ in marker.get_topic_names_and_types() if 'late' in name]
         # what comes later is known, so what came before would be
         until(watcher, lambda: 'marker' in watcher.get_node_names())

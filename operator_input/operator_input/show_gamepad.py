@@ -7,6 +7,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import select
+import signal
 import sys
 import time
 
@@ -19,6 +20,8 @@ WAIT = 0.5  # [s]
 
 def main() -> None:
     """Entry point: prints each change until Ctrl-C."""
+    # a script's shell starts background jobs with SIGINT ignored
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument('--preset', default=AUTO, help='auto, xbox, ps or generic')
     parser.add_argument('--device', default='', help='path, or expression for the name')

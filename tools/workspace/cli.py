@@ -7,6 +7,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 import os
+import signal
 import sys
 
 from .environment import choose_python, Environment
@@ -77,6 +78,8 @@ def main(arguments: Sequence[str]) -> int:
     Returns:
         The exit code: 0 done, 1 not done and said why, 130 interrupted.
     """
+    # a script's shell starts background jobs with SIGINT ignored
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         return _run(_parser().parse_args(arguments))
     except (WorkspaceError, OSError) as error:  # the latter: disk full, read-only, ...

@@ -90,7 +90,7 @@ class SocketCanBus(SocketBus):
             self._gone = False
         old.close()
         self._stamps.reopened()
-        _log.info('%s is back', self.name)
+        _log.warning('%s is back', self.name)  # as loud as its going was
 
     def _explain(self, error: OSError) -> BusError:
         if self._closed:

@@ -12,6 +12,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 import os
+import signal
 import sys
 
 from ..exceptions import CanopenError
@@ -34,6 +35,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         Exit code: 0, 1 when something is wrong (with a file, a device or the bus), 2 for wrong
         usage, when nothing was sent.
     """
+    # a script's shell starts background jobs with SIGINT ignored
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     parser = _parser()
     try:
         arguments = split_ros_arguments(sys.argv[1:] if argv is None else argv)

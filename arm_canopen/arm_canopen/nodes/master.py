@@ -13,7 +13,7 @@ import threading
 
 from rclpy.node import Node
 
-from node_runner import ParameterReader, refuse_misspelt, run_program, spin
+from node_runner import log_as, ParameterReader, refuse_misspelt, run_program, spin
 
 from ..can import open_bus
 from ..can.bus import Bus
@@ -91,6 +91,7 @@ def _run(stop: threading.Event, extend: Extend | None) -> None:
 def _make_process(config: BusConfig, can: Bus, stack: ExitStack) -> MasterProcess:
     node = Node('master', namespace=config.master.namespace or None)
     stack.callback(node.destroy_node)
+    log_as(node)
     parameters = _declare(node)
     for warning in (*config.warnings, *check_bus(config).warnings):
         node.get_logger().warning(str(warning))

@@ -6,13 +6,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-import logging
 from pathlib import Path
 import threading
 
 from rclpy.node import Node
 
-from node_runner import ParameterReader, refuse_misspelt, run_program, spin
+from node_runner import log_as, ParameterReader, refuse_misspelt, run_program, spin
 
 from ..can import open_bus
 from ..device.host import DeviceHost
@@ -47,22 +46,6 @@ class Population:
 Populate = Callable[[Node, DeviceHost], Population]
 
 
-class RosLogHandler(logging.Handler):
-    """Passes what the layers below log on to a node."""
-
-    def __init__(self, node: Node) -> None:
-        """Log as a node."""
-        super().__init__(logging.WARNING)
-        self._logger = node.get_logger()
-
-    def emit(self, record: logging.LogRecord) -> None:
-        """Log one record."""
-        if record.levelno >= logging.ERROR:
-            self._logger.error(self.format(record))
-        else:
-            self._logger.warning(self.format(record))
-
-
 def memories(node: Node) -> Callable[[int], ParameterMemory]:
     """Declare ``store_directory``; return what gives each device its memory, by node id."""
     folder = ParameterReader(node).text('store_directory', '', STORE_DIRECTORY)
@@ -92,12 +75,10 @@ def run_slaves(
 
     def body(stop: threading.Event) -> None:
         node = Node(name)
-        handler = RosLogHandler(node)
-        logging.getLogger('arm_canopen').addHandler(handler)
+        log_as(node)
         try:
             _run(node, populate, default_bus, stop)
         finally:
-            logging.getLogger('arm_canopen').removeHandler(handler)
             node.destroy_node()
 
     return run_program(name, body, CanopenError, args=args)

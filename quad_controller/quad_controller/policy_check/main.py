@@ -7,6 +7,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 import math
+import signal
 import sys
 
 from quad_description import PRESETS, robot_urdf
@@ -71,6 +72,8 @@ def run(arguments: Sequence[str]) -> int:
 
 def main() -> None:
     """Entry point."""
+    # a script's shell starts background jobs with SIGINT ignored
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     sys.exit(run(sys.argv[1:]))
 
 

@@ -8,6 +8,7 @@ import argparse
 from collections.abc import Mapping, Sequence
 import math
 from pathlib import Path
+import signal
 import sys
 
 from quad_description import movable_joints, PRESETS, robot_urdf
@@ -53,6 +54,8 @@ def run_calibrate(argv: Sequence[str], console: Console) -> int:
 
 def main() -> None:
     """Entry point."""
+    # a script's shell starts background jobs with SIGINT ignored
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     sys.exit(run_calibrate(sys.argv[1:], TerminalConsole()))
 
 

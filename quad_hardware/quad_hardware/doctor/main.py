@@ -8,6 +8,7 @@ import argparse
 from collections.abc import Iterator, Sequence
 import os
 from pathlib import Path
+import signal
 import sys
 
 from .finding import error, Finding, Severity
@@ -30,6 +31,8 @@ def run_doctor(argv: Sequence[str]) -> int:
 
 def main() -> None:
     """Entry point."""
+    # a script's shell starts background jobs with SIGINT ignored
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     sys.exit(run_doctor(sys.argv[1:]))
 
 

@@ -18,7 +18,7 @@ import signal
 import sys
 
 from .cli.commands import COMMANDS
-from .cli.interrupts import sigterm_interrupts
+from .cli.interrupts import signals_interrupt
 from .cli.parser import build
 
 _BROKEN_PIPE = 128 + signal.SIGPIPE
@@ -38,7 +38,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     words = list(sys.argv[1:] if argv is None else argv)
     try:
-        with sigterm_interrupts():
+        with signals_interrupt():
             code = _run(words)
         sys.stdout.flush()
     except KeyboardInterrupt:

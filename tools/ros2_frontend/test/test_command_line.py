@@ -130,6 +130,15 @@ def test_interrupts_are_quiet(zoo_env: Mapping[str, str], number: signal.Signals
 
 
 @pytest.mark.scenario
+def test_a_background_job_of_a_script_can_be_interrupted(zoo_env: Mapping[str, str]) -> None:
+    """Shells start those with SIGINT ignored."""
+    ignoring = ['sh', '-c', 'trap "" INT; exec "$@"', 'sh']
+    with RunningProcess([*ignoring, *PROGRAM, 'topic', 'echo', '/chatter'], zoo_env) as process:
+        process.wait_for('^data: ')
+        assert process.stop() == 2
+
+
+@pytest.mark.scenario
 def test_an_interrupt_during_discovery_is_quiet(zoo_env: Mapping[str, str]) -> None:
     """Also while waiting for a topic that never comes."""
     with RunningProcess([*PROGRAM, 'topic', 'hz', '/never'], zoo_env) as process:

@@ -10,7 +10,7 @@ import threading
 
 import pytest
 
-from ros2_frontend.cli.interrupts import deferred_interrupts, sigterm_interrupts
+from ros2_frontend.cli.interrupts import deferred_interrupts, signals_interrupt
 
 
 def interrupt(number: signal.Signals, times: int, done: list[str]) -> None:
@@ -40,22 +40,18 @@ def test_a_second_interrupt_is_not_kept() -> None:
     assert not done
 
 
-def test_what_was_ignored_stays_ignored() -> None:
-    """A background job of a script is not interrupted by the terminal."""
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_that_is_ignored_is_an_interrupt_while_a_command_runs(
+    number: signal.Signals,
+) -> None:
+    """A background job of a script has SIGINT ignored, and still ends."""
+    before = signal.signal(number, signal.SIG_IGN)
     try:
-        with deferred_interrupts():
-            os.kill(os.getpid(), signal.SIGINT)
+        with pytest.raises(KeyboardInterrupt), signals_interrupt():
+            os.kill(os.getpid(), number)
+        assert signal.getsignal(number) is signal.SIG_IGN
     finally:
-        signal.signal(signal.SIGINT, before)
-
-
-def test_sigterm_is_an_interrupt_while_a_command_runs() -> None:
-    """And what it was before afterwards."""
-    before = signal.getsignal(signal.SIGTERM)
-    with pytest.raises(KeyboardInterrupt), sigterm_interrupts():
-        os.kill(os.getpid(), signal.SIGTERM)
-    assert signal.getsignal(signal.SIGTERM) is before
+        signal.signal(number, before)
 
 
 def test_threads_can_use_the_blocks() -> None:
@@ -63,7 +59,7 @@ def test_threads_can_use_the_blocks() -> None:
     done = []
 
     def work() -> None:
-        with sigterm_interrupts(), deferred_interrupts():
+        with signals_interrupt(), deferred_interrupts():
             done.append('work')
 
     thread = threading.Thread(target=work)

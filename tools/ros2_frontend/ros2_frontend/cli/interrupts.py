@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 import contextlib
 import signal
 import threading
@@ -13,21 +13,14 @@ from types import FrameType
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
-def _in_main_thread() -> bool:
-    return threading.current_thread() is threading.main_thread()
-
-
 @contextlib.contextmanager
-def sigterm_interrupts() -> Iterator[None]:
-    """Let SIGTERM unwind the stack as Ctrl-C does, so that no ghost node stays in the graph."""
-    if not _in_main_thread():
+def signals_interrupt() -> Iterator[None]:
+    """Let SIGINT and SIGTERM unwind the stack, so that no ghost node stays in the graph.
+
+    SIGINT, too: a script's shell starts background jobs with SIGINT ignored.
+    """
+    with _handling(signal.default_int_handler):
         yield
-        return
-    previous = signal.signal(signal.SIGTERM, signal.default_int_handler)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, previous)
 
 
 @contextlib.contextmanager
@@ -40,9 +33,6 @@ def deferred_interrupts() -> Iterator[None]:
     Raises:
         KeyboardInterrupt: At the end of the block.
     """
-    if not _in_main_thread():
-        yield
-        return
     kept: list[int] = []
 
     def keep(number: int, frame: FrameType | None) -> None:
@@ -50,15 +40,20 @@ def deferred_interrupts() -> Iterator[None]:
             signal.default_int_handler(number, frame)
         kept.append(number)
 
-    # what is ignored (a background job of a script) stays ignored
-    previous = {number: signal.getsignal(number) for number in _SIGNALS}
-    for number, handler in previous.items():
-        if handler is not signal.SIG_IGN:
-            signal.signal(number, keep)
+    with _handling(keep):
+        yield
+    if kept:
+        raise KeyboardInterrupt
+
+
+@contextlib.contextmanager
+def _handling(handler: Callable[[int, FrameType | None], object]) -> Iterator[None]:
+    if threading.current_thread() is not threading.main_thread():
+        yield  # only the main thread may set handlers, and runs them
+        return
+    previous = {number: signal.signal(number, handler) for number in _SIGNALS}
     try:
         yield
     finally:
-        for number, handler in previous.items():
-            signal.signal(number, handler)
-    if kept:
-        raise KeyboardInterrupt
+        for number, before in previous.items():
+            signal.signal(number, before)

@@ -1,0 +1,142 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Records of Python's ``logging`` appear in the log of ROS, console and /rosout.
+
+The layers without ROS (bus, cycle, serial link) log with ``logging``. Their threads must not wait
+for DDS, so that the record goes into a queue and another thread logs it.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+import copy
+import logging
+import math
+import threading
+import time
+
+from rclpy.impl.rcutils_logger import RcutilsLogger
+from rclpy.logging import get_logger
+from rclpy.node import Node
+
+from .log_rate import LogRateLimit, WINDOW
+
+QUEUE_LENGTH = 500
+"""Records that wait for the thread that logs; more than these are counted and dropped."""
+
+
+class RosLogBridge(logging.Handler):
+    """Logs what the handlers of ``logging`` get, in a thread of its own.
+
+    Records are those of a node from :meth:`attach` on, which brings them to /rosout; before it
+    they reach the console only.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        *,
+        limit: LogRateLimit | None = None,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        """Prepare; :meth:`start` begins.
+
+        Args:
+            name: Name for the log until there is a node.
+            limit: How often one source may log; None for the default.
+            clock: The steady clock in [s].
+        """
+        super().__init__(logging.WARNING)
+        self._logger = get_logger(name)
+        self._attached = False
+        self._limit = limit or LogRateLimit()
+        self._clock = clock
+        self._records: deque[logging.LogRecord] = deque()
+        self._dropped = 0
+        self._wake = threading.Event()
+        self._closing = False
+        self._thread = threading.Thread(target=self._run, name='log bridge', daemon=True)
+
+    def start(self) -> None:
+        """Take the records of all loggers."""
+        self._thread.start()
+        logging.getLogger().addHandler(self)
+
+    def attach(self, node: Node) -> None:
+        """Log as a node, if none is attached."""
+        if not self._attached:
+            self._attached = True
+            self._logger = node.get_logger()
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Queue a record; never waits."""
+        if not self._limit.admit(_source(record), self._clock()):
+            return
+        if len(self._records) >= QUEUE_LENGTH:
+            self._dropped += 1
+            return
+        queued = copy.copy(record)  # other handlers get the record, too
+        queued.msg, queued.args = record.getMessage(), None  # what the arguments are may change
+        self._records.append(queued)
+        self._wake.set()
+
+    def close(self) -> None:
+        """Log what is queued, and end."""
+        logging.getLogger().removeHandler(self)
+        if self._thread.is_alive():
+            self._closing = True
+            self._wake.set()
+            self._thread.join()
+        super().close()
+
+    def _run(self) -> None:
+        while not self._closing:
+            self._wake.wait(None if self._limit.idle else WINDOW)
+            self._wake.clear()
+            self._log_queued(self._clock())
+        self._log_queued(math.inf)
+
+    def _log_queued(self, now: float) -> None:
+        while self._records:
+            record = self._records.popleft()
+            _log(self._logger, record.levelno, self.format(record))
+        self.acquire()  # what emit changes
+        try:
+            dropped, self._dropped = self._dropped, 0
+            suppressed = self._limit.collect(now)
+        finally:
+            self.release()
+        for source, count in suppressed.items():
+            _log(self._logger, logging.WARNING, f'{count} more records of {source} suppressed')
+        if dropped:
+            _log(self._logger, logging.WARNING, f'{dropped} records dropped, the queue was full')
+
+
+def log_as(node: Node) -> None:
+    """Let the records of this process's ``logging`` appear as those of a node.
+
+    Only the first node of a process counts. Without :func:`.run_program` nothing happens.
+
+    Args:
+        node: The node.
+    """
+    for handler in logging.getLogger().handlers:
+        if isinstance(handler, RosLogBridge):
+            handler.attach(node)
+
+
+def _source(record: logging.LogRecord) -> str:
+    return f'{record.name}:{record.lineno}'
+
+
+def _log(logger: RcutilsLogger, level: int, message: str) -> None:
+    """Log at a level; rclpy wants each level to have a line of its own."""
+    if level >= logging.CRITICAL:
+        logger.fatal(message)
+    elif level >= logging.ERROR:
+        logger.error(message)
+    elif level >= logging.WARNING:
+        logger.warning(message)
+    else:
+        logger.info(message)

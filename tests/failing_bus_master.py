@@ -1,0 +1,38 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The master's program on a bus that goes down when SIGUSR1 arrives."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import threading
+from typing import TYPE_CHECKING
+
+from arm_canopen.can.socket_bus import SocketBus
+from arm_canopen.exceptions import BusError
+from arm_canopen.nodes.master import run_master
+
+if TYPE_CHECKING:
+    from arm_canopen.can.frame import Frame
+
+DOWN = 'the bus went down'
+
+
+def main() -> int:
+    """Run the master."""
+    down = threading.Event()
+    signal.signal(signal.SIGUSR1, lambda *_: down.set())
+    receive = SocketBus.receive
+
+    def failing(bus: SocketBus, timeout: float) -> list[Frame]:
+        if down.is_set():
+            raise BusError(DOWN)
+        return receive(bus, timeout)
+
+    SocketBus.receive = failing  # type: ignore[assignment]
+    return run_master()
+
+
+if __name__ == '__main__':
+    sys.exit(main())
