@@ -142,7 +142,7 @@ WARNINGS = {
         '  position_mode: 8\n',
         f'  position_mode: 8\n  velocity_mode: 3 {HERE}\n',
         'defaults.velocity_mode',
-        r'mode 3 \(profile velocity\) cannot be used: .* 0x60FF \(target velocity\)',
+        r'the targets of mode 3 \(profile velocity\) go by SDO, .* 0x60FF \(target velocity\)',
         'map it below rpdo',
     ),
     'mode not supported': Case(

@@ -33,7 +33,7 @@ SCALARS = [
     Case('joint1', 'scale_pos_to_dev: 0 # <-', 'scale_pos_to_dev', '0 is out', 'than 0'),
     Case('joint1', 'scale_vel_to_dev: .nan # <-', 'scale_vel_to_dev', r'\.nan', '0.5'),
     Case('joint1', 'offset_pos_to_dev: inf # <-', 'offset_pos_to_dev', 'finite', 'one'),
-    Case('joint1', 'switching_state: 8 # <-', 'switching_state', '8', '5 Operation ena'),
+    Case('joint1', 'switching_state: 7 # <-', 'switching_state', '7', '5 Operation ena'),
     Case('joint1', 'position_mode: 3 # <-', 'position_mode', '3 is', '8 Cyclic posit'),
     Case('joint1', 'velocity_mode: 8 # <-', 'velocity_mode', '8 is', '3 Profile velo'),
     Case('joint1', 'period: 0 # <-', 'period', '0 is out of range', '1 to 60000'),

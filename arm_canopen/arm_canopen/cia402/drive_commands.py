@@ -11,9 +11,9 @@ from typing import Any, TypeVar
 from ..exceptions import DriveError
 from ..master.scheduler import Promise, Scheduler, Task
 from ..standard.drive import DriveState, OperationMode
+from ..standard.target_objects import TARGET_OBJECTS
 from .drive import Drive
 from .homing import home, HomingProgress
-from .mode_table import REQUIRED_OBJECTS
 from .modes import NoMode
 from .position_modes import Move, ProfilePosition
 from .recovery import Recovery
@@ -251,7 +251,7 @@ class DriveCommands(StopCommands):
         if not told.supports(number):
             why = f'the drive does not have it (0x6502 is 0x{told.supported_modes:X})'
         else:
-            target = REQUIRED_OBJECTS.get(number)
-            place = f'0x{drive.objects.at(target):04X}' if target is not None else 'its target'
+            target = TARGET_OBJECTS.get(number)
+            place = f'0x{drive.objects.at(target[0]):04X}' if target is not None else 'its target'
             why = f'{place} is in no RPDO of bus.yml; map it'
         return f'{drive.name} has no mode {number.title}: {why}; it has: {offered}'

@@ -8,6 +8,7 @@ from ..master.process_image import Reader, Writer
 from ..master.remote_node import RemoteNode
 from ..standard.drive import drive_state, DriveState, OperationMode
 from ..standard.objects import AXIS_OFFSET, Index
+from ..standard.target_objects import TARGET_OBJECTS
 
 
 class DriveObjects:
@@ -100,6 +101,17 @@ class DriveObjects:
     def target_writer(self, index: int, subindex: int = 0) -> Writer | None:
         """Return a writer for a target object that a PDO carries, else None."""
         return self._node.image.writer(self.at(index), subindex)
+
+    def profile_target_writer(self, mode: OperationMode) -> Writer | None:
+        """Return a writer for the target of a profile mode, by SDO where no PDO carries it."""
+        index, subindex = TARGET_OBJECTS[mode]
+        mapped = self.target_writer(index, subindex)
+        if mapped is not None:
+            return mapped
+        entry = self._node.config.dictionary.get(self.at(index), subindex)
+        if entry is None or not entry.access.writable:
+            return None
+        return self._node.target_writer(self.at(index), subindex)
 
     def held_position(self, mode: OperationMode) -> int | None:
         """Target of a cyclic position mode that the RPDOs carry in [inc], None when none does."""

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The modes that the RPDOs of bus.yml make possible."""
+"""The modes that the objects of a drive and its RPDOs make possible."""
 
 from __future__ import annotations
 
@@ -15,18 +15,6 @@ from .parameters import DriveParameters
 from .position_modes import ProfilePosition
 from .rate_modes import CyclicTorque, CyclicVelocity, ProfileTorque, ProfileVelocity, Velocity
 from .units import Units
-
-REQUIRED_OBJECTS: dict[OperationMode, Index] = {
-    OperationMode.PROFILE_POSITION: Index.TARGET_POSITION,
-    OperationMode.VELOCITY: Index.VL_TARGET_VELOCITY,
-    OperationMode.PROFILE_VELOCITY: Index.TARGET_VELOCITY,
-    OperationMode.PROFILE_TORQUE: Index.TARGET_TORQUE,
-    OperationMode.INTERPOLATED_POSITION: Index.INTERPOLATION_DATA,
-    OperationMode.CYCLIC_POSITION: Index.TARGET_POSITION,
-    OperationMode.CYCLIC_VELOCITY: Index.TARGET_VELOCITY,
-    OperationMode.CYCLIC_TORQUE: Index.TARGET_TORQUE,
-}
-"""The target object of each mode, which has to be in an RPDO (CiA 402-2, clauses 10 to 16)."""
 
 
 def build_modes(
@@ -44,32 +32,43 @@ def build_modes(
         warn: Takes a warning in words.
     """
     modes: list[Mode] = [NoMode(), Homing()]
-    modes += _position_modes(objects, units, parameters, warn)
-    vl_target = objects.target_writer(Index.VL_TARGET_VELOCITY)
-    if vl_target is not None:
-        modes.append(Velocity(units, vl_target))
-    velocity = objects.target_writer(Index.TARGET_VELOCITY)
-    if velocity is not None:
-        modes.append(ProfileVelocity(units, velocity))
-        modes.append(CyclicVelocity(units, velocity, lambda: parameters().profile.acceleration))
-    torque = objects.target_writer(Index.TARGET_TORQUE)
-    if torque is not None:
-        modes.append(ProfileTorque(units, torque))
-        modes.append(CyclicTorque(units, torque, lambda: parameters().torque_slope))
+    modes += _profile_modes(objects, units, warn)
+    modes += _cyclic_modes(objects, units, parameters)
     return {mode.number: mode for mode in modes}
 
 
-def _position_modes(
-    objects: DriveObjects,
-    units: Units,
-    parameters: Callable[[], DriveParameters],
-    warn: Callable[[str], None],
+def _profile_modes(
+    objects: DriveObjects, units: Units, warn: Callable[[str], None]
 ) -> Iterator[Mode]:
-    position = objects.target_writer(Index.TARGET_POSITION)
+    """Yield the modes whose targets are single values, which may go by SDO."""
+    position = objects.profile_target_writer(OperationMode.PROFILE_POSITION)
     if position is not None:
         leads = objects.must_lead(Index.TARGET_POSITION)
         yield ProfilePosition(units, position, warn, target_leads=leads)
+    vl_target = objects.profile_target_writer(OperationMode.VELOCITY)
+    if vl_target is not None:
+        yield Velocity(units, vl_target)
+    velocity = objects.profile_target_writer(OperationMode.PROFILE_VELOCITY)
+    if velocity is not None:
+        yield ProfileVelocity(units, velocity)
+    torque = objects.profile_target_writer(OperationMode.PROFILE_TORQUE)
+    if torque is not None:
+        yield ProfileTorque(units, torque)
+
+
+def _cyclic_modes(
+    objects: DriveObjects, units: Units, parameters: Callable[[], DriveParameters]
+) -> Iterator[Mode]:
+    """Yield the modes with a target in each cycle, which only an RPDO can carry."""
+    position = objects.target_writer(Index.TARGET_POSITION)
+    if position is not None:
         yield CyclicPosition(units, position, lambda: parameters().profile)
     interpolation = objects.target_writer(Index.INTERPOLATION_DATA, 1)
     if interpolation is not None:
         yield InterpolatedPosition(units, interpolation, lambda: parameters().profile)
+    velocity = objects.target_writer(Index.TARGET_VELOCITY)
+    if velocity is not None:
+        yield CyclicVelocity(units, velocity, lambda: parameters().profile.acceleration)
+    torque = objects.target_writer(Index.TARGET_TORQUE)
+    if torque is not None:
+        yield CyclicTorque(units, torque, lambda: parameters().torque_slope)

@@ -4,23 +4,12 @@
 
 from __future__ import annotations
 
-from ..standard.drive import mode_title, OperationMode
+from ..standard.drive import mode_title
 from ..standard.objects import AXIS_OFFSET, Index
 from ..standard.pdo import SYNCHRONOUS_MAX
-from .check_subject import CYCLIC_MODES, object_name, Subject, UsedMode
+from ..standard.target_objects import CYCLIC_MODES, TARGET_OBJECTS
+from .check_subject import object_name, Subject, UsedMode
 from .pdo_direction import RPDO, TPDO
-
-TARGETS: dict[OperationMode, tuple[Index, int]] = {
-    OperationMode.PROFILE_POSITION: (Index.TARGET_POSITION, 0),
-    OperationMode.VELOCITY: (Index.VL_TARGET_VELOCITY, 0),
-    OperationMode.PROFILE_VELOCITY: (Index.TARGET_VELOCITY, 0),
-    OperationMode.PROFILE_TORQUE: (Index.TARGET_TORQUE, 0),
-    OperationMode.INTERPOLATED_POSITION: (Index.INTERPOLATION_DATA, 1),
-    OperationMode.CYCLIC_POSITION: (Index.TARGET_POSITION, 0),
-    OperationMode.CYCLIC_VELOCITY: (Index.TARGET_VELOCITY, 0),
-    OperationMode.CYCLIC_TORQUE: (Index.TARGET_TORQUE, 0),
-}
-"""Target object of each mode (CiA 402-2, clauses 10 to 16)."""
 
 PERIOD_EXPONENTS = (-3, -4, -5, -6)
 """Units of 0x60C2:02 that are tried for a period, coarsest first."""
@@ -88,8 +77,10 @@ def _check_interpolation_period(subject: Subject, offset: int) -> None:
 def _check_one_frame(subject: Subject, offset: int) -> None:
     """A command and its target shall not be torn apart by a lost or late frame."""
     controls = subject.carriers(RPDO, Index.CONTROLWORD + offset)
-    modes = {used.mode for used in subject.used_modes()} or set(TARGETS)
-    for index, subindex in dict.fromkeys(TARGETS[mode] for mode in TARGETS if mode in modes):
+    modes = {used.mode for used in subject.used_modes()} or set(TARGET_OBJECTS)
+    for index, subindex in dict.fromkeys(
+        TARGET_OBJECTS[mode] for mode in TARGET_OBJECTS if mode in modes
+    ):
         targets = subject.carriers(RPDO, index + offset, subindex)
         if not controls or not targets or any(pdo in controls for pdo in targets):
             continue
@@ -108,14 +99,20 @@ def _check_one_frame(subject: Subject, offset: int) -> None:
 
 
 def _check_target(subject: Subject, used: UsedMode) -> None:
-    index, subindex = TARGETS[used.mode]
-    if not subject.carriers(RPDO, used.at(index), subindex):
-        subject.findings.warning(
-            subject.place(used.key),
-            f'mode {used.mode.value} ({mode_title(used.mode).lower()}) cannot be used: no enabled '
-            f'RPDO carries its target {object_name(used.at(index))}',
-            'map it below rpdo, best beside the controlword',
-        )
+    index, subindex = TARGET_OBJECTS[used.mode]
+    if subject.carriers(RPDO, used.at(index), subindex):
+        return
+    mode = f'mode {used.mode.value} ({mode_title(used.mode).lower()})'
+    entry = subject.node.dictionary.get(used.at(index), subindex)
+    if used.mode in CYCLIC_MODES or entry is None or not entry.access.writable:
+        what = f'{mode} cannot be used: no enabled RPDO carries its target'
+    else:
+        what = f'the targets of {mode} go by SDO, later than by PDO: no enabled RPDO carries'
+    subject.findings.warning(
+        subject.place(used.key),
+        f'{what} {object_name(used.at(index))}',
+        'map it below rpdo, best beside the controlword',
+    )
 
 
 def _check_support(subject: Subject, used: UsedMode) -> None:
@@ -162,7 +159,7 @@ def _check_cyclic(subject: Subject, used: UsedMode) -> None:
 
 
 def _check_target_time(subject: Subject, used: UsedMode) -> None:
-    index, subindex = TARGETS[used.mode]
+    index, subindex = TARGET_OBJECTS[used.mode]
     for pdo in subject.carriers(RPDO, used.at(index), subindex):
         if pdo.transmission > SYNCHRONOUS_MAX:
             subject.findings.warning(

@@ -17,16 +17,6 @@ from .model import BusConfig, NodeConfig, PdoConfig, SdoWrite
 from .pdo_direction import Direction, RPDO, TPDO
 from .shared_keys import HUNDRED_MICROSECONDS, MILLISECONDS
 
-CYCLIC_MODES = frozenset(
-    {
-        OperationMode.INTERPOLATED_POSITION,
-        OperationMode.CYCLIC_POSITION,
-        OperationMode.CYCLIC_VELOCITY,
-        OperationMode.CYCLIC_TORQUE,
-    }
-)
-"""Modes whose targets come with every SYNC (CiA 402-2, clauses 12 to 16)."""
-
 
 @dataclass(frozen=True, slots=True)
 class UsedMode:

@@ -28,6 +28,8 @@ from .shared_keys import (
 )
 
 SWITCHING_STATES = {state.value: state.title for state in DriveState if 2 <= state <= 5}
+FAULT_STATE = {DriveState.FAULT.value: 'Fault, taken as 5'}
+"""What the multichannel sample of ros2_canopen writes, and means Operation enabled."""
 POSITION_MODES = {
     mode.value: mode.title
     for mode in (
@@ -133,7 +135,9 @@ DRIVE_KEYS: tuple[Key, ...] = (
     Key('scale_eff_from_dev', Kind.NUMBER, 'scale_eff_from_dev', zero=False),
     Key('offset_pos_to_dev', Kind.NUMBER, 'offset_pos_to_dev'),
     Key('offset_pos_from_dev', Kind.NUMBER, 'offset_pos_from_dev'),
-    Key('switching_state', Kind.INTEGER, 'switching_state', choices=SWITCHING_STATES),
+    Key(
+        'switching_state', Kind.INTEGER, 'switching_state', choices=SWITCHING_STATES | FAULT_STATE
+    ),
     Key('homing_timeout_seconds', Kind.NUMBER, 'homing_timeout', low=0.1, high=3600),
     Key('position_mode', Kind.INTEGER, 'position_mode', choices=POSITION_MODES),
     Key('velocity_mode', Kind.INTEGER, 'velocity_mode', choices=VELOCITY_MODES),

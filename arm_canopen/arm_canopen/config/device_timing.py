@@ -6,9 +6,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 
 from ..standard.dictionary import ObjectDictionary
-from ..standard.objects import Index
+from ..standard.objects import AXIS_OFFSET, Index
 from ..standard.pdo import SYNCHRONOUS_MAX
 from .device_reader import DeviceDraft
 from .findings import Findings
@@ -53,7 +54,7 @@ def finish_device(
     _check_period(draft, master, findings)
     _check_sync(draft.pdos, master, findings)
     if config.is_drive:
-        _check_drive_pdos(draft, findings)
+        _check_drive_pdos(draft, config, findings)
     producer = _heartbeat_producer(draft, config.dictionary, findings)
     multiplier = draft.settings.heartbeat_multiplier or around.options.heartbeat_multiplier
     return replace(
@@ -172,13 +173,14 @@ def _check_sync(pdos: Sequence[PdoDraft], master: MasterConfig, findings: Findin
             )
 
 
-def _check_drive_pdos(draft: DeviceDraft, findings: Findings) -> None:
-    for direction, index, verb in CYCLIC_OBJECTS:
+def _check_drive_pdos(draft: DeviceDraft, config: NodeConfig, findings: Findings) -> None:
+    for axis, (direction, first, verb) in product(config.axes, CYCLIC_OBJECTS):
+        index = first + AXIS_OFFSET * axis.channel
         if not _is_mapped(draft.pdos, direction, index):
             findings.warning(
                 draft.section.place,
-                f'no enabled {direction.title} carries 0x{index:04X} ({index.name.lower()}); the '
-                f'drive cannot be {verb} in the cycle',
+                f'no enabled {direction.title} carries 0x{index:04X} ({first.name.lower()}); '
+                f'{axis.name or "the drive"} cannot be {verb} in the cycle',
                 f'map it below {direction.name}',
             )
 

@@ -27,7 +27,7 @@ def read_drive(section: Mapping, values: dict[str, Any], findings: Findings) -> 
         findings: Gets what is wrong.
     """
     if 'switching_state' in values:
-        values['switching_state'] = DriveState(values['switching_state'])
+        values['switching_state'] = _switching_state(section, values, findings)
     if 'recovery' in values:
         values['recovery'] = _policy(section.entries['recovery'], values['recovery'], findings)
     _check_one_rule(section, values, findings)
@@ -84,6 +84,18 @@ def _axis(drive: DriveConfig, part: Item | None, findings: Findings) -> DriveCon
     if any(key in part.entries for key in SCALE_KEYS):
         values['scale_from_factor_group'] = False
     return replace(drive, **values)
+
+
+def _switching_state(section: Mapping, values: dict[str, Any], findings: Findings) -> DriveState:
+    state = DriveState(values['switching_state'])
+    if state is not DriveState.FAULT:
+        return state
+    findings.warning(
+        section.entries['switching_state'].place,
+        '8 is Fault, in which no drive switches its mode; taken as 5 (Operation enabled)',
+        'write switching_state: 5',
+    )
+    return DriveState.OPERATION_ENABLED
 
 
 def _check_one_rule(section: Mapping, values: dict[str, Any], findings: Findings) -> None:

@@ -43,6 +43,20 @@ DRIVER_CLASSES: tuple[DriverClass, ...] = (
 )
 
 
+BASE_CLASSES = {
+    'ros2_canopen::CanopenDriver': (
+        "'ros2_canopen::Cia402Driver' for a drive, 'ros2_canopen::ProxyDriver' for another device"
+    ),
+    'ros2_canopen::LifecycleCanopenDriver': (
+        "'ros2_canopen::LifecycleCia402Driver' for a drive, 'ros2_canopen::LifecycleProxyDriver' "
+        'for another device'
+    ),
+    'ros2_canopen::CanopenMaster': "'ros2_canopen::MasterDriver'",
+    'ros2_canopen::LifecycleCanopenMaster': "'ros2_canopen::LifecycleMasterDriver'",
+}
+"""Classes that no bus.yml can name, and what is meant."""
+
+
 def check_driver(section: Mapping, name: str, findings: Findings, *, for_master: bool) -> None:
     """Check the driver class of the master or of a device, and its package.
 
@@ -66,6 +80,9 @@ def check_driver(section: Mapping, name: str, findings: Findings, *, for_master:
 
 
 def _remedy(name: str, names: list[str], for_master: bool) -> str:
+    base = BASE_CLASSES.get(name)
+    if base is not None:
+        return f'it is a base class of ros2_canopen; take {base}'
     if any(driver.name == name for driver in DRIVER_CLASSES):
         return f'it is for {"devices" if for_master else "the master"}; take {names[0]!r} here'
     close = difflib.get_close_matches(name, names, n=1)

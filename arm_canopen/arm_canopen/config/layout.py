@@ -78,7 +78,7 @@ def _new_devices(root: Mapping, findings: Findings) -> dict[str, Mapping]:
     for name, item in root.entries.items():
         if name not in TOP_LEVEL and not name.startswith('.'):
             findings.error(item.place, f'unknown section {name!r}', _section_remedy(name, item))
-    defaults = block(root, 'defaults', findings) or Mapping(root.place)
+    defaults = _with_dcf(block(root, 'defaults', findings) or Mapping(root.place), findings)
     nodes = root.entries.get('nodes')
     if nodes is None:
         findings.error(root.place, "there are 'defaults' but no 'nodes'", NODES_REMEDY)
@@ -105,7 +105,7 @@ def _old_devices(root: Mapping, findings: Findings) -> dict[str, Mapping]:
 
 def _is_misspelt(name: str, item: Item) -> bool:
     """Tell a section with a typing error from a device, which has an EDS in this format."""
-    is_device = isinstance(item, Mapping) and 'dcf' in item.entries
+    is_device = isinstance(item, Mapping) and bool({'dcf', 'eds'} & item.entries.keys())
     return name not in TOP_LEVEL and not is_device and bool(_close_section(name))
 
 
@@ -119,7 +119,7 @@ def _devices(nodes: Mapping, defaults: Mapping, findings: Findings) -> dict[str,
         if name.startswith('.'):
             continue
         if isinstance(item, Mapping):
-            result[name] = merge_device(defaults, item)
+            result[name] = merge_device(defaults, _with_dcf(item, findings))
         else:
             findings.error(
                 item.place,
@@ -127,6 +127,23 @@ def _devices(nodes: Mapping, defaults: Mapping, findings: Findings) -> dict[str,
                 _section_remedy(name, item),
             )
     return result
+
+
+def _with_dcf(section: Mapping, findings: Findings) -> Mapping:
+    """Take ``eds`` for ``dcf``, as many people write it; ros2_canopen knows the latter only."""
+    item = section.entries.get('eds')
+    if item is None:
+        return section
+    if 'dcf' in section.entries:
+        findings.error(item.place, "there are 'eds' and 'dcf'", "remove one; 'dcf' is the key")
+    else:
+        findings.warning(
+            item.place, "'eds' is taken for 'dcf'", "write 'dcf', as ros2_canopen does"
+        )
+    entries = {
+        ('dcf' if name == 'eds' else name): value for name, value in section.entries.items()
+    }
+    return Mapping(section.place, entries)
 
 
 def _section_remedy(name: str, item: Item) -> str:

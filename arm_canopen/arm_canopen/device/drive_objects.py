@@ -8,6 +8,7 @@ from collections.abc import Callable
 
 from ..standard.drive import OperationMode
 from ..standard.objects import AXIS_OFFSET, Index
+from ..standard.target_objects import TARGET_OBJECTS
 from .object_store import Integer, ObjectStore
 from .profile import Limits
 
@@ -43,6 +44,20 @@ class DriveObjects:
         self._bind_profile(bind)
         self._bind_velocity_mode(bind)
         self._bind_torque(bind)
+        self._dictionary = store.dictionary
+        self._offset = axis * AXIS_OFFSET
+
+    @property
+    def possible_modes(self) -> int:
+        """Bits of 0x6502 for the modes that the objects of the dictionary allow."""
+        modes = [
+            mode
+            for mode, (index, subindex) in TARGET_OBJECTS.items()
+            if (index + self._offset, subindex) in self._dictionary
+        ]
+        if (Index.HOMING_METHOD + self._offset, 0) in self._dictionary:
+            modes.append(OperationMode.HOMING)
+        return sum(mode.support_bit for mode in modes)
 
     def _bind_states(self, bind: Callable[..., Integer]) -> None:
         self.abort_connection = bind(Index.ABORT_CONNECTION_OPTION, default=1)

@@ -6,13 +6,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..exceptions import SdoAbortError
+from ..exceptions import CodecError, SdoAbortError, SdoError, SdoTimeoutError
 from ..standard.pdo import Number
 from .events import EventKind, Severity
-from .scheduler import Promise
+from .scheduler import Promise, Scheduler
 
 if TYPE_CHECKING:
     from .remote_objects import RemoteObjects
+
+WRITE_PAUSE = 0.05  # [s] between two writes of a value of which the newest counts
 
 
 class BackgroundReader:
@@ -76,3 +78,60 @@ class BackgroundWriter:
             self._written = None  # it did not arrive; a value that was refused is not repeated
         if not failing:
             self._node.report(EventKind.PDO, Severity.WARNING, str(promise.error))
+
+
+class LatestWriter:
+    """An object that is written by SDO, of which only the newest value counts.
+
+    One transfer is on its way at a time, and there is a pause between two, so that a value that
+    changes all the time does not fill the bus.
+    """
+
+    def __init__(
+        self, node: RemoteObjects, scheduler: Scheduler, index: int, subindex: int
+    ) -> None:
+        """Remember nothing written yet."""
+        self._node = node
+        self._scheduler = scheduler
+        self._address = (index, subindex)
+        self._wanted: Number | None = None
+        self._held: Number | None = None
+        self._busy = False
+        self._failing = False
+
+    @property
+    def delivered(self) -> bool:
+        """Whether the device has confirmed the last value."""
+        return self._wanted == self._held
+
+    def write(self, value: Number) -> None:
+        """Have the device hold a value as soon as possible."""
+        self._wanted = value
+        if value != self._held and not self._busy and self._node.online:
+            self._scheduler.background(self._deliver())
+
+    def forget(self) -> None:
+        """The device restarted: write again whatever comes."""
+        self._wanted = self._held = None
+
+    async def _deliver(self) -> None:
+        self._busy = True
+        try:
+            while self._wanted is not None and self._wanted != self._held and self._node.online:
+                value = self._wanted
+                try:
+                    await self._node.write_object(*self._address, value)
+                except (SdoError, CodecError) as error:
+                    self._failed(error)
+                    if not isinstance(error, SdoTimeoutError):
+                        break  # what was refused is not repeated before somebody asks again
+                else:
+                    self._held, self._failing = value, False
+                await self._scheduler.timer(WRITE_PAUSE)
+        finally:
+            self._busy = False
+
+    def _failed(self, error: Exception) -> None:
+        if not self._failing and self._node.online:
+            self._node.report(EventKind.PDO, Severity.WARNING, str(error))
+        self._failing = True

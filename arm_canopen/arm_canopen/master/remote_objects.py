@@ -13,7 +13,7 @@ from ..exceptions import CodecError, SdoError
 from ..standard.datatypes import decode, encode, Value
 from ..standard.dictionary import ObjectEntry
 from ..standard.objects import is_controlword
-from .background_objects import BackgroundReader, BackgroundWriter
+from .background_objects import BackgroundReader, BackgroundWriter, LatestWriter
 from .events import Event, EventKind, Report, Severity
 from .process_image import (
     PERIODS_MISSED,
@@ -72,7 +72,7 @@ class RemoteObjects:
         self._scheduler = scheduler
         self._report = report
         self._polled: dict[tuple[int, int], BackgroundReader] = {}
-        self._background_writers: list[BackgroundWriter] = []
+        self._background_writers: list[BackgroundWriter | LatestWriter] = []
 
     def report(self, kind: EventKind, severity: Severity, text: str) -> None:
         """Tell the owner of the network something about this device."""
@@ -93,6 +93,12 @@ class RemoteObjects:
         if mapped is not None:
             return mapped
         writer = BackgroundWriter(self, index, subindex)
+        self._background_writers.append(writer)
+        return writer
+
+    def target_writer(self, index: int, subindex: int = 0) -> Writer:
+        """Return a writer by SDO for a value of which only the newest counts."""
+        writer = LatestWriter(self, self._scheduler, index, subindex)
         self._background_writers.append(writer)
         return writer
 

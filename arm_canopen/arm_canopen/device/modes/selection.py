@@ -35,8 +35,9 @@ MODES: tuple[type[Mode], ...] = (
 class ModeSelection:
     """The modes of a drive.
 
-    A mode is there when it is simulated and 0x6502 of the dictionary names it. Another one is
-    refused to an SDO; from an RPDO it is ignored, and 0x6061 goes on showing the present mode.
+    A mode is there when it is simulated and 0x6502 of the dictionary names it; where the
+    dictionary says nothing, when it has the objects of the mode. Another one is refused to an
+    SDO; from an RPDO it is ignored, and 0x6061 goes on showing the present mode.
 
     Attributes:
         current: The selected mode.
@@ -53,8 +54,11 @@ class ModeSelection:
         """Select what the dictionary has as default, as after switching on."""
         for mode in self._modes.values():
             mode.reset()
-        # a dictionary may promise more than is simulated
-        self._objects.supported_modes.value &= sum(m.number.support_bit for m in MODES)
+        supported = self._objects.supported_modes
+        # many EDS files give no default here, and a drive without any mode would be of no use;
+        # others promise more than is simulated
+        promised = supported.value or self._objects.possible_modes
+        supported.value = promised & sum(m.number.support_bit for m in MODES)
         self.current = self._modes[NoMode.number]
         self.select()
 
