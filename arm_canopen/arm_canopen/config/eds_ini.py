@@ -2,14 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Splitting an EDS or DCF file into sections and values with their lines (CiA 306-1, 4.2).
 
-Takes what vendors' files hold: any case, blanks around names, CRLF, UTF-8 or Latin-1 text,
+Takes what vendors' files hold: any case, blanks around names, CRLF, UTF-8, UTF-16 or Latin-1 text,
 comments with ``;`` or ``#``. Odd lines are told and skipped, never fatal.
 """
 
 from __future__ import annotations
 
+import codecs
 from dataclasses import dataclass, field
 
+NUL_SAMPLE = 64  # [byte] of a file by which UTF-16 is recognised
 COMMENT_MARKS = (';', '#')
 
 
@@ -65,11 +67,25 @@ class IniFile:
 
 
 def decode_text(data: bytes) -> str:
-    """Read bytes as UTF-8 (with or without byte order mark), else as Latin-1."""
+    """Read bytes as UTF-8 or UTF-16 (with or without byte order mark), else as Latin-1."""
+    encoding = _utf_16(data)
     try:
+        if encoding:
+            return data.decode(encoding)
         return data.decode('utf-8-sig')
     except UnicodeDecodeError:
         return data.decode('latin-1')
+
+
+def _utf_16(data: bytes) -> str:
+    """Name the encoding of a text in which every other byte is 0, as that of ASCII is."""
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return 'utf-16'
+    head = data[:NUL_SAMPLE]
+    for start, encoding in ((1, 'utf-16-le'), (0, 'utf-16-be')):
+        if len(head) > 1 and not any(head[start::2]) and any(head[1 - start :: 2]):
+            return encoding
+    return ''
 
 
 def section_name(title: str) -> str:

@@ -14,13 +14,14 @@ from pathlib import Path
 
 from ..exceptions import ConfigError
 from ..standard.datatypes import bit_length
+from ..standard.device_profile import is_drive
 from ..standard.dictionary import AccessType, ObjectDictionary, ObjectEntry
 from ..standard.objects import Index
 from .eds import Eds, load_eds, read_eds_text
 from .eds_ini import IniFile, IniSection, read_ini
 from .eds_lint_lists import check_info, check_lists
 from .eds_lint_pdos import check_pdo_objects
-from .eds_standard import ACCESS, MANDATORY, Role, STANDARD_OBJECTS
+from .eds_standard import ACCESS, MANDATORY, Role, standard_objects
 from .findings import Findings, Place
 from .model import Problem
 
@@ -75,6 +76,8 @@ class _Linter:
         self._path = eds.path
         self._dictionary: ObjectDictionary = eds.dictionary
         self._sections = ini.sections
+        self._standard = standard_objects(eds.dictionary)
+        self._is_drive = is_drive(eds.dictionary)
         self._findings = findings
 
     def check(self) -> None:
@@ -122,8 +125,8 @@ class _Linter:
             self._tell(entry, 'parametername', 'the object has no ParameterName', 'give it one')
 
     def _check_standard(self, entry: ObjectEntry) -> None:
-        """Compare with what CiA 301 and 402 say of the object."""
-        standard = STANDARD_OBJECTS.get(entry.address)
+        """Compare with what CiA 301 and the profile of the device say of the object."""
+        standard = self._standard.get(entry.address)
         if standard is None:
             return
         if entry.data_type is not standard.data_type:
@@ -182,7 +185,7 @@ class _Linter:
             (RPDO_TARGETS, 'RPDO', entry.rpdo_mappable),
             (TPDO_VALUES, 'TPDO', entry.tpdo_mappable),
         ):
-            if entry.index in indices and not mappable:
+            if self._is_drive and entry.index in indices and not mappable:
                 self._tell(
                     entry,
                     'pdomapping',

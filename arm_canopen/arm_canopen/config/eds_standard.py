@@ -6,9 +6,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
+from typing import TypeAlias
 
 from ..standard.datatypes import DataType
-from ..standard.dictionary import AccessType
+from ..standard.device_profile import DeviceProfile, is_drive, profile_number
+from ..standard.dictionary import AccessType, ObjectDictionary
 from ..standard.objects import Index
 
 
@@ -39,8 +41,9 @@ class StandardObject:
 U8, U16, U32 = DataType.UNSIGNED8, DataType.UNSIGNED16, DataType.UNSIGNED32
 I8, I16, I32 = DataType.INTEGER8, DataType.INTEGER16, DataType.INTEGER32
 
-_ROWS: tuple[tuple[int, int, DataType, Role], ...] = (
-    # CiA 301, 7.5.2
+Rows: TypeAlias = tuple[tuple[int, int, DataType, Role], ...]
+
+_COMMUNICATION: Rows = (  # CiA 301, 7.5.2
     (Index.DEVICE_TYPE, 0, U32, Role.VALUE),
     (Index.ERROR_REGISTER, 0, U8, Role.VALUE),
     (Index.SYNC_COB_ID, 0, U32, Role.EITHER),
@@ -61,7 +64,8 @@ _ROWS: tuple[tuple[int, int, DataType, Role], ...] = (
     (Index.IDENTITY, 3, U32, Role.VALUE),
     (Index.IDENTITY, 4, U32, Role.VALUE),
     (Index.SYNC_OVERFLOW, 0, U8, Role.SETTING),
-    # CiA 402-2, clause 7 and the clauses of the modes
+)
+_DRIVE: Rows = (  # CiA 402-2, clause 7 and the clauses of the modes
     (Index.ERROR_CODE, 0, U16, Role.VALUE),
     (Index.CONTROLWORD, 0, U16, Role.SETTING),
     (Index.STATUSWORD, 0, U16, Role.VALUE),
@@ -85,11 +89,34 @@ _ROWS: tuple[tuple[int, int, DataType, Role], ...] = (
     (Index.SUPPORTED_MODES, 0, U32, Role.VALUE),
 )
 
-STANDARD_OBJECTS: dict[tuple[int, int], StandardObject] = {
-    (index, subindex): StandardObject(data_type, role)
-    for index, subindex, data_type, role in _ROWS
+_GENERIC_IO: Rows = (  # CiA 401, clause 7: the first of each kind
+    (0x6000, 1, U8, Role.VALUE),
+    (0x6200, 1, U8, Role.SETTING),
+    (0x6401, 1, I16, Role.VALUE),
+    (0x6411, 1, I16, Role.SETTING),
+)
+_ENCODER: Rows = (  # CiA 406, clause 7
+    (0x6000, 0, U16, Role.EITHER),
+    (0x6001, 0, U32, Role.EITHER),
+    (0x6002, 0, U32, Role.EITHER),
+    (0x6003, 0, U32, Role.SETTING),
+    (0x6004, 0, U32, Role.VALUE),
+)
+_PROFILES: dict[int, Rows] = {
+    DeviceProfile.GENERIC_IO: _GENERIC_IO,
+    DeviceProfile.DRIVE: _DRIVE,
+    DeviceProfile.ENCODER: _ENCODER,
 }
-"""By index and sub-index."""
+
+
+def standard_objects(dictionary: ObjectDictionary) -> dict[tuple[int, int], StandardObject]:
+    """Return what CiA 301 and the profile of a device say, by index and sub-index."""
+    number = DeviceProfile.DRIVE if is_drive(dictionary) else profile_number(dictionary)
+    return {
+        (index, subindex): StandardObject(data_type, role)
+        for index, subindex, data_type, role in (*_COMMUNICATION, *_PROFILES.get(number, ()))
+    }
+
 
 MANDATORY: dict[tuple[int, int], str] = {
     (Index.DEVICE_TYPE, 0): 'device type',

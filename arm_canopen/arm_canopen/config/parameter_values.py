@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from ..exceptions import CodecError
 from ..standard.datatypes import encode
+from ..standard.device_profile import is_drive
 from ..standard.dictionary import ObjectDictionary, ObjectEntry
 from ..standard.objects import AXIS_OFFSET, COMMANDS, Index
 from .eds import Eds
@@ -59,7 +60,7 @@ def _is_setting(entry: ObjectEntry) -> bool:
 
 def _data(entry: ObjectEntry, eds: Eds, findings: Findings) -> bytes | None:
     place = Place(eds.path, entry.line, key=f'[{entry.index:04X}]')
-    if _is_command(entry.index):
+    if is_drive(eds.dictionary) and _is_command(entry.index):
         what = f'the ParameterValue of {entry} is a command, which is not written at boot'
         findings.warning(place, what, 'remove it; commands are given by the services')
         return None

@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 
 from ..can.frame import Frame
 from ..standard.cob_id import CobId, NODE_ID_MAX, NODE_ID_MIN
+from ..standard.device_profile import is_drive
 from ..standard.dictionary import ObjectDictionary
 from ..standard.lss import UNCONFIGURED
 from ..standard.nmt import NmtCommand, NmtState
@@ -107,7 +108,8 @@ class Device:
         return tuple(
             Drive(self.store, shared, self._sync, servo, number=axis)
             for axis in range(AXES_MAX)
-            if (Index.CONTROLWORD + axis * AXIS_OFFSET, 0) in self.store
+            if is_drive(self.store.dictionary)
+            and (Index.CONTROLWORD + axis * AXIS_OFFSET, 0) in self.store
         )
 
     def _build_services(self) -> None:

@@ -1,0 +1,35 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Which device profile a device follows: objects from 0x6000 on mean what that profile says."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+from .dictionary import ObjectDictionary
+from .objects import Index
+
+PROFILE_MASK = 0xFFFF  # bits of 0x1000 that hold the number of the profile (CiA 301, 7.5.2.1)
+
+
+class DeviceProfile(IntEnum):
+    """Numbers of profiles whose objects are known here."""
+
+    GENERIC_IO = 401
+    DRIVE = 402
+    ENCODER = 406
+
+
+def profile_number(dictionary: ObjectDictionary) -> int:
+    """Return the number of the profile that the EDS names; 0 when it names none."""
+    entry = dictionary.get(Index.DEVICE_TYPE)
+    device_type = entry.default if entry is not None else None
+    return device_type & PROFILE_MASK if isinstance(device_type, int) else 0
+
+
+def is_drive(dictionary: ObjectDictionary) -> bool:
+    """Tell whether 0x6040 and its like are those of CiA 402; other profiles have them, too."""
+    number = profile_number(dictionary)
+    if number:
+        return number == DeviceProfile.DRIVE
+    return all(dictionary.has_index(index) for index in (Index.CONTROLWORD, Index.STATUSWORD))
