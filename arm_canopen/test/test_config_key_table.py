@@ -1,39 +1,122 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The page of all keys of bus.yml says what the reader does."""
+"""What docs/bus_yml.md says of the keys is what a bus.yml that is read shows."""
 
 from __future__ import annotations
 
-import importlib.util
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+import re
+from typing import Any, NamedTuple
 
+from config_samples import DRIVE_ROWS, eds_text, load_text, Row
 import pytest
+import yaml
 
-TOOL = Path(__file__).parents[1] / 'tools' / 'make_key_table.py'
+from arm_canopen.config import BusConfig
+from arm_canopen.config.section import SECTIONS
+from arm_canopen.exceptions import ConfigError
+
+PAGE = Path(__file__).parents[1] / 'docs' / 'bus_yml.md'
+TITLES = {
+    'options': 'options',
+    'master': 'master',
+    'A device, or `defaults`': 'device',
+    'A drive, or `defaults`': 'device',
+    'A number below `tpdo`': 'tpdo',
+    'A number below `rpdo`': 'rpdo',
+    'An entry of `sdo`': 'sdo',
+}
+ROW = re.compile(r'^\| `(\w+)` \| .*? \| (.*?) \| .+ \|$')
+GUARDING = (
+    Row(0x100C, 0, 'Guard time', 6, 'rw', '0'),
+    Row(0x100D, 0, 'Life time factor', 5, 'rw', '0'),
+)
+EDS = eds_text((*DRIVE_ROWS, *GUARDING))
 
 
-@pytest.fixture(scope='module')
-def tool() -> Any:
-    """The tool that writes the page."""
-    spec = importlib.util.spec_from_file_location('make_key_table', TOOL)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+class KeyRow(NamedTuple):
+    """A row of the page.
+
+    Attributes:
+        section: Where the key stands.
+        key: Its name.
+        default: What counts without it, empty when that depends on others.
+    """
+
+    section: str
+    key: str
+    default: str
 
 
-def test_the_page_is_up_to_date(tool: Any) -> None:
-    """It is what its tool makes of the present tables."""
-    assert tool.page() == tool.TARGET.read_text('utf-8')
+def key_rows() -> list[KeyRow]:
+    """Read the page."""
+    found, section = [], ''
+    for line in PAGE.read_text('utf-8').splitlines():
+        if line.startswith('## '):
+            section = TITLES[line[3:]]
+        elif (row := ROW.match(line)) and row[1] != 'key':
+            found.append(KeyRow(section, row[1], row[2]))
+    return found
 
 
-def test_no_text_is_left_over(tool: Any) -> None:
-    """Each text belongs to a key that there is."""
-    names = {key.name for _, _, keys, _ in tool.SECTIONS for key in keys}
-    sections = {name for name, _, _, _ in tool.SECTIONS}
-    for text in tool.TEXTS:
-        section, dot, name = text.rpartition('.')
-        assert name in names
-        assert not dot or section in sections
+def bus_with(section: str = '', **keys: Any) -> dict[str, Any]:
+    """Return a bus of one drive, with keys in one of its sections."""
+    sections: dict[str, dict[str, Any]] = {
+        'options': {},
+        'master': {
+            'node_id': 1,
+            'driver': 'ros2_canopen::MasterDriver',
+        },
+        'device': {'node_id': 2, 'driver': 'ros2_canopen::Cia402Driver', 'dcf': 'drive.eds'},
+        'tpdo': {'mapping': [{'index': 0x6041}]},
+        'rpdo': {'mapping': [{'index': 0x6040}]},
+        'sdo': {'index': 0x6081, 'value': 5},
+    }
+    if section:
+        sections[section] |= keys
+    device = sections['device'] | {
+        'tpdo': {1: sections['tpdo']},
+        'rpdo': {1: sections['rpdo']},
+        'sdo': [sections['sdo']],
+    }
+    return {
+        'options': sections['options'],
+        'master': sections['master'],
+        'nodes': {'joint1': device},
+    }
+
+
+def load(folder: Path, bus: dict[str, Any]) -> BusConfig:
+    """Load a bus, without what depends on where it was read from."""
+    config = load_text(folder, yaml.safe_dump(bus, sort_keys=False), eds=EDS)
+    (node,) = config.nodes
+    plain = replace(node, dictionary=EMPTY, line=0)
+    return replace(config, nodes=(plain,), warnings=())
+
+
+EMPTY: Any = None  # two dictionaries of one EDS are not equal
+
+
+@pytest.mark.parametrize('row', [row for row in key_rows() if row.default], ids=str)
+def test_the_default_is_what_counts_without_the_key(tmp_path: Path, row: KeyRow) -> None:
+    """A bus.yml that writes it is the same bus as one that leaves it out."""
+    value = yaml.safe_load(row.default)
+    assert load(tmp_path, bus_with(row.section, **{row.key: value})) == load(tmp_path, bus_with())
+
+
+def test_every_key_is_on_the_page_and_no_other() -> None:
+    """Of those that are read; a key that is not on the page is refused as unknown."""
+    read = {key.name for keys in SECTIONS.values() for key in keys}
+    assert {row.key for row in key_rows()} == read
+
+
+@pytest.mark.parametrize('section', sorted({row.section for row in key_rows()}))
+def test_a_key_that_is_not_on_the_page_is_refused(tmp_path: Path, section: str) -> None:
+    """With the names that are known there, all of which are on the page."""
+    with pytest.raises(ConfigError) as refused:
+        load(tmp_path, bus_with(section, zzz=1))
+    (problem,) = refused.value.problems
+    names = problem.remedy.partition('known here: ')[2].split(', ')
+    here = {row.key for row in key_rows() if row.section == section}
+    assert set(names) == here
