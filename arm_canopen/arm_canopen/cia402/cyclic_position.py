@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 from ..master.process_image import Writer
 from ..standard.drive import Controlword, OperationMode
-from .modes import Actual, Mode, NO_BITS
+from .modes import Actual, fitting, Mode, NO_BITS
 from .setpoint_profile import ProfileLimits, SetpointProfile
 from .units import Units
 
@@ -54,7 +54,8 @@ class CyclicPosition(Mode):
 
     def set_target(self, target: float) -> None:
         """Go to a single target by a profile."""
-        self._units.position_to_device(target)  # refuse now what could not be sent on arrival
+        # refuse now what could not be sent on arrival
+        fitting(self._target, self._units.position_to_device(target))
         self._profile.target = target
 
     @property
@@ -78,7 +79,7 @@ class CyclicPosition(Mode):
         Raises:
             DriveError: It is not finite or does not fit the object.
         """
-        self._units.position_to_device(setpoint)
+        fitting(self._target, self._units.position_to_device(setpoint))
         self._streamed = setpoint
 
     def step(self, now: float, period: float, statusword: int) -> int:

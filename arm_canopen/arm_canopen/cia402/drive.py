@@ -5,13 +5,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 
 from ..config.drive_model import DriveConfig
-from ..exceptions import DriveError, SdoError
+from ..exceptions import CanopenError, CodecError, SdoError
 from ..master.events import Severity
+from ..master.process_image import Output
 from ..master.remote_node import RemoteNode
 from ..master.scheduler import Scheduler, Task
 from ..standard.drive import DriveState, mode_title, OperationMode, Statusword
+from ..standard.objects import Index
 from .cyclic_position import CyclicPosition
 from .feed_forward import FeedForward
 from .following_watch import FollowingWatch
@@ -24,6 +27,7 @@ from .state_machine import Command, fault_reset, next_command
 from .target_limits import check_feed_forward
 
 FOLLOWS_COMMAND = int(Statusword.FOLLOWS_COMMAND)
+STOP_BY_SDO_TIME = 2.0  # [s] for a quick stop, before the power is taken all the same
 UNSEEN_STOP_TIME = 1.0  # [s] in which a motion source may lead a silent drive to rest on its path
 
 
@@ -71,6 +75,7 @@ class Drive(ModedDrive):
         self._unseen_since: float | None = None
         self._polling: Task[None] | None = None
         node.on_lost.append(self._on_lost)
+        node.on_failed.append(self.fail)
 
     @property
     def setpoint(self) -> float:
@@ -148,25 +153,48 @@ class Drive(ModedDrive):
                 bits = self._hold_without_target(edge=edge)
         self._send(command, bits)
 
-    def fail(self, error: Exception) -> None:
-        """Stop the drive, because its cycle failed; the other drives of the bus go on.
+    def fail(self, error: Exception, output: Output | None = None) -> None:
+        """Stop and disable the drive, because its cycle failed; never raises.
+
+        The other drives of the bus go on.
 
         Args:
             error: Why; one that the drive itself could not have caused is a defect.
+            output: An RPDO of its device that cannot be sent.
         """
         if self.state is DriveState.OPERATION_ENABLED:
             self.goal = DriveState.QUICK_STOP_ACTIVE
         elif self.goal is not None:
             self.goal = DriveState.SWITCH_ON_DISABLED
-        self.feed_forward.end()
-        self._send(self._command())
+        unreachable = output is not None and self.objects.is_controlled_by(output)
+        try:
+            self._send(self._command())
+            self.feed_forward.end()
+        except Exception:  # noqa: BLE001  # what keeps it from being led may keep this from it, too
+            unreachable = True
         text = str(error)
-        if not isinstance(error, DriveError):
+        if not isinstance(error, CanopenError):
             text = f'a defect in the CANopen master: {type(error).__name__}: {error}'
         if text != self._failure:
             self._failure = text
             self.released(Refusal(RefusalCause.CYCLE_FAILED, text))
             self.report(Severity.ERROR, f'stopped: {text}')
+            if unreachable and self.node.online:
+                self._scheduler.background(self._stop_by_sdo())
+
+    async def _stop_by_sdo(self) -> None:
+        """Take the power from a drive to which no controlword can be sent by RPDO."""
+        place = self.objects.at(Index.CONTROLWORD)
+        try:
+            await self.node.write_object(place, 0, int(Command.QUICK_STOP))
+            with suppress(TimeoutError):
+                await self._scheduler.until(self._is_without_power, STOP_BY_SDO_TIME)
+            await self.node.write_object(place, 0, int(Command.DISABLE_VOLTAGE))
+        except (SdoError, CodecError) as error:
+            self.report(Severity.ERROR, f'cannot be stopped: {error}; cut its power')
+
+    def _is_without_power(self) -> bool:
+        return self.state not in (DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE)
 
     def resume(self) -> None:
         """End a halt as soon as the drive has the new target, so that no old one revives."""

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from ..master.process_image import Reader, Writer
+from ..master.process_image import Output, Reader, Writer
 from ..master.remote_node import RemoteNode
 from ..standard.drive import drive_state, DriveState, OperationMode
 from ..standard.objects import AXIS_OFFSET, Index
@@ -49,6 +49,11 @@ class DriveObjects:
         if word is None or position is None or self._mode.value is None:
             return None
         return int(word), position
+
+    def is_controlled_by(self, output: Output) -> bool:
+        """Tell whether an RPDO carries the controlword of this axis."""
+        place = self.at(Index.CONTROLWORD)
+        return any(mapped.index == place for mapped in output.config.mapping)
 
     def fresh(self, now: float) -> bool:
         """Tell whether the state is known and young enough to act on, at a steady time in [s].

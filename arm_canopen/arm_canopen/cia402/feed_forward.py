@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from ..standard.objects import Index
 from .drive_objects import DriveObjects
+from .modes import fitting
 from .motion import Setpoint
 from .units import Units
 
@@ -40,6 +41,9 @@ class FeedForward:
         """
         velocity_dev = self._units.velocity_to_device(setpoint.velocity)
         torque_dev = self._units.effort_to_device(setpoint.effort)
+        for writer, value in ((self._velocity, velocity_dev), (self._torque, torque_dev)):
+            if writer is not None:
+                fitting(writer, value)
         if velocity_dev or torque_dev:
             self._acts = True
             self._write(velocity_dev, torque_dev)

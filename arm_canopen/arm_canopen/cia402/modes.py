@@ -14,6 +14,7 @@ from abc import ABC, abstractmethod
 from typing import NamedTuple
 
 from ..exceptions import DriveError
+from ..master.process_image import Writer
 from ..standard.drive import Controlword, OperationMode
 
 NO_BITS = 0  # bits are plain numbers in the cycle, where operators of IntFlag cost too much
@@ -34,6 +35,21 @@ class Actual(NamedTuple):
     velocity: float = 0.0
     velocity_dev: int = 0
     torque: int = 0
+
+
+def fitting(target: Writer, value: int) -> int:
+    """Return a target in device units, if its object can hold it.
+
+    Raises:
+        DriveError: It cannot; the message names the limits.
+    """
+    low, high = target.limits
+    if not low <= value <= high:
+        raise DriveError(
+            f'the target is {value} device units, but its object holds {low:g} to {high:g} only; '
+            'are the scale factors in bus.yml right, and the type of the object in the EDS?'
+        )
+    return value
 
 
 class Mode(ABC):

@@ -7,11 +7,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import partial
+import math
 
-from ..exceptions import DriveError
+from ..exceptions import CanopenError, DriveError
 from ..master.events import Event, EventKind, Report, Severity
+from ..standard.drive import DriveState
 from .drive import Drive
-from .motion import MotionSource, Setpoint
+from .motion import AxisFeedback, MotionSource, Setpoint
 from .refusal import Refusal, RefusalCause
 
 HAND_OVER_MARGIN = 2.0  # cycles of profile velocity from the set-point that a stream may start
@@ -100,7 +102,7 @@ class MotionGroup:
                 drive.fail(error)
 
     def _run(self, attachment: Attachment, now: float, period: float) -> None:
-        feedback = [drive.feedback() for drive in attachment.drives]
+        feedback = [_feedback(drive) for drive in attachment.drives]
         try:
             setpoints = list(attachment.source.update(now, period, feedback))
         except Exception as error:  # noqa: BLE001  # a source must not stop the cycle of the others
@@ -117,7 +119,10 @@ class MotionGroup:
             whole = setpoint if isinstance(setpoint, Setpoint) else Setpoint(setpoint)
             try:
                 self._stream(attachment, drive, whole, period)
-            except DriveError as error:
+            except Exception as error:  # noqa: BLE001
+                if not isinstance(error, CanopenError):
+                    drive.fail(error)
+                    continue
                 self._release(drive, Refusal(RefusalCause.SETPOINT_REFUSED, str(error)))
 
     def _stream(
@@ -161,6 +166,19 @@ class MotionGroup:
         name = type(attachment.source).__name__
         text = f'motion source {name} {reason}; it is detached and its drives are braked'
         self._report(Event(EventKind.DRIVE, Severity.ERROR, '', text))
+
+
+def _feedback(drive: Drive) -> AxisFeedback:
+    """Return the state of a drive for its source; one for which that fails is stopped."""
+    try:
+        return drive.feedback()
+    except Exception as error:  # noqa: BLE001
+        drive.fail(error)
+        failed = Refusal(RefusalCause.CYCLE_FAILED, str(error))
+        unknown = DriveState.UNKNOWN
+        return AxisFeedback(
+            drive.name, False, unknown, 0, math.nan, 0.0, math.nan, False, failed, math.inf
+        )
 
 
 def _greatest_speed(drive: Drive) -> float:

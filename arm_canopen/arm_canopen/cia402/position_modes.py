@@ -13,7 +13,7 @@ import math
 from ..exceptions import DriveError
 from ..master.process_image import Writer
 from ..standard.drive import Controlword, OperationMode, Statusword
-from .modes import Actual, Mode
+from .modes import Actual, fitting, Mode
 from .units import Units
 
 ACKNOWLEDGE = int(Statusword.SET_POINT_ACKNOWLEDGE)
@@ -177,7 +177,7 @@ class ProfilePosition(Mode):
                 there is nothing to count from.
         """
         to_device = self._units.distance_to_device if move.relative else None
-        value = (to_device or self._units.position_to_device)(move.target)
+        value = fitting(self._target, (to_device or self._units.position_to_device)(move.target))
         waiting = Waiting(value, move, self.destination(move))
         if move.immediate and not move.relative:
             self._queue.clear()

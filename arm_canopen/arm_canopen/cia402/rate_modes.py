@@ -13,7 +13,7 @@ from collections.abc import Callable
 
 from ..master.process_image import Writer
 from ..standard.drive import OperationMode
-from .modes import Actual, Mode, NO_BITS
+from .modes import Actual, fitting, Mode, NO_BITS
 from .units import Units
 
 VL_RAMP = 0x70
@@ -37,7 +37,7 @@ class DriveRamped(Mode):
 
     def set_target(self, target: float) -> None:
         """Command a value."""
-        self._target.write(self._to_device(target))
+        self._target.write(fitting(self._target, self._to_device(target)))
 
     def brake(self) -> None:
         """Command standstill; the drive makes the ramp."""
@@ -112,7 +112,8 @@ class MasterRamped(Mode):
 
     def set_target(self, target: float) -> None:
         """Ramp to a value."""
-        self._to_device(target)  # refuse now what could not be sent on arrival
+        # refuse now what could not be sent on arrival
+        fitting(self._target, self._to_device(target))
         self._goal = target
 
     def brake(self) -> None:

@@ -12,6 +12,7 @@ from ..standard.dictionary import ObjectDictionary
 from ..standard.objects import AXIS_OFFSET, Index
 from ..standard.pdo import SYNCHRONOUS_MAX
 from .device_reader import DeviceDraft
+from .drive_types import check_drive_types
 from .findings import Findings
 from .master_model import MasterConfig
 from .model import NodeConfig
@@ -55,6 +56,7 @@ def finish_device(
     _check_sync(draft.pdos, master, findings)
     if config.is_drive:
         _check_drive_pdos(draft, config, findings)
+        check_drive_types(draft.pdos, findings)
     producer = _heartbeat_producer(draft, config.dictionary, findings)
     multiplier = draft.settings.heartbeat_multiplier or around.options.heartbeat_multiplier
     return replace(

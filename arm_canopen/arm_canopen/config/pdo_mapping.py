@@ -6,9 +6,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ..standard.datatypes import bit_length, DataType
+from ..standard.datatypes import bit_length, DataType, SIGNED_BITS
 from ..standard.dictionary import ObjectDictionary, ObjectEntry
-from ..standard.objects import PDO_BITS_MAX
+from ..standard.objects import Index, is_signed, PDO_BITS_MAX
 from ..standard.pdo import MappedObject
 from .device_keys import MAPPING_KEYS
 from .document import Listing
@@ -17,6 +17,7 @@ from .findings import Findings, Place, RefusedError
 from .pdo_direction import Direction, RPDO
 from .sdo_list import find_entry, read_address
 
+SIGNED_BY_BITS = {bits: data_type for data_type, bits in SIGNED_BITS.items()}
 UNSIGNED_BY_BITS = {
     1: DataType.BOOLEAN,
     8: DataType.UNSIGNED8,
@@ -90,7 +91,9 @@ def _from_word(
         return MappedObject(index, subindex, entry.data_type)
     name = f'0x{index:04X}:{subindex:02X}'
     what = f'{name}, which is not there' if entry is None else f'{entry} with {bits} bits'
-    data_type = UNSIGNED_BY_BITS.get(bits)
+    # an object of a drive whose sign the standard knows is not read without it
+    signed = is_signed(index, subindex) and dictionary.has_index(Index.CONTROLWORD)
+    data_type = (SIGNED_BY_BITS if signed else UNSIGNED_BY_BITS).get(bits)
     result = 'the PDO is ignored' if data_type is None else f'taken as {data_type.name}'
     findings.warning(place, f'maps {what}; {result}', EDS_REMEDY)
     return None if data_type is None else MappedObject(index, subindex, data_type)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from ..exceptions import CodecError, SdoAbortError, SdoError, SdoTimeoutError
 from ..standard.pdo import Number
 from .events import EventKind, Severity
+from .process_image import Limits
 from .scheduler import Promise, Scheduler
 
 if TYPE_CHECKING:
@@ -50,6 +51,11 @@ class BackgroundWriter:
         self._written: Number | None = None
         self._failing = False
         self._open = 0
+
+    @property
+    def limits(self) -> Limits:
+        """Smallest and largest value that the object holds, by its type in the EDS."""
+        return self._node.limits(*self._address)
 
     @property
     def delivered(self) -> bool:
@@ -98,6 +104,11 @@ class LatestWriter:
         self._held: Number | None = None
         self._busy = False
         self._failing = False
+
+    @property
+    def limits(self) -> Limits:
+        """Smallest and largest value that the object holds, by its type in the EDS."""
+        return self._node.limits(*self._address)
 
     @property
     def delivered(self) -> bool:

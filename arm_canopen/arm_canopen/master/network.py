@@ -9,6 +9,7 @@ a function. See ``runner.py`` for the thread that does so on a real bus.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import TypeAlias
 
 from ..can.frame import Frame
@@ -31,6 +32,7 @@ from .scheduler import completed, Promise, Scheduler
 from .sdo_client import SdoClient
 from .startup import Startup
 
+DEFECT_PERIOD = 10.0  # [s] between two reports of the same defect
 WATCH_PERIOD = 0.005  # [s] between two looks at the life signs, which come at most so often
 
 CycleHook: TypeAlias = Callable[[float, float], None]
@@ -90,6 +92,7 @@ class Network:
         self._sync_time = 0.0
         self._feedback_due = False
         self._watch_at = 0.0
+        self._defects: dict[str, float] = {}  # when each may be reported again
         self._sync_counter = SyncCounter(master.sync_overflow)
         self._heartbeat = HeartbeatProducer(master.node_id, master.heartbeat_producer, self.send)
         self._time = TimeProducer(
@@ -139,13 +142,15 @@ class Network:
 
     def advance(self, now: float) -> None:
         """Let time pass: timers, conditions, heartbeats that are overdue."""
-        self.scheduler.advance(now)
+        self._contain(partial(self.scheduler.advance, now))
         if now < self._watch_at:
             return
         self._watch_at = now + WATCH_PERIOD
-        for node in self.nodes.values():
-            if node.watch(now):
-                self._boots.start(node)
+        self._contain_each(partial(self._watch, now))
+
+    def _watch(self, now: float, node: RemoteNode) -> None:
+        if node.watch(now):
+            self._boots.start(node)
 
     def cycle(self, now: float, period: float) -> None:
         """Run one cycle: image, drives, RPDOs, SYNC (DESIGN: one time base).
@@ -156,21 +161,44 @@ class Network:
         """
         self.advance(now)
         if self._feedback_due:
-            self.missed_pdos += sum(node.count_missed() for node in self.nodes.values())
+            self._contain_each(self._count_missed)
             self._feedback_complete()
-        self.on_cycle(now, period)
-        self._heartbeat.advance(now, self.state)
-        self._time.advance(now)
+        self._contain(partial(self.on_cycle, now, period))
+        self._contain(partial(self._heartbeat.advance, now, self.state))
+        self._contain(partial(self._time.advance, now))
         if self.state is not NmtState.OPERATIONAL:
             return
-        send = self.send
         for node in self.nodes.values():
             if node.online:
-                for output in node.image.outputs:
-                    if output.leaves(now):
-                        send(output.frame())
+                self._send_outputs(node, now)
         if self.config.master.sync_period > 0:
             self._send_sync(now)
+
+    def _count_missed(self, node: RemoteNode) -> None:
+        self.missed_pdos += node.count_missed()
+
+    def _send_outputs(self, node: RemoteNode, now: float) -> None:
+        for output in node.image.outputs:
+            try:
+                if output.leaves(now):
+                    self.send(output.frame())
+            except Exception as error:  # noqa: BLE001, PERF203
+                node.fail(error, output)
+
+    def _contain(self, step: Callable[[], object]) -> None:
+        """Let a step of the cycle that fails keep no other one from being done."""
+        try:
+            step()
+        except Exception as error:  # noqa: BLE001
+            self._report_defect(error)
+
+    def _contain_each(self, step: Callable[[RemoteNode], object]) -> None:
+        """Do a step for each device; one for which it fails is stopped, the others go on."""
+        for node in self.nodes.values():
+            try:
+                step(node)
+            except Exception as error:  # noqa: BLE001, PERF203
+                node.fail(error)
 
     def send_nmt(self, command: NmtCommand, node_id: int) -> Promise[None]:
         """Send an NMT command to one device, or to all with id 0; our own id commands the master.
@@ -239,6 +267,9 @@ class Network:
 
     def _report_defect(self, error: BaseException) -> None:
         text = f'a defect in the CANopen master: {type(error).__name__}: {error}'
+        if self.scheduler.now < self._defects.get(text, 0.0):
+            return
+        self._defects[text] = self.scheduler.now + DEFECT_PERIOD
         self._report(Event(EventKind.BUS, Severity.ERROR, '', text))
 
     def _connect(self, rivals: RivalWatch) -> Iterator[tuple[int, Callable[[Frame], None]]]:
@@ -280,8 +311,7 @@ class Network:
 
     def _send_sync(self, now: float) -> None:
         self._sync.start(now)
-        for node in self.nodes.values():
-            node.expect_answers()
+        self._contain_each(lambda node: node.expect_answers())
         self._sync_time = now
         self._feedback_due = True
         self.send(Frame(CobId.SYNC, self._sync_counter.next()))
@@ -289,4 +319,4 @@ class Network:
     def _feedback_complete(self) -> None:
         if self._feedback_due:
             self._feedback_due = False
-            self.on_feedback(self._sync_time)
+            self._contain(partial(self.on_feedback, self._sync_time))

@@ -8,13 +8,14 @@ are list look-ups. Objects that no PDO carries are read and written by SDO in th
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 import math
 from typing import Protocol, TypeAlias
 
 from ..can.frame import Frame
 from ..config.model import PdoConfig
 from ..exceptions import CodecError
+from ..standard.datatypes import DataType, integer_range
 from ..standard.pdo import MappedObject, Number, PdoCodec, SYNCHRONOUS_MAX
 
 EVENT_DRIVEN = 254  # transmission types from which on a PDO has an event timer (CiA 301, table 72)
@@ -23,6 +24,12 @@ PERIODS_MISSED = 3  # periods of a TPDO, or of a poll, without a new value
 STALE_AFTER = 0.5  # [s] without a new value, where its period is shorter
 
 StartValue: TypeAlias = Callable[[MappedObject], Number]
+Limits: TypeAlias = tuple[Number, Number]
+
+
+def limits_of(data_type: DataType) -> Limits:
+    """Return the smallest and the largest number that a type holds."""
+    return integer_range(data_type) or (-math.inf, math.inf)
 
 
 class SyncRound:
@@ -223,11 +230,19 @@ class Writer(Protocol):
     """Next value of an object of the device."""
 
     @property
+    def limits(self) -> Limits:
+        """Smallest and largest value that the object holds."""
+
+    @property
     def delivered(self) -> bool:
         """Whether the last value leaves with the PDOs of this cycle at the latest."""
 
     def write(self, value: Number) -> None:
-        """Set the value; it leaves with the next PDO, or by SDO when it changed."""
+        """Set the value; it leaves with the next PDO, or by SDO when it changed.
+
+        Raises:
+            CodecError: The object cannot hold it; the one before is kept.
+        """
 
 
 class InputReader:
@@ -255,11 +270,22 @@ class InputReader:
 
 
 class OutputWriter:
-    """Writes an object into every RPDO that carries it, so that none brings an old value."""
+    """Writes an object into every RPDO that carries it, so that none brings an old value.
 
-    def __init__(self, places: Iterable[tuple[Output, int]]) -> None:
+    A value that cannot be packed is refused here, where its writer is known: in the RPDO it would
+    keep everything else that it carries from being sent, the controlword too.
+
+    Attributes:
+        limits: Smallest and largest value that the object holds.
+    """
+
+    def __init__(self, places: Sequence[tuple[Output, int]]) -> None:
         """Point to the object: RPDOs, and its position in each."""
         self._places = [(output.values, position) for output, position in places]
+        output, position = places[0]
+        self._mapped = output.config.mapping[position]
+        self.limits = limits_of(self._mapped.data_type)
+        self._low, self._high = self.limits
 
     @property
     def delivered(self) -> bool:
@@ -267,7 +293,17 @@ class OutputWriter:
         return True
 
     def write(self, value: Number) -> None:
-        """Set the value for the next PDOs."""
+        """Set the value for the next PDOs.
+
+        Raises:
+            CodecError: The object cannot hold it.
+        """
+        if not self._low <= value <= self._high:
+            mapped = self._mapped
+            raise CodecError(
+                f'0x{mapped.index:04X}:{mapped.subindex:02X} cannot hold {value} '
+                f'({mapped.data_type.name}: {self._low:g} to {self._high:g})'
+            )
         for values, position in self._places:
             values[position] = value
 

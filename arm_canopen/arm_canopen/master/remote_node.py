@@ -17,7 +17,7 @@ from .emergency_log import EmergencyLog
 from .events import EventKind, Report, Severity
 from .life_signs import LifeSigns
 from .pdo_watch import PdoWatch
-from .process_image import SyncRound
+from .process_image import Output, SyncRound
 from .remote_objects import RemoteObjects
 from .scheduler import Scheduler
 
@@ -58,6 +58,8 @@ class RemoteNode(RemoteObjects):
         pdos: Whether its TPDOs come.
         on_boot_up: Called when it has restarted.
         on_lost: Its drivers, which stop; each is told why.
+        on_failed: Its drivers, which stop because a step of the cycle failed for this device; each
+            gets the error, and the RPDO that cannot be sent for it, if it is one.
         on_dropped_out: Called when it has to be booted again, though it did not restart, with the
             time to leave it alone before in [s].
     """
@@ -85,6 +87,8 @@ class RemoteNode(RemoteObjects):
         self.pdos = PdoWatch(self.image.inputs, self.report)
         self.on_boot_up: Callable[[], None] = lambda: None
         self.on_lost: list[Callable[[str], None]] = []
+        self.on_failed: list[Callable[[Exception, Output | None], None]] = []
+        self._failure = ''
         self.on_dropped_out: Callable[[float], None] = lambda pause: None
         self._backoff = DropBackoff()
         self._commanded: NmtCommand | None = None
@@ -162,6 +166,20 @@ class RemoteNode(RemoteObjects):
         if self.operational:
             self.pdos.look(now)
         return False
+
+    def fail(self, error: Exception, output: Output | None = None) -> None:
+        """Stop its drivers, because a step of the cycle failed; other devices go on.
+
+        Args:
+            error: Why.
+            output: The RPDO that cannot be sent, if that is what failed.
+        """
+        for driver_fails in self.on_failed:
+            driver_fails(error, output)
+        text = f'{type(error).__name__}: {error}'
+        if not self.on_failed and text != self._failure:
+            self._failure = text
+            self.report(EventKind.PDO, Severity.ERROR, f'its part of the cycle failed: {text}')
 
     def restarted(self) -> None:
         """It sent a boot-up message: it is another one than before."""

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+import math
 
 from ..can.frame import Frame
 from ..config.model import NodeConfig
@@ -16,6 +17,8 @@ from ..standard.objects import is_controlword
 from .background_objects import BackgroundReader, BackgroundWriter, LatestWriter
 from .events import Event, EventKind, Report, Severity
 from .process_image import (
+    Limits,
+    limits_of,
     PERIODS_MISSED,
     ProcessImage,
     Reader,
@@ -130,6 +133,11 @@ class RemoteObjects:
                 'the data type, reach it all the same'
             )
         return entry
+
+    def limits(self, index: int, subindex: int = 0) -> Limits:
+        """Return the smallest and largest value that an object holds, by its type in the EDS."""
+        entry = self.config.dictionary.get(index, subindex)
+        return (-math.inf, math.inf) if entry is None else limits_of(entry.data_type)
 
     async def read_object(
         self, index: int, subindex: int = 0, *, timeout: float | None = None

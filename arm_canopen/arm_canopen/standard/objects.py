@@ -130,6 +130,27 @@ OFFSETS = frozenset({Index.POSITION_OFFSET, Index.VELOCITY_OFFSET, Index.TORQUE_
 AXIS_OFFSET = 0x800  # between the objects of two axes of a drive (CiA 402-2, 7.2)
 AXES_MAX = 8  # axes of one device (CiA 402-2, 7.2)
 _CONTROLWORDS = frozenset(Index.CONTROLWORD + AXIS_OFFSET * axis for axis in range(AXES_MAX))
+_PROFILE_AREA = 0x6000  # first object of the first axis
+_SIGNED = frozenset(
+    {
+        (Index.VL_TARGET_VELOCITY, 0),
+        (Index.POSITION_ACTUAL, 0),
+        (Index.VELOCITY_ACTUAL, 0),
+        (Index.TARGET_TORQUE, 0),
+        (Index.TORQUE_ACTUAL, 0),
+        (Index.TARGET_POSITION, 0),
+        (Index.VELOCITY_OFFSET, 0),
+        (Index.TORQUE_OFFSET, 0),
+        (Index.INTERPOLATION_DATA, 1),
+        (Index.TARGET_VELOCITY, 0),
+    }
+)
+
+
+def is_signed(index: int, subindex: int) -> bool:
+    """Tell whether an object of any axis is a position, velocity or torque, which has a sign."""
+    axis, offset = divmod(index - _PROFILE_AREA, AXIS_OFFSET)
+    return 0 <= axis < AXES_MAX and (_PROFILE_AREA + offset, subindex) in _SIGNED
 
 
 def is_controlword(index: int) -> bool:

@@ -1,0 +1,39 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Whether the mapped objects of a drive have types that carry their units."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from ..standard.datatypes import DataType, UNSIGNED_BITS
+from ..standard.objects import is_signed
+from ..standard.pdo import MappedObject
+from .findings import Findings
+from .pdo_resolution import PdoDraft
+
+
+def check_drive_types(pdos: Sequence[PdoDraft], findings: Findings) -> None:
+    """Refuse mapped objects that cannot tell one direction from the other.
+
+    Args:
+        pdos: The PDOs of a drive.
+        findings: Gets what is wrong.
+    """
+    for pdo in pdos:
+        for mapped in _unsigned(pdo):
+            findings.error(
+                pdo.place,
+                f'{pdo.title} carries 0x{mapped.index:04X}:{mapped.subindex:02X} as '
+                f'{mapped.data_type.name}, which holds no negative value',
+                'correct its DataType in the EDS (0x0003 INTEGER16, 0x0004 INTEGER32), or the '
+                'length in the default mapping',
+            )
+
+
+def _unsigned(pdo: PdoDraft) -> Iterator[MappedObject]:
+    if pdo.config.enabled:
+        for mapped in pdo.config.mapping:
+            unsigned = mapped.data_type in UNSIGNED_BITS or mapped.data_type is DataType.BOOLEAN
+            if unsigned and is_signed(mapped.index, mapped.subindex):
+                yield mapped
