@@ -14,6 +14,7 @@ import pytest
 from simulated_quad import SimulatedQuad
 
 from quad_bringup.demo.track import tilt_of
+from quad_description import Pose, pose_positions
 from quad_msgs.msg import JointCommand
 
 pytestmark = [pytest.mark.scenario, pytest.mark.xdist_group('quad_faults')]
@@ -61,15 +62,20 @@ def check_upright(quad: SimulatedQuad) -> None:
     assert quad.tap.largest_step() < LARGEST_STEP
 
 
-def test_a_killed_controller_leaves_the_robot_standing(quad: SimulatedQuad) -> None:
-    """The servos hold; a new controller moves nothing until it is asked, and then smoothly."""
+def test_a_controller_killed_in_mid_trot_leaves_no_leg_in_the_air(quad: SimulatedQuad) -> None:
+    """The bridge folds the legs and says so; a new controller moves nothing until it is asked."""
     quad.set_mode('walk')
     quad.walk(1.5)
     killed = kill(quad, 'controller')
-    count = len(quad.tap.targets)
-    quad.spin(1.0)
-    assert len(quad.tap.targets) <= count + 2
+    quad.processes['hardware'].wait_for('commands broke off')
+    quad.spin(3.0)
     check_upright(quad)
+    joints = quad.joints[-1]
+    lying = [pose_positions(Pose.LIE)[name] for name in joints.name]
+    assert list(joints.position) == pytest.approx(lying, abs=0.15)
+    count = len(quad.tap.targets)
+    quad.spin(0.5)
+    assert len(quad.tap.targets) == count
     quad.start('controller')
     quad.spin(0.5)
     assert quad.tap.largest_step(since=killed) < RESUMED

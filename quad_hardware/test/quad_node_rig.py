@@ -7,6 +7,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from contextlib import ExitStack
+import math
 from pathlib import Path
 from typing import Any, TYPE_CHECKING
 
@@ -118,6 +119,19 @@ class Rig(ABC):
             nonlocal sent
             sent += 1
             self.command(positions)
+
+        timer = self.client.node.create_timer(0.02, send)
+        self.client.spin_until(lambda: sent >= count, TIMEOUT, 'stream of commands')
+        self.client.node.destroy_timer(timer)
+
+    def swing(self, duration: float) -> None:
+        """Publish commands of legs that swing, 50 times a second, and break off [s]."""
+        count, sent = round(duration / 0.02), 0
+
+        def send() -> None:
+            nonlocal sent
+            sent += 1
+            self.command([0.2 * math.sin(0.3 * sent), 0.6, -0.3] * 4)
 
         timer = self.client.node.create_timer(0.02, send)
         self.client.spin_until(lambda: sent >= count, TIMEOUT, 'stream of commands')

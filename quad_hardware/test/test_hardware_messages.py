@@ -124,7 +124,7 @@ def test_a_differentiated_rate_says_so_by_its_covariance() -> None:
 @given(ROTATIONS)
 def test_both_children_turn_and_go_the_same_way(rotation: Rotation) -> None:
     """Turn rate and velocity of base_link and of base_footprint are one vector of the world."""
-    found = []
+    found: list[Vector] = []
     for frames in (FRAMES, PARENT):
         message = odometry(replace(PLACE, rotation=rotation), frames)
         turn, twist = message.pose.pose.orientation, message.twist.twist

@@ -16,7 +16,7 @@ import pytest
 from rclpy.qos import ReliabilityPolicy
 from std_srvs.srv import SetBool
 
-from quad_description import movable_joints, robot_urdf
+from quad_description import movable_joints, Pose, pose_positions, robot_urdf
 from quad_hardware.joints import LimiterSettings
 from quad_hardware.joints.command import LONGEST_PERIOD
 from quad_hardware.protocol import BULK_READ_ORDER, MOTOR_ORDER, NEW, OLD, Protocol
@@ -156,6 +156,45 @@ def test_an_arm_that_is_not_there_disturbs_nothing(rig: NodeRig, garbage: float)
     rig.stream(POSE, 0.8)
     assert list(rig.hear('/joint_states', 10).position) == pytest.approx(POSE, abs=0.01)
     rig.wait_for_status('serial link', DiagnosticStatus.OK, 'reports arrive')
+
+
+def test_commands_that_break_off_in_motion_end_in_a_safe_posture(rig: NodeRig) -> None:
+    """The legs fold softly and diagnostics is in error, until somebody commands again."""
+    rig.swing(1.0)
+    rig.wait_for_status('joint commands', DiagnosticStatus.ERROR, 'lies down')
+    lying = [math.degrees(angle) for angle in pose_positions(Pose.LIE).values()]
+    rig.client.spin_until(
+        lambda: [rig.peer.angles[m] for m in LEGS_ORDER] == pytest.approx(lying, abs=0.1),
+        TIMEOUT,
+        'lying pose',
+    )
+    assert rig.largest_step() <= LARGEST_STEP + 0.01
+    rig.hear('/joint_states', 10)
+    count = len(rig.peer.commands)
+    rig.hear('/joint_states', 10)
+    assert len(rig.peer.commands) == count
+    rig.stream(list(pose_positions(Pose.LIE).values()), 0.1)
+    rig.wait_for_status('joint commands', DiagnosticStatus.OK, 'received')
+
+
+def test_commands_that_end_at_rest_leave_the_posture(rig: NodeRig) -> None:
+    """Nothing moves unasked: not a byte is sent after the last command."""
+    rig.stream(POSE, 1.5)
+    rig.hear('/joint_states', 5)
+    count = len(rig.peer.commands)
+    rig.hear('/joint_states', 50)
+    assert len(rig.peer.commands) == count
+
+
+def test_a_node_that_ends_in_motion_folds_the_legs_first(
+    isolation: Isolation, tmp_path: Path
+) -> None:
+    """As when the controller has died and the rest of the bring-up is stopped."""
+    with NodeRig(isolation, tmp_path) as rig:
+        rig.swing(1.0)
+        assert rig.node.stop() == 0
+        lying = [math.degrees(angle) for angle in pose_positions(Pose.LIE).values()]
+        assert [rig.peer.angles[m] for m in LEGS_ORDER] == pytest.approx(lying, abs=0.1)
 
 
 def test_a_cut_cable_is_survived_without_a_jump(rig: NodeRig) -> None:

@@ -20,6 +20,11 @@ def gravity_from_attitude(attitude: Quaternion) -> Vector:
     return rotate(conjugate(attitude), (0.0, 0.0, -1.0))
 
 
+def tilt_of(attitude: Quaternion) -> float:
+    """Return the angle between the body's z axis and up [rad]."""
+    return math.acos(min(max(-gravity_from_attitude(attitude)[2], -1.0), 1.0))
+
+
 def gravity_from_acceleration(acceleration: Vector) -> Vector | None:
     """Return the unit vector that points down, in the body; None while it accelerates.
 

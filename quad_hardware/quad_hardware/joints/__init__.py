@@ -3,6 +3,16 @@
 """From joints of the URDF to servos and back, and what is let through to them."""
 
 from .command import Command, CommandLimiter, LimiterSettings
+from .command_loss import CommandLoss, LossReaction
 from .mapping import JointMap, JointServo, servo_of
 
-__all__ = ['Command', 'CommandLimiter', 'JointMap', 'JointServo', 'LimiterSettings', 'servo_of']
+__all__ = [
+    'Command',
+    'CommandLimiter',
+    'CommandLoss',
+    'JointMap',
+    'JointServo',
+    'LimiterSettings',
+    'LossReaction',
+    'servo_of',
+]

@@ -51,6 +51,7 @@ class CommandCounters:
         reason: Why the last one was refused, or which joints were clamped.
         troubled: Something was refused or clamped since the last look.
         largest_step: Of a target since the last look [rad].
+        loss: What became of the robot when commands broke off in motion; empty while they come.
     """
 
     received: int = 0
@@ -61,6 +62,7 @@ class CommandCounters:
     reason: str = ''
     troubled: bool = field(default=False)
     largest_step: float = 0.0
+    loss: str = ''
 
 
 class LinkDiagnostic:
@@ -151,6 +153,8 @@ def command_diagnostic(node: str, port: str, counters: CommandCounters) -> Diagn
     """Describe what became of joint commands, and begin to look anew."""
     level = DiagnosticStatus.WARN if counters.troubled else DiagnosticStatus.OK
     message = counters.reason if counters.troubled else f'{counters.received} received'
+    if counters.loss:
+        level, message = DiagnosticStatus.ERROR, counters.loss
     values = {k: v for k, v in asdict(counters).items() if k != 'troubled'}
     counters.troubled, counters.largest_step = False, 0.0
     return _status(level, f'{node}: joint commands', message, port, values)

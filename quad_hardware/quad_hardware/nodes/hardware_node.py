@@ -13,6 +13,8 @@ import time
 
 from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import Odometry
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
 from rclpy.node import Node
 from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import BatteryState, Imu, JointState
@@ -24,8 +26,10 @@ from node_runner.wire import Reader, Stream
 from quad_msgs.msg import JointCommand
 
 from ..estimation import Estimate, Estimator, OdometryState
+from ..estimation.gravity import tilt_of
 from ..exceptions import CommandError, HardwareError
-from ..joints import Command, CommandLimiter
+from ..joints import Command, CommandLimiter, CommandLoss
+from ..joints.command import NOMINAL_PERIOD
 from ..link import Driver, LinkState, RobotState, STALE_TIME
 from . import messages
 from .diagnostics import (
@@ -63,6 +67,7 @@ class HardwareNode(Node):
         self._settings = settings = declare_parameters(self)
         self._joints = settings.joints
         self._limiter = CommandLimiter(settings.joints, settings.limiter)
+        self._loss = CommandLoss(settings.joints, settings.command_loss)
         self._estimator = Estimator(settings.urdf, settings.joints, settings.estimator)
         self._driver = Driver(settings.link, self._report, self._link_changed)
         self._latest: tuple[RobotState, Estimate] | None = None  # while the link is running
@@ -82,6 +87,11 @@ class HardwareNode(Node):
         self.create_subscription(JointCommand, 'joint_command', self._take, COMMAND_QOS, raw=True)
         self.create_service(SetBool, '~/torque', self._set_torque)
         self.create_timer(settings.diagnostics_period, self._diagnose)
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._silence = self.create_timer(self._loss.timeout, self._miss_commands, clock=steady)
+        self._descent = self.create_timer(NOMINAL_PERIOD, self._go_down, clock=steady)
+        for timer in (self._silence, self._descent):
+            timer.cancel()
         count = len(self._joints.names)
         self.get_logger().info(f'{count} joints; looking for the robot on {settings.link.path}')
 
@@ -90,7 +100,12 @@ class HardwareNode(Node):
         self._driver.start()
 
     def end(self) -> None:
-        """Close the port; the servos hold their last target."""
+        """Close the port; the servos hold their last target, at rest."""
+        if self._loss.in_motion:
+            self._miss_commands()
+        while self._loss.goes_down:
+            self._go_down()
+            time.sleep(NOMINAL_PERIOD)
         self._driver.stop()
 
     def _report(self, state: RobotState) -> str:
@@ -166,23 +181,68 @@ class HardwareNode(Node):
         try:
             self._check_rest(message, numbers[len(positions) :])
             self._limiter.check(positions)
-            place = self._place(now)
-            if not place:
-                self._drop(self._driver.status().detail)
-                return
-            measured = [place.get(name) for name in self._joints.names]
-            command = self._limiter.step(positions, measured, now)
+            command = self._send(positions, now)
         except CommandError as error:
             self._counters.refused += 1
             self._trouble(f'joint command refused: {error}')
             return
+        if command is not None:
+            self._loss.commanded(command.targets, now)
+            self._counters.loss = ''
+            self._descent.cancel()
+            self._silence.reset()
+
+    def _send(self, positions: Sequence[float], now: float) -> Command | None:
+        """Send what may be sent of some positions [rad]; None for nothing.
+
+        Raises:
+            CommandError: It is no command.
+        """
+        place = self._place(now)
+        if not place:
+            self._drop(self._driver.status().detail)
+            return None
+        measured = [place.get(name) for name in self._joints.names]
+        command = self._limiter.step(positions, measured, now)
         if self._limp:
             self._drop('the servos are without torque; call ~/torque with true')
         elif self._driver.command(self._joints.angles(command.targets)):
             self._estimator.command(now, command.targets)
             self._count(command)
+            return command
         else:
             self._drop(self._driver.status().detail)
+        return None
+
+    def _miss_commands(self) -> None:
+        """Bring the robot down when its commands broke off in motion, or say why not."""
+        self._silence.cancel()
+        if not self._loss.in_motion:
+            return
+        now = time.monotonic()
+        reason = self._loss.begin(self._place(now), self._tilt(), now)
+        does = f'holds as it is, for {reason}' if reason else 'lies down'
+        self._counters.loss = (
+            f'joint commands broke off while the legs moved: the robot {does}; '
+            'is the controller running?'
+        )
+        self.get_logger().error(self._counters.loss)
+        if not reason:
+            self._descent.reset()
+
+    def _go_down(self) -> None:
+        now = time.monotonic()
+        positions = self._loss.step(now)
+        if positions is None:
+            self._descent.cancel()
+            return
+        if self._send(positions, now) is None:
+            self._loss.forget()
+
+    def _tilt(self) -> float | None:
+        """Return how far the body leans [rad]; None when nobody knows."""
+        attitude = self._latest[1].attitude if self._latest is not None else None
+        return None if attitude is None else tilt_of(attitude)
 
     def _place(self, now: float) -> dict[str, float]:
         """Return where the joints are [rad], [m]; empty when the robot was not seen lately."""
@@ -193,6 +253,7 @@ class HardwareNode(Node):
 
     def _drop(self, reason: str) -> None:
         self._limiter.reset()
+        self._loss.forget()
         self._last_targets = ()
         self._counters.unsent += 1
         self._trouble(f'joint command not sent: {reason}')
@@ -211,6 +272,7 @@ class HardwareNode(Node):
             return response
         self._limp = not on
         self._limiter.reset()
+        self._loss.forget()
         response.message = 'the servos hold' if on else 'the servos are without torque'
         self.get_logger().info(response.message)
         return response

@@ -14,7 +14,7 @@ from quad_description import DescriptionError, Joint, movable_joints, PRESETS, r
 
 from ..estimation import EstimatorSettings, OdometrySettings, RateSource, SCALES
 from ..exceptions import CommandError
-from ..joints import JointMap, JointServo, LimiterSettings, servo_of
+from ..joints import JointMap, JointServo, LimiterSettings, LossReaction, servo_of
 from ..link import LinkOptions
 from ..link.vendor import VENDOR
 from ..link.vendor_library import is_installed
@@ -76,6 +76,7 @@ class NodeSettings:
         urdf: What it is.
         joints: Its servos.
         limiter: How fast targets may move.
+        command_loss: What the robot does when commands break off while its legs move.
         estimator: How its reports are read.
         frames: Names of the frames.
         deviations: Published with the IMU.
@@ -86,6 +87,7 @@ class NodeSettings:
     urdf: str
     joints: JointMap
     limiter: LimiterSettings
+    command_loss: LossReaction
     estimator: EstimatorSettings
     frames: Frames
     deviations: Deviations
@@ -123,6 +125,12 @@ def declare_parameters(node: Node) -> NodeSettings:
             start_speed=read.number(
                 'start_joint_speed', 2.0, (0.1, 100.0), 'of targets when commands begin [rad/s]'
             ),
+        ),
+        command_loss=read.choice(
+            'command_loss',
+            LossReaction.LIE.value,
+            {reaction.value: reaction for reaction in LossReaction},
+            'what the robot does when commands break off while its legs move',
         ),
         estimator=_estimator(read),
         frames=_frames(read),

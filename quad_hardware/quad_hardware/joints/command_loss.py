@@ -1,0 +1,147 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What becomes of a robot whose joint commands break off while its legs move.
+
+A controller that dies in the middle of a trot leaves two legs in the air, and the servos hold
+them there. Commands that end while all targets rest leave a posture that somebody chose: it stays.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from enum import Enum
+import math
+
+from quad_description import Pose, pose_positions
+
+from .mapping import JointMap
+
+MOTION_WINDOW = 0.3  # [s] at the end of a stream, in which targets rested or moved
+MIN_MOTION = 0.05  # [rad] of a target; levelling and noise are less
+MIN_STREAM = 0.5  # [s] a person who tries out a servo sends no stream
+SPEED = 1.0  # [rad/s] of the fastest joint on the way down
+MIN_DURATION = 1.0  # [s]
+MAX_TILT = 0.9  # [rad] beyond which legs find no ground
+
+
+class LossReaction(Enum):
+    """What the robot does; the value is that of the parameter."""
+
+    LIE = 'lie'  # folds its legs
+    HOLD = 'hold'  # stays as it is
+
+
+@dataclass(frozen=True, slots=True)
+class _Descent:
+    start: Mapping[str, float]
+    end: Mapping[str, float]
+    began_at: float  # [s]
+    duration: float  # [s]
+
+    def positions(self, names: Sequence[str], now: float) -> list[float]:
+        """Return positions on a path with a soft start and end [rad]."""
+        share = min(max((now - self.began_at) / self.duration, 0.0), 1.0)
+        share = 0.5 * (1.0 - math.cos(math.pi * share))
+        pairs = ((self.start[name], self.end[name]) for name in names)
+        return [start + share * (end - start) for start, end in pairs]
+
+
+class CommandLoss:
+    """Watches a stream of commands, and brings the robot down when it breaks off in motion.
+
+    Attributes:
+        timeout: A pause after which a stream has ended [s].
+    """
+
+    def __init__(
+        self, joints: JointMap, reaction: LossReaction = LossReaction.LIE, timeout: float = 0.5
+    ) -> None:
+        """Begin without a stream.
+
+        Args:
+            joints: The robot's.
+            reaction: What it does.
+            timeout: A pause after which a stream has ended [s].
+        """
+        self.timeout = timeout
+        self._legs = joints.names[: joints.leg_count]
+        servos = joints.servos[: joints.leg_count]
+        pose = pose_positions(Pose.LIE)
+        self._lying = {s.joint: min(max(pose[s.joint], s.lower), s.upper) for s in servos
+                       if s.joint in pose}  # fmt: skip
+        self._reaction = reaction
+        self._began_at = self._last_at = -math.inf
+        self._recent: deque[tuple[float, tuple[float, ...]]] = deque()
+        self._descent: _Descent | None = None
+
+    @property
+    def goes_down(self) -> bool:
+        """Whether the robot is on its way down."""
+        return self._descent is not None
+
+    def commanded(self, targets: Sequence[float], now: float) -> None:
+        """Take note of targets that were sent [rad]; whoever commands ends the way down."""
+        self._descent = None
+        if now - self._last_at > self.timeout:
+            self._began_at = now
+            self._recent.clear()
+        self._last_at = now
+        self._recent.append((now, tuple(targets[: len(self._legs)])))
+        while self._recent[0][0] < now - MOTION_WINDOW:
+            self._recent.popleft()
+
+    def forget(self) -> None:
+        """Forget the stream: the robot was lost or let go, and is not moved unasked."""
+        self._descent = None
+        self._began_at = self._last_at = -math.inf
+        self._recent.clear()
+
+    @property
+    def in_motion(self) -> bool:
+        """Whether the legs moved at the end of the last stream."""
+        if self._last_at - self._began_at < MIN_STREAM:
+            return False
+        columns = zip(*(targets for _, targets in self._recent), strict=True)
+        return any(max(column) - min(column) > MIN_MOTION for column in columns)
+
+    def begin(self, place: Mapping[str, float], tilt: float | None, now: float) -> str:
+        """Go down from now on, or say why not. The stream is forgotten.
+
+        Args:
+            place: Where the joints are [rad]; empty when nobody knows.
+            tilt: Of the body [rad]; None when nobody knows.
+            now: Time [s].
+
+        Returns:
+            Why the robot holds; empty when it goes down.
+        """
+        self.forget()
+        if reason := self._obstacle(place, tilt):
+            return reason
+        travel = max(abs(self._lying[name] - place[name]) for name in self._legs)
+        # a cosine is pi / 2 times as fast in its middle as on average
+        duration = max(MIN_DURATION, travel * math.pi / 2 / SPEED)
+        self._descent = _Descent(dict(place), self._lying, now, duration)
+        return ''
+
+    def step(self, now: float) -> list[float] | None:
+        """Return positions of the legs [rad]; None when there is nothing to do any more."""
+        descent = self._descent
+        if descent is None:
+            return None
+        if now >= descent.began_at + descent.duration:
+            self._descent = None
+        return descent.positions(self._legs, now)
+
+    def _obstacle(self, place: Mapping[str, float], tilt: float | None) -> str:
+        if self._reaction is LossReaction.HOLD:
+            return 'the parameter command_loss is hold'
+        if unknown := [name for name in self._legs if name not in self._lying]:
+            return f'no lying pose is known of {", ".join(unknown)}'
+        if missing := [name for name in self._legs if name not in place]:
+            return f'no report says where {", ".join(missing)} is'
+        if tilt is not None and tilt > MAX_TILT:
+            return f'the body is tilted by {math.degrees(tilt):.0f} degrees'
+        return ''

@@ -1,0 +1,121 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Commands that break off in motion: the robot comes down, or says why it may not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+import itertools
+import math
+
+from hypothesis import given
+from hypothesis import strategies as st
+import pytest
+
+from quad_description import movable_joints, Pose, pose_positions, robot_urdf
+from quad_hardware.joints import JointMap, servo_of
+from quad_hardware.joints.command_loss import CommandLoss, LossReaction, SPEED
+
+JOINTS = JointMap(servo_of(joint) for joint in movable_joints(robot_urdf('lite')))
+NAMES = JOINTS.names
+PERIOD = 0.02  # [s]
+STAND = pose_positions(Pose.STAND)
+STANDING = [STAND[name] for name in NAMES]
+LYING = [pose_positions(Pose.LIE)[name] for name in NAMES]
+
+
+def stream(loss: CommandLoss, duration: float, swing: float, start: float = 0.0) -> float:
+    """Command legs that swing by an angle [rad] about standing for a time; return its end [s]."""
+    count = round(duration / PERIOD)
+    for tick in range(count):
+        offset = swing * math.sin(2 * math.pi * tick * PERIOD / 0.28)
+        loss.commanded([angle + offset for angle in STANDING], start + tick * PERIOD)
+    return start + count * PERIOD
+
+
+def descend(loss: CommandLoss, now: float) -> list[list[float]]:
+    """Step until the robot is down, ten seconds at most."""
+    found = []
+    for tick in range(500):
+        positions = loss.step(now + tick * PERIOD)
+        if positions is None:
+            break
+        found.append(positions)
+    assert not loss.goes_down
+    return found
+
+
+@pytest.mark.parametrize('swing', [0.1, 0.3])
+def test_a_stream_that_breaks_off_in_motion_brings_the_robot_down(swing: float) -> None:
+    """From where the joints are, softly, to the lying pose, and then nothing is sent."""
+    loss = CommandLoss(JOINTS)
+    now = stream(loss, 2.0, swing)
+    assert loss.in_motion
+    assert loss.begin(STAND, 0.1, now) == ''
+    way = descend(loss, now)
+    assert way[0] == pytest.approx(STANDING)
+    assert way[-1] == pytest.approx(LYING)
+    steps = [abs(b - a) for one, two in itertools.pairwise(way)
+             for a, b in zip(one, two, strict=True)]  # fmt: skip
+    assert max(steps) <= SPEED * PERIOD * 1.01
+    assert not loss.in_motion
+
+
+@pytest.mark.parametrize(('duration', 'swing'), [(2.0, 0.0), (2.0, 0.02), (0.3, 0.3)])
+def test_commands_that_end_at_rest_leave_a_posture(duration: float, swing: float) -> None:
+    """Standing, levelling, a person who tries a servo for a moment: nothing moves by itself."""
+    loss = CommandLoss(JOINTS)
+    stream(loss, duration, swing)
+    assert not loss.in_motion
+
+
+def test_rest_at_the_end_counts() -> None:
+    """A robot that walked and then stood for half a second stands."""
+    loss = CommandLoss(JOINTS)
+    stream(loss, 0.5, 0.0, start=stream(loss, 2.0, 0.3))
+    assert not loss.in_motion
+
+
+@pytest.mark.parametrize(
+    ('place', 'tilt', 'reaction', 'named'),
+    [
+        ({}, 0.0, LossReaction.LIE, NAMES[0]),
+        (STAND, 1.2, LossReaction.LIE, '69 degrees'),
+        (STAND, 0.0, LossReaction.HOLD, 'command_loss'),
+    ],
+)
+def test_it_says_why_it_may_not(
+    place: dict[str, float], tilt: float, reaction: LossReaction, named: str
+) -> None:
+    """Nobody knows where the legs are, the robot lies on its side, or it is not wanted."""
+    loss = CommandLoss(JOINTS, reaction)
+    now = stream(loss, 2.0, 0.3)
+    assert named in loss.begin(place, tilt, now)
+    assert loss.step(now) is None
+
+
+def test_a_robot_of_others_holds() -> None:
+    """Where joints have other names, no lying pose is known."""
+    first, *rest = JOINTS.servos
+    loss = CommandLoss(JointMap([replace(first, joint='left_front_hip'), *rest]))
+    now = stream(loss, 2.0, 0.3)
+    assert 'left_front_hip' in loss.begin({**STAND, 'left_front_hip': 0.0}, None, now)
+
+
+def test_without_an_attitude_it_comes_down_all_the_same() -> None:
+    """A dead IMU is no reason to stay on two legs."""
+    loss = CommandLoss(JOINTS)
+    assert loss.begin(STAND, None, stream(loss, 2.0, 0.3)) == ''
+
+
+@given(st.floats(0.0, 3.0))
+def test_whoever_commands_ends_the_way_down(after: float) -> None:
+    """At any moment of it, and its own stream begins anew."""
+    loss = CommandLoss(JOINTS)
+    now = stream(loss, 2.0, 0.3) + 1.0
+    loss.begin(STAND, 0.0, now)
+    while loss.goes_down and loss.step(now) and now < after:
+        now += PERIOD
+    loss.commanded(STANDING, now)
+    assert loss.step(now + PERIOD) is None
+    assert not loss.in_motion
