@@ -15,8 +15,9 @@ import pytest
 from arm_canopen.can.frame import Frame
 from arm_canopen.device.object_store import ObjectStore
 from arm_canopen.device.sdo_server import SdoServer
-from arm_canopen.exceptions import SdoAbortError, SdoTimeoutError
+from arm_canopen.exceptions import SdoAbortError, SdoError, SdoTimeoutError
 from arm_canopen.master.scheduler import Scheduler
+from arm_canopen.master.sdo_block_client import BURST
 from arm_canopen.master.sdo_client import BLOCK_MIN, SdoClient
 from arm_canopen.standard.datatypes import DataType
 from arm_canopen.standard.dictionary import ObjectDictionary, ObjectEntry
@@ -56,6 +57,13 @@ class BlockLine:
         if data is not None:
             (self._to_client if to_client else self._to_server).append(data)
 
+    def carry(self) -> None:
+        """Carry a frame in each direction."""
+        if self._to_server:
+            self._server.receive(Frame(REQUEST, self._to_server.pop(0)), self.scheduler.now)
+        if self._to_client:
+            self.client.receive(Frame(RESPONSE, self._to_client.pop(0)))
+
     def run(self) -> None:
         """Carry frames and let time pass until nothing happens any more."""
         idle = 0
@@ -63,11 +71,7 @@ class BlockLine:
             idle += 1
             while self._to_client or self._to_server:
                 idle = 0
-                if self._to_server:
-                    frame = Frame(REQUEST, self._to_server.pop(0))
-                    self._server.receive(frame, self.scheduler.now)
-                if self._to_client:
-                    self.client.receive(Frame(RESPONSE, self._to_client.pop(0)))
+                self.carry()
             self.scheduler.advance(self.scheduler.now + 0.001)
 
     @property
@@ -194,3 +198,21 @@ def test_golden_frames_of_a_write() -> None:
     client.receive(Frame(RESPONSE, bytes.fromhex('A1 00 00 00 00 00 00 00')))
     assert done.done
     assert done.error is None
+
+
+def test_a_reset_in_the_pause_between_two_bursts_ends_the_transfer() -> None:
+    """No question is open then, and yet not one more segment goes to the rebooting device."""
+    line = BlockLine()
+    written = line.client.write(BLOB, 0, bytes(2000), TIMEOUT)
+    while sum(client for client, _ in line.frames) < 1 + BURST:  # the initiation and a burst
+        line.carry()
+    begin = len(line.frames)
+    line.client.cancel_all('the device restarted')
+    with pytest.raises(SdoError, match='the device restarted'):
+        written.result()
+    line.run()
+    sent = [data for client, data in line.frames[begin:] if client]
+    assert [data[0] for data in sent] == [0x80]  # the abort, and nothing else
+    value = line.client.read(BLOB, 0, TIMEOUT)
+    line.run()
+    assert value.error is None

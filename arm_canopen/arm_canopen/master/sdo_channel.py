@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias, TypeVar
 
 from ..can.frame import Frame
-from ..exceptions import CodecError, SdoAbortError, SdoError, SdoTimeoutError
+from ..exceptions import CodecError, SdoAbortError, SdoTimeoutError
 from ..standard.cob_id import CobId
 from ..standard.sdo import (
     Abort,
@@ -108,13 +108,12 @@ class SdoChannel:
         self.counters.stale += 1
         self._strays += 1
 
-    def cancel(self, reason: str) -> None:
-        """End the open question, because the device restarted or went away."""
-        promise, self._answered = self._answered, None
-        if promise is not None:
+    def cancel(self) -> None:
+        """Tell the device that the transfer is over, whether or not a question is open."""
+        if self._answered is not None:
+            self._answered = None
             self._owe(1)
-            self._send_abort(AbortCode.GENERAL)
-            promise.reject(SdoError(f'{self._name}: {reason}'))
+        self._send_abort(AbortCode.GENERAL)
 
     def restarted(self) -> None:
         """The device has restarted, so it owes no answer any more."""

@@ -22,7 +22,7 @@ from ..standard.sdo import (
     UploadSegmentRequest,
 )
 from ..standard.sdo_abort import AbortCode
-from .scheduler import Promise, Scheduler
+from .scheduler import Promise, Scheduler, Task
 from .sdo_block_client import read_blocks, write_blocks
 from .sdo_channel import response, SdoChannel, SdoCounters
 
@@ -53,6 +53,7 @@ class SdoClient:
         self._channel = SdoChannel(node_id, name, scheduler, send)
         self._queue: deque[tuple[Transfer[Any], Promise[Any]]] = deque()
         self._busy = False
+        self._running: Task[Any] | None = None
         self._has_blocks = True  # as long as the device has not shown the contrary
 
     @property
@@ -99,7 +100,9 @@ class SdoClient:
     def cancel_all(self, reason: str) -> None:
         """Reject every transfer, because the device restarted or went away."""
         queue, self._queue = self._queue, deque()
-        self._channel.cancel(reason)
+        if self._running is not None:
+            self._channel.cancel()
+            self._running.cancel(SdoError(f'{self._name}: {reason}'))
         for coroutine, promise in queue:
             coroutine.close()
             promise.reject(SdoError(f'{self._name}: {reason}'))
@@ -129,13 +132,15 @@ class SdoClient:
         while self._queue:
             transfer, promise = self._queue.popleft()
             try:
-                result = await transfer
+                # a task of its own, so that it can be ended wherever it waits
+                self._running = self._scheduler.spawn(transfer)
+                result = await self._running
             except Exception as error:  # noqa: BLE001  # belongs to whoever asked
                 promise.reject(error)
             else:
                 self.counters.done += 1
                 promise.resolve(result)
-        self._busy = False
+        self._busy, self._running = False, None
 
     async def _upload(self, index: int, subindex: int, timeout: float, *, block: bool) -> bytes:
         channel = self._channel
