@@ -278,6 +278,7 @@ def test_a_stream_that_ends_is_a_smooth_stop(mode: OperationMode) -> None:
     assert speed(net) == pytest.approx(0.0, abs=0.01)
     said = [text for text in net.told(Severity.WARNING) if 'stream of targets has paused' in text]
     assert len(said) == 1
+    assert ('stopped' in said[0]) is (mode is not OperationMode.PROFILE_POSITION)
     net.commands[JOINT].set_target(0.1 if mode not in TORQUES else 0.0)
     net.run(2.0)
     assert len([t for t in net.told(Severity.WARNING) if 'has paused' in t]) == 1

@@ -10,6 +10,7 @@ import pytest
 from virtual_network import bus_config, drive_config, PERIOD, SCALE, VirtualNetwork
 
 from arm_canopen.exceptions import DriveError
+from arm_canopen.master.events import Severity
 from arm_canopen.master.scheduler import Promise
 from arm_canopen.standard.drive import OperationMode
 
@@ -131,3 +132,44 @@ def test_no_target_is_taken_while_a_command_runs(name: str) -> None:
     with pytest.raises(DriveError, match=r'takes no target while .* is running'):
         client.commands.set_target(0.0)
     client.net.result(running)
+
+
+@pytest.mark.parametrize(
+    'mode',
+    [
+        OperationMode.PROFILE_POSITION,
+        OperationMode.CYCLIC_POSITION,
+        OperationMode.PROFILE_VELOCITY,
+        OperationMode.CYCLIC_VELOCITY,
+    ],
+)
+def test_nothing_is_called_stopped_that_moves(mode: OperationMode) -> None:
+    """A pause of the stream is reported as what it is at that moment."""
+    client = Publisher(mode)
+    position = mode in (OperationMode.PROFILE_POSITION, OperationMode.CYCLIC_POSITION)
+    for _ in range(60):
+        client.commands.stream_target(3.0 if position else 0.8)
+        client.net.run(PERIOD)
+    drive = client.net.drives[JOINT]
+    assert drive.velocity > 0.5
+    while not (said := [text for text in client.net.told() if 'has paused' in text]):
+        client.net.run(PERIOD)
+    moves = abs(drive.velocity) > 0.02
+    assert ('stopped' in said[0]) is not moves
+    assert moves is (mode is OperationMode.PROFILE_POSITION)
+    client.net.run(5.0)
+    assert client.net.told(Severity.WARNING) == said
+    assert (client.motor == pytest.approx(3.0, abs=0.01)) is moves
+
+
+def test_an_axis_that_does_not_stop_is_reported() -> None:
+    """Its RPDOs are lost, so it goes on at the last velocity that it was told."""
+    client = Publisher(OperationMode.PROFILE_VELOCITY)
+    for _ in range(60):
+        client.commands.stream_target(0.8)
+        client.net.run(PERIOD)
+    client.net.wire.loses = lambda sender, frame: frame.can_id in (0x202, 0x302)
+    client.net.run(4.0)
+    (error,) = client.net.told(Severity.ERROR)
+    assert 'has not come to rest' in error
+    assert not [text for text in client.net.told() if 'stopped' in text]

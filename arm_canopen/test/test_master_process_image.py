@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 import struct
 
@@ -198,3 +199,24 @@ def test_start_values_leave_with_the_first_frame() -> None:
         start=lambda mapped: start_value(config, mapped),
     )
     assert entries.outputs[0].frame().data == struct.pack('<iI', 0, 1234)
+
+
+def test_a_listener_that_is_cleared_by_another_thread_harms_no_frame() -> None:
+    """Between the look whether there is one and the call of it."""
+
+    class Cleared(Input):
+        """An input whose listener goes away as soon as it was looked at."""
+
+        @property
+        def listener(self) -> Callable[[Input], None] | None:
+            self.looks += 1
+            return heard.append if self.looks == 1 else None
+
+        @listener.setter
+        def listener(self, value: object) -> None:
+            self.looks = 0
+
+    heard: list[Input] = []
+    entry = Cleared(TPDOS[0], SyncRound(lambda: None))
+    entry.receive(Frame(TPDOS[0].cob_id, bytes(8)))
+    assert heard == [entry]

@@ -37,7 +37,7 @@ class DriveCommands(StopCommands):
         self._scheduler = scheduler
         self._running = ''
         self._task: Task[str] | None = None
-        self._stream = TargetStream(drive, scheduler)
+        self._stream = TargetStream(drive, scheduler, self._steps)
         self._recovery = Recovery(
             drive, scheduler, lambda mode: self.run('recovery', self._enable_in(mode))
         )

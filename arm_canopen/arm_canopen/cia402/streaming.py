@@ -10,6 +10,7 @@ from ..exceptions import DriveError
 from ..master.events import Severity
 from ..master.scheduler import Scheduler, Task
 from .drive import Drive
+from .sequences import DriveSequences, STOP_TIMEOUT
 
 
 class TargetStream:
@@ -20,9 +21,10 @@ class TargetStream:
     there was a pause of ``target_timeout``.
     """
 
-    def __init__(self, drive: Drive, scheduler: Scheduler) -> None:
-        """Take the drive and the time."""
+    def __init__(self, drive: Drive, scheduler: Scheduler, steps: DriveSequences) -> None:
+        """Take the drive, the time, and the steps of its commands."""
         self._drive = drive
+        self._steps = steps
         self._scheduler = scheduler
         self._came = -math.inf
         self._goes_on_until = 0.0
@@ -68,10 +70,33 @@ class TargetStream:
         drive = self._drive
         if not drive.accepts_targets:
             return  # what has taken it away has said so
-        if not drive.mode.halts_by_bit or drive.mode.setpoint is None:
-            drive.hold()  # in mode 1 it goes to the last target, and rests there
-        drive.report(
-            Severity.WARNING,
-            f'the stream of targets has paused for {drive.config.target_timeout * 1000:g} ms: '
-            'stopped; the next target goes on',
-        )
+        paused = f'the stream of targets has paused for {drive.config.target_timeout * 1000:g} ms'
+        if drive.mode.setpoint is not None and not drive.mode.cyclic:
+            drive.warn(f'{paused}: it goes on to the last target, and rests there')
+            return
+        speed = drive.speed
+        drive.hold()
+        self._scheduler.background(self._report_rest(paused, speed))
+
+    async def _report_rest(self, paused: str, speed: float) -> None:
+        """Report the stop when the axis stands, not when it is asked to."""
+        drive, steps = self._drive, self._steps
+        patience = STOP_TIMEOUT + speed / drive.parameters.profile.deceleration
+        halted = drive.halt
+
+        def ended() -> bool:
+            stands = drive.mode.braked and steps.is_slow()
+            return stands or not drive.accepts_targets or not halted.held or halted.leaving
+
+        await steps.settle()
+        try:
+            await self._scheduler.until(ended, patience)
+        except TimeoutError:
+            drive.report(
+                Severity.ERROR,
+                f'{paused}: it was halted, but has not come to rest within {patience:.1f} s and '
+                f'moves at {drive.velocity:g} per second',
+            )
+            return
+        if halted.held and not halted.leaving and drive.accepts_targets:
+            drive.warn(f'{paused}: stopped; the next target goes on')

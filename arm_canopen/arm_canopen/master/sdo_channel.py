@@ -73,7 +73,6 @@ class SdoChannel:
         self.counters = SdoCounters()
         self.address: Address = (0, 0)
         self._title = f'{name} (node {node_id})'
-        self._name = name
         self._request_id = CobId.SDO_REQUEST + node_id
         self._scheduler = scheduler
         self._send = send

@@ -160,7 +160,7 @@ class DeviceNode(Node):
 
     def _received(self, entry: Input) -> None:
         values = entry.values or ()
-        self.output.post(partial(self._publish_objects, entry, values))
+        self.output.post_stream(entry, partial(self._publish_objects, entry, values))
 
     def _publish_objects(self, entry: Input, values: tuple[float, ...]) -> None:
         for mapped, value in zip(entry.config.mapping, values, strict=True):

@@ -23,6 +23,7 @@ from ..cia402.motion_group import MotionGroup
 from ..cia402.sequences import SHUTDOWN_MAX
 from ..cia402.status import drive_status
 from ..config.model import BusConfig
+from ..exceptions import CanopenError
 from ..master.events import Event, EventKind, Severity
 from ..master.network import Network
 from ..master.remote_node import RemoteNode
@@ -144,9 +145,16 @@ class MasterProcess:
             self._thread.run_coroutine(leave).result(STOP_TIMEOUT)
         except FutureTimeoutError:
             self._node.get_logger().error('the drives did not all stop in time')
-        wait([self._ask_diagnostics()], LAST_WORD_TIMEOUT)  # in which states the drives are left
-        self._thread.stop()
-        self._output.stop()
+        except CanopenError as error:
+            self._node.get_logger().error(
+                f'the drives could not be stopped: {error}; those that watch the heartbeat of the '
+                'master stop by themselves'
+            )
+        finally:
+            last = self._ask_diagnostics()  # in which states the drives are left
+            wait([last], LAST_WORD_TIMEOUT)
+            self._thread.stop()
+            self._output.stop()
 
     def attach(self, source: MotionSource) -> Future[None]:
         """Let a motion source command its axes, from any thread; nothing waits.
@@ -189,7 +197,8 @@ class MasterProcess:
         self._load.count(frame)
 
     def _report(self, event: Event) -> None:
-        self._output.post(partial(self._tell, event))
+        self._count_operational(event)
+        self._output.post_stream((event.kind, event.node), partial(self._tell, event))
 
     def _feedback(self, sync_time: float) -> None:
         if self._feedback_posted:
@@ -247,7 +256,6 @@ class MasterProcess:
             logger.warning(str(event))
         else:
             logger.error(str(event))
-        self._count_operational(event)
         node = self._drives.get(event.node) or self._devices.get(event.node)
         if node is not None and event.kind in (EventKind.NMT_STATE, EventKind.HEARTBEAT_LOST):
             node.publish_nmt_state()
@@ -259,7 +267,8 @@ class MasterProcess:
             self._operational.add(event.node)
             if len(self._operational) == len(self.bus.nodes):
                 count = len(self.bus.nodes)
-                self._node.get_logger().info(f'all {count} devices operational')
+                text = f'all {count} devices operational'
+                self._output.post(lambda: self._node.get_logger().info(text) and None)
 
     def _ask_diagnostics(self) -> Future[list[DiagnosticStatus]]:
         future = self._thread.call(self._collect)
@@ -268,7 +277,8 @@ class MasterProcess:
 
     def _post_diagnostics(self, future: Future[list[DiagnosticStatus]]) -> None:
         if future.exception() is None:  # else the network has ended
-            self._output.post(partial(self._publish_diagnostics, future.result()))
+            publish = partial(self._publish_diagnostics, future.result())
+            self._output.post_stream('diagnostics', publish)
 
     def _publish_diagnostics(self, statuses: list[DiagnosticStatus]) -> None:
         message = DiagnosticArray(status=statuses)

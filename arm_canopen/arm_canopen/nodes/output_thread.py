@@ -4,25 +4,45 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
+from functools import partial
 from queue import SimpleQueue
 import threading
+from typing import Protocol
 
-from rclpy.impl.rcutils_logger import RcutilsLogger
+WAITING_MAX = 1000  # pieces of work from which on only the newest of each stream is kept
+
+
+class Logger(Protocol):
+    """What is used of a ROS logger."""
+
+    def warning(self, message: str) -> object:
+        """Log what was left out."""
+
+    def error(self, message: str) -> object:
+        """Log a defect."""
 
 
 class OutputThread:
     """Runs what other threads post, one after another."""
 
-    def __init__(self, logger: RcutilsLogger) -> None:
+    def __init__(self, logger: Logger) -> None:
         """Prepare; the thread starts with :meth:`start`.
 
         Args:
-            logger: Takes the defects of what was posted.
+            logger: Takes the defects of what was posted, and what had to be left out.
         """
         self._logger = logger
         self._queue: SimpleQueue[Callable[[], None] | None] = SimpleQueue()
+        self._lock = threading.Lock()
+        self._newest: dict[Hashable, Callable[[], None]] = {}
+        self._left_out = 0
         self._thread = threading.Thread(target=self._run, name='ros output', daemon=True)
+
+    @property
+    def waiting(self) -> int:
+        """Number of pieces of work that wait."""
+        return self._queue.qsize()
 
     def start(self) -> None:
         """Start to work."""
@@ -35,8 +55,44 @@ class OutputThread:
             self._thread.join()
 
     def post(self, work: Callable[[], None]) -> None:
-        """Have a function run soon; returns at once."""
+        """Have a function run soon; returns at once.
+
+        For what somebody waits for, such as answers of services: it is never left out.
+        """
         self._queue.put(work)
+
+    def post_stream(self, key: Hashable, work: Callable[[], None]) -> None:
+        """Have a function run soon that belongs to a stream; returns at once.
+
+        While ROS takes less than what comes, only the newest of each stream is kept.
+
+        Args:
+            key: The stream.
+            work: The function.
+        """
+        if self._queue.qsize() < WAITING_MAX:
+            self._queue.put(work)
+            return
+        with self._lock:
+            waits = key in self._newest
+            self._newest[key] = work
+            self._left_out += waits
+        if not waits:
+            self._queue.put(partial(self._run_newest, key))
+
+    def _run_newest(self, key: Hashable) -> None:
+        with self._lock:
+            work = self._newest.pop(key)
+            left_out = 0
+            if not self._newest:
+                left_out, self._left_out = self._left_out, 0
+        if left_out:
+            text = (
+                f'{left_out} messages were left out, because ROS takes them too slowly; is this '
+                'computer, or a subscriber, overloaded?'
+            )
+            self._logger.warning(text)
+        work()
 
     def _run(self) -> None:
         while (work := self._queue.get()) is not None:

@@ -1,0 +1,78 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The end of a master whose cycle has ended before it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+import threading
+
+from isolation import Isolation
+import pytest
+import rclpy
+from rclpy.node import Node
+
+from arm_canopen.can.frame import Frame
+from arm_canopen.can.virtual import VirtualBus, VirtualWire
+from arm_canopen.config.master_model import MasterConfig
+from arm_canopen.config.model import BusConfig
+from arm_canopen.exceptions import BusError
+from arm_canopen.nodes.master_process import MasterProcess
+
+DEADLINE = 10.0  # [s] for what takes milliseconds
+CONFIG = BusConfig(Path('bus.yml'), MasterConfig(1, cycle_period=0.005), ())
+
+
+class BreakingBus(VirtualBus):
+    """A bus whose driver fails in a way that nobody expects, once it is told to."""
+
+    broken = False
+
+    def receive(self, timeout: float) -> list[Frame]:
+        """Fail when told to."""
+        if self.broken:
+            raise ZeroDivisionError('injected')
+        return super().receive(timeout)
+
+
+@pytest.fixture
+def node(isolation: Isolation) -> Iterator[Node]:
+    """A node for the master."""
+    rclpy.init(domain_id=isolation.domain_id)
+    made = Node('master')
+    yield made
+    made.destroy_node()  # type: ignore[no-untyped-call]
+    rclpy.shutdown()
+
+
+def test_stop_ends_both_threads_after_the_cycle_has_died(node: Node) -> None:
+    """It says that the drives could not be stopped, and raises nothing."""
+    bus = BreakingBus('here', VirtualWire())
+    process = MasterProcess(node, CONFIG, bus, diagnostics_period=60.0)
+    before = set(threading.enumerate())
+    process.start()
+    started = set(threading.enumerate()) - before
+    assert {thread.name for thread in started} == {'canopen', 'ros output'}
+    bus.broken = True
+    (cycle,) = [thread for thread in started if thread.name == 'canopen']
+    cycle.join(DEADLINE)
+    assert not cycle.is_alive()
+    with pytest.raises(BusError):
+        process.attach(NoSource()).result(DEADLINE)
+    process.stop()
+    assert not any(thread.is_alive() for thread in started)
+    bus.close()
+
+
+class NoSource:
+    """A motion source without axes."""
+
+    axes = ()
+
+    def update(self, *_: object) -> tuple[()]:
+        """Answer nothing."""
+        return ()
+
+    def released(self, *_: object) -> None:
+        """Lose nothing."""
