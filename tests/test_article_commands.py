@@ -75,7 +75,7 @@ def test_refusals_say_why(arm: SimulatedArm) -> None:
     refused = call(arm, '/panda_joint2/target', TARGET, '{ target: 0.1 }')
     assert 'success=False' in refused
     arm.master.wait_for('panda_joint2 takes no target.*init.*Switch on disabled')
-    refused = call(arm, '/panda_joint2/torque_mode', TRIGGER)
+    refused = call(arm, '/panda_joint2/cyclic_torque_mode', TRIGGER)
     assert 'success=False' in refused
     assert 'in no RPDO' in refused
 
