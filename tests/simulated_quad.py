@@ -75,10 +75,11 @@ class SimulatedQuad:
         parameters = folder / 'parameters.yaml'
         write_parameters(parameters, urdf)
         robot = Stack(str(folder / 'robot'), simulate=True, protocol='new')
-        bridge = Stack(str(folder / ('tapped' if tapped else 'robot')), protocol='new')
+        port = folder / ('tapped' if tapped else 'robot')
+        bridge = Stack(str(port), simulate=True, protocol='new')
         specs = [
             quad_processes(robot, parameters, find_executable)[0],
-            *quad_processes(bridge, parameters, find_executable)[:2],
+            *quad_processes(bridge, parameters, find_executable)[1:3],
         ]
         self._specs = {spec.name: spec for spec in specs}
         self.processes: dict[str, RunningProcess] = {}

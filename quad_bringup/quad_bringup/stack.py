@@ -110,6 +110,8 @@ def _simulator(stack: Stack, find: FindExecutable) -> ProcessSpec:
 
 def _bridge(stack: Stack, parameters: Path, find: FindExecutable) -> ProcessSpec:
     values = {'port': stack.port, 'protocol': stack.protocol}
+    if stack.simulate:  # its IMU is where the description has it
+        values['imu.mounting_checked'] = 'true'
     argv = node_argv(Executable('quad_hardware', 'hardware_node'), find, values, parameters)
     if stack.calibration is not None:
         argv = (*argv, '--params-file', str(stack.calibration))

@@ -1,18 +1,30 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Which processes a quadruped has, with which arguments."""
+"""Which processes a quadruped has, and what they make of their arguments."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+import rclpy
+from rclpy.context import Context
+from rclpy.node import Node
 
-from process_supervisor import ProcessSpec, StartError
+from process_supervisor import ProcessSpec, StartError, write_parameters
 from quad_bringup.stack import quad_processes, Stack
+from quad_controller.nodes.parameters import declare_parameters as controller_parameters
+from quad_controller.nodes.parameters import NodeSettings as ControllerSettings
+from quad_description import movable_joints, robot_urdf
+from quad_hardware.calibration.parameter_file import write_parameters as write_calibration
+from quad_hardware.nodes.parameters import declare_parameters as hardware_parameters
+from quad_hardware.nodes.parameters import NodeSettings as HardwareSettings
+from quad_hardware.protocol import Code, Frame, Kind, NEW, Register, ROBOT_KINDS, StreamParser
+from quad_hardware.sim.options import build, parse_arguments, parse_servo, Simulation
+from quad_hardware.sim.servo import ServoModel
 
-PARAMETERS = Path('/tmp/parameters.yaml')
 OURS = ('quad_hardware', 'quad_controller', 'robot_viewer')
 
 
@@ -33,58 +45,108 @@ def underlay(folder: Path, *packages: str) -> Callable[[str, str], Path | None]:
 def processes(folder: Path, stack: Stack, *packages: str) -> dict[str, ProcessSpec]:
     """Plan a stack on an underlay with our packages and more."""
     find = underlay(folder, *OURS, *packages)
-    return {spec.name: spec for spec in quad_processes(stack, PARAMETERS, find)}
+    parameters = folder / 'robot_description.yaml'
+    write_parameters(parameters, robot_urdf(stack.preset, arm=stack.arm))
+    return {spec.name: spec for spec in quad_processes(stack, parameters, find)}
+
+
+@contextmanager
+def as_node(spec: ProcessSpec, name: str) -> Iterator[Node]:
+    """Give a node what its process gets on its command line."""
+    context = Context()
+    rclpy.init(args=list(spec.argv), context=context)
+    node = Node(name, context=context, enable_rosout=False)
+    try:
+        yield node
+    finally:
+        node.destroy_node()  # type: ignore[no-untyped-call]
+        rclpy.shutdown(context=context)
+
+
+def bridge_of(specs: dict[str, ProcessSpec]) -> HardwareSettings:
+    """What the serial bridge understands."""
+    with as_node(specs['hardware'], 'hardware_node') as node:
+        return hardware_parameters(node)
+
+
+def controller_of(specs: dict[str, ProcessSpec]) -> ControllerSettings:
+    """What the controller understands."""
+    with as_node(specs['controller'], 'controller_node') as node:
+        return controller_parameters(node)
+
+
+def simulator_of(specs: dict[str, ProcessSpec]) -> tuple[Path, Simulation]:
+    """The port and the robot that the simulator makes."""
+    argv = specs['fake_xgo'].argv
+    options = parse_arguments([*argv[1 : argv.index('--ros-args')], '--physics', 'none'])
+    return options.link, build(options)
 
 
 def test_hardware_has_no_simulator_and_simulation_has(tmp_path: Path) -> None:
-    """The bridge cannot tell the difference: it opens a serial port."""
-    real = processes(tmp_path, Stack('/dev/ttyAMA0'))
-    simulated = processes(tmp_path, Stack('/dev/ttyAMA0', simulate=True))
+    """The bridge opens the port that it is given; only of a simulated robot the IMU is known."""
+    port = tmp_path / 'xgo'
+    real = processes(tmp_path, Stack(str(port)))
+    simulated = processes(tmp_path, Stack(str(port), simulate=True))
     assert set(real) == {'hardware', 'controller', 'robot_state'}
     assert set(simulated) == {'fake_xgo', *real}
-    for name, spec in real.items():
-        assert simulated[name] == spec
-    assert '/dev/ttyAMA0' in simulated['fake_xgo'].argv
-    assert 'port:=/dev/ttyAMA0' in real['hardware'].argv
+    assert bridge_of(real).link == bridge_of(simulated).link
+    assert bridge_of(real).link.path == str(port)
+    assert simulator_of(simulated)[0] == port
+    assert not bridge_of(real).estimator.mounting.checked
+    assert bridge_of(simulated).estimator.mounting.checked
 
 
-def test_everyone_gets_the_same_description(tmp_path: Path) -> None:
-    """As a parameter file; the calibration comes after it and wins."""
-    stack = Stack('/dev/ttyAMA0', calibration=Path('/tmp/calibration.yaml'))
-    found = processes(tmp_path, stack)
-    for spec in found.values():
-        assert spec.argv[spec.argv.index('--params-file') + 1] == str(PARAMETERS)
-    assert found['hardware'].argv[-2:] == ('--params-file', '/tmp/calibration.yaml')
+@pytest.mark.parametrize(('preset', 'arm'), [('lite', False), ('mini', True)])
+def test_everyone_has_the_same_robot(tmp_path: Path, preset: str, arm: bool) -> None:
+    """Bridge, controller and simulator: the joints of the description, in its order."""
+    specs = processes(tmp_path, Stack(str(tmp_path / 'xgo'), preset, simulate=True, arm=arm))
+    names = tuple(joint.name for joint in movable_joints(robot_urdf(preset, arm=arm)))
+    assert bridge_of(specs).joints.names == names
+    assert bridge_of(specs).urdf == robot_urdf(preset, arm=arm)
+    assert controller_of(specs).robot.names == names
+    robot = simulator_of(specs)[1].board
+    assert len(robot.servos.fitted) == len(names)
+    assert robot.model.value == preset
 
 
-def test_preset_and_arm_reach_the_simulator(tmp_path: Path) -> None:
-    """So that physics has the robot of the description."""
-    stack = Stack('/tmp/xgo', 'mini', simulate=True, arm=True)
-    argv = processes(tmp_path, stack)['fake_xgo'].argv
-    assert argv[argv.index('--preset') + 1] == 'mini'
-    assert '--arm' in argv
-    assert '--servo' not in argv
-    argv = processes(tmp_path, Stack('p', simulate=True, servo='vendor_rl'))['fake_xgo'].argv
-    assert argv[argv.index('--servo') + 1] == 'vendor_rl'
-    assert '--arm' not in processes(tmp_path, Stack('/tmp/xgo', simulate=True))['fake_xgo'].argv
+def test_a_calibration_counts(tmp_path: Path) -> None:
+    """What calibrate has written reaches the bridge, beside the description."""
+    calibration = tmp_path / 'calibration.yaml'
+    values = {'joints': {'fl_hip_joint': {'sign': -1}}, 'imu': {'mounting_checked': True}}
+    write_calibration(calibration, values)
+    settings = bridge_of(processes(tmp_path, Stack('/dev/ttyAMA0', calibration=calibration)))
+    assert settings.joints.servos[0].sign == -1
+    assert settings.estimator.mounting.checked
 
 
-def test_both_ends_of_the_line_speak_the_same_protocol(tmp_path: Path) -> None:
-    """A simulated robot speaks both where the bridge asks."""
-    for protocol, spoken in (('auto', 'both'), ('new', 'new'), ('old', 'old')):
-        found = processes(tmp_path, Stack('p', simulate=True, protocol=protocol))
-        argv = found['fake_xgo'].argv
-        assert argv[argv.index('--protocol') + 1] == spoken
-        assert f'protocol:={protocol}' in found['hardware'].argv
+@pytest.mark.parametrize('protocol', ['auto', 'new', 'old'])
+def test_both_ends_of_the_line_speak_the_same_protocol(tmp_path: Path, protocol: str) -> None:
+    """Whichever the bridge tries first, the simulated robot answers in it."""
+    specs = processes(tmp_path, Stack(str(tmp_path / 'xgo'), simulate=True, protocol=protocol))
+    first = bridge_of(specs).link.protocols[0]
+    line = simulator_of(specs)[1].line
+    line.set_baud(first.baud)
+    register = Code.VERSION if first is NEW else Register.FIRMWARE
+    request = Frame(Kind.READ, register, b'' if first is NEW else bytes((10,)))
+    line.receive(request.encode(first), 0.0)
+    heard = StreamParser(first, ROBOT_KINDS).feed(line.advance(0.1))
+    assert [frame.address for frame in heard] == [register]
 
 
 def test_gait_and_policy_reach_the_controller(tmp_path: Path) -> None:
     """A policy only where there is one."""
-    argv = processes(tmp_path, Stack('p', gait='crawl'))['controller'].argv
-    assert 'gait:=crawl' in argv
-    assert not any('policy:=' in word for word in argv)
-    argv = processes(tmp_path, Stack('p', policy=Path('/a.onnx')))['controller'].argv
-    assert 'policy:=/a.onnx' in argv
+    settings = controller_of(processes(tmp_path, Stack('p', gait='crawl')))
+    assert (settings.first_gait.value, settings.policy) == ('crawl', '')
+    settings = controller_of(processes(tmp_path, Stack('p', policy=Path('/a.onnx'))))
+    assert (settings.first_gait.value, settings.policy) == ('trot', '/a.onnx')
+
+
+def test_soft_servos_reach_the_simulator(tmp_path: Path) -> None:
+    """The vendor's actuator, where it is asked for."""
+    specs = processes(tmp_path, Stack('p', simulate=True, servo='vendor_rl'))
+    argv = specs['fake_xgo'].argv
+    options = parse_arguments(argv[1 : argv.index('--ros-args')])
+    assert parse_servo(options.servo) is ServoModel.VENDOR_RL
 
 
 def test_who_commands_stops_before_who_transmits_before_who_obeys(tmp_path: Path) -> None:
@@ -109,4 +171,4 @@ def test_a_workspace_that_is_not_built_says_so(tmp_path: Path, missing: str) -> 
     """Whichever package it is."""
     find = underlay(tmp_path, *(name for name in OURS if name != missing))
     with pytest.raises(StartError, match='make build'):
-        quad_processes(Stack('p', simulate=True), PARAMETERS, find)
+        quad_processes(Stack('p', simulate=True), tmp_path / 'none.yaml', find)

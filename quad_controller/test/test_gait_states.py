@@ -19,7 +19,7 @@ from quad_controller.gait.velocity import Velocity
 from quad_controller.model.urdf import Vector
 from quad_controller.states.controller import Controller
 from quad_controller.states.faults import Fault
-from quad_controller.states.measurement import JointSample, Measurement
+from quad_controller.states.measurement import ImuSample, JointSample, Measurement
 from quad_controller.states.modes import MODES, State
 from quad_controller.states.parameters import StateParameters
 from quad_gait_rig import ARM_ROBOT, FOLDED, PERIOD, Rig, ROBOT, StillPolicy, tilted, UPRIGHT
@@ -568,6 +568,31 @@ def test_a_policy_is_told_nothing_that_is_not_measured(
     assert rig.controller.set_mode('walk').accepted
     unwatched = [text for text in rig.controller.status.warnings if 'max_turn_rate' in text]
     assert bool(unwatched) == (turning is None)
+
+
+def test_an_attitude_whose_signs_nobody_knows_is_not_acted_upon() -> None:
+    """It levels nothing, holds no heading and leads no policy; a fall is a fall all the same."""
+    turned = ImuSample((0.1, 0.0, 0.3, 0.9487), (0.0, 0.0, 0.0), (0.0, 0.0, 9.81))
+    ends = []
+    for imu in (turned, replace(turned, deviation=1.57), None):
+        rig = standing(policy_rig(require_imu=False)[0])
+        rig.imu = imu
+        rig.ask('walk')
+        rig.run(2.0, FORWARD)
+        ends.append(rig.positions)
+        told = [
+            text for text in rig.controller.status.warnings if 'orientation_covariance' in text
+        ]
+        uncertain = imu is not None and imu.is_uncertain
+        assert bool(told) == uncertain
+        assert rig.controller.set_mode('policy').accepted is not uncertain
+    level, unchecked, without = ends
+    assert unchecked == without
+    assert unchecked != level
+    rig = standing()
+    rig.imu = replace(tilted(1.2), deviation=1.57)
+    rig.run(0.3)
+    assert rig.is_in(State.FAULT)
 
 
 def test_without_a_policy_its_mode_is_refused() -> None:

@@ -52,12 +52,14 @@ class Behaviour:
         silent: It hears, and says nothing.
         corrupt: Share of the bytes sent that are damaged.
         attitude: Roll, pitch, yaw [deg].
+        acceleration: Specific force [m/s²].
         latency: Latency timer of the adapter between robot and host [s]; 0 for none.
     """
 
     silent: bool = False
     corrupt: float = 0.0
     attitude: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    acceleration: tuple[float, float, float] = (0.0, 0.0, 9.8)
     latency: float = 0.0
 
 
@@ -136,6 +138,7 @@ class PtyPeer:
     def _state(self) -> Feedback:
         return Feedback(
             attitude=self.behaviour.attitude,
+            acceleration=self.behaviour.acceleration,
             battery=80,
             battery_voltage=7.4,
             position=tuple(self.angles[motor] for motor in MOTOR_ORDER),
@@ -200,7 +203,7 @@ class PtyPeer:
             self._say(Frame(Kind.REPLY, frame.address, data))
         elif frame.address == Register.IMU:
             values = OLD.functions[Register.IMU].pack(
-                acceleration=(0.0, 0.0, 9.8),
+                acceleration=self.behaviour.acceleration,
                 rate=(0.0, 0.0, 0.0),
                 attitude=self.behaviour.attitude,
             )

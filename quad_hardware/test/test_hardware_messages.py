@@ -251,7 +251,7 @@ def test_the_level_of_the_robot(
         **change,  # type: ignore[arg-type]
     )
     health = Health(Battery(charge), error, refused=0, refusal='')
-    status = robot_diagnostic('hardware_node', '/dev/x', state, health)
+    status = robot_diagnostic('hardware_node', '/dev/x', state, health, mounting_checked=True)
     assert status.level == level
     assert words in status.message
 

@@ -58,6 +58,7 @@ def imu_sample(message: Imu, numbers: Sequence[float]) -> ImuSample:
         (0.0, 0.0, 0.0)
         if message.linear_acceleration_covariance[0] == UNMEASURED
         else (fx, fy, fz),
+        math.sqrt(max(*message.orientation_covariance[::4], 0.0)),
     )
 
 

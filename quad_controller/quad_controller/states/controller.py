@@ -257,6 +257,8 @@ class Controller:
             matters['held'] = f'joint states are {age:.0f} ms old; holding the last targets'
         if self._following.text:
             matters['following'] = self._following.text
+        if self._health.uncertainty and state in UPRIGHT_STATES:
+            matters['uncertain'] = self._health.uncertainty
         gait = self._generator
         if state in GAIT_STATES and gait.clamped:
             asked, walked = self._commands.velocity(state), gait.goal
@@ -326,4 +328,4 @@ class Controller:
         joints, imu = self._health.joints, self._health.imu
         if joints is None or imu is None:
             return 'a policy needs joint states and an attitude; there are none yet'
-        return lacking(joints, imu)
+        return self._health.uncertainty or lacking(joints, imu)

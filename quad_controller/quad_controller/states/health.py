@@ -105,6 +105,17 @@ class Health:
         return self.joints_age > self._parameters.hold_age
 
     @property
+    def uncertainty(self) -> str:
+        """Why the attitude is not acted upon, nothing when it is."""
+        if self.imu is None or not self.imu.is_uncertain:
+            return ''
+        return (
+            f'/imu is uncertain by {self.imu.deviation:.2f} rad (orientation_covariance), so '
+            'nothing is levelled, no heading held and no policy followed; check how the IMU is '
+            'mounted: ros2 run quad_hardware calibrate imu'
+        )
+
+    @property
     def warnings(self) -> tuple[str, ...]:
         """What is not right, but no fault yet."""
         late = self._parameters.warn_age
@@ -115,6 +126,8 @@ class Health:
             texts.append(f'the attitude is {self.imu_age * 1e3:.0f} ms old')
         if self.imu is not None and self.imu.angular_velocity is None:
             texts.append('/imu has no angular velocity, so max_turn_rate is not watched')
+        if self.uncertainty:
+            texts.append(self.uncertainty)
         return (*texts, *(reason for reason, _ in self._refusals.values()))
 
     def faults(self) -> Iterator[tuple[Fault, str]]:

@@ -10,6 +10,7 @@ import math
 from ..model.urdf import Vector
 
 NORM_TOLERANCE = 0.1  # of a quaternion's length; beyond it the message is no orientation
+MAX_DEVIATION = 0.35  # [rad] of an orientation that may be acted upon
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,11 +49,18 @@ class ImuSample:
         orientation: Unit quaternion of the body in the world, x, y, z, w.
         angular_velocity: In [rad/s]; None when it is not measured.
         acceleration: Specific force in [m/s^2]: +9.81 along z at rest (REP 145).
+        deviation: Standard deviation of the orientation in [rad]; 0 when it is not said.
     """
 
     orientation: tuple[float, float, float, float]
     angular_velocity: Vector | None
     acceleration: Vector
+    deviation: float = 0.0
+
+    @property
+    def is_uncertain(self) -> bool:
+        """Whether not even the signs of the orientation are sure; a wrong one is fed back."""
+        return self.deviation > MAX_DEVIATION
 
     def problem(self) -> str:
         """Say what is wrong with it, nothing when it can be used."""

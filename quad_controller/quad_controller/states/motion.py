@@ -137,7 +137,8 @@ class Walk(Motion):
 
     def step(self, situation: Situation, dt: float) -> Targets:
         """Return the next targets."""
-        attitude = situation.imu.roll_pitch_yaw if situation.imu is not None else None
+        imu = situation.imu
+        attitude = None if imu is None or imu.is_uncertain else imu.roll_pitch_yaw
         step = self._generator.step(situation.velocity, situation.pose, attitude, dt)
         self.reachable = step.reachable
         return step.targets

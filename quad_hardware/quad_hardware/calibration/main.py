@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""``ros2 run quad_hardware calibrate``: joints or odometry, into a parameter file."""
+"""``ros2 run quad_hardware calibrate``: joints, IMU or odometry, into a parameter file."""
 
 from __future__ import annotations
 
@@ -18,7 +18,8 @@ from ..joints import servo_of
 from ..link import LinkOptions
 from ..protocol import Model, Protocol, PROTOCOLS
 from .console import CancelledError, Console, TerminalConsole
-from .parameter_file import servo_parameters, write_parameters
+from .imu import calibrate_imu
+from .parameter_file import imu_parameters, servo_parameters, write_parameters
 from .robot import HandheldRobot
 from .wizard import calibrate_joints, zero_all
 
@@ -35,10 +36,7 @@ def run_calibrate(argv: Sequence[str], console: Console) -> int:
     """Calibrate as the command line says; return the exit code."""
     options = _parser().parse_args(argv)
     try:
-        if options.what == 'joints':
-            _joints(options, console)
-        else:
-            _odometry(options, console)
+        _PARTS[options.what](options, console)
     except KeyboardInterrupt:
         console.say('cancelled; nothing was written')
         return 1
@@ -67,10 +65,7 @@ def _joints(options: argparse.Namespace, console: Console) -> None:
     chosen = [servo for servo in servos if not options.joint or servo.joint in options.joint]
     console.say(f'{len(chosen)} joints. The servos will let go: support the robot.')
     motors = [servo.motor for servo in servos]
-    link = LinkOptions(
-        options.port, protocols=_PROTOCOLS[options.protocol], model=_MODELS[options.model]
-    )
-    with HandheldRobot(link, motors) as robot:
+    with HandheldRobot(_link(options), motors) as robot:
         console.ask('Enter takes their torque away; Ctrl-C leaves')
         with robot.limp():
             if options.zero_only:
@@ -82,6 +77,20 @@ def _joints(options: argparse.Namespace, console: Console) -> None:
     if found == chosen and not options.zero_only:
         raise CancelledError('every joint was skipped; nothing was written')
     write_parameters(options.output, servo_parameters(found))
+
+
+def _imu(options: argparse.Namespace, console: Console) -> None:
+    console.say('The servos stay as they are. Hold the robot by its body, not by its legs.')
+    with HandheldRobot(_link(options), ()) as robot:
+        found = imu_parameters(calibrate_imu(console, robot))
+    console.say(f'found: {found["imu"]}')
+    write_parameters(options.output, found)
+
+
+def _link(options: argparse.Namespace) -> LinkOptions:
+    return LinkOptions(
+        options.port, protocols=_PROTOCOLS[options.protocol], model=_MODELS[options.model]
+    )
 
 
 def _odometry(options: argparse.Namespace, console: Console) -> None:
@@ -96,17 +105,28 @@ def _odometry(options: argparse.Namespace, console: Console) -> None:
     write_parameters(options.output, {'odometry': {key: scale}})
 
 
+_PARTS = {'joints': _joints, 'imu': _imu, 'odometry': _odometry}
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog='calibrate', description=__doc__)
     kinds = parser.add_subparsers(dest='what', required=True)
     joints = kinds.add_parser('joints', help='signs, offsets and limits; moves joints by hand')
-    joints.add_argument('--port', default='/dev/ttyAMA0', help='of the robot (%(default)s)')
-    joints.add_argument(
-        '--protocol', choices=_PROTOCOLS, default=AUTO, help='what the robot speaks (%(default)s)'
-    )
-    joints.add_argument(
-        '--model', choices=_MODELS, default=AUTO, help='ranges of the old protocol (%(default)s)'
-    )
+    imu = kinds.add_parser('imu', help='how the IMU is mounted; tilts the robot by hand')
+    for kind in (joints, imu):
+        kind.add_argument('--port', default='/dev/ttyAMA0', help='of the robot (%(default)s)')
+        kind.add_argument(
+            '--protocol',
+            choices=_PROTOCOLS,
+            default=AUTO,
+            help='what the robot speaks (%(default)s)',
+        )
+        kind.add_argument(
+            '--model',
+            choices=_MODELS,
+            default=AUTO,
+            help='ranges of the old protocol (%(default)s)',
+        )
     joints.add_argument('--preset', choices=PRESETS, default='lite', help='(%(default)s)')
     joints.add_argument('--arm', action='store_true', help='with the arm on its back')
     joints.add_argument('--joint', action='append', default=[], help='only this one; repeatable')
@@ -116,7 +136,7 @@ def _parser() -> argparse.ArgumentParser:
     odometry.add_argument('--axis', choices=('x', 'y'), default='x', help='(%(default)s)')
     odometry.add_argument('--distance', type=_positive, default=1.0, help='[m] (%(default)s)')
     odometry.add_argument('--speed', type=_positive, default=0.15, help='[m/s] (%(default)s)')
-    for kind in (joints, odometry):
+    for kind in (joints, imu, odometry):
         kind.add_argument(
             '--output', type=Path, default=DEFAULT_FILE, help='parameter file (%(default)s)'
         )

@@ -11,6 +11,8 @@ from typing import cast
 
 import yaml
 
+from ..estimation import ImuMounting
+from ..estimation.rotation import yaw_of
 from ..exceptions import CommandError
 from ..joints import JointServo
 
@@ -58,6 +60,21 @@ def write_parameters(path: Path, changes: Mapping[str, object]) -> None:
 def servo_parameters(servos: Iterable[JointServo]) -> Tree:
     """Return the parameters of servos."""
     return {'joints': {servo.joint: _servo(servo) for servo in servos}}
+
+
+def imu_parameters(mounting: ImuMounting) -> Tree:
+    """Return the parameters of the mounting of the IMU."""
+    x, y, z, w = mounting.rotation
+    roll = math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
+    pitch = math.asin(min(max(2 * (w * y - z * x), -1.0), 1.0))
+    return {
+        'imu': {
+            'mounting': [round(angle, 5) for angle in (roll, pitch, yaw_of(mounting.rotation))],
+            'attitude_signs': list(mounting.attitude_signs),
+            'acceleration_signs': list(mounting.acceleration_signs),
+            'mounting_checked': mounting.checked,
+        }
+    }
 
 
 def _servo(servo: JointServo) -> Tree:

@@ -5,13 +5,15 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 import math
-from statistics import median
+from statistics import fmean, median
 import threading
 from typing import TYPE_CHECKING
 
+from ..estimation.rotation import Vector
 from ..exceptions import NoAnswerError
 from ..link import Driver, LinkOptions, LinkState, RobotState
 
@@ -22,6 +24,19 @@ if TYPE_CHECKING:
 
 SAMPLES = 15  # reports that one reading is the median of
 PATIENCE = 4.0  # [s] for a robot to report
+
+
+@dataclass(frozen=True, slots=True)
+class ImuReading:
+    """What the IMU reports.
+
+    Attributes:
+        attitude: Roll, pitch, yaw [deg].
+        acceleration: Specific force [m/s²]; None where it is not reported.
+    """
+
+    attitude: Vector
+    acceleration: Vector | None
 
 
 class HandheldRobot:
@@ -36,6 +51,7 @@ class HandheldRobot:
         """
         self._motors = frozenset(motors)
         self._recent: deque[Mapping[int, float]] = deque(maxlen=SAMPLES)
+        self._imu: deque[RobotState] = deque(maxlen=SAMPLES)
         self._changed = threading.Condition()
         self._driver = Driver(options, self._take, self._forget)
 
@@ -51,6 +67,26 @@ class HandheldRobot:
                 raise NoAnswerError(self._driver.status().detail)
             motors = set[int].intersection(*(set(angles) for angles in self._recent))
             return {m: median(angles[m] for angles in self._recent) for m in sorted(motors)}
+
+    def imu(self) -> ImuReading:
+        """Return what the IMU reports from now on, as a mean.
+
+        Raises:
+            NoAnswerError: The robot does not report, or no number; says why.
+        """
+        with self._changed:
+            self._imu.clear()
+            if not self._changed.wait_for(lambda: len(self._imu) == SAMPLES, PATIENCE):
+                raise NoAnswerError(self._driver.status().detail)
+            states = list(self._imu)
+        roll, pitch, yaw = map(_mean_angle, zip(*(s.attitude for s in states), strict=True))
+        if not all(map(math.isfinite, (roll, pitch, yaw))):
+            raise NoAnswerError('the IMU reports no number; switch the robot off and on')
+        forces = [state.acceleration for state in states if state.acceleration is not None]
+        if not forces:
+            return ImuReading((roll, pitch, yaw), None)
+        x, y, z = map(fmean, zip(*forces, strict=True))
+        return ImuReading((roll, pitch, yaw), (x, y, z))
 
     @contextmanager
     def limp(self) -> Iterator[None]:
@@ -71,6 +107,7 @@ class HandheldRobot:
 
     def _take(self, state: RobotState) -> str:
         with self._changed:
+            self._imu.append(state)
             self._recent.append(
                 {
                     motor: angle
@@ -84,6 +121,7 @@ class HandheldRobot:
     def _forget(self, _state: LinkState, _detail: str) -> None:
         with self._changed:
             self._recent.clear()
+            self._imu.clear()
 
     def __enter__(self) -> Self:
         """Look for the robot.
@@ -107,3 +145,10 @@ class HandheldRobot:
     ) -> None:
         """Leave the robot."""
         self._driver.stop()
+
+
+def _mean_angle(degrees: Iterable[float]) -> float:
+    """Return the mean of angles [deg] that may be on both sides of 180."""
+    angles = [math.radians(angle) for angle in degrees]
+    sines, cosines = map(math.sin, angles), map(math.cos, angles)
+    return math.degrees(math.atan2(fmean(sines), fmean(cosines)))

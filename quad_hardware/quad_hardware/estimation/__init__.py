@@ -4,6 +4,7 @@
 
 from .battery import Battery
 from .estimator import Estimate, Estimator, EstimatorSettings, Health, RateSource
+from .imu_mounting import ImuMounting
 from .odometry import OdometrySettings, OdometryState, SCALES
 
 __all__ = [
@@ -13,6 +14,7 @@ __all__ = [
     'Estimator',
     'EstimatorSettings',
     'Health',
+    'ImuMounting',
     'OdometrySettings',
     'OdometryState',
     'RateSource',

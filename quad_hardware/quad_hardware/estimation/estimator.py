@@ -7,7 +7,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import Enum
-import math
 
 from ..joints import JointMap
 from ..link.state import RobotState
@@ -16,9 +15,10 @@ from .board_watch import BoardWatch
 from .feet import Feet
 from .filters import AttitudeRate, JointRate
 from .gravity import GravityCheck
+from .imu_mounting import ImuMounting
 from .odometry import LegOdometry, OdometrySettings, OdometryState
 from .plausibility import Plausibility
-from .rotation import from_roll_pitch_yaw, Quaternion, Vector
+from .rotation import Quaternion, Vector
 from .sample_clock import SampleClock
 
 
@@ -39,12 +39,14 @@ class EstimatorSettings:
         rate_cutoff: Of the low-pass of differentiated angular velocities [Hz].
         joint_cutoff: Of the low-pass of differentiated joint velocities [Hz].
         odometry: How the legs are read.
+        mounting: How the IMU sits on the body.
     """
 
     rate_source: RateSource = RateSource.AUTO
     rate_cutoff: float = 12.0
     joint_cutoff: float = 12.0
     odometry: OdometrySettings = field(default_factory=OdometrySettings)
+    mounting: ImuMounting = field(default_factory=ImuMounting)
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,9 +149,10 @@ class Estimator:
             return Estimate(time, joints_time, positions, velocities, None, None, False, None)
         if self._boards.restarted(state):
             self._odometry.keep_heading()
-        roll, pitch, yaw = map(math.radians, state.attitude)
-        attitude = from_roll_pitch_yaw(roll, pitch, yaw)
-        self._gravity.take(attitude, state.acceleration)
+        mounting, felt = self._settings.mounting, state.acceleration
+        attitude = mounting.attitude(state.attitude)
+        acceleration = None if felt is None else mounting.acceleration(felt)
+        self._gravity.take(attitude, acceleration)
         rate, measured = self._angular_velocity(time, attitude, state)
         return Estimate(
             time=time,
@@ -159,7 +162,7 @@ class Estimator:
             attitude=attitude,
             angular_velocity=rate,
             rate_measured=measured,
-            acceleration=state.acceleration,
+            acceleration=acceleration,
         )
 
     def walk(self, estimate: Estimate) -> OdometryState | None:
@@ -188,8 +191,7 @@ class Estimator:
         if source is RateSource.NONE:
             return None, False
         if source is RateSource.AUTO and state.rates is not None:
-            x, y, z = map(math.radians, state.rates)
-            return (x, y, z), True
+            return self._settings.mounting.rate(state.rates), True
         return differentiated, False
 
     def _padded(self, positions: Sequence[float]) -> list[float]:

@@ -27,6 +27,12 @@ FAULTS = {
 }
 """What a fault is called, and what to do."""
 
+UNCHECKED = (
+    'nobody has compared the mounting of the IMU with gravity, so the controller does not level: '
+    'ros2 run quad_hardware calibrate imu'
+)
+"""What is said of an attitude whose signs may be wrong."""
+
 _LINK_LEVELS = {
     LinkState.CONNECTING: DiagnosticStatus.ERROR,
     LinkState.FAILED: DiagnosticStatus.ERROR,
@@ -112,9 +118,21 @@ class LinkDiagnostic:
         return since if min(since) >= 0 else (parser.frames, parser.damaged)
 
 
-def robot_diagnostic(node: str, port: str, state: RobotState, health: Health) -> DiagnosticStatus:
-    """Describe battery, servos and IMU."""
+def robot_diagnostic(
+    node: str, port: str, state: RobotState, health: Health, *, mounting_checked: bool
+) -> DiagnosticStatus:
+    """Describe battery, servos and IMU.
+
+    Args:
+        node: Name of the node.
+        port: Its serial port.
+        state: The newest report.
+        health: How the robot is.
+        mounting_checked: Somebody has compared the mounting of the IMU with gravity.
+    """
     level, message = DiagnosticStatus.OK, 'no faults'
+    if not mounting_checked:
+        level, message = DiagnosticStatus.WARN, UNCHECKED
     error, charge, voltage = health.gravity_error, health.battery.charge, health.battery.voltage
     hot = {m: t for m, t in (state.temperatures or {}).items() if t > HOT_SERVO}
     if error is not None and error > GRAVITY_ERROR:
@@ -141,6 +159,7 @@ def robot_diagnostic(node: str, port: str, state: RobotState, health: Health) ->
         'battery': '' if charge is None else f'{charge:.0f}',
         'voltage': '' if voltage is None else f'{voltage:.2f}',
         'faults': state.faults,
+        'imu_mounting_checked': mounting_checked,
         'gravity_error': '' if error is None else f'{error:.3f}',
         'hottest_servo': max((state.temperatures or {0: 0.0}).values()),
         'implausible_reports': health.refused,

@@ -325,7 +325,10 @@ class HardwareNode(Node):
         if latest is not None:
             state, _ = latest
             health = self._estimator.health()
-            array.status.append(robot_diagnostic(name, port, state, health))
+            checked = self._settings.estimator.mounting.checked
+            array.status.append(
+                robot_diagnostic(name, port, state, health, mounting_checked=checked)
+            )
             self._battery.publish(messages.battery(health.battery, now))
         self._diagnostics.publish(array)
 

@@ -12,7 +12,9 @@ from rclpy.node import Node
 from node_runner import ParameterReader, refuse_misspelt
 from quad_description import DescriptionError, Joint, movable_joints, PRESETS, robot_urdf
 
-from ..estimation import EstimatorSettings, OdometrySettings, RateSource, SCALES
+from ..estimation import EstimatorSettings, ImuMounting, OdometrySettings, RateSource, SCALES
+from ..estimation.imu_mounting import UNCHECKED_DEVIATION
+from ..estimation.rotation import from_roll_pitch_yaw, Vector
 from ..exceptions import CommandError
 from ..joints import JointMap, JointServo, LimiterSettings, LossReaction, servo_of
 from ..link import LinkOptions
@@ -116,6 +118,7 @@ def declare_parameters(node: Node) -> NodeSettings:
         vendor_method=method,
     )
     urdf = _urdf(read)
+    estimator = _estimator(read)
     settings = NodeSettings(
         link=link,
         urdf=urdf,
@@ -132,9 +135,9 @@ def declare_parameters(node: Node) -> NodeSettings:
             {reaction.value: reaction for reaction in LossReaction},
             'what the robot does when commands break off while its legs move',
         ),
-        estimator=_estimator(read),
+        estimator=estimator,
         frames=_frames(read),
-        deviations=_deviations(read),
+        deviations=_deviations(read, checked=estimator.mounting.checked),
         diagnostics_period=read.number('diagnostics_period', 1.0, (0.1, 60.0), 'period [s]'),
     )
     refuse_misspelt(node)
@@ -218,7 +221,40 @@ def _estimator(read: ParameterReader) -> EstimatorSettings:
             scale_x=read.number('odometry.scale_x', 1.0, SCALES, 'factor of the way forward'),
             scale_y=read.number('odometry.scale_y', 1.0, SCALES, 'factor of the way sideways'),
         ),
+        mounting=_mounting(read),
     )
+
+
+def _mounting(read: ParameterReader) -> ImuMounting:
+    roll, pitch, yaw = _three(
+        read, 'imu.mounting', (0.0, 0.0, 0.0), 'roll, pitch, yaw of the IMU in base_link [rad]'
+    )
+    return ImuMounting(
+        from_roll_pitch_yaw(roll, pitch, yaw),
+        _signs(read, 'imu.attitude_signs', 'of roll, pitch and yaw as they are reported'),
+        _signs(read, 'imu.acceleration_signs', 'of the specific force; +9.8 upwards at rest'),
+        _signs(read, 'imu.rate_signs', 'of the angular velocity'),
+        checked=read.flag(
+            'imu.mounting_checked',
+            default=False,
+            meaning='the mounting was compared with gravity (calibrate imu)',
+        ),
+    )
+
+
+def _signs(read: ParameterReader, name: str, meaning: str) -> Vector:
+    signs = _three(read, name, (1.0, 1.0, 1.0), meaning)
+    if not set(signs) <= {1.0, -1.0}:
+        raise CommandError(f'{name} is {list(signs)}: each must be 1 or -1')
+    return signs
+
+
+def _three(read: ParameterReader, name: str, default: Vector, meaning: str) -> Vector:
+    values = read.numbers(name, meaning) or default
+    if len(values) != len(default):
+        raise CommandError(f'{name} has {len(values)} numbers; give three, for x, y and z')
+    x, y, z = values
+    return x, y, z
 
 
 def _frames(read: ParameterReader) -> Frames:
@@ -238,10 +274,12 @@ def _frames(read: ParameterReader) -> Frames:
     )
 
 
-def _deviations(read: ParameterReader) -> Deviations:
+def _deviations(read: ParameterReader, *, checked: bool) -> Deviations:
     span = (0.0, 10.0)
+    orientation = read.number('orientation_stddev', 0.02, span, '[rad]')
     return Deviations(
-        orientation=read.number('orientation_stddev', 0.02, span, '[rad]'),
+        # whoever levels by an attitude of which nobody knows the signs has to be told
+        orientation=orientation if checked else max(orientation, UNCHECKED_DEVIATION),
         rate=read.number('angular_velocity_stddev', 0.2, span, 'differentiated [rad/s]'),
         gyro=read.number('gyro_stddev', 0.02, span, 'of a gyro [rad/s]'),
         acceleration=read.number('linear_acceleration_stddev', 0.3, span, '[m/s²]'),

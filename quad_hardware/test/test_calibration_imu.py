@@ -1,0 +1,180 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""How the IMU is mounted: found by tilting, applied to reports, and not taken for granted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+import itertools
+import math
+from pathlib import Path
+
+from hypothesis import given
+from hypothesis import strategies as st
+import pytest
+
+from quad_calibration_script import Script
+from quad_hardware.calibration.imu import find_mounting, Readings, Stance
+from quad_hardware.calibration.main import run_calibrate
+from quad_hardware.calibration.parameter_file import imu_parameters, read_parameters
+from quad_hardware.calibration.robot import ImuReading
+from quad_hardware.estimation.gravity import gravity_from_attitude, STANDARD_GRAVITY
+from quad_hardware.estimation.imu_mounting import ImuMounting
+from quad_hardware.estimation.rotation import (
+    conjugate,
+    from_roll_pitch_yaw,
+    multiply,
+    Quaternion,
+    rotate,
+    Vector,
+    yaw_of,
+)
+from quad_hardware.exceptions import CommandError
+from quad_pty_peer import PtyPeer
+
+SIGNS: list[Vector] = [(x, y, z) for x, y, z in itertools.product((1.0, -1.0), repeat=3)]
+MOUNTINGS = st.builds(
+    ImuMounting,
+    st.builds(
+        from_roll_pitch_yaw,
+        st.sampled_from([0.0, math.pi]),
+        st.just(0.0),
+        st.sampled_from([quarter * math.pi / 2 for quarter in range(4)]),
+    ),
+    st.sampled_from(SIGNS),
+    st.sampled_from(SIGNS),
+)
+YAWED = ImuMounting(from_roll_pitch_yaw(0.0, 0.0, math.pi))  # as in the vendor's simulation
+
+
+def angles_of(rotation: Quaternion) -> Vector:
+    """Roll, pitch, yaw of a rotation [deg]."""
+    x, y, z, w = rotation
+    roll = math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
+    pitch = math.asin(min(max(2 * (w * y - z * x), -1.0), 1.0))
+    return math.degrees(roll), math.degrees(pitch), math.degrees(yaw_of(rotation))
+
+
+def signed(signs: Vector, values: Vector) -> Vector:
+    """Values with signs."""
+    x, y, z = (sign * value for sign, value in zip(signs, values, strict=True))
+    return x, y, z
+
+
+def report(mounting: ImuMounting, body: Quaternion) -> ImuReading:
+    """What an IMU with a mounting reports of a body at rest."""
+    unsigned = angles_of(multiply(body, mounting.rotation))
+    x, y, z = gravity_from_attitude(body)
+    force = (-STANDARD_GRAVITY * x, -STANDARD_GRAVITY * y, -STANDARD_GRAVITY * z)
+    felt = rotate(conjugate(mounting.rotation), force)
+    return ImuReading(
+        signed(mounting.attitude_signs, unsigned), signed(mounting.acceleration_signs, felt)
+    )
+
+
+def held(mounting: ImuMounting, tilt: float = 20.0, yaw: float = 0.3) -> dict[Stance, ImuReading]:
+    """What is reported while a person holds the robot as asked, with a hand that is not exact."""
+    angle, odd = math.radians(tilt), 0.05
+    bodies = {
+        Stance.LEVEL: from_roll_pitch_yaw(odd, -odd, yaw),
+        Stance.NOSE_DOWN: from_roll_pitch_yaw(-odd, angle, yaw + 0.1),
+        Stance.RIGHT_DOWN: from_roll_pitch_yaw(angle, odd, yaw - 0.1),
+        Stance.TURNED_LEFT: from_roll_pitch_yaw(0.0, odd, yaw + 0.8),
+    }
+    return {stance: report(mounting, body) for stance, body in bodies.items()}
+
+
+@given(MOUNTINGS, st.floats(12.0, 40.0), st.floats(-3.1, 3.1), st.booleans())
+def test_what_is_found_turns_reports_into_the_attitude_of_the_body(
+    mounting: ImuMounting, tilt: float, yaw: float, accelerometer: bool
+) -> None:
+    """Whatever the signs, and any of the eight ways to lie on the board: gravity is right."""
+    readings = held(mounting, tilt, yaw)
+    if not accelerometer:
+        readings = {stance: replace(r, acceleration=None) for stance, r in readings.items()}
+    found = find_mounting(readings)
+    assert found.checked
+    for roll, pitch, turn in [(0.3, 0.0, 0.0), (0.0, -0.3, 1.0), (-0.2, 0.2, -2.0)]:
+        body = from_roll_pitch_yaw(roll, pitch, turn)
+        seen = report(mounting, body)
+        attitude = found.attitude(seen.attitude)
+        assert gravity_from_attitude(attitude) == pytest.approx(
+            gravity_from_attitude(body), abs=1e-6
+        )
+        if accelerometer:
+            assert seen.acceleration is not None
+            down = rotate(conjugate(body), (0.0, 0.0, -STANDARD_GRAVITY))
+            felt = found.acceleration(seen.acceleration)
+            assert [-x for x in felt] == pytest.approx(down, abs=1e-6)
+    level, turned = (
+        yaw_of(found.attitude(report(mounting, from_roll_pitch_yaw(0.0, 0.0, angle)).attitude))
+        for angle in (0.0, 0.5)
+    )
+    assert math.remainder(turned - level, math.tau) == pytest.approx(0.5, abs=1e-6)
+
+
+def test_a_turned_imu_is_a_turned_imu() -> None:
+    """Where both would do, a rotation is found and not two wrong signs."""
+    found = find_mounting(held(YAWED))
+    assert found.attitude_signs == found.acceleration_signs == (1.0, 1.0, 1.0)
+    assert abs(yaw_of(found.rotation)) == pytest.approx(math.pi)
+    assert find_mounting(held(ImuMounting())) == ImuMounting(checked=True)
+
+
+def still(readings: dict[Stance, ImuReading]) -> None:
+    """Somebody who does not tilt the robot."""
+    readings[Stance.NOSE_DOWN] = readings[Stance.LEVEL]
+
+
+def shaken(readings: dict[Stance, ImuReading]) -> None:
+    """Somebody who swings the robot."""
+    readings[Stance.RIGHT_DOWN] = replace(
+        readings[Stance.RIGHT_DOWN], acceleration=(0.0, 5.0, 13.0)
+    )
+
+
+def askew(readings: dict[Stance, ImuReading]) -> None:
+    """An accelerometer that feels something else than the attitude says."""
+    readings[Stance.NOSE_DOWN] = replace(
+        readings[Stance.NOSE_DOWN], acceleration=readings[Stance.RIGHT_DOWN].acceleration
+    )
+
+
+@pytest.mark.parametrize(
+    ('spoil', 'named'), [(still, 'nose_down'), (shaken, 'right_down'), (askew, 'nose_down')]
+)
+def test_what_fits_no_mounting_is_refused(
+    spoil: Callable[[dict[Stance, ImuReading]], None], named: str
+) -> None:
+    """The message says in which stance, and nothing is found."""
+    readings = held(ImuMounting())
+    spoil(readings)
+    with pytest.raises(CommandError, match=named):
+        find_mounting(readings)
+
+
+def test_a_person_finds_it_and_the_file_has_it(tmp_path: Path) -> None:
+    """By the dialogue, over the serial line: the parameters of hardware_node, and checked."""
+    output = tmp_path / 'found.yaml'
+    readings: Readings = held(YAWED)
+    with PtyPeer(tmp_path / 'port') as peer:
+
+        def hold(stance: Stance) -> Callable[[], None]:
+            def move() -> None:
+                reading = readings[stance]
+                assert reading.acceleration is not None
+                peer.behaviour = replace(
+                    peer.behaviour, attitude=reading.attitude, acceleration=reading.acceleration
+                )
+
+            return move
+
+        script = Script(*((hold(stance), '') for stance in Stance))
+        command = ['imu', '--port', str(peer.link), '--output', str(output)]
+        assert run_calibrate(command, script) == 0, script.said
+        assert peer.torque
+        assert peer.commands == []
+    found = read_parameters(output)['imu']
+    assert found == imu_parameters(find_mounting(readings))['imu']
+    assert found['mounting_checked'] is True  # type: ignore[index]
