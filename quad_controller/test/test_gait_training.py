@@ -11,26 +11,53 @@ from gait_teacher import GaitTeacher
 import pytest
 from train_imitation import Trainer
 
-from quad_controller.gait.body import UPRIGHT
 from quad_controller.gait.generator import GaitGenerator
 from quad_controller.gait.parameters import GaitParameters
 from quad_controller.gait.velocity import Velocity
+from quad_controller.model.quadruped import Targets
 from quad_controller.policy.check import check_contract
+from quad_controller.policy.interface import PolicyStep
 from quad_controller.policy.metadata import read_metadata
 from quad_controller.policy.network import OnnxNetwork
 from quad_controller.policy.options import PolicyOptions
-from quad_gait_physics import MODEL
+from quad_controller.states.measurement import ImuSample, JointSample
+from quad_gait_physics import MODEL, PhysicsRig
 
 
-@pytest.mark.parametrize('velocity', [Velocity(0.2), Velocity(0.1, 0.05), Velocity()])
-def test_the_teacher_is_the_gait(velocity: Velocity) -> None:
-    """After some cycles the gait is where the teacher has it for the same phase."""
-    parameters = GaitParameters(level_gain=0.0)
-    gait, teacher = GaitGenerator(MODEL, parameters), GaitTeacher(MODEL, parameters)
-    for _ in range(100):
-        step = gait.step(velocity, UPRIGHT, None, 0.02)
-    expected = teacher.targets(velocity, gait.phase, (0.0, 0.0))
-    assert step.targets == pytest.approx(expected, abs=1e-6)
+class Lesson:
+    """The teacher as a policy: what is imitated has to walk."""
+
+    name = 'teacher'
+
+    def __init__(self, teacher: GaitTeacher) -> None:
+        """Begin at the start of a cycle."""
+        self._teacher = teacher
+        self._phase = 0.0
+
+    def reset(self, others: Targets) -> None:
+        """Begin at the start of a cycle."""
+        self._phase = 0.0
+
+    def step(
+        self, joints: JointSample, imu: ImuSample, velocity: Velocity, dt: float
+    ) -> PolicyStep:
+        """Answer for what was measured, and go on in the cycle while there is a velocity."""
+        self._phase = (self._phase + dt / self._teacher.schedule.period) % 1.0
+        phase = 0.0 if velocity.at_rest else self._phase
+        return PolicyStep(self._teacher.targets(velocity, phase, imu.roll_pitch), '')
+
+
+@pytest.mark.parametrize('velocity', [Velocity(0.2), Velocity(0.1, 0.05), Velocity(yaw=0.6)])
+def test_the_teacher_walks(velocity: Velocity) -> None:
+    """In physics, as fast as it is told to, and upright: or its imitation would not."""
+    rig = PhysicsRig(policy=Lesson(GaitTeacher(MODEL, GaitParameters())))
+    rig.mode('policy')
+    rig.run(1.0, velocity)
+    went = rig.travel(2.8, velocity)
+    assert (went.x, went.y) == pytest.approx((velocity.x, velocity.y), abs=0.03)
+    assert went.yaw == pytest.approx(velocity.yaw, abs=0.12)
+    assert went.tilt < math.radians(6.0)
+    assert not rig.faulted
 
 
 def test_a_short_training_gives_a_policy_of_the_right_form(tmp_path: Path) -> None:

@@ -1,128 +1,123 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The board's own gait: its legs are those of the URDF, and it walks as fast as it is told to."""
+"""The board's own gait as a client of the register protocol sees it, in physics."""
 
 from __future__ import annotations
 
 import math
 
-from hypothesis import given
-from hypothesis import strategies as st
 import numpy as np
 import pytest
 from sim_virtual import VirtualRobot
 
-from quad_description import robot_urdf
+from quad_description import movable_joints, robot_urdf
 from quad_hardware.protocol import Frame, Kind, OLD, Register
-from quad_hardware.sim.turning import Turn
-from quad_hardware.sim.walking import measure_legs, Walker
-from quad_kinematics import link_pose, parse
 
-URDF = robot_urdf('lite')
-ROOT = parse(URDF)
-LEGS = measure_legs(URDF)
+NEUTRAL = 128
+MAX_TILT = math.radians(8.0)  # [rad]
+DONE = Frame(Kind.READ, 0x3F, b'\x01')
+JOINTS = movable_joints(robot_urdf('lite'))
 
 
-@pytest.mark.parametrize('leg', LEGS, ids=lambda leg: leg.name)
-@given(x=st.floats(-0.05, 0.02), y=st.floats(-0.02, 0.02), z=st.floats(-0.11, -0.06))
-def test_a_leg_reaches_where_it_is_sent(leg: object, x: float, y: float, z: float) -> None:
-    """Forward kinematics of the URDF brings the solution back to the point."""
-    assert isinstance(leg, type(LEGS[0]))
-    wanted = (x, leg.side * leg.beside + y, z)
-    foot, _ = link_pose(ROOT, f'{leg.name}_foot', leg.solve(wanted))
-    hip, _ = link_pose(ROOT, f'{leg.name}_hip', {})
-    assert foot - hip == pytest.approx(wanted, abs=1e-9)
+def standing(*arguments: str) -> VirtualRobot:
+    """A robot of the old protocol on its feet."""
+    return VirtualRobot('--start', 'stand', '--noise', 'none', *arguments, protocol=OLD)
 
 
-def test_a_point_too_far_away_is_pointed_at() -> None:
-    """The leg is stretched, and no number is missing."""
-    for leg in LEGS:
-        assert all(map(math.isfinite, leg.solve((0.3, 0.0, -0.3)).values()))
-
-
-def test_targets_do_not_jump() -> None:
-    """From standing into full speed and back no joint moves faster than its servo can."""
-    walker = Walker(URDF)
-    before = walker.step(0.02)
-    fastest = 0.0
-    for tick in range(400):
-        walker.command = (0.2, 0.05, 0.5) if 20 < tick < 200 else (0.0, 0.0, 0.0)
-        now = walker.step(0.02)
-        fastest = max(fastest, *(abs(now[name] - before[name]) / 0.02 for name in now))
-        before = now
-    assert fastest < 12.0
-    assert not walker.walking
-
-
-@pytest.mark.parametrize(
-    ('register', 'byte', 'expected'),
-    [
-        (Register.VX, 230, (0.130, 0, 0)),
-        (Register.VX, 25, (-0.130, 0, 0)),
-        (Register.VY, 230, (0, 0.094, 0)),
-        (Register.VYAW, 200, (0, 0, 0.993)),
-    ],
-)
-def test_it_walks_as_fast_as_the_register_says(
-    register: int, byte: int, expected: tuple[float, float, float]
-) -> None:
-    """Step length over step time is the speed [m/s], degrees a second the rate; no fall."""
-    robot = VirtualRobot('--start', 'stand', '--noise', 'none', protocol=OLD)
+def write(robot: VirtualRobot, register: int, byte: int) -> None:
+    """Write a byte."""
     robot.send(Frame(Kind.WRITE, register, bytes((byte,))))
-    robot.run(2.5)
-    plant = robot.simulation.plant
-    headings, places = [], []
-    for _ in range(150):
+
+
+def travel(robot: VirtualRobot, duration: float) -> tuple[float, float, float]:
+    """Speeds ahead and to the left [m/s] and turn rate [rad/s]; the robot stays upright."""
+    pose = robot.simulation.plant.base_pose
+    headings, places = [pose.roll_pitch_yaw[2]], [pose.position[:2]]
+    for _ in range(round(duration / 0.02)):
         robot.run(0.02)
-        places.append(plant.base_pose.position[:2])
-        headings.append(plant.base_pose.roll_pitch_yaw[2])
-        assert plant.base_pose.tilt < math.radians(6)
+        pose = robot.simulation.plant.base_pose
+        places.append(pose.position[:2])
+        headings.append(pose.roll_pitch_yaw[2])
+        assert pose.tilt < MAX_TILT
     yaw = np.unwrap(headings)
-    steps = np.diff(np.array(places), axis=0) / 0.02
+    steps = np.diff(np.array(places), axis=0)
     cos, sin = np.cos(yaw[:-1]), np.sin(yaw[:-1])
-    ahead = float(np.mean(cos * steps[:, 0] + sin * steps[:, 1]))
-    aside = float(np.mean(-sin * steps[:, 0] + cos * steps[:, 1]))
-    turning = float(yaw[-1] - yaw[0]) / (0.02 * (len(yaw) - 1))
-    assert (ahead, aside) == pytest.approx(expected[:2], abs=0.03)
-    assert turning == pytest.approx(expected[2], abs=0.1)
+    ahead = float(np.sum(cos * steps[:, 0] + sin * steps[:, 1]))
+    aside = float(np.sum(-sin * steps[:, 0] + cos * steps[:, 1]))
+    return ahead / duration, aside / duration, float(yaw[-1] - yaw[0]) / duration
 
 
-@given(
-    angle=st.floats(-8.0, 8.0),
-    yaw=st.floats(-math.pi, math.pi),
-    grip=st.floats(0.3, 1.1),
-)
-def test_a_turn_ends_at_its_angle(angle: float, yaw: float, grip: float) -> None:
-    """Whatever part of the rate the robot manages, and wherever the heading wraps around."""
-    turn, now, turned = Turn(angle, yaw, 0.0), 0.0, 0.0
-    while rate := turn.rate(math.remainder(yaw + turned, 2 * math.pi), now):
-        turned += grip * rate * 0.02
-        now += 0.02
-        assert now < 60.0
-    given_up = now > 1.0 + 3.0 * abs(angle) / math.radians(60.0)
-    assert given_up or turned == pytest.approx(angle, abs=math.radians(2.5))
-    assert not given_up or grip < 0.5
+@pytest.mark.parametrize('axis', [0, 1, 2], ids=['VX', 'VY', 'VYAW'])
+def test_more_is_faster_and_the_other_way_is_back(axis: int) -> None:
+    """Half of the byte is half of the speed, below the middle is backwards; others stay still."""
+    register = (Register.VX, Register.VY, Register.VYAW)[axis]
+    robot, speeds = standing(), []
+    for byte in (NEUTRAL + 90, NEUTRAL + 45, NEUTRAL - 90):
+        write(robot, register, byte)
+        robot.run(1.2)
+        went = travel(robot, 2.24)  # eight strides
+        still = [abs(speed) for place, speed in enumerate(went) if place != axis]
+        assert max(still) < 0.2 * max(abs(went[axis]), 0.1)
+        speeds.append(went[axis])
+    full, half, back = speeds
+    assert full > (0.06, 0.06, 0.5)[axis]
+    assert half == pytest.approx(full / 2, rel=0.25)
+    assert back == pytest.approx(-full, rel=0.25)
+
+
+@pytest.mark.parametrize('byte', [127, 128])
+def test_both_middles_are_rest(byte: int) -> None:
+    """From a walk the robot comes to rest on its feet, and goes nowhere."""
+    robot = standing()
+    write(robot, Register.VX, 230)
+    robot.run(1.0)
+    write(robot, Register.VX, byte)
+    robot.run(1.0)
+    assert max(map(abs, travel(robot, 0.5))) < 0.01
+    assert robot.simulation.plant.base_pose.position[2] > 0.09
+
+
+def test_no_servo_is_asked_for_more_than_it_can() -> None:
+    """From standing into full speed and back, the joints that move stay below their speeds."""
+    robot = standing()
+    fastest = np.zeros(len(JOINTS))
+    for vx, vyaw in ((230, 200), (25, 60), (NEUTRAL, NEUTRAL)):
+        write(robot, Register.VX, vx)
+        robot.run(0.01)
+        write(robot, Register.VYAW, vyaw)
+        for _ in range(100):
+            robot.run(0.01)
+            fastest = np.maximum(fastest, np.abs(robot.simulation.plant.measure().velocities))
+    assert fastest.max() > 1.0
+    assert all(fastest < 1.2 * np.array([joint.velocity for joint in JOINTS]))
+
+
+@pytest.mark.parametrize('degrees', [-90, 200])
+def test_it_turns_by_an_angle_and_says_when_it_is_done(degrees: int) -> None:
+    """Register 3F takes whole degrees, most significant byte first; also more than half round."""
+    robot = standing()
+    robot.send(Frame(Kind.WRITE, 0x3F, degrees.to_bytes(2, 'big', signed=True)))
+    turned, heading = 0.0, 0.0
+    answers: list[bytes] = []
+    while not answers or answers[-1] == b'\x00':
+        for _ in range(20):
+            robot.run(0.02)
+            yaw = robot.simulation.plant.base_pose.roll_pitch_yaw[2]
+            turned, heading = turned + math.remainder(yaw - heading, math.tau), yaw
+        (answer,) = robot.ask(DONE)
+        answers.append(answer.payload)
+        assert robot.now < 20.0
+    assert answers[0] == b'\x00'
+    assert turned == pytest.approx(math.radians(degrees), abs=0.15)
+    robot.run(1.0)
+    assert max(map(abs, travel(robot, 0.5))) < 0.02
 
 
 def test_a_robot_that_cannot_turn_gives_up() -> None:
-    """A turn without any motion ends."""
-    turn, now = Turn(1.0, 0.0, 0.0), 0.0
-    while turn.rate(0.0, now):
-        now += 0.02
-    assert 3.0 < now < 5.0
-
-
-def test_it_turns_by_an_angle_and_says_when_it_is_done() -> None:
-    """Register 3F takes whole degrees, the most significant byte first."""
-    robot = VirtualRobot('--start', 'stand', '--noise', 'none', protocol=OLD)
-    robot.send(Frame(Kind.WRITE, 0x3F, (-90).to_bytes(2, 'big', signed=True)))
-    done = Frame(Kind.READ, 0x3F, b'\x01')
-    robot.run(1.5)
-    (answer,) = robot.ask(done)
-    assert answer.payload == b'\x00'
-    robot.run(3.0)
-    (answer,) = robot.ask(done)
-    assert answer.payload == b'\x01'
-    yaw = robot.simulation.plant.base_pose.roll_pitch_yaw[2]
-    assert yaw == pytest.approx(-math.pi / 2, abs=0.12)
-    assert not robot.simulation.board.walker.walking
+    """One that hangs in the air moves its legs and turns nowhere; it says that it is done."""
+    robot = standing('--physics', 'none')
+    robot.send(Frame(Kind.WRITE, 0x3F, (60).to_bytes(2, 'big', signed=True)))
+    robot.run(1.0)
+    assert robot.ask(DONE)[0].payload == b'\x00'
+    robot.run(5.0)
+    assert robot.ask(DONE)[0].payload == b'\x01'
