@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
-from functools import partial
 import math
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -36,11 +35,13 @@ from arm_canopen.can import Frame
 from arm_canopen.standard.cob_id import CobId
 from arm_servo import load_limits, MotionCore, RobotModel, SetPoint
 from arm_servo.arrays import Array
-from arm_servo.nodes.desk import Desk
+from arm_servo.commands import twist_command
+from arm_servo.gateway import CommandGateway
 from arm_servo.nodes.following import FollowingLimits, FollowingWatch
 from arm_servo.nodes.joint_feedback import JointFeedback
 from arm_servo.nodes.motion_thread import MotionCycle, MotionThread
 from arm_servo.nodes.real_time import prefer_this_thread
+from arm_servo.requests import JogRequest
 
 if TYPE_CHECKING:
     from isolation import Isolation
@@ -280,7 +281,7 @@ def loop(period: float) -> Rows:
         (folder / 'panda.srdf').read_text(encoding='utf-8'),
         load_limits(folder / 'limits.yaml'),
     )
-    desk = Desk(MotionCore(model))
+    gateway = CommandGateway(MotionCore(model))
     feedback = JointFeedback(model.joints, 1e9)
     feedback.take(model.joints, READY, [0.0] * len(READY), time.monotonic())
     late: list[float] = []
@@ -305,14 +306,14 @@ def loop(period: float) -> Rows:
     watch = FollowingWatch(model.limits, FollowingLimits(), period)
     words: list[str] = []
     thread = MotionThread(
-        Timed(desk, feedback, put, watch),
+        Timed(gateway, feedback, put, watch),
         period,
         lambda: words.append(prefer_this_thread(40)),
     )
     thread.start()
     while time.monotonic() - begin[0] < SECONDS:
         sense = 1.0 if (time.monotonic() - begin[0]) % 2.0 < 1.0 else -1.0
-        future = desk.submit(partial(_jog, 0.1 * sense))
+        future = gateway.jog(_jog(model, 0.1 * sense))
         future.add_done_callback(_raise)
         time.sleep(0.02)
     thread.stop()
@@ -327,8 +328,9 @@ def loop(period: float) -> Rows:
     ]
 
 
-def _jog(speed: float, core: MotionCore, now: float) -> None:
-    core.twist([0.0, 0.0, speed, 0.0, 0.0, 0.0], now)
+def _jog(model: RobotModel, speed: float) -> JogRequest:
+    command = twist_command(model, [0.0, 0.0, speed, 0.0, 0.0, 0.0], None, None)
+    return JogRequest(command, time.monotonic() + 0.1)
 
 
 def _raise(future: Future[None]) -> None:

@@ -146,7 +146,7 @@ class Brakes:
         return lead
 
     def pressing(self, bounds: Bounds, forces: Array, factor: float) -> list[Limiter]:
-        """Name the bounds and rows that press.
+        """Name the bounds and rows that press, the strongest first.
 
         Args:
             bounds: The bounds.
@@ -155,7 +155,8 @@ class Brakes:
         """
         count, share = len(self._limits), min(max(factor, 0.0), 1.0)
         found = []
-        for place in np.flatnonzero(np.abs(forces) > PRESSING):
+        strength = np.abs(forces)
+        for place in sorted(np.flatnonzero(strength > PRESSING), key=lambda each: -strength[each]):
             if place >= count:
                 pair = bounds.near[place - count]
                 name = ' - '.join(pair.links)

@@ -31,6 +31,19 @@ class Proximity:
     gradient: Array
 
 
+@dataclass(frozen=True, slots=True)
+class LeastClearance:
+    """The two links that are nearest to each other.
+
+    Attributes:
+        distance: Between their surfaces in [m], or a lower bound where it is more than asked for.
+        links: Their names; empty where nothing is as near.
+    """
+
+    distance: float
+    links: tuple[str, ...] = ()
+
+
 class Clearances:
     """Measures the distances of pairs, as far as they are not known well enough.
 

@@ -5,14 +5,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 import math
 
 import numpy as np
 
 from .arrays import Array, checked, Mask
 from .exceptions import CommandError
-from .model import Pose, RobotModel
-from .servo import PoseCommand, TwistCommand
+from .model import combined, Pose, RobotModel
+from .requests import JogRequest
+from .servo import Command, JointCommand, PoseCommand, TwistCommand
 
 SKEW = 1e-3
 """How far a rotation may be from one, for rounding of quaternions."""
@@ -61,17 +63,42 @@ def twist_command(
     return TwistCommand(values, link, None if axes is None else _rotation(axes, 'axes'))
 
 
-def pose_command(pose: Pose) -> PoseCommand:
+def pose_command(pose: Pose, linear_speed: float = 0.4, angular_speed: float = 0.8) -> PoseCommand:
     """Check a pose.
 
     Args:
         pose: Pose of the tip in the base.
+        linear_speed: Greatest speed of the tip on the way there in [m/s].
+        angular_speed: Greatest angular speed of the tip on the way there in [rad/s].
 
     Raises:
         CommandError: A number is not finite, or the rotation is none.
     """
     position = checked(pose.position, 3, 'position')
-    return PoseCommand(Pose(_rotation(pose.rotation, 'rotation'), position))
+    return PoseCommand(
+        Pose(_rotation(pose.rotation, 'rotation'), position),
+        linear_speed,
+        angular_speed,
+    )
+
+
+def in_base(model: RobotModel, positions: Array, request: JogRequest) -> Command:
+    """Return the command of a request, about the tip and in the base.
+
+    Args:
+        model: The arm.
+        positions: Positions of the joints in [rad], for frames that move with the arm.
+        request: What is asked, in its frame.
+    """
+    command, frame = request.command, request.frame
+    if frame is None or isinstance(command, JointCommand):
+        return command
+    place = model.pose(positions, frame) if isinstance(frame, str) else frame
+    if isinstance(command, PoseCommand):
+        return replace(command, pose=combined(place, command.pose))
+    linear, angular = place.rotation @ command.twist[:3], place.rotation @ command.twist[3:]
+    lever = model.pose(positions).position - place.position
+    return TwistCommand(np.concatenate((linear + np.cross(angular, lever), angular)))
 
 
 def duration_of(duration: float | None, default: float) -> float:

@@ -2,8 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """One motion core: jogging, trajectories and single targets hand over to each other smoothly.
 
-Every source starts from the commanded state, and every step passes the same gate, so a hand-over
+Every source starts from the commanded state, and every step passes the same filter, so a hand-over
 is no event: positions, velocities and accelerations go on from where they are.
+
+Every motion comes in by one contract: :meth:`MotionCore.prepare` plans and checks a request beside
+the cycle, :meth:`MotionCore.commit` begins it in the cycle, and refuses what was prepared for
+another state or before another command or stop.
 """
 
 from __future__ import annotations
@@ -14,26 +18,30 @@ import math
 import numpy as np
 
 from .arrays import Array, checked
-from .commands import by_joint, duration_of, pose_command, twist_command
+from .command_arbiter import CommandArbiter
+from .commands import by_joint, duration_of, in_base, pose_command, twist_command
 from .core_settings import CoreSettings
-from .exceptions import CommandError, NotReadyError
-from .execution import Execution, Feedback
+from .exceptions import CommandError, GoalCode, NotReadyError, StateMovedError
+from .execution import Execution, Feedback, Outcome
 from .goal import TrajectoryGoal
-from .guard import Guard
 from .model import Pose, RobotModel
 from .otg import Generator, MotionState
-from .planning import Planning, Way
-from .report import Limiter, MotionReport
+from .preparation import CommandBasis, JointGoalPlan, Preparation, Prepared, PreparedTrajectory
+from .report import Cause
+from .requests import DisplacementRequest, JogRequest, MotionRequest, TargetRequest
+from .safety_filter import SafetyFilter
 from .servo import Command, JointCommand
 from .set_point import SetPoint, Source
-from .sources import Sources
+
+DISPLACED = 0.01
+"""How far the arm may be from where a trajectory was prepared in [rad]."""
 
 
 class MotionCore:
     """Set-points for an arm, cycle by cycle.
 
-    It reads no clock: times are steady times in [s] that its owner hands over. Commands and
-    :meth:`step` are for one thread.
+    Times are steady times in [s] that the owner hands over; it reads no clock. All methods are for
+    the thread of the cycle but :meth:`prepare`, which is for any one other thread.
     """
 
     def __init__(self, model: RobotModel, settings: CoreSettings | None = None) -> None:
@@ -44,16 +52,16 @@ class MotionCore:
             settings: How the core behaves.
         """
         self._model = model
-        self._limits = model.limits
         self._settings = settings or CoreSettings()
-        self._generator = Generator(model.limits)
-        self._planning = Planning(model, self._generator, self._settings)
-        self._sources = Sources(model, self._generator, self._settings)
-        self._guard = Guard(model, self._generator, self._settings.clearance)
+        generator = Generator(model.limits)
+        self._preparation = Preparation(model, generator, self._settings)
+        self._arbiter = CommandArbiter(model, generator, self._settings)
+        self._filter = SafetyFilter(model, generator)
         self._state: MotionState | None = None
         self._speed = 1.0
         self._paused = False
-        self._turn = 0
+        self._sequence = 0
+        self._last_change = ''
         self._loose = False
 
     @property
@@ -75,12 +83,12 @@ class MotionCore:
     @property
     def source(self) -> Source:
         """What moves the arm."""
-        return self._sources.active
+        return self._arbiter.active
 
     @property
     def execution(self) -> Execution | None:
         """The trajectory that was followed last, with its outcome; None before the first."""
-        return self._sources.execution
+        return self._arbiter.execution
 
     @property
     def feedback(self) -> Feedback | None:
@@ -97,6 +105,22 @@ class MotionCore:
         """Whether it is paused."""
         return self._paused
 
+    @property
+    def basis(self) -> CommandBasis:
+        """What a motion is prepared from now.
+
+        Raises:
+            NotReadyError: The position of the arm is not known yet.
+        """
+        return CommandBasis(
+            self.state,
+            self._sequence,
+            self.source,
+            self.speed_scaling,
+            self._arbiter.target,
+            self.execution,
+        )
+
     def reset(self, positions: Sequence[float] | Array, reason: str = 'the arm was reset') -> None:
         """Begin at rest where the arm is; whatever moved it ends.
 
@@ -108,10 +132,70 @@ class MotionCore:
             CommandError: The count is wrong, or a position is not finite.
         """
         where = checked(positions, len(self._model), 'positions')
-        self._turn += 1
-        self._sources.release(reason)
+        self._changed('the arm was moved by something else')
+        self._arbiter.release(reason)
         self._state = MotionState.at_rest(where)
-        self._guard.reset(self._state)
+        self._filter.reset(self._state)
+
+    def prepare(self, request: MotionRequest, basis: CommandBasis) -> Prepared:
+        """Plan a request and check its path; nothing moves. For any one thread at a time.
+
+        Args:
+            request: What is asked.
+            basis: The arm where the motion begins: :attr:`basis`, or foreseen from it.
+
+        Raises:
+            CommandError: The request is refused.
+        """
+        return self._preparation.prepare(request, basis)
+
+    def commit(self, prepared: Prepared) -> None:
+        """Begin a motion; where it is off, the arm catches up smoothly.
+
+        Args:
+            prepared: What :meth:`prepare` returned.
+
+        Raises:
+            CommandError: Another command or a stop came after it was prepared.
+            StateMovedError: The arm is elsewhere than where a trajectory was prepared.
+            NotReadyError: The position of the arm is not known yet.
+        """
+        if isinstance(prepared, JointGoalPlan):
+            if prepared.sequence != self._sequence:
+                raise CommandError(
+                    f'{self._last_change} before this command had begun; send it again'
+                )
+            self._changed('another command came')
+            self._arbiter.aim(prepared.target, prepared.max_speed)
+            return
+        self._check_place(prepared)
+        self._changed('another command came')
+        self._arbiter.follow(prepared.execution)
+
+    def ignores(self, request: JogRequest) -> bool:
+        """Whether a jog asks for standing still, and nobody jogs: it stops nothing else."""
+        return request.is_zero and self.source is not Source.JOG
+
+    def commit_jog(self, request: JogRequest) -> None:
+        """Jog from now on; there is nothing to prepare, the safety filter sees every step.
+
+        Args:
+            request: What is asked.
+
+        Raises:
+            CommandError: The arm is paused.
+            NotReadyError: The position of the arm is not known yet.
+        """
+        state = self.state
+        if self.ignores(request):
+            return
+        if self._paused:
+            raise CommandError(
+                'the arm is paused; resume first (~/resume of the trajectory controller)'
+            )
+        command = in_base(self._model, state.position, request)
+        self._changed('another command came')
+        self._arbiter.jog(command, request.expires)
 
     def twist(
         self,
@@ -182,113 +266,37 @@ class MotionCore:
             GoalError: It is refused; what moves the arm goes on.
             NotReadyError: The position of the arm is not known yet.
         """
-        execution = self.plan(goal, self.state)
-        self.begin(execution)
-        return execution
+        prepared = self._preparation.trajectory(goal, self.basis)
+        self.commit(prepared)
+        return prepared.execution
 
-    def plan(self, goal: TrajectoryGoal, state: MotionState) -> Execution:
-        """Check a trajectory and plan its execution, see :class:`Planning`.
-
-        For any one thread at a time: only the execution's steps use what belongs to the cycle.
-
-        Args:
-            goal: The trajectory.
-            state: The commanded state at which it will begin.
-
-        Raises:
-            GoalError: It is refused.
-        """
-        return self._planning.execution(goal, state, self._pace)
-
-    def begin(self, execution: Execution) -> None:
-        """Follow a trajectory that was planned; where it is off, the arm catches up smoothly.
-
-        Args:
-            execution: What :meth:`plan` returned.
-
-        Raises:
-            NotReadyError: The position of the arm is not known yet.
-        """
-        _ = self.state
-        self._turn += 1
-        self._sources.follow(execution)
-
-    def move_to(self, positions: Mapping[str, float], fastest: float = math.inf) -> None:
+    def move_to(self, positions: Mapping[str, float], max_speed: float = math.inf) -> None:
         """Move joints to positions in the shortest time, and rest there.
 
         Args:
             positions: Targets in [rad] by joint; the others come to rest.
-            fastest: Greatest speed of a joint in [rad/s].
+            max_speed: Greatest speed of a joint in [rad/s].
 
         Raises:
             CommandError: A joint is unknown, a number is not finite or beyond a limit, or links
                 meet on the way.
             NotReadyError: The position of the arm is not known yet.
         """
-        way = self.way_to(positions, fastest)
-        self.check(way)
-        self.go(way)
+        self.commit(self.prepare(TargetRequest(positions, max_speed), self.basis))
 
-    def nudge(self, displacements: Mapping[str, float], fastest: float = math.inf) -> None:
-        """Move joints on by amounts, and rest there; nudges add up while they are carried out.
+    def move_by(self, displacements: Mapping[str, float], max_speed: float = math.inf) -> None:
+        """Move joints on by amounts, and rest there; they add up while they are carried out.
 
         Args:
             displacements: How far in [rad] by joint.
-            fastest: Greatest speed of a joint in [rad/s].
+            max_speed: Greatest speed of a joint in [rad/s].
 
         Raises:
             CommandError: A joint is unknown, the end is not finite or beyond a limit, or links
                 meet on the way.
             NotReadyError: The position of the arm is not known yet.
         """
-        way = self.way_by(displacements, fastest)
-        self.check(way)
-        self.go(way)
-
-    def way_to(self, positions: Mapping[str, float], fastest: float = math.inf) -> Way:
-        """Return the way of :meth:`move_to`, for :meth:`check` and :meth:`go`; nothing moves."""
-        values, moved = by_joint(self._model, positions, 'positions')
-        rest, limits = self._generator.brake(self.state), self._limits
-        stay = self.state.position if rest is None else rest.at(rest.duration).position
-        # where a joint comes to rest was not asked for: it need not be refused
-        target = np.where(moved, values, np.clip(stay, limits.lower, limits.upper))
-        return self._way(target, fastest)
-
-    def way_by(self, displacements: Mapping[str, float], fastest: float = math.inf) -> Way:
-        """Return the way of :meth:`nudge`, for :meth:`check` and :meth:`go`; nothing moves."""
-        values, moved = by_joint(self._model, displacements, 'displacements')
-        pending = self._sources.target
-        if pending is not None:
-            return self._way(
-                pending + values, fastest
-            )  # what other nudges are on their way to stays
-        ends, names = self.state.position + values, self._limits.names
-        asked = {names[place]: float(ends[place]) for place in np.flatnonzero(moved)}
-        return self.way_to(asked, fastest)
-
-    def check(self, way: Way) -> None:
-        """Look for collisions on a way, see :class:`Planning`; for any one thread.
-
-        Args:
-            way: The way.
-
-        Raises:
-            CommandError: Links meet on it.
-        """
-        self._planning.check(way)
-
-    def go(self, way: Way) -> None:
-        """Go a way that was checked.
-
-        Args:
-            way: What :meth:`way_to` or :meth:`way_by` returned.
-
-        Raises:
-            CommandError: Another command came in between.
-        """
-        if way.turn != self._turn:
-            raise CommandError('another command came before this one had begun; give it again')
-        self._sources.aim(way.target, way.fastest)
+        self.commit(self.prepare(DisplacementRequest(displacements, max_speed), self.basis))
 
     def stop(self, reason: str = 'stopped') -> None:
         """Come to rest: a trajectory on its path, anything else in the shortest time.
@@ -296,12 +304,12 @@ class MotionCore:
         Args:
             reason: Why, for the trajectory that this ends.
         """
-        self._turn += 1
-        self._sources.stop(reason)
+        self._changed('the arm was stopped')
+        self._arbiter.stop(reason)
 
     def pause(self) -> None:
         """Come to rest, a trajectory on its path; jogging is refused until :meth:`resume`."""
-        self._turn += 1
+        self._changed('the arm was paused')
         self._paused = True
 
     def resume(self) -> None:
@@ -333,40 +341,69 @@ class MotionCore:
             NotReadyError: The position of the arm is not known yet.
         """
         state = self.state
-        wanted, report = self._sources.step(
-            state, measured or state, now, period, pace=self._pace, paused=self._paused
+        wanted, report = self._arbiter.step(
+            state,
+            measured or state,
+            now,
+            period,
+            speed_scaling=self.speed_scaling,
+            paused=self._paused,
         )
-        # the ways of trajectories and targets were looked at; but not from out of a jog
-        self._loose = self._sources.active in {Source.JOG, Source.NONE} or (
-            self._loose and state.moving and self._sources.brakes
-        )
-        after, limiter = self._guard.step(state, wanted, period, clearances=self._loose)
+        after, limiter = self._filter.step(state, wanted, period, self._clearance(state))
         self._state = after
-        source = self._sources.ended(after, now, paused=self._paused)
-        return SetPoint(after, source, _with(report, limiter))
+        if limiter is not None:
+            report = report.with_limiter(limiter)
+            if limiter.cause is Cause.COLLISION:
+                self._give_up_catching_up(limiter.name)
+        source = self._arbiter.ended(after, now, paused=self._paused)
+        return SetPoint(after, source, report)
 
     @property
-    def _pace(self) -> float:
+    def speed_scaling(self) -> float:
+        """Speed override that counts, 0 to 1: none while it is paused."""
         return 0.0 if self._paused else self._speed
 
-    def _jog(self, command: Command, now: float, duration: float | None) -> None:
-        _ = self.state
-        counts = duration_of(duration, self._settings.timeout)
-        if self._paused:
-            raise CommandError(
-                'the arm is paused; resume first (~/resume of the trajectory controller)'
+    def _clearance(self, state: MotionState) -> float | None:
+        """Return the distance that links must keep on a stop in [m].
+
+        None for what is on a path that was checked: a stop stays on it.
+        """
+        jogged = self.source in {Source.JOG, Source.NONE}
+        self._loose = jogged or (self._loose and state.moving and self._arbiter.brakes)
+        if self._loose:
+            return self._settings.clearance
+        if self._arbiter.on_path or not self._settings.check_self_collision:
+            return None
+        return 0.0
+
+    def _give_up_catching_up(self, links: str) -> None:
+        """End a trajectory that cannot be met without contact; the arm comes to rest."""
+        if self.source is Source.TRAJECTORY and self.execution is not None:
+            self.execution.abandon(
+                Outcome(
+                    GoalCode.PATH_TOLERANCE_VIOLATED,
+                    f'{links} would collide while the arm catches up with the path; begin at rest,'
+                    ' or give the first point more time',
+                )
             )
-        self._turn += 1
-        self._sources.jog(command, now + counts)
 
-    def _way(self, target: Array, fastest: float) -> Way:
-        if not fastest > 0.0:
-            raise CommandError(f'greatest speed of a joint {fastest} rad/s: it must be above 0')
-        self._sources.check_target(target)
-        return Way(self.state, target, fastest, self._turn)
+    def _changed(self, what: str) -> None:
+        """Count a command or a stop: what was prepared before it is void."""
+        self._sequence += 1
+        self._last_change = what
 
+    def _check_place(self, prepared: PreparedTrajectory) -> None:
+        """Make sure that the arm is where a trajectory was prepared; else its way is another."""
+        off = np.abs(self.state.position - prepared.state.position)
+        joint = int(np.argmax(off))
+        if off[joint] > DISPLACED:
+            raise StateMovedError(
+                GoalCode.INVALID_GOAL,
+                f'{self._model.joints[joint]} was moved by {off[joint]:.3f} rad while the'
+                ' trajectory was planned, and its path was checked from there only; end what'
+                ' moves the arm, and send it again',
+            )
 
-def _with(report: MotionReport, limiter: Limiter | None) -> MotionReport:
-    if limiter is None:
-        return report
-    return MotionReport(min(report.factor, limiter.factor), (*report.limiters, limiter))
+    def _jog(self, command: Command, now: float, duration: float | None) -> None:
+        counts = duration_of(duration, self._settings.timeout)
+        self.commit_jog(JogRequest(command, now + counts))

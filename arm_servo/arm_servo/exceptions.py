@@ -9,6 +9,7 @@
     │   └── LimitsError             the limits file is the matter
     ├── CommandError (ValueError)   a command is refused before anything moves
     │   └── GoalError               a trajectory is refused; carries the code of the action
+    │       └── StateMovedError     the arm is elsewhere than where it was planned
     └── NotReadyError               nothing can be commanded before the arm's position is known
 
 Arguments of the wrong kind from a *programmer* stay ``ValueError``/``TypeError``.
@@ -75,6 +76,10 @@ class GoalError(CommandError):
         """
         super().__init__(reason)
         self.code = code
+
+
+class StateMovedError(GoalError):
+    """The arm is elsewhere than where a trajectory was planned; planned anew it may begin."""
 
 
 class NotReadyError(ServoError):

@@ -1,31 +1,31 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Following a trajectory: on its path, at any pace, to an end that says how it went."""
+"""Following a trajectory: on its path, at any speed, to an end that says how it went."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 
 import numpy as np
 
 from .arrays import Array
+from .catch_up import CatchUpInterpolator
 from .exceptions import GoalCode
-from .follower import Follower
 from .goal import GoalRules, JointTolerance, TrajectoryGoal
 from .goal_path import build_path
 from .limits import JointLimits
 from .otg import Generator, MotionState
 from .path import Path
-from .path_clock import PathClock
 from .tolerances import tolerances
+from .trajectory_timer import TrajectoryTimer
 
 ARRIVED = 1e-6
 """How near to the end the set-points must be to have arrived in [rad]."""
 
 CHASING = 0.7
-"""Pace at most while the arm catches up with the path."""
+"""Speed scaling at most while the arm catches up with the path."""
 
 MET = 1e-3
 """How near to the path the set-points must be to have met it in [rad]."""
@@ -83,23 +83,24 @@ class Feedback:
         time: Time of the trajectory in [s].
         desired: What the trajectory says now.
         actual: What was measured.
-        pace: Seconds of the trajectory per second.
+        speed_scaling: Seconds of the trajectory per second.
     """
 
     time: float
     desired: MotionState
     actual: MotionState
-    pace: float
+    speed_scaling: float
 
 
 class Execution:
     """One trajectory on its way.
 
-    Pause, speed and cancel act on the pace at which the path is walked, so the arm stays on it.
+    Pause, speed and cancel act on the speed scaling of the path, so the arm stays on it.
 
     Attributes:
         phase: Where the execution is.
         feedback: Where it is on the path, as of the last step.
+        on_path: Whether the last step was taken exactly on the path, which was checked.
         ending: How it ends or has ended; None while nothing is decided.
     """
 
@@ -110,7 +111,7 @@ class Execution:
         limits: JointLimits,
         generator: Generator,
         state: MotionState,
-        pace: float,
+        speed_scaling: float,
         settings: ExecutionSettings,
         wait: float = 0.0,
     ) -> None:
@@ -121,7 +122,7 @@ class Execution:
             limits: Limits of the joints.
             generator: Plans how to catch up.
             state: Commanded state of the arm where it begins.
-            pace: Pace to start with, 0 to 1.
+            speed_scaling: Speed scaling to start with, 0 to 1.
             settings: How it is followed.
             wait: How long to wait at rest in [s]; the state is one of rest then.
 
@@ -131,9 +132,11 @@ class Execution:
         self._limits, self._waiting = limits, wait
         planned = build_path(goal, limits, state, settings.rules)
         self._path, self._late = planned.path, planned.late
-        # an arm that moves goes on as it does, and takes up the pace from there
-        self._clock = PathClock(limits, 1.0 if state.moving else pace)
-        self._follower = Follower(limits, generator)
+        # an arm that moves goes on as it does, and changes its speed from there
+        self._timer = TrajectoryTimer(limits, 1.0 if state.moving else speed_scaling)
+        self._begins_at_rest = not state.moving
+        self._begun = False
+        self._catch_up = CatchUpInterpolator(limits, generator)
         self._path_tolerance = tolerances(limits, goal.path_tolerance, settings.path)
         self._goal_tolerance = tolerances(limits, goal.goal_tolerance, settings.goal)
         self._goal_time = goal.goal_time or settings.goal_time
@@ -143,8 +146,11 @@ class Execution:
         self._rested = False
         self.ending: Outcome | None = None
         self.phase = Phase.FOLLOWING
+        self.on_path = False
         begin_point = self._path.at(0.0)
-        self.feedback = Feedback(0.0, MotionState.at_rest(begin_point.position), state, pace)
+        self.feedback = Feedback(
+            0.0, MotionState.at_rest(begin_point.position), state, speed_scaling
+        )
 
     @property
     def path(self) -> Path:
@@ -153,19 +159,21 @@ class Execution:
 
     @property
     def duration(self) -> float:
-        """How long its path lasts at full pace in [s]."""
+        """How long its path lasts at full speed in [s]."""
         return self._path.duration
 
     def foreseen(self, ahead: float) -> MotionState:
-        """Return where it will be at its present pace; for any thread.
+        """Return where it will be at its present speed; for any thread.
 
         Args:
             ahead: Time from the last step in [s]; less than 0 is the past.
         """
         feedback, path = self.feedback, self._path
-        here = path.at(feedback.time + feedback.pace * max(ahead - self._waiting, 0.0))
+        here = path.at(feedback.time + feedback.speed_scaling * max(ahead - self._waiting, 0.0))
         return MotionState(
-            here.position, here.velocity * feedback.pace, here.acceleration * feedback.pace**2
+            here.position,
+            here.velocity * feedback.speed_scaling,
+            here.acceleration * feedback.speed_scaling**2,
         )
 
     def stop(self, outcome: Outcome) -> None:
@@ -188,62 +196,74 @@ class Execution:
             self.phase = Phase.DONE
 
     def step(
-        self, state: MotionState, measured: MotionState, pace: float, period: float
+        self, state: MotionState, measured: MotionState, speed_scaling: float, period: float
     ) -> MotionState | None:
         """Advance.
 
         Args:
             state: Commanded state now.
             measured: Measured state now.
-            pace: Wanted pace, 0 to 1.
+            speed_scaling: Wanted speed scaling, 0 to 1.
             period: Time to the next step in [s].
 
         Returns:
             The state to command next; None to come to rest: it does not begin yet, or there is no
             way to follow.
         """
-        if self.waits:
-            return self._wait(state, period)
+        if not self._begun and self._waits(speed_scaling):
+            return self._wait(state, speed_scaling, period)
+        self._begun = True
         self._check(state, measured, period)
         if self.phase is Phase.STOPPING:
-            pace = 0.0
+            speed_scaling = 0.0
         elif self._off > MET:  # joints that give their utmost for the path cannot catch up
-            pace = min(pace, CHASING)
-        self._clock.step(self._path, pace, period)
-        following = self._follower.step(state, self._ahead(period), period)
+            speed_scaling = min(speed_scaling, CHASING)
+        self._timer.step(self._path, speed_scaling, period)
+        following = self._catch_up.step(state, self._ahead(period), period)
+        self.on_path = following is not None and self._catch_up.exact
         desired = self._ahead(period)(period)
-        self.feedback = Feedback(self._clock.time, desired, measured, self._clock.pace)
+        self.feedback = Feedback(self._timer.time, desired, measured, self._timer.speed_scaling)
         self._advance(following)
         return following
 
     @property
     def waits(self) -> bool:
         """Whether it is yet to begin."""
-        return self._waiting > 0.0
+        return not self._begun
 
-    def _wait(self, state: MotionState, period: float) -> MotionState | None:
+    def _waits(self, speed_scaling: float) -> bool:
+        """Whether it does not begin now: before its time, or at rest in a pause or a stop."""
+        if self._waiting > 0.0:
+            return True
+        if not self._begins_at_rest:
+            return False
+        self._timer.begin(speed_scaling)
+        return speed_scaling == 0.0 or self.phase is Phase.STOPPING
+
+    def _wait(self, state: MotionState, speed_scaling: float, period: float) -> MotionState | None:
         """Come to rest where the path begins, and wait there; all is planned already."""
         self._waiting -= period
+        self.feedback = replace(self.feedback, speed_scaling=speed_scaling)
         if self.phase is Phase.STOPPING:
             self.phase = Phase.DONE
             return None
         self._rested = self._rested or not state.moving
-        if not self._rested:
-            return None  # the joints slow down in step
+        if not self._rested or speed_scaling == 0.0:
+            return None  # the joints slow down in step; in a pause they stay where they are
         rest = MotionState.at_rest(self._path.at(0.0).position)
-        return self._follower.step(state, lambda _: rest, period)
+        return self._catch_up.step(state, lambda _: rest, period)
 
     def _ahead(self, period: float) -> Callable[[float], MotionState]:
         """Return where the path will be, by the time from now in [s]."""
-        clock, path = self._clock, self._path
+        timer, path = self._timer, self._path
 
         def ahead(time: float) -> MotionState:
-            at, pace, change = clock.ahead(time - period)
+            at, speed_scaling, change = timer.ahead(time - period)
             here = path.at(at)
             return MotionState(
                 here.position,
-                here.velocity * pace,
-                here.acceleration * pace**2 + here.velocity * change,
+                here.velocity * speed_scaling,
+                here.acceleration * speed_scaling**2 + here.velocity * change,
             )
 
         return ahead
@@ -251,7 +271,7 @@ class Execution:
     def _check(self, state: MotionState, measured: MotionState, period: float) -> None:
         """Check the tolerances at the present place."""
         desired, limits = self.feedback.desired, self._limits
-        error = desired.position - measured.position
+        error = limits.error(desired.position, measured.position)
         speed_error = desired.velocity - measured.velocity
         if self.phase is Phase.FOLLOWING:
             violation = self._astray(desired.position - state.position)
@@ -291,8 +311,8 @@ class Execution:
 
     def _advance(self, state: MotionState | None) -> None:
         """Go on to the next phase at the end of the path, or where it stands still."""
-        if self.phase is Phase.FOLLOWING and self._clock.time >= self._path.duration:
+        if self.phase is Phase.FOLLOWING and self._timer.time >= self._path.duration:
             self.phase = Phase.SETTLING
-        at_rest = self._clock.stopped or self._clock.time >= self._path.duration
+        at_rest = self._timer.stopped or self._timer.time >= self._path.duration
         if self.phase is Phase.STOPPING and at_rest and (state is None or not state.moving):
             self.phase = Phase.DONE

@@ -23,10 +23,11 @@ from .path_timing import Demand, Timing
 OVER = 1.02
 """How far the speed of a segment may exceed a limit; it is walked slower then."""
 
-LONGER = (1.2, 0.5)
+LONGER = (1.1, 0.5)
 """Share, and time in [s], by which a path may take longer than asked.
 
-As much as MoveIt waits for: allowed_execution_duration_scaling, allowed_goal_duration_margin.
+As much as MoveIt waits for by default: allowed_execution_duration_scaling,
+allowed_goal_duration_margin.
 """
 
 DENSE = 1e-3

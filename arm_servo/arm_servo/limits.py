@@ -39,6 +39,9 @@ KEYS = {
 }
 """Names of the numbers behind each ``has_..._limits`` of MoveIt's format."""
 
+TURN = 2.0 * math.pi
+"""A whole turn in [rad]."""
+
 SLACK = 1e-3
 """How much a limit may exceed the description's for rounding, as a share."""
 
@@ -78,6 +81,17 @@ class JointLimits:
     def __len__(self) -> int:
         """Return the number of joints."""
         return len(self.names)
+
+    def error(self, wanted: Array, actual: Array) -> Array:
+        """Return wanted less actual; of continuous joints half a turn at most.
+
+        Args:
+            wanted: Positions in [rad].
+            actual: Positions in [rad]; whole turns of continuous joints do not count.
+        """
+        error: Array = wanted - actual
+        turns = np.where(self.continuous, TURN * np.round(error / TURN), 0.0)
+        return error - turns
 
     @property
     def continuous(self) -> Mask:

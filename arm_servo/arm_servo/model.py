@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 
 from .arrays import Array, frozen, Native
-from .clearances import Clearances, Proximity
+from .clearances import Clearances, LeastClearance, Proximity
 from .collision import CollisionModel
 from .description import Description
 from .exceptions import CommandError, ModelError
@@ -35,6 +35,11 @@ class Pose:
 
     rotation: Array
     position: Array
+
+
+def combined(outer: Pose, inner: Pose) -> Pose:
+    """Return a pose in the frame in which the outer one is given."""
+    return Pose(outer.rotation @ inner.rotation, outer.position + outer.rotation @ inner.position)
 
 
 class RobotModel:
@@ -162,15 +167,20 @@ class RobotModel:
         distances = self._clearances.least(positions, within)
         return float(distances.min(initial=math.inf))
 
-    def least_clearance(self, places: Array, within: float) -> float:
-        """Return the least distance between two shapes at any of some places in [m].
+    def least_clearance(self, places: Array, within: float) -> LeastClearance:
+        """Return the two links that come nearest to each other at any of some places.
 
         Args:
             places: Joint positions in [rad] (m, n).
             within: Distance of interest in [m]; where it is more, a lower bound is good enough.
         """
-        proven = self._clearances.proven(places, within)
-        return min((self.clearance(each, within) for each in places[proven:]), default=within)
+        least = LeastClearance(within)
+        for positions in places[self._clearances.proven(places, within) :]:
+            distances = self._clearances.least(positions, within)
+            pair = int(distances.argmin())
+            if distances[pair] < least.distance:
+                least = LeastClearance(float(distances[pair]), self.pairs[pair])
+        return least
 
     def stays_apart(self, lower: Array, upper: Array, within: float) -> bool:
         """Whether no shapes are as near at any positions between bounds, as far as is known.

@@ -17,7 +17,6 @@ class Cause(Enum):
     COLLISION = 'collision'
     SINGULARITY = 'singularity'
     HOLD = 'path'
-    STOP_CHECK = 'stop check'
     SOLVER = 'solver'
 
 
@@ -59,6 +58,15 @@ class MotionReport:
 
     factor: float = 1.0
     limiters: tuple[Limiter, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Sort the limiters, so that the first is the one that matters."""
+        strongest = tuple(sorted(self.limiters, key=lambda limiter: limiter.factor))
+        object.__setattr__(self, 'limiters', strongest)
+
+    def with_limiter(self, limiter: Limiter) -> MotionReport:
+        """Return the report with one limiter more."""
+        return MotionReport(min(self.factor, limiter.factor), (limiter, *self.limiters))
 
     def __str__(self) -> str:
         """Say it in one line."""

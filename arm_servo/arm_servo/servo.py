@@ -24,7 +24,7 @@ BASE = np.eye(3)
 RELEASED = np.array([2e-3] * 3 + [5e-3] * 3)
 """Speed below which a released axis is held again in [m/s] and [rad/s]."""
 
-LEAST_PACE = 0.1
+MIN_SHARE = 0.1
 """Least share of a command that is carried out while held axes are off."""
 
 SLOWED, HASTENED = 0.1, 0.4
@@ -65,9 +65,13 @@ class PoseCommand:
 
     Attributes:
         pose: Pose of the tip in the base.
+        linear_speed: Greatest speed of the tip on the way there in [m/s].
+        angular_speed: Greatest angular speed of the tip on the way there in [rad/s].
     """
 
     pose: Pose
+    linear_speed: float = 0.4
+    angular_speed: float = 0.8
 
 
 Command = TwistCommand | JointCommand | PoseCommand
@@ -79,9 +83,7 @@ class ServoSettings:
 
     Attributes:
         hold: How fast held axes come back, per error, in [1/s].
-        pace: How fast a pose is approached at the end, per distance, in [1/s].
-        linear_speed: Greatest speed of the tip towards a pose in [m/s].
-        angular_speed: Greatest angular speed of the tip towards a pose in [rad/s].
+        approach: How fast a pose is approached at the end, per distance, in [1/s].
         linear_deceleration: Deceleration towards a pose in [m/s2].
         angular_deceleration: Angular deceleration towards a pose in [rad/s2].
         path_error: Error of held axes at which the command is slowed down in [m].
@@ -91,9 +93,7 @@ class ServoSettings:
     """
 
     hold: float = 8.0
-    pace: float = 4.0
-    linear_speed: float = 0.4
-    angular_speed: float = 0.8
+    approach: float = 4.0
     linear_deceleration: float = 0.5
     angular_deceleration: float = 1.5
     path_error: float = 5e-4
@@ -146,7 +146,7 @@ class ServoSource:
             return self._ik.joints(state, command.velocity, command.commanded, period)
         if isinstance(command, PoseCommand):
             self.reset()
-            return self._toward(state, command.pose, period)
+            return self._toward(state, command, period)
         return self._jog(state, command, period)
 
     def _jog(self, state: MotionState, command: TwistCommand, period: float) -> IkAnswer:
@@ -194,18 +194,18 @@ class ServoSource:
         scale = self._settings.path_error
         x, y, z, *turns = error.tolist()
         off: float = max(map(abs, (x, y, z, *(self._length * turn for turn in turns))))
-        wanted = min(1.0, max(LEAST_PACE, 1.0 - (off - scale) / (4.0 * scale)))
+        wanted = min(1.0, max(MIN_SHARE, 1.0 - (off - scale) / (4.0 * scale)))
         return min(max(wanted, self._share - period / SLOWED), self._share + period / HASTENED)
 
-    def _toward(self, state: MotionState, goal: Pose, period: float) -> IkAnswer:
+    def _toward(self, state: MotionState, command: PoseCommand, period: float) -> IkAnswer:
         """Approach a pose, slowing down so as to arrive at rest."""
         settings = self._settings
-        error = _error(goal, self._model.pose(state.position), np.eye(3))
+        error = _error(command.pose, self._model.pose(state.position), np.eye(3))
         linear = _approach(
-            error[:3], settings.pace, settings.linear_speed, settings.linear_deceleration
+            error[:3], settings.approach, command.linear_speed, settings.linear_deceleration
         )
         angular = _approach(
-            error[3:], settings.pace, settings.angular_speed, settings.angular_deceleration
+            error[3:], settings.approach, command.angular_speed, settings.angular_deceleration
         )
         twist = np.concatenate((linear, angular))
         return self._ik.cartesian(
@@ -213,12 +213,12 @@ class ServoSource:
         )
 
 
-def _approach(error: Array, pace: float, fastest: float, deceleration: float) -> Array:
+def _approach(error: Array, gain: float, fastest: float, deceleration: float) -> Array:
     """Return a velocity towards a point: even, then braking, then fading."""
     distance = float(np.linalg.norm(error))
     if distance == 0.0:
         return error
-    speed = min(fastest, pace * distance, np.sqrt(deceleration * distance))
+    speed = min(fastest, gain * distance, np.sqrt(deceleration * distance))
     approach: Array = error * (speed / distance)
     return approach
 

@@ -9,7 +9,6 @@ import math
 import numpy as np
 
 from .arrays import Array
-from .exceptions import CommandError
 from .limits import JointLimits
 from .otg import Generator, MotionState
 
@@ -25,7 +24,7 @@ class SingleTarget:
 
     Attributes:
         target: Positions in [rad]; None without one.
-        fastest: Greatest speed of a joint on the way there in [rad/s].
+        max_speed: Greatest speed of a joint on the way there in [rad/s].
     """
 
     def __init__(self, limits: JointLimits, generator: Generator) -> None:
@@ -39,38 +38,21 @@ class SingleTarget:
         self._full = self._planner = generator
         self._planned_for = (1.0, math.inf)
         self.target: Array | None = None
-        self.fastest = math.inf
+        self.max_speed = math.inf
 
-    def check(self, target: Array) -> None:
-        """Make sure that a target is within the limits.
-
-        Args:
-            target: Positions in [rad].
-
-        Raises:
-            CommandError: A position is beyond a limit.
-        """
-        beyond = (target < self._limits.lower) | (target > self._limits.upper)
-        if beyond.any():
-            joint = int(np.argmax(beyond))
-            raise CommandError(
-                f'{self._limits.names[joint]}: {target[joint]:.4f} is beyond its limits'
-                f' {self._limits.lower[joint]:.4f}..{self._limits.upper[joint]:.4f}'
-            )
-
-    def step(self, state: MotionState, speed: float, period: float) -> MotionState | None:
+    def step(self, state: MotionState, speed_scaling: float, period: float) -> MotionState | None:
         """Return the next state; None to come to rest.
 
         Args:
             state: Commanded state of the joints.
-            speed: Share of the speed, 0 to 1.
+            speed_scaling: Share of the speed, 0 to 1.
             period: Time to the next step in [s].
         """
-        if self.target is None or speed == 0.0:
+        if self.target is None or speed_scaling == 0.0:
             return None
-        if (speed, self.fastest) != self._planned_for:
-            self._planned_for = speed, self.fastest
-            self._planner = self._full.slowed(max(speed, SLOWEST), self.fastest)
+        if (speed_scaling, self.max_speed) != self._planned_for:
+            self._planned_for = speed_scaling, self.max_speed
+            self._planner = self._full.slowed(max(speed_scaling, SLOWEST), self.max_speed)
         there = MotionState.at_rest(self.target)
         plan = self._planner.to_state(state, there)
         if plan is None:

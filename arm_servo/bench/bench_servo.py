@@ -180,7 +180,7 @@ def time_of_check(model: RobotModel) -> tuple[float, int]:
         core = MotionCore(model, CoreSettings(check_self_collision=False))
         core.reset(ready(model.name))
         try:
-            path = core.plan(TrajectoryGoal(model.joints, points), core.state).path
+            path = core.follow(TrajectoryGoal(model.joints, points)).path
         except GoalError:
             continue  # too fast somewhere
         begin = time.perf_counter()

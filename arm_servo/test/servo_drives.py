@@ -5,17 +5,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import Future
+from concurrent.futures import Executor, Future
 from dataclasses import replace
 
 import numpy as np
+from servo_commands import InlineWorker
 from servo_robots import ready, robot
 
 from arm_canopen import AxisFeedback, MotionSource, Setpoint
 from arm_canopen.standard.drive import DriveState
 from arm_servo.arrays import Array
 from arm_servo.core import MotionCore
-from arm_servo.nodes.desk import Desk
+from arm_servo.gateway import CommandGateway
 from arm_servo.nodes.drive_source import DriveSource
 
 PERIOD = 0.01
@@ -25,20 +26,22 @@ class Drives:
     """Drives that go to their set-points at once.
 
     Attributes:
-        desk: The desk of the core that commands them.
+        gateway: Commands to the core that moves them.
         source: The source under test.
         axes: State of each drive; to be changed by tests.
         path: Positions commanded so far, a row for each cycle.
     """
 
-    def __init__(self, name: str = 'panda') -> None:
+    def __init__(self, name: str = 'panda', worker: Executor | None = None) -> None:
         """Let the drives be ready to follow."""
         self.now = 100.0
-        self.desk = Desk(MotionCore(robot(name)), lambda: self.now)
-        self.source = DriveSource(self.desk)
+        self.gateway = CommandGateway(
+            MotionCore(robot(name)), lambda: self.now, worker or InlineWorker()
+        )
+        self.source = DriveSource(self.gateway)
         self.axes = [
             AxisFeedback(joint, True, DriveState.OPERATION_ENABLED, 8, at, 0.0, at, True)
-            for joint, at in zip(self.desk.model.joints, ready(name).tolist(), strict=True)
+            for joint, at in zip(self.gateway.model.joints, ready(name).tolist(), strict=True)
         ]
         self.path: list[Array] = []
         self.attachments: list[MotionSource] = []

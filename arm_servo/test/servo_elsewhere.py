@@ -5,14 +5,17 @@
 from __future__ import annotations
 
 from collections import deque
+from concurrent.futures import Executor
 
 import numpy as np
+from servo_commands import InlineWorker
+from servo_commands import jog as jog_joints
 from servo_robots import ready, robot
 
 from arm_servo.arrays import Array
 from arm_servo.core import MotionCore
+from arm_servo.gateway import CommandGateway
 from arm_servo.goal import GoalPoint, TrajectoryGoal
-from arm_servo.nodes.desk import Desk
 from arm_servo.nodes.following import FollowingLimits, FollowingWatch
 from arm_servo.nodes.joint_feedback import JointFeedback
 from arm_servo.nodes.motion_thread import MotionCycle
@@ -33,7 +36,9 @@ class Elsewhere:
         points: All set-points so far.
     """
 
-    def __init__(self, following: FollowingLimits | None = None) -> None:
+    def __init__(
+        self, following: FollowingLimits | None = None, worker: Executor | None = None
+    ) -> None:
         """Stand in the ready pose."""
         model = robot('gp110')
         self.now = 50.0
@@ -44,10 +49,12 @@ class Elsewhere:
         self.sag = 0.0
         self.points: list[SetPoint] = []
         self._way: deque[Array] = deque()
-        self.desk = Desk(MotionCore(model), lambda: self.now)
+        self.gateway = CommandGateway(
+            MotionCore(model), lambda: self.now, worker or InlineWorker()
+        )
         self.feedback = JointFeedback(model.joints, 0.2)
         watch = FollowingWatch(model.limits, following or FollowingLimits(), PERIOD)
-        self.cycle = MotionCycle(self.desk, self.feedback, self.take, watch)
+        self.cycle = MotionCycle(self.gateway, self.feedback, self.take, watch)
 
     def take(self, point: SetPoint) -> None:
         """Go to a set-point, at once or some cycles later."""
@@ -63,7 +70,7 @@ class Elsewhere:
             self.now += PERIOD
             if self.heard:
                 at = (self.at - self.sag).tolist()
-                self.feedback.take(self.desk.model.joints, at, [], self.now)
+                self.feedback.take(self.gateway.model.joints, at, [], self.now)
             self.cycle.step(self.now, PERIOD)
 
     def path(self) -> Array:
@@ -73,14 +80,14 @@ class Elsewhere:
 
 def swing(arm: Elsewhere, far: float = 0.3) -> TrajectoryGoal:
     """Return a trajectory of all joints."""
-    return TrajectoryGoal(arm.desk.model.joints, [GoalPoint(2.0, (arm.at + far).tolist())])
+    return TrajectoryGoal(arm.gateway.model.joints, [GoalPoint(2.0, (arm.at + far).tolist())])
 
 
 def jog(arm: Elsewhere, cycles: int, speed: float = 0.5) -> list[str]:
     """Jog the first joint with a command in each cycle; return why commands were refused."""
     refusals = []
     for _ in range(cycles):
-        future = arm.desk.submit(lambda core, now: core.jog({'joint_1_s': speed}, now))
+        future = jog_joints(arm.gateway, {'joint_1_s': speed}, arm.now)
         arm.run()
         if (error := future.exception(0.0)) is not None:
             refusals.append(str(error))

@@ -11,10 +11,10 @@ import numpy as np
 import pinocchio as pin
 
 from arm_servo.arrays import Array
-from arm_servo.guard import Guard
 from arm_servo.model import RobotModel
 from arm_servo.otg import Generator, MotionState
 from arm_servo.report import Limiter, MotionReport
+from arm_servo.safety_filter import SafetyFilter
 from arm_servo.servo import Command, ServoSource
 
 PERIOD = 0.01
@@ -28,7 +28,7 @@ class Run:
     Attributes:
         states: State after every cycle, the start first.
         report: The last report.
-        held_up: What the guard held up, by any cycle.
+        held_up: What the safety filter held up, by any cycle.
         moved: Twist from the first pose to the last, in the base.
     """
 
@@ -54,9 +54,9 @@ def run(
 ) -> Run:
     """Carry out a command, or one that changes with time, for a time [s]."""
     source, generator = ServoSource(model), Generator(model.limits)
-    guard = Guard(model, generator, clearance=0.005)
+    safety_filter = SafetyFilter(model, generator)
     state = start if isinstance(start, MotionState) else MotionState.at_rest(start)
-    guard.reset(state)
+    safety_filter.reset(state)
     states, held_up, report = [state], [], MotionReport()
     for step in range(round(duration / period)):
         now = command(step * period) if callable(command) else command
@@ -64,7 +64,7 @@ def run(
         report = answer.report
         plan = generator.to_velocity(state, answer.velocity)
         assert plan is not None
-        state, limiter = guard.step(state, plan.at(period), period, clearances=True)
+        state, limiter = safety_filter.step(state, plan.at(period), period, 0.005)
         held_up += [limiter] if limiter is not None else []
         states.append(state)
     moved = twist_between(model, states[0].position, state.position)

@@ -230,16 +230,16 @@ def test_nudges_add_up() -> None:
     """Ten steps of a hundredth, one after the other or at once, make a tenth."""
     core = core_of('prbt')
     for _ in range(5):
-        core.nudge({'prbt_joint_1': 0.01})
+        core.move_by({'prbt_joint_1': 0.01})
     stream(core, 1.0)
     for _ in range(5):
-        core.nudge({'prbt_joint_1': 0.01})
+        core.move_by({'prbt_joint_1': 0.01})
         stream(core, 0.02)
-    core.nudge({'prbt_joint_2': 0.02})
+    core.move_by({'prbt_joint_2': 0.02})
     end = stream(core, 1.0)[-1].state.position
     assert end[:2] == pytest.approx([0.1, 0.02], abs=1e-9)
     with pytest.raises(CommandError, match='beyond its limits'):
-        core.nudge({'prbt_joint_1': 9.0})
+        core.move_by({'prbt_joint_1': 9.0})
 
 
 def test_a_target_goes_at_the_overridden_speed() -> None:
@@ -257,13 +257,13 @@ def test_a_nudge_goes_at_its_own_speed() -> None:
     for speed in (1.0, 0.5):
         core = core_of('prbt')
         core.override(speed)
-        core.nudge({'prbt_joint_1': 0.5}, 0.25)
+        core.move_by({'prbt_joint_1': 0.5}, 0.25)
         points = stream(core, 6.0)
         fastest = max(float(np.abs(point.state.velocity).max()) for point in points)
         assert fastest == pytest.approx(0.25 * speed, rel=1e-3)
         assert points[-1].state.position[0] - ready('prbt')[0] == pytest.approx(0.5, abs=1e-9)
     with pytest.raises(CommandError, match='above 0'):
-        core.nudge({'prbt_joint_1': 0.5}, 0.0)
+        core.move_by({'prbt_joint_1': 0.5}, 0.0)
 
 
 def test_a_pause_holds_everything() -> None:

@@ -10,13 +10,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from servo_commands import outcome
 from servo_drives import Drives, PERIOD
 
 from arm_canopen import AxisFeedback, CanopenError, Refusal, RefusalCause
 from arm_canopen.standard.drive import DriveState
 from arm_servo.core import MotionCore
 from arm_servo.exceptions import GoalCode, NotReadyError
-from arm_servo.execution import Execution, Phase
+from arm_servo.execution import Phase
+from arm_servo.gateway import MotionCommand
 from arm_servo.goal import GoalPoint, TrajectoryGoal
 from arm_servo.nodes.drive_reasons import why_not
 from arm_servo.set_point import Source
@@ -24,12 +26,12 @@ from arm_servo.set_point import Source
 Change = Callable[[AxisFeedback], AxisFeedback]
 
 
-def swing(drives: Drives, far: float = 0.4, time: float = 2.0) -> Future[Execution]:
+def swing(drives: Drives, far: float = 0.4, time: float = 2.0) -> MotionCommand:
     """Order a trajectory of all joints."""
     to = [axis.setpoint + far for axis in drives.axes]
     to[3] -= 2 * far  # the fourth joint of the Panda has little room upwards
-    goal = TrajectoryGoal(drives.desk.model.joints, [GoalPoint(time, to)])
-    return drives.desk.submit(lambda core, _: core.follow(goal))
+    goal = TrajectoryGoal(drives.gateway.model.joints, [GoalPoint(time, to)])
+    return drives.gateway.request(goal)
 
 
 def attached() -> Drives:
@@ -53,10 +55,10 @@ def test_it_begins_where_the_set_points_are() -> None:
 def test_nothing_moves_before_it_is_attached() -> None:
     """Without its drives it answers no set-points, and refuses commands."""
     drives = Drives()
-    future = swing(drives)
+    command = swing(drives)
     assert drives.run() == [None] * 7
     with pytest.raises(NotReadyError, match='not attached yet'):
-        future.result(0.0)
+        command.future.result(0.0)
 
 
 @pytest.mark.parametrize(
@@ -73,26 +75,26 @@ def test_the_others_stop_on_the_path_when_a_drive_drops_out(change: Change, word
     """The six others come to rest smoothly on the path; the trajectory names drive and remedy."""
     drives = attached()
     begin = drives.path[-1]
-    future = swing(drives)
+    command = swing(drives)
     drives.run(60)
     before = len(drives.path)
     drives.axes[2] = change(replace(drives.axes[2], followable=False))
     answer = drives.run()
     assert [point is None for point in answer] == [number == 2 for number in range(7)]
     drives.run(200)
-    execution = future.result(0.0)
-    assert execution.phase is Phase.DONE
-    assert execution.ending is not None
-    assert execution.ending.code is GoalCode.PATH_TOLERANCE_VIOLATED
-    assert 'panda_joint3' in execution.ending.reason
-    assert words in execution.ending.reason
+    ending = outcome(command)
+    assert command.execution is not None
+    assert command.execution.phase is Phase.DONE
+    assert ending.code is GoalCode.PATH_TOLERANCE_VIOLATED
+    assert 'panda_joint3' in ending.reason
+    assert words in ending.reason
     others = [0, 1, 3, 4, 5, 6]
     path = np.array(drives.path)[:, others] - begin[others]
     ratio = path[before:] / path[before:, :1]  # all joints swing in proportion on the path
     assert np.abs(np.abs(ratio) - 1.0).max() < 1e-6
     speeds = np.diff(path, axis=0) / PERIOD
     jumps = np.abs(np.diff(speeds, axis=0)) / PERIOD
-    assert (jumps.max(axis=0) < 1.01 * drives.desk.model.limits.acceleration[others]).all()
+    assert (jumps.max(axis=0) < 1.01 * drives.gateway.model.limits.acceleration[others]).all()
     assert np.abs(speeds[-1]).max() == 0.0
 
 
@@ -100,15 +102,14 @@ def test_a_silent_drive_is_led_to_rest_on_the_path_with_the_others() -> None:
     """Its set-points are still sent: the whole arm stops in step, and the trajectory names it."""
     drives = attached()
     begin = drives.path[-1]
-    future = swing(drives)
+    command = swing(drives)
     drives.run(60)
     before = len(drives.path)
     silent = Refusal(RefusalCause.SILENT, 'the last is 0.5 s old')
     drives.axes[2] = replace(drives.axes[2], refusal=silent, age=0.5)
     assert None not in drives.run()
     drives.run(200)
-    ending = future.result(0.0).ending
-    assert ending is not None
+    ending = outcome(command)
     assert ending.reason.startswith('panda_joint3 does not send its TPDOs')
     path = np.array(drives.path) - begin
     ratio = path[before:] / path[before:, :1]
@@ -121,7 +122,7 @@ def test_a_drive_that_was_taken_away_comes_back_when_attached_again() -> None:
     drives = attached()
     drives.source.released('panda_joint5', Refusal(RefusalCause.SINGLE_TARGET))
     assert drives.run(3) == [None] * 7
-    assert 'single target' in drives.desk.snapshot.blocked
+    assert 'single target' in drives.gateway.snapshot.blocked
     assert drives.source.detached
     drives.axes[4] = replace(drives.axes[4], position=0.3, setpoint=0.3)
     drives.attach()
@@ -138,7 +139,7 @@ def test_an_attach_that_failed_is_tried_again() -> None:
     pending.set_exception(CanopenError('the cycle has ended'))
     assert drives.source.detached
     assert drives.run() == [None] * 7
-    assert 'not attached yet' in drives.desk.snapshot.blocked
+    assert 'not attached yet' in drives.gateway.snapshot.blocked
     drives.attach()
     assert None not in drives.run()
 
@@ -151,17 +152,17 @@ def test_a_drive_that_was_faulted_follows_again_when_it_can() -> None:
     assert drives.run(3) == [None] * 7
     drives.axes[1] = whole
     assert None not in drives.run()
-    assert drives.desk.snapshot.source is Source.NONE
+    assert drives.gateway.snapshot.source is Source.NONE
 
 
 def test_a_command_that_waited_too_long_is_refused() -> None:
     """After a pause of the cycle an old command moves nothing."""
     drives = attached()
-    future = swing(drives)
+    command = swing(drives)
     drives.now += 1.0
     drives.run()
     with pytest.raises(NotReadyError, match='stood still'):
-        future.result(0.0)
+        command.future.result(0.0)
 
 
 def test_a_defect_of_the_core_is_told_and_latched(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -183,28 +184,28 @@ def test_a_defect_of_the_core_is_told_and_latched(monkeypatch: pytest.MonkeyPatc
 def test_settings_are_taken_while_the_arm_does_not_follow() -> None:
     """Speed and pause can be set before the drives are there."""
     drives = Drives()
-    future = drives.desk.submit(lambda core, _: core.override(0.3), moves=False)
+    future = drives.gateway.override(0.3)
     drives.run()
     future.result(0.0)
-    assert drives.desk.snapshot.speed == 0.3
+    assert drives.gateway.snapshot.speed == 0.3
 
 
 def test_where_the_arm_is_to_be_is_known_before_it_follows() -> None:
     """It is where the drives stand, at rest; later what is commanded."""
     drives = Drives()
-    assert drives.desk.snapshot.reference is None
+    assert drives.gateway.snapshot.reference is None
     drives.attach()
     drives.axes[0] = replace(drives.axes[0], followable=False, position=0.3)
     drives.run()
-    reference = drives.desk.snapshot.reference
+    reference = drives.gateway.snapshot.reference
     assert reference is not None
     assert reference.position[0] == 0.3
     assert not reference.moving
     drives.axes[0] = replace(drives.axes[0], followable=True)
     drives.run()
-    point = drives.desk.snapshot.set_point
+    point = drives.gateway.snapshot.set_point
     assert point is not None
-    assert drives.desk.snapshot.reference is point.state
+    assert drives.gateway.snapshot.reference is point.state
 
 
 def test_drives_with_the_same_trouble_are_named_together() -> None:
@@ -224,14 +225,14 @@ def test_drives_with_the_same_trouble_are_named_together() -> None:
 def test_a_trajectory_ends_at_once_when_no_drive_is_left() -> None:
     """As at the end of the master: there is nothing to be brought to rest on the path."""
     drives = attached()
-    future = swing(drives)
+    command = swing(drives)
     drives.run(60)
     whole = drives.axes
     drives.axes = [replace(axis, followable=False, state=DriveState.FAULT) for axis in whole]
     assert drives.run() == [None] * 7
-    ending = future.result(0.0).ending
-    assert future.result(0.0).phase is Phase.DONE
-    assert ending is not None
+    ending = outcome(command)
+    assert command.execution is not None
+    assert command.execution.phase is Phase.DONE
     assert 'have a fault' in ending.reason
     drives.axes = [replace(axis, setpoint=axis.position) for axis in whole]
     before = [axis.position for axis in drives.axes]

@@ -8,6 +8,7 @@ import math
 
 import numpy as np
 import pytest
+from servo_commands import outcome
 from servo_elsewhere import Elsewhere, jog, PERIOD, swing
 
 from arm_servo.exceptions import GoalCode
@@ -28,7 +29,7 @@ def test_jogging_an_arm_that_stands_still_runs_no_further_than_the_limit() -> No
     assert 'joint_1_s does not follow' in refusals[0]
     speeds = np.diff(arm.path(), axis=0) / PERIOD
     jumps = np.abs(np.diff(speeds, axis=0)) / PERIOD
-    assert (jumps.max(axis=0) < 1.01 * arm.desk.model.limits.acceleration).all()
+    assert (jumps.max(axis=0) < 1.01 * arm.gateway.model.limits.acceleration).all()
 
 
 def test_a_stream_of_commands_does_not_start_it_again() -> None:
@@ -41,7 +42,7 @@ def test_a_stream_of_commands_does_not_start_it_again() -> None:
     assert len(jog(arm, 100)) == 100
     assert len(arm.points) == sent
     arm.run(40)
-    assert arm.desk.snapshot.blocked == ''
+    assert arm.gateway.snapshot.blocked == ''
     arm.moves = True
     before = np.array(arm.at)
     assert jog(arm, 50) == []
@@ -55,10 +56,9 @@ def test_a_trajectory_of_an_arm_that_stands_still_ends_with_the_joint() -> None:
     arm.run(5)
     arm.moves = False
     goal = swing(arm, 0.4)
-    future = arm.desk.submit(lambda core, _: core.follow(goal))
+    command = arm.gateway.request(goal)
     arm.run(300)
-    ending = future.result(0.0).ending
-    assert ending is not None
+    ending = outcome(command)
     assert ending.code is GoalCode.PATH_TOLERANCE_VIOLATED
     assert 'does not follow: it is 0.2' in ending.reason
 
@@ -72,7 +72,7 @@ def test_an_arm_that_is_late_follows(delay: int) -> None:
     assert jog(arm, 200, 2.0) == []
     arm.run(30)
     assert np.ptp(arm.path()[:, 0]) > 1.0
-    assert arm.desk.snapshot.blocked == ''
+    assert arm.gateway.snapshot.blocked == ''
 
 
 def test_no_limit_lets_it_run() -> None:

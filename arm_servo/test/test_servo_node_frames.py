@@ -18,8 +18,8 @@ from servo_robots import robot
 from tf2_msgs.msg import TFMessage
 
 from arm_servo.exceptions import CommandError
-from arm_servo.model import Pose
-from arm_servo.nodes.frame_tree import combined, FrameTree, inverse, rotation_of
+from arm_servo.model import combined, Pose
+from arm_servo.nodes.frame_tree import FrameTree, inverse, rotation_of
 from arm_servo.nodes.tf_listener import TfListener
 
 if TYPE_CHECKING:

@@ -5,16 +5,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 import numpy as np
-import pytest
+from servo_commands import jog, move_by, twist
 from servo_drives import Drives, PERIOD
 
-from arm_servo.core import MotionCore
 from arm_servo.exceptions import ServoError
+from arm_servo.gateway import MOTIONS
 from arm_servo.goal import GoalPoint, TrajectoryGoal
 
 NUDGES = st.lists(st.floats(-0.3, 0.3), min_size=7, max_size=7)
@@ -31,35 +30,29 @@ STEPS = st.one_of(
 PLANS = st.lists(st.tuples(STEPS, st.integers(1, 40)), min_size=2, max_size=8)
 
 
-def order(core: MotionCore, now: float, kind: str, numbers: list[float]) -> None:
-    """Carry out one step of a plan."""
-    names = core.model.joints
-    if kind == 'twist':
-        core.twist(numbers, now, duration=0.2)
-    elif kind == 'jog':
-        core.jog(dict(zip(names, numbers, strict=True)), now, duration=0.2)
-    elif kind == 'target':
-        core.nudge(dict(zip(names, numbers, strict=True)))
-    elif kind == 'trajectory':
-        to = core.state.position + numbers
-        core.follow(TrajectoryGoal(names, [GoalPoint(1.0, to.tolist())]))
-    elif kind in {'slow', 'fast'}:
-        core.override(0.3 if kind == 'slow' else 1.0)
-    elif kind == 'stop':
-        core.stop()
-    elif kind == 'pause':
-        core.pause()
-    elif kind == 'resume':
-        core.resume()
-
-
 def perform(drives: Drives, kind: str, numbers: list[float]) -> None:
-    """Order a step, or let a drive drop out or come back."""
+    """Command a step, or let a drive drop out or come back."""
+    gateway = drives.gateway
+    names = gateway.model.joints
     if kind in {'lose', 'find'}:
         drives.axes[3] = replace(drives.axes[3], followable=kind == 'find')
-        return
-    command = partial(order, kind=kind, numbers=numbers)
-    drives.desk.submit(command)
+    elif kind == 'twist':
+        twist(gateway, numbers, drives.now, 0.2)
+    elif kind == 'jog':
+        jog(gateway, dict(zip(names, numbers, strict=True)), drives.now, 0.2)
+    elif kind == 'target':
+        move_by(gateway, dict(zip(names, numbers, strict=True)))
+    elif kind == 'trajectory':
+        to = np.array([axis.setpoint for axis in drives.axes]) + numbers
+        gateway.request(TrajectoryGoal(names, [GoalPoint(1.0, to.tolist())]))
+    elif kind in {'slow', 'fast'}:
+        gateway.override(0.3 if kind == 'slow' else 1.0)
+    elif kind == 'stop':
+        gateway.stop(MOTIONS, 'stopped')
+    elif kind == 'pause':
+        gateway.pause()
+    elif kind == 'resume':
+        gateway.resume()
 
 
 BRIEFLY_LOST = [(('trajectory', [0.3] * 7), 40), (('lose', []), 4), (('find', []), 20)]
@@ -91,7 +84,7 @@ def test_no_hand_over_makes_the_set_points_jump(
     rates = np.abs(np.diff(path, 2, axis=0)) / PERIOD**2
     for loss in losses:  # an ideal drive stands still at once when nobody commands it
         rates[max(loss - 1, 0) : loss + 1, 3] = 0.0
-    limits = drives.desk.model.limits.acceleration
+    limits = drives.gateway.model.limits.acceleration
     assert (rates.max(axis=0) <= 1.02 * limits + 1e-6).all()
 
 
@@ -102,11 +95,16 @@ def test_a_refused_command_changes_nothing(numbers: list[float]) -> None:
     drives = Drives()
     drives.attach()
     drives.run(2)
-    drives.desk.submit(lambda core, now: core.twist(numbers, now, duration=5.0))
+    twist(drives.gateway, [0.01, *numbers[1:]], drives.now, 5.0)
     drives.run(5)
-    source = drives.desk.snapshot.source
-    future = drives.desk.submit(lambda core, now: core.twist([float('nan')] * 6, now))
-    drives.run()
-    with pytest.raises(ServoError):
-        future.result(0.0)
-    assert drives.desk.snapshot.source is source
+    source = drives.gateway.snapshot.source
+    there = [axis.setpoint + 9.0 for axis in drives.axes]
+    goal = TrajectoryGoal(drives.gateway.model.joints, [GoalPoint(1.0, there)])
+    refused = [
+        move_by(drives.gateway, {'panda_joint1': float('nan')}),
+        move_by(drives.gateway, {'panda_joint1': 9.0}),
+        drives.gateway.request(goal),
+    ]
+    drives.run(10)
+    assert all(isinstance(command.future.exception(), ServoError) for command in refused)
+    assert drives.gateway.snapshot.source is source

@@ -10,6 +10,8 @@ import threading
 
 import numpy as np
 import pytest
+from servo_commands import jog as jog_joints
+from servo_commands import outcome
 from servo_elsewhere import Elsewhere, jog, PERIOD, swing
 
 from arm_servo.exceptions import GoalCode, NotReadyError
@@ -23,7 +25,7 @@ def test_nothing_is_sent_before_something_moves() -> None:
     arm.run(20)
     assert not arm.points
     goal = swing(arm)
-    arm.desk.submit(lambda core, _: core.follow(goal))
+    arm.gateway.request(goal)
     arm.run(400)
     sent = len(arm.points)
     assert sent > 200
@@ -40,7 +42,7 @@ def test_it_begins_where_others_have_moved_the_arm() -> None:
     arm.run(2)
     before = np.array(arm.at)
     goal = swing(arm)
-    arm.desk.submit(lambda core, _: core.follow(goal))
+    arm.gateway.request(goal)
     arm.run(2)
     assert np.abs(arm.path()[0] - before).max() < 1e-4
 
@@ -97,7 +99,7 @@ def test_a_cycle_that_raises_is_the_end_and_the_arm_comes_to_rest() -> None:
     assert isinstance(thread.error, ArithmeticError)
     assert not arm.points[-1].state.moving
     speeds = [point.state.velocity[0] for point in arm.points[before - 1 :]]
-    most = arm.desk.model.limits.acceleration[0]
+    most = arm.gateway.model.limits.acceleration[0]
     assert max(a - b for a, b in pairwise(speeds)) <= 1.01 * most * 0.001
 
 
@@ -105,7 +107,7 @@ def test_commands_are_refused_before_the_first_joint_state() -> None:
     """The reason names the joints that are silent."""
     arm = Elsewhere()
     arm.heard = False
-    future = arm.desk.submit(lambda core, _: core.jog({'joint_1_s': 0.1}, arm.now))
+    future = jog_joints(arm.gateway, {'joint_1_s': 0.1}, arm.now)
     arm.run()
     with pytest.raises(NotReadyError, match='no joint states of'):
         future.result(0.0)
@@ -116,23 +118,22 @@ def test_the_arm_comes_to_rest_on_its_path_when_joint_states_are_lost() -> None:
     arm = Elsewhere()
     arm.run(3)
     goal = swing(arm, 0.5)
-    future = arm.desk.submit(lambda core, _: core.follow(goal))
+    command = arm.gateway.request(goal)
     arm.run(80)
     arm.heard = False
     arm.run(200)
-    ending = future.result(0.0).ending
-    assert ending is not None
+    ending = outcome(command)
     assert ending.code is GoalCode.PATH_TOLERANCE_VIOLATED
     assert 'no joint states' in ending.reason
     path = arm.path()
     assert np.ptp(path - path[:, :1] - (path[0] - path[0, 0]), axis=1).max() < 1e-6  # on the line
     speeds = np.diff(path, axis=0) / PERIOD
     jumps = np.abs(np.diff(speeds, axis=0)) / PERIOD
-    assert (jumps.max(axis=0) < 1.01 * arm.desk.model.limits.acceleration).all()
+    assert (jumps.max(axis=0) < 1.01 * arm.gateway.model.limits.acceleration).all()
     assert not arm.points[-1].state.moving
     arm.heard = True
     arm.run(5)
-    assert arm.desk.snapshot.blocked == ''
+    assert arm.gateway.snapshot.blocked == ''
 
 
 def test_numbers_that_are_none_do_not_count() -> None:

@@ -9,9 +9,9 @@ from dataclasses import replace
 import pytest
 from servo_drives import Drives
 
-from arm_servo.nodes.desk import Snapshot
 from arm_servo.nodes.trajectory_pause import words_of_pause, words_of_resume
 from arm_servo.set_point import Source
+from arm_servo.snapshot import Snapshot
 
 IDLE = Snapshot(1.0, None, None, '')
 
@@ -41,10 +41,10 @@ def test_a_pause_counts_as_speed_0() -> None:
     drives = Drives()
     drives.attach()
     drives.run(2)
-    drives.desk.submit(lambda core, _now: core.override(0.5), moves=False)
-    drives.desk.submit(lambda core, _now: core.pause(), moves=False)
+    drives.gateway.override(0.5)
+    drives.gateway.pause()
     drives.run()
-    assert drives.desk.snapshot.pace == 0.0
-    drives.desk.submit(lambda core, _now: core.resume(), moves=False)
+    assert drives.gateway.snapshot.speed_scaling == 0.0
+    drives.gateway.resume()
     drives.run()
-    assert drives.desk.snapshot.pace == 0.5
+    assert drives.gateway.snapshot.speed_scaling == 0.5

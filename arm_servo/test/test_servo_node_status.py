@@ -8,11 +8,11 @@ import pytest
 from servo_drives import Drives
 
 from arm_canopen import Refusal, RefusalCause
-from arm_servo.nodes.desk import Snapshot
 from arm_servo.nodes.servo_status import code_of, status_of, StatusCode
 from arm_servo.otg import MotionState
 from arm_servo.report import Cause, Limiter, MotionReport
 from arm_servo.set_point import SetPoint, Source
+from arm_servo.snapshot import Snapshot
 
 
 def snapshot(report: MotionReport, source: Source = Source.JOG) -> Snapshot:
@@ -63,7 +63,7 @@ def test_a_blocked_arm_says_so() -> None:
     drives.attach()
     drives.source.released('panda_joint1', Refusal(RefusalCause.SINGLE_TARGET))
     drives.run()
-    code, words = status_of(drives.desk.snapshot, '', '', '')
+    code, words = status_of(drives.gateway.snapshot, '', '', '')
     assert code == StatusCode.INVALID
     assert 'panda_joint1' in words
 

@@ -20,6 +20,7 @@ from arm_servo.exceptions import CommandError, GoalCode, GoalError
 from arm_servo.execution import Phase
 from arm_servo.goal import GoalPoint, TrajectoryGoal
 from arm_servo.path_check import PathCheck, STEP
+from arm_servo.requests import DisplacementRequest
 from arm_servo.set_point import Source
 
 PERIOD = 0.01
@@ -109,7 +110,7 @@ def test_a_single_target_through_contact_is_refused(name: str) -> None:
     with pytest.raises(CommandError, match='would collide after'):
         core.move_to(by_name(core, end))
     with pytest.raises(CommandError, match='would collide after'):
-        core.nudge(by_name(core, end - begin))
+        core.move_by(by_name(core, end - begin))
     execution = core.follow(goal_to(core, begin))
     with pytest.raises(CommandError, match='would collide after'):
         core.move_to(by_name(core, end))
@@ -141,12 +142,18 @@ def test_an_arm_in_contact_may_part_and_not_go_deeper(name: str) -> None:
         core.follow(goal_to(core, inside, 8.0))
 
 
-def test_a_way_is_void_when_another_command_came() -> None:
-    """What was checked is not begun behind a stop."""
+def test_a_plan_is_void_when_another_command_came() -> None:
+    """What was checked does not begin behind a stop, nor behind another motion."""
     core = core_at('prbt', ready('prbt'))
-    way = core.way_by({'prbt_joint_1': 0.1})
-    core.check(way)
-    core.stop()
-    with pytest.raises(CommandError, match='another command'):
-        core.go(way)
-    assert core.source is Source.NONE
+    for come_between in (MotionCore.stop, MotionCore.pause, _move_a_little):
+        plan = core.prepare(DisplacementRequest({'prbt_joint_1': 0.1}), core.basis)
+        come_between(core)
+        with pytest.raises(CommandError, match='before this command had begun'):
+            core.commit(plan)
+        core.stop()
+        core.resume()
+        assert core.source is Source.NONE
+
+
+def _move_a_little(core: MotionCore) -> None:
+    core.move_by({'prbt_joint_2': 0.01})

@@ -282,7 +282,7 @@ def test_set_points_that_leave_the_path_end_the_trajectory() -> None:
         limits=limits,
         generator=Generator(limits),
         state=MotionState.at_rest(begin),
-        pace=1.0,
+        speed_scaling=1.0,
         settings=ExecutionSettings(),
     )
     state = MotionState.at_rest(begin)

@@ -20,9 +20,9 @@ CLEAR = 0.0045
 """Clearance of a stop in [m], and a little for sliding along."""
 
 
-def nudge(core: MotionCore) -> None:
+def ask_back(core: MotionCore) -> None:
     """Ask for a target where the arm is, which it has to come back to."""
-    core.nudge(dict.fromkeys(core.model.joints, 0.0))
+    core.move_by(dict.fromkeys(core.model.joints, 0.0))
 
 
 def follow_back(core: MotionCore) -> None:
@@ -41,7 +41,7 @@ ENDS: dict[str, Callable[[MotionCore], None]] = {
     'stop': MotionCore.stop,
     'pause': MotionCore.pause,
     'time-out': lambda _core: None,
-    'target': nudge,
+    'target': ask_back,
     'trajectory': follow_back,
     'stamped trajectory': follow_later,
 }

@@ -459,3 +459,61 @@ def test_joints_in_any_order_and_some_of_them() -> None:
     expected = np.array(start)
     expected[[4, 1]] += (0.3, -0.2)
     assert states[-1].position == pytest.approx(expected, abs=1e-6)
+
+
+def test_a_turn_of_a_continuous_joint_is_no_error() -> None:
+    """A drive that counts from -pi to pi is where it was sent, on the way and at the goal."""
+    core = MotionCore(chain('cyyzyz'))
+    core.reset([3.0, 0.2, 1.5, 0.9, 1.1, 0.8])
+    tight = dict.fromkeys(core.model.joints, JointTolerance(0.01))
+    there = [3.6, 0.2, 1.5, 0.9, 1.1, 0.8]
+    goal = TrajectoryGoal(core.model.joints, [GoalPoint(2.0, there)])
+    execution = core.follow(replace(goal, path_tolerance=tight, goal_tolerance=tight))
+    for step in range(600):
+        state = core.state
+        wrapped = np.array(state.position)
+        wrapped[0] = np.arctan2(np.sin(wrapped[0]), np.cos(wrapped[0]))
+        core.step(step * PERIOD, PERIOD, MotionState(wrapped, state.velocity, state.acceleration))
+    assert execution.ending is not None
+    assert execution.ending.code is GoalCode.SUCCESSFUL, execution.ending.reason
+
+
+@pytest.mark.parametrize('age', [0.0, -0.3])
+@pytest.mark.parametrize('is_paused_later', [False, True])
+def test_a_trajectory_that_is_paused_before_its_begin_does_not_move_the_arm(
+    age: float, is_paused_later: bool
+) -> None:
+    """Not by a creep to its first point either; it begins with the end of the pause."""
+    core = MotionCore(robot('panda'))
+    begin = ready('panda')
+    core.reset(begin)
+    points = [GoalPoint(0.0, (begin + 0.0009).tolist()), GoalPoint(2.0, (begin + 0.2).tolist())]
+    goal = TrajectoryGoal(core.model.joints, points, age=age)
+    if is_paused_later:
+        core.follow(goal)
+        core.pause()
+    else:
+        core.pause()
+        core.follow(goal)
+    for step in range(300):
+        assert core.step(step * PERIOD, PERIOD).state.position.tolist() == begin.tolist()
+    core.resume()
+    for step in range(300, 900):
+        core.step(step * PERIOD, PERIOD)
+    assert core.state.position == pytest.approx(begin + 0.2, abs=1e-6)
+
+
+def test_a_canceled_trajectory_that_waits_in_a_pause_ends() -> None:
+    """Where it is: at rest, before its begin."""
+    core = MotionCore(robot('panda'))
+    core.reset(ready('panda'))
+    core.pause()
+    there = (ready('panda') + 0.2).tolist()
+    execution = core.follow(TrajectoryGoal(core.model.joints, [GoalPoint(2.0, there)]))
+    core.step(0.0, PERIOD)
+    core.stop()
+    core.resume()
+    for step in range(1, 20):
+        core.step(step * PERIOD, PERIOD)
+    assert execution.phase is Phase.DONE
+    assert core.state.position.tolist() == ready('panda').tolist()

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..arrays import frozen
+from ..gateway import CommandGateway
 from ..otg import MotionState
 from ..set_point import Source
-from .desk import Desk
 from .drive_reasons import why_not
 
 if TYPE_CHECKING:
@@ -28,17 +28,17 @@ class DriveSource:
     set-points are: at once when nobody took a drive away, else when it is attached again.
     """
 
-    def __init__(self, desk: Desk) -> None:
+    def __init__(self, gateway: CommandGateway) -> None:
         """Wait for the drives.
 
         Args:
-            desk: The core's desk; it is stepped here only.
+            gateway: Commands to the core; it is stepped here only.
         """
         from arm_canopen import Setpoint
 
         self._make: type[Setpoint] = Setpoint
-        self._desk = desk
-        self._axes = list(desk.model.joints)
+        self._gateway = gateway
+        self._axes = list(gateway.model.joints)
         self._released: dict[str, str] = dict.fromkeys(self._axes, 'was not attached yet')
         self._following = False
         self._left: set[str] = set()  # drives that dropped out since all of them followed
@@ -108,17 +108,17 @@ class DriveSource:
         if not self._following and not blocked:
             self._take_over(feedback)
         if not self._following or measured is None:
-            self._desk.idle(now, measured, self._lost or blocked)
+            self._gateway.idle(now, measured, self._lost or blocked)
             return [None] * len(feedback)
         if blocked and not self._lost:
             self._lost = blocked
-            self._desk.fail(blocked)
+            self._gateway.fail(blocked)
         self._left.update(axis.name for axis in feedback if not axis.followable)
         if len(self._left) == len(feedback):  # nothing is left to be brought to rest
-            self._desk.idle(now, measured, self._lost)
+            self._gateway.idle(now, measured, self._lost)
             self._following, self._lost = False, ''
             return [None] * len(feedback)
-        point = self._desk.step(now, period, measured, self._lost)
+        point = self._gateway.step(now, period, measured, self._lost)
         if self._lost and point.source is Source.NONE and not point.state.moving:
             self._following, self._lost = False, ''
         rows = zip(point.state.position, point.state.velocity, feedback, strict=True)
@@ -129,7 +129,7 @@ class DriveSource:
 
     def _take_over(self, feedback: Sequence[AxisFeedback]) -> None:
         """Begin at rest at the set-points of the drives."""
-        self._desk.begin(frozen([axis.setpoint for axis in feedback]))
+        self._gateway.begin(frozen([axis.setpoint for axis in feedback]))
         self._following, self._lost = True, ''
         self._left.clear()
 

@@ -12,9 +12,6 @@ import numpy as np
 from ..arrays import Array
 from ..limits import JointLimits
 
-TURN = 2.0 * math.pi
-"""A whole turn in [rad]."""
-
 MOVED = 0.002
 """How far an arm at rest may turn by itself in [rad]; more was done by others."""
 
@@ -105,8 +102,7 @@ class FollowingWatch:
 
     def _unwound(self, measured: Array, near: Array) -> Array:
         """Add whole turns to continuous joints."""
-        turns = TURN * np.round((near - measured) / TURN)
-        return measured + np.where(self._joints.continuous, turns, 0.0)
+        return near - self._joints.error(near, measured)
 
     def problem(self, measured: Array) -> str:
         """Say which joint does not follow; empty when all do.

@@ -12,7 +12,7 @@ import pinocchio as pin
 
 from ..arrays import Array
 from ..exceptions import CommandError
-from ..model import Pose
+from ..model import combined, Pose
 
 STALE = 1.0
 """Age at which a transform of /tf counts no more in [s]."""
@@ -35,11 +35,6 @@ def rotation_of(quaternion: Sequence[float]) -> Array:
         raise CommandError(f'orientation {list(quaternion)}: its length is {length:.4g}, not 1')
     matrix: Array = pin.Quaternion(np.array(quaternion) / length).toRotationMatrix()
     return matrix
-
-
-def combined(outer: Pose, inner: Pose) -> Pose:
-    """Return a pose in the frame in which the outer one is given."""
-    return Pose(outer.rotation @ inner.rotation, outer.position + outer.rotation @ inner.position)
 
 
 def inverse(pose: Pose) -> Pose:

@@ -10,8 +10,8 @@ from sensor_msgs.msg import JointState
 
 from node_runner import ParameterReader
 
+from ..gateway import CommandGateway
 from .controller_manager import Controller
-from .desk import Desk
 from .trajectory_parameters import RATES
 
 
@@ -39,18 +39,18 @@ class JointStateBroadcaster:
         rate: Its rate in [Hz].
     """
 
-    def __init__(self, node: Node, desk: Desk, *, active: bool) -> None:
+    def __init__(self, node: Node, gateway: CommandGateway, *, active: bool) -> None:
         """Advertise.
 
         Args:
             node: The node ``joint_state_broadcaster``.
-            desk: The core's desk.
+            gateway: Commands to the core.
             active: Whether it publishes from the start.
         """
         self.active = active
-        self._node, self._desk = node, desk
+        self._node, self._gateway = node, gateway
         self._frame, self.rate, self._is_dynamic = declare_broadcaster(node)
-        self._joints = list(desk.model.joints)
+        self._joints = list(gateway.model.joints)
         self._states = node.create_publisher(JointState, '/joint_states', 10)
         self._dynamic = node.create_publisher(DynamicJointState, '/dynamic_joint_states', 10)
         node.create_timer(1.0 / self.rate, self._publish)
@@ -66,7 +66,7 @@ class JointStateBroadcaster:
         self.active = active
 
     def _publish(self) -> None:
-        measured = self._desk.snapshot.measured
+        measured = self._gateway.snapshot.measured
         if measured is None or not self.active:
             return
         positions, velocities = measured.position.tolist(), measured.velocity.tolist()

@@ -37,9 +37,9 @@ def _build(make_node: MakeNode) -> MotionThread:
         jogging.timeout,
         check_self_collision=trajectory.check,
     )
-    desk, thread = make_loop(node, model, settings, loop, output)
-    Servo(servo, desk, jogging, keep_drives)
-    offer_trajectories(manager, node, desk, trajectory, loop.period)
+    gateway, thread = make_loop(node, model, settings, loop, output)
+    Servo(servo, gateway, jogging, keep_drives)
+    offer_trajectories(manager, node, gateway, trajectory, loop.period)
     return thread
 
 

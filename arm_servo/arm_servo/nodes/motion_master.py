@@ -20,8 +20,8 @@ from node_runner import destroyed_if_refused, refuse_misspelt
 from ..core import MotionCore
 from ..core_settings import CoreSettings
 from ..exceptions import ModelError, ServoError
+from ..gateway import CommandGateway
 from .controller_manager import ControllerManager, trajectory_entry
-from .desk import Desk
 from .drive_source import DriveSource
 from .joint_state_broadcaster import JointStateBroadcaster
 from .robot_parameters import declare_manager, declare_robot, same_robot
@@ -75,11 +75,13 @@ class Motion:
             jogging.timeout,
             check_self_collision=trajectory.check,
         )
-        self._desk = Desk(MotionCore(model, settings))
-        self._source = DriveSource(self._desk)
-        self._servo = Servo(servo, self._desk, jogging, self._prepare)
-        self._controller = TrajectoryController(controller, self._desk, trajectory, self._prepare)
-        self._broadcaster = JointStateBroadcaster(broadcaster, self._desk, active=broadcasts)
+        self._gateway = CommandGateway(MotionCore(model, settings))
+        self._source = DriveSource(self._gateway)
+        self._servo = Servo(servo, self._gateway, jogging, self._prepare)
+        self._controller = TrajectoryController(
+            controller, self._gateway, trajectory, self._prepare
+        )
+        self._broadcaster = JointStateBroadcaster(broadcaster, self._gateway, active=broadcasts)
         period = self._master.bus.master.sync_period
         self._switch = ControllerManager(
             manager,
@@ -106,7 +108,7 @@ class Motion:
 
     def _attach_first(self) -> None:
         self._prepare()
-        if self._desk.snapshot.time:  # the cycle asks for set-points
+        if self._gateway.snapshot.time:  # the cycle asks for set-points
             self._manager.destroy_timer(self._attaching)
 
     def _prepare(self) -> None:

@@ -13,10 +13,10 @@ import time
 import numpy as np
 
 from ..arrays import Array
+from ..gateway import CommandGateway
 from ..otg import hard_brake, MotionState
 from ..report import MotionReport
 from ..set_point import SetPoint, Source
-from .desk import Desk
 from .following import FollowingWatch
 from .joint_feedback import JointFeedback
 
@@ -39,7 +39,7 @@ class MotionCycle:
 
     def __init__(
         self,
-        desk: Desk,
+        gateway: CommandGateway,
         feedback: JointFeedback,
         output: Callable[[SetPoint], None],
         watch: FollowingWatch,
@@ -47,13 +47,13 @@ class MotionCycle:
         """Wait for the arm.
 
         Args:
-            desk: The core's desk.
+            gateway: Commands to the core.
             feedback: The arm's measured state.
             output: Takes the set-points while something moves, and the last at rest.
             watch: Compares the two.
         """
-        self._desk, self._feedback, self._output = desk, feedback, output
-        self._state = MotionState.at_rest(np.zeros(len(desk.model)))
+        self._gateway, self._feedback, self._output = gateway, feedback, output
+        self._state = MotionState.at_rest(np.zeros(len(gateway.model)))
         self._watch = watch
         self.closing = ''
         self._compared = -math.inf
@@ -80,14 +80,14 @@ class MotionCycle:
             self._begin(measured.position)
             self._following, self._lost = True, ''
         if not self._following or measured is None:
-            self._desk.idle(now, measured, blocked)
+            self._gateway.idle(now, measured, blocked)
             return
         if not blocked:
             blocked = self._compare(measured.position, now)
         if blocked and not self._lost:
             self._lost = blocked
-            self._desk.fail(blocked)
-        self._put(self._desk.step(now, period, measured, self._lost))
+            self._gateway.fail(blocked)
+        self._put(self._gateway.step(now, period, measured, self._lost))
 
     def brake(self, period: float) -> None:
         """Slow the last set-point down, without the core; for when the core has failed.
@@ -95,18 +95,18 @@ class MotionCycle:
         Args:
             period: Time to the next cycle in [s].
         """
-        self._state = hard_brake(self._state, self._desk.model.limits, period)
+        self._state = hard_brake(self._state, self._gateway.model.limits, period)
         self._output(SetPoint(self._state, Source.NONE, MotionReport()))
         self._quiet = not self._state.moving
 
     def _kept(self, now: float) -> str:
         """Return why the arm did not follow, as long as somebody goes on to command it."""
-        if now - max(self._failed, self._desk.refused) > SILENCE:
+        if now - max(self._failed, self._gateway.refused) > SILENCE:
             self._failure = ''
         return self._failure
 
     def _begin(self, position: Array) -> None:
-        self._desk.begin(position)
+        self._gateway.begin(position)
         self._watch.begin(position)
 
     def _compare(self, position: Array, now: float) -> str:

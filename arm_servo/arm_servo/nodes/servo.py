@@ -17,20 +17,18 @@ from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from ..core import MotionCore
 from ..exceptions import ModelError, NotReadyError, ServoError
-from ..set_point import Source
-from .aimer import Aimer
-from .desk import Desk
+from ..gateway import CommandGateway, JOGGING
+from ..requests import DisplacementRequest, JogRequest
+from .command_converter import CommandConverter
 from .refusals import Refusals
 from .ros_numbers import seconds
 from .servo_modes import CommandKind, ServoModes
-from .servo_orders import Displacements, Order, ServoOrders
 from .servo_parameters import PREFIX, read_scales, Scales, ServoParameters
 from .servo_status import status_of
 from .tf_listener import TfListener
 
-Convert = Callable[[Any], Order | Displacements]
+Convert = Callable[[Any, float], JogRequest | DisplacementRequest]
 
 FRESH = 0.5
 """Silence after which a command begins a new motion, which may take drives back, in [s]."""
@@ -43,32 +41,38 @@ class Servo:
     """``~/delta_twist_cmds``, ``~/delta_joint_cmds``, ``~/pose_target_cmds`` and their services.
 
     Attributes:
-        orders: Makes commands of messages.
+        converter: Makes requests of messages.
     """
 
     def __init__(
-        self, node: Node, desk: Desk, parameters: ServoParameters, prepare: Callable[[], None]
+        self,
+        node: Node,
+        gateway: CommandGateway,
+        parameters: ServoParameters,
+        prepare: Callable[[], None],
     ) -> None:
         """Offer them.
 
         Args:
             node: The servo's node.
-            desk: The core's desk.
+            gateway: Commands to the core.
             parameters: How it behaves.
             prepare: Called before a new motion, to get the drives back.
         """
-        self._node, self._desk, self._prepare = node, desk, prepare
+        self._node, self._gateway, self._prepare = node, gateway, prepare
         self._parameters = parameters
-        self._aimer = Aimer(desk)
         self._modes = ServoModes(node, self._stop)
-        self.orders = ServoOrders(TfListener(node, desk.model), parameters, read_scales(node))
+        model = gateway.model
+        self.converter = CommandConverter(
+            model, TfListener(node, model), parameters, read_scales(node)
+        )
         self._last = -FRESH
         self._refusals = Refusals()
         self._status = node.create_publisher(ServoStatus, parameters.status_topic, 10)
         for kind, message, topic, convert in (
-            (CommandKind.TWIST, TwistStamped, parameters.twist_topic, self.orders.twist),
-            (CommandKind.JOINT_JOG, JointJog, parameters.joint_topic, self.orders.jog),
-            (CommandKind.POSE, PoseStamped, parameters.pose_topic, self.orders.pose),
+            (CommandKind.TWIST, TwistStamped, parameters.twist_topic, self.converter.twist),
+            (CommandKind.JOINT_JOG, JointJog, parameters.joint_topic, self.converter.jog),
+            (CommandKind.POSE, PoseStamped, parameters.pose_topic, self.converter.pose),
         ):
             node.create_subscription(message, topic, partial(self._take, kind, convert), 10)
         node.add_on_set_parameters_callback(self._check_scales)
@@ -78,26 +82,27 @@ class Servo:
     def _take(self, kind: CommandKind, convert: Convert, message: Any) -> None:  # noqa: ANN401  # messages have no type
         begin = time.monotonic()
         try:
-            self._check_age(message)
+            age = self._checked_age(message)
             self._modes.admit(kind)
-            order = convert(message)
-            if begin - self._last > FRESH:
+            request = convert(message, begin - age)
+            is_zero = isinstance(request, JogRequest) and request.is_zero
+            if not is_zero and begin - self._last > FRESH:
                 self._prepare()
         except ServoError as error:
             self._refuse(str(error))
             return
-        self._last = begin
-        if isinstance(order, Displacements):
-            future = self._aimer.nudge(order.by_joint, order.fastest)
+        if not is_zero:
+            self._last = begin
+        if isinstance(request, JogRequest):
+            self._gateway.jog(request).add_done_callback(self._note)
         else:
-            self._aimer.cancel()
-            future = self._desk.submit(order)
-        future.add_done_callback(self._note)
+            self._gateway.request(request).future.add_done_callback(self._note)
 
-    def _check_age(self, message: Any) -> None:  # noqa: ANN401
+    def _checked_age(self, message: Any) -> float:  # noqa: ANN401
+        """Return how long ago a message was sent in [s]."""
         stamp = seconds(message.header.stamp)
         if not stamp:  # as good as now
-            return
+            return 0.0
         age = float(self._node.get_clock().now().nanoseconds) * 1e-9 - stamp
         if age > self._parameters.timeout:
             late = age - self._parameters.timeout
@@ -106,8 +111,9 @@ class Servo:
             )
         if age < -FUTURE:
             raise NotReadyError(f'stamped {-age:.2f} s in the future: are the clocks in step?')
+        return max(age, 0.0)
 
-    def _note(self, future: Future[None]) -> None:
+    def _note(self, future: Future[Any]) -> None:
         """Remember what became of a command; in the cycle, so nothing is logged here."""
         error = None if future.cancelled() else future.exception()
         if error is not None:
@@ -119,12 +125,7 @@ class Servo:
         self._refusals.note(reason, time.monotonic())
 
     def _stop(self, reason: str) -> None:
-        def stop(core: MotionCore, _now: float) -> None:
-            if core.source in {Source.JOG, Source.TARGET}:
-                core.stop(reason)
-
-        self._aimer.cancel()
-        self._desk.submit(stop, moves=False)
+        self._gateway.stop(JOGGING, reason)
 
     def _check_scales(self, parameters: list[Parameter]) -> SetParametersResult:
         for parameter in parameters:
@@ -136,21 +137,21 @@ class Servo:
         return SetParametersResult(successful=True)
 
     def _rescale(self, _parameters: list[Parameter]) -> None:
-        self.orders.scales = self._scales()
+        self.converter.scales = self._scales()
 
     def _scales(self) -> Scales:
         try:
             return read_scales(self._node)
         except ModelError:
-            return self.orders.scales
+            return self.converter.scales
 
     def _publish_status(self) -> None:
-        now, snapshot = time.monotonic(), self._desk.snapshot
+        now, snapshot = time.monotonic(), self._gateway.snapshot
         code, words = status_of(
             snapshot,
             self._refusals.fresh(now),
             self._modes.paused,
-            self.orders.capped,
+            self.converter.capped,
             now - snapshot.time,
         )
         if reason := self._refusals.to_log(now):

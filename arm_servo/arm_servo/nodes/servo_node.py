@@ -30,8 +30,8 @@ def _build(make_node: MakeNode) -> MotionThread:
         timeout=servo.timeout,
         check_self_collision=declare_check(ParameterReader(node, PREFIX)),
     )
-    desk, thread = make_loop(node, model, settings, declare_loop(node, PREFIX), output)
-    Servo(node, desk, servo, keep_drives)
+    gateway, thread = make_loop(node, model, settings, declare_loop(node, PREFIX), output)
+    Servo(node, gateway, servo, keep_drives)
     return thread
 
 

@@ -16,6 +16,9 @@ from ..servo import ServoSettings
 
 PREFIX = 'moveit_servo.'
 
+DEFAULT_LINEAR_SPEED, DEFAULT_ANGULAR_SPEED = 0.4, 0.8
+"""Scales of the tool's speeds in [m/s] and [rad/s]."""
+
 
 class Units(Enum):
     """What the numbers of commands are."""
@@ -85,7 +88,7 @@ def declare_servo(node: Node, group: str) -> ServoParameters:
     if named != group:
         raise ModelError(f'{PREFIX}move_group_name is {named!r}, but the group is {group!r}')
     _declare_scales(node)
-    scales = read_scales(node)
+    read_scales(node)
     return ServoParameters(
         read.number(
             'incoming_command_timeout',
@@ -106,7 +109,7 @@ def declare_servo(node: Node, group: str) -> ServoParameters:
         read.text('pose_command_in_topic', '~/pose_target_cmds', 'topic of poses'),
         read.text('status_topic', '~/status', 'topic of the status'),
         read.number('status_rate', 25.0, (1.0, 500.0), 'rate of the status [Hz]'),
-        ServoSettings(linear_speed=scales.linear or 0.4, angular_speed=scales.rotational or 0.8),
+        ServoSettings(),
     )
 
 
@@ -132,10 +135,16 @@ def _declare_scales(node: Node) -> None:
     live = ParameterReader(node, PREFIX, fixed=False)
     live.text('command_in_type', Units.UNITLESS.value, 'unitless (-1 to 1) or speed_units')
     live.number(
-        'scale.linear', 0.4, (0.0, 10.0), 'speed of the tool at 1, cap in speed units [m/s]'
+        'scale.linear',
+        DEFAULT_LINEAR_SPEED,
+        (0.0, 10.0),
+        'speed of the tool at 1, cap in speed units [m/s]',
     )
     live.number(
-        'scale.rotational', 0.8, (0.0, 20.0), 'angular speed at 1, cap in speed units [rad/s]'
+        'scale.rotational',
+        DEFAULT_ANGULAR_SPEED,
+        (0.0, 20.0),
+        'angular speed at 1, cap in speed units [rad/s]',
     )
     live.number('scale.joint', 0.5, (0.0, 20.0), 'speed of a joint at 1 [rad/s]')
     live.number('override_velocity_scaling_factor', 0.0, (0.0, 1.0), 'factor; 0 is none')

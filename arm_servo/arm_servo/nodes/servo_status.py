@@ -8,7 +8,7 @@ from enum import IntEnum
 
 from ..report import Cause, MotionReport
 from ..set_point import Source
-from .desk import Snapshot
+from ..snapshot import Snapshot
 
 HALTED = 0.02
 """Share of the asked speed below which a motion counts as halted."""

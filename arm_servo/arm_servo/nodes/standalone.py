@@ -21,8 +21,8 @@ from node_runner import ParameterReader, refuse_misspelt, run_program, spin
 from ..core import MotionCore
 from ..core_settings import CoreSettings
 from ..exceptions import ServoError
+from ..gateway import CommandGateway
 from ..model import RobotModel
-from .desk import Desk
 from .following import FollowingLimits, FollowingWatch
 from .joint_feedback import JointFeedback
 from .motion_thread import MotionCycle, MotionThread
@@ -99,7 +99,7 @@ def make_loop(
     settings: CoreSettings,
     loop: LoopParameters,
     output: OutputParameters,
-) -> tuple[Desk, MotionThread]:
+) -> tuple[CommandGateway, MotionThread]:
     """Put core, feedback and output together; nothing runs yet.
 
     Args:
@@ -111,7 +111,7 @@ def make_loop(
     """
     for note in model.notes:
         node.get_logger().warning(note)
-    desk = Desk(MotionCore(model, settings))
+    gateway = CommandGateway(MotionCore(model, settings))
     feedback = JointFeedback(model.joints, loop.joint_timeout)
 
     def take(message: JointState) -> None:
@@ -120,13 +120,13 @@ def make_loop(
     node.create_subscription(JointState, loop.joint_topic, take, 10)
     publish = TopicOutput(node, output, list(model.joints), loop.period)
     watch = FollowingWatch(model.limits, loop.following, loop.period)
-    cycle = MotionCycle(desk, feedback, publish, watch)
+    cycle = MotionCycle(gateway, feedback, publish, watch)
 
     def begin() -> None:
         if words := prefer_this_thread(loop.priority):
             node.get_logger().info(words)
 
-    return desk, MotionThread(cycle, loop.period, begin)
+    return gateway, MotionThread(cycle, loop.period, begin)
 
 
 def keep_drives() -> None:

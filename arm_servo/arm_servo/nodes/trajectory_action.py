@@ -5,9 +5,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import Future
 from dataclasses import dataclass, field
 import time
+import traceback
 from typing import Any
 
 from control_msgs.action import FollowJointTrajectory
@@ -15,20 +15,19 @@ from rclpy.action.server import ActionServer, CancelResponse
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 
-from ..core import MotionCore
 from ..exceptions import GoalCode, GoalError, ServoError
 from ..execution import Execution, Outcome, Phase
+from ..gateway import CommandGateway, MotionCommand
 from ..goal import TrajectoryGoal
-from .desk import Desk
 from .trajectory_messages import difference, point_of
 
-PATIENCE = 5.0
+START_TIMEOUT = 5.0
 """Time in which a goal must be planned and taken by the cycle in [s]."""
 
-PER_POINT = 0.01
+START_TIMEOUT_PER_POINT = 0.01
 """The same for each of its points in [s]."""
 
-Follow = Callable[[TrajectoryGoal], Future[Execution]]
+Follow = Callable[[TrajectoryGoal], MotionCommand]
 
 
 @dataclass(slots=True)
@@ -36,26 +35,35 @@ class _Goal:
     """A goal from its acceptance to its end."""
 
     handle: Any
-    future: Future[Execution]
-    patience: float
+    command: MotionCommand | None = None  # None for a goal that is refused at once
     begin: float = field(default_factory=time.monotonic)
     outcome: Outcome | None = None
+    is_concluded: bool = False
+
+    @property
+    def timeout(self) -> float:
+        """Time in which it must have begun in [s]."""
+        return START_TIMEOUT + START_TIMEOUT_PER_POINT * len(self.handle.request.trajectory.points)
 
     def ending(self) -> Outcome | None:
         """Return how it has ended; None while it goes on."""
-        if self.future.cancelled():
+        if self.command is None:
+            return self.outcome
+        execution, future = self.command.execution, self.command.future
+        if execution is not None:
+            return execution.ending if execution.phase is Phase.DONE else None
+        if future.cancelled():
             return Outcome(GoalCode.SUCCESSFUL, 'canceled before it began', canceled=True)
-        if not self.future.done():
-            late = time.monotonic() - self.begin > self.patience
-            if late and self.future.cancel():
-                return Outcome(GoalCode.INVALID_GOAL, 'the cycle does not run; is the bus up?')
-            return None
-        error = self.future.exception()
-        if error is not None:
-            code = error.code if isinstance(error, GoalError) else GoalCode.INVALID_GOAL
-            return Outcome(code, str(error))
-        execution = self.future.result()
-        return execution.ending if execution.phase is Phase.DONE else None
+        error = future.exception() if future.done() else None
+        return None if error is None else refusal(error)
+
+
+def refusal(error: BaseException) -> Outcome:
+    """Return the outcome of a goal that is refused."""
+    code = error.code if isinstance(error, GoalError) else GoalCode.INVALID_GOAL
+    if isinstance(error, ServoError):
+        return Outcome(code, str(error))
+    return Outcome(code, f'the goal could not be planned: {type(error).__name__}: {error}')
 
 
 class TrajectoryAction:
@@ -69,7 +77,7 @@ class TrajectoryAction:
     def __init__(
         self,
         node: Node,
-        desk: Desk,
+        gateway: CommandGateway,
         rate: float,
         convert: Callable[[Any], TrajectoryGoal],
         follow: Follow,
@@ -78,13 +86,13 @@ class TrajectoryAction:
 
         Args:
             node: The controller's node.
-            desk: The core's desk.
+            gateway: Commands to the core.
             rate: Rate of the feedback in [Hz].
             convert: Makes a trajectory of a goal; raises GoalError.
             follow: Has a trajectory followed.
         """
         self._node = node
-        self._desk = desk
+        self._gateway = gateway
         self._convert = convert
         self._follow = follow
         self._goals: dict[bytes, _Goal] = {}
@@ -101,49 +109,53 @@ class TrajectoryAction:
     def _start(self, handle: Any) -> None:  # noqa: ANN401  # rclpy has no types here
         # handle.execute() would end the goal when its callback returns, which is now
         handle._update_state(rclpy_implementation.GoalEvent.EXECUTE)  # noqa: SLF001
+        goal = self._goals[bytes(handle.goal_id.uuid)] = _Goal(handle)
         try:
-            future = self._follow(self._convert(handle.request))
+            goal.command = self._follow(self._convert(handle.request))
         except ServoError as error:
-            future = Future()
-            future.set_exception(error)
-        self._goals[bytes(handle.goal_id.uuid)] = _Goal(
-            handle, future, PATIENCE + PER_POINT * len(handle.request.trajectory.points)
-        )
+            goal.outcome = refusal(error)
+        except Exception as error:  # noqa: BLE001  # a goal must not end the program
+            goal.outcome = refusal(error)
+            self._node.get_logger().error(traceback.format_exc())
 
     def _cancel(self, handle: Any) -> CancelResponse:  # noqa: ANN401
         goal = self._goals.get(bytes(handle.goal_id.uuid))
-
-        if goal is not None and goal.future.cancel():
-            return CancelResponse.ACCEPT  # it has not begun
-
-        def stop(_core: MotionCore, _now: float) -> None:
-            if goal is not None and goal.future.done() and goal.future.exception() is None:
-                outcome = Outcome(GoalCode.SUCCESSFUL, 'canceled: at rest on the path', True)
-                goal.future.result().stop(outcome)
-
-        self._desk.submit(stop, moves=False)
+        if goal is not None and goal.command is not None:
+            self._gateway.cancel(goal.command, 'canceled: at rest on the path')
         return CancelResponse.ACCEPT
 
     def _watch(self) -> None:
         for goal in list(self._goals.values()):
-            if goal.outcome is not None:
+            if goal.is_concluded:
                 continue
-            goal.outcome = goal.ending()
+            goal.outcome = goal.ending() or self._overdue(goal)
             if goal.outcome is not None:
+                goal.is_concluded = True
                 self._server.notify_execute(goal.handle, None)  # leads to _conclude
-            elif goal.future.done():
-                self._publish_feedback(goal)
+            elif goal.command is not None and goal.command.execution is not None:
+                self._publish_feedback(goal.handle, goal.command.execution)
 
-    def _publish_feedback(self, goal: _Goal) -> None:
-        state = goal.future.result().feedback
+    def _overdue(self, goal: _Goal) -> Outcome | None:
+        """End a goal that the cycle does not begin with."""
+        waits = goal.command is not None and goal.command.execution is None
+        if goal.command is None or not waits or time.monotonic() - goal.begin <= goal.timeout:
+            return None
+        reason = 'the cycle does not run; is the bus up?'
+        self._gateway.cancel(goal.command, reason)
+        return Outcome(GoalCode.INVALID_GOAL, reason)
+
+    def _publish_feedback(self, handle: Any, execution: Execution) -> None:  # noqa: ANN401
+        state = execution.feedback
         feedback = FollowJointTrajectory.Feedback(
-            joint_names=list(self._desk.model.joints),
+            joint_names=list(self._gateway.model.joints),
             desired=point_of(state.desired, state.time),
             actual=point_of(state.actual, state.time),
-            error=point_of(difference(state.desired, state.actual), state.time),
+            error=point_of(
+                difference(self._gateway.model.limits, state.desired, state.actual), state.time
+            ),
         )
         feedback.header.stamp = self._node.get_clock().now().to_msg()
-        goal.handle.publish_feedback(feedback)
+        handle.publish_feedback(feedback)
 
     def _conclude(self, handle: Any) -> FollowJointTrajectory.Result:  # noqa: ANN401
         outcome = self._goals.pop(bytes(handle.goal_id.uuid)).outcome

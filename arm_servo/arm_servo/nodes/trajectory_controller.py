@@ -17,13 +17,11 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from trajectory_msgs.msg import JointTrajectory
 
-from ..core import MotionCore
 from ..exceptions import NotReadyError, ServoError
 from ..execution import Execution
+from ..gateway import CommandGateway, MotionCommand
 from ..goal import TrajectoryGoal
 from ..set_point import Source
-from .desk import Desk
-from .planner import Planner
 from .ros_numbers import seconds
 from .trajectory_action import TrajectoryAction
 from .trajectory_messages import (
@@ -49,7 +47,7 @@ class TrajectoryController:
     def __init__(
         self,
         node: Node,
-        desk: Desk,
+        gateway: CommandGateway,
         parameters: TrajectoryParameters,
         prepare: Callable[[], None],
     ) -> None:
@@ -57,18 +55,17 @@ class TrajectoryController:
 
         Args:
             node: The controller's node.
-            desk: The core's desk.
+            gateway: Commands to the core.
             parameters: How it behaves.
             prepare: Called before a trajectory, to get the drives back.
         """
         self.active = True
         self._node = node
-        self._desk = desk
+        self._gateway = gateway
         self._parameters = parameters
         self._prepare = prepare
         self._execution: Execution | None = None
         self._news: deque[str] = deque()
-        self._planner = Planner(desk, self._check_active)
         self._state = node.create_publisher(
             JointTrajectoryControllerState, '~/controller_state', 10
         )
@@ -76,10 +73,10 @@ class TrajectoryController:
         for qos in (LATCHED, 1):  # who publishes it once from a shell does not latch it
             node.create_subscription(SpeedScalingFactor, '~/speed_scaling_input', self._scale, qos)
         node.create_service(QueryTrajectoryState, '~/query_state', self._query)
-        TrajectoryPause(node, desk)
+        TrajectoryPause(node, gateway)
         node.create_timer(1.0 / parameters.state_rate, self._publish_state)
         self._action = TrajectoryAction(
-            node, desk, parameters.monitor_rate, self._convert, self._follow
+            node, gateway, parameters.monitor_rate, self._convert, self._follow
         )
         if parameters.speed != 1.0:
             self._override(parameters.speed)
@@ -87,13 +84,8 @@ class TrajectoryController:
     def set_active(self, active: bool) -> None:  # a callback of the manager
         """Take trajectories, or stop on the path and take none."""
         self.active = active
-
-        def stop(core: MotionCore, _now: float) -> None:
-            if core.source is Source.TRAJECTORY:
-                core.stop('the controller was deactivated')
-
         if not active:
-            self._desk.submit(stop, moves=False)
+            self._gateway.stop([Source.TRAJECTORY], 'the controller was deactivated')
 
     @property
     def _now(self) -> float:
@@ -102,36 +94,35 @@ class TrajectoryController:
     def _convert(self, request: Any) -> TrajectoryGoal:  # noqa: ANN401  # goals have no type
         return goal_of_action(request, self._now, self._parameters)
 
-    def _follow(self, goal: TrajectoryGoal) -> Future[Execution]:
+    def _follow(self, goal: TrajectoryGoal) -> MotionCommand:
         self._check_active()
         self._prepare()
-        future = self._planner.follow(goal)
-        future.add_done_callback(self._remember)
-        return future
+        command = self._gateway.request(goal)
+        command.future.add_done_callback(self._remember)
+        return command
 
     def _check_active(self) -> None:
         if not self.active:
             name = self._node.get_name()
             raise NotReadyError(f'{name} is inactive; activate it with switch_controller')
 
-    def _remember(self, future: Future[Execution]) -> None:
+    def _remember(self, future: Future[Execution | None]) -> None:
         if not future.cancelled() and future.exception() is None:
             self._execution = future.result()
 
     def _take(self, message: JointTrajectory) -> None:
         try:
-            future = self._follow(goal_of_trajectory(message, self._now, self._parameters))
+            command = self._follow(goal_of_trajectory(message, self._now, self._parameters))
         except ServoError as error:
             self._news.append(f'trajectory refused: {error}')
             return
-        future.add_done_callback(self._tell_refusal)
+        command.future.add_done_callback(self._tell_refusal)
 
     def _scale(self, message: SpeedScalingFactor) -> None:
         self._override(message.factor)
 
     def _override(self, speed: float) -> None:
-        future = self._desk.submit(lambda core, _now: core.override(speed), moves=False)
-        future.add_done_callback(self._tell_refusal)
+        self._gateway.override(speed).add_done_callback(self._tell_refusal)
 
     def _tell_refusal(self, future: Future[Any]) -> None:
         if not future.cancelled() and (error := future.exception()) is not None:
@@ -140,7 +131,7 @@ class TrajectoryController:
     def _query(
         self, request: QueryTrajectoryState.Request, response: QueryTrajectoryState.Response
     ) -> QueryTrajectoryState.Response:
-        snapshot, execution = self._desk.snapshot, self._execution
+        snapshot, execution = self._gateway.snapshot, self._execution
         state = snapshot.reference
         response.message = snapshot.stale(time.monotonic() - snapshot.time)
         if state is None or response.message:
@@ -151,7 +142,7 @@ class TrajectoryController:
             state = execution.foreseen(ahead)
         response.success = True
         response.message = 'paused; ~/resume goes on' if snapshot.paused else ''
-        response.name = list(self._desk.model.joints)
+        response.name = list(self._gateway.model.joints)
         response.position = state.position.tolist()
         response.velocity = state.velocity.tolist()
         response.acceleration = state.acceleration.tolist()
@@ -160,17 +151,17 @@ class TrajectoryController:
     def _publish_state(self) -> None:
         while self._news:
             self._node.get_logger().warning(self._news.popleft())
-        snapshot = self._desk.snapshot
+        snapshot = self._gateway.snapshot
         wanted, measured = snapshot.reference, snapshot.measured
         if wanted is None or measured is None:
             return
         message = JointTrajectoryControllerState(
-            joint_names=list(self._desk.model.joints),
+            joint_names=list(self._gateway.model.joints),
             reference=point_of(wanted),
             feedback=point_of(measured),
-            error=point_of(difference(wanted, measured)),
+            error=point_of(difference(self._gateway.model.limits, wanted, measured)),
             output=point_of(wanted),
-            speed_scaling_factor=snapshot.pace,
+            speed_scaling_factor=snapshot.speed_scaling,
         )
         age = Duration(nanoseconds=round((time.monotonic() - snapshot.time) * 1e9))
         message.header.stamp = (self._node.get_clock().now() - age).to_msg()  # that of the cycle

@@ -11,6 +11,7 @@ from trajectory_msgs.msg import JointTrajectoryPoint
 
 from ..exceptions import GoalCode, GoalError
 from ..goal import GoalPoint, JointTolerance, TrajectoryGoal
+from ..limits import JointLimits
 from ..otg import MotionState
 from .ros_numbers import seconds
 from .trajectory_parameters import TrajectoryParameters
@@ -100,10 +101,10 @@ def point_of(state: MotionState, time: float = 0.0) -> JointTrajectoryPoint:
     return point
 
 
-def difference(wanted: MotionState, actual: MotionState) -> MotionState:
+def difference(limits: JointLimits, wanted: MotionState, actual: MotionState) -> MotionState:
     """Return wanted less actual; accelerations are not measured, so theirs are zero."""
     return MotionState(
-        wanted.position - actual.position,
+        limits.error(wanted.position, actual.position),
         wanted.velocity - actual.velocity,
         0.0 * wanted.acceleration,
     )

@@ -11,9 +11,9 @@ import time
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 
-from ..core import MotionCore
+from ..gateway import CommandGateway
 from ..set_point import Source
-from .desk import Desk, Snapshot
+from ..snapshot import Snapshot
 
 WHAT = {
     Source.TRAJECTORY: 'the trajectory',
@@ -25,14 +25,14 @@ WHAT = {
 class TrajectoryPause:
     """Holds whatever moves the arm, and lets it go on."""
 
-    def __init__(self, node: Node, desk: Desk) -> None:
+    def __init__(self, node: Node, gateway: CommandGateway) -> None:
         """Offer the services.
 
         Args:
             node: The controller's node.
-            desk: The core's desk.
+            gateway: Commands to the core.
         """
-        self._desk = desk
+        self._gateway = gateway
         self._paused = False  # as it was ordered: the cycle may not have come to it yet
         node.create_service(Trigger, '~/pause', self._pause)
         node.create_service(Trigger, '~/resume', self._resume)
@@ -49,15 +49,14 @@ class TrajectoryPause:
         words: Callable[[Snapshot], str],
         response: Trigger.Response,
     ) -> Trigger.Response:
-        snapshot = self._desk.snapshot
+        snapshot = self._gateway.snapshot
         response.message = snapshot.stale(time.monotonic() - snapshot.time)
         if response.message:
             return response
-        command = MotionCore.pause if paused else MotionCore.resume
-        future = self._desk.submit(lambda core, _now: command(core), moves=False)
-        if future.done() and (error := future.exception()) is not None:
-            response.message = str(error)  # too much waits for the cycle
-            return response
+        if paused:
+            self._gateway.pause()
+        else:
+            self._gateway.resume()
         response.success, response.message = True, words(replace(snapshot, paused=self._paused))
         self._paused = paused
         return response

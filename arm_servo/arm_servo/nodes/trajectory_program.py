@@ -10,8 +10,8 @@ import sys
 from rclpy.node import Node
 
 from ..core_settings import CoreSettings
+from ..gateway import CommandGateway
 from .controller_manager import ControllerManager, trajectory_entry
-from .desk import Desk
 from .motion_thread import MotionThread
 from .robot_parameters import declare_manager, declare_robot
 from .standalone import declare_loop, keep_drives, make_loop, MakeNode, run_standalone
@@ -32,25 +32,29 @@ def _build(make_node: MakeNode) -> MotionThread:
     loop = declare_loop(node, '')
     output = declare_output(node, '', OUTPUT, ARRAY)
     settings = CoreSettings(execution=trajectory.execution, check_self_collision=trajectory.check)
-    desk, thread = make_loop(node, model, settings, loop, output)
-    offer_trajectories(manager, node, desk, trajectory, loop.period)
+    gateway, thread = make_loop(node, model, settings, loop, output)
+    offer_trajectories(manager, node, gateway, trajectory, loop.period)
     return thread
 
 
 def offer_trajectories(
-    manager: Node, node: Node, desk: Desk, parameters: TrajectoryParameters, period: float
+    manager: Node,
+    node: Node,
+    gateway: CommandGateway,
+    parameters: TrajectoryParameters,
+    period: float,
 ) -> None:
     """Offer trajectories, and tell the controller manager's clients of it.
 
     Args:
         manager: The node ``controller_manager``.
         node: The node of the trajectory controller.
-        desk: The core's desk.
+        gateway: Commands to the core.
         parameters: Of the controller.
         period: Period of the cycle in [s].
     """
-    controller = TrajectoryController(node, desk, parameters, keep_drives)
-    joints = desk.model.joints
+    controller = TrajectoryController(node, gateway, parameters, keep_drives)
+    joints = gateway.model.joints
     entry = trajectory_entry(node.get_name(), joints, period, controller.set_active)
     ControllerManager(manager, [entry])
 

@@ -19,7 +19,7 @@ from .set_point import Source
 from .single_target import SingleTarget
 
 
-class Sources:
+class CommandArbiter:
     """What may move an arm, and what does.
 
     Attributes:
@@ -47,17 +47,6 @@ class Sources:
         """Where a single target takes the arm in [rad]; None without one."""
         return self._single.target
 
-    def check_target(self, target: Array) -> None:
-        """Make sure that a single target is within the limits.
-
-        Args:
-            target: Positions in [rad].
-
-        Raises:
-            CommandError: A position is beyond a limit.
-        """
-        self._single.check(target)
-
     def jog(self, command: Command, fresh_until: float) -> None:
         """Let a jog command move the arm.
 
@@ -78,6 +67,13 @@ class Sources:
             return self.execution is not None and self.execution.waits
         return self.active is Source.TARGET
 
+    @property
+    def on_path(self) -> bool:
+        """Whether the step that was taken last is on a path that was checked for collisions."""
+        if self.active is not Source.TRAJECTORY or self.execution is None:
+            return False
+        return self.execution.on_path
+
     def follow(self, execution: Execution) -> None:
         """Let a trajectory move the arm.
 
@@ -87,17 +83,17 @@ class Sources:
         self.release('a new trajectory took over')
         self.active, self.execution = Source.TRAJECTORY, execution
 
-    def aim(self, target: Array, fastest: float) -> None:
+    def aim(self, target: Array, max_speed: float) -> None:
         """Let a single target move the arm.
 
         Args:
             target: Positions in [rad], within the limits.
-            fastest: Greatest speed of a joint in [rad/s].
+            max_speed: Greatest speed of a joint in [rad/s].
         """
         if self.active is not Source.TARGET:
             self.release('a single target took over')
         self.active = Source.TARGET
-        self._single.target, self._single.fastest = frozen(target), fastest
+        self._single.target, self._single.max_speed = frozen(target), max_speed
 
     def stop(self, reason: str) -> None:
         """Come to rest: a trajectory on its path, anything else in the shortest time.
@@ -128,7 +124,7 @@ class Sources:
         now: float,
         period: float,
         *,
-        pace: float,
+        speed_scaling: float,
         paused: bool,
     ) -> tuple[MotionState, MotionReport]:
         """Return the next state that is wanted, and what limits it.
@@ -138,7 +134,7 @@ class Sources:
             measured: Measured state now.
             now: Steady time in [s].
             period: Time to the next step in [s].
-            pace: Pace of trajectories and targets, 0 to 1.
+            speed_scaling: Share of the speed of trajectories and targets, 0 to 1.
             paused: Whether jogging comes to rest in spite of a command.
         """
         report, wanted = MotionReport(), None
@@ -146,9 +142,9 @@ class Sources:
             velocity, report = self._jogging.step(state, now, period, held=paused)
             wanted = None if velocity is None else self._toward(state, velocity, period)
         elif self.active is Source.TRAJECTORY and self.execution is not None:
-            wanted = self.execution.step(state, measured, pace, period)
+            wanted = self.execution.step(state, measured, speed_scaling, period)
         elif self.active is Source.TARGET:
-            wanted = self._single.step(state, pace, period)
+            wanted = self._single.step(state, speed_scaling, period)
         if wanted is None:
             wanted = self._toward(state, np.zeros(len(self._limits)), period)
         return wanted, report

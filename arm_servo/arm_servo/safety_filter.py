@@ -7,6 +7,7 @@ from __future__ import annotations
 import numpy as np
 
 from .arrays import Array, Mask
+from .clearances import LeastClearance
 from .model import RobotModel
 from .otg import Generator, hard_brake, MotionState, Plan
 from .report import Cause, Limiter
@@ -24,7 +25,7 @@ EXACT = 1e-7
 """Rounding of ruckig's positions that is let pass in [rad]."""
 
 
-class Guard:
+class SafetyFilter:
     """Lets a step pass only when the shortest stop behind it stays within the limits.
 
     A joint that could not stop any more brakes instead; where links would come too near, all do.
@@ -32,18 +33,17 @@ class Guard:
     beyond a limit, or in contact, may go back and may not go further.
     """
 
-    def __init__(self, model: RobotModel, generator: Generator, clearance: float) -> None:
+    def __init__(self, model: RobotModel, generator: Generator) -> None:
         """Prepare.
 
         Args:
             model: The arm.
             generator: Plans its stops.
-            clearance: Least distance between links on a stop in [m].
         """
         self._model = model
         self._limits = model.limits
         self._generator = generator
-        self._clearance = clearance
+        self._clearance = 0.0  # for which the floor was found
         self._lower: Array = model.limits.lower
         self._upper: Array = model.limits.upper
         self._anywhere: Array = np.full(len(model), np.inf)
@@ -63,7 +63,7 @@ class Guard:
             self._remember(stop)
 
     def step(
-        self, state: MotionState, wanted: MotionState, period: float, clearances: bool
+        self, state: MotionState, wanted: MotionState, period: float, clearance: float | None
     ) -> tuple[MotionState, Limiter | None]:
         """Let a step pass, or brake instead.
 
@@ -71,7 +71,8 @@ class Guard:
             state: Commanded state now.
             wanted: State wanted at the end of the period.
             period: Its length in [s].
-            clearances: Whether distances between links count too.
+            clearance: Least distance between links on a stop in [m]; None where what moves the
+                arm keeps to a path that was checked.
 
         Returns:
             The state to command, and what held the wanted one up.
@@ -79,16 +80,15 @@ class Guard:
         beyond, stop = self._beyond(wanted)
         limiter = None
         if beyond.any():  # these joints brake, each for itself; the others go on
-            name = self._limits.names[int(np.argmax(beyond))]
-            limiter = Limiter(Cause.STOP_CHECK, name, 0.0, 0.0)
+            limiter = self._limit(wanted, int(np.argmax(beyond)))
             wanted = _mixed(beyond, self._brake(state, period), wanted)
             beyond, stop = self._beyond(wanted)
         if stop is not None and not beyond.any():
-            room = self._room(stop, state, clearances)
-            if room is None:
+            near = self._too_near(stop, state, clearance)
+            if near is None:
                 self._remember(stop)
                 return wanted, limiter
-            limiter = Limiter(Cause.STOP_CHECK, 'distance of links', room, 0.0)
+            limiter = Limiter(Cause.COLLISION, ' - '.join(near.links), near.distance, 0.0)
             eased = self._eased(state, period)
             if eased is not None:
                 return eased, limiter
@@ -105,39 +105,55 @@ class Guard:
         lower, upper = stop.extremes
         return beyond | (lower < self._lower - EXACT) | (upper > self._upper + EXACT), stop
 
+    def _limit(self, wanted: MotionState, joint: int) -> Limiter:
+        """Name the limit that a joint would break."""
+        name, speed = self._limits.names[joint], float(abs(wanted.velocity[joint]))
+        if speed > self._fastest[joint]:
+            return Limiter(Cause.JOINT_VELOCITY, name, speed, 0.0)
+        ways = (
+            wanted.position[joint] - self._limits.lower[joint],
+            self._limits.upper[joint] - wanted.position[joint],
+        )
+        return Limiter(Cause.JOINT_POSITION, name, float(min(ways)), 0.0)
+
     def _remember(self, stop: Plan) -> None:
         """Allow as much beyond the limits as the present stop needs, and no more."""
         lower, upper = stop.extremes
         self._lower = np.minimum(self._limits.lower, np.maximum(self._lower, lower))
         self._upper = np.maximum(self._limits.upper, np.minimum(self._upper, upper))
 
-    def _room(self, stop: Plan, state: MotionState, clearances: bool) -> float | None:
-        """Return the distance of links that a stop would leave when it is too small.
+    def _too_near(
+        self, stop: Plan, state: MotionState, clearance: float | None
+    ) -> LeastClearance | None:
+        """Return which links a stop would bring too near, and how near; None for none.
 
         Links that are nearer than they should be may stay as they are, not come nearer.
         """
-        if not clearances:
-            self._floor = None  # what moves the arm now looks after that itself
+        if clearance is None:
+            self._floor = None
             return None
+        if clearance != self._clearance:
+            self._clearance, self._floor = clearance, None
         if self._floor is None:
             now = self._generator.brake(state)
-            self._floor = self._clearance if now is None else self._distance(now)
-            self._floor = min(self._floor, self._clearance)
-        room = self._distance(stop)
-        if room < self._floor - TOUCH:
+            self._floor = clearance if now is None else self._least(now).distance
+            self._floor = min(self._floor, clearance)
+        near = self._least(stop)
+        if near.distance < self._floor - TOUCH:
             # what stopping now brings about cannot be had better
             now = self._generator.brake(state)
-            least = self._floor - TOUCH if now is None else min(self._floor, self._distance(now))
+            least = self._floor - TOUCH
+            least = least if now is None else min(self._floor, self._least(now).distance)
             self._floor = min(self._floor, least + TOUCH)
-        if room < self._floor - TOUCH - EXACT:
-            return room
-        self._floor = max(self._floor, min(room, self._clearance))
+        if near.distance < self._floor - TOUCH - EXACT:
+            return near
+        self._floor = max(self._floor, min(near.distance, clearance))
         return None
 
-    def _distance(self, stop: Plan) -> float:
-        """Return the least distance between links on a stop in [m], if it is small."""
+    def _least(self, stop: Plan) -> LeastClearance:
+        """Return the least distance between links on a stop, if it is small."""
         if self._model.stays_apart(*stop.extremes, self._clearance):
-            return self._clearance
+            return LeastClearance(self._clearance)
         way = np.ptp(np.stack(stop.extremes), axis=0).sum()
         looks = min(max(LOOKS, round(way / STRIDE)), MOST_LOOKS)
         times = np.linspace(0.0, stop.duration, looks + 1)[1:].tolist()
@@ -151,7 +167,7 @@ class Guard:
             return None
         after = plan.at(period)
         beyond, stop = self._beyond(after)
-        if stop is None or beyond.any() or self._distance(plan) < self._floor - TOUCH:
+        if stop is None or beyond.any() or self._least(plan).distance < self._floor - TOUCH:
             return None
         self._remember(stop)
         return after

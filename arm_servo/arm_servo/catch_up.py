@@ -33,7 +33,7 @@ OWN_JOLT = (0.25, 0.129)
 """The same where the state that is followed goes on: a limited jerk that turns makes as much."""
 
 
-class Follower:
+class CatchUpInterpolator:
     """Follows a state that moves by itself, within the limits of the joints.
 
     A step that the limits allow is taken exactly. Otherwise it plans to where the state will be
@@ -53,6 +53,11 @@ class Follower:
         self._plan: Plan | None = None
         self._elapsed = 0.0
         self._exact = False
+
+    @property
+    def exact(self) -> bool:
+        """Whether the last step was taken exactly: it is on what is followed."""
+        return self._exact
 
     def step(
         self, state: MotionState, ahead: Callable[[float], MotionState], period: float

@@ -1,40 +1,31 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Messages of the servo's topics as commands for the core."""
+"""Messages of the servo's topics as requests."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
 from typing import Any, Protocol
 
 import numpy as np
 
 from ..arrays import Array, checked
-from ..core import MotionCore
+from ..commands import by_joint, pose_command, twist_command
 from ..exceptions import CommandError
-from ..model import Pose
-from .frame_tree import combined, rotation_of
+from ..model import Pose, RobotModel
+from ..requests import DisplacementRequest, JogRequest
+from ..servo import JointCommand
+from .frame_tree import rotation_of
 from .ros_numbers import xyz, xyzw
-from .servo_parameters import Scales, ServoParameters, Units
+from .servo_parameters import (
+    DEFAULT_ANGULAR_SPEED,
+    DEFAULT_LINEAR_SPEED,
+    Scales,
+    ServoParameters,
+    Units,
+)
 
-Order = Callable[[MotionCore, float], None]
-
-
-@dataclass(frozen=True, slots=True)
-class Displacements:
-    """An order to move joints on.
-
-    Attributes:
-        by_joint: How far in [rad] by joint.
-        fastest: Greatest speed of a joint in [rad/s].
-    """
-
-    by_joint: Mapping[str, float]
-    fastest: float
-
-
-LONGEST = 60.0
+MAX_DURATION = 60.0
 """Longest duration of a joint jog in [s]."""
 
 
@@ -48,50 +39,54 @@ class Frames(Protocol):
         """Return the pose of a frame that is no link in the base; raises CommandError."""
 
 
-class ServoOrders:
-    """Makes commands of messages; what is wrong with one is raised before anything moves.
+class CommandConverter:
+    """Makes requests of messages; what is wrong with one is raised before anything moves.
+
+    A request expires some time after its message was sent; both are steady times in [s].
 
     Attributes:
         scales: How numbers become speeds.
         capped: What was cut off the last command, in words; empty when nothing was.
     """
 
-    def __init__(self, frames: Frames, parameters: ServoParameters, scales: Scales) -> None:
+    def __init__(
+        self, model: RobotModel, frames: Frames, parameters: ServoParameters, scales: Scales
+    ) -> None:
         """Prepare.
 
         Args:
+            model: The arm; only its names are used.
             frames: Frames of commands.
             parameters: How the servo behaves.
             scales: How numbers become speeds.
         """
         self.scales = scales
         self.capped = ''
+        self._model = model
         self._frames = frames
         self._parameters = parameters
 
-    def twist(self, message: Any) -> Order:  # noqa: ANN401  # message classes have no type
-        """Return the command of a TwistStamped.
+    def twist(self, message: Any, sent: float) -> JogRequest:  # noqa: ANN401  # messages have no type
+        """Return the request of a TwistStamped.
 
         Raises:
             CommandError: A number is not finite, or the frame is unknown.
         """
         twist = np.concatenate((xyz(message.twist.linear), xyz(message.twist.angular)))
         twist = self._scaled(checked(twist, 6, 'twist'))
+        expires = sent + self._parameters.timeout
         frame = message.header.frame_id or self._parameters.default_frame
-        if not frame:
-            return lambda core, now: core.twist(twist, now)
-        if not self._parameters.about_tip:
-            place = self._place(frame)
-            return lambda core, now: core.twist(_about(core, place(core), twist), now)
-        if self._frames.is_link(frame):
-            return lambda core, now: core.twist(
-                twist, now, link=None if frame == core.model.base else frame
-            )
-        axes = self._frames.pose(frame).rotation
-        return lambda core, now: core.twist(twist, now, axes=axes)
+        link, axes, about = None, None, None
+        if frame and not self._parameters.about_tip:
+            about = self._place(frame)
+        elif frame and self._frames.is_link(frame):
+            link = None if frame == self._model.base else frame
+        elif frame:
+            axes = self._frames.pose(frame).rotation
+        return JogRequest(twist_command(self._model, twist, link, axes), expires, about)
 
-    def jog(self, message: Any) -> Order | Displacements:  # noqa: ANN401
-        """Return the command of a JointJog: speeds for a duration, or displacements.
+    def jog(self, message: Any, sent: float) -> JogRequest | DisplacementRequest:  # noqa: ANN401
+        """Return the request of a JointJog: speeds for a duration, or displacements.
 
         Raises:
             CommandError: Lengths differ, a number is not finite, or it has both or neither.
@@ -104,9 +99,11 @@ class ServoOrders:
         if message.displacements:
             ways = _by_name(names, message.displacements, 'displacements')
             self.capped = ''
-            return Displacements(ways, self.scales.joint * self.scales.override)
-        if not 0.0 <= message.duration <= LONGEST:
-            raise CommandError(f'duration {message.duration} s: 0 (the time-out) to {LONGEST:g}')
+            return DisplacementRequest(ways, self.scales.joint * self.scales.override)
+        if not 0.0 <= message.duration <= MAX_DURATION:
+            raise CommandError(
+                f'duration {message.duration} s: 0 (the time-out) to {MAX_DURATION:g}'
+            )
         speeds = _by_name(names, message.velocities, 'velocities')
         factor = self.scales.override
         if self.scales.units is Units.UNITLESS:
@@ -116,11 +113,11 @@ class ServoOrders:
             factor *= self.scales.joint
             speeds = {name: min(max(speed, -1.0), 1.0) for name, speed in speeds.items()}
         speeds = {name: factor * speed for name, speed in speeds.items()}
-        duration = message.duration or None
-        return lambda core, now: core.jog(speeds, now, duration)
+        command = JointCommand(*by_joint(self._model, speeds, 'velocities'))
+        return JogRequest(command, sent + (message.duration or self._parameters.timeout))
 
-    def pose(self, message: Any) -> Order:  # noqa: ANN401
-        """Return the command of a PoseStamped.
+    def pose(self, message: Any, sent: float) -> JogRequest:  # noqa: ANN401
+        """Return the request of a PoseStamped.
 
         Raises:
             CommandError: A number is not finite, the quaternion is none, or the frame is unknown.
@@ -129,17 +126,18 @@ class ServoOrders:
         goal = Pose(rotation_of(xyzw(message.pose.orientation)), position)
         frame = message.header.frame_id or self._parameters.default_frame
         self.capped = ''
-        if not frame:
-            return lambda core, now: core.track(goal, now)
-        place = self._place(frame)
-        return lambda core, now: core.track(combined(place(core), goal), now)
+        scales = self.scales
+        command = pose_command(
+            goal,
+            scales.override * (scales.linear or DEFAULT_LINEAR_SPEED),
+            scales.override * (scales.rotational or DEFAULT_ANGULAR_SPEED),
+        )
+        expires = sent + self._parameters.timeout
+        return JogRequest(command, expires, self._place(frame) if frame else None)
 
-    def _place(self, frame: str) -> Callable[[MotionCore], Pose]:
-        """Return what tells the pose of a frame in the base."""
-        if self._frames.is_link(frame):
-            return lambda core: core.model.pose(core.state.position, frame)
-        pose = self._frames.pose(frame)
-        return lambda _core: pose
+    def _place(self, frame: str) -> str | Pose:
+        """Return a link, whose pose changes with the arm, or the pose of another frame."""
+        return frame if self._frames.is_link(frame) else self._frames.pose(frame)
 
     def _scaled(self, twist: Array) -> Array:
         """Return a twist in [m/s] and [rad/s]; what is cut off is told."""
@@ -160,10 +158,3 @@ def _by_name(names: list[str], values: Any, what: str) -> Mapping[str, float]:  
     if len(names) != len(values):
         raise CommandError(f'{len(names)} joint_names, but {len(values)} {what}')
     return dict(zip(names, checked(list(values), len(names), what).tolist(), strict=True))
-
-
-def _about(core: MotionCore, place: Pose, twist: Array) -> Array:
-    """Return the tip's twist in the base when the twist turns about the origin of a frame."""
-    linear, angular = place.rotation @ twist[:3], place.rotation @ twist[3:]
-    arm = core.model.pose(core.state.position).position - place.position
-    return np.concatenate((linear + np.cross(angular, arm), angular))

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from control_msgs.msg import JointJog
-from geometry_msgs.msg import TwistStamped
+from geometry_msgs.msg import PoseStamped, TwistStamped
 import numpy as np
 import pytest
 from servo_robots import ready, robot
@@ -16,9 +16,10 @@ from arm_servo.arrays import Array
 from arm_servo.core import MotionCore
 from arm_servo.exceptions import CommandError
 from arm_servo.model import Pose
-from arm_servo.nodes.servo_orders import ServoOrders
+from arm_servo.nodes.command_converter import CommandConverter
 from arm_servo.nodes.servo_parameters import Scales, ServoParameters, Units
-from arm_servo.servo import ServoSettings
+from arm_servo.requests import JogRequest
+from arm_servo.servo import PoseCommand, ServoSettings
 
 PERIOD = 0.01
 SPEED = Scales(Units.SPEED, 0.2, 0.5, 0.5, 1.0)
@@ -39,10 +40,10 @@ class Frames:
         return Pose(np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1.0]]), np.array([0.5, 0.0, 0.0]))
 
 
-def orders(scales: Scales, *, about_tip: bool = True) -> ServoOrders:
+def converter(scales: Scales, *, about_tip: bool = True) -> CommandConverter:
     """Return what makes commands."""
     parameters = ServoParameters(0.1, about_tip, '', '', '', '', '', 25.0, ServoSettings())
-    return ServoOrders(Frames(), parameters, scales)
+    return CommandConverter(robot('gp110'), Frames(), parameters, scales)
 
 
 def twist(numbers: Sequence[float], frame: str = '') -> TwistStamped:
@@ -54,12 +55,12 @@ def twist(numbers: Sequence[float], frame: str = '') -> TwistStamped:
     return message
 
 
-def tool_twist(made: ServoOrders, message: TwistStamped) -> tuple[Array, Array]:
+def tool_twist(made: CommandConverter, message: TwistStamped) -> tuple[Array, Array]:
     """Carry a command out for a while; return the twist reached in the base, and the positions."""
     core = MotionCore(robot('gp110'))
     core.reset(ready('gp110'))
     for number in range(60):
-        made.twist(message)(core, number * PERIOD)
+        core.commit_jog(made.twist(message, number * PERIOD))
         core.step(number * PERIOD, PERIOD)
     state = core.state
     return core.model.jacobian(state.position) @ state.velocity, state.position
@@ -67,13 +68,13 @@ def tool_twist(made: ServoOrders, message: TwistStamped) -> tuple[Array, Array]:
 
 def test_unitless_numbers_are_shares_of_the_scales() -> None:
     """Half of 0.2 m/s is 0.1 m/s, within a hundredth."""
-    reached, _ = tool_twist(orders(UNITLESS), twist([0, 0, 0.5, 0, 0, 0]))
+    reached, _ = tool_twist(converter(UNITLESS), twist([0, 0, 0.5, 0, 0, 0]))
     assert reached == pytest.approx([0, 0, 0.1, 0, 0, 0], abs=1e-3)
 
 
 def test_speeds_are_taken_as_they_are_up_to_the_cap() -> None:
     """The direction is kept, and what was cut off is told."""
-    made = orders(SPEED)
+    made = converter(SPEED)
     reached, _ = tool_twist(made, twist([0, 0.05, 0.05, 0, 0, 0]))
     assert reached == pytest.approx([0, 0.05, 0.05, 0, 0, 0], abs=1e-3)
     assert made.capped == ''
@@ -84,16 +85,16 @@ def test_speeds_are_taken_as_they_are_up_to_the_cap() -> None:
 
 def test_a_twist_in_a_frame_of_tf_is_turned() -> None:
     """X of the table is y of the base; it turns nothing."""
-    reached, _ = tool_twist(orders(SPEED), twist([0.1, 0, 0, 0, 0, 0], 'table'))
+    reached, _ = tool_twist(converter(SPEED), twist([0.1, 0, 0, 0, 0, 0], 'table'))
     assert reached == pytest.approx([0, 0.1, 0, 0, 0, 0], abs=1e-3)
 
 
 def test_a_twist_may_turn_about_the_origin_of_its_frame() -> None:
     """The tip then moves on a circle about the table, else it only turns."""
     message = twist([0, 0, 0, 0, 0, 0.1], 'table')
-    turned, _ = tool_twist(orders(SPEED), message)
+    turned, _ = tool_twist(converter(SPEED), message)
     assert turned == pytest.approx([0, 0, 0, 0, 0, 0.1], abs=1e-3)
-    carried, at = tool_twist(orders(SPEED, about_tip=False), message)
+    carried, at = tool_twist(converter(SPEED, about_tip=False), message)
     arm = robot('gp110').pose(at).position - Frames().pose('table').position
     wanted = [*np.cross([0, 0, 0.1], arm), 0, 0, 0.1]
     assert carried == pytest.approx(wanted, abs=3e-3)
@@ -101,14 +102,14 @@ def test_a_twist_may_turn_about_the_origin_of_its_frame() -> None:
 
 def test_a_joint_jog_is_cut_and_scaled() -> None:
     """Twice full speed is full speed, which the scale says."""
-    made = orders(UNITLESS)
+    made = converter(UNITLESS)
     core = MotionCore(robot('gp110'))
     core.reset(ready('gp110'))
     name = core.model.joints[0]
     for number in range(60):
-        order = made.jog(JointJog(joint_names=[name], velocities=[2.0]))
-        assert callable(order)
-        order(core, number * PERIOD)
+        request = made.jog(JointJog(joint_names=[name], velocities=[2.0]), number * PERIOD)
+        assert isinstance(request, JogRequest)
+        core.commit_jog(request)
         core.step(number * PERIOD, PERIOD)
     assert core.state.velocity[0] == pytest.approx(0.4, abs=1e-3)
     assert 'cut' in made.capped
@@ -127,4 +128,40 @@ def test_a_joint_jog_is_cut_and_scaled() -> None:
 def test_a_joint_jog_that_makes_no_sense_is_refused(message: JointJog, words: str) -> None:
     """Before it reaches the core."""
     with pytest.raises(CommandError, match=words):
-        orders(UNITLESS).jog(message)
+        converter(UNITLESS).jog(message, 0.0)
+
+
+def test_a_command_expires_a_time_out_after_it_was_sent() -> None:
+    """Not after it arrived: what is old already has less time; a duration counts likewise."""
+    made = converter(UNITLESS)
+    assert made.twist(twist([0, 0, 0.5, 0, 0, 0]), 20.0).expires == pytest.approx(20.1)
+    jog = made.jog(JointJog(joint_names=['joint_1_s'], velocities=[1.0], duration=2.0), 20.0)
+    assert isinstance(jog, JogRequest)
+    assert jog.expires == pytest.approx(22.0)
+
+
+def test_a_pose_is_approached_at_the_speeds_of_the_scales() -> None:
+    """As they are now, times the override."""
+    made = converter(Scales(Units.SPEED, 0.2, 0.5, 0.5, 0.5))
+    message = PoseStamped()
+    message.pose.orientation.w = 1.0
+    command = made.pose(message, 0.0).command
+    assert isinstance(command, PoseCommand)
+    assert (command.linear_speed, command.angular_speed) == pytest.approx((0.1, 0.25))
+    made.scales = Scales(Units.SPEED, 0.4, 0.8, 0.5, 1.0)
+    command = made.pose(message, 0.0).command
+    assert isinstance(command, PoseCommand)
+    assert (command.linear_speed, command.angular_speed) == pytest.approx((0.4, 0.8))
+
+
+def test_a_pose_is_not_approached_faster_than_its_speed() -> None:
+    """Seen on the tool."""
+    core = MotionCore(robot('gp110'))
+    core.reset(ready('gp110'))
+    here = core.model.pose(core.state.position)
+    there = Pose(here.rotation, here.position + np.array((0.0, 0.3, 0.0)))
+    core.commit_jog(JogRequest(PoseCommand(there, 0.05, 0.8), 10.0))
+    for number in range(200):
+        core.step(number * PERIOD, PERIOD)
+    speed = core.model.jacobian(core.state.position) @ core.state.velocity
+    assert speed[1] == pytest.approx(0.05, rel=0.05)

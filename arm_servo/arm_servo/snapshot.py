@@ -1,0 +1,70 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What the motion core does, for any thread."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .execution import Execution
+from .otg import MotionState
+from .set_point import SetPoint, Source
+
+MAX_CYCLE_AGE = 0.25
+"""Age of a cycle at which the cycle stands still: commands are refused, as they would surprise."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Snapshot:
+    """What the core did in a cycle.
+
+    Attributes:
+        time: Steady time of the cycle in [s].
+        set_point: What was commanded; None while the arm does not follow.
+        measured: What was measured; None before the first feedback.
+        blocked: Why the arm does not follow, with the remedy; empty while it does.
+        source: What moves it.
+        paused: Whether it is paused.
+        speed: Speed override, 0 to 1.
+        cycles: Cycles so far in which the arm followed.
+        period: Period of the cycle in [s].
+        execution: The trajectory that was followed last; None before the first.
+    """
+
+    time: float
+    set_point: SetPoint | None
+    measured: MotionState | None
+    blocked: str
+    source: Source = Source.NONE
+    paused: bool = False
+    speed: float = 1.0
+    cycles: int = 0
+    period: float = 0.01
+    execution: Execution | None = None
+
+    @property
+    def speed_scaling(self) -> float:
+        """Speed override that counts, 0 to 1: none while it is paused."""
+        return 0.0 if self.paused else self.speed
+
+    @property
+    def reference(self) -> MotionState | None:
+        """Where the arm is to be: where it stands while it does not follow; None while unknown."""
+        if self.set_point is not None:
+            return self.set_point.state
+        if self.measured is None or not np.isfinite(self.measured.position).all():
+            return None
+        return MotionState.at_rest(self.measured.position)
+
+    def stale(self, age: float) -> str:
+        """Return that the cycle does not run; empty when it does.
+
+        Args:
+            age: Time since the cycle of this snapshot in [s].
+        """
+        if age <= MAX_CYCLE_AGE:
+            return ''
+        begun = f'{age:.1f} s ago' if self.time else 'never'
+        return f'the cycle does not run (the last was {begun}); is the bus up?'

@@ -1,0 +1,141 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The time of a trajectory: how fast it runs, with limited acceleration and jerk of the joints."""
+
+from __future__ import annotations
+
+import numpy as np
+import ruckig
+
+from .limits import JointLimits
+from .path import Path
+
+QUICKEST = 10.0
+"""Greatest change of the speed scaling in [1/s], for where the path asks nothing of the joints."""
+
+ABRUPTEST = 200.0
+"""Greatest change of that in [1/s2]."""
+
+SHARE = 0.9
+"""Share of the joints' acceleration that a change of the speed scaling may bring them to."""
+
+JERK_SHARE = 0.4
+"""Share of the joints' jerk that a change of the speed scaling may ask."""
+
+SPREAD = 5.0
+"""Cycles at least in which a change of the speed scaling builds up."""
+
+FLOOR = 0.2
+"""Share of its room that a change of the speed scaling has where the path leaves none."""
+
+SOON = 0.01
+"""How far ahead on the path its own jerk is looked for in [s]."""
+
+
+class TrajectoryTimer:
+    """Runs through a path at a speed scaling of 0 to 1 that changes smoothly.
+
+    Coming to a stop it may overrun by a little, and go back.
+
+    Attributes:
+        time: Time of the path in [s].
+        speed_scaling: Seconds of the path per second.
+        change: Change of the speed scaling in [1/s].
+    """
+
+    def __init__(self, limits: JointLimits, speed_scaling: float) -> None:
+        """Start at the begin of a path.
+
+        Args:
+            limits: Limits of the joints.
+            speed_scaling: Seconds of the trajectory per second to start with.
+        """
+        self._limits = limits
+        self._otg = ruckig.Ruckig(1)
+        self._demand = ruckig.InputParameter(1)
+        self._demand.control_interface = ruckig.ControlInterface.Velocity
+        self._demand.max_velocity = [10.0]
+        self._wanted = speed_scaling
+        self.time = 0.0
+        self.speed_scaling = speed_scaling
+        self.change = 0.0
+
+    def begin(self, speed_scaling: float) -> None:
+        """Begin at a speed scaling, from rest on a path that begins at rest."""
+        self._wanted = self.speed_scaling = speed_scaling
+
+    def ahead(self, time: float) -> tuple[float, float, float]:
+        """Foresee time, speed scaling and change, which goes on evenly until it is as wanted.
+
+        Args:
+            time: How far ahead in [s].
+        """
+        gap = self._wanted - self.speed_scaling
+        if self.change * gap <= 0.0:
+            return self.time + self.speed_scaling * time, self.speed_scaling, self.change
+        changing = gap / self.change
+        if time < changing:
+            way = (self.speed_scaling + 0.5 * self.change * time) * time
+            return self.time + way, self.speed_scaling + self.change * time, self.change
+        way = (self.speed_scaling + 0.5 * gap) * changing + self._wanted * (time - changing)
+        return self.time + way, self._wanted, 0.0
+
+    @property
+    def stopped(self) -> bool:
+        """Whether it stands still."""
+        return self.speed_scaling == 0.0 and self.change == 0.0
+
+    def step(self, path: Path, wanted: float, period: float) -> None:
+        """Advance.
+
+        Args:
+            path: The path.
+            wanted: Speed scaling to reach.
+            period: Time to advance by in [s].
+        """
+        self._wanted = wanted
+        if self.speed_scaling == wanted and self.change == 0.0:
+            self.time += self.speed_scaling * period
+            return
+        quickest, abruptest = self._room(path, 1.0 if wanted > self.speed_scaling else -1.0)
+        abruptest = min(abruptest, quickest / (SPREAD * period))
+        demand = self._demand
+        demand.current_position = [self.time]
+        demand.current_velocity = [self.speed_scaling]
+        demand.current_acceleration = [self.change]
+        demand.target_velocity = [wanted]
+        demand.max_acceleration = [quickest]
+        demand.max_jerk = [abruptest]
+        trajectory = ruckig.Trajectory(1)
+        try:
+            self._otg.calculate(demand, trajectory)
+        except ruckig.RuckigError:  # at once, rather than not at all; the joints are limited yet
+            self.time, self.speed_scaling, self.change = self.time + wanted * period, wanted, 0.0
+            return
+        if trajectory.duration <= period:
+            reached = trajectory.at_time(trajectory.duration)[0][0]
+            left = period - trajectory.duration
+            self.time, self.speed_scaling, self.change = reached + wanted * left, wanted, 0.0
+            return
+        values = (each[0] for each in trajectory.at_time(period))
+        self.time, self.speed_scaling, self.change = values
+
+    def _room(self, path: Path, sense: float) -> tuple[float, float]:
+        """Return how fast the speed scaling may change in [1/s], and that in [1/s2]."""
+        here, soon, limits = path.at(self.time), path.at(self.time + SOON), self._limits
+        speed = np.maximum(np.abs(here.velocity), 1e-9)
+        bend = np.maximum(np.abs(here.acceleration), np.abs(soon.acceleration))
+        bend *= self.speed_scaling
+        used = sense * np.sign(here.velocity) * here.acceleration * self.speed_scaling**2
+        room = np.maximum(SHARE * limits.acceleration - used, FLOOR * limits.acceleration)
+        # by the chain rule a change c of the scaling p costs jerk: three times acceleration p c,
+        # and velocity dc/dt, beside the path's own jerk p^3
+        quickest = min(
+            float(np.min(room / speed)),
+            float(np.min(JERK_SHARE * limits.jerk / np.maximum(3.0 * bend, 1e-9))),
+        )
+        own = np.abs(soon.acceleration - here.acceleration) / SOON * self.speed_scaling**3
+        left = limits.jerk - own - 3.0 * bend * abs(self.change)
+        left = JERK_SHARE * np.maximum(left, FLOOR * limits.jerk)
+        abruptest = float(np.min(left / speed))
+        return min(quickest, QUICKEST), min(abruptest, ABRUPTEST)

@@ -1,0 +1,296 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""No stop is overtaken: every kind of stop at every moment of every kind of command.
+
+A command goes through the cycle and a worker; the tests decide when each takes its next step, so
+a stop is put between any two of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+import numpy as np
+import pytest
+from servo_commands import jog, move_by, SteppedWorker, twist
+from servo_drives import Drives, PERIOD
+from servo_elsewhere import Elsewhere
+
+from arm_canopen import Refusal, RefusalCause
+from arm_canopen.standard.drive import DriveState
+from arm_servo.arrays import Array
+from arm_servo.gateway import CommandGateway, JOGGING, MotionCommand
+from arm_servo.goal import GoalPoint, TrajectoryGoal
+from arm_servo.model import combined, Pose
+from arm_servo.requests import JogRequest
+from arm_servo.servo import PoseCommand
+from arm_servo.set_point import Source
+
+SETTLED = 400
+"""Cycles in which everything has come to rest."""
+
+AT_REST = 50
+"""Cycles without motion after which nothing begins by itself any more."""
+
+Give = Callable[[CommandGateway, float, Array], MotionCommand | None]
+
+
+def _twist(gateway: CommandGateway, now: float, _at: Array) -> None:
+    twist(gateway, [0.0, 0.1, 0.1, 0.0, 0.0, 0.3], now, 60.0)
+
+
+def _jog(gateway: CommandGateway, now: float, _at: Array) -> None:
+    jog(gateway, {gateway.model.joints[0]: 0.5}, now, 60.0)
+
+
+def _pose(gateway: CommandGateway, now: float, at: Array) -> None:
+    there = combined(gateway.model.pose(at), Pose(np.eye(3), np.array([0.0, 0.05, 0.05])))
+    gateway.jog(JogRequest(PoseCommand(there), now + 60.0))
+
+
+def _displacement(gateway: CommandGateway, _now: float, _at: Array) -> MotionCommand:
+    return move_by(gateway, {gateway.model.joints[0]: 0.4})
+
+
+def _goal(gateway: CommandGateway, at: Array, count: int, age: float = 0.0) -> TrajectoryGoal:
+    steps = np.linspace(0.0, 0.3, count + 1)[1:]
+    points = [
+        GoalPoint(1.0 + 3.0 * number / count, [at[0] + step, *at[1:].tolist()])
+        for number, step in enumerate(steps.tolist())
+    ]
+    return TrajectoryGoal(gateway.model.joints, points, age=age)
+
+
+def _trajectory(gateway: CommandGateway, _now: float, at: Array) -> MotionCommand:
+    return gateway.request(_goal(gateway, at, 3))
+
+
+def _long_trajectory(gateway: CommandGateway, _now: float, at: Array) -> MotionCommand:
+    return gateway.request(_goal(gateway, at, 80))
+
+
+def _stamped_trajectory(gateway: CommandGateway, _now: float, at: Array) -> MotionCommand:
+    return gateway.request(_goal(gateway, at, 3, age=-0.15))
+
+
+JOGS: dict[str, Give] = {
+    'twist': _twist,
+    'jog': _jog,
+    'pose': _pose,
+    'displacement': _displacement,
+}
+TRAJECTORIES: dict[str, Give] = {
+    'trajectory': _trajectory,
+    'long trajectory': _long_trajectory,
+    'stamped trajectory': _stamped_trajectory,
+}
+COMMANDS = JOGS | TRAJECTORIES
+
+STEPS = st.lists(st.sampled_from(['cycle', 'cycle', 'work']), max_size=14)
+LATER = st.sampled_from([0, 0, 0, 5, 20, 60])
+"""Cycles between the steps of the command and the stop: 0 for while it is prepared."""
+
+
+class Bench:
+    """An arm, the worker of its commands, and what has happened since the stop."""
+
+    def __init__(self, arm: Drives | Elsewhere, worker: SteppedWorker) -> None:
+        self.arm, self.gateway, self._worker = arm, arm.gateway, worker
+        self.arm.run(3)
+
+    @property
+    def at(self) -> Array:
+        """Where the arm was sent last."""
+        point = self.gateway.snapshot.set_point
+        assert point is not None
+        return point.state.position
+
+    def take(self, steps: list[str]) -> None:
+        """Let cycle and worker take their steps."""
+        for step in steps:
+            if step == 'cycle':
+                self.arm.run()
+            else:
+                self._worker.run()
+
+    def settle(self) -> list[Array]:
+        """Run until all is prepared and at rest; return where the arm was in each cycle."""
+        path = [self.where]
+        for _ in range(SETTLED):
+            self._worker.run()
+            self.arm.run()
+            path.append(self.where)
+            rested = len(path) > AT_REST and (path[-AT_REST] == path[-1]).all()
+            if rested and self._worker.is_idle:
+                return path
+        raise AssertionError('the arm does not come to rest')
+
+    @property
+    def where(self) -> Array:
+        """Where the drives were sent."""
+        if isinstance(self.arm, Elsewhere):
+            return np.array(self.arm.at)
+        return np.array([axis.setpoint for axis in self.arm.axes])
+
+
+def bench(at_topics: bool = False) -> Bench:
+    """Return an arm that follows."""
+    worker = SteppedWorker()
+    if at_topics:
+        return Bench(Elsewhere(worker=worker), worker)
+    drives = Drives(worker=worker)
+    drives.attach()
+    return Bench(drives, worker)
+
+
+def stays_at_rest(path: list[Array], limits: Array, speed: float) -> None:
+    """Make sure that the arm only brakes from the stop on, and rests at last."""
+    speeds = np.abs(np.diff(np.array(path), axis=0)) / PERIOD
+    # what was in this very cycle still counts; then nothing gets faster
+    assert speeds.max() <= 1.1 * speed + 2.0 * float(limits.max()) * PERIOD + 1e-9
+
+
+def run_to_stop(
+    arm: Bench, kind: str, steps: list[str], later: int
+) -> tuple[MotionCommand | None, float, bool]:
+    """Give a command and let it go some way; return it, the speed, and whether it stands still."""
+    command = COMMANDS[kind](arm.gateway, arm.arm.now, arm.at)
+    arm.take(steps)
+    before = arm.where
+    for _ in range(later):
+        arm.take(['work'])
+        before = arm.where
+        arm.take(['cycle'])
+    snapshot = arm.gateway.snapshot
+    assert snapshot.set_point is not None
+    state, limits = snapshot.set_point.state, arm.gateway.model.limits
+    coming = state.acceleration**2 / (2.0 * limits.jerk)  # while the acceleration is taken back
+    speed = float((np.abs(state.velocity) + coming).max())
+    speed = max(speed, float(np.abs(arm.where - before).max()) / PERIOD)
+    return command, speed, snapshot.source is Source.NONE
+
+
+@given(st.sampled_from(sorted(COMMANDS)), STEPS, LATER)
+@example('displacement', ['cycle'], 0)
+@example('displacement', ['cycle', 'work'], 0)
+@example('long trajectory', ['cycle', 'work', 'cycle'], 0)
+@example('stamped trajectory', ['cycle', 'work', 'cycle'], 5)
+@settings(max_examples=30, deadline=None)
+def test_a_pause_is_never_overtaken(kind: str, steps: list[str], later: int) -> None:
+    """``~/pause``: the arm rests; a trajectory goes on with ``~/resume``, nothing before it."""
+    arm = bench()
+    command, speed, is_idle = run_to_stop(arm, kind, steps, later)
+    begin = arm.where
+    arm.gateway.pause()
+    path = arm.settle()
+    stays_at_rest(path, arm.gateway.model.limits.acceleration, speed)
+    if is_idle:
+        assert np.abs(path[-1] - begin).max() == 0.0
+    arm.gateway.resume()
+    arm.take(['cycle', 'work'] * 10)
+    if command is not None and kind in TRAJECTORIES:
+        assert command.execution is not None, command.future.exception()
+
+
+@given(st.sampled_from(sorted(JOGS)), STEPS, LATER)
+@example('displacement', ['cycle'], 0)
+@example('displacement', ['cycle', 'work'], 0)
+@settings(max_examples=30, deadline=None)
+def test_a_pause_of_the_servo_is_never_overtaken(kind: str, steps: list[str], later: int) -> None:
+    """``~/pause_servo``: whatever was commanded before it does not move the arm after it."""
+    arm = bench()
+    command, speed, is_idle = run_to_stop(arm, kind, steps, later)
+    begin = arm.where
+    arm.gateway.stop(JOGGING, 'the servo was paused')
+    path = arm.settle()
+    stays_at_rest(path, arm.gateway.model.limits.acceleration, speed)
+    if is_idle:
+        assert np.abs(path[-1] - begin).max() == 0.0
+    assert arm.gateway.snapshot.source is Source.NONE
+    assert command is None or command.future.done()
+
+
+@given(st.sampled_from([*sorted(TRAJECTORIES), 'displacement']), STEPS, LATER, st.booleans())
+@settings(max_examples=30, deadline=None)
+def test_a_cancel_is_never_overtaken(
+    kind: str, steps: list[str], later: int, jogged: bool
+) -> None:
+    """A goal that was canceled does not move the arm, however far it had come."""
+    arm = bench()
+    if jogged:  # then a long trajectory lets the arm come to rest first
+        jog(arm.gateway, {arm.gateway.model.joints[0]: 0.3}, arm.arm.now, 0.3)
+        arm.take(['cycle'] * 10)
+    command, speed, is_idle = run_to_stop(arm, kind, steps, later)
+    assert command is not None
+    begin = arm.where
+    arm.gateway.cancel(command, 'canceled')
+    path = arm.settle()
+    if not jogged:
+        stays_at_rest(path, arm.gateway.model.limits.acceleration, speed)
+        if is_idle:
+            assert np.abs(path[-1] - begin).max() == 0.0
+    assert arm.gateway.snapshot.source is Source.NONE
+    assert command.future.done()
+    if command.execution is not None:
+        assert command.execution.ending is not None
+        is_arrived = command.execution.ending.reason == 'the goal is reached'
+        assert command.execution.ending.canceled or is_arrived
+
+
+@pytest.mark.parametrize('is_disabled', [False, True])
+@given(st.sampled_from(sorted(COMMANDS)), STEPS, LATER, STEPS)
+@example('displacement', ['cycle'], 0, ['cycle'])
+@example('displacement', ['cycle', 'work'], 0, ['cycle'])
+@example('trajectory', ['cycle', 'work'], 0, ['cycle'])
+@example('trajectory', ['cycle'], 0, ['cycle', 'cycle'])
+@settings(max_examples=20, deadline=None)
+def test_a_halt_is_never_overtaken(
+    is_disabled: bool, kind: str, steps: list[str], later: int, halted: list[str]
+) -> None:
+    """``~/halt`` or a disable of one drive: back again, nothing from before moves the arm."""
+    arm = bench()
+    drives = arm.arm
+    assert isinstance(drives, Drives)
+    command, speed, is_idle = run_to_stop(arm, kind, steps, later)
+    begin = arm.where
+    healthy = drives.axes[2]
+    if is_disabled:
+        drives.axes[2] = replace(
+            healthy, followable=False, state=DriveState.SWITCH_ON_DISABLED, velocity=0.0
+        )
+    else:
+        drives.source.released(healthy.name, Refusal(RefusalCause.HALTED))
+    drives.run()  # the cycle sees it
+    arm.take(halted)
+    if is_disabled:
+        drives.axes[2] = replace(healthy, velocity=0.0)
+    drives.attach()
+    path = arm.settle()
+    stays_at_rest(path, arm.gateway.model.limits.acceleration, speed)
+    if is_idle:
+        assert np.abs(path[-1] - begin).max() == 0.0
+    assert arm.gateway.snapshot.source is Source.NONE
+    assert command is None or command.future.done()
+
+
+@given(st.sampled_from(sorted(COMMANDS)), STEPS, LATER)
+@settings(max_examples=20, deadline=None)
+def test_the_end_of_the_program_is_never_overtaken(
+    kind: str, steps: list[str], later: int
+) -> None:
+    """Ctrl-C: the arm comes to rest, and nothing begins any more."""
+    arm = bench(at_topics=True)
+    topics = arm.arm
+    assert isinstance(topics, Elsewhere)
+    command, speed, is_idle = run_to_stop(arm, kind, steps, later)
+    begin = arm.where
+    topics.cycle.closing = 'the program ends'
+    path = arm.settle()
+    stays_at_rest(path, arm.gateway.model.limits.acceleration, speed)
+    if is_idle:
+        assert np.abs(path[-1] - begin).max() == 0.0
+    assert topics.cycle.at_rest
+    assert command is None or command.future.done()

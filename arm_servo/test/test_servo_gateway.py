@@ -1,0 +1,273 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Commands through the gateway: prepared beside the cycle, begun in it, without a jump."""
+
+from __future__ import annotations
+
+from concurrent.futures import Future
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from servo_commands import jog, move_by, SteppedWorker, twist
+from servo_drives import Drives, PERIOD
+
+from arm_canopen import Refusal, RefusalCause
+from arm_servo.exceptions import CommandError, GoalCode, GoalError, NotReadyError, StateMovedError
+from arm_servo.gateway import MAX_ATTEMPTS, MAX_QUEUED_MOTIONS, MotionCommand
+from arm_servo.goal import GoalPoint, TrajectoryGoal
+from arm_servo.set_point import Source
+
+JOINT = 'panda_joint1'
+
+
+def ready(worker: SteppedWorker | None = None) -> Drives:
+    """Return drives that follow."""
+    drives = Drives(worker=worker)
+    drives.attach()
+    drives.run(2)
+    return drives
+
+
+def wave(drives: Drives, count: int) -> TrajectoryGoal:
+    """Return a trajectory of many points, 0.05 s apart, that ends where it began."""
+    begin = np.array([axis.setpoint for axis in drives.axes])
+    points = []
+    for number in range(1, count + 1):
+        share = number / count
+        points.append(
+            GoalPoint(0.5 + 0.05 * number, (begin + 0.2 * np.sin(np.pi * share) ** 2).tolist())
+        )
+    return TrajectoryGoal(drives.gateway.model.joints, points)
+
+
+def begun(drives: Drives, command: MotionCommand, most: int = 200) -> None:
+    """Run cycles until a motion has begun or was refused."""
+    for _ in range(most):
+        if command.future.done():
+            return
+        drives.run()
+    raise AssertionError(f'it has not begun after {most} cycles')
+
+
+def rates(drives: Drives, first: int) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    """Return the greatest change of speed of each joint in [rad/s2]."""
+    path = np.array(drives.path)[first:]
+    most: np.ndarray[tuple[int], np.dtype[np.float64]] = (
+        np.abs(np.diff(path, 2, axis=0)).max(axis=0) / PERIOD**2
+    )
+    return most
+
+
+@pytest.mark.parametrize('moving', [False, True])
+def test_a_long_trajectory_begins_without_a_jump(moving: bool) -> None:
+    """Speeds change by no more than the acceleration limit, from rest and out of a jog."""
+    drives = ready()
+    goal = wave(drives, 60)
+    if moving:
+        jog(drives.gateway, {JOINT: 0.4}, drives.now, 30.0)
+        drives.run(50)
+    before = len(drives.path) - 2
+    command = drives.gateway.request(goal)
+    begun(drives, command)
+    drives.run(450)
+    assert (rates(drives, before) <= 1.02 * drives.gateway.model.limits.acceleration).all()
+    assert command.execution is not None
+    assert command.execution.ending is not None
+    assert command.execution.ending.code is GoalCode.SUCCESSFUL, command.execution.ending.reason
+    assert drives.path[-1] == pytest.approx(goal.points[-1].positions, abs=1e-6)
+
+
+def test_one_trajectory_takes_over_from_another_in_motion() -> None:
+    """It is planned from where the first will be, and joins it there."""
+    drives = ready()
+    first = drives.gateway.request(wave(drives, 60))
+    begun(drives, first)
+    drives.run(120)
+    before = len(drives.path) - 2
+    goal = wave(drives, 20)
+    begun(drives, drives.gateway.request(goal))
+    drives.run(300)
+    assert (rates(drives, before) <= 1.02 * drives.gateway.model.limits.acceleration).all()
+    assert drives.path[-1] == pytest.approx(goal.points[-1].positions, abs=1e-6)
+    assert first.execution is not None
+    assert first.execution.ending is not None
+    assert first.execution.ending.code is GoalCode.INVALID_GOAL
+
+
+def test_a_jog_that_ends_while_a_long_goal_is_planned_does_no_harm() -> None:
+    """It comes to rest first, and the trajectory begins there: nobody can foresee a jog."""
+    drives = ready()
+    goal = wave(drives, 300)
+    jog(drives.gateway, {JOINT: 0.4}, drives.now, 0.5)
+    drives.run(45)
+    command = drives.gateway.request(goal)
+    begun(drives, command)
+    assert command.execution is not None
+    off = 0.0
+    for _ in range(300):
+        drives.run()
+        desired = command.execution.feedback.desired.position
+        off = max(off, float(np.abs(drives.path[-1] - desired).max()))
+    assert off < 1e-3
+
+
+@pytest.mark.parametrize('always', [False, True])
+def test_an_arm_that_was_moved_meanwhile_is_planned_for_again(always: bool) -> None:
+    """The path from elsewhere is another, and was not checked; at last the goal is refused."""
+    worker = SteppedWorker()
+    drives = ready(worker)
+    there = wave(drives, 2).points[0].positions
+    goal = TrajectoryGoal(drives.gateway.model.joints, [GoalPoint(4.0, there)])
+    command = drives.gateway.request(goal)
+    plans = 0
+    for cycle in range(400):
+        drives.run()
+        if always or plans == 0:
+            jog(drives.gateway, {JOINT: 0.5}, drives.now, 0.3)
+        if cycle % 30 == 29:  # the arm has moved since the plan's basis
+            plans += worker.run()
+        if command.future.done():
+            break
+    if always:
+        assert plans == MAX_ATTEMPTS
+        assert isinstance(command.future.exception(), StateMovedError)
+        assert drives.gateway.snapshot.source is Source.JOG
+        return
+    execution = command.future.result()
+    assert execution is not None
+    assert plans >= 2
+    drives.run(5)
+    assert drives.path[-1] == pytest.approx(execution.feedback.desired.position, abs=0.02)
+
+
+def test_a_goal_that_is_refused_does_not_stop_a_jog() -> None:
+    """What moves the arm goes on."""
+    drives = ready()
+    goal = wave(drives, 300)
+    jog(drives.gateway, {JOINT: 0.4}, drives.now, 30.0)
+    drives.run(45)
+    wrong = drives.gateway.request(replace(goal, joints=['elbow', *goal.joints[1:]]))
+    begun(drives, wrong)
+    error = wrong.future.exception()
+    assert isinstance(error, GoalError)
+    assert error.code is GoalCode.INVALID_JOINTS
+    drives.run(5)
+    assert drives.gateway.snapshot.source is Source.JOG
+
+
+def test_refusals_reach_whoever_asked() -> None:
+    """What is wrong with the goal, and with the drives; attached again, a goal at once counts."""
+    drives = ready()
+    wrong = drives.gateway.request(TrajectoryGoal(['elbow'], []))
+    begun(drives, wrong)
+    assert isinstance(wrong.future.exception(), GoalError)
+    drives.source.released(JOINT, Refusal(RefusalCause.SINGLE_TARGET))
+    drives.run(3)
+    blocked = drives.gateway.request(wave(drives, 40))
+    begun(drives, blocked)
+    with pytest.raises(NotReadyError, match=JOINT):
+        blocked.future.result()
+    drives.attach()  # and at once a goal, before the next cycle
+    accepted = drives.gateway.request(wave(drives, 40))
+    begun(drives, accepted)
+    assert accepted.future.result() is not None
+
+
+def test_a_trajectory_that_was_cancelled_before_it_began_does_not_begin() -> None:
+    """Wherever it is on its way: the arm stays where it is."""
+    for cycles, jobs in ((0, 0), (1, 0), (1, 1), (2, 0)):
+        worker = SteppedWorker()
+        drives = ready(worker)
+        before = drives.path[-1].tolist()
+        command = drives.gateway.request(wave(drives, 60))
+        drives.run(cycles)
+        for _ in range(jobs):
+            worker.run()
+        drives.gateway.cancel(command, 'canceled')
+        while worker.run():
+            pass
+        drives.run(50)
+        assert command.future.cancelled()
+        assert drives.path[-1].tolist() == before
+
+
+def test_displacements_add_up_and_are_reached() -> None:
+    """Ten at once, of which each waits for the one before."""
+    drives = ready()
+    begin = drives.path[-1]
+    commands = [move_by(drives.gateway, {JOINT: 0.02}) for _ in range(10)]
+    begun(drives, commands[-1])
+    drives.run(100)
+    assert [command.future.exception() for command in commands] == [None] * 10
+    assert drives.gateway.snapshot.source is Source.NONE
+    assert drives.path[-1][0] - begin[0] == pytest.approx(0.2, abs=1e-6)
+    assert np.array(drives.path)[-1, 1:] == pytest.approx(begin[1:], abs=1e-6)
+
+
+def test_a_displacement_into_contact_is_refused_and_nothing_moves() -> None:
+    """The wrist of Panda, turned and folded until its hand would be in the forearm."""
+    drives = ready()
+    before = drives.path[-1]
+    command = move_by(drives.gateway, {'panda_joint6': -1.4})
+    begun(drives, command)
+    drives.run(20)
+    with pytest.raises(CommandError, match='panda_link5 and panda_hand would collide'):
+        command.future.result(0.0)
+    assert drives.path[-1].tolist() == before.tolist()
+
+
+def test_a_flood_is_refused() -> None:
+    """What cannot be carried out in time is not kept for later."""
+    drives = ready()
+    commands = [move_by(drives.gateway, {JOINT: 0.0001}) for _ in range(MAX_QUEUED_MOTIONS + 10)]
+    assert isinstance(commands[-1].future.exception(0.0), NotReadyError)
+    drives.run(2 * len(commands))
+    assert all(command.future.done() for command in commands)
+
+
+def test_a_zero_stops_a_jog_and_nothing_else() -> None:
+    """A client that streams zeros while another moves the arm, or nobody, changes nothing."""
+    drives = ready()
+
+    def source() -> Source:
+        return drives.gateway.snapshot.source
+
+    command = drives.gateway.request(wave(drives, 20))
+    begun(drives, command)
+    drives.run(30)
+    zeros: list[Future[None]] = [
+        twist(drives.gateway, [0.0] * 6, drives.now),
+        jog(drives.gateway, {JOINT: 0.0}, drives.now),
+    ]
+    drives.run(2)
+    assert [zero.exception() for zero in zeros] == [None, None]
+    assert source() is Source.TRAJECTORY
+    drives.run(300)
+    assert command.execution is not None
+    assert command.execution.ending is not None
+    assert command.execution.ending.code is GoalCode.SUCCESSFUL
+    moved = move_by(drives.gateway, {JOINT: 0.3})
+    for _ in range(100):
+        twist(drives.gateway, [0.0] * 6, drives.now)
+        drives.run()
+    assert moved.future.exception() is None
+    assert source() is Source.NONE
+    jog(drives.gateway, {JOINT: 0.4}, drives.now, 10.0)
+    drives.run(50)
+    twist(drives.gateway, [0.0] * 6, drives.now)
+    drives.run(60)
+    assert source() is Source.NONE
+    assert all(before.tolist() == after.tolist() for before, after in pairwise(drives.path[-10:]))
+
+
+def test_a_zero_is_no_command_to_an_arm_that_does_not_follow() -> None:
+    """It is not refused, so it neither shows in the status nor keeps the arm from recovering."""
+    drives = ready()
+    drives.source.released(JOINT, Refusal(RefusalCause.SINGLE_TARGET))
+    drives.run(3)
+    zero = twist(drives.gateway, [0.0] * 6, drives.now)
+    drives.run()
+    assert zero.exception() is None
+    assert drives.gateway.refused == -np.inf
