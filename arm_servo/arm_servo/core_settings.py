@@ -18,7 +18,8 @@ class CoreSettings:
         servo: How jogging behaves.
         execution: How trajectories are followed.
         timeout: Time without a fresh jog command after which the arm comes to rest in [s].
-        clearance: Least distance between links that a jog and its stop may bring about in [m].
+        clearance: Least distance between links that a jog and its stop may bring about in [m];
+            None is any.
         check_self_collision: Whether a trajectory or a single target is refused on whose way
             links meet.
     """
@@ -26,5 +27,5 @@ class CoreSettings:
     servo: ServoSettings = field(default_factory=ServoSettings)
     execution: ExecutionSettings = field(default_factory=ExecutionSettings)
     timeout: float = 0.1
-    clearance: float = 0.005
+    clearance: float | None = 0.005
     check_self_collision: bool = True

@@ -33,13 +33,14 @@ def check_parameters(model: RobotModel, document: Mapping[str, Any]) -> list[tup
     from node_runner import ParameterError, refuse_misspelt
 
     from .nodes.parameter_sheet import ParameterSheet
+    from .nodes.upstream_parameters import is_upstream
 
     problems = []
     for name, declare in _nodes(model, document).items():
         sheet = ParameterSheet(name, _given(document, name))
         try:
             declare(sheet.node)
-            refuse_misspelt(sheet.node)
+            refuse_misspelt(sheet.node, is_upstream)
         except (ParameterError, ModelError) as error:
             problems.append((name, str(error)))
     return problems

@@ -42,7 +42,7 @@ class Frames:
 
 def converter(scales: Scales, *, about_tip: bool = True) -> CommandConverter:
     """Return what makes commands."""
-    parameters = ServoParameters(0.1, about_tip, '', '', '', '', '', 25.0, ServoSettings())
+    parameters = ServoParameters(0.1, about_tip, '', '', '', '', '', 25.0, 0.005, ServoSettings())
     return CommandConverter(robot('gp110'), Frames(), parameters, scales)
 
 

@@ -35,6 +35,7 @@ def _build(make_node: MakeNode) -> MotionThread:
         jogging.settings,
         trajectory.execution,
         jogging.timeout,
+        jogging.clearance,
         check_self_collision=trajectory.check,
     )
     gateway, thread = make_loop(node, model, settings, loop, output)

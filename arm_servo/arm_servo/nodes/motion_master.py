@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from rclpy.node import Node
 
 from arm_canopen import run_master
-from node_runner import destroyed_if_refused, refuse_misspelt
+from node_runner import destroyed_if_refused
 
 from ..core import MotionCore
 from ..core_settings import CoreSettings
@@ -29,6 +29,7 @@ from .servo import Servo
 from .servo_parameters import declare_servo
 from .trajectory_controller import TrajectoryController
 from .trajectory_parameters import declare_trajectory
+from .upstream_parameters import check_names
 
 if TYPE_CHECKING:
     from arm_canopen import MasterProcess
@@ -73,6 +74,7 @@ class Motion:
             jogging.settings,
             trajectory.execution,
             jogging.timeout,
+            jogging.clearance,
             check_self_collision=trajectory.check,
         )
         self._gateway = CommandGateway(MotionCore(model, settings))
@@ -91,7 +93,7 @@ class Motion:
             ],
         )
         for node in self.nodes:
-            refuse_misspelt(node)
+            check_names(node)
         for note in model.notes:
             manager.get_logger().warning(note)
         self._attaching = manager.create_timer(ATTACH_PERIOD, self._attach_first)

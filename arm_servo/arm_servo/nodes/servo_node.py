@@ -28,6 +28,7 @@ def _build(make_node: MakeNode) -> MotionThread:
     settings = CoreSettings(
         servo=servo.settings,
         timeout=servo.timeout,
+        clearance=servo.clearance,
         check_self_collision=declare_check(ParameterReader(node, PREFIX)),
     )
     gateway, thread = make_loop(node, model, settings, declare_loop(node, PREFIX), output)

@@ -11,13 +11,23 @@ from rclpy.node import Node
 
 from node_runner import ParameterReader
 
+from ..bounds import BrakeSettings
+from ..core_settings import CoreSettings
 from ..exceptions import ModelError
 from ..servo import ServoSettings
+from ..velocity_ik import IkSettings
 
 PREFIX = 'moveit_servo.'
 
 DEFAULT_LINEAR_SPEED, DEFAULT_ANGULAR_SPEED = 0.4, 0.8
 """Scales of the tool's speeds in [m/s] and [rad/s]."""
+
+
+CLEARANCE = CoreSettings().clearance
+"""Least distance between links that a jog may bring about in [m]."""
+
+UNCHECKED = ServoSettings(ik=IkSettings(brakes=BrakeSettings(pairs=0)))
+"""Jogging that heeds no other links."""
 
 
 class Units(Enum):
@@ -59,6 +69,7 @@ class ServoParameters:
         pose_topic: Topic of poses.
         status_topic: Topic of the status.
         status_rate: Its rate in [Hz].
+        clearance: Least distance between links that a jog may bring about in [m]; None is any.
         settings: How the core jogs.
     """
 
@@ -70,6 +81,7 @@ class ServoParameters:
     pose_topic: str
     status_topic: str
     status_rate: float
+    clearance: float | None
     settings: ServoSettings
 
 
@@ -89,6 +101,7 @@ def declare_servo(node: Node, group: str) -> ServoParameters:
         raise ModelError(f'{PREFIX}move_group_name is {named!r}, but the group is {group!r}')
     _declare_scales(node)
     read_scales(node)
+    checks = read.flag('check_collisions', 'jogs brake in front of other links', default=True)
     return ServoParameters(
         read.number(
             'incoming_command_timeout',
@@ -109,7 +122,8 @@ def declare_servo(node: Node, group: str) -> ServoParameters:
         read.text('pose_command_in_topic', '~/pose_target_cmds', 'topic of poses'),
         read.text('status_topic', '~/status', 'topic of the status'),
         read.number('status_rate', 25.0, (1.0, 500.0), 'rate of the status [Hz]'),
-        ServoSettings(),
+        CLEARANCE if checks else None,
+        ServoSettings() if checks else UNCHECKED,
     )
 
 

@@ -16,7 +16,7 @@ import time
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
-from node_runner import ParameterReader, refuse_misspelt, run_program, spin
+from node_runner import ParameterReader, run_program, spin
 
 from ..core import MotionCore
 from ..core_settings import CoreSettings
@@ -28,6 +28,7 @@ from .joint_feedback import JointFeedback
 from .motion_thread import MotionCycle, MotionThread
 from .real_time import prefer_this_thread
 from .topic_output import OutputParameters, TopicOutput
+from .upstream_parameters import check_names
 
 SWITCH_INTERVAL = 0.0005
 """How long a busy callback may keep the interpreter from the cycle in [s]."""
@@ -182,7 +183,7 @@ def _serve(build: Callable[[MakeNode], MotionThread], stop: threading.Event) -> 
 
         thread = build(make_node)
         for node in nodes:
-            refuse_misspelt(node)
+            check_names(node)
         gc.freeze()  # what is there now is there to stay, and need not be looked through
         thread.start(failed=stop.set)
         stack.callback(thread.stop)
