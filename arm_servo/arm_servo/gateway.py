@@ -316,7 +316,7 @@ class CommandGateway:
         )
         return set_point
 
-    def fail(self, reason: str, code: GoalCode = GoalCode.PATH_TOLERANCE_VIOLATED) -> None:
+    def fail(self, reason: str, code: GoalCode = GoalCode.INVALID_GOAL) -> None:
         """Bring the arm to rest, a trajectory on its path; the trajectory ends with the reason.
 
         Args:
@@ -343,7 +343,7 @@ class CommandGateway:
         self._carry_out(_Cycle(now, self._snapshot.period, blocked))
         execution = self._core.execution
         if execution is not None:  # it ended at the latest when the arm came to rest
-            execution.abandon(Outcome(GoalCode.PATH_TOLERANCE_VIOLATED, blocked))
+            execution.abandon(Outcome(GoalCode.INVALID_GOAL, blocked))
         self._snapshot = Snapshot(
             now,
             None,

@@ -20,7 +20,6 @@ from servo_drives import Drives, PERIOD
 from servo_elsewhere import Elsewhere
 
 from arm_canopen import Refusal, RefusalCause
-from arm_canopen.standard.drive import DriveState
 from arm_servo.arrays import Array
 from arm_servo.gateway import CommandGateway, JOGGING, MotionCommand
 from arm_servo.goal import GoalPoint, TrajectoryGoal
@@ -259,7 +258,7 @@ def test_a_halt_is_never_overtaken(
     healthy = drives.axes[2]
     if is_disabled:
         drives.axes[2] = replace(
-            healthy, followable=False, state=DriveState.SWITCH_ON_DISABLED, velocity=0.0
+            healthy, followable=False, refusal=Refusal(RefusalCause.NOT_ENABLED), velocity=0.0
         )
     else:
         drives.source.released(healthy.name, Refusal(RefusalCause.HALTED))

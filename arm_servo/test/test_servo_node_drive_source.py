@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import replace
 
@@ -13,17 +12,15 @@ import pytest
 from servo_commands import outcome
 from servo_drives import Drives, PERIOD
 
-from arm_canopen import AxisFeedback, CanopenError, Refusal, RefusalCause
-from arm_canopen.standard.drive import DriveState
+from arm_canopen import CanopenError, Refusal, RefusalCause
 from arm_servo.core import MotionCore
 from arm_servo.exceptions import GoalCode, NotReadyError
 from arm_servo.execution import Phase
 from arm_servo.gateway import MotionCommand
 from arm_servo.goal import GoalPoint, TrajectoryGoal
 from arm_servo.nodes.drive_reasons import why_not
+from arm_servo.nodes.drive_source import NOT_ATTACHED
 from arm_servo.set_point import Source
-
-Change = Callable[[AxisFeedback], AxisFeedback]
 
 
 def swing(drives: Drives, far: float = 0.4, time: float = 2.0) -> MotionCommand:
@@ -62,31 +59,36 @@ def test_nothing_moves_before_it_is_attached() -> None:
 
 
 @pytest.mark.parametrize(
-    ('change', 'words'),
+    ('cause', 'code', 'words'),
     [
-        (lambda axis: replace(axis, online=False), 'offline'),
-        (lambda axis: replace(axis, state=DriveState.FAULT), 'recover'),
-        (lambda axis: replace(axis, state=DriveState.SWITCH_ON_DISABLED), 'init'),
-        (lambda axis: replace(axis, mode=1), 'cyclic_position_mode'),
-        (lambda axis: axis, 'another client'),
+        (RefusalCause.OFFLINE, GoalCode.INVALID_GOAL, 'is offline; look after its power'),
+        (RefusalCause.FAULT, GoalCode.INVALID_GOAL, 'is faulted; call its ~/recover'),
+        (RefusalCause.NOT_ENABLED, GoalCode.INVALID_GOAL, '~/init'),
+        (RefusalCause.OTHER_MODE, GoalCode.INVALID_GOAL, '~/cyclic_position_mode'),
+        (RefusalCause.HALTED, GoalCode.INVALID_GOAL, 'is halted; the next command'),
+        (RefusalCause.SHUTDOWN, GoalCode.INVALID_GOAL, 'is shut down'),
+        (RefusalCause.NOT_FOLLOWING, GoalCode.PATH_TOLERANCE_VIOLATED, 'does not follow'),
     ],
 )
-def test_the_others_stop_on_the_path_when_a_drive_drops_out(change: Change, words: str) -> None:
-    """The six others come to rest smoothly on the path; the trajectory names drive and remedy."""
+def test_the_others_stop_on_the_path_when_a_drive_drops_out(
+    cause: RefusalCause, code: GoalCode, words: str
+) -> None:
+    """The six others come to rest smoothly on the path; the trajectory names the one cause."""
     drives = attached()
     begin = drives.path[-1]
     command = swing(drives)
     drives.run(60)
     before = len(drives.path)
-    drives.axes[2] = change(replace(drives.axes[2], followable=False))
+    drives.axes[2] = replace(drives.axes[2], followable=False, refusal=Refusal(cause))
     answer = drives.run()
     assert [point is None for point in answer] == [number == 2 for number in range(7)]
     drives.run(200)
     ending = outcome(command)
     assert command.execution is not None
     assert command.execution.phase is Phase.DONE
-    assert ending.code is GoalCode.PATH_TOLERANCE_VIOLATED
-    assert 'panda_joint3' in ending.reason
+    assert ending.code is code
+    assert ending.reason.startswith('panda_joint3 ')
+    assert 'panda_joint4' not in ending.reason
     assert words in ending.reason
     others = [0, 1, 3, 4, 5, 6]
     path = np.array(drives.path)[:, others] - begin[others]
@@ -211,15 +213,33 @@ def test_where_the_arm_is_to_be_is_known_before_it_follows() -> None:
 def test_drives_with_the_same_trouble_are_named_together() -> None:
     """In one sentence, with the verb of several; others have their own."""
     drives = Drives()
-    off = [replace(axis, followable=False, online=False) for axis in drives.axes[:2]]
-    disabled = replace(drives.axes[2], followable=False, state=DriveState.SWITCH_ON_DISABLED)
-    assert why_not([*off, disabled], {}) == (
+    offline, disabled = Refusal(RefusalCause.OFFLINE), Refusal(RefusalCause.NOT_ENABLED)
+    off = [replace(axis, followable=False, refusal=offline) for axis in drives.axes[:2]]
+    third = replace(drives.axes[2], followable=False, refusal=disabled)
+    assert why_not([*off, third], {}) == (
         'panda_joint1, panda_joint2 are offline; look after their power and their cable;'
-        ' panda_joint3 is in state Switch on disabled; call its ~/init'
+        ' panda_joint3 is not enabled; call its ~/init'
     )
-    assert why_not(drives.axes[:2], dict.fromkeys(drives.source.axes, 'was not attached yet')) == (
+    assert why_not(drives.axes[:2], dict.fromkeys(drives.source.axes, NOT_ATTACHED)) == (
         'panda_joint1, panda_joint2 were not attached yet; the next command takes them back'
     )
+
+
+def test_the_cause_is_told_and_not_what_followed_from_it() -> None:
+    """A master that shuts down disables the drives: that they are disabled is a consequence."""
+    drives = attached()
+    command = swing(drives)
+    drives.run(60)
+    for number, axis in enumerate(drives.axes):
+        drives.source.released(axis.name, Refusal(RefusalCause.SHUTDOWN))
+        drives.axes[number] = replace(
+            axis, followable=False, refusal=Refusal(RefusalCause.NOT_ENABLED)
+        )
+    drives.run(3)
+    ending = outcome(command)
+    assert ending.code is GoalCode.INVALID_GOAL
+    assert 'shut down' in ending.reason
+    assert 'not enabled' not in ending.reason
 
 
 def test_a_trajectory_ends_at_once_when_no_drive_is_left() -> None:
@@ -228,12 +248,14 @@ def test_a_trajectory_ends_at_once_when_no_drive_is_left() -> None:
     command = swing(drives)
     drives.run(60)
     whole = drives.axes
-    drives.axes = [replace(axis, followable=False, state=DriveState.FAULT) for axis in whole]
+    drives.axes = [
+        replace(axis, followable=False, refusal=Refusal(RefusalCause.FAULT)) for axis in whole
+    ]
     assert drives.run() == [None] * 7
     ending = outcome(command)
     assert command.execution is not None
     assert command.execution.phase is Phase.DONE
-    assert 'have a fault' in ending.reason
+    assert 'are faulted' in ending.reason
     drives.axes = [replace(axis, setpoint=axis.position) for axis in whole]
     before = [axis.position for axis in drives.axes]
     assert [point.position for point in drives.run() if point] == pytest.approx(before, abs=1e-12)

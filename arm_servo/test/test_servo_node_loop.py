@@ -123,7 +123,7 @@ def test_the_arm_comes_to_rest_on_its_path_when_joint_states_are_lost() -> None:
     arm.heard = False
     arm.run(200)
     ending = outcome(command)
-    assert ending.code is GoalCode.PATH_TOLERANCE_VIOLATED
+    assert ending.code is GoalCode.INVALID_GOAL
     assert 'no joint states' in ending.reason
     path = arm.path()
     assert np.ptp(path - path[:, :1] - (path[0] - path[0, 0]), axis=1).max() < 1e-6  # on the line

@@ -4,68 +4,96 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Mapping, Sequence
 
-if TYPE_CHECKING:
-    from arm_canopen import AxisFeedback
+from arm_canopen import AxisFeedback, Refusal, RefusalCause
 
-CYCLIC_MODES = frozenset({7, 8})
-"""Modes of operation that follow a stream of positions (CiA 402-2, 0x6061)."""
+from ..exceptions import GoalCode
 
-FAULTS = frozenset({'FAULT', 'FAULT_REACTION_ACTIVE'})
-"""Names of the states of a faulted drive."""
+POWER = 'look after its power and its cable'
+MODE = 'call its ~/cyclic_position_mode or ~/interpolated_position_mode'
+COMMAND = 'the next command takes it back'
 
+REMEDIES: Mapping[RefusalCause, str] = {
+    RefusalCause.OFFLINE: POWER,
+    RefusalCause.NOT_OPERATIONAL: 'call its ~/init',
+    RefusalCause.STATE_UNKNOWN: POWER,
+    RefusalCause.SILENT: POWER,
+    RefusalCause.FAULT: 'call its ~/recover',
+    RefusalCause.NOT_ENABLED: 'call its ~/init',
+    RefusalCause.MODE_CHANGE: MODE,
+    RefusalCause.OTHER_MODE: MODE,
+    RefusalCause.MODE_SELECTED: MODE,
+    RefusalCause.HALTED: COMMAND,
+    RefusalCause.SINGLE_TARGET: COMMAND,
+    RefusalCause.OTHER_SOURCE: COMMAND,
+    RefusalCause.COMMANDED: COMMAND,
+    RefusalCause.NOT_FOLLOWING: 'free its way; the next command takes it back',
+    RefusalCause.CYCLE_FAILED: 'see the log; the next command takes it back',
+    RefusalCause.SETPOINT_REFUSED: 'see the log; the next command takes it back',
+    RefusalCause.SHUTDOWN: 'start the master again',
+}
 
-PLURAL = {'is': 'are', 'has': 'have', 'was': 'were', 'does': 'do'}
+PLURAL = {'is': 'are', 'has': 'have', 'was': 'were', 'does': 'do', 'moves': 'move'}
 """Words with which reasons begin, as they are said of several drives."""
 
+Released = Mapping[str, Refusal | str]
+"""Drives that were taken away, with what happened."""
 
-def why_not(feedback: Sequence[AxisFeedback], released: Mapping[str, str]) -> str:
-    """Say why the arm cannot follow; empty when it can.
+
+def why_not(feedback: Sequence[AxisFeedback], released: Released) -> str:
+    """Return why the arm cannot follow now; empty when it can.
 
     Args:
         feedback: State of each drive.
-        released: Drives that were taken away, with the reason.
+        released: Drives that were taken away.
     """
-    reasons = [_reason(axis, released.get(axis.name, '')) for axis in feedback]
-    return '; '.join(_joined([reason for reason in reasons if reason]))
+    return _sentence(
+        (axis.name, axis.refusal or released.get(axis.name)) for axis in feedback
+    ) or _sentence((axis.name, UNKNOWN) for axis in feedback if not axis.followable)
 
 
-def _reason(axis: AxisFeedback, released: str) -> tuple[str, str] | None:
-    """Return what is wrong with a drive; names and remedies are apart, to join equal ones."""
-    if not axis.online:
-        return axis.name, 'is offline; look after its power and its cable'
-    if axis.refusal is not None and axis.refusal.cause.name == 'SILENT':
-        return axis.name, f'{axis.refusal.cause.value}; look after its power and its cable'
-    if axis.state.name in FAULTS:
-        return axis.name, 'has a fault; call its ~/recover'
-    if axis.state.name != 'OPERATION_ENABLED':
-        return axis.name, f'is in state {axis.state.title}; call its ~/init'
-    if axis.mode not in CYCLIC_MODES:
-        return axis.name, (
-            f'is in mode {axis.mode}; call its ~/cyclic_position_mode or'
-            ' ~/interpolated_position_mode'
-        )
-    if not axis.followable:
-        return axis.name, 'is moved or halted by another client, or the master ends'
-    if released:
-        return axis.name, f'{released}; the next command takes it back'
-    return None
+def what_happened(feedback: Sequence[AxisFeedback], released: Released) -> tuple[str, GoalCode]:
+    """Return why an arm that followed does not go on, and the code of its trajectory.
+
+    What took a drive away is the cause; the state that it is in now may be a consequence.
+
+    Args:
+        feedback: State of each drive.
+        released: Drives that were taken away.
+    """
+    causes = [(axis.name, released.get(axis.name) or axis.refusal) for axis in feedback]
+    is_behind = any(
+        isinstance(cause, Refusal) and cause.cause is RefusalCause.NOT_FOLLOWING
+        for _, cause in causes
+    )
+    code = GoalCode.PATH_TOLERANCE_VIOLATED if is_behind else GoalCode.INVALID_GOAL
+    return _sentence(causes) or why_not(feedback, released), code
 
 
-def _joined(reasons: Sequence[tuple[str, str]]) -> list[str]:
+UNKNOWN = 'accepts no set-points; see the log of the master'
+
+
+def _sentence(causes: Iterable[tuple[str, Refusal | str | None]]) -> str:
     """Name drives with the same trouble together."""
     names: dict[str, list[str]] = {}
-    for name, reason in reasons:
-        names.setdefault(reason, []).append(name)
-    return [
+    for name, cause in causes:
+        if cause is not None:
+            names.setdefault(_words(cause), []).append(name)
+    return '; '.join(
         f'{", ".join(axes)} {reason if len(axes) == 1 else _of_several(reason)}'
         for reason, axes in names.items()
-    ]
+    )
+
+
+def _words(cause: Refusal | str) -> str:
+    if isinstance(cause, str):
+        return cause
+    return f'{cause}; {REMEDIES[cause.cause]}'
 
 
 def _of_several(reason: str) -> str:
     """Return what is said of one drive, said of several."""
     verb, rest = reason.split(' ', 1)
-    return f'{PLURAL[verb]} {rest.replace(" its ", " their ")}'.replace('takes it', 'takes them')
+    several = rest.replace(' its ', ' their ').replace('takes it', 'takes them')
+    return f'{PLURAL.get(verb, verb)} {several}'

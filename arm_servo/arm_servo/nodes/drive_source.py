@@ -14,10 +14,13 @@ from ..arrays import frozen
 from ..gateway import CommandGateway
 from ..otg import MotionState
 from ..set_point import Source
-from .drive_reasons import why_not
+from .drive_reasons import COMMAND, what_happened, why_not
 
 if TYPE_CHECKING:
     from arm_canopen import AxisFeedback, MotionSource, Refusal, Setpoint
+
+
+NOT_ATTACHED = f'was not attached yet; {COMMAND}'
 
 
 class DriveSource:
@@ -39,7 +42,7 @@ class DriveSource:
         self._make: type[Setpoint] = Setpoint
         self._gateway = gateway
         self._axes = list(gateway.model.joints)
-        self._released: dict[str, str] = dict.fromkeys(self._axes, 'was not attached yet')
+        self._released: dict[str, Refusal | str] = dict.fromkeys(self._axes, NOT_ATTACHED)
         self._following = False
         self._left: set[str] = set()  # drives that dropped out since all of them followed
         self._lost = ''
@@ -77,7 +80,7 @@ class DriveSource:
             axis: Name of the drive.
             refusal: Why it was taken away.
         """
-        self._released = {**self._released, axis: f'was taken away: it {refusal}'}
+        self._released = {**self._released, axis: refusal}
 
     def update(
         self, now: float, period: float, feedback: Sequence[AxisFeedback]
@@ -95,7 +98,8 @@ class DriveSource:
         try:
             return self._update(now, period, feedback)
         except Exception as error:  # the bus detaches it then
-            reason = f'was let go, because the motion core raised {type(error).__name__}: {error}'
+            what = f'{type(error).__name__}: {error}'
+            reason = f'was let go, because the motion core raised {what}; {COMMAND}'
             self._released = dict.fromkeys(self._axes, reason)
             self._following, self._lost = False, ''
             raise
@@ -111,8 +115,8 @@ class DriveSource:
             self._gateway.idle(now, measured, self._lost or blocked)
             return [None] * len(feedback)
         if blocked and not self._lost:
-            self._lost = blocked
-            self._gateway.fail(blocked)
+            self._lost, code = what_happened(feedback, self._released)
+            self._gateway.fail(self._lost, code)
         self._left.update(axis.name for axis in feedback if not axis.followable)
         if len(self._left) == len(feedback):  # nothing is left to be brought to rest
             self._gateway.idle(now, measured, self._lost)

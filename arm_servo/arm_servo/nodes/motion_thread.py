@@ -13,6 +13,7 @@ import time
 import numpy as np
 
 from ..arrays import Array
+from ..exceptions import GoalCode
 from ..gateway import CommandGateway
 from ..otg import hard_brake, MotionState
 from ..report import MotionReport
@@ -82,11 +83,12 @@ class MotionCycle:
         if not self._following or measured is None:
             self._gateway.idle(now, measured, blocked)
             return
+        code = GoalCode.INVALID_GOAL
         if not blocked:
-            blocked = self._compare(measured.position, now)
+            blocked, code = self._compare(measured.position, now), GoalCode.PATH_TOLERANCE_VIOLATED
         if blocked and not self._lost:
             self._lost = blocked
-            self._gateway.fail(blocked)
+            self._gateway.fail(blocked, code)
         self._put(self._gateway.step(now, period, measured, self._lost))
 
     def brake(self, period: float) -> None:
