@@ -46,6 +46,13 @@ class Drives:
         self.path: list[Array] = []
         self.attachments: list[MotionSource] = []
 
+    def place(self, positions: Sequence[float]) -> None:
+        """Let the drives stand elsewhere."""
+        self.axes = [
+            replace(axis, position=at, setpoint=at)
+            for axis, at in zip(self.axes, positions, strict=True)
+        ]
+
     def attach(self) -> None:
         """Give the source its drives."""
         self.source.attach(self._attached)

@@ -15,7 +15,8 @@ from servo_runs import PERIOD, Run, run
 
 from arm_servo.arrays import Array
 from arm_servo.model import RobotModel
-from arm_servo.report import Cause
+from arm_servo.otg import MotionState
+from arm_servo.report import Cause, Limiter
 from arm_servo.servo import JointCommand, PoseCommand, TwistCommand
 
 SPEED = np.array([0.1] * 3 + [0.3] * 3)  # [m/s], [rad/s]
@@ -35,11 +36,42 @@ def kept(model: RobotModel, result: Run) -> None:
         assert np.all(np.abs(jerk) <= limits.jerk * 1.0001)
 
 
-def moves_or_tells(result: Run, twist: Array) -> bool:
-    """Whether the tool moved as asked by a twentieth at least, or the report names a cause."""
+AT_BOUND = 0.02
+"""How near a joint is to its limit in [rad], or links in [m], when they hold a motion up."""
+
+LOST = 0.12
+"""Scaled singular value below which a direction is as good as lost."""
+
+
+def holds_up(model: RobotModel, state: MotionState, limiter: Limiter) -> bool:
+    """Whether what a report names is so: measured on the arm, not read from the report."""
+    limits = model.limits
+    if limiter.cause is Cause.COLLISION:
+        pairs = model.nearest(state.position, 1.0, 100)
+        distances = [each.distance for each in pairs if ' - '.join(each.links) == limiter.name]
+        return min(distances) < AT_BOUND
+    if limiter.cause is Cause.SINGULARITY:
+        scaled = model.jacobian(state.position)
+        scaled[:3] *= 3.0 / model.reach
+        return float(np.linalg.svd(scaled, compute_uv=False)[-1]) < LOST
+    if limiter.name not in limits.names:
+        return False
+    joint = limits.names.index(limiter.name)
+    if limiter.cause is Cause.JOINT_VELOCITY:
+        return bool(abs(state.velocity[joint]) > 0.95 * limits.velocity[joint])
+    ways = np.abs(state.position[joint] - np.array((limits.lower[joint], limits.upper[joint])))
+    return limiter.cause is Cause.JOINT_POSITION and bool(ways.min() < AT_BOUND)
+
+
+def moves_or_tells(model: RobotModel, result: Run, twist: Array) -> bool:
+    """Whether the tool moved as asked by a twentieth, or the cause that is named is so."""
     axis = int(np.argmax(np.abs(twist)))
     asked = twist[axis] * PERIOD * (len(result.states) - 1)
-    return bool(result.moved[axis] / asked > 0.05 or result.report.limiters or result.held_up)
+    named = [*result.report.limiters, *result.held_up[-1:]]
+    return bool(
+        result.moved[axis] / asked > 0.05
+        or any(holds_up(model, result.states[-1], limiter) for limiter in named)
+    )
 
 
 @pytest.mark.parametrize('name', ROBOTS)
@@ -53,7 +85,7 @@ def test_the_asked_speed_is_the_speed(name: str, twist: Array) -> None:
     if result.report.factor > 0.999:
         assert achieved == pytest.approx(slow, abs=0.01 * float(np.abs(slow).max()))
     else:
-        assert result.report.limiters
+        assert any(holds_up(model, state, limiter) for limiter in result.report.limiters)
 
 
 @pytest.mark.parametrize('name', ROBOTS)
@@ -80,7 +112,7 @@ def test_no_trap_in_the_straight_pose(name: str, twist: Array) -> None:
     """From the singular pose each direction moves, or the report names what is lost."""
     model = robot(name)
     result = run(model, STRAIGHT[name], TwistCommand(twist), 1.0)
-    assert moves_or_tells(result, twist)
+    assert moves_or_tells(model, result, twist)
     kept(model, result)
 
 
@@ -103,7 +135,7 @@ def test_no_trap_at_a_joint_limit(name: str, twist: Array) -> None:
     start = np.array(ready(name))
     start[4] = model.limits.upper[4]
     result = run(model, start, TwistCommand(twist), 1.0)
-    assert moves_or_tells(result, twist)
+    assert moves_or_tells(model, result, twist)
     kept(model, result)
 
 
@@ -143,7 +175,7 @@ def test_no_trap_in_contact(name: str, twist: Array) -> None:
     before = model.clearance(start)
     assert before < 0.005
     result = run(model, start, TwistCommand(twist), 1.0)
-    assert moves_or_tells(result, twist)
+    assert moves_or_tells(model, result, twist)
     assert model.clearance(result.states[-1].position) > min(before, 0.004) - 1e-3
     kept(model, result)
 
@@ -205,8 +237,8 @@ def test_a_blocked_axis_does_not_stop_the_other(name: str) -> None:
     result = run(model, start, TwistCommand(np.array([0.4, 0.1, 0, 0, 0, 0])), 4.0)
     end = result.states[-1]
     achieved = model.jacobian(end.position) @ end.velocity
-    assert result.moved[1] > 0.2 or result.report.limiters
-    assert achieved[0] < 0.4
+    assert achieved[0] < 0.2  # the commanded axis that is lost
+    assert result.moved[1] > 0.2
     kept(model, result)
 
 

@@ -1,84 +1,155 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The servo's status: a code for tools, and words for people."""
+"""The servo's status: what an arm that is jogged somewhere reports, to tools and to people."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import pytest
-from servo_drives import Drives
+from servo_commands import InlineWorker, jog, move_by, twist
+from servo_drives import Drives, PERIOD
+from servo_robots import ready, robot, STRAIGHT
 
 from arm_canopen import Refusal, RefusalCause
+from arm_servo.core import MotionCore
+from arm_servo.core_settings import CoreSettings
+from arm_servo.gateway import CommandGateway
+from arm_servo.nodes.servo_parameters import UNCHECKED
 from arm_servo.nodes.servo_status import code_of, status_of, StatusCode
-from arm_servo.otg import MotionState
 from arm_servo.report import Cause, Limiter, MotionReport
-from arm_servo.set_point import SetPoint, Source
-from arm_servo.snapshot import Snapshot
 
 
-def snapshot(report: MotionReport, source: Source = Source.JOG) -> Snapshot:
-    """Return a snapshot of an arm that follows."""
-    point = SetPoint(MotionState.at_rest([0.0]), source, report)
-    return Snapshot(1.0, point, None, '', source)
+def attached(name: str = 'panda', at: Sequence[float] = ()) -> Drives:
+    """Return drives that follow, in a pose."""
+    drives = Drives(name)
+    if at:
+        drives.place(at)
+    drives.attach()
+    drives.run(2)
+    return drives
 
 
-@pytest.mark.parametrize(
-    ('cause', 'factor', 'code'),
-    [
-        (Cause.COLLISION, 0.5, StatusCode.DECELERATE_FOR_COLLISION),
-        (Cause.COLLISION, 0.0, StatusCode.HALT_FOR_COLLISION),
-        (Cause.SINGULARITY, 0.3, StatusCode.DECELERATE_FOR_APPROACHING_SINGULARITY),
-        (Cause.SINGULARITY, 0.0, StatusCode.HALT_FOR_SINGULARITY),
-        (Cause.JOINT_POSITION, 0.4, StatusCode.JOINT_BOUND),
-        (Cause.JOINT_VELOCITY, 0.4, StatusCode.NO_WARNING),
-    ],
-)
-def test_each_cause_has_the_code_of_moveit_servo(
-    cause: Cause, factor: float, code: StatusCode
-) -> None:
-    """And the message names what limits, with the factor."""
-    report = MotionReport(factor, (Limiter(cause, 'elbow', 0.018, factor),))
-    assert code_of(report) is code
-    told, words = status_of(snapshot(report), '', '', '')
-    assert told == code
-    assert 'elbow' in words
-    assert f'{factor:.2f}x' in words
+def codes(drives: Drives, cycles: int) -> list[tuple[int, str]]:
+    """Run cycles, and return the status of each that is another than the one before."""
+    found: list[tuple[int, str]] = []
+    for _ in range(cycles):
+        drives.run()
+        status = status_of(drives.gateway.snapshot, '', '', '')
+        if not found or found[-1][0] != status[0]:
+            found.append(status)
+    return found
+
+
+def test_a_free_jog_has_no_warning() -> None:
+    """And the message says that nothing limits it."""
+    drives = attached()
+    twist(drives.gateway, [0.0, 0.02, 0.0, 0.0, 0.0, 0.0], drives.now, 60.0)
+    assert codes(drives, 60)[-1] == (StatusCode.NO_WARNING, 'free')
+
+
+def test_a_jog_to_a_joint_limit_is_told() -> None:
+    """With the joint, as soon as it is slowed down."""
+    drives = attached()
+    jog(drives.gateway, {'panda_joint1': 2.0}, drives.now, 60.0)
+    code, words = codes(drives, 300)[-1]
+    assert code == StatusCode.JOINT_BOUND
+    assert 'panda_joint1' in words
+
+
+def test_a_jog_into_contact_is_slowed_down_and_then_halted() -> None:
+    """With the two links."""
+    drives = attached()
+    jog(drives.gateway, {'panda_joint6': -1.0}, drives.now, 60.0)
+    found = codes(drives, 300)
+    assert StatusCode.DECELERATE_FOR_COLLISION in [code for code, _ in found]
+    code, words = found[-1]
+    assert code == StatusCode.HALT_FOR_COLLISION
+    assert 'panda_link5' in words
+    assert 'panda_hand' in words
+
+
+def test_a_direction_that_is_lost_is_told() -> None:
+    """The straight arm cannot go sideways without its elbow."""
+    drives = attached('gp110', STRAIGHT['gp110'].tolist())
+    twist(drives.gateway, [0.0, 0.1, 0.0, 0.0, 0.0, 0.0], drives.now, 60.0)
+    code, words = codes(drives, 60)[-1]
+    assert code == StatusCode.HALT_FOR_SINGULARITY
+    assert 'y is lost' in words
+
+
+def test_a_stop_of_the_safety_filter_is_no_free_motion() -> None:
+    """Where nothing else brakes in front of contact, it does, with code and links."""
+    core = MotionCore(robot('panda'), CoreSettings(servo=UNCHECKED))
+    gateway = CommandGateway(core, lambda: 100.0, InlineWorker())
+    core.reset(ready('panda'))
+    jog(gateway, {'panda_joint6': -1.0}, 100.0, 60.0)
+    reported = set()
+    for cycle in range(250):
+        state = core.state
+        gateway.step(100.0 + cycle * PERIOD, PERIOD, state, '')
+        code, words = status_of(gateway.snapshot, '', '', '')
+        reported.add(code)
+        if code == StatusCode.HALT_FOR_COLLISION:
+            assert 'panda_link5' in words
+            assert 'panda_hand' in words
+    assert StatusCode.HALT_FOR_COLLISION in reported
+    assert core.model.clearance(core.state.position) > 0.004
+
+
+def test_the_strongest_limit_is_the_one_that_counts() -> None:
+    """In whatever order they were found."""
+    slowed = Limiter(Cause.COLLISION, 'hand - arm', 0.03, 0.6)
+    halted = Limiter(Cause.JOINT_POSITION, 'elbow', 0.0, 0.0)
+    for limiters in ((slowed, halted), (halted, slowed)):
+        report = MotionReport(0.0, limiters)
+        assert report.limiters[0] is halted
+        assert code_of(report) is StatusCode.JOINT_BOUND
+    assert MotionReport(0.6, (slowed,)).with_limiter(halted).limiters[0] is halted
 
 
 def test_a_refusal_comes_before_everything_else() -> None:
     """A person whose command was refused sees why, whatever else goes on."""
-    code, words = status_of(snapshot(MotionReport()), 'stale', 'paused', 'cut')
-    assert (code, words) == (StatusCode.INVALID, 'stale')
+    drives = attached()
+    assert status_of(drives.gateway.snapshot, 'stale', 'paused', 'cut') == (-1, 'stale')
 
 
 def test_a_cycle_that_stands_still_is_told() -> None:
     """What the last cycle said is not repeated for ever."""
-    code, words = status_of(snapshot(MotionReport()), '', '', '', 3.0)
+    drives = attached()
+    code, words = status_of(drives.gateway.snapshot, '', '', '', 3.0)
     assert code == StatusCode.INVALID
-    assert 'does not run (the last was 3.0 s ago)' in words
+    assert '3.0 s ago' in words
 
 
 def test_a_blocked_arm_says_so() -> None:
     """Without drives the status is invalid, and names the remedy."""
-    drives = Drives()
-    drives.attach()
+    drives = attached()
     drives.source.released('panda_joint1', Refusal(RefusalCause.SINGLE_TARGET))
-    drives.run()
+    drives.run(3)
     code, words = status_of(drives.gateway.snapshot, '', '', '')
     assert code == StatusCode.INVALID
     assert 'panda_joint1' in words
 
 
-@pytest.mark.parametrize(
-    ('source', 'words'),
-    [(Source.NONE, 'ready'), (Source.TRAJECTORY, 'trajectory'), (Source.TARGET, 'target')],
-)
-def test_it_tells_what_moves_the_arm(source: Source, words: str) -> None:
+def test_it_tells_what_moves_the_arm() -> None:
     """Also while nobody jogs."""
-    code, text = status_of(snapshot(MotionReport(), source), '', '', '')
-    assert code == StatusCode.NO_WARNING
-    assert words in text
+    drives = attached()
+    assert status_of(drives.gateway.snapshot, '', '', '') == (StatusCode.NO_WARNING, 'ready')
+    move_by(drives.gateway, {'panda_joint1': 0.3})
+    drives.run(5)
+    assert 'target' in status_of(drives.gateway.snapshot, '', '', '')[1]
+    twist(drives.gateway, [0.0, 0.02, 0.0, 0.0, 0.0, 0.0], drives.now, 60.0)
+    drives.run(2)
+    assert status_of(drives.gateway.snapshot, '', '', 'cut to 1')[1].startswith('cut to 1')
 
 
-def test_what_was_cut_off_is_told() -> None:
-    """A command beyond its range is carried out in part, and says so."""
-    assert 'cut to 1' in status_of(snapshot(MotionReport()), '', '', 'cut to 1')[1]
+@pytest.mark.parametrize('paused', [False, True])
+def test_a_pause_of_the_arm_is_told(paused: bool) -> None:
+    """Jogging is refused then, and the message names the service that ends it."""
+    drives = attached()
+    if paused:
+        drives.gateway.pause()
+    drives.run(2)
+    words = status_of(drives.gateway.snapshot, '', '', '')[1]
+    assert ('~/resume' in words) == paused
