@@ -291,7 +291,14 @@ class CommandGateway:
         """
         self._core.reset(positions)
 
-    def step(self, now: float, period: float, measured: MotionState, blocked: str) -> SetPoint:
+    def step(
+        self,
+        now: float,
+        period: float,
+        measured: MotionState,
+        blocked: str,
+        ages: Array | None = None,
+    ) -> SetPoint:
         """Carry out what was commanded, and return the set-point of this cycle.
 
         Args:
@@ -299,6 +306,7 @@ class CommandGateway:
             period: Time to the next cycle in [s].
             measured: Measured state.
             blocked: Why the arm comes to rest and takes no commands; empty when it does.
+            ages: How old the measured values of each joint are in [s].
         """
         self._carry_out(_Cycle(now, period, blocked))
         set_point = self._core.step(now, period, measured)
@@ -313,6 +321,7 @@ class CommandGateway:
             self._snapshot.cycles + 1,
             period,
             self._core.execution,
+            ages,
         )
         return set_point
 
@@ -330,13 +339,16 @@ class CommandGateway:
         else:
             self._core.stop(reason)
 
-    def idle(self, now: float, measured: MotionState | None, blocked: str) -> None:
+    def idle(
+        self, now: float, measured: MotionState | None, blocked: str, ages: Array | None = None
+    ) -> None:
         """Pass a cycle in which the arm does not follow; commands are refused.
 
         Args:
             now: Steady time.
             measured: Measured state, when it is known.
             blocked: Why, with the remedy.
+            ages: How old the measured values of each joint are in [s].
         """
         if self._snapshot.set_point is not None:
             self._void(MOTIONS, blocked)
@@ -352,6 +364,7 @@ class CommandGateway:
             paused=self._core.paused,
             speed=self._core.speed,
             cycles=self._snapshot.cycles,
+            ages=ages,
         )
 
     def _void(self, sources: Iterable[Source], reason: str) -> None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .arrays import Array
 from .execution import Execution
 from .otg import MotionState
 from .set_point import SetPoint, Source
@@ -31,6 +32,8 @@ class Snapshot:
         cycles: Cycles so far in which the arm followed.
         period: Period of the cycle in [s].
         execution: The trajectory that was followed last; None before the first.
+        ages: How old the measured values of each joint were in the cycle in [s]; None where they
+            are as old as the cycle.
     """
 
     time: float
@@ -43,6 +46,7 @@ class Snapshot:
     cycles: int = 0
     period: float = 0.01
     execution: Execution | None = None
+    ages: Array | None = None
 
     @property
     def speed_scaling(self) -> float:

@@ -107,22 +107,22 @@ class DriveSource:
     def _update(
         self, now: float, period: float, feedback: Sequence[AxisFeedback]
     ) -> Sequence[Setpoint | None]:
-        measured = measured_state(feedback)
+        measured, ages = measured_state(feedback), frozen([axis.age for axis in feedback])
         blocked = why_not(feedback, self._released)
         if not self._following and not blocked:
             self._take_over(feedback)
         if not self._following or measured is None:
-            self._gateway.idle(now, measured, self._lost or blocked)
+            self._gateway.idle(now, measured, self._lost or blocked, ages)
             return [None] * len(feedback)
         if blocked and not self._lost:
             self._lost, code = what_happened(feedback, self._released)
             self._gateway.fail(self._lost, code)
         self._left.update(axis.name for axis in feedback if not axis.followable)
         if len(self._left) == len(feedback):  # nothing is left to be brought to rest
-            self._gateway.idle(now, measured, self._lost)
+            self._gateway.idle(now, measured, self._lost, ages)
             self._following, self._lost = False, ''
             return [None] * len(feedback)
-        point = self._gateway.step(now, period, measured, self._lost)
+        point = self._gateway.step(now, period, measured, self._lost, ages)
         if self._lost and point.source is Source.NONE and not point.state.moving:
             self._following, self._lost = False, ''
         rows = zip(point.state.position, point.state.velocity, feedback, strict=True)

@@ -83,7 +83,12 @@ class Motion:
         self._controller = TrajectoryController(
             controller, self._gateway, trajectory, self._prepare
         )
-        self._broadcaster = JointStateBroadcaster(broadcaster, self._gateway, active=broadcasts)
+        self._broadcaster = JointStateBroadcaster(
+            broadcaster,
+            self._gateway,
+            [name for name in self._drives(self._master) if name not in model.joints],
+            active=broadcasts,
+        )
         period = self._master.bus.master.sync_period
         self._switch = ControllerManager(
             manager,
@@ -99,8 +104,11 @@ class Motion:
         self._attaching = manager.create_timer(ATTACH_PERIOD, self._attach_first)
 
     @staticmethod
-    def _check_drives(master: MasterProcess, joints: Sequence[str]) -> None:
-        drives = [node.name for node in master.bus.nodes if node.is_drive]
+    def _drives(master: MasterProcess) -> list[str]:
+        return [node.name for node in master.bus.nodes if node.is_drive]
+
+    def _check_drives(self, master: MasterProcess, joints: Sequence[str]) -> None:
+        drives = self._drives(master)
         missing = [name for name in joints if name not in drives]
         if missing:
             raise ModelError(

@@ -1,0 +1,55 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Joint states: measured lately, stamped when they were, and of all drives."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from servo_drives import Drives, PERIOD
+
+from arm_servo.nodes.joint_state_broadcaster import JointSample, JointSamples, MAX_AGE
+
+GRIPPER = JointSample(0.04, 0.0, 100.0)
+
+
+def ready() -> tuple[Drives, JointSamples]:
+    """Return drives that follow, and what is published of them."""
+    drives = Drives()
+    drives.attach()
+    drives.run(2)
+    return drives, JointSamples(drives.gateway.model.joints)
+
+
+def test_a_cycle_that_stands_still_makes_no_new_states() -> None:
+    """What it measured last keeps its time, and is published no more after a while."""
+    drives, samples = ready()
+    cycle = drives.now
+    found = samples.fresh(drives.gateway.snapshot, cycle + 0.3)
+    assert {sample.time for sample in found.values()} == {cycle}
+    assert samples.fresh(drives.gateway.snapshot, cycle + MAX_AGE + PERIOD) == {}
+
+
+def test_a_drive_that_is_silent_is_left_out() -> None:
+    """Its last position is not told for the present one; the others go on."""
+    drives, samples = ready()
+    drives.axes[2] = replace(drives.axes[2], age=0.3)
+    drives.run()
+    found = samples.fresh(drives.gateway.snapshot, drives.now)
+    assert found['panda_joint3'].time == pytest.approx(drives.now - 0.3)
+    drives.axes[2] = replace(drives.axes[2], age=MAX_AGE + PERIOD)
+    drives.run()
+    found = samples.fresh(drives.gateway.snapshot, drives.now)
+    assert list(found) == [name for name in drives.source.axes if name != 'panda_joint3']
+
+
+def test_drives_beside_the_arm_are_there() -> None:
+    """A gripper is no joint of the group, and a joint of the robot."""
+    drives, samples = ready()
+    samples.hear('gripper', replace(GRIPPER, time=drives.now))
+    found = samples.fresh(drives.gateway.snapshot, drives.now)
+    assert list(found) == [*drives.source.axes, 'gripper']
+    assert found['gripper'].position == 0.04
+    found = samples.fresh(drives.gateway.snapshot, drives.now + MAX_AGE + PERIOD)
+    assert 'gripper' not in found
