@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 import pytest
-from servo_commands import outcome
+from servo_commands import move_by, outcome
 from servo_elsewhere import Elsewhere, jog, PERIOD, swing
 
 from arm_servo.exceptions import GoalCode
@@ -104,3 +104,31 @@ def test_continuous_joints_may_be_whole_turns_off() -> None:
     watch.begin(np.array([3.2]))
     assert watch.problem(np.array([3.2 - 2 * math.pi])) == ''
     assert 'wheel' in watch.problem(np.array([3.5 - 2 * math.pi]))
+
+
+@pytest.mark.parametrize('noise', [0.0, 0.0005, 0.003, 0.006])
+def test_a_noisy_arm_at_rest_was_not_moved(noise: float) -> None:
+    """Encoder noise resets nothing, so displacements are carried out; a real motion is seen."""
+    arm, rng = Elsewhere(), np.random.default_rng(1)
+
+    def run(cycles: int) -> None:
+        for _ in range(cycles):
+            arm.now += PERIOD
+            noisy = arm.at + rng.normal(0.0, noise, len(arm.at))
+            arm.feedback.take(arm.gateway.model.joints, noisy.tolist(), [], arm.now)
+            arm.cycle.step(arm.now, PERIOD)
+
+    run(100)
+    for _ in range(10):
+        begin = arm.at[0]
+        command = move_by(arm.gateway, {'joint_1_s': 0.02})
+        run(60)
+        assert command.future.done()
+        assert command.future.exception() is None
+        assert arm.at[0] - begin == pytest.approx(0.02, abs=8.0 * noise + 1e-6)
+    arm.at = arm.at + 0.2
+    run(3)
+    sent = len(arm.points)
+    move_by(arm.gateway, {'joint_1_s': 0.02})
+    run(5)
+    assert np.abs(arm.path()[sent] - arm.at).max() < 8.0 * noise + 0.01

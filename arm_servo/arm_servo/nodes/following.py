@@ -15,6 +15,12 @@ from ..limits import JointLimits
 MOVED = 0.002
 """How far an arm at rest may turn by itself in [rad]; more was done by others."""
 
+LEARNING = 0.1
+"""Share of a new measurement in the mean and in the noise of an arm at rest."""
+
+NOISE_ALLOWANCE, MEAN_ALLOWANCE = 8.0, 2.0
+"""How many times its noise a measurement, and the mean of many, may be off by itself."""
+
 ARRIVING = 0.02
 """The same while it may still be on its last way, from all that was commanded."""
 
@@ -53,7 +59,8 @@ class FollowingWatch:
         self._turn = 0
         self._quiet = math.ceil(limits.delay / period)
         self._still = 0
-        self._rest = self._commands[0]
+        self._rest = self._mean = self._last = self._commands[0]
+        self._noise = np.zeros(len(joints))
 
     def begin(self, positions: Array) -> None:
         """Begin where the arm stands.
@@ -62,7 +69,7 @@ class FollowingWatch:
             positions: Its positions in [rad].
         """
         self._commands[:] = positions
-        self._rest = positions
+        self._rest = self._mean = self._last = positions
 
     def command(self, positions: Array) -> None:
         """Note the command of a cycle.
@@ -88,17 +95,33 @@ class FollowingWatch:
         """Whether others have moved the arm since it came to rest; once a cycle.
 
         Drives need not stand exactly where they were sent, so what counts is where they stood.
+        Encoders are noisy: how much so is learned at rest.
 
         Args:
             measured: Measured positions in [rad].
             quiet: Nothing is commanded.
         """
         self._still = self._still + 1 if quiet else 0
+        if self._still <= 1:
+            self._mean = self._last = measured
+        allowed = np.maximum(MOVED, NOISE_ALLOWANCE * self._noise)
+        self._learn(measured)
         if self._still <= self._quiet:
-            self._rest = measured
+            self._rest = self._mean
             return quiet and bool(self.errors(measured).max() > ARRIVING)
         aside = np.abs(self._unwound(measured, self._rest) - self._rest)
-        return bool(aside.max() > MOVED)
+        drifted = np.abs(self._mean - self._rest)
+        return bool(
+            np.any(aside > allowed)
+            or np.any(drifted > np.maximum(MOVED, MEAN_ALLOWANCE * self._noise))
+        )
+
+    def _learn(self, measured: Array) -> None:
+        """Take a measurement into the mean and the noise."""
+        near = self._unwound(measured, self._last)
+        self._noise = self._noise + LEARNING * (np.abs(near - self._last) - self._noise)
+        self._last = near
+        self._mean = self._mean + LEARNING * (self._unwound(measured, self._mean) - self._mean)
 
     def _unwound(self, measured: Array, near: Array) -> Array:
         """Add whole turns to continuous joints."""

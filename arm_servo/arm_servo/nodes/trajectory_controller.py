@@ -8,6 +8,7 @@ from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
 import time
+import traceback
 from typing import Any
 
 from control_msgs.msg import JointTrajectoryControllerState, SpeedScalingFactor
@@ -115,6 +116,9 @@ class TrajectoryController:
             command = self._follow(goal_of_trajectory(message, self._now, self._parameters))
         except ServoError as error:
             self._news.append(f'trajectory refused: {error}')
+            return
+        except Exception:  # noqa: BLE001  # a message must not end the program
+            self._node.get_logger().error(f'trajectory refused: {traceback.format_exc()}')
             return
         command.future.add_done_callback(self._tell_refusal)
 
