@@ -70,9 +70,10 @@ def status_of(
         return int(StatusCode.NO_WARNING), paused
     if snapshot.paused:
         return int(StatusCode.NO_WARNING), 'the arm is held; ~/resume of the trajectory controller'
-    if snapshot.source is not Source.JOG:
-        return int(StatusCode.NO_WARNING), _idle(snapshot.source)
     report = snapshot.set_point.report
+    if snapshot.source is not Source.JOG:
+        words = _idle(snapshot.source)
+        return int(code_of(report)), f'{words}; {report}' if report.limiters else words
     words = str(report) if not capped else f'{capped}; {report}'
     return int(code_of(report)), words
 
