@@ -12,7 +12,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 import random
-import re
 
 import pytest
 from virtual_network import (
@@ -25,11 +24,12 @@ from virtual_network import (
     with_defaults,
 )
 
+from arm_canopen import RefusalCause
 from arm_canopen.can.frame import Frame
 from arm_canopen.config.identity import Identity
 from arm_canopen.device.drive import Drive as SimulatedDrive
 from arm_canopen.exceptions import DriveError, SdoError
-from arm_canopen.master.events import Severity
+from arm_canopen.master.events import EventKind, Severity
 from arm_canopen.standard.drive import DriveState, OperationMode
 
 FAULTY, WITNESS = 'joint1', 'joint2'
@@ -204,9 +204,10 @@ class Fault:
     Attributes:
         name: What happens.
         happen: Makes it happen.
-        says: What the master says, as a regular expression; empty when it is none the wiser.
+        reports: What the master reports as an error of every drive that is met, or of the bus.
         state: States in one of which the drive ends; None when it is gone.
-        refuses: What answers a target meanwhile.
+        cause: Why targets are refused meanwhile.
+        emcy: Code of the EMCY that the master has received, None when it need not have one.
         witness_stops: The other drive is met, too.
         cure: Removes the cause.
         way: What brings the drive back.
@@ -214,11 +215,12 @@ class Fault:
 
     name: str
     happen: Callable[[Arm], None]
-    says: str
+    reports: EventKind
     state: DriveState | None
-    refuses: str
+    cause: RefusalCause
     cure: Callable[[Arm], None]
     way: Way
+    emcy: int | None = None
     witness_stops: bool = False
 
     def __str__(self) -> str:
@@ -228,38 +230,80 @@ class Fault:
 
 SWITCHED_OFF, FAULT = DriveState.SWITCH_ON_DISABLED, DriveState.FAULT
 FAULTS = (
-    Fault('slave killed', kill, 'heartbeat lost', None, 'offline', revive, Way.INIT),
-    Fault('slave rebooted', reboot, 'boot-up', SWITCHED_OFF, 'takes no target', nothing, Way.INIT),
     Fault(
-        'master unheard', silence_master, '', FAULT, '', mend_bus, Way.RECOVER, witness_stops=True
+        'slave killed',
+        kill,
+        EventKind.HEARTBEAT_LOST,
+        None,
+        RefusalCause.OFFLINE,
+        revive,
+        Way.INIT,
+    ),
+    Fault(
+        'slave rebooted',
+        reboot,
+        EventKind.HEARTBEAT_LOST,
+        SWITCHED_OFF,
+        RefusalCause.NOT_ENABLED,
+        nothing,
+        Way.INIT,
+    ),
+    Fault(
+        'master unheard',
+        silence_master,
+        EventKind.HEARTBEAT_LOST,
+        FAULT,
+        RefusalCause.OFFLINE,
+        mend_bus,
+        Way.RECOVER,
+        emcy=0x8130,
+        witness_stops=True,
     ),
     Fault(
         'bus down',
         cut_bus,
-        'interface is down',
+        EventKind.BUS,
         FAULT,
-        '',
+        RefusalCause.OFFLINE,
         mend_bus,
         Way.RECOVER,
         witness_stops=True,
     ),
-    Fault('EMCY', over_current, 'FAULT.*0x2310', FAULT, 'recover', nothing, Way.RECOVER),
+    Fault(
+        'EMCY',
+        over_current,
+        EventKind.DRIVE,
+        FAULT,
+        RefusalCause.FAULT,
+        nothing,
+        Way.RECOVER,
+        emcy=0x2310,
+    ),
     Fault(
         'STO low',
         open_safety_circuit,
-        'FAULT|left Operation enabled',
+        EventKind.DRIVE,
         FAULT,
-        'recover',
+        RefusalCause.FAULT,
         close_safety_circuit,
         Way.RECOVER,
     ),
-    Fault('following error', following_error, '0x8611', FAULT, 'recover', nothing, Way.RECOVER),
+    Fault(
+        'following error',
+        following_error,
+        EventKind.DRIVE,
+        FAULT,
+        RefusalCause.FAULT,
+        nothing,
+        Way.RECOVER,
+        emcy=0x8611,
+    ),
     Fault(
         'heartbeat stopped',
         stop_heartbeat,
-        'heartbeat lost',
+        EventKind.HEARTBEAT_LOST,
         SWITCHED_OFF,
-        'offline',
+        RefusalCause.OFFLINE,
         mend_bus,
         Way.ENABLE,
     ),
@@ -269,22 +313,30 @@ FAULTS = (
 @pytest.mark.parametrize('mode', MODES, ids=lambda mode: mode.name)
 @pytest.mark.parametrize('fault', FAULTS, ids=str)
 def test_fault_in_motion(fault: Fault, mode: OperationMode) -> None:
-    """It is said, the drive stops, targets are refused, and only a command brings it back."""
+    """It is reported, the drive stops, refuses targets, and only a command brings it back."""
     arm = Arm()
     arm.move(mode)
+    before = len(arm.net.events)
     fault.happen(arm)
     if not fault.witness_stops:
         arm.stop(WITNESS, mode)
     arm.net.run(SETTLING)
-    said = [text for text in arm.net.told(Severity.INFO) if re.search(fault.says, text)]
-    assert said, arm.net.story()
+    met = [FAULTY, WITNESS] if fault.witness_stops else [FAULTY]
+    for name in met:
+        errors = [event for event in arm.net.events[before:] if event.severity is Severity.ERROR]
+        assert any(event.kind is fault.reports and event.node in (name, '') for event in errors), (
+            arm.net.story()
+        )
+        codes = [emcy.code for _, emcy in arm.net.network.nodes[name].emergencies.history]
+        assert fault.emcy is None or fault.emcy in codes
+        refusal = arm.net.drives[name].refusal
+        assert refusal is not None
+        assert refusal.cause is fault.cause
+        with pytest.raises(DriveError):
+            arm.net.commands[name].set_target(0.1)
     if fault.state is not None:
         assert arm.state() is fault.state, arm.net.story()
         arm.stands(FAULTY)
-    if fault.refuses:
-        with pytest.raises(DriveError, match=fault.refuses):
-            arm.net.commands[FAULTY].set_target(0.1)
-    met = [FAULTY, WITNESS] if fault.witness_stops else [FAULTY]
     assert (arm.state(WITNESS) is not DriveState.OPERATION_ENABLED) is fault.witness_stops
 
     fault.cure(arm)

@@ -7,13 +7,16 @@ from __future__ import annotations
 import random
 
 import pytest
-from virtual_network import bus_config, drive_config, VirtualNetwork
+from virtual_network import bus_config, drive_config, PERIOD, SCALE, VirtualNetwork
 
 from arm_canopen.can.frame import Frame
-from arm_canopen.standard.nmt import NmtState
+from arm_canopen.standard.drive import DriveState, OperationMode
+from arm_canopen.standard.nmt import ALL_NODES, NmtCommand, NmtState
 
 FRAMES = 50_000  # for each seed
 BURST = 100  # frames between two looks
+RECOVERY_TIME = 30.0  # [s] in which the master has booted the devices again
+TARGET = 0.4  # [rad]
 NODE_IDS = (2, 3)
 COMMANDING = frozenset(
     base + node_id for base in (0x200, 0x300, 0x400, 0x500, 0x600) for node_id in NODE_IDS
@@ -61,21 +64,51 @@ def make_noise(network: VirtualNetwork, source: random.Random, *, commanding: bo
 
 @pytest.mark.parametrize('seed', range(2))
 def test_anything_on_the_bus(seed: int) -> None:
-    """Frames at every identifier, NMT and SDO included: afterwards the network works again."""
+    """Frames at every identifier, NMT and SDO included: the master boots all again by itself.
+
+    Nothing is enabled then. Parameters that the noise has written by SDO are in the devices until
+    they are reset, as after any other master; then they move as on the first day.
+    """
     source = random.Random(seed)
     network = make_network()
     for _ in range(FRAMES // BURST):
         make_noise(network, source, commanding=True)
-    network.run(5.0)
-    for name in list(network.devices):
-        network.power_off(name)
-        network.power_on(name)
-    network.run(2.0)  # until the master has noticed
     assert network.network.unknown_frames > FRAMES // 10
-    network.run_until(network.all_ready, 120.0)
+    network.run_until(network.all_ready, RECOVERY_TIME)
+    assert_cyclic(network)
+    positions = motors(network)
+    network.run(5.0)
+    assert network.all_ready()
+    assert motors(network) == positions
+    for name, drive in network.drives.items():
+        assert drive.fresh
+        assert drive.state is not DriveState.OPERATION_ENABLED
+        assert not drive.accepts_targets
+        network.do(name, 'recover')  # what the noise has left behind faults no drive for good
+        network.do(name, 'disable')
+    network.network.send_nmt(NmtCommand.RESET_NODE, ALL_NODES)
+    network.run_until(lambda: not any(node.online for node in network.network.nodes.values()))
+    network.run_until(network.all_ready, RECOVERY_TIME)
     for name in network.drives:
         network.do(name, 'recover')
-        network.do(name, 'disable')
+        network.select(name, OperationMode.CYCLIC_POSITION)
+        network.commands[name].set_target(TARGET)
+    network.run(3.0)
+    assert motors(network) == pytest.approx([TARGET] * len(NODE_IDS), abs=1e-3)
+
+
+def motors(network: VirtualNetwork) -> list[float]:
+    """Return where the motors really are in [rad]."""
+    drives = [device.drive for device in network.devices.values()]
+    return [drive.position / SCALE for drive in drives if drive is not None]
+
+
+def assert_cyclic(network: VirtualNetwork) -> None:
+    """Check that SYNC and the RPDOs of each device leave in every cycle."""
+    begin = network.now
+    network.run(1.0)
+    for can_id in (0x080, *(0x200 + node_id for node_id in NODE_IDS)):
+        assert len(network.frames(can_id, since=begin)) == pytest.approx(1.0 / PERIOD, abs=2)
 
 
 @pytest.mark.parametrize('seed', range(2))
