@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from ..master.process_image import Output, Reader, Writer
+from ..master.process_image import Output, Writer
 from ..master.remote_node import RemoteNode
 from ..standard.drive import drive_state, DriveState, OperationMode
 from ..standard.objects import AXIS_OFFSET, Index
@@ -29,10 +29,12 @@ class DriveObjects:
         self._velocity = node.image.reader(self.at(Index.VELOCITY_ACTUAL))
         self._torque = node.image.reader(self.at(Index.TORQUE_ACTUAL))
         polled_mode = node.image.reader(self.at(Index.MODE_OF_OPERATION_DISPLAY)) is None
-        state: list[Reader] = [self._statusword, self._position]
+        state = [self._statusword, self._position, self._velocity, self._torque]
         state += [] if polled_mode else [self._mode]
-        state += [reader for reader in (self._velocity, self._torque) if reader is not None]
-        self._state = state
+        # several objects come in one TPDO, which is looked at once
+        self._sources = list(
+            dict.fromkeys(reader.source for reader in state if reader is not None)
+        )
         self.controlword = node.writer(self.at(Index.CONTROLWORD))
         self.mode = node.writer(self.at(Index.MODE_OF_OPERATION))
 
@@ -60,12 +62,14 @@ class DriveObjects:
 
         A mode of operation that is read by SDO does not count: the cycle needs no SDO.
         """
-        return self._mode.value is not None and not any(o.stale(now) for o in self._state)
+        if self._mode.value is None:
+            return False
+        return not any(source.stale(now) for source in self._sources)
 
     @property
     def timestamp(self) -> float:
         """Steady time of the oldest value of the state in [s]."""
-        return min(reader.timestamp for reader in self._state)
+        return min(source.timestamp for source in self._sources)
 
     @property
     def statusword(self) -> int:

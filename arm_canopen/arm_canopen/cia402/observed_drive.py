@@ -36,6 +36,7 @@ class ObservedDrive:
         objects: Its objects in the process image.
         state: State shown in the last cycle.
         statusword: 0x6041 as it was then.
+        fresh: Its state was known in the last cycle, and young enough to act on.
         halt: What keeps it halted.
         error: 0x603F in words when it was faulted last, else empty.
     """
@@ -55,6 +56,7 @@ class ObservedDrive:
         self.objects = DriveObjects(node, config.channel)
         self.state = DriveState.UNKNOWN
         self.statusword = 0
+        self.fresh = False
         self.halt = Halt()
         self.error = ''
         self._position = math.nan
@@ -67,14 +69,6 @@ class ObservedDrive:
     def parameters(self) -> DriveParameters:
         """What it told about itself."""
         return self._upkeep.told
-
-    @property
-    def fresh(self) -> bool:
-        """Whether its state is known and young enough to act on."""
-        node = self.node
-        return (
-            node.online and not node.left_operational and self.objects.fresh(self._scheduler.now)
-        )
 
     @property
     def age(self) -> float:
@@ -182,6 +176,7 @@ class ObservedDrive:
             return
         word, position_inc = seen
         self._position = self.units.position_from_device(position_inc)
+        self.fresh = self.objects.fresh(self._scheduler.now)
         if self.fresh:
             self._estimate.note(self._scheduler.now, position_inc)
         else:
@@ -190,7 +185,7 @@ class ObservedDrive:
             self.state, self.statusword = drive_state(word), word
 
     def _lose_sight(self) -> None:
-        self.state, self.statusword = DriveState.UNKNOWN, 0
+        self.state, self.statusword, self.fresh = DriveState.UNKNOWN, 0, False
         self._estimate.clear()
 
     def _actual(self) -> Actual:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from ..exceptions import CodecError, SdoAbortError, SdoError, SdoTimeoutError
 from ..standard.pdo import Number
 from .events import EventKind, Severity
-from .process_image import Limits
+from .process_image import Limits, Source
 from .scheduler import Promise, Scheduler
 
 if TYPE_CHECKING:
@@ -35,6 +35,11 @@ class BackgroundReader:
         self.value: Number | None = None
         self.timestamp = 0.0
         self._stale_after = stale_after
+
+    @property
+    def source(self) -> Source:
+        """Itself: it is polled alone."""
+        return self
 
     def stale(self, now: float) -> bool:
         """Tell whether it is unknown, or too old to act on, at a steady time in [s]."""

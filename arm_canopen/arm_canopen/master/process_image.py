@@ -211,19 +211,29 @@ class Output:
         return Frame(self._cob_id, self._pack(self.values))
 
 
+class Source(Protocol):
+    """What values come in: a TPDO, or the polling of an object.
+
+    Attributes:
+        timestamp: Steady time at which they came last in [s].
+    """
+
+    timestamp: float
+
+    def stale(self, now: float) -> bool:
+        """Tell whether they are unknown, or too old to act on, at a steady time in [s]."""
+
+
 class Reader(Protocol):
-    """Last known value of an object of the device, with its age."""
+    """Last known value of an object of the device."""
 
     @property
     def value(self) -> Number | None:
         """The value, None while unknown."""
 
     @property
-    def timestamp(self) -> float:
-        """Steady time at which it came in [s]."""
-
-    def stale(self, now: float) -> bool:
-        """Tell whether it is unknown, or too old to act on, at a steady time in [s]."""
+    def source(self) -> Source:
+        """What it comes in, which knows its age."""
 
 
 class Writer(Protocol):
@@ -260,13 +270,9 @@ class InputReader:
         return None if values is None else values[self._position]
 
     @property
-    def timestamp(self) -> float:
-        """Steady time of arrival of its TPDO in [s]."""
-        return self._source.timestamp
-
-    def stale(self, now: float) -> bool:
-        """Tell whether its TPDO has stopped at a steady time in [s]."""
-        return self._source.stale(now)
+    def source(self) -> Source:
+        """Its TPDO."""
+        return self._source
 
 
 class OutputWriter:
