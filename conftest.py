@@ -17,6 +17,8 @@ from hypothesis import settings
 from isolation import Isolation, reserve
 import pytest
 
+from dds_network import restrict_dds
+
 for _marker in Path(__file__).parent.glob('*/resource/*'):
     if (_marker.parents[1] / _marker.name / '__init__.py').is_file():
         importlib.import_module(_marker.name)
@@ -24,6 +26,8 @@ for _marker in Path(__file__).parent.glob('*/resource/*'):
 # A shell starts background jobs of a script with SIGINT ignored, which children inherit. Programs
 # that need a handler set it (tests start them with SIGINT ignored); those of the tests need none.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+restrict_dds(os.environ)  # of this process; those that it starts inherit it
 
 # how long an example takes says more about the machine than about the code
 settings.register_profile('workspace', deadline=None)

@@ -24,7 +24,14 @@ if [ -f "$_workspace_root/.venv/.workspace.json" ]; then
   if [ -f "$_workspace_root/install/local_setup.$_workspace_shell" ]; then
     _workspace_source "$_workspace_root/install/local_setup.$_workspace_shell"
   fi
-  _workspace_status=0
+  # DDS stays on this host, or is opened as DDS_NETWORK says (dds_network/README.md)
+  _workspace_dds=$("$_workspace_root/.venv/bin/python" -I -S -c '
+import sys
+sys.path.insert(0, sys.argv[1])
+from dds_network.shell import main
+sys.exit(main())' "$_workspace_root/dds_network") && _workspace_status=0 || _workspace_status=1
+  eval "$_workspace_dds"
+  unset _workspace_dds
 else
   echo "env.sh: there is no finished environment yet; run: make -C $_workspace_root build" >&2
   _workspace_status=1

@@ -11,6 +11,8 @@ import itertools
 import os
 import socket
 
+from dds_network import restrict_dds
+
 DOMAINS = 100  # above, DDS ports run into the ephemeral ones
 RESERVATIONS = 24500  # a TCP port for each domain; who holds it has the domain
 
@@ -40,11 +42,9 @@ class Isolation:
     @property
     def env(self) -> dict[str, str]:
         """Environment for the test's processes."""
-        return os.environ | {
-            'ROS_DOMAIN_ID': str(self.domain_id),
-            'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
-            'PYTHONUNBUFFERED': '1',
-        }
+        env = os.environ | {'ROS_DOMAIN_ID': str(self.domain_id), 'PYTHONUNBUFFERED': '1'}
+        restrict_dds(env)
+        return env
 
 
 @contextmanager

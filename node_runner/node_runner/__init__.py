@@ -4,6 +4,7 @@
 
 from .construction import destroyed_if_refused, destroyed_when_refused
 from .exceptions import ParameterError
+from .joining import init_ros
 from .log_bridge import log_as, RosLogBridge
 from .misspelt import refuse_misspelt, refuse_similar
 from .parameter_reader import ParameterReader
@@ -18,6 +19,7 @@ __all__ = [
     'RosLogBridge',
     'destroyed_if_refused',
     'destroyed_when_refused',
+    'init_ros',
     'log_as',
     'make_executor',
     'refuse_misspelt',

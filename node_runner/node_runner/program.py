@@ -7,14 +7,15 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 import threading
 
-import rclpy
 from rclpy.exceptions import NameValidationException, ParameterException
 from rclpy.logging import get_logger
 from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import try_shutdown
 
+from dds_network import NETWORK_VARIABLE, NetworkChoiceError
+
 from .exceptions import ParameterError
+from .joining import init_ros
 from .log_bridge import log_as, RosLogBridge
 from .signals import stop_on_signals
 from .spinning import spin
@@ -51,10 +52,10 @@ def run_program(
     """
     stop = stop_on_signals(patient=patient)
     try:
-        rclpy.init(
-            args=None if args is None else list(args),
-            signal_handler_options=SignalHandlerOptions.NO,
-        )
+        init_ros(args)
+    except NetworkChoiceError as error:
+        get_logger(name).fatal(f'{NETWORK_VARIABLE}: {error}')
+        return REFUSED
     except RuntimeError as error:  # rcl has no finer class for all of them
         get_logger(name).fatal(f'ROS does not take these arguments: {error}')
         return REFUSED

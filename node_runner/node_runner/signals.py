@@ -18,7 +18,7 @@ def stop_on_signals(*, patient: bool = False) -> threading.Event:
     (``ros2 launch``, say) sends one when the first signal seems to do nothing, while a robot comes
     to rest. A SIGHUP that is ignored already stays so, as ``nohup`` wants it.
 
-    Initialise rclpy with ``SignalHandlerOptions.NO``; :func:`.run_program` does both.
+    Initialise rclpy by :func:`.init_ros`; :func:`.run_program` does both.
 
     Args:
         patient: Not even a second SIGINT ends the process at once; for programs that have to leave

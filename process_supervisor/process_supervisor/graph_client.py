@@ -10,11 +10,11 @@ from __future__ import annotations
 from collections.abc import Callable
 import time
 
-import rclpy
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
+
+from node_runner import init_ros
 
 from .exceptions import CallError, GivenUpError
 
@@ -29,17 +29,20 @@ class GraphClient:
         node: The node, for what is published, heard and called.
     """
 
-    def __init__(self, name: str, given_up: Callable[[], bool]) -> None:
+    def __init__(self, name: str, given_up: Callable[[], bool], namespace: str = '') -> None:
         """Join the ROS graph.
 
         Args:
             name: Name of the node.
             given_up: True when nothing shall be waited for any more.
+            namespace: Its namespace; relative names are meant in it.
         """
         self._given_up = given_up
         self._context = Context()
-        rclpy.init(context=self._context, signal_handler_options=SignalHandlerOptions.NO)
-        self.node = Node(name, context=self._context, enable_rosout=False)
+        init_ros(context=self._context)
+        self.node = Node(
+            name, context=self._context, namespace=namespace or None, enable_rosout=False
+        )
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
 

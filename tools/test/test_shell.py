@@ -3,6 +3,7 @@
 from pathlib import Path
 import shutil
 import subprocess
+import sys
 
 import pytest
 
@@ -20,6 +21,8 @@ def checkout(tmp_path: Path) -> Path:
     venv = root / '.venv'
     (venv / 'bin').mkdir(parents=True)
     shutil.copy(this_checkout().root / 'env.sh', root)
+    shutil.copytree(this_checkout().root / 'dds_network', root / 'dds_network')
+    (venv / 'bin' / 'python').symlink_to(sys.executable)
     wheels = Underlay(UnderlayKind.WHEELS, venv)
     write_setup_scripts(venv, wheels, [venv / 'lib', venv / 'more.libs'])
     (venv / '.workspace.json').write_text('{}')
@@ -66,11 +69,30 @@ def test_env_sh_from_any_folder_twice(
 
 
 def test_discovery_stays_on_this_host_unless_asked(checkout: Path) -> None:
-    """The default is LOCALHOST; a person's own value is kept."""
-    script = '. ./env.sh; echo $ROS_AUTOMATIC_DISCOVERY_RANGE'
-    assert shell('bash', script, checkout).stdout.strip() == 'LOCALHOST'
-    asked = shell('bash', script, checkout, ROS_AUTOMATIC_DISCOVERY_RANGE='SUBNET')
-    assert asked.stdout.strip() == 'SUBNET'
+    """Whatever ROS's own variables ask for, the profile with loopback alone is named."""
+    for asked in (
+        {},
+        {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SUBNET'},
+        {'ROS_STATIC_PEERS': '10.0.0.1'},
+        {'DDS_NETWORK': 'localhost'},
+    ):
+        done = shell('bash', '. ./env.sh; env', checkout, **asked)
+        assert done.returncode == 0
+        found = variables(done.stdout)
+        closed = checkout / 'dds_network' / 'dds_network' / 'dds_network_localhost.xml'
+        assert found['FASTRTPS_DEFAULT_PROFILES_FILE'] == str(closed)
+        assert found['ROS_AUTOMATIC_DISCOVERY_RANGE'] == 'SYSTEM_DEFAULT'
+        # what does not open anything is told
+        assert bool(done.stderr) == any('ROS_' in name for name in asked)
+
+
+def test_an_interface_that_is_not_there_keeps_the_shell_closed(checkout: Path) -> None:
+    """The status of `source` tells it, and nothing is open."""
+    script = '. ./env.sh; echo "status $?"; env'
+    done = shell('bash', script, checkout, DDS_NETWORK='no.such.interface.invalid')
+    assert 'status 1' in done.stdout
+    assert 'dds_network_localhost' in variables(done.stdout)['FASTRTPS_DEFAULT_PROFILES_FILE']
+    assert 'DDS_NETWORK' in done.stderr
 
 
 def test_a_ros_that_was_sourced_before_is_left(checkout: Path) -> None:

@@ -18,6 +18,8 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
+from node_runner import init_ros
+
 from ..estimation import SCALES
 from ..exceptions import NoAnswerError
 from .console import ask_number, Console
@@ -61,7 +63,7 @@ class Walker:
     def __init__(self) -> None:
         """Join ROS; use it in a with statement."""
         self._context = Context()
-        rclpy.init(context=self._context)
+        init_ros(context=self._context)
         self._node = Node('quad_calibrate', context=self._context, enable_rosout=False)
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)

@@ -16,10 +16,10 @@ from .tree import links_without_place
 NODES = ('hardware_node', 'controller_node', 'robot_state_publisher')
 RATE, RATE_SHARE = 50.0, 0.9  # [Hz], and the share of it that is still well
 _SOURCES = {
-    '/joint_states': 'hardware_node',
-    '/imu': 'hardware_node',
-    '/odom': 'hardware_node',
-    '/joint_command': 'controller_node',
+    'joint_states': 'hardware_node',
+    'imu': 'hardware_node',
+    'odom': 'hardware_node',
+    'joint_command': 'controller_node',
 }
 
 
@@ -91,7 +91,7 @@ def _check_rate(seen: Observation, topic: str) -> Iterator[Finding]:
         yield warning(topic, f'{rate:.1f} Hz instead of {RATE:.0f}', remedy)
     elif source not in seen.nodes:
         yield note(topic, f'silent, for {source} is not running')
-    elif topic == '/joint_command':
+    elif topic == 'joint_command':
         yield note(
             topic, 'silent', "ros2 service call /set_mode quad_msgs/srv/SetMode '{mode: stand}'"
         )
@@ -102,12 +102,12 @@ def _check_rate(seen: Observation, topic: str) -> Iterator[Finding]:
 def _check_joints(seen: Observation) -> Iterator[Finding]:
     if not seen.urdf:
         remedy = 'run robot_state_publisher, which publishes it'
-        yield warning('/robot_description', 'nobody publishes it', remedy)
+        yield warning('robot_description', 'nobody publishes it', remedy)
         return
     try:
         wanted = [joint.name for joint in movable_joints(seen.urdf)]
     except DescriptionError as problem:
-        yield error('/robot_description', str(problem), 'mend the URDF')
+        yield error('robot_description', str(problem), 'mend the URDF')
         return
     if not seen.joints:
         return

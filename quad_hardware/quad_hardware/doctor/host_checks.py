@@ -7,11 +7,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 import importlib.util
 
+from dds_network import describe_dds, is_this_host, NETWORK_VARIABLE, NetworkChoiceError
+
 from ..link.vendor_library import is_installed
 from .finding import error, Finding, good, note, warning
 
 LEAST_MEMORY = 300e6  # [B] below that, processes are soon ended
-_LOCAL = 'LOCALHOST'
 
 
 def check_environment(environment: Mapping[str, str]) -> Iterator[Finding]:
@@ -27,20 +28,26 @@ def check_environment(environment: Mapping[str, str]) -> Iterator[Finding]:
             'environment', f'ROS {environment.get("ROS_DISTRO", "of unknown distribution")}'
         )
     domain = environment.get('ROS_DOMAIN_ID', '0')
-    reach = environment.get('ROS_AUTOMATIC_DISCOVERY_RANGE', 'SUBNET')
-    if environment.get('ROS_LOCALHOST_ONLY') == '1':
-        reach = _LOCAL
     if not domain.isdigit() or not 0 <= int(domain) <= 232:
         yield error('domain', f'ROS_DOMAIN_ID is {domain!r}', 'export ROS_DOMAIN_ID=0')
-    elif reach == _LOCAL:
-        yield note(
+    else:
+        yield _reach(domain, environment)
+
+
+def _reach(domain: str, environment: Mapping[str, str]) -> Finding:
+    try:
+        this_host, reach = is_this_host(environment), describe_dds(environment)
+    except NetworkChoiceError as problem:
+        remedy = f'export {NETWORK_VARIABLE} with an interface or a peer that exists'
+        return error('domain', f'{NETWORK_VARIABLE}: {problem}', remedy)
+    if this_host:
+        return note(
             'domain',
             f'{domain}, on this machine only',
-            'to reach other machines: export ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET, and the same '
+            f'to reach other machines: export {NETWORK_VARIABLE}=INTERFACE, and the same '
             'ROS_DOMAIN_ID on each',
         )
-    else:
-        yield good('domain', f'{domain}, reaching {reach.lower()}; it must be the same everywhere')
+    return good('domain', f'{domain}, the same everywhere; {reach}')
 
 
 def check_memory(meminfo: str) -> Iterator[Finding]:

@@ -18,6 +18,7 @@ from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import String
 from tf2_msgs.msg import TFMessage
 
+from node_runner import init_ros
 from quad_msgs.msg import JointCommand
 
 from .graph_checks import NODES, Observation
@@ -25,10 +26,10 @@ from .graph_checks import NODES, Observation
 SETTLING = 1.0  # [s] until topics are connected
 DISCOVERY = 5.0  # [s] until the others are found, if they are there at all
 _KINDS = {
-    '/joint_states': JointState,
-    '/imu': Imu,
-    '/odom': Odometry,
-    '/joint_command': JointCommand,
+    'joint_states': JointState,
+    'imu': Imu,
+    'odom': Odometry,
+    'joint_command': JointCommand,
 }
 _LATCHED = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
@@ -40,7 +41,7 @@ def observe(duration: float) -> Observation:
         duration: How long [s].
     """
     context = Context()
-    rclpy.init(context=context)
+    init_ros(context=context)
     node = Node('quad_doctor', context=context, enable_rosout=False)
     executor = SingleThreadedExecutor(context=context)
     executor.add_node(node)
@@ -88,10 +89,10 @@ def _subscribe(node: Node, seen: Observation) -> None:
         bad = (s for s in message.status if s.level != DiagnosticStatus.OK)
         seen.diagnostics = [*kept, *((s.level[0], f'{s.name} ({s.message})') for s in bad)]
 
-    node.create_subscription(String, '/robot_description', description, _LATCHED)
+    node.create_subscription(String, 'robot_description', description, _LATCHED)
     node.create_subscription(TFMessage, '/tf', transforms, 100)
     node.create_subscription(TFMessage, '/tf_static', transforms, _LATCHED)
-    node.create_subscription(DiagnosticArray, '/diagnostics', diagnostics, 10)
+    node.create_subscription(DiagnosticArray, 'diagnostics', diagnostics, 10)
 
 
 def _count(seen: Observation, topic: str) -> Callable[[object], None]:

@@ -13,14 +13,12 @@ import threading
 
 from geometry_msgs.msg import Vector3
 from nav_msgs.msg import Odometry
-import rclpy
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import ok, try_shutdown
 from std_srvs.srv import Trigger
 
-from node_runner import make_executor
+from node_runner import init_ros, make_executor
 from quad_msgs.srv import InjectFault, Push
 
 from .board import POSE_TIME
@@ -140,7 +138,7 @@ def serve_with_ros(
         SimulationError: What ended the robot.
     """
     # the caller has signal handlers that end the server
-    rclpy.init(args=list(ros_arguments), signal_handler_options=SignalHandlerOptions.NO)
+    init_ros(ros_arguments)
     ended: list[BaseException] = []
     thread = threading.Thread(target=_live, args=(server, ended), name='fake_xgo')
     executor = make_executor()

@@ -34,6 +34,5 @@ def zoo_env() -> Iterator[Mapping[str, str]]:
 @pytest.fixture
 def zoo(zoo_env: Mapping[str, str], monkeypatch: pytest.MonkeyPatch) -> Mapping[str, str]:
     """Put this process into the domain of the zoo."""
-    for name in ('ROS_DOMAIN_ID', 'ROS_AUTOMATIC_DISCOVERY_RANGE'):
-        monkeypatch.setenv(name, zoo_env[name])
+    monkeypatch.setenv('ROS_DOMAIN_ID', zoo_env['ROS_DOMAIN_ID'])
     return zoo_env

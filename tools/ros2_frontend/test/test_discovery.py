@@ -119,11 +119,10 @@ def test_what_appears_late_is_found(count: dict[str, int]) -> None:
 
 def test_patience_follows_the_user_and_the_reach(monkeypatch: pytest.MonkeyPatch) -> None:
     """`--spin-time` is the limit; for a name it is also how long nothing may happen."""
-    monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
-    monkeypatch.delenv('ROS_STATIC_PEERS', raising=False)
+    monkeypatch.setattr('ros2_frontend.ros.discovery.is_this_host', lambda environ: True)
     near = Patience.for_lists(None)
     assert Patience.for_lists(2.0).limit == 2.0
     assert Patience.for_names(2.0) == Patience(2.0, 2.0)
     assert Patience.for_names(None).quiet < Patience.for_names(None).limit
-    monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'SUBNET')
+    monkeypatch.setattr('ros2_frontend.ros.discovery.is_this_host', lambda environ: False)
     assert Patience.for_lists(None).quiet > near.quiet

@@ -10,14 +10,8 @@ import struct
 
 from hypothesis import given
 from hypothesis import strategies as st
-import pytest
 
-from ros2_frontend.ros.participants import (
-    DiscoveryPorts,
-    parse_ports,
-    reach_is_this_host,
-    read_ports,
-)
+from ros2_frontend.ros.participants import DiscoveryPorts, parse_ports, read_ports
 from ros2_frontend.ros.spdp import Inquiry, PaperParticipant
 
 HEAD = (
@@ -56,25 +50,6 @@ def test_own_sockets_are_told_from_others() -> None:
                 continue
             break
         assert bound.getsockname()[1] in read_ports(domain).own
-
-
-@pytest.mark.parametrize(
-    ('environ', 'expected'),
-    [
-        ({}, False),
-        ({'ROS_AUTOMATIC_DISCOVERY_RANGE': 'localhost'}, True),
-        ({'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SUBNET'}, False),
-        ({'ROS_LOCALHOST_ONLY': '1'}, True),
-        ({'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST', 'ROS_STATIC_PEERS': '10.0.0.1'}, False),
-    ],
-)
-def test_reach(environ: dict[str, str], expected: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The count is complete only when nobody outside this host can take part."""
-    for name in ('ROS_AUTOMATIC_DISCOVERY_RANGE', 'ROS_LOCALHOST_ONLY', 'ROS_STATIC_PEERS'):
-        monkeypatch.delenv(name, raising=False)
-    for name, value in environ.items():
-        monkeypatch.setenv(name, value)
-    assert reach_is_this_host() is expected
 
 
 def parameters(data: bytes) -> dict[int, bytes]:

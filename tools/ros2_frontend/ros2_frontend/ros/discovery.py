@@ -14,11 +14,13 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable
 from contextlib import closing
 from dataclasses import dataclass
+import os
 import time
 from typing import Protocol, TypeVar
 
 from ..aliases import Endpoint, NamesAndTypes
-from .participants import DiscoveryPorts, reach_is_this_host, read_ports
+from .dds import is_this_host
+from .participants import DiscoveryPorts, read_ports
 from .spdp import Inquiry
 
 T = TypeVar('T')
@@ -79,7 +81,7 @@ class Patience:
         Returns:
             The patience; never beyond what the user asked for.
         """
-        quiet = _QUIET_FOR_LISTS if reach_is_this_host() else _QUIET_FOR_NETWORK
+        quiet = _QUIET_FOR_LISTS if is_this_host(os.environ) else _QUIET_FOR_NETWORK
         return cls(_LIMIT if spin_time is None else spin_time, quiet)
 
     @classmethod

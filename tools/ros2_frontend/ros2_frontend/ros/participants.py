@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-import os
 from pathlib import Path
 
 # DDSI-RTPS 2.2, 9.6.1.4: PB, DG, PG and d1
@@ -95,12 +94,3 @@ def _own_sockets() -> frozenset[str]:
         if target.startswith('socket:['):
             found.add(target[len('socket:[') : -1])
     return frozenset(found)
-
-
-def reach_is_this_host() -> bool:
-    """Whether discovery is limited to this host, so that no participant is outside the count."""
-    if os.environ.get('ROS_STATIC_PEERS'):
-        return False
-    if os.environ.get('ROS_LOCALHOST_ONLY') == '1':
-        return True
-    return os.environ.get('ROS_AUTOMATIC_DISCOVERY_RANGE', '').upper() == 'LOCALHOST'

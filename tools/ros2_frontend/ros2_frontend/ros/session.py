@@ -19,6 +19,7 @@ import time
 from ..aliases import Handle, Node
 from ..cli.errors import FrontendError
 from ..cli.interrupts import deferred_interrupts
+from .dds import restrict
 
 NODE_PREFIX = '_ros2cli'  # a leading underscore hides a node from `ros2 node list`
 
@@ -93,9 +94,10 @@ def open_session(args: Namespace, node_name: str | None = None) -> Iterator[Sess
     from rclpy.signals import SignalHandlerOptions
     from rclpy.validate_node_name import validate_node_name
 
+    restrict(os.environ)
     context = Context()
     # no log file per command
-    rclpy.init(
+    rclpy.init(  # noqa: TID251  # restricted above
         args=['--ros-args', '--disable-external-lib-logs'],
         context=context,
         signal_handler_options=SignalHandlerOptions.NO,

@@ -1,0 +1,37 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Which network interfaces DDS uses: loopback, and those that a person names.
+
+DDS of Fast DDS has no authentication: whoever reaches its sockets can call every service. So a
+process of this workspace opens UDP sockets on the loopback interface only, unless the variable
+``DDS_NETWORK``, or the option ``--network`` of a bring-up, names interfaces or peers.
+
+    from dds_network import restrict_dds
+
+    restrict_dds(os.environ)  # before rclpy.init, or before processes are started
+"""
+
+from .environment import (
+    describe_dds,
+    is_this_host,
+    NETWORK_VARIABLE,
+    open_dds,
+    PROFILE_VARIABLE,
+    restrict_dds,
+    selected_reach,
+)
+from .exceptions import NetworkChoiceError
+from .reach import Interface, Reach
+
+__all__ = [
+    'NETWORK_VARIABLE',
+    'PROFILE_VARIABLE',
+    'Interface',
+    'NetworkChoiceError',
+    'Reach',
+    'describe_dds',
+    'is_this_host',
+    'open_dds',
+    'restrict_dds',
+    'selected_reach',
+]

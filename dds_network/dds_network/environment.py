@@ -1,0 +1,124 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The environment variables by which Fast DDS and rmw learn what to use."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, MutableMapping
+
+from .host import read_interfaces
+from .profile import is_own_profile, profile_file
+from .reach import Reach, resolve_reach
+
+NETWORK_VARIABLE = 'DDS_NETWORK'
+"""Interfaces and peers that a person opens DDS to; empty or unset for none."""
+PROFILE_VARIABLE = 'FASTRTPS_DEFAULT_PROFILES_FILE'
+"""File that Fast DDS 2 reads its default profile from."""
+RANGE_VARIABLE = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
+PEERS_VARIABLE = 'ROS_STATIC_PEERS'
+LOCALHOST_ONLY_VARIABLE = 'ROS_LOCALHOST_ONLY'
+_TRANSPORTS_VARIABLE = 'FASTDDS_BUILTIN_TRANSPORTS'
+_RMW_VARIABLE = 'RMW_IMPLEMENTATION'
+_FAST_DDS = 'rmw_fastrtps'
+_OFF = 'OFF'
+# rmw leaves the transports and peers of the profile as they are. With LOCALHOST it adds a UDP
+# transport of its own, which uses every interface.
+_PROFILE_DECIDES = 'SYSTEM_DEFAULT'
+
+
+def has_own_transports(environ: Mapping[str, str]) -> bool:
+    """Whether a person configures the transports: by a profile of his own, or another rmw."""
+    profile = environ.get(PROFILE_VARIABLE, '')
+    other_rmw = not environ.get(_RMW_VARIABLE, _FAST_DDS).startswith(_FAST_DDS)
+    return other_rmw or bool(profile and not is_own_profile(profile))
+
+
+def selected_reach(environ: Mapping[str, str]) -> Reach:
+    """Return what a person has opened.
+
+    Raises:
+        NetworkChoiceError: He names what does not exist.
+    """
+    text = environ.get(NETWORK_VARIABLE, '')
+    return resolve_reach(text, read_interfaces()) if text.strip() else Reach()
+
+
+def dds_variables(environ: Mapping[str, str], reach: Reach) -> dict[str, str]:
+    """Return the variables that keep DDS to a reach.
+
+    Args:
+        environ: The environment as it is; transports that a person configured are left alone.
+        reach: What DDS may use.
+
+    Raises:
+        NetworkChoiceError: The profile cannot be written.
+    """
+    if has_own_transports(environ):
+        return {}
+    shared_memory = environ.get(_TRANSPORTS_VARIABLE) != 'UDPv4'
+    profile = profile_file(reach, shared_memory=shared_memory)
+    variables = {PROFILE_VARIABLE: str(profile)}
+    if environ.get(RANGE_VARIABLE) != _OFF:
+        variables[RANGE_VARIABLE] = _PROFILE_DECIDES
+    if environ.get(LOCALHOST_ONLY_VARIABLE) == '1':
+        variables[LOCALHOST_ONLY_VARIABLE] = '0'  # it means LOCALHOST
+    return variables
+
+
+def restrict_dds(environ: MutableMapping[str, str]) -> Reach:
+    """Keep DDS of this process and of those that it starts to what a person has opened.
+
+    Call it before rclpy.init: Fast DDS reads its profile once.
+
+    Args:
+        environ: ``os.environ``, or the environment of a process to start; it is changed.
+
+    Returns:
+        What is open.
+
+    Raises:
+        NetworkChoiceError: ``DDS_NETWORK`` names what does not exist.
+    """
+    reach = selected_reach(environ)
+    environ.update(dds_variables(environ, reach))
+    return reach
+
+
+def open_dds(environ: MutableMapping[str, str], names: str | None) -> str:
+    """Do the same for a program with the option ``--network``, which goes before the variable.
+
+    Args:
+        environ: As of :func:`restrict_dds`.
+        names: Argument of the option; None without it.
+
+    Returns:
+        What is open, for people.
+
+    Raises:
+        NetworkChoiceError: They do not exist.
+    """
+    if names is not None:
+        environ[NETWORK_VARIABLE] = names
+    restrict_dds(environ)
+    return describe_dds(environ)
+
+
+def describe_dds(environ: Mapping[str, str]) -> str:
+    """Return what DDS is open to, for people.
+
+    Raises:
+        NetworkChoiceError: ``DDS_NETWORK`` names what does not exist.
+    """
+    if has_own_transports(environ):
+        decider = environ.get(PROFILE_VARIABLE) or environ.get(_RMW_VARIABLE)
+        return f'{decider} decides which networks DDS uses; it may be open to all of them'
+    return selected_reach(environ).describe()
+
+
+def is_this_host(environ: Mapping[str, str]) -> bool:
+    """Whether DDS of a process with this environment reaches nothing but this host.
+
+    Raises:
+        NetworkChoiceError: ``DDS_NETWORK`` names what does not exist.
+    """
+    return not has_own_transports(environ) and selected_reach(environ).is_this_host

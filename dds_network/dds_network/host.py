@@ -1,0 +1,52 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The network interfaces of this host, as the kernel reports them."""
+
+from __future__ import annotations
+
+import errno
+import fcntl
+import socket
+import struct
+
+_SIOCGIFADDR = 0x8915  # linux/sockios.h: the first IPv4 address of an interface
+_IFREQ_SIZE = 40  # [byte] struct ifreq
+_NAME_SIZE = 16  # [byte] IFNAMSIZ
+_ANY_PORT = 7400  # connecting a UDP socket sends nothing; the port does not matter
+
+
+def read_interfaces() -> dict[str, str]:
+    """Return the IPv4 address of each interface that has one, by its name."""
+    found = {}
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        for _, name in socket.if_nameindex():
+            request = name.encode()[: _NAME_SIZE - 1].ljust(_IFREQ_SIZE, b'\0')
+            try:
+                answer = fcntl.ioctl(probe, _SIOCGIFADDR, request)
+            except OSError as error:
+                if error.errno not in {errno.EADDRNOTAVAIL, errno.ENODEV}:
+                    raise
+                continue
+            # struct sockaddr_in behind the name: family, port, address
+            found[name] = socket.inet_ntoa(struct.unpack_from('4s', answer, _NAME_SIZE + 4)[0])
+    return found
+
+
+def resolve_host(name: str) -> str:
+    """Return the IPv4 address of a host.
+
+    Raises:
+        OSError: Nobody knows it.
+    """
+    return socket.gethostbyname(name)
+
+
+def source_address(peer: str) -> str:
+    """Return the address of this host from which packets to a peer leave.
+
+    Raises:
+        OSError: No route leads there.
+    """
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.connect((peer, _ANY_PORT))
+        return str(probe.getsockname()[0])

@@ -1,0 +1,93 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The profile that Fast DDS reads: its transports, their interfaces, its first peers."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from pathlib import Path
+import stat
+import tempfile
+import xml.etree.ElementTree as ET
+
+from .exceptions import NetworkChoiceError
+from .reach import Reach
+
+LOCALHOST_PROFILE = Path(__file__).with_name('dds_network_localhost.xml')
+"""The profile with loopback and shared memory alone; all others are made from it."""
+PREFIX = 'dds_network_'
+"""How the file of every profile of this package begins."""
+# RTPS 2.2, 9.6.1.4.1; naming peers takes the place of this default
+_DISCOVERY_GROUP = '239.255.0.1'
+_NAMESPACE = 'http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles'
+
+
+def is_own_profile(path: str) -> bool:
+    """Whether a profile is one of this package, in whatever checkout."""
+    return Path(path).name.startswith(PREFIX)
+
+
+def profile_file(reach: Reach, *, shared_memory: bool = True) -> Path:
+    """Return the file with a profile; it is written where it is not there.
+
+    Args:
+        reach: What DDS uses besides loopback.
+        shared_memory: False where processes do not share /dev/shm.
+
+    Raises:
+        NetworkChoiceError: It cannot be written.
+    """
+    if reach.is_this_host and shared_memory:
+        return LOCALHOST_PROFILE
+    text = profile_text(reach, shared_memory=shared_memory)
+    name = f'{PREFIX}{hashlib.sha256(text.encode()).hexdigest()[:16]}.xml'
+    folder = Path(tempfile.gettempdir()) / f'dds_network-{os.getuid()}'
+    try:
+        return _write(_private(folder) / name, text)
+    except OSError as error:
+        raise NetworkChoiceError(f'{folder}: {error.strerror or error}') from error
+
+
+def profile_text(reach: Reach, *, shared_memory: bool = True) -> str:
+    """Return a profile as XML; arguments as of :func:`profile_file`."""
+    ET.register_namespace('', _NAMESPACE)
+    root = ET.parse(LOCALHOST_PROFILE).getroot()  # noqa: S314  # our own file
+    allowed = _find(root, 'interfaceWhiteList')
+    for interface in reach.interfaces:
+        _add(allowed, 'address').text = interface.address
+    if reach.peers:
+        first = _add(_add(_find(root, 'rtps'), 'builtin'), 'initialPeersList')
+        for peer in (_DISCOVERY_GROUP, *reach.peers):
+            _add(_add(_add(first, 'locator'), 'udpv4'), 'address').text = peer
+    if not shared_memory:
+        transports = _find(root, 'userTransports')
+        transports.remove(transports[0])
+    return ET.tostring(root, encoding='unicode')
+
+
+def _find(root: ET.Element, tag: str) -> ET.Element:
+    return next(root.iter(f'{{{_NAMESPACE}}}{tag}'))
+
+
+def _add(parent: ET.Element, tag: str) -> ET.Element:
+    return ET.SubElement(parent, f'{{{_NAMESPACE}}}{tag}')
+
+
+def _private(folder: Path) -> Path:
+    """Make a folder that only this user writes to; another user may have made it before."""
+    folder.mkdir(mode=0o700, exist_ok=True)
+    found = folder.lstat()
+    if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.getuid():
+        raise NetworkChoiceError(f'{folder} belongs to another user; remove it or set TMPDIR')
+    folder.chmod(0o700)
+    return folder
+
+
+def _write(path: Path, text: str) -> Path:
+    if not path.exists():
+        descriptor, written = tempfile.mkstemp(dir=path.parent)
+        with os.fdopen(descriptor, 'w', encoding='utf-8') as file:
+            file.write(text)
+        Path(written).replace(path)
+    return path

@@ -1,0 +1,122 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""From what a person names to the interfaces and peers of DDS."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+import re
+
+from . import host
+from .exceptions import NetworkChoiceError
+
+_LOOPBACK = '127.'
+
+
+@dataclass(frozen=True, slots=True)
+class Interface:
+    """A network interface.
+
+    Attributes:
+        name: Its name, e.g. ``eth0``.
+        address: Its IPv4 address.
+    """
+
+    name: str
+    address: str
+
+
+@dataclass(frozen=True, slots=True)
+class Reach:
+    """What DDS uses besides loopback and shared memory.
+
+    Attributes:
+        interfaces: Interfaces on which its sockets receive.
+        peers: IPv4 addresses that it announces itself to, for networks without multicast.
+    """
+
+    interfaces: tuple[Interface, ...] = ()
+    peers: tuple[str, ...] = ()
+
+    @property
+    def is_this_host(self) -> bool:
+        """Whether nothing but loopback is used."""
+        return not self.interfaces
+
+    def describe(self) -> str:
+        """Return what is open, and what that means, for people."""
+        if self.is_this_host:
+            return 'DDS stays on this host'
+        names = ', '.join(f'{each.name} ({each.address})' for each in self.interfaces)
+        peers = f', announced to {", ".join(self.peers)}' if self.peers else ''
+        return (
+            f'DDS is open on {names}{peers}; it has no authentication: whoever reaches this '
+            'network can command the robot'
+        )
+
+
+def resolve_reach(
+    text: str,
+    interfaces: Mapping[str, str],
+    resolve_host: Callable[[str], str] = host.resolve_host,
+    source_address: Callable[[str], str] = host.source_address,
+) -> Reach:
+    """Find the interfaces and peers that a text names.
+
+    Args:
+        text: Names of interfaces, and addresses or names of peers, separated by commas or blanks;
+            empty or ``localhost`` for none.
+        interfaces: The IPv4 addresses of this host by the name of their interface.
+        resolve_host: Returns the IPv4 address of a host name.
+        source_address: Returns the address of this host that faces a peer.
+
+    Raises:
+        NetworkChoiceError: There is no such interface or host, or no route to it.
+    """
+    opened: dict[str, Interface] = {}
+    peers: dict[str, None] = {}
+    names = {address: name for name, address in interfaces.items()}
+    for word in filter(None, re.split(r'[,\s]+', text)):
+        address = interfaces.get(word)
+        if address is None:
+            address = _peer_address(word, interfaces, resolve_host)
+            if address not in names and not address.startswith(_LOOPBACK):
+                peers[address] = None
+                address = _facing(word, address, source_address)
+        if address.startswith(_LOOPBACK):
+            continue
+        name = names.get(address)
+        if name is None:
+            raise NetworkChoiceError(
+                f'packets to {word} leave from {address}, which is the address of no interface; '
+                f'name the interface instead: {_available(interfaces)}'
+            )
+        opened[name] = Interface(name, address)
+    return Reach(tuple(opened.values()), tuple(peers))
+
+
+def _peer_address(
+    word: str, interfaces: Mapping[str, str], resolve_host: Callable[[str], str]
+) -> str:
+    try:
+        return resolve_host(word)
+    except (OSError, UnicodeError) as error:
+        raise NetworkChoiceError(
+            f'{word!r} is neither an interface with an IPv4 address nor a known host; '
+            f'interfaces: {_available(interfaces)}'
+        ) from error
+
+
+def _facing(word: str, address: str, source_address: Callable[[str], str]) -> str:
+    try:
+        return source_address(address)
+    except OSError as error:
+        raise NetworkChoiceError(
+            f'no route leads to {word} ({address}): {error.strerror or error}'
+        ) from error
+
+
+def _available(interfaces: Mapping[str, str]) -> str:
+    outside = [name for name, address in interfaces.items() if not address.startswith(_LOOPBACK)]
+    return ', '.join(outside) or 'only loopback'

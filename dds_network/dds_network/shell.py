@@ -1,0 +1,73 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What env.sh evaluates: the variables of this package as commands of a shell."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+import os
+from shlex import quote
+import sys
+
+from .environment import (
+    dds_variables,
+    describe_dds,
+    has_own_transports,
+    LOCALHOST_ONLY_VARIABLE,
+    NETWORK_VARIABLE,
+    PEERS_VARIABLE,
+    RANGE_VARIABLE,
+    selected_reach,
+)
+from .exceptions import NetworkChoiceError
+from .reach import Reach
+
+_SUBNET = 'SUBNET'
+
+
+def notices(environ: Mapping[str, str], reach: Reach) -> Iterator[str]:
+    """Tell a person what is open, and which of his settings does not open anything.
+
+    Args:
+        environ: The environment before it is changed.
+        reach: What DDS may use.
+    """
+    if has_own_transports(environ) or not reach.is_this_host:
+        yield describe_dds(environ)
+        return
+    asked = [
+        f'{name}={environ[name]}'
+        for name, effective in (
+            (PEERS_VARIABLE, bool(environ.get(PEERS_VARIABLE))),
+            (RANGE_VARIABLE, environ.get(RANGE_VARIABLE, '').upper() == _SUBNET),
+        )
+        if effective and environ.get(LOCALHOST_ONLY_VARIABLE) != '1'
+    ]
+    if asked:
+        yield (
+            f'{" and ".join(asked)} has no effect, DDS stays on this host; to open it: '
+            f'export {NETWORK_VARIABLE}=INTERFACE or a peer, and source env.sh again'
+        )
+
+
+def main(environ: Mapping[str, str] = os.environ) -> int:
+    """Print the commands.
+
+    Returns:
+        0, or 1 when the choice is wrong; the commands then keep DDS on this host.
+    """
+    status = 0
+    try:
+        reach = selected_reach(environ)
+        lines = list(notices(environ, reach))
+    except NetworkChoiceError as error:
+        reach, lines, status = Reach(), [f'{NETWORK_VARIABLE}: {error}'], 1
+    for line in lines:
+        sys.stderr.write(f'env.sh: {line}\n')
+    for name, value in dds_variables(environ, reach).items():
+        sys.stdout.write(f'export {name}={quote(value)}\n')
+    return status
+
+
+if __name__ == '__main__':
+    sys.exit(main())

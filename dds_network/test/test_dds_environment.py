@@ -1,0 +1,101 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+
+from pathlib import Path
+import tempfile
+import xml.etree.ElementTree as ET
+
+import pytest
+
+from dds_network import (
+    Interface,
+    is_this_host,
+    NETWORK_VARIABLE,
+    NetworkChoiceError,
+    open_dds,
+    PROFILE_VARIABLE,
+    Reach,
+    restrict_dds,
+)
+from dds_network.profile import LOCALHOST_PROFILE, profile_file, profile_text
+
+OPEN = Reach((Interface('eth0', '10.0.0.5'),), ('10.0.0.9',))
+
+
+def texts(profile: str, tag: str) -> list[str]:
+    """Return the texts of all elements of a name."""
+    root = ET.fromstring(profile)  # noqa: S314  # our own
+    return [element.text or '' for element in root.iter() if element.tag.endswith(f'}}{tag}')]
+
+
+def children(profile: str, tag: str) -> list[str]:
+    """Return the texts of what the first element of a name holds."""
+    root = ET.fromstring(profile)  # noqa: S314  # our own
+    found = next(element for element in root.iter() if element.tag.endswith(f'}}{tag}'))
+    return [element.text or '' for element in found]
+
+
+def test_the_default_is_loopback_and_shared_memory() -> None:
+    """Nothing else, whatever ROS's own variables say; a file that is always there."""
+    environ = {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SUBNET', 'ROS_LOCALHOST_ONLY': '1'}
+    assert restrict_dds(environ) == Reach()
+    assert environ[PROFILE_VARIABLE] == str(LOCALHOST_PROFILE)
+    assert environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] == 'SYSTEM_DEFAULT'
+    assert environ['ROS_LOCALHOST_ONLY'] == '0'
+    profile = LOCALHOST_PROFILE.read_text(encoding='utf-8')
+    assert children(profile, 'interfaceWhiteList') == ['127.0.0.1']
+    assert texts(profile, 'type') == ['SHM', 'UDPv4']
+    assert texts(profile, 'useBuiltinTransports') == ['false']
+
+
+def test_an_open_profile_adds_interfaces_and_peers() -> None:
+    """Loopback stays, and discovery by multicast beside the peers."""
+    profile = profile_text(OPEN)
+    assert children(profile, 'interfaceWhiteList') == ['127.0.0.1', '10.0.0.5']
+    assert texts(profile, 'address')[-2:] == ['239.255.0.1', '10.0.0.9']
+    without = profile_text(OPEN, shared_memory=False)
+    assert children(without, 'userTransports') == ['udp']
+
+
+def test_profiles_are_written_for_this_user_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A folder that somebody else could have prepared is refused."""
+    monkeypatch.setattr(tempfile, 'tempdir', str(tmp_path))
+    file = profile_file(OPEN)
+    assert file == profile_file(OPEN)
+    assert file.read_text(encoding='utf-8') == profile_text(OPEN)
+    assert file.parent.stat().st_mode & 0o077 == 0
+    trap = tmp_path / 'elsewhere'
+    file.parent.rename(trap)
+    file.parent.symlink_to(trap)
+    with pytest.raises(NetworkChoiceError):
+        profile_file(OPEN)
+
+
+def test_the_option_goes_before_the_variable() -> None:
+    """Whatever a person names last counts; what does not exist is refused."""
+    environ = {NETWORK_VARIABLE: 'no.such.interface.invalid'}
+    with pytest.raises(NetworkChoiceError):
+        open_dds(environ, None)
+    open_dds(environ, 'localhost')
+    assert environ[PROFILE_VARIABLE] == str(LOCALHOST_PROFILE)
+    assert is_this_host(environ)
+
+
+@pytest.mark.parametrize(
+    'own', [{PROFILE_VARIABLE: '/home/me/dds.xml'}, {'RMW_IMPLEMENTATION': 'rmw_cyclonedds_cpp'}]
+)
+def test_transports_of_a_person_are_left_alone(own: dict[str, str]) -> None:
+    """He decides, and nobody claims that DDS stays on this host."""
+    environ = dict(own)
+    restrict_dds(environ)
+    assert environ == own
+    assert not is_this_host(environ)
+
+
+def test_discovery_that_is_off_stays_off() -> None:
+    """ROS_AUTOMATIC_DISCOVERY_RANGE=OFF is narrower than any profile."""
+    environ = {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'OFF'}
+    restrict_dds(environ)
+    assert environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] == 'OFF'

@@ -1,0 +1,33 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The one way into ROS for programs of this workspace."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import os
+
+import rclpy
+from rclpy.context import Context
+from rclpy.signals import SignalHandlerOptions
+
+from dds_network import restrict_dds
+
+
+def init_ros(args: Sequence[str] | None = None, context: Context | None = None) -> None:
+    """Initialise rclpy without its signal handlers, with DDS on the networks that are open.
+
+    Args:
+        args: Command line; None for the process's own.
+        context: What to initialise; None for the default one.
+
+    Raises:
+        NetworkChoiceError: ``DDS_NETWORK`` names what does not exist.
+        RuntimeError: ROS does not accept the arguments, or its environment variables.
+    """
+    restrict_dds(os.environ)
+    rclpy.init(  # noqa: TID251  # the one place
+        args=None if args is None else list(args),
+        context=context,
+        signal_handler_options=SignalHandlerOptions.NO,
+    )
