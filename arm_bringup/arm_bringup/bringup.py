@@ -13,11 +13,14 @@ import tempfile
 
 from process_supervisor import (
     find_executable,
+    parse_with_ros,
+    RosOptions,
     supervise,
     SupervisorError,
     USAGE_ERROR,
     write_parameters,
 )
+from process_supervisor.arguments import apply_network
 
 from .description import expand_xacro
 from .enabling import enabling
@@ -25,8 +28,10 @@ from .exceptions import BringupError, RobotError
 from .motion import choose_master, motion_files
 from .session import (
     add_arguments,
+    in_namespace_of_bus,
     locate,
     no_files,
+    read_drives,
     REAL_BUS,
     robots_epilog,
     session,
@@ -35,11 +40,14 @@ from .session import (
 from .stack import controller_process, MASTER
 
 
-def parse(argv: Sequence[str] | None) -> argparse.Namespace:
+def parse(argv: Sequence[str]) -> tuple[argparse.Namespace, RosOptions]:
     """Parse the command line.
 
     Args:
-        argv: Arguments without the program's name; None takes those of the process.
+        argv: Arguments without the program's name.
+
+    Returns:
+        What was asked for, and the options of all nodes.
     """
     parser = argparse.ArgumentParser(
         prog='ros2 run arm_bringup bringup',
@@ -73,7 +81,7 @@ def parse(argv: Sequence[str] | None) -> argparse.Namespace:
         help='trajectories and jogging only, for drives of another process: it hears '
         '/joint_states, and publishes set-points',
     )
-    return parser.parse_args(argv)
+    return parse_with_ros(parser, argv)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -85,32 +93,39 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns:
         0 after Ctrl-C or SIGTERM, 1 when a process failed, 2 when nothing was started.
     """
-    arguments = parse(argv)
+    arguments, ros = parse(sys.argv[1:] if argv is None else argv)
     try:
         if arguments.controller_only:
-            return _controllers(arguments)
-        return _arm(arguments)
+            return _controllers(arguments, ros)
+        return _arm(arguments, ros)
     except (BringupError, SupervisorError) as error:
         sys.stderr.write(f'{error}\n')
         return USAGE_ERROR
 
 
-def _arm(arguments: argparse.Namespace) -> int:
+def _arm(arguments: argparse.Namespace, ros: RosOptions) -> int:
     master, no_motion = MASTER, '--drives-only'
     if not arguments.drives_only:
         master, no_motion = choose_master(locate(arguments.robot), find_executable)
     files = no_files if no_motion else motion_files
-    with session(arguments, simulate=arguments.simulate, master=master, master_files=files) as arm:
+    with session(
+        arguments, ros, simulate=arguments.simulate, master=master, master_files=files
+    ) as arm:
         offered = f'no motion ({no_motion})' if no_motion else 'trajectories and jogging'
-        _say(f'{arm.robot.name} on CAN bus {arm.bus}: {offered}')
+        place = f' in namespace /{arm.ros.namespace}' if arm.ros.namespace else ''
+        _say(f'{arm.robot.name} on CAN bus {arm.bus}{place}: {offered}')
         with contextlib.ExitStack() as stack:
             if arguments.enable:
-                stack.enter_context(enabling(arm.drives, arm.mode_service, _say))
+                stack.enter_context(
+                    enabling(arm.drives, arm.mode_service, _say, arm.ros.namespace)
+                )
             return supervise(arm.processes).exit_code
 
 
-def _controllers(arguments: argparse.Namespace) -> int:
+def _controllers(arguments: argparse.Namespace, ros: RosOptions) -> int:
+    apply_network(arguments)
     robot = locate(arguments.robot)
+    ros = in_namespace_of_bus(ros, read_drives(robot))
     if not robot.movable:
         raise RobotError(
             f'{robot.name} lacks {robot.semantic.name} and {robot.limits.name}: '
@@ -119,9 +134,9 @@ def _controllers(arguments: argparse.Namespace) -> int:
     with tempfile.TemporaryDirectory(prefix='arm_bringup-') as folder:
         parameters = Path(folder) / 'robot_description.yaml'
         write_parameters(parameters, expand_xacro(robot.description))
-        files = motion_files(robot, Path(folder))
+        files = motion_files(robot, Path(folder), ros)
         _say(f'{robot.name}: trajectories and jogging for drives of another process')
-        process = controller_process(files, parameters, arguments.timeout, find_executable)
+        process = controller_process(files, parameters, arguments.timeout, find_executable, ros)
         return supervise([process]).exit_code
 
 

@@ -21,7 +21,7 @@ AGAIN = 1.0
 
 @contextlib.contextmanager
 def enabling(
-    drives: Sequence[str], mode_service: str, say: Callable[[str], None]
+    drives: Sequence[str], mode_service: str, say: Callable[[str], None], namespace: str = ''
 ) -> Iterator[None]:
     """Enable drives beside what runs in the block.
 
@@ -29,10 +29,11 @@ def enabling(
         drives: Their names.
         mode_service: Service of each that selects the mode of streams.
         say: Takes a line that says how it went, from any thread.
+        namespace: Theirs.
     """
     ended = threading.Event()
     thread = threading.Thread(
-        target=_enable, args=[drives, mode_service, say, ended], name='enabling'
+        target=_enable, args=[drives, mode_service, say, ended, namespace], name='enabling'
     )
     thread.start()
     try:
@@ -43,12 +44,16 @@ def enabling(
 
 
 def _enable(
-    drives: Sequence[str], mode_service: str, say: Callable[[str], None], ended: threading.Event
+    drives: Sequence[str],
+    mode_service: str,
+    say: Callable[[str], None],
+    ended: threading.Event,
+    namespace: str,
 ) -> None:
     from .demo.client import ArmClient
 
-    client = ArmClient(ended.is_set)
-    init, mode = ([f'/{drive}/{name}' for drive in drives] for name in ('init', mode_service))
+    client = ArmClient(ended.is_set, namespace)
+    init, mode = ([f'{drive}/{name}' for drive in drives] for name in ('init', mode_service))
     deadline = time.monotonic() + PATIENCE
     try:
         client.prepare([*init, *mode])

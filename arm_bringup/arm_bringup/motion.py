@@ -15,7 +15,7 @@ from xml.etree import ElementTree as ET
 
 import yaml
 
-from process_supervisor import Executable, FindExecutable
+from process_supervisor import Executable, FindExecutable, namespaced_parameters, RosOptions
 
 from .exceptions import RobotError
 from .robots import Robot
@@ -24,12 +24,13 @@ from .stack import MASTER, MOTION_MASTER
 MAKE_MOVE = 'build arm_servo (make build) for trajectories and jogging'
 
 
-def motion_files(robot: Robot, folder: Path) -> Sequence[Path]:
+def motion_files(robot: Robot, folder: Path, ros: RosOptions) -> Sequence[Path]:
     """Write the parameter file for the nodes of arm_servo.
 
     Args:
         robot: A robot with an SRDF and limits.
         folder: Where to.
+        ros: Options of all nodes.
 
     Returns:
         The files to hand over.
@@ -38,9 +39,20 @@ def motion_files(robot: Robot, folder: Path) -> Sequence[Path]:
         'robot_description_semantic': robot.semantic.read_text(encoding='utf-8'),
         'joint_limits': str(robot.limits),
     }
+    moveit_servo = {'frame_prefix': ros.frame_prefix}
     path = folder / 'motion.yaml'  # JSON is YAML, whatever characters are in it
-    path.write_text(json.dumps({'/**': {'ros__parameters': values}}), encoding='utf-8')
-    return [path, robot.controllers] if robot.controllers.is_file() else [path]
+    path.write_text(
+        json.dumps(
+            {
+                '/**': {'ros__parameters': values},
+                '/**/servo_node': {'ros__parameters': {'moveit_servo': moveit_servo}},
+            }
+        ),
+        encoding='utf-8',
+    )
+    if not robot.controllers.is_file():
+        return [path]
+    return [path, namespaced_parameters(robot.controllers, ros, folder)]
 
 
 def controller_name(robot: Robot) -> str:

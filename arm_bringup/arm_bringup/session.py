@@ -14,14 +14,17 @@ import tempfile
 from typing import TYPE_CHECKING
 
 from process_supervisor import (
+    add_namespace,
     exclusive,
     Executable,
     find_executable,
     ProcessSpec,
     ros_domain,
+    RosOptions,
+    StartError,
     write_parameters,
 )
-from process_supervisor.arguments import add_timeout
+from process_supervisor.arguments import add_network, add_timeout, apply_network
 
 from .description import expand_xacro
 from .exceptions import RobotError
@@ -35,8 +38,10 @@ REAL_BUS = 'can0'
 """Bus without --can on hardware: never one on which only simulated drives could be."""
 SIMULATED_BUS = 'auto'
 """Bus without --can in simulation: vcan0 when it exists, else multicast on the loopback."""
-REMEDY = 'another bus with --can and another ROS_DOMAIN_ID'
-"""What a second bring-up is told to take."""
+BUS_REMEDY = 'another bus with --can'
+"""What a second bring-up on a bus is told to take."""
+NAMESPACE_REMEDY = 'another --namespace'
+"""What a second bring-up in a namespace is told to take."""
 INTERPOLATED_POSITION = 7
 """Mode of operation (CiA 402-2, 0x6060)."""
 
@@ -49,6 +54,7 @@ class Session:
         robot: The robot.
         bus: Name of its CAN bus, no longer ``auto``.
         drives: Names of its drives, in the order of bus.yml.
+        ros: Options of all nodes.
         mode_service: Service that selects the mode in which all of them follow a stream.
         urdf: Its description.
         processes: What is to be run.
@@ -57,6 +63,7 @@ class Session:
     robot: Robot
     bus: str
     drives: list[str]
+    ros: RosOptions
     mode_service: str
     urdf: str
     processes: list[ProcessSpec]
@@ -79,6 +86,8 @@ def add_arguments(parser: argparse.ArgumentParser, *, default_bus: str) -> None:
         help='CAN bus: can0, vcan0, udp_multicast[:239.x.y.z[:PORT]], auto, or an adapter of '
         f'python-can as INTERFACE:CHANNEL@BITRATE (default: {default_bus})',
     )
+    add_namespace(parser)
+    add_network(parser)
     add_timeout(parser)
 
 
@@ -125,6 +134,25 @@ def read_drives(robot: Robot) -> list[NodeConfig]:
     return drives
 
 
+def in_namespace_of_bus(ros: RosOptions, drives: Sequence[NodeConfig]) -> RosOptions:
+    """Take over the namespace of bus.yml, unless the command line has one: all nodes share it.
+
+    Args:
+        ros: Options of all nodes.
+        drives: The drives of the robot.
+
+    Raises:
+        RobotError: Its drives are in several.
+    """
+    named = {drive.namespace.strip('/') for drive in drives}
+    if len(named) > 1 and not ros.namespace:
+        raise RobotError(
+            f'bus.yml puts the drives into several namespaces ({", ".join(sorted(named))}); '
+            'choose one for all with --namespace'
+        )
+    return ros.within(next(iter(named)))
+
+
 def stream_mode_service(drives: Sequence[NodeConfig]) -> str:
     """Name the service for the mode of streams: what bus.yml asks for, else cyclic position.
 
@@ -136,30 +164,65 @@ def stream_mode_service(drives: Sequence[NodeConfig]) -> str:
     return 'cyclic_position_mode'
 
 
-def no_files(robot: Robot, folder: Path) -> Sequence[Path]:
+def no_files(robot: Robot, folder: Path, ros: RosOptions) -> Sequence[Path]:
     """Make no parameter files; for :func:`session`.
 
     Args:
         robot: The robot.
         folder: Where files would go.
+        ros: Options of all nodes.
     """
-    del robot, folder
+    del robot, folder, ros
     return ()
+
+
+@contextlib.contextmanager
+def own_bus(wanted: str | None, *, simulate: bool) -> Iterator[str]:
+    """Hold a bus, as long as the block runs.
+
+    Args:
+        wanted: What was asked for; None takes the usual one.
+        simulate: ``auto`` is a bus that no other bring-up has; else it is where the drives are.
+
+    Raises:
+        StartError: Another bring-up is on it.
+    """
+    from arm_canopen.can import AUTO, auto_names, resolve_name
+
+    wanted = wanted or (SIMULATED_BUS if simulate else REAL_BUS)
+    names = auto_names() if simulate and wanted == AUTO else iter([resolve_name(wanted)])
+    with contextlib.ExitStack() as stack:
+        yield _first_free(names, stack)
+
+
+def _first_free(names: Iterator[str], stack: contextlib.ExitStack) -> str:
+    """Hold the first bus that no other bring-up has; if all are taken, tell who has the first."""
+    name = next(names)
+    try:
+        stack.enter_context(exclusive(f'bus {name}', BUS_REMEDY))
+    except StartError as taken:
+        try:
+            return _first_free(names, stack)
+        except StopIteration:
+            raise taken from None
+    return name
 
 
 @contextlib.contextmanager
 def session(
     arguments: argparse.Namespace,
+    ros: RosOptions,
     *,
     simulate: bool,
     master: Executable,
     master_parameters: Mapping[str, str] | None = None,
-    master_files: Callable[[Robot, Path], Sequence[Path]] = no_files,
+    master_files: Callable[[Robot, Path, RosOptions], Sequence[Path]] = no_files,
 ) -> Iterator[Session]:
-    """Prepare a bring-up; the bus and the ROS domain are its own as long as the block runs.
+    """Prepare a bring-up; the bus and the namespace are its own as long as the block runs.
 
     Args:
         arguments: What :func:`add_arguments` parsed.
+        ros: Options of all nodes.
         simulate: With simulated slaves.
         master: What runs the bus.
         master_parameters: ROS parameters for it beside the usual ones.
@@ -168,18 +231,18 @@ def session(
     Raises:
         RobotError: The robot folder is unknown or incomplete.
         DescriptionError: Its xacro file cannot be expanded.
-        StartError: An executable is missing, or another bring-up is on this bus or domain.
+        StartError: An executable or a network is missing, or another bring-up is on this bus or
+            in this namespace of the domain.
     """
-    from arm_canopen.can import resolve_name
-
+    apply_network(arguments)
     robot = locate(arguments.robot)
     drives = read_drives(robot)
-    bus = resolve_name(arguments.can or (SIMULATED_BUS if simulate else REAL_BUS))
+    ros = in_namespace_of_bus(ros, drives)
     domain = ros_domain(os.environ)
-    locks = Path(tempfile.gettempdir())
     with contextlib.ExitStack() as stack:
-        stack.enter_context(exclusive(f'bus {bus}', locks, REMEDY))
-        stack.enter_context(exclusive(f'ROS domain {domain}', locks, REMEDY))
+        place = f'namespace /{ros.namespace} of ROS domain {domain}'
+        stack.enter_context(exclusive(place, NAMESPACE_REMEDY))
+        bus = stack.enter_context(own_bus(arguments.can, simulate=simulate))
         folder = stack.enter_context(tempfile.TemporaryDirectory(prefix='arm_bringup-'))
         urdf = expand_xacro(robot.description)
         parameters = Path(folder) / 'robot_description.yaml'
@@ -191,8 +254,9 @@ def session(
             arguments.timeout,
             master,
             dict(master_parameters or {}),
-            master_files(robot, Path(folder)),
+            master_files(robot, Path(folder), ros),
+            ros,
         )
         processes = arm_processes(wanted, parameters, find_executable)
         names = [drive.name for drive in drives]
-        yield Session(robot, bus, names, stream_mode_service(drives), urdf, processes)
+        yield Session(robot, bus, names, ros, stream_mode_service(drives), urdf, processes)

@@ -15,6 +15,7 @@ from process_supervisor import (
     LOG_FORMAT,
     node_argv,
     ProcessSpec,
+    RosOptions,
 )
 
 from .robots import Robot
@@ -58,6 +59,7 @@ class Stack:
         master: What runs the bus.
         master_parameters: ROS parameters for it beside the usual ones.
         master_files: Parameter files for it beside the usual one.
+        ros: Options of all nodes.
     """
 
     robot: Robot
@@ -67,6 +69,7 @@ class Stack:
     master: Executable = MASTER
     master_parameters: Mapping[str, str] = field(default_factory=dict)
     master_files: Sequence[Path] = ()
+    ros: RosOptions = field(default_factory=RosOptions)
 
 
 def arm_processes(stack: Stack, parameters: Path, find: FindExecutable) -> list[ProcessSpec]:
@@ -88,7 +91,7 @@ def arm_processes(stack: Stack, parameters: Path, find: FindExecutable) -> list[
         _slaves(stack, bus, find),
         _master(stack, bus, parameters, find),
         None if stack.master == MOTION_MASTER else _publisher(stack, parameters, find),
-        _state_publisher(parameters, find),
+        _state_publisher(stack, parameters, find),
     ]
     return [spec for spec in everything if spec is not None]
 
@@ -98,7 +101,7 @@ def _slaves(stack: Stack, bus: Mapping[str, str], find: FindExecutable) -> Proce
         return None
     return ProcessSpec(
         name='slaves',
-        argv=node_argv(Executable('arm_canopen', 'fake_slaves'), find, bus),
+        argv=node_argv(Executable('arm_canopen', 'fake_slaves'), find, bus, ros=stack.ros),
         environment=LOG_FORMAT,
         ready=SLAVES_READY,
         ready_timeout=stack.ready_timeout,
@@ -112,7 +115,9 @@ def _master(
     return ProcessSpec(
         name='master',
         argv=(
-            *node_argv(stack.master, find, {**bus, **stack.master_parameters}, parameters),
+            *node_argv(
+                stack.master, find, {**bus, **stack.master_parameters}, parameters, stack.ros
+            ),
             *parameter_files(stack.master_files),
         ),
         environment=LOG_FORMAT,
@@ -123,7 +128,11 @@ def _master(
 
 
 def controller_process(
-    files: Sequence[Path], parameters: Path, ready_timeout: float, find: FindExecutable
+    files: Sequence[Path],
+    parameters: Path,
+    ready_timeout: float,
+    find: FindExecutable,
+    ros: RosOptions,
 ) -> ProcessSpec:
     """Say which process moves drives that another process has; that one makes /tf, too.
 
@@ -132,13 +141,17 @@ def controller_process(
         parameters: The file of :func:`process_supervisor.write_parameters`.
         ready_timeout: How long it may take to be ready in [s].
         find: Finds executables.
+        ros: Options of all nodes.
 
     Raises:
         StartError: An executable is missing.
     """
     return ProcessSpec(
         name='controller',
-        argv=(*node_argv(MOTION_CONTROLLER, find, {}, parameters), *parameter_files(files)),
+        argv=(
+            *node_argv(MOTION_CONTROLLER, find, {}, parameters, ros),
+            *parameter_files(files),
+        ),
         environment=LOG_FORMAT,
         ready=CONTROLLER_READY,
         ready_timeout=ready_timeout,
@@ -155,11 +168,16 @@ def parameter_files(files: Sequence[Path]) -> list[str]:
     return [word for file in files for word in ('--params-file', str(file))]
 
 
+def frame_prefix(ros: RosOptions) -> dict[str, str]:
+    """Return the parameter that keeps the TF frames of several robots apart."""
+    return {'frame_prefix': ros.frame_prefix} if ros.frame_prefix else {}
+
+
 def _publisher(stack: Stack, parameters: Path, find: FindExecutable) -> ProcessSpec:
     executable = Executable('arm_canopen', 'canopen_joint_state_publisher')
     return ProcessSpec(
         name='joint_states',
-        argv=node_argv(executable, find, {}, parameters),
+        argv=node_argv(executable, find, {}, parameters, stack.ros),
         environment=LOG_FORMAT,
         ready=PUBLISHER_READY,
         ready_timeout=stack.ready_timeout,
@@ -167,13 +185,14 @@ def _publisher(stack: Stack, parameters: Path, find: FindExecutable) -> ProcessS
     )
 
 
-def _state_publisher(parameters: Path, find: FindExecutable) -> ProcessSpec | None:
+def _state_publisher(stack: Stack, parameters: Path, find: FindExecutable) -> ProcessSpec | None:
     executable = first_found(STATE_PUBLISHERS, find)
     if executable is None:
         return None  # the arm moves without TF
+    values = {'publish_frequency': TF_RATE, **frame_prefix(stack.ros)}
     return ProcessSpec(
         name='robot_state',
-        argv=node_argv(executable, find, {'publish_frequency': TF_RATE}, parameters),
+        argv=node_argv(executable, find, values, parameters, stack.ros),
         environment=LOG_FORMAT,
         required=False,
         stop_order=THEN_LISTENERS,

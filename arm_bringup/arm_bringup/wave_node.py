@@ -48,7 +48,7 @@ class WaveNode(Node):
         style = WaveStyle()
         self._source = WaveSource(plan_wave(joint_limits(urdf), drives, style), style)
         self._left: dict[str, str] = {}
-        self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
+        self._diagnostics = self.create_publisher(DiagnosticArray, 'diagnostics', 10)
         self.create_service(Trigger, '~/start', self._start)
         self.create_service(Trigger, '~/stop', self._stop)
         self.create_timer(REPORT_PERIOD, self._publish)

@@ -6,9 +6,11 @@ from __future__ import annotations
 
 import contextlib
 from pathlib import Path
+import re
 import shutil
 import signal
 
+from isolation import Isolation
 import pytest
 from small_bringup import read_until, SmallWorkspace
 from small_processes import PATIENCE
@@ -24,10 +26,12 @@ READY = {
 
 
 @pytest.fixture
-def workspace(tmp_path: Path, prefix: Path) -> SmallWorkspace:
-    """Install the small programs."""
-    sources = ('arm_bringup', 'arm_canopen', 'process_supervisor')
-    return SmallWorkspace(tmp_path, 'arm_bringup', READY, sources, [prefix])
+def workspace(tmp_path: Path, prefix: Path, isolation: Isolation) -> SmallWorkspace:
+    """Install the small programs, in a ROS domain that nobody else is in."""
+    sources = ('arm_bringup', 'arm_canopen', 'process_supervisor', 'dds_network')
+    workspace = SmallWorkspace(tmp_path, 'arm_bringup', READY, sources, [prefix])
+    workspace.environment['ROS_DOMAIN_ID'] = str(isolation.domain_id)
+    return workspace
 
 
 def test_ctrl_c_ends_it_with_0_after_the_master_the_listeners_and_the_slaves(
@@ -120,43 +124,66 @@ def test_a_workspace_that_is_not_built_says_how(workspace: SmallWorkspace) -> No
     assert 'make build' in output
 
 
-@pytest.mark.parametrize(
-    ('bus', 'domain', 'what'),
-    [('udp_multicast', '7', 'bus udp_multicast'), ('udp_multicast:239.9.9.9', '5', 'domain 5')],
-    ids=['same bus', 'same domain'],
-)
+@pytest.mark.parametrize('what', ['bus', 'namespace'])
 def test_a_second_bring_up_on_the_same_is_refused(
-    workspace: SmallWorkspace, bus: str, domain: str, what: str
+    workspace: SmallWorkspace, isolation: Isolation, what: str
 ) -> None:
     """The first goes on; the message says which process it is and what to do."""
-    workspace.environment['ROS_DOMAIN_ID'] = '5'
-    with workspace.bringup('panda', '--simulate', '--can', 'udp_multicast') as first:
+    first_place = ['--can', isolation.bus, '--namespace', 'left']
+    second_place = {
+        'bus': ['--can', isolation.bus, '--namespace', 'right'],
+        'namespace': ['--can', isolation.second_bus, '--ros-args', '-r', '__ns:=/left'],
+    }
+    with workspace.bringup('panda', '--simulate', *first_place) as first:
         read_until(first, 'all is ready')
-        workspace.environment['ROS_DOMAIN_ID'] = domain
-        code, output = workspace.run('panda', '--simulate', '--can', bus)
+        code, output = workspace.run('panda', '--simulate', *second_place[what])
         assert code == 2
         assert f'process {first.pid}' in output
-        assert what in output
+        assert isolation.bus in output if what == 'bus' else '--namespace' in output
         first.send_signal(signal.SIGINT)
         assert 'bye' in first.communicate(timeout=PATIENCE)[0]
         assert first.returncode == 0
 
 
-def test_bring_ups_on_other_buses_and_domains_run_side_by_side(workspace: SmallWorkspace) -> None:
-    """Neither hears of the other."""
+def test_a_second_simulated_arm_has_a_bus_of_its_own(workspace: SmallWorkspace) -> None:
+    """In a namespace of the same domain, without being told which bus."""
     with contextlib.ExitStack() as stack:
-        running = []
-        for number in (5, 6):
-            workspace.environment['ROS_DOMAIN_ID'] = str(number)
-            bus = f'udp_multicast:239.9.9.{number}'
-            arguments = ('panda', '--simulate', '--can', bus)
+        running, buses = [], set()
+        for side in ('left', 'right'):
+            arguments = ('panda', '--simulate', '--namespace', side)
             running.append(stack.enter_context(workspace.bringup(*arguments)))
             seen = read_until(running[-1], 'all is ready')
-            assert f'simulated drives on {bus}' in seen
+            found = re.search(r'on CAN bus (\S+) in namespace /(\w+)', seen)
+            assert found is not None
+            assert found[2] == side
+            assert f'simulated drives on {found[1]}' in seen
+            buses.add(found[1])
+        assert len(buses) == 2
         for process in running:
             process.send_signal(signal.SIGINT)
             process.communicate(timeout=PATIENCE)
             assert process.returncode == 0
+
+
+def test_the_namespace_of_bus_yml_is_that_of_all_nodes(
+    workspace: SmallWorkspace, tmp_path: Path
+) -> None:
+    """Also of those that have no bus.yml, and a bring-up beside it is in another one."""
+    folder = tmp_path / 'my_arm'
+    shutil.copytree(PANDA, folder)
+    for file in ('urdf.xacro', 'srdf'):
+        (folder / f'panda.{file}').rename(folder / f'my_arm.{file}')
+    text = (folder / 'bus.yml').read_text()
+    text = re.sub('(?m)^(master|defaults):\n', r'\g<0>  namespace: cell\n', text)
+    (folder / 'bus.yml').write_text(text)
+    for (package, name), line in READY.items():
+        workspace.install(package, name, ready=f'{line} in {{__ns}}')
+    with workspace.bringup(f'{folder}/', '--simulate') as process:
+        seen = read_until(process, 'all is ready')
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=PATIENCE)
+    assert 'in namespace /cell' in seen
+    assert len(re.findall(' in /cell$', seen, re.MULTILINE)) == len(READY)
 
 
 def test_help_names_the_robots(workspace: SmallWorkspace) -> None:

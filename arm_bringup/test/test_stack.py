@@ -12,7 +12,7 @@ import yaml
 from arm_bringup.motion import choose_master, MAKE_MOVE, motion_files
 from arm_bringup.robots import Robot
 from arm_bringup.stack import arm_processes, MASTER, MOTION_MASTER, Stack
-from process_supervisor import Executable, ProcessSpec, StartError
+from process_supervisor import Executable, ProcessSpec, RosOptions, StartError
 
 ROBOT = Robot('panda', Path('/robots/panda/bus.yml'), Path('/robots/panda/panda.urdf.xacro'))
 PARAMETERS = Path('/tmp/parameters.yaml')
@@ -66,7 +66,7 @@ def test_master_without_arm_servo(tmp_path: Path) -> None:
     robot.semantic.write_text('<robot name="my"/>')
     robot.limits.touch()
     assert choose_master(robot, full) == (MOTION_MASTER, '')
-    (file,) = motion_files(robot, tmp_path)
+    (file,) = motion_files(robot, tmp_path, RosOptions())
     values = yaml.safe_load(file.read_text())['/**']['ros__parameters']
     assert values['robot_description_semantic'] == '<robot name="my"/>'
 

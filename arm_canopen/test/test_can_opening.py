@@ -4,7 +4,9 @@
 
 from __future__ import annotations
 
+import itertools
 import logging
+import os
 import subprocess
 import sys
 
@@ -15,19 +17,21 @@ from arm_canopen.can import Frame, open_bus, opening, resolve_name
 from arm_canopen.can.interfaces import CanInterface
 from arm_canopen.exceptions import BusError
 
+MULTICAST = f'udp_multicast:239.74.7.2:{43113 + os.getuid() % 10_000}'
+
 
 @pytest.mark.parametrize(
     ('interfaces', 'expected'),
     [
-        ({}, 'udp_multicast:239.74.163.2'),
+        ({}, MULTICAST),
         ({'vcan0': CanInterface('vcan0', is_up=True, queue_length=1000)}, 'vcan0'),
         (
             {'vcan0': CanInterface('vcan0', is_up=False, queue_length=1000)},
-            'udp_multicast:239.74.163.2',
+            MULTICAST,
         ),
         (
             {'can0': CanInterface('can0', is_up=True, queue_length=10)},
-            'udp_multicast:239.74.163.2',
+            MULTICAST,
         ),
     ],
     ids=['none', 'vcan0', 'vcan0 down', 'real can0'],
@@ -37,7 +41,24 @@ def test_auto_takes_vcan0_when_it_is_up_and_never_real_hardware(
 ) -> None:
     """Without a name nothing real is ever driven."""
     monkeypatch.setattr(opening, 'can_interfaces', lambda: interfaces)
+    monkeypatch.setenv('ROS_DOMAIN_ID', '7')
     assert resolve_name('auto') == expected
+
+
+def test_users_and_domains_have_buses_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    """And further ones for further robots: no two of them are the same."""
+    monkeypatch.setattr(opening, 'can_interfaces', dict)
+    names: list[str] = []
+    for user in (0, 1000, 1001):
+        monkeypatch.setattr(os, 'getuid', lambda user=user: user)
+        for domain in ('', '1', '232'):
+            monkeypatch.setenv('ROS_DOMAIN_ID', domain)
+            assert resolve_name('auto') == resolve_name('auto')
+            names += itertools.islice(opening.auto_names(), 3)
+    assert len(set(names)) == len(names)
+    for name in names:
+        with open_bus(name) as bus:
+            assert bus.name == name
 
 
 def test_auto_says_which_bus_it_took(

@@ -85,7 +85,8 @@ def _nodes(model: RobotModel, document: Mapping[str, Any]) -> dict[str, Callable
 def _given(document: Mapping[str, Any], node: str) -> dict[str, Any]:
     """Return the parameters of a node; later ones of the file count more, as in rcl."""
     given: dict[str, Any] = {}
+    names = {EVERY_NODE, node, f'/{node}', f'{EVERY_NODE}/{node}'}
     for name, table in document.items():
-        if name in {EVERY_NODE, node, f'/{node}'} and isinstance(table, dict):
+        if name in names and isinstance(table, dict):
             given |= table.get('ros__parameters') or {}
     return given

@@ -29,9 +29,9 @@ UNITLESS = Scales(Units.UNITLESS, 0.2, 0.5, 0.4, 1.0)
 class Frames:
     """Links of the arm, and one frame of TF beside it, turned by a quarter about z."""
 
-    def is_link(self, frame: str) -> bool:
-        """Tell whether a frame is a link."""
-        return frame in robot('gp110').frames
+    def link(self, frame: str) -> str | None:
+        """Return a frame that is a link."""
+        return frame if frame in robot('gp110').frames else None
 
     def pose(self, frame: str) -> Pose:
         """Return the pose of the table; any other frame is unknown."""

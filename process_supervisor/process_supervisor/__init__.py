@@ -20,10 +20,12 @@ from .nodes import (
     FindExecutable,
     first_found,
     LOG_FORMAT,
+    namespaced_parameters,
     node_argv,
     ros_domain,
     write_parameters,
 )
+from .ros_options import add_namespace, parse_with_ros, RosOptions
 from .runner import Runner
 from .spec import POLITE, ProcessSpec, StopStep
 from .supervision import Notice, Outcome, Phase, Severity, Supervision
@@ -46,18 +48,22 @@ __all__ = [
     'Painter',
     'Phase',
     'ProcessSpec',
+    'RosOptions',
     'Runner',
     'Severity',
     'StartError',
     'StopStep',
     'Supervision',
     'SupervisorError',
+    'add_namespace',
     'exclusive',
     'explain',
     'find_executable',
     'first_found',
     'is_smart',
+    'namespaced_parameters',
     'node_argv',
+    'parse_with_ros',
     'ros_domain',
     'severity_of',
     'supervise',

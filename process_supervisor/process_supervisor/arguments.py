@@ -7,6 +7,12 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable
 import math
+import os
+import sys
+
+from dds_network import NETWORK_VARIABLE, NetworkChoiceError, open_dds
+
+from .exceptions import StartError
 
 
 def seconds_from(least: float, *, finite: bool = True) -> Callable[[str], float]:
@@ -40,3 +46,33 @@ def add_timeout(parser: argparse.ArgumentParser) -> None:
         default=30.0,
         help='longest time until all is ready in [s]; inf waits for ever (default: %(default)s)',
     )
+
+
+def add_network(parser: argparse.ArgumentParser) -> None:
+    """Declare ``--network``.
+
+    Args:
+        parser: Where to.
+    """
+    parser.add_argument(
+        '--network',
+        metavar='NAMES',
+        help='open DDS to other machines: network interfaces, or addresses of peers, separated by '
+        'commas; there is no authentication, whoever reaches them can command the robot (default: '
+        f'the variable {NETWORK_VARIABLE}, else this host only)',
+    )
+
+
+def apply_network(arguments: argparse.Namespace) -> None:
+    """Keep DDS of this process and those that it starts to what a person opened; print it.
+
+    Args:
+        arguments: What :func:`add_network` parsed.
+
+    Raises:
+        StartError: There is no such interface or peer.
+    """
+    try:
+        sys.stdout.write(f'{open_dds(os.environ, arguments.network)}\n')
+    except NetworkChoiceError as error:
+        raise StartError(f'--network: {error}') from error

@@ -1,46 +1,59 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""One bring-up per bus, port and ROS domain: a second one would only disturb the first."""
+"""One bring-up per bus, serial port and ROS namespace: a second one would only disturb the first.
+
+Held by a socket in the abstract namespace of Unix: it is seen by all users of the network
+namespace, as the bus and the domain are, and the kernel gives it back when its process ends,
+however it ends.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 import contextlib
-import fcntl
-import os
-from pathlib import Path
-import re
+import errno
+import socket
+import struct
 
 from .exceptions import StartError
 
+_CREDENTIALS = struct.Struct('3i')  # struct ucred: process, user, group
+_LONGEST = 100  # [byte] of the 107 that an abstract name may have
+
 
 @contextlib.contextmanager
-def exclusive(thing: str, folder: Path, remedy: str) -> Iterator[None]:
-    """Hold a lock on something, as long as the block runs.
-
-    The kernel gives the lock back when this process ends, however it ends.
+def exclusive(thing: str, remedy: str) -> Iterator[None]:
+    """Hold something, as long as the block runs.
 
     Args:
         thing: What is used, as the user knows it: ``bus vcan0``.
-        folder: Folder for the lock file.
         remedy: What to take instead, for the message: ``another bus with --can``.
 
     Raises:
         StartError: Another process holds it; the message says which.
     """
-    file = folder / f'bringup-{os.getuid()}-{re.sub("[^A-Za-z0-9.]+", "-", thing)}.lock'
-    # not truncated yet: it has the pid of the process that holds the lock
-    descriptor = os.open(file, os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_NOFOLLOW, 0o600)
-    with os.fdopen(descriptor, 'r+', encoding='ascii') as lock:
+    name = f'\0bringup {thing}'.encode()[:_LONGEST]
+    with socket.socket(socket.AF_UNIX) as holder:
         try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as error:
-            lock.seek(0)
+            holder.bind(name)
+        except OSError as error:
+            if error.errno != errno.EADDRINUSE:
+                raise
             raise StartError(
-                f'another bring-up (process {lock.read().strip()}) is on {thing}; stop it, '
-                f'or take {remedy}'
+                f'another bring-up{_process_of(name)} is on {thing}; stop it, or take {remedy}'
             ) from error
-        lock.truncate(0)
-        lock.write(f'{os.getpid()}\n')
-        lock.flush()
+        holder.listen()
         yield
+
+
+def _process_of(name: bytes) -> str:
+    """Tell whose socket it is; nothing when it has just been closed."""
+    with socket.socket(socket.AF_UNIX) as probe:
+        probe.setblocking(False)
+        try:
+            probe.connect(name)
+            raw = probe.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
+        except OSError:
+            return ''
+    process, user, _ = _CREDENTIALS.unpack(raw)
+    return f' (process {process} of user {user})'

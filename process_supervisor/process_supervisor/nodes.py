@@ -11,6 +11,7 @@ import os
 from pathlib import Path
 
 from .exceptions import StartError
+from .ros_options import RosOptions
 
 DOMAIN_MAX = 232
 """Highest ROS domain whose UDP ports exist."""
@@ -78,6 +79,7 @@ def node_argv(
     find: FindExecutable,
     values: Mapping[str, str] | None = None,
     parameters: Path | None = None,
+    ros: RosOptions | None = None,
 ) -> tuple[str, ...]:
     """Make the command line of a node.
 
@@ -86,6 +88,7 @@ def node_argv(
         find: Finds executables.
         values: ROS parameters as the command line takes them.
         parameters: A ROS parameter file.
+        ros: Options of all nodes.
 
     Returns:
         Program and arguments.
@@ -106,7 +109,7 @@ def node_argv(
         argv += ['--params-file', str(parameters)]
     for name, value in (values or {}).items():
         argv += ['-p', f'{name}:={value}']
-    return tuple(argv)
+    return (*argv, *(ros.node_arguments if ros is not None else ()))
 
 
 def write_parameters(file: Path, urdf: str) -> None:
@@ -118,6 +121,37 @@ def write_parameters(file: Path, urdf: str) -> None:
     """
     # a JSON string is a YAML string, whatever characters are in it
     file.write_text(f'/**:\n  ros__parameters:\n    robot_description: {json.dumps(urdf)}\n')
+
+
+def namespaced_parameters(file: Path, ros: RosOptions, folder: Path) -> Path:
+    """Make a parameter file that names its nodes reach them in a namespace.
+
+    Args:
+        file: A ROS parameter file.
+        ros: Options of all nodes.
+        folder: Where to write the copy.
+
+    Returns:
+        The file itself where there is no namespace.
+
+    Raises:
+        StartError: It is no YAML map.
+    """
+    if not ros.namespace:
+        return file
+    import yaml
+
+    try:
+        nodes = dict(yaml.safe_load(file.read_text(encoding='utf-8')) or {})
+    except (OSError, yaml.YAMLError, TypeError, ValueError) as error:
+        raise StartError(f'{file}: no ROS parameter file: {error}') from error
+    moved = {
+        name if name.startswith('/**') else ros.resolve(name.lstrip('/')): values
+        for name, values in nodes.items()
+    }
+    copy = folder / f'{ros.namespace.replace("/", "-")}-{file.name}'
+    copy.write_text(json.dumps(moved), encoding='utf-8')  # JSON is YAML
+    return copy
 
 
 def ros_domain(environment: Mapping[str, str]) -> str:

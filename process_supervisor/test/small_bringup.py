@@ -64,7 +64,7 @@ class SmallWorkspace:
             **os.environ,
             'AMENT_PREFIX_PATH': os.pathsep.join(map(str, (folder / 'prefix', *prefixes))),
             'PYTHONPATH': os.pathsep.join(str(SOURCES / name) for name in sources),
-            'TMPDIR': str(folder),  # its locks are nobody else's
+            'TMPDIR': str(folder),
         }
 
     def install(self, package: str, name: str, then: str = '', ready: str | None = None) -> None:

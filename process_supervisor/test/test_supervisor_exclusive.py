@@ -4,24 +4,86 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 import os
-from pathlib import Path
+import subprocess
+import sys
+import uuid
 
 import pytest
 
 from process_supervisor import exclusive, StartError
 
 REMEDY = 'another bus with --can'
+HOLD = """
+import os, sys
+from process_supervisor import exclusive, StartError
+os.setuid({user})
+try:
+    with exclusive({bus!r}, ''):
+        print('held', flush=True)
+        sys.stdin.read()
+except StartError as error:
+    print(error, flush=True)
+"""
 
 
-def test_the_second_on_a_bus_is_refused_with_the_first_ones_process(tmp_path: Path) -> None:
+@pytest.fixture
+def bus() -> str:
+    """Name a bus that no other test of this machine has."""
+    return f'bus {uuid.uuid4().hex}'
+
+
+@contextmanager
+def another_process(bus: str, user: int) -> Iterator[tuple[subprocess.Popen[str], str]]:
+    """Let a process take a bus; yield it and what it says, and kill it."""
+    with subprocess.Popen(
+        [sys.executable, '-c', HOLD.format(bus=bus, user=user)],
+        env=os.environ | {'PYTHONPATH': os.pathsep.join(sys.path)},
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as process:
+        assert process.stdout is not None
+        try:
+            yield process, process.stdout.readline()
+        finally:
+            process.kill()
+
+
+def test_the_second_on_a_bus_is_refused_with_the_first_ones_process(bus: str) -> None:
     """And told what to do; another bus is free; after the first has left, so is this one."""
-    with exclusive('bus vcan0', tmp_path, REMEDY):
-        for _ in range(2):  # being refused must not spoil what the next one reads
-            words = rf'process {os.getpid()}.*bus vcan0.*--can'
-            with pytest.raises(StartError, match=words), exclusive('bus vcan0', tmp_path, REMEDY):
+    with exclusive(bus, REMEDY):
+        for _ in range(3):  # being refused must not spoil what the next one reads
+            words = rf'process {os.getpid()} of user {os.getuid()}.*{bus}.*--can'
+            with pytest.raises(StartError, match=words), exclusive(bus, REMEDY):
                 pass
-        with exclusive('bus udp_multicast:239.1.2.3', tmp_path, REMEDY):
+        with exclusive(f'{bus}:5000', REMEDY):
             pass
-    with exclusive('bus vcan0', tmp_path, REMEDY):
+    with exclusive(bus, REMEDY):
+        pass
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason='becomes another user')
+def test_another_user_is_refused_too(bus: str) -> None:
+    """Bus and domain are those of the host, whoever is on them."""
+    nobody = 65534
+    with exclusive(bus, REMEDY), another_process(bus, nobody) as (_, said):
+        assert f'process {os.getpid()} of user 0' in said
+    with (
+        another_process(bus, nobody) as (process, _),
+        pytest.raises(StartError, match=f'process {process.pid} of user {nobody}'),
+        exclusive(bus, REMEDY),
+    ):
+        pass
+
+
+def test_a_killed_one_leaves_nothing(bus: str) -> None:
+    """The kernel gives it back."""
+    with another_process(bus, os.getuid()) as (_, said):
+        assert said == 'held\n'
+        with pytest.raises(StartError), exclusive(bus, REMEDY):
+            pass
+    with exclusive(bus, REMEDY):
         pass

@@ -6,26 +6,36 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 import sys
 
-from process_supervisor import supervise, SupervisorError, USAGE_ERROR
+from process_supervisor import (
+    parse_with_ros,
+    RosOptions,
+    supervise,
+    SupervisorError,
+    USAGE_ERROR,
+)
 
 from .exceptions import BringupError
-from .leaving import lie_down
+from .leaving import join_ros, lie_down
 from .session import add_arguments, session
 
 HINT = """in a second terminal:
-    ros2 run quad_teleop teleop_keyboard
-    ros2 service call /set_mode quad_msgs/srv/SetMode "{mode: stand}\""""
+    ros2 run quad_teleop teleop_keyboard{hint}
+    ros2 service call {set_mode} quad_msgs/srv/SetMode "{{mode: stand}}\""""
 """What to do with a robot that has been brought up."""
 
 
-def parse(argv: Sequence[str] | None) -> argparse.Namespace:
+def parse(argv: Sequence[str]) -> tuple[argparse.Namespace, RosOptions]:
     """Parse the command line.
 
     Args:
-        argv: Arguments without the program's name; None takes those of the process.
+        argv: Arguments without the program's name.
+
+    Returns:
+        What was asked for, and the options of all nodes.
     """
     parser = argparse.ArgumentParser(
         prog='ros2 run quad_bringup bringup',
@@ -53,7 +63,7 @@ def parse(argv: Sequence[str] | None) -> argparse.Namespace:
         help='at Ctrl-C end at once and let the servos hold, instead of lying down first',
     )
     add_arguments(parser)
-    return parser.parse_args(argv)
+    return parse_with_ros(parser, argv)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -65,11 +75,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns:
         0 after Ctrl-C or SIGTERM, 1 when a process failed, 2 when nothing was started.
     """
-    arguments = parse(argv)
+    arguments, ros = parse(sys.argv[1:] if argv is None else argv)
     try:
-        with session(arguments, arguments.port) as quad:
-            sys.stdout.write(f'{quad.title}\n{HINT}\n')
-            farewell = None if arguments.hold else lie_down
+        with session(arguments, ros, arguments.port) as quad:
+            hint = HINT.format(hint=ros.hint, set_mode=ros.resolve('set_mode'))
+            sys.stdout.write(f'{quad.title}\n{hint}\n')
+            join = partial(join_ros, namespace=ros.namespace)
+            farewell = None if arguments.hold else partial(lie_down, make_client=join)
             return supervise(quad.processes, farewell=farewell).exit_code
     except (BringupError, SupervisorError) as error:
         sys.stderr.write(f'{error}\n')

@@ -41,6 +41,8 @@ LAUNCH_ARGUMENTS = (
     LaunchArgument('servo', '', 'servo model of a simulated robot'),
     LaunchArgument('protocol', '', 'auto, new, old or vendor'),
     LaunchArgument('calibration', '', 'parameters of the serial bridge'),
+    LaunchArgument('namespace', '', 'namespace of all nodes, and prefix of TF frames'),
+    LaunchArgument('network', '', 'interfaces or peers that DDS is opened to'),
 )
 """What the launch file takes; the port is that of the robot's computer."""
 

@@ -42,15 +42,16 @@ MakeClient = Callable[[Callable[[], bool]], Client]
 """Joins the ROS graph; the client asks the argument whether its waiting shall be given up."""
 
 
-def join_ros(given_up: Callable[[], bool]) -> Client:
+def join_ros(given_up: Callable[[], bool], namespace: str = '') -> Client:
     """Make the client; rclpy is loaded only now, a bring-up does not need it.
 
     Args:
         given_up: True when nothing shall be waited for any more.
+        namespace: That of the robot.
     """
     from .mode_client import ModeClient
 
-    return ModeClient('quad_bringup', given_up)
+    return ModeClient('quad_bringup', given_up, namespace)
 
 
 def lie_down(

@@ -18,7 +18,7 @@ REFUSED_PATIENCE = 3.0
 """Time in [s] for which a refused mode is asked for again."""
 ASK_AGAIN = 0.2
 """Time in [s] between that."""
-STATE_TOPIC = '/controller_node/state'
+STATE_TOPIC = 'controller_node/state'
 """Topic on which the controller says what it is doing."""
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
@@ -26,14 +26,15 @@ LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 class ModeClient(GraphClient):
     """A node of its own; use it in one thread."""
 
-    def __init__(self, name: str, given_up: Callable[[], bool]) -> None:
+    def __init__(self, name: str, given_up: Callable[[], bool], namespace: str = '') -> None:
         """Join the ROS graph.
 
         Args:
             name: Name of the node.
             given_up: True when nothing shall be waited for any more.
+            namespace: That of the robot.
         """
-        super().__init__(name, given_up)
+        super().__init__(name, given_up, namespace)
         self._state = ''
         self._modes = self.node.create_client(SetMode, 'set_mode')
         self.node.create_subscription(String, STATE_TOPIC, self._take_state, LATCHED)

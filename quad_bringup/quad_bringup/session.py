@@ -13,13 +13,16 @@ from pathlib import Path
 import tempfile
 
 from process_supervisor import (
+    add_namespace,
     exclusive,
     find_executable,
+    namespaced_parameters,
     ProcessSpec,
     ros_domain,
+    RosOptions,
     write_parameters,
 )
-from process_supervisor.arguments import add_timeout
+from process_supervisor.arguments import add_network, add_timeout, apply_network
 from quad_description import movable_joints, PRESETS, robot_urdf
 
 from .exceptions import ArgumentError
@@ -30,8 +33,10 @@ GAITS = ('trot', 'crawl', 'pace')
 AUTO, NEW, VENDOR = 'auto', 'new', 'vendor'
 PROTOCOLS = (AUTO, NEW, 'old', VENDOR)
 """Serial protocols of quad_hardware."""
-REMEDY = 'another --port and another ROS_DOMAIN_ID'
-"""What a second bring-up is told to take."""
+PORT_REMEDY = 'another --port'
+"""What a second bring-up on a port is told to take."""
+NAMESPACE_REMEDY = 'another --namespace'
+"""What a second bring-up in a namespace is told to take."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,31 +96,36 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "simulated one; vendor goes through the vendor's xgo_lib2, whose vendor_servo_method is "
         'given in --calibration (default: %(default)s)',
     )
+    add_namespace(parser)
+    add_network(parser)
     add_timeout(parser)
 
 
 @contextlib.contextmanager
-def session(arguments: argparse.Namespace, port: str | None) -> Iterator[Session]:
-    """Prepare a bring-up; the port and the ROS domain are its own as long as the block runs.
+def session(arguments: argparse.Namespace, ros: RosOptions, port: str | None) -> Iterator[Session]:
+    """Prepare a bring-up; the port and the namespace are its own as long as the block runs.
 
     Args:
         arguments: What :func:`add_arguments` parsed; ``calibration`` may be there, too.
+        ros: Options of all nodes.
         port: Serial port of the robot; None for a simulated one.
 
     Raises:
         ArgumentError: A file is not there, or the servos of a real robot were chosen.
-        StartError: An executable is missing, or another bring-up is on this port or domain.
+        StartError: An executable or a network is missing, or another bring-up is on this port or
+            in this namespace of the domain.
     """
     policy, calibration = (
         _existing(name, getattr(arguments, name, None)) for name in ('policy', 'calibration')
     )
+    apply_network(arguments)
     domain = ros_domain(os.environ)
-    locks = Path(tempfile.gettempdir())
     with contextlib.ExitStack() as stack:
         if port is not None:
             name = f'port {os.path.realpath(port)}'  # two names of one port are one port
-            stack.enter_context(exclusive(name, locks, REMEDY))
-        stack.enter_context(exclusive(f'ROS domain {domain}', locks, REMEDY))
+            stack.enter_context(exclusive(name, PORT_REMEDY))
+        place = f'namespace /{ros.namespace} of ROS domain {domain}'
+        stack.enter_context(exclusive(place, NAMESPACE_REMEDY))
         prefix = 'quad_bringup-'
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix=prefix)))
         urdf = robot_urdf(arguments.preset, arm=arguments.arm)
@@ -130,7 +140,8 @@ def session(arguments: argparse.Namespace, port: str | None) -> Iterator[Session
             gait=arguments.gait,
             protocol=_protocol(arguments.protocol, simulate=port is None),
             policy=policy,
-            calibration=calibration,
+            calibration=calibration and namespaced_parameters(calibration, ros, folder),
+            ros=ros,
             ready_timeout=arguments.timeout,
         )
         title = f'XGO {wanted.preset}{" with arm" if wanted.arm else ""}' + (

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from process_supervisor import (
@@ -14,6 +14,7 @@ from process_supervisor import (
     LOG_FORMAT,
     node_argv,
     ProcessSpec,
+    RosOptions,
     StartError,
 )
 
@@ -53,6 +54,7 @@ class Stack:
         protocol: Serial protocol, ``new`` or ``old``; ``auto`` asks the robot.
         calibration: Parameter file that ``quad_hardware calibrate`` has written.
         ready_timeout: How long each process may take to be ready in [s].
+        ros: Options of all nodes.
     """
 
     port: str
@@ -65,6 +67,13 @@ class Stack:
     protocol: str = 'auto'
     calibration: Path | None = None
     ready_timeout: float = 30.0
+    ros: RosOptions = field(default_factory=RosOptions)
+
+    @property
+    def frames(self) -> dict[str, str]:
+        """The parameter that keeps the TF frames of several robots apart."""
+        prefix = self.ros.frame_prefix
+        return {'frame_prefix': prefix} if prefix else {}
 
 
 def quad_processes(stack: Stack, parameters: Path, find: FindExecutable) -> list[ProcessSpec]:
@@ -91,7 +100,7 @@ def quad_processes(stack: Stack, parameters: Path, find: FindExecutable) -> list
 
 def _simulator(stack: Stack, find: FindExecutable) -> ProcessSpec:
     executable = Executable('quad_hardware', 'fake_xgo')
-    program, *ros_arguments = node_argv(executable, find)
+    program, *ros_arguments = node_argv(executable, find, ros=stack.ros)
     spoken = 'both' if stack.protocol == 'auto' else stack.protocol
     options = ['--link', stack.port, '--preset', stack.preset, '--protocol', spoken]
     if stack.arm:
@@ -109,10 +118,11 @@ def _simulator(stack: Stack, find: FindExecutable) -> ProcessSpec:
 
 
 def _bridge(stack: Stack, parameters: Path, find: FindExecutable) -> ProcessSpec:
-    values = {'port': stack.port, 'protocol': stack.protocol}
+    values = {'port': stack.port, 'protocol': stack.protocol, **stack.frames}
     if stack.simulate:  # its IMU is where the description has it
         values['imu.mounting_checked'] = 'true'
-    argv = node_argv(Executable('quad_hardware', 'hardware_node'), find, values, parameters)
+    executable = Executable('quad_hardware', 'hardware_node')
+    argv = node_argv(executable, find, values, parameters, stack.ros)
     if stack.calibration is not None:
         argv = (*argv, '--params-file', str(stack.calibration))
     return ProcessSpec(
@@ -132,7 +142,7 @@ def _controller(stack: Stack, parameters: Path, find: FindExecutable) -> Process
     executable = Executable('quad_controller', 'controller_node')
     return ProcessSpec(
         name='controller',
-        argv=node_argv(executable, find, values, parameters),
+        argv=node_argv(executable, find, values, parameters, stack.ros),
         environment=LOG_FORMAT,
         ready=CONTROLLER_READY,
         ready_timeout=stack.ready_timeout,
@@ -146,9 +156,10 @@ def _state_publisher(stack: Stack, parameters: Path, find: FindExecutable) -> Pr
         raise StartError(
             'there is no robot_state_publisher; build the workspace (make build) and source env.sh'
         )
+    values = {'publish_frequency': f'{TF_RATE}', **stack.frames}
     return ProcessSpec(
         name='robot_state',
-        argv=node_argv(executable, find, {'publish_frequency': f'{TF_RATE}'}, parameters),
+        argv=node_argv(executable, find, values, parameters, stack.ros),
         environment=LOG_FORMAT,
         ready=PUBLISHER_READY,
         ready_timeout=stack.ready_timeout,

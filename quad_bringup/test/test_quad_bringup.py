@@ -9,6 +9,7 @@ from pathlib import Path
 import re
 import signal
 
+from isolation import Isolation
 import pytest
 from small_bringup import read_until, SmallWorkspace
 from small_processes import PATIENCE
@@ -22,10 +23,12 @@ READY = {
 
 
 @pytest.fixture
-def workspace(tmp_path: Path) -> SmallWorkspace:
-    """Install the small programs."""
-    sources = ('quad_bringup', 'quad_description', 'process_supervisor')
-    return SmallWorkspace(tmp_path, 'quad_bringup', READY, sources)
+def workspace(tmp_path: Path, isolation: Isolation) -> SmallWorkspace:
+    """Install the small programs, in a ROS domain that nobody else is in."""
+    sources = ('quad_bringup', 'quad_description', 'process_supervisor', 'dds_network')
+    workspace = SmallWorkspace(tmp_path, 'quad_bringup', READY, sources)
+    workspace.environment['ROS_DOMAIN_ID'] = str(isolation.domain_id)
+    return workspace
 
 
 def test_ctrl_c_ends_it_with_0_in_order(workspace: SmallWorkspace) -> None:
@@ -94,16 +97,17 @@ def test_what_cannot_be_started_says_so_at_once(
 
 
 def test_a_second_bring_up_on_the_same_port_is_refused(workspace: SmallWorkspace) -> None:
-    """By whatever name it calls the port; another ROS domain does not help."""
+    """By whatever name it calls the port, in whatever namespace; and in the same namespace."""
     port, name = workspace.folder / 'port', workspace.folder / 'other_name'
     port.touch()
     name.symlink_to(port)
-    workspace.environment['ROS_DOMAIN_ID'] = '5'
     with workspace.bringup('--port', str(port), '--hold') as first:
         read_until(first, 'all is ready')
-        for domain, second, what in (('7', name, 'port'), ('5', '/dev/other', 'ROS domain 5')):
-            workspace.environment['ROS_DOMAIN_ID'] = domain
-            code, output = workspace.run('--port', str(second))
+        for arguments, what in (
+            (['--port', str(name), '--namespace', 'dog'], 'port'),
+            (['--port', '/dev/other'], '--namespace'),
+        ):
+            code, output = workspace.run(*arguments)
             assert code == 2
             assert f'process {first.pid}' in output
             assert what in output
@@ -112,13 +116,13 @@ def test_a_second_bring_up_on_the_same_port_is_refused(workspace: SmallWorkspace
         assert first.returncode == 0
 
 
-def test_simulations_in_other_domains_run_side_by_side(workspace: SmallWorkspace) -> None:
+def test_simulations_in_other_namespaces_run_side_by_side(workspace: SmallWorkspace) -> None:
     """Each has a port of its own."""
     with contextlib.ExitStack() as stack:
         running, ports = [], set()
-        for number in (5, 6):
-            workspace.environment['ROS_DOMAIN_ID'] = str(number)
-            running.append(stack.enter_context(workspace.bringup('--simulate', '--hold')))
+        for side in ('left', 'right'):
+            arguments = ('--simulate', '--hold', '--namespace', side)
+            running.append(stack.enter_context(workspace.bringup(*arguments)))
             seen = read_until(running[-1], 'all is ready')
             ports.add(next(line for line in seen.splitlines() if 'simulated, on' in line))
         assert len(ports) == 2

@@ -45,6 +45,7 @@ class Display(Node):
         arm = read.flag('arm', 'with the arm on its back', default=False)
         motion = read.choice('motion', SWEEP, {name: name for name in MOTIONS}, 'what it does')
         rate = read.number('rate', 50.0, RATES, 'joint states a second [Hz]')
+        self._prefix = read.text('frame_prefix', '', 'before each frame')
         refuse_misspelt(self)
         urdf = robot_urdf(preset, arm)
         self._joints = movable_joints(urdf)
@@ -67,14 +68,14 @@ class Display(Node):
         message = JointState(name=list(positions), position=list(positions.values()))
         message.header.stamp = now.to_msg()
         self._states.publish(message)
-        self._footprint.publish(TFMessage(transforms=[_footprint(message)]))
+        self._footprint.publish(TFMessage(transforms=[_footprint(message, self._prefix)]))
 
 
-def _footprint(states: JointState) -> TransformStamped:
+def _footprint(states: JointState, prefix: str) -> TransformStamped:
     """Return where the ground is below a body that is level and stands on its lowest foot."""
-    transform = TransformStamped(child_frame_id='base_footprint')
+    transform = TransformStamped(child_frame_id=f'{prefix}base_footprint')
     transform.header.stamp = states.header.stamp
-    transform.header.frame_id = 'base_link'
+    transform.header.frame_id = f'{prefix}base_link'
     positions = dict(zip(states.name, states.position, strict=True))
     transform.transform.translation.z = -standing_height(positions)
     return transform

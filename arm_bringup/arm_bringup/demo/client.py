@@ -24,15 +24,16 @@ class ArmClient(GraphClient):
         figures: The latest of /diagnostics.
     """
 
-    def __init__(self, given_up: Callable[[], bool]) -> None:
+    def __init__(self, given_up: Callable[[], bool], namespace: str = '') -> None:
         """Join the ROS graph.
 
         Args:
             given_up: True when nothing shall be waited for any more.
+            namespace: That of the arm.
         """
-        super().__init__('demo', given_up)
+        super().__init__('demo', given_up, namespace)
         self.figures = Figures()
-        self.node.create_subscription(DiagnosticArray, '/diagnostics', self._take, 50)
+        self.node.create_subscription(DiagnosticArray, 'diagnostics', self._take, 50)
         self._clients: dict[str, Any] = {}
 
     def _take(self, message: DiagnosticArray) -> None:

@@ -6,10 +6,17 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Sequence
+from functools import partial
 import os
 import sys
 
-from process_supervisor import Executable, SupervisorError, USAGE_ERROR
+from process_supervisor import (
+    Executable,
+    parse_with_ros,
+    RosOptions,
+    SupervisorError,
+    USAGE_ERROR,
+)
 from process_supervisor.arguments import seconds_from
 from process_supervisor.demo import perform
 from process_supervisor.play import REFRESH
@@ -25,11 +32,14 @@ WAVE_MASTER = Executable('arm_bringup', 'wave_master')
 """The master of the demo."""
 
 
-def parse(argv: Sequence[str] | None) -> argparse.Namespace:
+def parse(argv: Sequence[str]) -> tuple[argparse.Namespace, RosOptions]:
     """Parse the command line.
 
     Args:
-        argv: Arguments without the program's name; None takes those of the process.
+        argv: Arguments without the program's name.
+
+    Returns:
+        What was asked for, and the options of all nodes.
     """
     parser = argparse.ArgumentParser(
         prog='ros2 run arm_bringup demo',
@@ -47,37 +57,40 @@ def parse(argv: Sequence[str] | None) -> argparse.Namespace:
         'joints were enabled, moved (it takes them 5 s to get going) and followed (default: until '
         'Ctrl-C)',
     )
-    return parser.parse_args(argv)
+    return parse_with_ros(parser, argv)
 
 
-def join_ros(given_up: Callable[[], bool]) -> Client:
+def join_ros(namespace: str, given_up: Callable[[], bool]) -> Client:
     """Make the ROS client of the demo; rclpy loads while the processes start.
 
     Args:
+        namespace: That of the arm.
         given_up: True when nothing shall be waited for any more.
     """
     from .client import ArmClient
 
-    return ArmClient(given_up)
+    return ArmClient(given_up, namespace)
 
 
-def commands(joint: str, mode_service: str, candump: str) -> list[str]:
+def commands(joint: str, mode_service: str, candump: str, ros: RosOptions) -> list[str]:
     """Return commands to try in a second terminal.
 
     Args:
         joint: Name of a drive.
         mode_service: Service that selects the mode of the wave.
         candump: Command that shows the bus.
+        ros: Options of all nodes.
     """
     call = 'ros2 service call'
+    drive = ros.resolve(joint)
     return [
-        f'{call} /{joint}/position_mode std_srvs/srv/Trigger',
-        f'{call} /{joint}/target canopen_interfaces/srv/COTargetDouble "{{ target: 1.0 }}"',
-        'ros2 topic hz /joint_states',
+        f'{call} {drive}/position_mode std_srvs/srv/Trigger',
+        f'{call} {drive}/target canopen_interfaces/srv/COTargetDouble "{{ target: 1.0 }}"',
+        f'ros2 topic hz {ros.resolve("joint_states")}',
         candump,
         # back into the wave
-        f'{call} /{joint}/{mode_service} std_srvs/srv/Trigger',
-        f'{call} /wave/start std_srvs/srv/Trigger',
+        f'{call} {drive}/{mode_service} std_srvs/srv/Trigger',
+        f'{call} {ros.resolve("wave/start")} std_srvs/srv/Trigger',
     ]
 
 
@@ -105,9 +118,9 @@ def run(arm: Session, duration: float | None) -> int:
         arm.processes,
         view=view,
         figures=Figures(),
-        commands=commands(arm.drives[0], arm.mode_service, candump),
+        commands=commands(arm.drives[0], arm.mode_service, candump, arm.ros),
         make_play=lambda display: Play(list(view.limits), arm.mode_service, display, duration),
-        make_client=join_ros,
+        make_client=partial(join_ros, arm.ros.namespace),
         endless=duration is None,
     )
 
@@ -121,11 +134,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns:
         0 when all went well, 1 when something did not, 2 when nothing was started.
     """
-    arguments = parse(argv)
+    arguments, ros = parse(sys.argv[1:] if argv is None else argv)
     parameters = {'diagnostics_period': f'{REFRESH}'}
     try:
         with session(
-            arguments, simulate=True, master=WAVE_MASTER, master_parameters=parameters
+            arguments, ros, simulate=True, master=WAVE_MASTER, master_parameters=parameters
         ) as arm:
             return run(arm, arguments.duration)
     except (BringupError, SupervisorError) as error:

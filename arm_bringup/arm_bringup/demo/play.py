@@ -77,9 +77,9 @@ class Play(play.Play[Client]):
         client.wait_until(lambda: self._stands_still(client), CALL_TIMEOUT, 'the wave to stop')
 
     def _services(self) -> tuple[list[str], list[str], list[str]]:
-        init = [f'/{joint}/init' for joint in self._joints]
-        mode = [f'/{joint}/{self._mode_service}' for joint in self._joints]
-        return init, mode, ['/wave/start', '/wave/stop']
+        init = [f'{joint}/init' for joint in self._joints]
+        mode = [f'{joint}/{self._mode_service}' for joint in self._joints]
+        return init, mode, ['wave/start', 'wave/stop']
 
     def _booted(self, client: Client, ready: Callable[[], bool]) -> bool:
         self._show(client)

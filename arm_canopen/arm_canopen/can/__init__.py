@@ -4,6 +4,6 @@
 
 from .bus import Bus, BusCounters
 from .frame import Frame
-from .opening import open_bus, resolve_name
+from .opening import AUTO, auto_names, open_bus, resolve_name
 
-__all__ = ['Bus', 'BusCounters', 'Frame', 'open_bus', 'resolve_name']
+__all__ = ['AUTO', 'Bus', 'BusCounters', 'Frame', 'auto_names', 'open_bus', 'resolve_name']

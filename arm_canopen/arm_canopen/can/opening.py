@@ -8,13 +8,16 @@
 ``virtual:NAME``                       inside this process
 ``INTERFACE:CHANNEL[@BITRATE]``        any other adapter, by python-can, e.g.
                                        ``pcan:PCAN_USBBUS1@500000``
-``auto``                               vcan0 when it exists and is up, else ``udp_multicast``
+``auto``                               vcan0 when it exists and is up, else the multicast bus of
+                                       this user and ROS domain
 =====================================  ===========================================================
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 import logging
+import os
 import socket
 
 from ..exceptions import BusError
@@ -26,6 +29,8 @@ from .virtual import open_virtual
 
 AUTO = 'auto'
 _AUTO_INTERFACE = 'vcan0'
+_BUSES = 250  # as many as fit into the last byte of the group
+_USERS = 10_000  # whose ports differ
 _log = logging.getLogger(__name__)
 
 
@@ -55,12 +60,20 @@ def open_bus(name: str) -> Bus:
 
 def resolve_name(name: str) -> str:
     """Return the name of the bus that :func:`open_bus` would open; it is ``name`` but for auto."""
-    if name != AUTO:
-        return name
+    return next(auto_names()) if name == AUTO else name
+
+
+def auto_names() -> Iterator[str]:
+    """Yield the buses that ``auto`` may be: the first, and others for further robots beside it."""
     interface = can_interfaces().get(_AUTO_INTERFACE)
     if interface is not None and interface.is_up and hasattr(socket, 'AF_CAN'):
-        return interface.name
-    return f'udp_multicast:{DEFAULT_GROUP}'
+        yield interface.name
+    domain = os.environ.get('ROS_DOMAIN_ID', '')
+    group = f'239.74.{int(domain) % 256 if domain.isdecimal() else 0}'
+    # by its port each user of this host has buses of his own
+    port = DEFAULT_PORT + os.getuid() % _USERS
+    for number in range(2, 2 + _BUSES):
+        yield f'udp_multicast:{group}.{number}:{port}'
 
 
 def _open_multicast(name: str, channel: str) -> Bus:

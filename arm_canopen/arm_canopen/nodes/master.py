@@ -76,10 +76,11 @@ def _run(stop: threading.Event, extend: Extend | None) -> None:
     first = Node('master')
     try:
         parameters = _declare(first)
+        named = first.get_namespace().strip('/')  # of __ns, which goes before any bus.yml
     finally:
         first.destroy_node()  # bus.yml, which is known from here on, says in which namespace it is
     configs = [load_bus(path) for path in parameters.bus_configs]
-    _check_names(configs)
+    _check_names(configs, named)
     with ExitStack() as stack:
         processes = []
         for config, name in zip(configs, parameters.can_names, strict=True):
@@ -145,15 +146,20 @@ def _stop(processes: Sequence[MasterProcess], others: Sequence[Node]) -> None:
         stopping.result()
 
 
-def _check_names(configs: Sequence[BusConfig]) -> None:
-    """Refuse two nodes of one name, which would answer each other's services."""
+def _check_names(configs: Sequence[BusConfig], named: str) -> None:
+    """Refuse two nodes of one name, which would answer each other's services.
+
+    Args:
+        configs: The buses.
+        named: Namespace that the command line gives to all nodes; empty for none.
+    """
     taken: set[tuple[str, str]] = set()
     for config in configs:
-        namespace = config.master.namespace.strip('/')
+        namespace = named or config.master.namespace.strip('/')
         names = [(namespace, 'master')]
         if config.master.is_lifecycle:
             names.append((namespace, MANAGER))
-        names += [(node.namespace.strip('/'), node.name) for node in config.nodes]
+        names += [(named or node.namespace.strip('/'), node.name) for node in config.nodes]
         for name in names:
             if name in taken:
                 raise CanopenError(

@@ -97,7 +97,7 @@ class MasterProcess:
         }
         services = MasterServices(node, self._thread, self._output)
         services.check_owner = self._check_owner
-        self._diagnostics = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
+        self._diagnostics = node.create_publisher(DiagnosticArray, 'diagnostics', 10)
         node.create_timer(diagnostics_period, self._ask_diagnostics)
         node.create_timer(LISTENER_PERIOD, self._update_listeners)
         devices = {**self._devices, **self._drives}

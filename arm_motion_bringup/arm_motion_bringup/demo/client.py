@@ -42,7 +42,12 @@ class MotionClient(ArmClient):
     """
 
     def __init__(
-        self, given_up: Callable[[], bool], model: RobotModel, controller: str, period: float
+        self,
+        given_up: Callable[[], bool],
+        model: RobotModel,
+        controller: str,
+        period: float,
+        namespace: str = '',
     ) -> None:
         """Join the ROS graph.
 
@@ -51,25 +56,26 @@ class MotionClient(ArmClient):
             model: The arm, for where the tool is.
             controller: Name of the trajectory controller.
             period: Period of the cycle in [s].
+            namespace: That of the arm.
         """
-        super().__init__(given_up)
+        super().__init__(given_up, namespace)
         self.figures = MotionFigures()
         self.samples: list[Sample] = []
         self.words = ''
         self.limited: list[str] = []
         self._model, self._period = model, period
         node = self.node
-        self._twist = node.create_publisher(TwistStamped, '/servo_node/delta_twist_cmds', 10)
+        self._twist = node.create_publisher(TwistStamped, 'servo_node/delta_twist_cmds', 10)
         self._speed = node.create_publisher(
-            SpeedScalingFactor, f'/{controller}/speed_scaling_input', LATCHED
+            SpeedScalingFactor, f'{controller}/speed_scaling_input', LATCHED
         )
         self._action = ActionClient(
-            node, FollowJointTrajectory, f'/{controller}/follow_joint_trajectory'
+            node, FollowJointTrajectory, f'{controller}/follow_joint_trajectory'
         )
         node.create_subscription(
-            JointTrajectoryControllerState, f'/{controller}/controller_state', self._state, 50
+            JointTrajectoryControllerState, f'{controller}/controller_state', self._state, 50
         )
-        node.create_subscription(ServoStatus, '/servo_node/status', self._status, 10)
+        node.create_subscription(ServoStatus, 'servo_node/status', self._status, 10)
 
     @property
     def last(self) -> Sample:

@@ -26,7 +26,7 @@ from arm_bringup.session import (
 )
 from arm_bringup.stack import MOTION_MASTER
 from arm_servo import load_limits, RobotModel, ServoError
-from process_supervisor import SupervisorError, USAGE_ERROR
+from process_supervisor import parse_with_ros, RosOptions, SupervisorError, USAGE_ERROR
 from process_supervisor.arguments import seconds_from
 from process_supervisor.demo import perform
 from process_supervisor.display import Display
@@ -41,11 +41,14 @@ RATE = 100.0
 """Rate of the controller's states in [Hz]."""
 
 
-def parse(argv: Sequence[str] | None) -> argparse.Namespace:
+def parse(argv: Sequence[str]) -> tuple[argparse.Namespace, RosOptions]:
     """Parse the command line.
 
     Args:
-        argv: Arguments without the program's name; None takes those of the process.
+        argv: Arguments without the program's name.
+
+    Returns:
+        What was asked for, and the options of all nodes.
     """
     parser = argparse.ArgumentParser(
         prog='ros2 run arm_motion_bringup demo',
@@ -61,19 +64,20 @@ def parse(argv: Sequence[str] | None) -> argparse.Namespace:
         type=seconds_from(0.0),
         help='repeat it until so many seconds are over, once at least (default: until Ctrl-C)',
     )
-    return parser.parse_args(argv)
+    return parse_with_ros(parser, argv)
 
 
-def demo_files(robot: Robot, folder: Path) -> Sequence[Path]:
+def demo_files(robot: Robot, folder: Path, ros: RosOptions) -> Sequence[Path]:
     """Write the parameter files of the demo: the robot's own, and what the demo relies on.
 
     Args:
         robot: A robot with an SRDF and limits.
         folder: Where to.
+        ros: Options of all nodes.
     """
     values = {
-        controller_name(robot): {'ros__parameters': {'state_publish_rate': RATE}},
-        'servo_node': {
+        f'/**/{controller_name(robot)}': {'ros__parameters': {'state_publish_rate': RATE}},
+        '/**/servo_node': {
             'ros__parameters': {
                 'moveit_servo': {
                     'command_in_type': 'speed_units',
@@ -84,7 +88,7 @@ def demo_files(robot: Robot, folder: Path) -> Sequence[Path]:
     }
     path = folder / 'demo.yaml'
     path.write_text(json.dumps(values), encoding='utf-8')
-    return [*motion_files(robot, folder), path]
+    return [*motion_files(robot, folder, ros), path]
 
 
 def build_model(robot: Robot, urdf: str) -> RobotModel:
@@ -136,23 +140,26 @@ def run(arm: Session, duration: float | None) -> int:
         arm.processes,
         view=MotionView(ArmView(title, limits)),
         figures=MotionFigures(),
-        commands=commands(controller),
+        commands=commands(controller, arm.ros),
         make_play=make_play,
-        make_client=lambda given_up: MotionClient(given_up, model, controller, period),
+        make_client=lambda given_up: MotionClient(
+            given_up, model, controller, period, arm.ros.namespace
+        ),
         endless=False,
     )
 
 
-def commands(controller: str) -> list[str]:
+def commands(controller: str, ros: RosOptions) -> list[str]:
     """Return commands to try in a second terminal.
 
     Args:
         controller: Name of the trajectory controller.
+        ros: Options of all nodes.
     """
     return [
-        'ros2 run arm_servo servo_keyboard_input',
-        'ros2 topic echo /servo_node/status',
-        f'ros2 topic echo /{controller}/controller_state',
+        f'ros2 run arm_servo servo_keyboard_input{ros.hint}',
+        f'ros2 topic echo {ros.resolve("servo_node/status")}',
+        f'ros2 topic echo {ros.resolve(controller)}/controller_state',
     ]
 
 
@@ -165,7 +172,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns:
         0 when all went well, 1 when something did not, 2 when nothing was started.
     """
-    arguments = parse(argv)
+    arguments, ros = parse(sys.argv[1:] if argv is None else argv)
     try:
         robot = locate(arguments.robot)
         if not robot.movable:
@@ -175,6 +182,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             )
         with session(
             arguments,
+            ros,
             simulate=True,
             master=MOTION_MASTER,
             master_parameters={'diagnostics_period': '0.2'},

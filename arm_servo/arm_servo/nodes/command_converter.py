@@ -32,8 +32,8 @@ MAX_DURATION = 60.0
 class Frames(Protocol):
     """Frames of commands: links of the robot, or others whose pose is known."""
 
-    def is_link(self, frame: str) -> bool:
-        """Tell whether a frame is a link of the robot."""
+    def link(self, frame: str) -> str | None:
+        """Return the link of the robot that a frame is; None for another frame."""
 
     def pose(self, frame: str) -> Pose:
         """Return the pose of a frame that is no link in the base; raises CommandError."""
@@ -79,8 +79,8 @@ class CommandConverter:
         link, axes, about = None, None, None
         if frame and not self._parameters.about_tip:
             about = self._place(frame)
-        elif frame and self._frames.is_link(frame):
-            link = None if frame == self._model.base else frame
+        elif frame and (named := self._frames.link(frame)):
+            link = None if named == self._model.base else named
         elif frame:
             axes = self._frames.pose(frame).rotation
         return JogRequest(twist_command(self._model, twist, link, axes), expires, about)
@@ -137,7 +137,7 @@ class CommandConverter:
 
     def _place(self, frame: str) -> str | Pose:
         """Return a link, whose pose changes with the arm, or the pose of another frame."""
-        return frame if self._frames.is_link(frame) else self._frames.pose(frame)
+        return self._frames.link(frame) or self._frames.pose(frame)
 
     def _scaled(self, twist: Array) -> Array:
         """Return a twist in [m/s] and [rad/s]; what is cut off is told."""

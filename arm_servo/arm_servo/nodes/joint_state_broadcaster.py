@@ -117,8 +117,8 @@ class JointStateBroadcaster:
         self._node, self._gateway = node, gateway
         self._frame, self.rate, self._is_dynamic = declare_broadcaster(node)
         self._samples = JointSamples(gateway.model.joints)
-        self._states = node.create_publisher(JointState, '/joint_states', 10)
-        self._dynamic = node.create_publisher(DynamicJointState, '/dynamic_joint_states', 10)
+        self._states = node.create_publisher(JointState, 'joint_states', 10)
+        self._dynamic = node.create_publisher(DynamicJointState, 'dynamic_joint_states', 10)
         for name in others:
             topic = f'{name}/joint_states'
             node.create_subscription(JointState, topic, partial(self._hear, name), 10)

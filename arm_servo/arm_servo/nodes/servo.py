@@ -63,9 +63,8 @@ class Servo:
         self._parameters = parameters
         self._modes = ServoModes(node, self._stop)
         model = gateway.model
-        self.converter = CommandConverter(
-            model, TfListener(node, model), parameters, read_scales(node)
-        )
+        frames = TfListener(node, model, parameters.frame_prefix)
+        self.converter = CommandConverter(model, frames, parameters, read_scales(node))
         self._last = -FRESH
         self._refusals = Refusals()
         self._status = node.create_publisher(ServoStatus, parameters.status_topic, 10)

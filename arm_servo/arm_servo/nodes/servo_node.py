@@ -23,7 +23,7 @@ def _build(make_node: MakeNode) -> MotionThread:
     node = make_node('servo_node')
     model = declare_robot(node)
     servo = declare_servo(node, model.group)
-    topic = f'/{model.group}_controller/joint_trajectory'
+    topic = f'{model.group}_controller/joint_trajectory'
     output = declare_output(node, PREFIX, topic, TRAJECTORY)
     settings = CoreSettings(
         servo=servo.settings,

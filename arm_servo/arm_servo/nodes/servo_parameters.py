@@ -71,6 +71,7 @@ class ServoParameters:
         status_rate: Its rate in [Hz].
         clearance: Least distance between links that a jog may bring about in [m]; None is any.
         settings: How the core jogs.
+        frame_prefix: Before the names of the robot's links in TF.
     """
 
     timeout: float
@@ -83,6 +84,7 @@ class ServoParameters:
     status_rate: float
     clearance: float | None
     settings: ServoSettings
+    frame_prefix: str = ''
 
 
 def declare_servo(node: Node, group: str) -> ServoParameters:
@@ -124,6 +126,7 @@ def declare_servo(node: Node, group: str) -> ServoParameters:
         read.number('status_rate', 25.0, (1.0, 500.0), 'rate of the status [Hz]'),
         CLEARANCE if checks else None,
         ServoSettings() if checks else UNCHECKED,
+        read.text('frame_prefix', '', 'what robot_state_publisher puts before frames in TF'),
     )
 
 

@@ -69,7 +69,7 @@ def declare_loop(node: Node, prefix: str) -> LoopParameters:
     read = ParameterReader(node, prefix)
     return LoopParameters(
         read.number('publish_period', 0.01, (0.001, 0.1), 'period of the loop [s]'),
-        read.text('joint_topic', '/joint_states', 'topic of the joint states'),
+        read.text('joint_topic', 'joint_states', 'topic of the joint states'),
         read.number(
             'joint_state_timeout',
             0.5,

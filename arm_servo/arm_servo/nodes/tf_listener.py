@@ -28,22 +28,25 @@ class TfListener:
     /tf costs a Python node more than the jogging, and few need it.
     """
 
-    def __init__(self, node: Node, model: RobotModel) -> None:
+    def __init__(self, node: Node, model: RobotModel, prefix: str = '') -> None:
         """Do not listen yet.
 
         Args:
             node: The node that subscribes.
             model: The arm; its links need no TF.
+            prefix: Before the names of its links in TF.
         """
         self._node = node
-        self._base = model.base
+        self._prefix = prefix
+        self._base = prefix + model.base
         self._links = frozenset(model.frames)
         self._names = ', '.join(model.frames)
         self._tree: FrameTree | None = None
 
-    def is_link(self, frame: str) -> bool:
-        """Tell whether a frame is a link of the robot."""
-        return frame in self._links
+    def link(self, frame: str) -> str | None:
+        """Return the link of the robot that a frame is, with or without its prefix."""
+        name = frame.removeprefix(self._prefix)
+        return name if name in self._links else None
 
     def pose(self, frame: str) -> Pose:
         """Return the pose of a frame of TF in the base of the arm.

@@ -19,7 +19,7 @@ from .topic_output import ARRAY, declare_output
 from .trajectory_controller import TrajectoryController
 from .trajectory_parameters import declare_trajectory, TrajectoryParameters
 
-OUTPUT = '/forward_position_controller/commands'
+OUTPUT = 'forward_position_controller/commands'
 """Default of command_out_topic, the name that ros2_controllers' examples use."""
 
 

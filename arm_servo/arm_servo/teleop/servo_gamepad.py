@@ -67,7 +67,7 @@ class ServoGamepad(Node):
             ),
             CommandStream(1.0 / rate, rest_of),
         )
-        servo = read.text('servo', '/servo_node', 'name of the servo node')
+        servo = read.text('servo', 'servo_node', 'name of the servo node')
         base = read.text('base_frame', '', "base frame; empty takes the arm's base link")
         tool = read.text('tool_frame', '', "tool frame; empty takes the arm's tip link")
         preset = read.text('preset', AUTO, 'auto, xbox, ps or generic')

@@ -54,7 +54,7 @@ class ServoKeyboardInput(Node):
         repeat = read.number('repeat_timeout', 0.15, (0.05, 1.0), 'Time-out of its repeats [s]')
         self.kitty = read.flag('kitty', 'Ask the terminal for true key releases', default=True)
         self.evdev = read.flag('evdev', "Ask this machine's keyboards for them", default=True)
-        self.servo = read.text('servo', '/servo_node', 'name of the servo node')
+        self.servo = read.text('servo', 'servo_node', 'name of the servo node')
         self.frames = (
             read.text('base_frame', '', "base frame; empty takes the arm's base link"),
             read.text('tool_frame', '', "tool frame; empty takes the arm's tip link"),

@@ -54,7 +54,7 @@ class ServoLink:
 
         Args:
             node: The node.
-            servo: Full name of the servo's node.
+            servo: Name of the servo's node, relative to the namespace or full.
             say: Tells the person something.
             base_frame: Frame of jogs in the base; empty takes the arm's base link.
             tool_frame: Frame of jogs in the tool; empty takes the arm's tip link.
@@ -163,7 +163,7 @@ class ServoLink:
 
     def _call(self, client: Any, request: Any, what: str, granted: Callable[[], None]) -> None:  # noqa: ANN401
         if not client.service_is_ready():
-            self._say(f'{what}: there is no service {client.srv_name}; is the servo running?')
+            self._say(f'{what}: there is no service {client.service_name}; is the servo running?')
             return
 
         def take(future: Any) -> None:  # noqa: ANN401  # rclpy's Future

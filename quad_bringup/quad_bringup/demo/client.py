@@ -40,7 +40,11 @@ class QuadClient(ModeClient):
     """Commands, and hears everything; use it in one thread."""
 
     def __init__(
-        self, joints: Sequence[str], ground_truth: str, given_up: Callable[[], bool]
+        self,
+        joints: Sequence[str],
+        ground_truth: str,
+        given_up: Callable[[], bool],
+        namespace: str = '',
     ) -> None:
         """Join the ROS graph.
 
@@ -48,8 +52,9 @@ class QuadClient(ModeClient):
             joints: Names of the joints, in the order of /joint_command.
             ground_truth: Topic on which the simulator says where the body is.
             given_up: True when nothing shall be waited for any more.
+            namespace: That of the robot.
         """
-        super().__init__('demo', given_up)
+        super().__init__('demo', given_up, namespace)
         self._joints = list(joints)
         self._truth, self._odometry = Track(), Track()
         self._beat = Beat(LOOP_PERIOD)
@@ -71,7 +76,7 @@ class QuadClient(ModeClient):
             (JointState, 'joint_states', self._take_joints, sensor),
             (BatteryState, 'battery_state', self._take_battery, sensor),
             (JointCommand, 'joint_command', self._take_targets, COMMAND_QOS),
-            (DiagnosticArray, '/diagnostics', self._take_diagnostics, 50),
+            (DiagnosticArray, 'diagnostics', self._take_diagnostics, 50),
         )
         for kind, topic, callback, qos in topics:
             self.node.create_subscription(kind, topic, callback, qos)

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 import sys
 
-from process_supervisor import SupervisorError, USAGE_ERROR
+from process_supervisor import parse_with_ros, RosOptions, SupervisorError, USAGE_ERROR
 from process_supervisor.arguments import seconds_from
 from process_supervisor.demo import perform
 from quad_description import LEGS
@@ -21,15 +21,18 @@ from .itinerary import share_of, SHORTEST
 from .play import Client, Play
 from .view import QuadView
 
-GROUND_TRUTH = '/fake_xgo/ground_truth'
+GROUND_TRUTH = 'fake_xgo/ground_truth'
 """Topic on which the simulated robot says where its body is."""
 
 
-def parse(argv: Sequence[str] | None) -> argparse.Namespace:
+def parse(argv: Sequence[str]) -> tuple[argparse.Namespace, RosOptions]:
     """Parse the command line.
 
     Args:
-        argv: Arguments without the program's name; None takes those of the process.
+        argv: Arguments without the program's name.
+
+    Returns:
+        What was asked for, and the options of all nodes.
     """
     parser = argparse.ArgumentParser(
         prog='ros2 run quad_bringup demo',
@@ -45,39 +48,42 @@ def parse(argv: Sequence[str] | None) -> argparse.Namespace:
         help=f'walk for so many seconds, at least {SHORTEST:g}, and end with a summary; the exit '
         'code says whether it moved as it was told (default: until Ctrl-C)',
     )
-    return parser.parse_args(argv)
+    return parse_with_ros(parser, argv)
 
 
-def join_ros(joints: Sequence[str], given_up: Callable[[], bool]) -> Client:
+def join_ros(joints: Sequence[str], namespace: str, given_up: Callable[[], bool]) -> Client:
     """Make the ROS client of the demo; rclpy loads while the processes start.
 
     Args:
         joints: Names of the joints, in the order of /joint_command.
+        namespace: That of the robot.
         given_up: True when nothing shall be waited for any more.
     """
     from .client import QuadClient
 
-    return QuadClient(joints, GROUND_TRUTH, given_up)
+    return QuadClient(joints, GROUND_TRUTH, given_up, namespace)
 
 
-def commands(port: str) -> list[str]:
+def commands(port: str, ros: RosOptions) -> list[str]:
     """Return commands to try in a second terminal.
 
     Args:
         port: Serial port of the robot.
+        ros: Options of all nodes.
     """
     return [
-        'ros2 topic hz /joint_command',
-        'ros2 topic echo /odom',
-        f'ros2 run quad_hardware doctor --port {port}',
+        f'ros2 topic hz {ros.resolve("joint_command")}',
+        f'ros2 topic echo {ros.resolve("odom")}',
+        f'ros2 run quad_hardware doctor --port {port}{ros.hint}',
     ]
 
 
-def run(quad: Session, mode: str, duration: float | None, share: float) -> int:
+def run(quad: Session, ros: RosOptions, mode: str, duration: float | None, share: float) -> int:
     """Run the demo.
 
     Args:
         quad: The quadruped, prepared.
+        ros: Options of all nodes.
         mode: Mode in which it walks.
         duration: How long it walks in [s]; None until Ctrl-C.
         share: Of the velocities of a trot.
@@ -89,9 +95,9 @@ def run(quad: Session, mode: str, duration: float | None, share: float) -> int:
         quad.processes,
         view=QuadView(quad.title, LEGS),
         figures=Figures(),
-        commands=commands(quad.port),
+        commands=commands(quad.port, ros),
         make_play=lambda display: Play(display, mode, duration, share),
-        make_client=partial(join_ros, quad.joints),
+        make_client=partial(join_ros, quad.joints, ros.namespace),
         endless=duration is None,
     )
 
@@ -105,12 +111,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns:
         0 when all went well, 1 when something did not, 2 when nothing was started.
     """
-    arguments = parse(argv)
+    arguments, ros = parse(sys.argv[1:] if argv is None else argv)
     geometric = arguments.policy is None
     mode, share = ('walk', share_of(arguments.gait)) if geometric else ('policy', 1.0)
     try:
-        with session(arguments, None) as quad:
-            return run(quad, mode, arguments.duration, share)
+        with session(arguments, ros, None) as quad:
+            return run(quad, ros, mode, arguments.duration, share)
     except (BringupError, SupervisorError) as error:
         sys.stderr.write(f'{error}\n')
         return USAGE_ERROR

@@ -104,7 +104,7 @@ class ControllerNode(Node):
             for topic in ('joint_command', 'joint_command_shadow')
         )
         self._state = self.create_publisher(String, '~/state', LATCHED_QOS)
-        self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
+        self._diagnostics = self.create_publisher(DiagnosticArray, 'diagnostics', 10)
         self._subscribe()
         self.create_service(SetMode, 'set_mode', self._set_mode)
         self.create_service(Trigger, '~/clear_fault', self._clear_fault)

@@ -82,7 +82,7 @@ class HardwareNode(Node):
         self._battery = self.create_publisher(BatteryState, 'battery_state', SENSOR_DEPTH)
         self._tf = Stream(self.create_publisher(TFMessage, '/tf', 100))
         self._link = LinkDiagnostic()
-        self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', SENSOR_DEPTH)
+        self._diagnostics = self.create_publisher(DiagnosticArray, 'diagnostics', SENSOR_DEPTH)
         self._reader = Reader(JointCommand, 'position', 'velocity', 'effort')
         self.create_subscription(JointCommand, 'joint_command', self._take, COMMAND_QOS, raw=True)
         self.create_service(SetBool, '~/torque', self._set_torque)

@@ -259,11 +259,16 @@ def _three(read: ParameterReader, name: str, default: Vector, meaning: str) -> V
 
 def _frames(read: ParameterReader) -> Frames:
     modes = {'child': False, 'parent': True}
+    prefix = read.text('frame_prefix', '', 'before each frame, as of robot_state_publisher')
+
+    def frame(parameter: str, default: str, meaning: str) -> str:
+        return prefix + read.text(parameter, default, meaning)
+
     return Frames(
-        odom=read.text('odom_frame', 'odom', 'where the robot began'),
-        base=read.text('base_frame', 'base_link', 'the body'),
-        footprint=read.text('footprint_frame', 'base_footprint', 'on the ground below the body'),
-        imu=read.text('imu_frame', 'imu_link', 'the IMU'),
+        odom=frame('odom_frame', 'odom', 'where the robot began'),
+        base=frame('base_frame', 'base_link', 'the body'),
+        footprint=frame('footprint_frame', 'base_footprint', 'on the ground below the body'),
+        imu=frame('imu_frame', 'imu_link', 'the IMU'),
         footprint_is_parent=read.choice(
             'footprint_mode',
             'child',

@@ -36,7 +36,7 @@ class Controller:
         self._report: ControllerReport | None = None
         self._modes = CommandClient(node, SetMode, 'set_mode', say, self._granted)
         self._faults = CommandClient(node, Trigger, 'controller_node/clear_fault', say)
-        node.create_subscription(DiagnosticArray, '/diagnostics', self._take, 10)
+        node.create_subscription(DiagnosticArray, 'diagnostics', self._take, 10)
 
     def ask_mode(self, mode: Mode, now: float) -> None:
         """Ask for a mode.

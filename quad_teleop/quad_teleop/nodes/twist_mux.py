@@ -43,7 +43,7 @@ class TwistMux(Node):
         stamped = self._stamped()
         self._type: Any = TwistStamped if stamped else Twist
         self._output = self.create_publisher(self._type, 'cmd_vel_out', 1)
-        self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
+        self._diagnostics = self.create_publisher(DiagnosticArray, 'diagnostics', 10)
         for source in inputs.sources:
             take = partial(self._velocity, source.name)
             self.create_subscription(self._type, source.topic, take, 1)

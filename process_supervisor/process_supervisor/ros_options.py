@@ -1,0 +1,145 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What all ROS nodes of a bring-up have in common: their namespace, and ROS arguments."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+import re
+
+from .exceptions import StartError
+
+_BEGIN, _END = '--ros-args', '--'
+_REMAPS = frozenset({'-r', '--remap'})
+_NAMESPACE_RULE = re.compile(r'(?:[^:]*:)?__ns:=(.*)')
+_NAME_RULE = re.compile(r'(?:[^:]*:)?__(?:node|name):=')
+_NAMESPACE = re.compile(r'/?[A-Za-z_]\w*(?:/[A-Za-z_]\w*)*', re.ASCII)
+
+
+@dataclass(frozen=True, slots=True)
+class RosOptions:
+    """The options of all nodes of a bring-up.
+
+    Attributes:
+        namespace: Their namespace without a slash at either end; empty for the root.
+        arguments: What stood behind ``--ros-args``, but for the namespace.
+    """
+
+    namespace: str = ''
+    arguments: tuple[str, ...] = ()
+
+    @property
+    def frame_prefix(self) -> str:
+        """What stands before the names of TF frames, so that two robots share /tf."""
+        return f'{self.namespace}/' if self.namespace else ''
+
+    @property
+    def node_arguments(self) -> tuple[str, ...]:
+        """Words for the command line of a node, behind its ``--ros-args``."""
+        rule = ('-r', f'__ns:=/{self.namespace}') if self.namespace else ()
+        return (*rule, *self.arguments)
+
+    @property
+    def hint(self) -> str:
+        """What a person appends to ``ros2 run`` for a node beside these; begins with a blank."""
+        return f' --ros-args -r __ns:=/{self.namespace}' if self.namespace else ''
+
+    def resolve(self, name: str) -> str:
+        """Return the full name of a relative one."""
+        return f'/{self.frame_prefix}{name}'
+
+    def within(self, namespace: str) -> RosOptions:
+        """Return the same in another namespace, unless a person has named one."""
+        return self if self.namespace else replace(self, namespace=namespace.strip('/'))
+
+
+def add_namespace(parser: argparse.ArgumentParser) -> None:
+    """Declare ``--namespace``.
+
+    Args:
+        parser: Where to.
+    """
+    parser.add_argument(
+        '--namespace',
+        metavar='NS',
+        type=_namespace,
+        help='namespace of all nodes, topics and services, and prefix of all TF frames; each '
+        'robot of a ROS domain has its own (default: none). What stands behind --ros-args '
+        'reaches every node',
+    )
+
+
+def parse_with_ros(
+    parser: argparse.ArgumentParser, argv: Sequence[str]
+) -> tuple[argparse.Namespace, RosOptions]:
+    """Parse a command line that may have ROS arguments.
+
+    Args:
+        parser: With the option of :func:`add_namespace`.
+        argv: The command line without the program.
+
+    Returns:
+        What the parser found, and the options of the nodes.
+    """
+    own, ros = _split(argv)
+    arguments = parser.parse_args(own)
+    try:
+        return arguments, _options(arguments.namespace or '', ros)
+    except (StartError, argparse.ArgumentTypeError) as error:
+        parser.error(str(error))
+
+
+def _split(argv: Sequence[str]) -> tuple[list[str], list[str]]:
+    own: list[str] = []
+    ros: list[str] = []
+    current = own
+    for word in argv:
+        if word == _BEGIN:
+            current = ros
+        elif word == _END and current is ros:
+            current = own
+        else:
+            current.append(word)
+    return own, ros
+
+
+def _options(namespace: str, words: Sequence[str]) -> RosOptions:
+    kept: list[str] = []
+    for option, value in _pairs(words):
+        rule = _NAMESPACE_RULE.fullmatch(value) if option in _REMAPS else None
+        if option in _REMAPS and _NAME_RULE.match(value):
+            raise StartError(
+                f'{option} {value} would give several nodes one name; use --namespace'
+            )
+        if rule is None:
+            kept += [option, *([value] if value else [])]
+            continue
+        named = _namespace(rule[1])
+        if namespace not in {'', named}:
+            raise StartError(f'--namespace {namespace} and {option} {value} contradict each other')
+        namespace = named
+    return RosOptions(namespace, tuple(kept))
+
+
+def _pairs(words: Sequence[str]) -> Iterator[tuple[str, str]]:
+    """Yield each option with its value; flags have none."""
+    rest = iter([*words, ''])
+    word = next(rest)
+    while word:
+        value = next(rest)
+        if word.startswith('--') and value.startswith('-'):  # --disable-rosout-logs and the like
+            yield word, ''
+            word = value
+        else:
+            yield word, value
+            word = next(rest, '')
+
+
+def _namespace(text: str) -> str:
+    if not _NAMESPACE.fullmatch(text):
+        raise argparse.ArgumentTypeError(
+            f'{text!r} is no ROS namespace; letters, digits and _, e.g. left or cell/left'
+        )
+    return text.strip('/')
