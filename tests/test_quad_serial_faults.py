@@ -109,3 +109,20 @@ def test_a_broken_line_is_told_and_survived(
 def said(quad: SimulatedQuad, speaker: str, reason: str) -> int:
     """Return how often a process has given a reason so far."""
     return sum(bool(re.search(reason, line)) for line in quad.processes[speaker].lines)
+
+
+def test_with_a_dead_imu_the_robot_is_laid_down(quad: SimulatedQuad) -> None:
+    """Its fault stops the walk; lying down needs joints only, and is done; then it is cleared."""
+    told = said(quad, 'controller', 'fault, attitude')
+    standing = quad.truth[-1].pose.pose.position.z
+    request = InjectFault.Request(fault='imu')
+    assert quad.client.call(InjectFault, '/fake_xgo/fault', request).success
+    quad.walk(1.5)
+    quad.processes['controller'].wait_for('fault, attitude', count=told + 1)
+    quad.set_mode('lie')
+    quad.client.spin_until(lambda: quad.state == 'lie', 20.0, 'lying')
+    quad.spin(0.5)
+    assert quad.truth[-1].pose.pose.position.z < standing - 0.02
+    none = InjectFault.Request(fault='none')
+    assert quad.client.call(InjectFault, '/fake_xgo/fault', none).success
+    walk_again(quad)

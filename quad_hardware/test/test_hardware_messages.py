@@ -28,11 +28,11 @@ from quad_hardware.estimation.rotation import (
     yaw_of,
 )
 from quad_hardware.estimation.rotation import Quaternion as Rotation
+from quad_hardware.joints import CommandCounters
 from quad_hardware.link import DialectCounters, LinkState, LinkStatus, RobotState
 from quad_hardware.nodes import messages
 from quad_hardware.nodes.diagnostics import (
     command_diagnostic,
-    CommandCounters,
     LinkDiagnostic,
     robot_diagnostic,
 )

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 import itertools
 import math
@@ -13,7 +14,7 @@ from hypothesis import strategies as st
 import pytest
 
 from quad_description import movable_joints, Pose, pose_positions, robot_urdf
-from quad_hardware.joints import JointMap, servo_of
+from quad_hardware.joints import JointCommander, JointMap, LimiterSettings, servo_of
 from quad_hardware.joints.command_loss import CommandLoss, LossReaction, SPEED
 
 JOINTS = JointMap(servo_of(joint) for joint in movable_joints(robot_urdf('lite')))
@@ -119,3 +120,64 @@ def test_whoever_commands_ends_the_way_down(after: float) -> None:
     loss.commanded(STANDING, now)
     assert loss.step(now + PERIOD) is None
     assert not loss.in_motion
+
+
+class Line:
+    """What a commander sends its angles to; it may be cut."""
+
+    def __init__(self) -> None:
+        self.sent: list[Mapping[int, float]] = []
+        self.warned: list[str] = []
+        self.obstacle = ''
+        self.commander = JointCommander(
+            JOINTS, LimiterSettings(), LossReaction.LIE,
+            send=self._send, obstacle=lambda: self.obstacle, warn=self.warned.append,
+        )  # fmt: skip
+
+    def _send(self, angles: Mapping[int, float]) -> bool:
+        if not self.obstacle:
+            self.sent.append(angles)
+        return not self.obstacle
+
+    def walk(self, duration: float) -> float:
+        """Command swinging legs for a time from zero on; return its end [s]."""
+        for tick in range(round(duration / PERIOD)):
+            positions = [angle + 0.2 * math.sin(0.4 * tick) for angle in STANDING]
+            assert self.commander.take(positions, STAND, tick * PERIOD) is not None
+        return duration
+
+
+def test_what_breaks_off_is_sent_down_through_the_same_limits() -> None:
+    """The way down is counted and limited as commands are; at its end nothing is sent."""
+    line = Line()
+    now = line.walk(2.0) + line.commander.timeout
+    assert 'lies down' in line.commander.miss(STAND, 0.0, now)
+    before = len(line.sent)
+    while line.commander.goes_down:
+        now += PERIOD
+        line.commander.go_down(STAND, now)
+    assert line.sent[-1] == pytest.approx(JOINTS.angles(LYING))
+    assert len(line.sent) > before + 40
+    assert line.commander.go_down(STAND, now + PERIOD) is None
+    assert line.commander.counters.loss
+    assert line.commander.take(LYING, STAND, now + 1.0) is not None
+    assert not line.commander.counters.loss
+
+
+@pytest.mark.parametrize('cut', ['before', 'on the way'])
+def test_a_robot_that_is_lost_is_not_brought_down_later(cut: str) -> None:
+    """The link fails: the way down ends, and a robot that comes back is not moved unasked."""
+    line = Line()
+    now = line.walk(2.0) + line.commander.timeout
+    if cut == 'before':
+        assert 'holds as it is' in line.commander.miss({}, None, now)
+    else:
+        line.commander.miss(STAND, 0.0, now)
+        assert line.commander.go_down(STAND, now + PERIOD) is not None
+        line.obstacle = 'no report'
+        assert line.commander.go_down(STAND, now + 2 * PERIOD) is None
+        assert 'no report' in line.warned[-1]
+        line.obstacle = ''
+    assert not line.commander.goes_down
+    assert line.commander.go_down(STAND, now + 1.0) is None
+    assert line.commander.miss(STAND, 0.0, now + 2.0) == ''

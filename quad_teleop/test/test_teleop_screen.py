@@ -58,7 +58,7 @@ def test_state_of_the_controller_is_shown() -> None:
         (replace(MOVING, mode=Mode.STAND, is_heard=False), ''),
         (
             replace(VIEW, report=report('fault', 'fault', Level.ERROR, 'it fell over')),
-            'fault: it fell over; Backspace clears it',
+            'fault: it fell over; Backspace clears it, 0 lies down',
         ),
     ],
 )

@@ -4,12 +4,15 @@
 
 from .command import Command, CommandLimiter, LimiterSettings
 from .command_loss import CommandLoss, LossReaction
+from .commander import CommandCounters, JointCommander
 from .mapping import JointMap, JointServo, servo_of
 
 __all__ = [
     'Command',
+    'CommandCounters',
     'CommandLimiter',
     'CommandLoss',
+    'JointCommander',
     'JointMap',
     'JointServo',
     'LimiterSettings',

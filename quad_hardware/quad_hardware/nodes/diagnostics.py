@@ -4,13 +4,14 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict
 import math
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
 from ..estimation import Health
 from ..estimation.battery import EMPTY_BATTERY, LOW_BATTERY
+from ..joints import CommandCounters
 from ..link import latency_problem, LinkState, LinkStatus, RobotState
 from ..protocol import Fault, ParserCounters
 
@@ -42,33 +43,6 @@ _LINK_LEVELS = {
     LinkState.REFUSED: DiagnosticStatus.ERROR,
     LinkState.STOPPED: DiagnosticStatus.ERROR,
 }
-
-
-@dataclass(slots=True)
-class CommandCounters:
-    """What became of joint commands.
-
-    Attributes:
-        received: All of them.
-        refused: Of wrong length or not finite.
-        unsent: Came while the link was not running.
-        clamped: Went beyond limits and were taken to them.
-        slowed: Asked for more speed than allowed, and were approached.
-        reason: Why the last one was refused, or which joints were clamped.
-        troubled: Something was refused or clamped since the last look.
-        largest_step: Of a target since the last look [rad].
-        loss: What became of the robot when commands broke off in motion; empty while they come.
-    """
-
-    received: int = 0
-    refused: int = 0
-    unsent: int = 0
-    clamped: int = 0
-    slowed: int = 0
-    reason: str = ''
-    troubled: bool = field(default=False)
-    largest_step: float = 0.0
-    loss: str = ''
 
 
 class LinkDiagnostic:

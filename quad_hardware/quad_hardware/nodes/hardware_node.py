@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 import gc
 import math
 import sys
@@ -28,16 +28,11 @@ from quad_msgs.msg import JointCommand
 from ..estimation import Estimate, Estimator, OdometryState
 from ..estimation.gravity import tilt_of
 from ..exceptions import CommandError, HardwareError
-from ..joints import Command, CommandLimiter, CommandLoss
+from ..joints import JointCommander
 from ..joints.command import NOMINAL_PERIOD
 from ..link import Driver, LinkState, RobotState, STALE_TIME
 from . import messages
-from .diagnostics import (
-    command_diagnostic,
-    CommandCounters,
-    LinkDiagnostic,
-    robot_diagnostic,
-)
+from .diagnostics import command_diagnostic, LinkDiagnostic, robot_diagnostic
 from .parameters import declare_parameters
 
 COMMAND_QOS = QoSProfile(
@@ -66,13 +61,17 @@ class HardwareNode(Node):
         super().__init__('hardware_node')
         self._settings = settings = declare_parameters(self)
         self._joints = settings.joints
-        self._limiter = CommandLimiter(settings.joints, settings.limiter)
-        self._loss = CommandLoss(settings.joints, settings.command_loss)
+        self._commander = JointCommander(
+            settings.joints,
+            settings.limiter,
+            settings.command_loss,
+            send=self._send_angles,
+            obstacle=self._obstacle,
+            warn=self._warn,
+        )
         self._estimator = Estimator(settings.urdf, settings.joints, settings.estimator)
         self._driver = Driver(settings.link, self._report, self._link_changed)
         self._latest: tuple[RobotState, Estimate] | None = None  # while the link is running
-        self._counters = CommandCounters()
-        self._last_targets: tuple[float, ...] = ()
         self._limp = False
         self._joint_states = Stream(
             self.create_publisher(JointState, 'joint_states', SENSOR_DEPTH)
@@ -88,7 +87,8 @@ class HardwareNode(Node):
         self.create_service(SetBool, '~/torque', self._set_torque)
         self.create_timer(settings.diagnostics_period, self._diagnose)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._silence = self.create_timer(self._loss.timeout, self._miss_commands, clock=steady)
+        timeout = self._commander.timeout
+        self._silence = self.create_timer(timeout, self._miss_commands, clock=steady)
         self._descent = self.create_timer(NOMINAL_PERIOD, self._go_down, clock=steady)
         for timer in (self._silence, self._descent):
             timer.cancel()
@@ -101,9 +101,9 @@ class HardwareNode(Node):
 
     def end(self) -> None:
         """Close the port; the servos hold their last target, at rest."""
-        if self._loss.in_motion:
+        if self._commander.in_motion:
             self._miss_commands()
-        while self._loss.goes_down:
+        while self._commander.goes_down:
             self._go_down()
             time.sleep(NOMINAL_PERIOD)
         self._driver.stop()
@@ -163,7 +163,7 @@ class HardwareNode(Node):
         """Say how the link is; runs in the thread of the driver."""
         if state is not LinkState.RUNNING:
             self._latest = None  # the robot may be moved while nobody sees it
-            self._limiter.reset()
+            self._commander.lose()
         if state in {LinkState.REFUSED, LinkState.FAILED}:
             self.get_logger().error(f'{state.value}: {detail}')
         elif state in {LinkState.STALE, LinkState.CONNECTING}:
@@ -174,75 +174,49 @@ class HardwareNode(Node):
             self.get_logger().info(f'{state.value}: {detail}')
 
     def _take(self, data: bytes) -> None:
-        self._counters.received += 1
+        self._commander.counters.received += 1
         now = time.monotonic()
         message, numbers = self._reader.read(data)
         positions = numbers[: len(message.position)]
         try:
-            self._check_rest(message, numbers[len(positions) :])
-            self._limiter.check(positions)
-            command = self._send(positions, now)
+            _check_rest(message, numbers[len(positions) :])
         except CommandError as error:
-            self._counters.refused += 1
-            self._trouble(f'joint command refused: {error}')
+            self._commander.refuse(error)
             return
-        if command is not None:
-            self._loss.commanded(command.targets, now)
-            self._counters.loss = ''
+        if command := self._commander.take(positions, self._place(now), now):
+            self._estimator.command(now, command.targets)
             self._descent.cancel()
             self._silence.reset()
-
-    def _send(self, positions: Sequence[float], now: float) -> Command | None:
-        """Send what may be sent of some positions [rad]; None for nothing.
-
-        Raises:
-            CommandError: It is no command.
-        """
-        place = self._place(now)
-        if not place:
-            self._drop(self._driver.status().detail)
-            return None
-        measured = [place.get(name) for name in self._joints.names]
-        command = self._limiter.step(positions, measured, now)
-        if self._limp:
-            self._drop('the servos are without torque; call ~/torque with true')
-        elif self._driver.command(self._joints.angles(command.targets)):
-            self._estimator.command(now, command.targets)
-            self._count(command)
-            return command
-        else:
-            self._drop(self._driver.status().detail)
-        return None
 
     def _miss_commands(self) -> None:
         """Bring the robot down when its commands broke off in motion, or say why not."""
         self._silence.cancel()
-        if not self._loss.in_motion:
-            return
-        now = time.monotonic()
-        reason = self._loss.begin(self._place(now), self._tilt(), now)
-        does = f'holds as it is, for {reason}' if reason else 'lies down'
-        self._counters.loss = (
-            f'joint commands broke off while the legs moved: the robot {does}; '
-            'is the controller running?'
-        )
-        self.get_logger().error(self._counters.loss)
-        if not reason:
+        now, latest = time.monotonic(), self._latest
+        attitude = latest[1].attitude if latest is not None else None
+        tilt = None if attitude is None else tilt_of(attitude)
+        if loss := self._commander.miss(self._place(now), tilt, now):
+            self.get_logger().error(loss)
             self._descent.reset()
 
     def _go_down(self) -> None:
         now = time.monotonic()
-        positions = self._loss.step(now)
-        if positions is None:
+        if command := self._commander.go_down(self._place(now), now):
+            self._estimator.command(now, command.targets)
+        else:
             self._descent.cancel()
-            return
-        if self._send(positions, now) is None:
-            self._loss.forget()
 
-    def _tilt(self) -> float | None:
-        """Return how far the body leans [rad]; None when nobody knows."""
-        attitude = self._latest[1].attitude if self._latest is not None else None
-        return None if attitude is None else tilt_of(attitude)
+    def _send_angles(self, angles: Mapping[int, float]) -> bool:
+        return not self._limp and self._driver.command(angles)
+
+    def _obstacle(self) -> str:
+        """Say why nothing is sent to the servos."""
+        status = self._driver.status()
+        if self._limp and status.state is LinkState.RUNNING:
+            return 'the servos are without torque; call ~/torque with true'
+        return status.detail
+
+    def _warn(self, reason: str) -> None:
+        self.get_logger().warning(reason, throttle_duration_sec=WARN_PERIOD)
 
     def _place(self, now: float) -> dict[str, float]:
         """Return where the joints are [rad], [m]; empty when the robot was not seen lately."""
@@ -250,13 +224,6 @@ class HardwareNode(Node):
         if latest is None or now - latest[0].arrival > STALE_TIME:
             return {}
         return latest[1].positions
-
-    def _drop(self, reason: str) -> None:
-        self._limiter.reset()
-        self._loss.forget()
-        self._last_targets = ()
-        self._counters.unsent += 1
-        self._trouble(f'joint command not sent: {reason}')
 
     def _set_torque(
         self, request: SetBool.Request, response: SetBool.Response
@@ -271,47 +238,10 @@ class HardwareNode(Node):
             response.message = self._driver.status().detail
             return response
         self._limp = not on
-        self._limiter.reset()
-        self._loss.forget()
+        self._commander.forget()
         response.message = 'the servos hold' if on else 'the servos are without torque'
         self.get_logger().info(response.message)
         return response
-
-    def _check_rest(self, message: JointCommand, rest: Sequence[float]) -> None:
-        """Refuse velocities and efforts that do not fit the positions; servos take neither."""
-        for name, values in (('velocity', message.velocity), ('effort', message.effort)):
-            if values and len(values) != len(message.position):
-                raise CommandError(
-                    f'{len(values)} values of {name} for {len(message.position)} positions; '
-                    'leave them out or give one for each'
-                )
-        if not all(map(math.isfinite, rest)):
-            raise CommandError('velocity or effort holds what is no finite number')
-
-    def _count(self, command: Command) -> None:
-        counters, legs = self._counters, self._joints.leg_count
-        pairs = zip(self._last_targets[:legs], command.targets[:legs], strict=False)
-        step = max((abs(after - before) for before, after in pairs), default=0.0)
-        counters.largest_step = max(counters.largest_step, step)
-        self._last_targets = command.targets
-        counters.slowed += bool(command.slowed)
-        if command.unseen:
-            self._trouble(
-                f'nobody measures where {", ".join(command.unseen)} is: it goes to its first '
-                'target at the lowest speed'
-            )
-        if command.clamped:
-            counters.clamped += 1
-        beyond = {
-            'beyond limits, taken to them': set(command.clamped) - set(command.outside),
-            'found beyond limits, moved only towards them': command.outside,
-        }
-        if told := [f'{what}: {", ".join(sorted(who))}' for what, who in beyond.items() if who]:
-            self._trouble('; '.join(told))
-
-    def _trouble(self, reason: str) -> None:
-        self._counters.reason, self._counters.troubled = reason, True
-        self.get_logger().warning(reason, throttle_duration_sec=WARN_PERIOD)
 
     def _diagnose(self) -> None:
         name, port, latest = self.get_name(), self._settings.link.path, self._latest
@@ -320,7 +250,7 @@ class HardwareNode(Node):
         array.header.stamp = now
         array.status = [
             self._link.describe(name, port, self._driver.status()),
-            command_diagnostic(name, port, self._counters),
+            command_diagnostic(name, port, self._commander.counters),
         ]
         if latest is not None:
             state, _ = latest
@@ -331,6 +261,18 @@ class HardwareNode(Node):
             )
             self._battery.publish(messages.battery(health.battery, now))
         self._diagnostics.publish(array)
+
+
+def _check_rest(message: JointCommand, rest: Sequence[float]) -> None:
+    """Refuse velocities and efforts that do not fit the positions; servos take neither."""
+    for name, values in (('velocity', message.velocity), ('effort', message.effort)):
+        if values and len(values) != len(message.position):
+            raise CommandError(
+                f'{len(values)} values of {name} for {len(message.position)} positions; '
+                'leave them out or give one for each'
+            )
+    if not all(map(math.isfinite, rest)):
+        raise CommandError('velocity or effort holds what is no finite number')
 
 
 def main() -> int:

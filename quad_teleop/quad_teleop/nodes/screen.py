@@ -67,7 +67,7 @@ def hint(view: View) -> str:
     """
     report = view.report
     if report is not None and report.has_fault:
-        return f'fault: {report.message}; Backspace clears it'
+        return f'fault: {report.message}; Backspace clears it, 0 lies down'
     if view.velocity is None or not view.is_heard:
         return ''
     moves = report.follows_velocities if report else view.mode is None or view.mode.moves

@@ -1,0 +1,193 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""From joint commands to servo angles: checked, limited, counted, and watched for their end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from ..exceptions import CommandError
+from .command import Command, CommandLimiter, LimiterSettings
+from .command_loss import CommandLoss, LossReaction
+from .mapping import JointMap
+
+
+@dataclass(slots=True)
+class CommandCounters:
+    """What became of joint commands.
+
+    Attributes:
+        received: All of them.
+        refused: Of wrong length or not finite.
+        unsent: Came while the link was not running.
+        clamped: Went beyond limits and were taken to them.
+        slowed: Asked for more speed than allowed, and were approached.
+        reason: Why the last one was refused, or which joints were clamped.
+        troubled: Something was refused or clamped since the last look.
+        largest_step: Of a target since the last look [rad].
+        loss: What became of the robot when commands broke off in motion; empty while they come.
+    """
+
+    received: int = 0
+    refused: int = 0
+    unsent: int = 0
+    clamped: int = 0
+    slowed: int = 0
+    reason: str = ''
+    troubled: bool = field(default=False)
+    largest_step: float = 0.0
+    loss: str = ''
+
+
+class JointCommander:
+    """Lets joint commands through to the servos; times are on the monotonic clock [s].
+
+    Attributes:
+        counters: What became of them.
+        timeout: Time after the last command at which :meth:`miss` is to be called [s].
+    """
+
+    def __init__(
+        self,
+        joints: JointMap,
+        limiter: LimiterSettings,
+        reaction: LossReaction,
+        *,
+        send: Callable[[Mapping[int, float]], bool],
+        obstacle: Callable[[], str],
+        warn: Callable[[str], None],
+    ) -> None:
+        """Begin without a stream.
+
+        Args:
+            joints: Of the robot.
+            limiter: How fast targets may move.
+            reaction: What the robot does when commands break off while its legs move.
+            send: Has servo angles sent, by motor id [deg]; returns whether they are.
+            obstacle: Says why nothing is sent.
+            warn: Takes what is the matter with a command.
+        """
+        self.counters = CommandCounters()
+        self._joints = joints
+        self._limiter = CommandLimiter(joints, limiter)
+        self._loss = CommandLoss(joints, reaction)
+        self._send_angles, self._obstacle, self._warn = send, obstacle, warn
+        self._last_targets: tuple[float, ...] = ()
+        self.timeout = self._loss.timeout
+
+    @property
+    def in_motion(self) -> bool:
+        """Whether the legs moved at the end of the last stream of commands."""
+        return self._loss.in_motion
+
+    @property
+    def goes_down(self) -> bool:
+        """Whether the robot is on its way down, because commands broke off."""
+        return self._loss.goes_down
+
+    def lose(self) -> None:
+        """Begin anew with the next command, for the robot was lost; any thread may call it."""
+        self._limiter.reset()
+
+    def forget(self) -> None:
+        """Begin anew with the next command, and do not miss it: servos were let go, or not."""
+        self._limiter.reset()
+        self._loss.forget()
+        self._last_targets = ()
+
+    def refuse(self, error: CommandError) -> None:
+        """Count a command that is none."""
+        self.counters.refused += 1
+        self._trouble(f'joint command refused: {error}')
+
+    def take(
+        self, positions: Sequence[float], place: Mapping[str, float], now: float
+    ) -> Command | None:
+        """Take a command, and return what was sent for it; None for nothing.
+
+        Args:
+            positions: Targets of the first joints, in the order of the URDF [rad], [m].
+            place: Where the joints are [rad], [m]; empty when the robot was not seen lately.
+            now: Time [s].
+        """
+        command = self._send(positions, place, now)
+        if command is not None:
+            self._loss.commanded(command.targets, now)
+            self.counters.loss = ''
+        return command
+
+    def miss(self, place: Mapping[str, float], tilt: float | None, now: float) -> str:
+        """Bring the robot down, if its commands broke off in motion; return what it does.
+
+        Args:
+            place: As in :meth:`take`.
+            tilt: Of the body [rad]; None when nobody knows.
+            now: Time [s].
+        """
+        if not self._loss.in_motion:
+            return ''
+        reason = self._loss.begin(place, tilt, now)
+        does = f'holds as it is, for {reason}' if reason else 'lies down'
+        self.counters.loss = (
+            f'joint commands broke off while the legs moved: the robot {does}; '
+            'is the controller running?'
+        )
+        return self.counters.loss
+
+    def go_down(self, place: Mapping[str, float], now: float) -> Command | None:
+        """Send the next targets on the way down; None for nothing, at its end too."""
+        positions = self._loss.step(now)
+        command = None if positions is None else self._send(positions, place, now)
+        if command is None:
+            self._loss.forget()
+        return command
+
+    def _send(
+        self, positions: Sequence[float], place: Mapping[str, float], now: float
+    ) -> Command | None:
+        try:
+            self._limiter.check(positions)
+            if not place:
+                self._drop()
+                return None
+            measured = [place.get(name) for name in self._joints.names]
+            command = self._limiter.step(positions, measured, now)
+        except CommandError as error:
+            self.refuse(error)
+            return None
+        if not self._send_angles(self._joints.angles(command.targets)):
+            self._drop()
+            return None
+        self._count(command)
+        return command
+
+    def _drop(self) -> None:
+        self.forget()
+        self.counters.unsent += 1
+        self._trouble(f'joint command not sent: {self._obstacle()}')
+
+    def _count(self, command: Command) -> None:
+        counters, legs = self.counters, self._joints.leg_count
+        pairs = zip(self._last_targets[:legs], command.targets[:legs], strict=False)
+        step = max((abs(after - before) for before, after in pairs), default=0.0)
+        counters.largest_step = max(counters.largest_step, step)
+        self._last_targets = command.targets
+        counters.slowed += bool(command.slowed)
+        if command.unseen:
+            self._trouble(
+                f'nobody measures where {", ".join(command.unseen)} is: it goes to its first '
+                'target at the lowest speed'
+            )
+        if command.clamped:
+            counters.clamped += 1
+        beyond = {
+            'beyond limits, taken to them': set(command.clamped) - set(command.outside),
+            'found beyond limits, moved only towards them': command.outside,
+        }
+        if told := [f'{what}: {", ".join(sorted(who))}' for what, who in beyond.items() if who]:
+            self._trouble('; '.join(told))
+
+    def _trouble(self, reason: str) -> None:
+        self.counters.reason, self.counters.troubled = reason, True
+        self._warn(reason)
