@@ -72,6 +72,7 @@ class Rig(ABC):
                 *arguments,
             ]
             self.node = self.start()
+            self.node.wait_for('running: reports arrive', TIMEOUT)
             self.wait_until_ready()
         except BaseException:
             self._stack.close()

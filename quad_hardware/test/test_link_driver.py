@@ -107,8 +107,10 @@ def test_servos_let_go_and_hold_again(rig: Rig) -> None:
     rig.reports(1)
     assert rig.driver.torque(on=False)
     wait_for(lambda: not rig.peer.torque, 'torque off')
+    wait_for(lambda: rig.driver.limp, 'limp servos')
     assert rig.driver.torque(on=True)
     wait_for(lambda: rig.peer.torque, 'torque on')
+    wait_for(lambda: not rig.driver.limp, 'servos that hold')
     assert rig.peer.commands == []
     rig.peer.unplug()
     rig.reach(LinkState.CONNECTING)

@@ -101,6 +101,7 @@ def test_a_change_of_torque_that_is_not_sent_is_told(tmp_path: Path) -> None:
         driver.stop()
         assert accepted == [True]
         assert peer.torque
+        assert not driver.limp
     (failure,) = [detail for state, detail in changes if state is LinkState.FAILED]
     assert 'torque' in failure
 

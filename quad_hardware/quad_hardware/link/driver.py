@@ -36,6 +36,9 @@ class Driver:
     or nothing when it is taken; ``on_change`` when the state of the link changes. Both must be
     quick; when one of them fails, the conversation begins anew, and the link says so. Nothing is
     sent to servos while no report is taken: they hold their last target.
+
+    Attributes:
+        limp: Whether the last change of torque that was sent let the servos go.
     """
 
     def __init__(
@@ -52,7 +55,8 @@ class Driver:
         self._stopping = threading.Event()
         self._wake_read, self._wake_write = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
         self._mailbox = Mailbox()
-        self._torque_unsent = False  # accepted, taken from the mailbox, and not written yet
+        self._torque_unsent: bool | None = None  # taken from the mailbox, and not written yet
+        self.limp = False
         self._state = LinkState.CONNECTING
         self._detail = 'not started'
         self._session: Session | None = None
@@ -134,8 +138,8 @@ class Driver:
     def _enter(self, state: LinkState, detail: str) -> None:
         if state is LinkState.RUNNING:
             self._mailbox.open()
-        elif self._mailbox.close().torque is not None or self._torque_unsent:
-            self._torque_unsent = False
+        elif self._mailbox.close().torque is not None or self._torque_unsent is not None:
+            self._torque_unsent = None
             detail += '; a change of torque was not sent'
         if (state, detail) != (self._state, self._detail):
             self._state, self._detail = state, detail
@@ -199,7 +203,8 @@ class Driver:
             step = dialect.step(now)
             if step.send:
                 session.port.write(step.send)
-            self._torque_unsent = dialect.torque_pending
+            if self._torque_unsent is not None and not dialect.torque_pending:
+                self.limp, self._torque_unsent = not self._torque_unsent, None
             timeout = min(step.wake, self._deadline(now)) - now
             if session.parser.pending:
                 timeout = min(timeout, QUIET_TIME)
@@ -228,7 +233,7 @@ class Driver:
             self._commands += 1
         if orders.torque is not None:
             dialect.torque(on=orders.torque)
-            self._torque_unsent = True
+            self._torque_unsent = orders.torque
 
     def _listen(self, session: Session, timeout: float, bytes_at: float) -> float:
         """Wait for bytes or a command; return when bytes last came [s]."""

@@ -72,7 +72,6 @@ class HardwareNode(Node):
         self._estimator = Estimator(settings.urdf, settings.joints, settings.estimator)
         self._driver = Driver(settings.link, self._report, self._link_changed)
         self._latest: tuple[RobotState, Estimate] | None = None  # while the link is running
-        self._limp = False
         self._joint_states = Stream(
             self.create_publisher(JointState, 'joint_states', SENSOR_DEPTH)
         )
@@ -206,12 +205,12 @@ class HardwareNode(Node):
             self._descent.cancel()
 
     def _send_angles(self, angles: Mapping[int, float]) -> bool:
-        return not self._limp and self._driver.command(angles)
+        return not self._driver.limp and self._driver.command(angles)
 
     def _obstacle(self) -> str:
         """Say why nothing is sent to the servos."""
         status = self._driver.status()
-        if self._limp and status.state is LinkState.RUNNING:
+        if self._driver.limp and status.state is LinkState.RUNNING:
             return 'the servos are without torque; call ~/torque with true'
         return status.detail
 
@@ -237,7 +236,6 @@ class HardwareNode(Node):
         if not response.success:
             response.message = self._driver.status().detail
             return response
-        self._limp = not on
         self._commander.forget()
         response.message = 'the servos hold' if on else 'the servos are without torque'
         self.get_logger().info(response.message)
