@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 import math
 
@@ -58,8 +59,10 @@ class PhysicsRig:
         gait: GaitParameters | None = None,
         policy: Policy | None = None,
         model: Quadruped = MODEL,
+        sense: Callable[[Robot], Measurement] = measure,
     ) -> None:
-        """Stand up."""
+        """Stand up, by what the robot's sensors say."""
+        self._sense = sense
         self.robot, self.model = robot or Robot(robot_urdf()), model
         self.controller = Controller(
             model, gait or GaitParameters(), StateParameters(), policy=policy
@@ -77,7 +80,7 @@ class PhysicsRig:
     def step(self, velocity: Velocity) -> None:
         """Pass one period."""
         self.controller.set_velocity(velocity)
-        output = self.controller.step(measure(self.robot), PERIOD)
+        output = self.controller.step(self._sense(self.robot), PERIOD)
         if output.targets is not None:
             self.robot.set_targets(dict(zip(self.model.names, output.targets, strict=True)))
         self.robot.step(PERIOD)

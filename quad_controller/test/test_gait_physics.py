@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 import math
 
 import pytest
@@ -14,8 +15,12 @@ from quad_controller.gait.parameters import GaitParameters
 from quad_controller.gait.servo_compensation import ServoModel
 from quad_controller.gait.velocity import Velocity
 from quad_controller.model.quadruped import quadruped
+from quad_controller.states.measurement import Measurement
 from quad_description import robot_urdf
-from quad_gait_physics import PhysicsRig
+from quad_gait_physics import measure, PhysicsRig
+from quad_hardware.estimation import ImuMounting
+from quad_hardware.estimation.imu_mounting import UNCHECKED_DEVIATION
+from quad_hardware.estimation.rotation import about_z, multiply, yaw_of
 from quad_hardware.sim.physics import Robot
 from quad_hardware.sim.servo import ServoParameters
 from quad_hardware.sim.terrain import Terrain
@@ -168,3 +173,35 @@ def test_compensation_makes_soft_servos_keep_their_speed() -> None:
         errors.append(abs(rig.travel(5.0, Velocity(0.2)).x - 0.2))
     assert errors[0] > 0.04
     assert errors[1] < 0.03
+
+
+def yawed_imu(mounting: ImuMounting, robot: Robot) -> Measurement:
+    """What a controller gets of an IMU that is turned by 180 degrees about the vertical."""
+    measured = measure(robot)
+    assert measured.imu is not None
+    x, y, z, w = multiply(measured.imu.orientation, about_z(math.pi))
+    roll = math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
+    pitch = math.asin(2 * (w * y - z * x))
+    reported = math.degrees(roll), math.degrees(pitch), math.degrees(yaw_of((x, y, z, w)))
+    deviation = 0.02 if mounting.checked else UNCHECKED_DEVIATION
+    imu = replace(measured.imu, orientation=mounting.attitude(reported), deviation=deviation)
+    return replace(measured, imu=imu)
+
+
+@pytest.mark.parametrize(
+    ('mounting', 'least', 'most'),
+    [
+        (ImuMounting(about_z(math.pi), checked=True), 4.0, 6.5),  # levelled
+        (ImuMounting(), 7.5, 8.5),  # as the slope is
+    ],
+    ids=['mounting is known', 'nobody has checked it'],
+)
+def test_an_imu_that_sits_otherwise_tilts_nobody(
+    mounting: ImuMounting, least: float, most: float
+) -> None:
+    """On a slope of 8 degrees; taken for an IMU that sits right, it tilts the body by 16."""
+    slope = Robot(robot_urdf(), terrain=Terrain.slope(math.radians(8.0)))
+    rig = PhysicsRig(slope, sense=partial(yawed_imu, mounting))
+    rig.run(3.0)
+    assert rig.state == 'stand'
+    assert least < math.degrees(rig.robot.base_pose.tilt) < most
