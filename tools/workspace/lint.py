@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 import os
 from pathlib import Path
 import subprocess
@@ -41,7 +42,7 @@ def type_check_units(root: Path) -> dict[str, list[Path]]:
 
 
 def lint(layout: Layout, environ: Mapping[str, str]) -> int:
-    """Run all checks, also after one that failed.
+    """Run all checks side by side, also after one that failed.
 
     Returns:
         0 when all passed, else 1.
@@ -54,17 +55,28 @@ def lint(layout: Layout, environ: Mapping[str, str]) -> int:
     for name, folders in type_check_units(layout.root).items():
         cache = layout.root / '.mypy_cache' / name
         commands.append([bin_folder / 'mypy', '--cache-dir', cache, *folders])
-    failed = 0
-    for command in commands:
-        names = [
-            os.path.relpath(part, layout.root) if isinstance(part, Path) else part
-            for part in command
-        ]
-        print('==', ' '.join(names), flush=True)
-        failed += bool(
-            subprocess.run(
-                command, cwd=layout.root, env=clean_environment(environ), check=False
-            ).returncode
+    environment = clean_environment(environ)
+
+    def run(command: list[str | Path]) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            command,
+            cwd=layout.root,
+            env=environment,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            check=False,
         )
+
+    failed = 0
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        for command, done in zip(commands, pool.map(run, commands), strict=True):
+            print('==', ' '.join(_shown(layout.root, part) for part in command))
+            print(done.stdout, end='', flush=True)
+            failed += bool(done.returncode)
     print(f'{failed} of {len(commands)} checks failed' if failed else 'All checks passed')
     return int(failed > 0)
+
+
+def _shown(root: Path, part: str | Path) -> str:
+    return os.path.relpath(part, root) if isinstance(part, Path) else part
