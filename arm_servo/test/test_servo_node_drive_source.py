@@ -119,6 +119,22 @@ def test_a_silent_drive_is_led_to_rest_on_the_path_with_the_others() -> None:
     assert np.abs(np.diff(path, axis=0)[-1]).max() == 0.0
 
 
+def test_drives_that_are_cut_off_together_are_named_together() -> None:
+    """One of them is silent a cycle before the others, whose last TPDOs are nearly as old."""
+    drives = attached()
+    command = swing(drives)
+    drives.run(60)
+    silent = Refusal(RefusalCause.SILENT, 'the last is 0.5 s old')
+    drives.axes = [replace(axis, age=0.495) for axis in drives.axes]
+    drives.axes[2] = replace(drives.axes[2], refusal=silent, age=0.505)
+    drives.axes[6] = replace(drives.axes[6], age=0.02)
+    drives.run(200)
+    ending = outcome(command)
+    for axis in drives.axes[:6]:
+        assert axis.name in ending.reason
+    assert drives.axes[6].name not in ending.reason
+
+
 def test_a_drive_that_was_taken_away_comes_back_when_attached_again() -> None:
     """Another client's target is left alone until the next attach; then all goes on from there."""
     drives = attached()

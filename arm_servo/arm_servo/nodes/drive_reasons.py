@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+import math
 
 from arm_canopen import AxisFeedback, Refusal, RefusalCause
 
@@ -34,6 +35,9 @@ REMEDIES: Mapping[RefusalCause, str] = {
     RefusalCause.SHUTDOWN: 'start the master again',
 }
 
+SILENT_SHARE = 0.5
+"""Share of the age of a silent drive from which on another one counts as silent, too."""
+
 PLURAL = {'is': 'are', 'has': 'have', 'was': 'were', 'does': 'do', 'moves': 'move'}
 """Words with which reasons begin, as they are said of several drives."""
 
@@ -62,13 +66,25 @@ def what_happened(feedback: Sequence[AxisFeedback], released: Released) -> tuple
         feedback: State of each drive.
         released: Drives that were taken away.
     """
-    causes = [(axis.name, released.get(axis.name) or axis.refusal) for axis in feedback]
+    causes: list[tuple[str, Refusal | str | None]] = [
+        (axis.name, released.get(axis.name) or axis.refusal) for axis in feedback
+    ]
+    oldest = max((axis.age for axis in feedback if _is_silent(axis)), default=math.inf)
+    for number, axis in enumerate(feedback):
+        # what cuts several drives off at once shows of some of them a few cycles later
+        if causes[number][1] is None and axis.age > SILENT_SHARE * oldest:
+            detail = f'the last is {axis.age:.1f} s old'
+            causes[number] = axis.name, Refusal(RefusalCause.SILENT, detail)
     is_behind = any(
         isinstance(cause, Refusal) and cause.cause is RefusalCause.NOT_FOLLOWING
         for _, cause in causes
     )
     code = GoalCode.PATH_TOLERANCE_VIOLATED if is_behind else GoalCode.INVALID_GOAL
     return _sentence(causes) or why_not(feedback, released), code
+
+
+def _is_silent(axis: AxisFeedback) -> bool:
+    return axis.refusal is not None and axis.refusal.cause is RefusalCause.SILENT
 
 
 UNKNOWN = 'accepts no set-points; see the log of the master'
