@@ -40,8 +40,8 @@ from arm_servo.gateway import CommandGateway
 from arm_servo.nodes.following import FollowingLimits, FollowingWatch
 from arm_servo.nodes.joint_feedback import JointFeedback
 from arm_servo.nodes.motion_thread import MotionCycle, MotionThread
-from arm_servo.nodes.real_time import prefer_this_thread
 from arm_servo.requests import JogRequest
+from realtime_loop import raise_priority
 
 if TYPE_CHECKING:
     from isolation import Isolation
@@ -308,7 +308,7 @@ def loop(period: float) -> Rows:
     thread = MotionThread(
         Timed(gateway, feedback, put, watch),
         period,
-        lambda: words.append(prefer_this_thread(40)),
+        lambda: words.append(raise_priority(40, 'the loop').text),
     )
     thread.start()
     while time.monotonic() - begin[0] < SECONDS:
@@ -318,7 +318,7 @@ def loop(period: float) -> Rows:
         time.sleep(0.02)
     thread.stop()
     half, most, worst = 1e6 * np.percentile(late, [50, 99, 100])
-    kind = words[0] if words and words[0] else 'with real-time priority'
+    kind = words[0]
     return [
         (
             f'loop at {1 / period:.0f} Hz, late by p50 / p99 / max',

@@ -4,9 +4,10 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
+from itertools import combinations, pairwise
 import math
 import threading
+import time
 
 import numpy as np
 import pytest
@@ -101,6 +102,28 @@ def test_a_cycle_that_raises_is_the_end_and_the_arm_comes_to_rest() -> None:
     speeds = [point.state.velocity[0] for point in arm.points[before - 1 :]]
     most = arm.gateway.model.limits.acceleration[0]
     assert max(a - b for a, b in pairwise(speeds)) <= 1.01 * most * 0.001
+
+
+def test_a_stall_is_no_burst_of_cycles() -> None:
+    """Cycles that were missed are left out: of n in a row at most the first is late."""
+    arm, cycle_period = Elsewhere(), 0.01
+    begins: list[float] = []
+    enough = threading.Event()
+
+    def step(now: float, period: float) -> None:
+        begins.append(time.monotonic())
+        if len(begins) == 3:
+            time.sleep(8.5 * cycle_period)  # the stall
+        if len(begins) == 15:
+            enough.set()
+
+    arm.cycle.step = step  # type: ignore[method-assign]
+    thread = MotionThread(arm.cycle, cycle_period)
+    thread.start()
+    assert enough.wait(10.0)
+    thread.stop()
+    for (i, first), (j, last) in combinations(enumerate(begins), 2):
+        assert last - first > (j - i - 1) * cycle_period - 1e-4
 
 
 def test_commands_are_refused_before_the_first_joint_state() -> None:

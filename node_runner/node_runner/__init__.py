@@ -9,6 +9,7 @@ from .log_bridge import log_as, RosLogBridge
 from .misspelt import refuse_misspelt, refuse_similar
 from .parameter_reader import ParameterReader
 from .program import run_node, run_program
+from .realtime import declare_thread_priority, raise_thread_priority, settle_process_memory
 from .signals import stop_on_signals
 from .spinning import make_executor, spin, WAKE_PERIOD
 
@@ -17,15 +18,18 @@ __all__ = [
     'ParameterError',
     'ParameterReader',
     'RosLogBridge',
+    'declare_thread_priority',
     'destroyed_if_refused',
     'destroyed_when_refused',
     'init_ros',
     'log_as',
     'make_executor',
+    'raise_thread_priority',
     'refuse_misspelt',
     'refuse_similar',
     'run_node',
     'run_program',
+    'settle_process_memory',
     'spin',
     'stop_on_signals',
 ]

@@ -50,10 +50,16 @@ class DeviceRunner:
         self._calls: SimpleQueue[tuple[Callable[[], None], Future[Any]]] = SimpleQueue()
         self._stopping = False
         self._bus_failed = False
+        self._begin: Callable[[], None] = lambda: None
         self._thread = threading.Thread(target=self.run, name='devices', daemon=True)
 
-    def start(self) -> None:
-        """Switch the devices on, in a thread of their own."""
+    def start(self, begin: Callable[[], None] = lambda: None) -> None:
+        """Switch the devices on, in a thread of their own.
+
+        Args:
+            begin: Called first in the thread, which may want a priority.
+        """
+        self._begin = begin
         self._thread.start()
 
     def stop(self) -> None:
@@ -93,6 +99,7 @@ class DeviceRunner:
     def run(self) -> None:
         """Run the devices in this thread, until :meth:`stop` is called from another one."""
         try:
+            self._begin()
             while not self._stopping:
                 self._step()
         finally:

@@ -13,6 +13,8 @@ import threading
 import time
 from typing import Any, TypeVar
 
+from realtime_loop import CycleTimer
+
 from ..can.bus import Bus
 from ..can.frame import Frame
 from ..exceptions import BusError
@@ -56,10 +58,16 @@ class NetworkThread:
         self._ended = False
         self._open: set[Future[Any]] = set()
         self._bus_failed = False
+        self._begin: Callable[[], None] = lambda: None
         self._thread = threading.Thread(target=self._run, name='canopen', daemon=True)
 
-    def start(self) -> None:
-        """Start the network and its cycle."""
+    def start(self, begin: Callable[[], None] = lambda: None) -> None:
+        """Start the network and its cycle.
+
+        Args:
+            begin: Called first in the thread, which may want a priority.
+        """
+        self._begin = begin
         self._thread.start()
 
     def stop(self) -> None:
@@ -123,6 +131,7 @@ class NetworkThread:
 
     def _run(self) -> None:
         try:
+            self._begin()
             self._cycle_until_stopped()
         except Exception:
             logger.exception('the CANopen cycle has ended by a defect')
@@ -134,16 +143,15 @@ class NetworkThread:
 
     def _cycle_until_stopped(self) -> None:
         self.network.start(time.monotonic())
-        deadline = time.monotonic()
+        timer = CycleTimer(self.period, time.monotonic())
         while not self._stopping:
-            self._serve_until(deadline)
+            self._serve_until(timer.deadline)
             now = time.monotonic()
-            skipped = int((now - deadline) / self.period)
-            self._statistics.record(now - deadline, skipped)
-            if now - deadline > PAUSE_TOLD:
-                self._guarded(partial(self.network.note_pause, now - deadline))
+            cycle = timer.begin(now)
+            self._statistics.record(cycle.late, cycle.skipped)
+            if cycle.late > PAUSE_TOLD:
+                self._guarded(partial(self.network.note_pause, cycle.late))
             self._guarded(partial(self.network.cycle, now, self.period))
-            deadline += (skipped + 1) * self.period
 
     def _serve_until(self, deadline: float) -> None:
         """Take frames, hand-overs and timers until the deadline of the next cycle.

@@ -13,7 +13,14 @@ import threading
 
 from rclpy.node import Node
 
-from node_runner import log_as, ParameterReader, refuse_misspelt, run_program, spin
+from node_runner import (
+    declare_thread_priority,
+    log_as,
+    ParameterReader,
+    refuse_misspelt,
+    run_program,
+    spin,
+)
 
 from ..can import open_bus
 from ..can.bus import Bus
@@ -24,6 +31,7 @@ from ..exceptions import CanopenError
 from .managed_bus import MANAGER
 from .master_process import MasterProcess
 
+THREAD_PRIORITY = 50  # SCHED_FIFO, as ros2_control has it
 SWITCH_INTERVAL = 0.0005  # [s] how long a busy callback may keep the interpreter from the cycle
 
 Extend = Callable[[MasterProcess], Sequence[Node]]
@@ -63,12 +71,14 @@ class Parameters:
         bus_configs: Paths of the bus.yml files, one for each bus.
         can_names: Names of the CAN interfaces, in the same order.
         diagnostics_period: Time between two /diagnostics messages in [s].
+        thread_priority: SCHED_FIFO priority of the thread of the cycle; 0 asks for none.
         beside_master: Start although another master is heard on the bus.
     """
 
     bus_configs: list[str]
     can_names: list[str]
     diagnostics_period: float
+    thread_priority: int
     beside_master: bool
 
 
@@ -102,6 +112,7 @@ def _make_process(config: BusConfig, can: Bus, stack: ExitStack) -> MasterProces
         config,
         can,
         diagnostics_period=parameters.diagnostics_period,
+        thread_priority=parameters.thread_priority,
         beside_master=parameters.beside_master,
     )
     for other in process.nodes[1:]:
@@ -185,6 +196,7 @@ def _declare(node: Node) -> Parameters:
     period = read.number(
         'diagnostics_period', 1.0, (0.05, 60.0), 'time between two /diagnostics messages [s]'
     )
+    priority = declare_thread_priority(read, THREAD_PRIORITY)
     beside_master = read.flag(
         'beside_master',
         'start although another master is heard, which leads other devices',
@@ -195,7 +207,9 @@ def _declare(node: Node) -> Parameters:
         raise CanopenError(
             'no bus_config: give the path of a bus.yml with --ros-args -p bus_config:=FILE'
         )
-    parameters = Parameters(configs.split(','), can_names.split(','), period, beside_master)
+    parameters = Parameters(
+        configs.split(','), can_names.split(','), period, priority, beside_master
+    )
     if len(parameters.bus_configs) != len(parameters.can_names):
         raise CanopenError(
             f'bus_config names {len(parameters.bus_configs)} buses, can_interface_name '

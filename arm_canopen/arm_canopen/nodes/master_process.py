@@ -13,6 +13,8 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.node import Node
 from rclpy.time import Time
 
+from node_runner import raise_thread_priority, settle_process_memory
+
 from ..can.bus import Bus
 from ..can.frame import Frame
 from ..can.load import BusLoad
@@ -59,6 +61,7 @@ class MasterProcess:
         can: Bus,
         *,
         diagnostics_period: float,
+        thread_priority: int = 0,
         beside_master: bool = False,
     ) -> None:
         """Build it; nothing is sent before :meth:`start`.
@@ -68,6 +71,7 @@ class MasterProcess:
             config: The bus.
             can: The open CAN interface; it stays the caller's to close.
             diagnostics_period: Time between two /diagnostics messages in [s].
+            thread_priority: SCHED_FIFO priority of the thread of the cycle; 0 asks for none.
             beside_master: Start although another master is heard, and command no device of its.
         """
         self.bus = config
@@ -75,6 +79,7 @@ class MasterProcess:
         self._can = can
         self._output = OutputThread(node.get_logger())
         self._load = BusLoad(config.master.bitrate, time.monotonic())
+        self._thread_priority = thread_priority
         self._beside_master = beside_master
         self._network = Network(config, self._send, self._report, beside_master=beside_master)
         self._network.on_frame = self._load.count
@@ -124,7 +129,9 @@ class MasterProcess:
         """Boot the devices and start the cycle."""
         self._started = True
         self._output.start()
-        self._thread.start()
+        settle_process_memory(self._node)
+        what, priority = 'the CANopen cycle', self._thread_priority
+        self._thread.start(lambda: raise_thread_priority(self._node, priority, what))
 
     def stop(self) -> None:
         """Bring every drive to quick stop and disable it, then end the cycle."""

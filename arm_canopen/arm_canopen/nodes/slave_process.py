@@ -11,7 +11,16 @@ import threading
 
 from rclpy.node import Node
 
-from node_runner import log_as, ParameterReader, refuse_misspelt, run_program, spin
+from node_runner import (
+    declare_thread_priority,
+    log_as,
+    ParameterReader,
+    raise_thread_priority,
+    refuse_misspelt,
+    run_program,
+    settle_process_memory,
+    spin,
+)
 
 from ..can import open_bus
 from ..device.host import DeviceHost
@@ -26,6 +35,7 @@ CAN_INTERFACES = (
     'can0, vcan0, udp_multicast:239.x.y.z[:port], auto, or INTERFACE:CHANNEL[@BITRATE]'
 )
 
+THREAD_PRIORITY = 30  # SCHED_FIFO: devices answer SYNC in time, and leave the master the way
 STORE_DIRECTORY = 'folder of what the devices store (0x1010, LSS); empty: until they end'
 SCENARIO = 'YAML file with faults and their times; empty for none'
 
@@ -90,9 +100,11 @@ def _run(node: Node, populate: Populate, default_bus: str, stop: threading.Event
         runner = DeviceRunner(bus)
         population = populate(node, runner.host)
         _play_scenario(node, runner.host, population)
+        priority = declare_thread_priority(ParameterReader(node), THREAD_PRIORITY)
         refuse_misspelt(node)
         FaultServices(node, runner, population.names)
-        runner.start()
+        settle_process_memory(node)
+        runner.start(lambda: raise_thread_priority(node, priority, 'the simulated devices'))
         try:
             node.get_logger().info(f'{population.what} on {bus.name}')
             spin([node], stop)

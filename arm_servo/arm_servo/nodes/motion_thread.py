@@ -12,6 +12,8 @@ import time
 
 import numpy as np
 
+from realtime_loop import CycleTimer
+
 from ..arrays import Array
 from ..exceptions import GoalCode
 from ..gateway import CommandGateway
@@ -26,9 +28,6 @@ SILENCE = 0.3
 
 LAST_STOP = 3.0
 """Longest time for the arm to come to rest at the end of the program in [s]."""
-
-LATE = 10
-"""Periods by which the thread may be late before it lets cycles go."""
 
 
 class MotionCycle:
@@ -135,7 +134,7 @@ class MotionCycle:
 
 
 class MotionThread:
-    """Runs cycles at absolute deadlines of the monotonic clock.
+    """Runs cycles at absolute deadlines of the monotonic clock; after a stall it skips some.
 
     Attributes:
         error: What a cycle has raised; the arm was braked, and no cycle follows.
@@ -208,10 +207,7 @@ class MotionThread:
         return self._cycle.at_rest or now > self._until
 
     def _cycles(self, step: Callable[[float, float], None], ends: Callable[[float], bool]) -> None:
-        deadline = time.monotonic()
+        timer = CycleTimer(self._period, time.monotonic())
         while not ends(now := time.monotonic()):
-            step(deadline, self._period)
-            deadline += self._period
-            if now - deadline > LATE * self._period:
-                deadline = now
-            time.sleep(max(0.0, deadline - time.monotonic()))
+            step(timer.begin(now).time, self._period)
+            time.sleep(max(0.0, timer.deadline - time.monotonic()))

@@ -16,7 +16,14 @@ import time
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
-from node_runner import ParameterReader, run_program, spin
+from node_runner import (
+    declare_thread_priority,
+    ParameterReader,
+    raise_thread_priority,
+    run_program,
+    settle_process_memory,
+    spin,
+)
 
 from ..core import MotionCore
 from ..core_settings import CoreSettings
@@ -26,12 +33,14 @@ from ..model import RobotModel
 from .following import FollowingLimits, FollowingWatch
 from .joint_feedback import JointFeedback
 from .motion_thread import MotionCycle, MotionThread
-from .real_time import prefer_this_thread
 from .topic_output import OutputParameters, TopicOutput
 from .upstream_parameters import check_names
 
 SWITCH_INTERVAL = 0.0005
 """How long a busy callback may keep the interpreter from the cycle in [s]."""
+
+THREAD_PRIORITY = 40
+"""SCHED_FIFO priority of the loop, unless a parameter says another; that of moveit_servo."""
 
 LAST_WORDS = 0.2
 """How long clients are answered after the arm has come to rest at the end in [s]."""
@@ -76,9 +85,7 @@ def declare_loop(node: Node, prefix: str) -> LoopParameters:
             (0.02, 10.0),
             'silence of a joint at which the arm comes to rest [s]',
         ),
-        read.whole(
-            'thread_priority', 40, (0, 99), 'SCHED_FIFO priority of the loop; 0 asks for none'
-        ),
+        declare_thread_priority(read, THREAD_PRIORITY),
         FollowingLimits(
             read.number(
                 'following_error_limit',
@@ -124,8 +131,7 @@ def make_loop(
     cycle = MotionCycle(gateway, feedback, publish, watch)
 
     def begin() -> None:
-        if words := prefer_this_thread(loop.priority):
-            node.get_logger().info(words)
+        raise_thread_priority(node, loop.priority, 'the motion loop')
 
     return gateway, MotionThread(cycle, loop.period, begin)
 
@@ -184,7 +190,7 @@ def _serve(build: Callable[[MakeNode], MotionThread], stop: threading.Event) -> 
         thread = build(make_node)
         for node in nodes:
             check_names(node)
-        gc.freeze()  # what is there now is there to stay, and need not be looked through
+        settle_process_memory(nodes[0])
         thread.start(failed=stop.set)
         stack.callback(thread.stop)
         nodes[0].get_logger().info('ready for commands')

@@ -50,10 +50,16 @@ class ControlLoop:
         self._battery: float | None = None
         self._arrival: float | None = None
         self._stopping = False
+        self._begin: Callable[[], None] = lambda: None
         self._thread = threading.Thread(target=self._guarded, name='control', daemon=True)
 
-    def start(self) -> None:
-        """Begin to step."""
+    def start(self, begin: Callable[[], None] = lambda: None) -> None:
+        """Begin to step.
+
+        Args:
+            begin: Called first in the thread, which may want a priority.
+        """
+        self._begin = begin
         self._pacer = Pacer(self._period, time.monotonic())
         self._thread.start()
 
@@ -92,6 +98,7 @@ class ControlLoop:
 
     def _guarded(self) -> None:
         try:
+            self._begin()
             self._run()
         except Exception as error:  # noqa: BLE001  # whatever it is, the node must hear of it
             self._fail(error)

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import gc
 import sys
 import threading
 
@@ -24,7 +23,13 @@ from sensor_msgs.msg import BatteryState, Imu, JointState
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from node_runner import destroyed_when_refused, run_program, spin
+from node_runner import (
+    destroyed_when_refused,
+    raise_thread_priority,
+    run_program,
+    settle_process_memory,
+    spin,
+)
 from node_runner.wire import Reader, Stream
 from quad_msgs.msg import JointCommand
 from quad_msgs.srv import SetMode
@@ -118,7 +123,8 @@ class ControllerNode(Node):
 
     def begin(self) -> None:
         """Start the control loop."""
-        self._loop.start()
+        priority = self._settings.thread_priority
+        self._loop.start(lambda: raise_thread_priority(self, priority, 'the control loop'))
 
     def end(self) -> None:
         """Stop sending; the servos hold their last targets."""
@@ -297,8 +303,8 @@ def main() -> int:
 def _serve(stop: threading.Event) -> int:
     sys.setswitchinterval(SWITCH_INTERVAL)
     node = ControllerNode(stop)
+    settle_process_memory(node)
     node.begin()
-    gc.freeze()  # what is there now is there to stay, and need not be looked through
     try:
         spin([node], stop)
     finally:

@@ -10,7 +10,7 @@ from typing import Any
 
 from rclpy.node import Node
 
-from node_runner import ParameterReader, refuse_misspelt
+from node_runner import declare_thread_priority, ParameterReader, refuse_misspelt
 from quad_description import PRESETS, robot_urdf
 
 from ..gait.body import BodyLimits
@@ -65,6 +65,8 @@ POLICY_MEANINGS: Mapping[str, str] = {
     'low_pass': 'cut-off of a filter of its targets [Hz]; 0: none',
 }
 
+THREAD_PRIORITY = 45  # SCHED_FIFO: below that of the driver, which it waits for
+
 
 @dataclass(frozen=True, slots=True)
 class NodeSettings:
@@ -80,6 +82,7 @@ class NodeSettings:
         policy_options: How it is run.
         policy_dry_run: Whether the policy is only watched.
         diagnostics_period: In [s].
+        thread_priority: SCHED_FIFO priority of the thread of its loop; 0 asks for none.
     """
 
     robot: Quadruped
@@ -91,6 +94,7 @@ class NodeSettings:
     policy_options: PolicyOptions
     policy_dry_run: bool
     diagnostics_period: float
+    thread_priority: int
 
 
 def declare_parameters(node: Node) -> NodeSettings:
@@ -122,6 +126,7 @@ def declare_parameters(node: Node) -> NodeSettings:
             meaning='the policy is asked, but only joint_command_shadow tells its answers',
         ),
         diagnostics_period=read.number('diagnostics_period', 1.0, (0.1, 60.0), 'period [s]'),
+        thread_priority=declare_thread_priority(read, THREAD_PRIORITY),
     )
     refuse_misspelt(node)
     return settings

@@ -52,6 +52,7 @@ class Driver:
         self._on_state = on_state
         self._on_change = on_change
         self._thread = threading.Thread(target=self._run, name='serial', daemon=True)
+        self._begin: Callable[[], None] = lambda: None
         self._stopping = threading.Event()
         self._wake_read, self._wake_write = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
         self._mailbox = Mailbox()
@@ -68,8 +69,13 @@ class Driver:
         self._refusal = ''
         self._heard_at = self._reported_at = -float('inf')
 
-    def start(self) -> None:
-        """Start the thread, which looks for the robot until it finds it."""
+    def start(self, begin: Callable[[], None] = lambda: None) -> None:
+        """Start the thread, which looks for the robot until it finds it.
+
+        Args:
+            begin: Called first in the thread, which may want a priority.
+        """
+        self._begin = begin
         self._thread.start()
 
     def stop(self) -> None:
@@ -146,6 +152,7 @@ class Driver:
             self._on_change(state, detail)
 
     def _run(self) -> None:
+        self._begin()
         while not self._stopping.is_set():
             self._try_to_converse()
         self._enter(LinkState.STOPPED, 'stopped')

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-import gc
 import math
 import sys
 import threading
@@ -21,7 +20,13 @@ from sensor_msgs.msg import BatteryState, Imu, JointState
 from std_srvs.srv import SetBool
 from tf2_msgs.msg import TFMessage
 
-from node_runner import destroyed_when_refused, run_program, spin
+from node_runner import (
+    destroyed_when_refused,
+    raise_thread_priority,
+    run_program,
+    settle_process_memory,
+    spin,
+)
 from node_runner.wire import Reader, Stream
 from quad_msgs.msg import JointCommand
 
@@ -96,7 +101,8 @@ class HardwareNode(Node):
 
     def begin(self) -> None:
         """Start looking for the robot."""
-        self._driver.start()
+        priority = self._settings.thread_priority
+        self._driver.start(lambda: raise_thread_priority(self, priority, 'the serial driver'))
 
     def end(self) -> None:
         """Close the port; the servos hold their last target, at rest."""
@@ -281,8 +287,8 @@ def main() -> int:
 def _serve(stop: threading.Event) -> None:
     sys.setswitchinterval(SWITCH_INTERVAL)
     node = HardwareNode()
+    settle_process_memory(node)
     node.begin()
-    gc.freeze()  # what is there now is there to stay, and need not be looked through
     try:
         spin([node], stop)
     finally:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 from rclpy.node import Node
 
-from node_runner import ParameterReader, refuse_misspelt
+from node_runner import declare_thread_priority, ParameterReader, refuse_misspelt
 from quad_description import DescriptionError, Joint, movable_joints, PRESETS, robot_urdf
 
 from ..estimation import EstimatorSettings, ImuMounting, OdometrySettings, RateSource, SCALES
@@ -23,6 +23,7 @@ from ..link.vendor_library import is_installed
 from ..protocol import Model, Protocol, PROTOCOLS
 
 AUTO = 'auto'
+THREAD_PRIORITY = 50  # SCHED_FIFO: replies of the robot are read and commands sent at once
 _PROTOCOLS: Mapping[str, tuple[Protocol, ...]] = {
     AUTO: PROTOCOLS,
     VENDOR.name: (),
@@ -83,6 +84,7 @@ class NodeSettings:
         frames: Names of the frames.
         deviations: Published with the IMU.
         diagnostics_period: [s]
+        thread_priority: SCHED_FIFO priority of the thread of its loop; 0 asks for none.
     """
 
     link: LinkOptions
@@ -94,6 +96,7 @@ class NodeSettings:
     frames: Frames
     deviations: Deviations
     diagnostics_period: float
+    thread_priority: int
 
 
 def declare_parameters(node: Node) -> NodeSettings:
@@ -139,6 +142,7 @@ def declare_parameters(node: Node) -> NodeSettings:
         frames=_frames(read),
         deviations=_deviations(read, checked=estimator.mounting.checked),
         diagnostics_period=read.number('diagnostics_period', 1.0, (0.1, 60.0), 'period [s]'),
+        thread_priority=declare_thread_priority(read, THREAD_PRIORITY),
     )
     refuse_misspelt(node)
     return settings

@@ -1,0 +1,39 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The parameter of a thread that owns a cycle, and what becomes of it, in the log of a node."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from rclpy.node import Node
+
+from realtime_loop import Outcome, PRIORITY_MAX, raise_priority, settle_memory
+
+from .parameter_reader import ParameterReader
+
+
+def declare_thread_priority(read: ParameterReader, default: int) -> int:
+    """Declare ``thread_priority`` as ros2_control has it; return its value."""
+    return read.whole(
+        'thread_priority',
+        default,
+        (0, PRIORITY_MAX),
+        'SCHED_FIFO priority of the thread of the cycle; 0 asks for none',
+    )
+
+
+def raise_thread_priority(node: Node, priority: int, what: str) -> None:
+    """Give the calling thread its priority; a refusal is a warning that says how to get it."""
+    _log(node, raise_priority(priority, what), refused=node.get_logger().warning)
+
+
+def settle_process_memory(node: Node) -> None:
+    """Freeze the garbage collector and lock the memory, before the cycle starts."""
+    _log(node, settle_memory(), refused=node.get_logger().info)
+
+
+def _log(node: Node, outcome: Outcome, refused: Callable[[str], object]) -> None:
+    if outcome.text:
+        log = node.get_logger().info if outcome.granted else refused
+        log(outcome.text)

@@ -1,0 +1,91 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Real-time priority, locked memory and a frozen garbage collector, where the system grants them.
+
+A process does without what is refused; the outcome says in one line what that means and how to
+get it.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import gc
+import os
+from pathlib import Path
+import resource
+from typing import NamedTuple
+
+PRIORITY_MAX = 99
+CAP_IPC_LOCK = 14
+MCL_CURRENT, MCL_FUTURE, MCL_ONFAULT = 1, 2, 4  # sys/mman.h
+
+LIMITS = (
+    "allow it by the lines '* - rtprio 98' and '* - memlock unlimited' in "
+    '/etc/security/limits.d/realtime.conf and a new login; in a container by --ulimit rtprio=98 '
+    '--ulimit memlock=-1 --cap-add=SYS_NICE'
+)
+
+
+class Outcome(NamedTuple):
+    """What became of a request.
+
+    Attributes:
+        granted: Whether the system has granted it.
+        text: The outcome in words; empty when nothing was asked for.
+    """
+
+    granted: bool
+    text: str
+
+
+def raise_priority(priority: int, what: str) -> Outcome:
+    """Give the calling thread a real-time priority; threads that it starts do not inherit it.
+
+    Args:
+        priority: SCHED_FIFO priority; 0 asks for none.
+        what: What the thread does, for the words.
+    """
+    if not priority:
+        return Outcome(granted=False, text='')
+    try:
+        policy = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK
+        os.sched_setscheduler(0, policy, os.sched_param(priority))
+    except (OSError, AttributeError) as error:  # not granted, or no system for it
+        return Outcome(
+            granted=False,
+            text=f'{what} has no real-time priority ({error}), and may be late on a busy machine: '
+            f'{LIMITS}; or set thread_priority to 0',
+        )
+    return Outcome(granted=True, text=f'{what} runs with real-time priority {priority}')
+
+
+def settle_memory() -> Outcome:
+    """Keep garbage collector and swap from what this process has now; call it before the cycle.
+
+    Pages are locked as soon as they are used, so that the process does not grow by it.
+
+    Returns:
+        Whether the memory is locked.
+    """
+    gc.collect()
+    gc.freeze()  # what is there now is there to stay, and need not be looked through
+    if not _may_lock():
+        limit = resource.getrlimit(resource.RLIMIT_MEMLOCK)[0] // 1024  # [kB]
+        return Outcome(granted=False, text=f'the memory is not locked (memlock is {limit} kB)')
+    libc = ctypes.CDLL(None, use_errno=True)
+    if libc.mlockall(MCL_CURRENT | MCL_FUTURE | MCL_ONFAULT):
+        reason = os.strerror(ctypes.get_errno())
+        return Outcome(granted=False, text=f'the memory is not locked ({reason})')
+    return Outcome(granted=True, text='the memory is locked')
+
+
+def _may_lock() -> bool:
+    """Whether locking has no limit; below one, a process that grows would end by it."""
+    if resource.getrlimit(resource.RLIMIT_MEMLOCK)[0] == resource.RLIM_INFINITY:
+        return True
+    try:
+        status = Path('/proc/self/status').read_text(encoding='ascii')
+    except OSError:
+        return False
+    capabilities = status.partition('CapEff:')[2].split()
+    return bool(capabilities) and bool(int(capabilities[0], 16) >> CAP_IPC_LOCK & 1)
