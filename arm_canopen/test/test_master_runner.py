@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from concurrent.futures import Future
 from pathlib import Path
 import threading
+import time
 
 import pytest
 
@@ -19,6 +20,7 @@ from arm_canopen.exceptions import BusError
 from arm_canopen.master.network import Network
 from arm_canopen.master.runner import NetworkThread
 from arm_canopen.master.scheduler import Promise
+from arm_canopen.standard.cob_id import CobId
 
 PATIENCE = 10.0  # [s] deadline for what takes milliseconds
 
@@ -109,3 +111,46 @@ def test_nobody_waits_for_a_thread_that_has_ended(bench: Bench) -> None:
         with pytest.raises(BusError, match='the CANopen master has ended'):
             future.result(PATIENCE)
     never.resolve(None)
+
+
+def test_published_jitter_is_that_of_sync_on_the_bus() -> None:
+    """A listener never sees SYNC later against its grid than the figures say, whatever runs."""
+    wire = VirtualWire()
+    bus, listener = VirtualBus('here', wire), VirtualBus('there', wire)
+    period = 0.01
+    master = MasterConfig(1, sync_period=period, cycle_period=period)
+    order: list[str] = []
+
+    def send(frame: Frame) -> None:
+        if frame.can_id == CobId.SYNC:
+            order.append('sync')
+        bus.send(frame)
+
+    def work(now: float, period: float) -> None:
+        order.append('work')
+        time.sleep(0.4 * period * (len(order) % 4 == 0))
+
+    network = Network(BusConfig(Path('bus.yml'), master, ()), send, lambda event: None)
+    network.on_cycle = work
+    thread = NetworkThread(bus, network)
+    thread.start()
+    arrivals: list[float] = []
+    end = time.monotonic() + PATIENCE
+    while len(arrivals) < 100 and time.monotonic() < end:
+        arrivals += [f.timestamp for f in listener.receive(1.0) if f.can_id == CobId.SYNC]
+    figures = thread.call(thread.figures).result(PATIENCE)
+    thread.stop()
+    arrivals += [f.timestamp for f in listener.receive(0.0) if f.can_id == CobId.SYNC]
+    bus.close()
+    listener.close()
+    assert order[: len(order) // 2 * 2] == ['sync', 'work'] * (len(order) // 2)
+    seen = arrivals[: figures.cycles]
+    # a listener does not know the grid; on that of the SYNC that was least late it holds for all
+    grids = [sorted((arrival - origin) % period for arrival in seen) for origin in seen]
+    last = len(seen) - 1
+    published = (figures.jitter_p50, figures.jitter_p99, figures.jitter_max)
+    ranks = (last // 2, last * 99 // 100, last)
+    assert any(
+        all(ours > late[rank] - 1e-6 for ours, rank in zip(published, ranks, strict=True))
+        for late in grids
+    )

@@ -396,6 +396,8 @@ class VirtualNetwork:
         deadlines = [self.network.scheduler.next_deadline()]
         deadlines += [station.next_deadline() for station in self.stations.values()]
         events = [time for time in deadlines if time is not None]
+        if self._cycle_at < NEVER:
+            events.append(self.network.next_update)
         time = min(self.wire.next_arrival, self._cycle_at, *events, NEVER)
         if time > end:
             self.now = end
@@ -412,10 +414,14 @@ class VirtualNetwork:
         return True
 
     def _serve_master(self) -> None:
-        self.network.advance(self.now)
+        period = self._config.master.cycle_period
         if self._cycle_at <= self.now:
-            self.network.cycle(self.now, self._config.master.cycle_period)
-            self._cycle_at += self._config.master.cycle_period
+            self.network.sync()
+            self.network.cycle(self.now, period)
+            self._cycle_at += period
+        self.network.advance(self.now)
+        if self.network.next_update <= self.now:
+            self.network.update(self.now, period)
 
     def _deliver(self, sender: str, frame: Frame) -> None:
         if sender != 'master' and self._cycle_at < NEVER:

@@ -33,6 +33,8 @@ from .sdo_client import SdoClient
 from .startup import Startup
 
 DEFECT_PERIOD = 10.0  # [s] between two reports of the same defect
+NEVER = float('inf')
+UPDATE_SHARE = 0.5  # of the period after SYNC, at which TPDOs that are missing are not awaited
 WATCH_PERIOD = 0.005  # [s] between two looks at the life signs, which come at most so often
 
 CycleHook: TypeAlias = Callable[[float, float], None]
@@ -46,8 +48,9 @@ class Network:
         nodes: Its devices by name.
         scheduler: Time and coroutines of the network.
         on_cycle: Called in each cycle before the RPDOs leave, with time and period in [s].
-        on_feedback: Called when all TPDOs of a SYNC have come, or at the next cycle at the latest,
-            with the time of that SYNC in [s].
+        on_feedback: Called after each update, with the time of the SYNC in [s] whose TPDOs the
+            drives have taken.
+        next_update: When :meth:`update` is due in [s]; infinite when it is done in this cycle.
         on_frame: Called with each received frame, for statistics.
         send: Sends a frame; a bus that refuses it is told once until it works again.
         missed_pdos: TPDOs that did not answer a SYNC, over all devices.
@@ -88,9 +91,10 @@ class Network:
         self.send = BusSender(send, report).send
         self._report = report
         self.state = NmtState.OPERATIONAL if master.start else NmtState.PRE_OPERATIONAL
-        self._sync = SyncRound(self._feedback_complete, master.sync_window, master.sync_period)
+        self.next_update = NEVER
+        self._sync = SyncRound(self._round_complete, master.sync_window, master.sync_period)
         self._sync_time = 0.0
-        self._feedback_due = False
+        self._feedback_due = self._round_open = False
         self._watch_at = 0.0
         self._defects: dict[str, float] = {}  # when each may be reported again
         self._sync_counter = SyncCounter(master.sync_overflow)
@@ -152,27 +156,55 @@ class Network:
         if node.watch(now):
             self._boots.start(node)
 
+    def sync(self) -> None:
+        """Send SYNC at its deadline; nothing that takes time stands before it."""
+        if self._syncs:
+            self.send(Frame(CobId.SYNC, self._sync_counter.next()))
+
     def cycle(self, now: float, period: float) -> None:
-        """Run one cycle: image, drives, RPDOs, SYNC (DESIGN: one time base).
+        """Begin the cycle whose SYNC has just been sent.
 
         Args:
             now: Steady time in [s].
             period: Time to the next cycle in [s].
         """
-        self.advance(now)
-        if self._feedback_due:
+        if self._round_open:
             self._contain_each(self._count_missed)
-            self._feedback_complete()
-        self._contain(partial(self.on_cycle, now, period))
+        self._round_open = self._syncs
+        overdue = self.next_update < NEVER
+        self.next_update = now
+        if self._syncs:
+            self._begin_round(now)
+            if self._sync.pending and not overdue:
+                self.next_update = now + UPDATE_SHARE * period
+        self.advance(now)
         self._contain(partial(self._heartbeat.advance, now, self.state))
         self._contain(partial(self._time.advance, now))
-        if self.state is not NmtState.OPERATIONAL:
-            return
-        for node in self.nodes.values():
-            if node.online:
-                self._send_outputs(node, now)
-        if self.config.master.sync_period > 0:
-            self._send_sync(now)
+
+    def update(self, now: float, period: float) -> None:
+        """Run drives and motion sources, and send the RPDOs that the next SYNC makes valid.
+
+        Due at :attr:`next_update`: when all TPDOs of the SYNC have come, or half a period after
+        it without those that are missing.
+
+        Args:
+            now: Steady time of the cycle in [s].
+            period: Time to the next cycle in [s].
+        """
+        self.next_update = NEVER
+        self._contain(partial(self.on_cycle, now, period))
+        if self.state is NmtState.OPERATIONAL:
+            for node in self.nodes.values():
+                if node.online:
+                    self._send_outputs(node, now)
+        if self._feedback_due:
+            self._feedback_due = False
+            self._contain(partial(self.on_feedback, self._sync_time))
+
+    @property
+    def _syncs(self) -> bool:
+        """Whether SYNC is sent."""
+        return self.state is NmtState.OPERATIONAL and self.config.master.sync_period > 0
 
     def _count_missed(self, node: RemoteNode) -> None:
         self.missed_pdos += node.count_missed()
@@ -309,14 +341,13 @@ class Network:
             if node_id in (ALL_NODES, node.config.node_id):
                 node.note_command(command)
 
-    def _send_sync(self, now: float) -> None:
+    def _begin_round(self, now: float) -> None:
         self._sync.start(now)
         self._contain_each(lambda node: node.expect_answers())
         self._sync_time = now
         self._feedback_due = True
-        self.send(Frame(CobId.SYNC, self._sync_counter.next()))
 
-    def _feedback_complete(self) -> None:
-        if self._feedback_due:
-            self._feedback_due = False
-            self._contain(partial(self.on_feedback, self._sync_time))
+    def _round_complete(self) -> None:
+        """Update now, unless that is done already in this cycle."""
+        if self.next_update < NEVER:
+            self.next_update = self.scheduler.now

@@ -9,11 +9,12 @@ from collections.abc import Callable, Coroutine
 from concurrent.futures import Future
 from functools import partial
 import logging
+import math
 import threading
 import time
 from typing import Any, TypeVar
 
-from realtime_loop import CycleTimer
+from realtime_loop import Cycle, CycleTimer
 
 from ..can.bus import Bus
 from ..can.frame import Frame
@@ -54,6 +55,7 @@ class NetworkThread:
         self._bus = bus
         self._statistics = CycleStatistics(self.period)
         self._work: deque[tuple[Future[Any], Callable[[], None]]] = deque()
+        self._cycle_time = 0.0
         self._stopping = False
         self._ended = False
         self._open: set[Future[Any]] = set()
@@ -148,26 +150,41 @@ class NetworkThread:
             self._serve_until(timer.deadline)
             now = time.monotonic()
             cycle = timer.begin(now)
-            self._statistics.record(cycle.late, cycle.skipped)
-            if cycle.late > PAUSE_TOLD:
-                self._guarded(partial(self.network.note_pause, cycle.late))
-            self._guarded(partial(self.network.cycle, now, self.period))
+            self._guarded(self.network.sync)
+            sent = time.monotonic()
+            self._statistics.record(cycle.late + sent - now, cycle.skipped)
+            self._begin_cycle(cycle, now)
+
+    def _begin_cycle(self, cycle: Cycle, now: float) -> None:
+        """Do what follows SYNC, with what has come before it taken first.
+
+        After a pause of this process, that is older than the time-outs that it would otherwise
+        seem to have missed.
+        """
+        self._cycle_time = cycle.time
+        frames = self._receive(0.0)
+        self._take([frame for frame in frames if frame.timestamp < now])
+        if cycle.late > PAUSE_TOLD:
+            self._guarded(partial(self.network.note_pause, cycle.late))
+        self._guarded(partial(self.network.cycle, now, self.period))
+        self._take([frame for frame in frames if frame.timestamp >= now])
 
     def _serve_until(self, deadline: float) -> None:
-        """Take frames, hand-overs and timers until the deadline of the next cycle.
-
-        The bus is looked at once even when the deadline has passed: what waits there after a
-        pause of this process is older than the time-outs that would otherwise be missed.
-        """
+        """Take frames, hand-overs and timers, and update, until the next SYNC is due."""
+        network = self.network
         while not self._stopping:
-            timer = self.network.scheduler.next_deadline()
-            wake = deadline if timer is None else min(deadline, timer)
-            frames = self._receive(max(0.0, wake - time.monotonic()))
-            self._take(frames)
             now = time.monotonic()
             if now >= deadline:
                 return
-            self._guarded(partial(self.network.advance, now))
+            timer = network.scheduler.next_deadline() or math.inf
+            wake = min(deadline, timer, network.next_update)
+            self._take(self._receive(max(0.0, wake - now)))
+            now = time.monotonic()
+            if now >= deadline:
+                return
+            self._guarded(partial(network.advance, now))
+            if now >= network.next_update:
+                self._guarded(partial(network.update, self._cycle_time, self.period))
 
     def _receive(self, timeout: float) -> list[Frame]:
         try:

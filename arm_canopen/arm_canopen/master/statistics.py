@@ -16,7 +16,7 @@ class CycleFigures:
         period: Nominal period in [s].
         cycles: Number of cycles.
         overruns: Cycles that were left out because the one before ended too late.
-        jitter_p50: Median lateness of the start of a cycle in [s].
+        jitter_p50: Median lateness of SYNC, when it has been handed to the bus, in [s].
         jitter_p99: 99th percentile of the lateness in [s].
         jitter_max: Largest lateness in [s].
     """
@@ -48,7 +48,7 @@ class CycleStatistics:
         """Add a cycle.
 
         Args:
-            late: Start minus deadline in [s].
+            late: Time when SYNC was sent minus deadline in [s].
             skipped: Deadlines that had passed as a whole and were left out.
         """
         self._late.append(late)
