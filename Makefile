@@ -5,7 +5,7 @@
 
 # with a name, .venv is made from that interpreter: make PYTHON=python3.12 build
 PYTHON ?=
-# seconds; without it the demo runs until Ctrl-C
+# seconds; without it a demo runs until Ctrl-C, chaos for 10 minutes, soak for an hour
 DURATION ?=
 # a robot of arm_bringup, or the path of a robot folder
 ROBOT ?= panda
@@ -15,7 +15,7 @@ ARGS ?=
 WORKSPACE = cd tools && $(or $(PYTHON),python3) -m workspace $(if $(PYTHON),--python $(PYTHON))
 IN_ENVIRONMENT = bash -c '. "$(CURDIR)/env.sh" && exec "$$@"' environment
 
-.PHONY: help demo demo-arm demo-quad test build lint bench setup pins clean distclean
+.PHONY: help demo demo-arm demo-quad test build lint bench chaos soak setup pins clean distclean
 .DEFAULT_GOAL := help
 
 help:
@@ -26,6 +26,8 @@ help:
 	@echo 'make build      build every package; then: source env.sh'
 	@echo 'make lint       ruff, its formatter, mypy'
 	@echo 'make bench      print the figures'
+	@echo 'make chaos      disturb arm and quadruped in motion at random (DURATION=600, SEED=1)'
+	@echo 'make soak       run both for long, and tell whether anything is lost or grows (DURATION=3600)'
 	@echo 'make setup      make the environment only'
 	@echo 'make pins       renew the pinned requirements'
 	@echo 'make clean      remove what was built'
@@ -43,9 +45,10 @@ demo-arm: system
 	@$(WORKSPACE) build arm_motion_bringup
 	@$(IN_ENVIRONMENT) ros2 run arm_motion_bringup demo $(ROBOT) $(if $(DURATION),--duration $(DURATION))
 
+# some containers set PYTHONDONTWRITEBYTECODE: every worker and process would compile all that it imports
 test: system
 	@$(WORKSPACE) build --dev
-	@$(IN_ENVIRONMENT) python -m pytest -n auto --dist loadgroup $(ARGS)
+	@$(IN_ENVIRONMENT) env -u PYTHONDONTWRITEBYTECODE python -m pytest -n auto --dist loadgroup $(ARGS)
 
 build: system
 	@$(WORKSPACE) build
@@ -56,6 +59,15 @@ lint: system
 bench: system
 	@$(WORKSPACE) build --dev
 	@$(IN_ENVIRONMENT) tools/bench
+
+chaos: system
+	@$(WORKSPACE) build --dev
+	@$(IN_ENVIRONMENT) python tests/chaos.py \
+	  $(if $(DURATION),--duration $(DURATION)) $(if $(SEED),--seed $(SEED))
+
+soak: system
+	@$(WORKSPACE) build --dev
+	@$(IN_ENVIRONMENT) python tests/soak.py $(if $(DURATION),--duration $(DURATION))
 
 setup: system
 	@$(WORKSPACE) setup

@@ -19,6 +19,8 @@ import pytest
 
 from dds_network import restrict_dds
 
+SCENARIOS = Path(__file__).parent / 'tests'
+
 for _marker in Path(__file__).parent.glob('*/resource/*'):
     if (_marker.parents[1] / _marker.name / '__init__.py').is_file():
         importlib.import_module(_marker.name)
@@ -38,6 +40,18 @@ settings.load_profile('workspace')
 def pytest_xdist_auto_num_workers() -> int:
     """Take two workers a core: half of the tests wait for processes, deadlines and the bus."""
     return 2 * len(os.sched_getaffinity(0))
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Let two workers have the scenarios with whole robots: more would share two cores too often.
+
+    Large groups begin first, so that the others run beside them, and not all scenarios at the end.
+    """
+    robots = [item for item in items if item.path.parent == SCENARIOS]
+    files = sorted({item.path for item in robots})
+    for item in robots:
+        item.add_marker(pytest.mark.xdist_group(f'robots-{files.index(item.path) % 2}'))
 
 
 @pytest.fixture

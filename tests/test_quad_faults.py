@@ -17,7 +17,7 @@ from quad_bringup.demo.track import tilt_of
 from quad_description import Pose, pose_positions
 from quad_msgs.msg import JointCommand
 
-pytestmark = [pytest.mark.scenario, pytest.mark.xdist_group('quad_faults')]
+pytestmark = pytest.mark.scenario
 
 LARGEST_STEP = 23.0
 """Degrees between two commands to a servo; the trot needs half of it, a jump would be more."""

@@ -20,7 +20,7 @@ from quad_msgs.srv import InjectFault
 if TYPE_CHECKING:
     pass
 
-pytestmark = [pytest.mark.scenario, pytest.mark.xdist_group('quad_serial_faults')]
+pytestmark = pytest.mark.scenario
 
 LARGEST_STEP = math.radians(23.0)
 """Radians between two targets of a servo; the trot needs half of it, a jump would be more."""

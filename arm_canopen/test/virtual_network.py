@@ -393,8 +393,8 @@ class VirtualNetwork:
 
     def _step(self, end: float) -> bool:
         """Go on to the next event; returns False when there is none until ``end``."""
-        deadlines = [self.network.scheduler.next_deadline()]
-        deadlines += [station.next_deadline() for station in self.stations.values()]
+        due = {name: station.next_deadline() for name, station in self.stations.items()}
+        deadlines = [self.network.scheduler.next_deadline(), *due.values()]
         events = [time for time in deadlines if time is not None]
         if self._cycle_at < NEVER:
             events.append(self.network.next_update)
@@ -405,10 +405,9 @@ class VirtualNetwork:
         self.now = max(self.now, time)
         while self.wire.next_arrival <= self.now:
             self._deliver(*self.wire.take())
-        for station in list(self.stations.values()):
-            deadline = station.next_deadline()
-            if deadline is not None and deadline <= self.now:
-                station.advance(self.now)
+        for name, deadline in due.items():  # what the frames have made due is the next event
+            if deadline is not None and deadline <= self.now and name in self.stations:
+                self.stations[name].advance(self.now)
         if self._cycle_at < NEVER:
             self._serve_master()
         return True

@@ -14,6 +14,14 @@ from processes import RunningProcess
 import pytest
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Let one worker have the zoo: its nodes publish all the time."""
+    for item in items:
+        if 'zoo' in getattr(item, 'fixturenames', ()):
+            item.add_marker(pytest.mark.xdist_group('zoo'))
+
+
 @pytest.fixture
 def ros2(capsys: pytest.CaptureFixture[str]) -> Ros2:
     """Run a command line in this process."""
