@@ -11,7 +11,6 @@ from typing import Any, TYPE_CHECKING
 from ament_index_python.packages import get_package_share_directory
 from control_msgs.action import FollowJointTrajectory
 from processes import executable, RunningProcess
-from rclpy.action.client import ActionClient
 from simulated_arm import JOINTS, SimulatedArm
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
@@ -21,6 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from isolation import Isolation
+    from rclpy.action.client import ActionClient
     from ros_client import RosClient
 
 READY = [0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785]
@@ -86,6 +86,11 @@ class MovingArm(SimulatedArm):
         return GoalRun(self.client, goal)
 
 
+def trajectory_client(client: RosClient) -> ActionClient:
+    """Return the client of the arm's trajectory controller."""
+    return client.action(FollowJointTrajectory, f'{CONTROLLER}/follow_joint_trajectory')
+
+
 class GoalRun:
     """A goal of the action on its way.
 
@@ -97,13 +102,9 @@ class GoalRun:
         """Send it and wait until it is accepted."""
         self.feedback: list[Any] = []
         self._client = client
-        self._action = ActionClient(
-            client.node, FollowJointTrajectory, f'{CONTROLLER}/follow_joint_trajectory'
-        )
-        assert self._action.wait_for_server(20.0)
-        sent = self._action.send_goal_async(
-            goal, lambda message: self.feedback.append(message.feedback)
-        )
+        action = trajectory_client(client)
+        assert action.wait_for_server(20.0)
+        sent = action.send_goal_async(goal, lambda message: self.feedback.append(message.feedback))
         client.spin_until(sent.done, 10.0, 'acceptance')
         self._handle = sent.result()
         assert self._handle.accepted

@@ -29,6 +29,7 @@ class RosClient:
         self._context = Context()
         rclpy.init(context=self._context, domain_id=domain_id)
         self.node = Node(name, context=self._context)
+        self._actions: dict[str, ActionClient] = {}
         self._executor = EventsExecutor(context=self._context)
         self._executor.add_node(self.node)
 
@@ -49,6 +50,12 @@ class RosClient:
         """Call a std_srvs/Trigger."""
         return self.call(Trigger, name, Trigger.Request(), timeout)
 
+    def action(self, action_type: Any, name: str) -> ActionClient:
+        """Return the one client of an action: a server does not know a new one at once."""
+        if name not in self._actions:
+            self._actions[name] = ActionClient(self.node, action_type, name)
+        return self._actions[name]
+
     def listen(self, message_type: Any, topic: str, qos: Any = 10) -> list[Any]:
         """Subscribe to a topic; the list grows while the client spins."""
         messages: list[Any] = []
@@ -62,6 +69,11 @@ class RosClient:
             if time.monotonic() > deadline:
                 raise AssertionError(f'no {what} within {timeout} s')
             self._executor.spin_once(0.05)
+
+    def spin_for(self, seconds: float) -> None:
+        """Serve callbacks for a time in [s]."""
+        end = time.monotonic() + seconds
+        self.spin_until(lambda: time.monotonic() >= end, seconds + 20.0, 'end of that time')
 
     def __enter__(self) -> Self:
         """Use it in a with statement."""

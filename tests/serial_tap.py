@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import itertools
 import os
 from pathlib import Path
+import random
 import select
 import termios
 import threading
@@ -58,6 +59,7 @@ class SerialTap:
         link: Path of the bridge's end.
         targets: What the bridge told the servos so far (the protocol that pushes states).
         reports: Steady times in [s] at which the robot's states had come in.
+        noise: Share of the bytes, of both directions, in which a bit is inverted from now on.
     """
 
     def __init__(self, link: Path, robot: Path) -> None:
@@ -70,6 +72,8 @@ class SerialTap:
         self.link = link
         self.targets: list[Target] = []
         self.reports: list[float] = []
+        self.noise = 0.0
+        self._chance = random.Random(0)
         self._host, self._pushed = (StreamParser(NEW, k) for k in (HOST_KINDS, ROBOT_KINDS))
         self._robot = os.open(robot, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
         self._bridge, self._far = os.openpty()
@@ -85,6 +89,10 @@ class SerialTap:
     def thread_id(self) -> int:
         """The system's id of the thread that passes the bytes on."""
         return self._thread.native_id or 0
+
+    def seed(self, number: int) -> None:
+        """Say which bytes the noise hits."""
+        self._chance.seed(number)
 
     def forget(self) -> None:
         """Begin anew with nothing seen."""
@@ -129,12 +137,18 @@ class SerialTap:
                 data = _receive(self._bridge)
                 for frame in self._host.feed(data):
                     self._take(frame)
-                _send(self._robot, data)
+                _send(self._robot, self._disturbed(data))
             if self._robot in ready:
                 data = _receive(self._robot)
                 frames = self._pushed.feed(data)
                 self.reports += [time.monotonic() for each in frames if each.kind is Kind.PUSH]
-                _send(self._bridge, data)
+                _send(self._bridge, self._disturbed(data))
+
+    def _disturbed(self, data: bytes) -> bytes:
+        if not (noise := self.noise):
+            return data
+        chance = self._chance
+        return bytes(b ^ 1 << chance.randrange(8) if chance.random() < noise else b for b in data)
 
     def _pass_speed_on(self) -> None:
         wanted, there = termios.tcgetattr(self._far), termios.tcgetattr(self._robot)

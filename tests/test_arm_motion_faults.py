@@ -16,10 +16,11 @@ from moveit_msgs.msg import ServoStatus
 from moving_arm import CONTROLLER, goal_to, MovingArm, READY
 import numpy as np
 import pytest
+from sdo_probe import is_enabled, read_position
 from std_srvs.srv import SetBool
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from arm_canopen.can import Frame, open_bus
+from arm_canopen.can import open_bus
 from arm_msgs.srv import InjectFault
 
 if TYPE_CHECKING:
@@ -32,8 +33,6 @@ if TYPE_CHECKING:
 pytestmark = pytest.mark.scenario
 
 Result = FollowJointTrajectory.Result
-
-POSITION, STATUSWORD = 0x6064, 0x6041
 
 
 def test_an_arm_survives_its_drives(isolation: Isolation, tmp_path: Path) -> None:
@@ -165,26 +164,9 @@ def test_drives_stop_by_themselves_when_the_master_is_killed(
 
 def _path_to_rest(bus: Bus) -> list[int]:
     """Return the positions of the first drive until it is disabled and stands."""
-    path = [_read(bus, 2, POSITION)]
+    path = [read_position(bus, 2)]
     deadline = time.monotonic() + 8.0
-    while not (len(path) > 100 and path[-1] == path[-100] and _stopped(bus)):
-        path.append(_read(bus, 2, POSITION))
+    while not (len(path) > 100 and path[-1] == path[-100] and not is_enabled(bus, 2)):
+        path.append(read_position(bus, 2))
         assert time.monotonic() < deadline, path[::20]
     return path
-
-
-def _stopped(bus: Bus) -> bool:
-    """Tell whether the first drive is no longer in Operation enabled."""
-    return bool((_read(bus, 2, STATUSWORD) & 0x6F) != 0x27)
-
-
-def _read(bus: Bus, node_id: int, index: int) -> int:
-    """Read a number by SDO, as a second master would."""
-    bus.send(Frame(0x600 + node_id, bytes([0x40, index & 0xFF, index >> 8, 0, 0, 0, 0, 0])))
-    deadline = time.monotonic() + 2.0
-    while time.monotonic() < deadline:
-        for frame in bus.receive(0.1):
-            if frame.can_id == 0x580 + node_id and frame.data[1:3] == index.to_bytes(2, 'little'):
-                size = 4 - ((frame.data[0] >> 2) & 3)
-                return int.from_bytes(frame.data[4 : 4 + size], 'little', signed=True)
-    raise AssertionError(f'node {node_id} does not answer')

@@ -1,0 +1,250 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The Panda on trajectories, with a cable between master and drives that can be disturbed."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack, suppress
+from pathlib import Path
+import signal
+import time
+from typing import TYPE_CHECKING
+
+from action_msgs.msg import GoalStatus
+from ament_index_python.packages import get_package_share_directory
+from bus_tap import BusTap, LineQuality, PERFECT
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from disturbance import Disturbance, Event, full_cpu
+from moving_arm import goal_to, GoalRun, MovingArm, READY
+from sdo_probe import is_enabled, read_position
+from simulated_arm import JOINTS
+
+from arm_bringup.description import expand_xacro
+from arm_canopen.can import open_bus
+from arm_servo import JointLimits, load_limits, RobotModel
+from arm_watch import ArmWatch
+
+if TYPE_CHECKING:
+    from types import TracebackType
+
+    from isolation import Isolation
+    from processes import RunningProcess
+    from typing_extensions import Self
+
+FIRST_NODE = 2
+AWAY = [at + 0.4 for at in READY]
+"""Where it goes from READY in [rad]."""
+WAY_TIME = 2.0
+"""How long it goes there in [s]."""
+PATIENCE = 60.0
+"""Longest time in [s] until it works again; requests may go to a killed master until DDS knows."""
+ANSWER = 3.0
+"""Longest time in [s] for one answer."""
+REST = 0.5
+"""Time in [s] without motion that counts as rest."""
+COMING_TO_REST = 20.0
+"""Longest time in [s] from the end of a disturbance to rest."""
+WORST_LOSS = 0.3
+WORST_DELAY = 0.2
+"""In [s]."""
+
+
+class TappedArm(MovingArm):
+    """The drives are on a bus of their own, behind a tap."""
+
+    def __init__(self, isolation: Isolation, folder: Path, device_bus: str) -> None:
+        """Start the processes and wait until all drives are booted."""
+        self._device_bus = device_bus
+        super().__init__(isolation, folder)
+
+    def start(self, name: str, *arguments: str) -> RunningProcess:
+        """Start an executable on its bus."""
+        if name == 'fake_slaves':
+            arguments = ('-p', f'can_interface_name:={self._device_bus}', *arguments)
+        return super().start(name, *arguments)
+
+    def restart(self, name: str) -> None:
+        """Start a process that was killed."""
+        process = self.start({'slaves': 'fake_slaves'}.get(name, name))
+        setattr(self, name, process)
+
+
+class ArmVictim:
+    """Drives the Panda to and fro."""
+
+    kinds = (
+        Disturbance.KILL,
+        Disturbance.STOP,
+        Disturbance.LOSS,
+        Disturbance.DELAY,
+        Disturbance.DOUBLING,
+        Disturbance.FULL_CPU,
+    )
+    processes = ('master', 'slaves')
+
+    def __init__(self, isolation: Isolation, folder: Path, seed: int) -> None:
+        """Start master, drives and tap, and let the drives follow."""
+        self.watch = ArmWatch(dict(enumerate(JOINTS, FIRST_NODE)), panda_limits())
+        listeners = (self.watch.take_from_master, self.watch.take_from_device)
+        self._stack = ExitStack()
+        try:
+            self._device_bus = isolation.second_bus
+            tap = BusTap(isolation.bus, self._device_bus, seed, listeners)
+            self._tap = self._stack.enter_context(tap)
+            arm = TappedArm(isolation, folder, self._device_bus)
+            self._arm = self._stack.enter_context(arm)
+            self._diagnostics = arm.client.listen(DiagnosticArray, '/diagnostics')
+            self._goal = AWAY
+            self._works_again()
+        except BaseException:
+            self._stack.close()
+            raise
+
+    def __enter__(self) -> Self:
+        """Use it in a with statement."""
+        return self
+
+    def __exit__(
+        self,
+        exc_type: type[BaseException] | None,
+        exc: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """Stop all processes."""
+        self._stack.close()
+
+    def violations(self) -> list[str]:
+        """Return what was against a law since the last call."""
+        found, self.watch.violations = self.watch.violations, []
+        return found
+
+    def round(self, event: Event) -> str:
+        """Move, be disturbed, come to rest, recover and move again.
+
+        Raises:
+            AssertionError: It did not.
+        """
+        self._diagnostics.clear()
+        self._goal = READY if self._goal is AWAY else AWAY
+        self.watch.allow(self._goal)
+        run = self._arm.send(goal_to(self._goal, WAY_TIME))
+        self._arm.client.spin_for(event.delay)
+        self._disturb(event)
+        outcome = self._end_of(run, event)
+        if event.kind is not Disturbance.KILL:
+            self._comes_to_rest()
+        self.watch.forbid()
+        if event.kind is Disturbance.KILL:
+            if event.process == 'slaves':
+                self.watch.forget_positions()
+            self._arm.restart(event.process)
+        self._works_again()
+        return outcome
+
+    def _disturb(self, event: Event) -> None:
+        if event.kind is Disturbance.FULL_CPU:
+            with full_cpu():
+                self._arm.client.spin_for(event.duration)
+        elif event.process:
+            process = self._arm.master if event.process == 'master' else self._arm.slaves
+            if event.kind is Disturbance.KILL:
+                process.signal(signal.SIGKILL)
+                process.wait()
+                self._arm.client.spin_for(REST)
+            else:
+                process.signal(signal.SIGSTOP)
+                self._arm.client.spin_for(event.duration)
+                process.signal(signal.SIGCONT)
+        else:
+            share = event.severity * WORST_LOSS
+            self._tap.quality = {
+                Disturbance.LOSS: LineQuality(loss=share),
+                Disturbance.DOUBLING: LineQuality(doubling=share),
+                Disturbance.DELAY: LineQuality(delay=event.severity * WORST_DELAY),
+            }[event.kind]
+            self._arm.client.spin_for(event.duration)
+            self._tap.quality = PERFECT
+
+    def _end_of(self, run: GoalRun, event: Event) -> str:
+        """Return how a goal ended; where it was not reached, somebody says why."""
+        if event.kind is Disturbance.KILL and event.process == 'master':
+            self._stops_without_master()
+            return 'stopped by the drives'
+        status, result = run.wait()
+        if status == GoalStatus.STATUS_SUCCEEDED:
+            return 'reached'
+        words = str(result.error_string)
+        assert words, f'ended with {result.error_code} and no words'
+        self._arm.client.spin_until(self._is_diagnosed, ANSWER, 'diagnostic of the stop')
+        return f'aborted: {words}'
+
+    def _stops_without_master(self) -> None:
+        """Wait until no drive is enabled; where each stands is where it may be."""
+        end = time.monotonic() + COMING_TO_REST
+        with open_bus(self._device_bus) as bus:
+            for node_id, joint in enumerate(JOINTS, FIRST_NODE):
+                while is_enabled(bus, node_id):
+                    assert time.monotonic() < end, f'{joint} goes on without its master'
+            before = [read_position(bus, node) for node, _ in enumerate(JOINTS, FIRST_NODE)]
+            self._arm.client.spin_for(REST)
+            after = [read_position(bus, node) for node, _ in enumerate(JOINTS, FIRST_NODE)]
+        assert before == after, f'moves without its master: {before}, {after}'
+        self.watch.see(after)
+
+    def _is_diagnosed(self) -> bool:
+        return any(
+            status.level != DiagnosticStatus.OK and status.message
+            for message in self._diagnostics
+            for status in message.status
+        )
+
+    def _comes_to_rest(self) -> None:
+        rest = self.watch.still_for
+        self._arm.client.spin_until(lambda: rest() > REST, COMING_TO_REST, 'rest')
+
+    def _works_again(self) -> None:
+        """Enable what is not, as the README says; nothing moves by that; then move."""
+        end = time.monotonic() + PATIENCE
+        words = ''
+        while time.monotonic() < end:
+            words = self._enabled() or self._goes()
+            if not words:
+                return
+            self._arm.client.spin_for(REST)
+        raise AssertionError(f'does not work again: {words}')
+
+    def _enabled(self) -> str:
+        """Reset faults and enable all drives; return what is refused."""
+        for joint in JOINTS:
+            for service in ('init', 'cyclic_position_mode'):
+                words = self._ask(f'/{joint}/{service}')
+                if words:
+                    return f'{joint}: {words}'
+        return ''
+
+    def _ask(self, name: str) -> str:
+        with suppress(AssertionError):
+            answer = self._arm.client.trigger(name, ANSWER)
+            return '' if answer.success else str(answer.message)
+        return f'no answer of {name}'
+
+    def _goes(self) -> str:
+        """Go back to where the last motion was to lead; return what prevents it."""
+        self.watch.allow(self._goal)
+        try:
+            status, result = self._arm.send(goal_to(self._goal, 2 * WAY_TIME)).wait()
+        except AssertionError as error:
+            words = str(error)
+        else:
+            words = '' if status == GoalStatus.STATUS_SUCCEEDED else str(result.error_string)
+        self._comes_to_rest()
+        self.watch.forbid()
+        return words
+
+
+def panda_limits() -> JointLimits:
+    """Return the limits of the Panda."""
+    robot = Path(get_package_share_directory('arm_bringup')) / 'robots' / 'panda'
+    semantic = (robot / 'panda.srdf').read_text(encoding='utf-8')
+    table = load_limits(robot / 'limits.yaml')
+    return RobotModel(expand_xacro(robot / 'panda.urdf.xacro'), semantic, table).limits

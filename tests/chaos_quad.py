@@ -1,0 +1,203 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The quadruped at a walk, with a serial cable that can be noisy."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+import math
+import signal
+import time
+from typing import TYPE_CHECKING
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from disturbance import Disturbance, Event, full_cpu
+from simulated_quad import SimulatedQuad
+
+from quad_bringup.demo.itinerary import Velocity
+from quad_bringup.demo.track import tilt_of
+from quad_description import movable_joints, robot_urdf
+from quad_hardware.joints import JointMap, servo_of
+
+if TYPE_CHECKING:
+    from pathlib import Path
+    from types import TracebackType
+
+    from isolation import Isolation
+    from serial_tap import Target
+    from typing_extensions import Self
+
+WORST_NOISE = 0.02
+"""Share of the bytes in which a bit is inverted."""
+LARGEST_STEP = 23.0
+"""Degrees between two commands to a servo; the trot needs half of it, a jump would be more."""
+WALKED = 0.1
+"""Metres that it goes when it works, in [m]."""
+STRAYED = 0.06
+"""Metres that the body may go in a second without a command, as it puts its feet down, in [m]."""
+ROUNDING = 0.1
+"""Degrees by which an angle on the wire may be beyond a limit, which is in radians."""
+SETTLING = 3.0
+"""Time in [s] in which it ends its gait, of the robot's clock."""
+PATIENCE = 20.0
+"""Longest time in [s] until it walks."""
+FALLEN = math.radians(45.0)
+AHEAD, BACK = Velocity(forward=0.2), Velocity(forward=-0.2)
+
+
+class QuadVictim:
+    """Walks to and fro."""
+
+    kinds = (Disturbance.KILL, Disturbance.STOP, Disturbance.NOISE, Disturbance.FULL_CPU)
+    processes = ('controller', 'hardware')
+
+    def __init__(self, isolation: Isolation, folder: Path, seed: int) -> None:
+        """Start everything, and let it walk."""
+        self._servos = {
+            servo.motor: servo
+            for servo in JointMap(map(servo_of, movable_joints(robot_urdf()))).servos
+        }
+        self._violations: list[str] = []
+        self._velocity = AHEAD
+        self._stack = ExitStack()
+        try:
+            self._quad = self._stack.enter_context(SimulatedQuad(isolation, folder))
+            self._quad.tap.seed(seed)
+            self._diagnostics = self._quad.client.listen(DiagnosticArray, '/diagnostics')
+            self._works_again()
+        except BaseException:
+            self._stack.close()
+            raise
+
+    def __enter__(self) -> Self:
+        """Use it in a with statement."""
+        return self
+
+    def __exit__(
+        self,
+        exc_type: type[BaseException] | None,
+        exc: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """Stop all processes."""
+        self._stack.close()
+
+    def violations(self) -> list[str]:
+        """Return what was against a law since the last call."""
+        found, self._violations = self._violations, []
+        return found
+
+    def round(self, event: Event) -> str:
+        """Walk, be disturbed, come to rest, recover and walk again.
+
+        Raises:
+            AssertionError: It did not.
+        """
+        self._quad.tap.forget()
+        self._diagnostics.clear()
+        self._velocity = BACK if self._velocity is AHEAD else AHEAD
+        self._walk(event.delay)
+        self._disturb(event)
+        self._check_targets()
+        outcome = self._end()
+        self._stays()
+        if event.kind is Disturbance.KILL:
+            self._quad.tap.forget()
+            self._quad.start(event.process)
+            self._stays()
+        self._works_again()
+        return outcome
+
+    def _disturb(self, event: Event) -> None:
+        if event.kind is Disturbance.FULL_CPU:
+            with full_cpu():
+                self._walk(event.duration)
+        elif event.kind is Disturbance.NOISE:
+            self._quad.tap.noise = event.severity * WORST_NOISE
+            self._walk(event.duration)
+            self._quad.tap.noise = 0.0
+        else:
+            process = self._quad.processes[event.process]
+            if event.kind is Disturbance.KILL:
+                process.signal(signal.SIGKILL)
+                process.wait()
+                self._walk(1.0)
+            else:
+                process.signal(signal.SIGSTOP)
+                self._walk(event.duration)
+                process.signal(signal.SIGCONT)
+
+    def _end(self) -> str:
+        """Let nobody command it any more; where it has stopped by itself, it says why."""
+        self._quad.spin(SETTLING)
+        self._quad.tap.forget()
+        state = self._quad.state
+        if state != 'fault' or not self._quad.processes['controller'].is_running():
+            return state
+        words = self._told()
+        assert words, 'is in fault, and /diagnostics does not say why'
+        return f'fault: {words}'
+
+    def _told(self) -> str:
+        """Return what the last diagnostics complain of."""
+        return '; '.join(
+            status.message
+            for message in self._diagnostics[-20:]
+            for status in message.status
+            if status.level == DiagnosticStatus.ERROR
+        )
+
+    def _stays(self) -> None:
+        """Nothing goes anywhere while nobody asks for it."""
+        before = self._place()
+        self._quad.spin(1.0)
+        after = self._place()
+        moved = math.dist(before, after)
+        if moved > STRAYED:
+            self._violations.append(f'went {moved:.3f} m without a command')
+        turn = self._quad.truth[-1].pose.pose.orientation
+        tilt = tilt_of((turn.x, turn.y, turn.z, turn.w))
+        if tilt > FALLEN:
+            self._violations.append(
+                f'has fallen, it is tilted by {math.degrees(tilt):.0f} degrees'
+            )
+
+    def _works_again(self) -> None:
+        """Clear the fault, as the README says; nothing moves by that; then stand up and walk."""
+        self._quad.clear_fault()
+        self._stays()
+        self._quad.stand()
+        self._quad.set_mode('walk')
+        before, end = self._place(), time.monotonic() + PATIENCE
+        while math.dist(before, self._place()) < WALKED:
+            assert time.monotonic() < end, f'goes nowhere, in state {self._quad.state}'
+            self._walk(0.5)
+        self._check_targets()
+
+    def _walk(self, seconds: float) -> None:
+        """Command a velocity for a time in [s]; the robot's clock may stand meanwhile."""
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            self._quad.walk(0.1, self._velocity)
+
+    def _place(self) -> tuple[float, float]:
+        position = self._quad.truth[-1].pose.pose.position
+        return position.x, position.y
+
+    def _check_targets(self) -> None:
+        """Look at all that servos were told since the last look."""
+        targets = list(self._quad.tap.targets)
+        step = self._quad.tap.largest_step()
+        if step > LARGEST_STEP:
+            self._violations.append(f'two targets of a servo are {step:.1f} degrees apart')
+        for target in targets:
+            self._violations += self._beyond(target)
+
+    def _beyond(self, target: Target) -> list[str]:
+        found = []
+        for motor, angle in target.angles.items():
+            servo = self._servos[motor]
+            low, high = sorted((servo.angle(servo.lower), servo.angle(servo.upper)))
+            if not low - ROUNDING <= angle <= high + ROUNDING:
+                found.append(f'{servo.joint}: {angle:.1f} degrees, limits {low:.1f} {high:.1f}')
+        return found
