@@ -5,11 +5,23 @@
 from __future__ import annotations
 
 from dataclasses import replace
+import time
+from typing import Any
 
+from isolation import Isolation
 import pytest
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
 from servo_drives import Drives, PERIOD
 
-from arm_servo.nodes.joint_state_broadcaster import JointSample, JointSamples, MAX_AGE
+from arm_servo.nodes.joint_state_broadcaster import (
+    JointSample,
+    JointSamples,
+    JointStateBroadcaster,
+    MAX_AGE,
+)
 
 GRIPPER = JointSample(0.04, 0.0, 100.0)
 
@@ -53,3 +65,33 @@ def test_drives_beside_the_arm_are_there() -> None:
     assert found['gripper'].position == 0.04
     found = samples.fresh(drives.gateway.snapshot, drives.now + MAX_AGE + PERIOD)
     assert 'gripper' not in found
+
+
+def test_a_gripper_is_published_with_the_arm(isolation: Isolation) -> None:
+    """Its drive publishes its own joint states; the broadcaster puts them beside the arm's."""
+    rclpy.init(domain_id=isolation.domain_id)
+    drives, _ = ready()
+    heard: list[JointState] = []
+    nodes: list[Any] = [Node('joint_state_broadcaster'), Node('gripper')]
+    node, gripper = nodes
+    try:
+        JointStateBroadcaster(node, drives.gateway, ['gripper'], active=True)
+        publisher = gripper.create_publisher(JointState, 'gripper/joint_states', 10)
+        gripper.create_subscription(JointState, 'joint_states', heard.append, 10)
+        executor = SingleThreadedExecutor()
+        executor.add_node(node)
+        executor.add_node(gripper)
+        deadline = time.monotonic() + 30.0
+        while not any('gripper' in message.name for message in heard):
+            drives.now = time.monotonic() - PERIOD
+            drives.run()
+            publisher.publish(JointState(name=['gripper'], position=[0.04], velocity=[0.0]))
+            executor.spin_once(timeout_sec=0.05)
+            assert time.monotonic() < deadline
+    finally:
+        for each in nodes:
+            each.destroy_node()
+        rclpy.shutdown()
+    whole = next(message for message in heard if 'gripper' in message.name)
+    assert [*whole.name] == [*drives.source.axes, 'gripper']
+    assert whole.position[-1] == 0.04
