@@ -27,6 +27,7 @@ from arm_canopen.standard.drive import Controlword, DriveState, OperationMode, S
 
 JOINT = 'joint1'
 NODE_ID = 2
+STATUS_PDO = 0x180 + NODE_ID
 COMMAND_PDO = 0x200 + NODE_ID
 
 
@@ -190,6 +191,51 @@ def test_a_target_that_is_not_taken_does_not_end_the_halt() -> None:
     assert_rests(net, 4.0)
     assert net.drives[JOINT].halted
     assert any('stays halted' in text for text in net.told(Severity.WARNING))
+
+
+def without_acknowledge(sender: str, frame: Frame) -> Frame:
+    """Clear bit 12 in the statusword of the drive."""
+    if frame.can_id != STATUS_PDO or sender == 'master':
+        return frame
+    return frame._replace(data=frame.data[:1] + bytes((frame.data[1] & ~0x10,)) + frame.data[2:])
+
+
+@pytest.mark.parametrize('before', [0.3, 2.0], ids=['not known yet', 'known'])
+def test_a_drive_without_acknowledge_moves_after_a_halt(before: float) -> None:
+    """The halt ends with the new set-point, and the old one does not revive."""
+    net = running_in(OperationMode.PROFILE_POSITION)
+    net.wire.alters = without_acknowledge
+    net.commands[JOINT].set_target(5.0)
+    net.run(before)
+    net.do(JOINT, 'halt', preempt=True)
+    rest = motor(net)
+    net.commands[JOINT].set_target(rest - 0.2)
+    highest = rest
+    for _ in range(400):
+        net.run(PERIOD)
+        highest = max(highest, motor(net))
+    assert highest < rest + 5e-3
+    assert motor(net) == pytest.approx(rest - 0.2, abs=2e-3)
+    assert not net.drives[JOINT].halted
+
+
+def test_a_drive_without_acknowledge_is_reported_once() -> None:
+    """It goes to every target, and queued moves wait for the one before (bit 10)."""
+    net = running_in(OperationMode.PROFILE_POSITION)
+    net.wire.alters = without_acknowledge
+    for target in (0.3, 0.6, 0.1):
+        net.commands[JOINT].set_target(target)
+        net.run(2.5)
+        assert motor(net) == pytest.approx(target, abs=2e-3)
+    net.commands[JOINT].move(Move(0.8, immediate=False))
+    net.commands[JOINT].move(Move(0.2, immediate=False))
+    highest = 0.0
+    for _ in range(400):
+        net.run(PERIOD)
+        highest = max(highest, motor(net))
+    assert highest == pytest.approx(0.8, abs=3e-3)
+    assert motor(net) == pytest.approx(0.2, abs=2e-3)
+    assert len([text for text in net.told(Severity.WARNING) if 'bit 12' in text]) == 1
 
 
 def test_relative_moves_count_from_what_the_drive_has_or_gets() -> None:

@@ -12,6 +12,7 @@ from .cyclic_position import CyclicPosition
 from .mode_table import build_modes
 from .modes import Mode, NO_BITS
 from .observed_drive import FAULTY, ObservedDrive
+from .position_modes import NEW_SET_POINT
 from .refusal import Refusal, RefusalCause
 from .target_limits import check_target
 
@@ -164,6 +165,8 @@ class ModedDrive(ObservedDrive):
                 'stays halted: it has not taken its new target (bit 12); ~/disable and ~/enable '
                 'make it forget the moves that it holds'
             )
+        if bits & NEW_SET_POINT:
+            halt = self.halt.bits(self.mode)  # ends with the edge where no acknowledge will come
         if self.halt.bits(self.mode) and self.mode.cyclic:
             self.mode.preload(self._actual())  # from there it goes on
         return bits | halt

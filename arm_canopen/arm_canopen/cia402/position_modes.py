@@ -17,6 +17,7 @@ from .modes import Actual, fitting, Mode
 from .units import Units
 
 ACKNOWLEDGE = int(Statusword.SET_POINT_ACKNOWLEDGE)
+TARGET_REACHED = int(Statusword.TARGET_REACHED)
 NEW_SET_POINT = int(Controlword.NEW_SET_POINT)
 CHANGE_IMMEDIATELY = int(Controlword.CHANGE_IMMEDIATELY)
 ACKNOWLEDGE_TIMEOUT = 1.0  # [s] a drive acknowledges a set-point within a few cycles
@@ -86,6 +87,10 @@ class ProfilePosition(Mode):
 
     Of immediate moves the newest counts: it replaces those that still wait for the handshake.
     Others queue, and none of them is lost; relative ones too, for each counts from the one before.
+
+    A drive that has never raised bit 12 when its time was up does not do so at all, which is
+    reported once. From then on a set-point counts as taken when it was offered, and a move that
+    waits for the one before follows bit 10 (target reached).
     """
 
     number = OperationMode.PROFILE_POSITION
@@ -120,6 +125,8 @@ class ProfilePosition(Mode):
         self._setpoint: float | None = None
         self._reference: float | None = None
         self._taken = False
+        self._acknowledges: bool | None = None  # None until the drive has shown it
+        self._offered: Waiting | None = None
         self.handshake = Handshake.IDLE
 
     @property
@@ -202,12 +209,18 @@ class ProfilePosition(Mode):
             self._watch_emptied(now, patience, acknowledged=acknowledged)
         elif acknowledged:
             self._watch_full(now)
-        else:
+        elif self._follows_at_once or statusword & TARGET_REACHED:
             self._full_since = self._imposed = None
             self._hand_over(now, acknowledged=False)
         if self.handshake in (Handshake.OFFERED, Handshake.IMPOSED):
             return self._bits | NEW_SET_POINT
         return self._bits
+
+    @property
+    def _follows_at_once(self) -> bool:
+        """Whether the next move may be offered while the one before runs."""
+        waits = bool(self._queue) and not self._queue[0].move.immediate
+        return self._acknowledges is not False or not waits
 
     def _forget(self) -> None:
         self._queue.clear()
@@ -223,7 +236,7 @@ class ProfilePosition(Mode):
         self.handshake = Handshake.IDLE
         if not self._queue:
             return
-        waiting = self._queue.popleft()
+        self._offered = waiting = self._queue.popleft()
         self._target.write(waiting.value)
         self._bits = waiting.move.bits
         self._setpoint = self._reference = waiting.destination
@@ -235,6 +248,7 @@ class ProfilePosition(Mode):
     def _offer(self, now: float, *, acknowledged: bool) -> None:
         self._offered_at = now
         self._cycles_left = EDGE_CYCLES
+        self._taken |= self._acknowledges is False
         self.handshake = Handshake.IMPOSED if acknowledged else Handshake.OFFERED
 
     def _show_edge(self, now: float) -> None:
@@ -280,12 +294,39 @@ class ProfilePosition(Mode):
 
     def _watch_acknowledge(self, now: float, *, acknowledged: bool) -> None:
         if acknowledged:
-            self._taken = True
+            self._taken = self._acknowledges = True
             self.handshake = Handshake.RELEASED
+        elif self._acknowledges is False:
+            self._cycles_left -= 1
+            if self._cycles_left <= 0:
+                self._withdraw()
         elif now - self._offered_at > ACKNOWLEDGE_TIMEOUT:
             self._not_acknowledged()
 
+    def _withdraw(self) -> None:
+        self.handshake = Handshake.WITHDRAWN
+        self._cycles_left = EDGE_CYCLES
+
+    def _never_acknowledged(self) -> None:
+        """Go on without bit 12; an absolute move is offered again, as it may have met a halt."""
+        self._acknowledges = False
+        offered = self._offered
+        if offered is not None and offered.move.immediate and not offered.move.relative:
+            if not self._queue:
+                self._queue.append(offered)
+        else:
+            self._taken = True
+        self._withdraw()
+        self._warn(
+            f'set-points are not acknowledged (bit 12 did not come within {ACKNOWLEDGE_TIMEOUT:g} '
+            's): from now on they count as taken, and queued moves wait for bit 10 (target '
+            'reached)'
+        )
+
     def _not_acknowledged(self) -> None:
+        if self._acknowledges is None:
+            self._never_acknowledged()
+            return
         self.handshake = Handshake.RELEASED
         self._reference = None
         self._warn(
