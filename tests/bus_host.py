@@ -50,4 +50,7 @@ def attack(group: str, port: str, address: str, target: str) -> None:
 
 
 if __name__ == '__main__':
-    {'hear': hear, 'attack': attack}[sys.argv[1]](*sys.argv[2:])
+    if sys.argv[1] == 'hear':
+        hear(*sys.argv[2:])
+    else:
+        attack(*sys.argv[2:])
