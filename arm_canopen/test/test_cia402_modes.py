@@ -492,3 +492,15 @@ def test_the_buffer_of_mode_7_is_emptied_first() -> None:
         if entry.frame.can_id == 0x200 + NODE_ID and entry.frame.data[2] == 7
     )
     assert last_write < first_seven
+
+
+def test_a_drive_that_refuses_mode_zero_is_never_sent_it() -> None:
+    """Quirk `no_mode_zero`: once it shows a mode, that is the one in its RPDO, after boot, too."""
+    dictionary = with_defaults(drive_dictionary(), {(0x6060, 0): 1, (0x6061, 0): 1})
+    config = full_drive(dictionary=dictionary.for_node(NODE_ID), scales={'quirks': 'no_mode_zero'})
+    net = VirtualNetwork(bus_config(config))
+    net.boot()
+    net.run(0.2)
+    net.do(JOINT, 'init')
+    net.run(0.2)
+    assert {data[2] for data in net.frames(0x200 + NODE_ID)} == {1}

@@ -22,6 +22,7 @@ from .moded_drive import ModedDrive
 from .modes import NO_BITS
 from .motion import AxisFeedback, Setpoint
 from .observed_drive import FAULTY
+from .quirks import quirks_of
 from .refusal import Refusal, RefusalCause
 from .state_machine import Command, fault_reset, next_command
 from .target_limits import check_feed_forward
@@ -66,6 +67,7 @@ class Drive(ModedDrive):
         self._streamed = False
         self._failure = ''
         self._controlword = 0
+        self._quirks = quirks_of(self.config.quirks)
         self._mode_shown = self._mode_led = self.mode
         self._begun = False
         self._announced = False
@@ -239,7 +241,11 @@ class Drive(ModedDrive):
     def _send(self, command: Command, bits: int = NO_BITS) -> None:
         self._controlword = int(command) | bits
         self.objects.controlword.write(self._controlword)
-        self.objects.mode.write(int(self._mode_shown.number))
+        number = int(self._mode_shown.number)
+        if number or not self._quirks.no_mode_zero:
+            self.objects.mode.write(number)
+        elif self.objects.mode_display:
+            self.objects.mode.write(self.objects.mode_display)  # keeps the mode that it has
 
     def _take_over(self) -> None:
         """Go on where another master has left the drive."""
