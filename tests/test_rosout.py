@@ -20,7 +20,9 @@ from simulated_arm import panda_bus
 
 TIMEOUT = 60.0  # [s]
 # what the master logs at its start is heard although it is found later
-LATCHED = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+LATCHED = QoSProfile(  # type: ignore[no-untyped-call]
+    depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL
+)
 
 
 @pytest.mark.scenario
