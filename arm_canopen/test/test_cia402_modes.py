@@ -24,6 +24,7 @@ from virtual_network import (
     with_defaults,
 )
 
+from arm_canopen.can.frame import Frame
 from arm_canopen.cia402.homing import HomingProgress
 from arm_canopen.cia402.position_modes import Move, QUEUE_MAX
 from arm_canopen.config.drive_model import DriveConfig, RecoveryPolicy
@@ -504,3 +505,23 @@ def test_a_drive_that_refuses_mode_zero_is_never_sent_it() -> None:
     net.do(JOINT, 'init')
     net.run(0.2)
     assert {data[2] for data in net.frames(0x200 + NODE_ID)} == {1}
+
+
+@pytest.mark.parametrize('every', [1, 2, 3, 4])
+def test_a_fault_reset_reaches_a_drive_that_looks_less_often(every: int) -> None:
+    """The pulse lasts several cycles, so that no rate of the drive misses it each time."""
+    net = booted()
+    net.do(JOINT, 'init')
+    drive = net.devices[JOINT].drive
+    assert drive is not None
+    sent: list[int] = []
+
+    def loses(sender: str, frame: Frame) -> bool:
+        sent.append(frame.can_id)
+        return frame.can_id == 0x200 + NODE_ID and sent.count(frame.can_id) % every != 0
+
+    net.wire.loses = loses
+    drive.raise_fault(0x3210, net.now)
+    net.run(0.3)
+    net.do(JOINT, 'recover')
+    assert net.drives[JOINT].state is DriveState.OPERATION_ENABLED

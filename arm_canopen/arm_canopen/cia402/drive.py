@@ -67,6 +67,7 @@ class Drive(ModedDrive):
         self._streamed = False
         self._failure = ''
         self._controlword = 0
+        self._reset_began: float | None = None
         self._quirks = quirks_of(self.config.quirks)
         self._mode_shown = self._mode_led = self.mode
         self._begun = False
@@ -313,7 +314,10 @@ class Drive(ModedDrive):
 
     def _command(self) -> Command:
         if self.resetting and self.state is DriveState.FAULT:
-            return Command(fault_reset(self.state, self._controlword))
+            if self._reset_began is None:
+                self._reset_began = self._scheduler.now
+            return Command(fault_reset(self.state, self._scheduler.now - self._reset_began))
+        self._reset_began = None
         return (
             Command.DISABLE_VOLTAGE if self.goal is None else next_command(self.state, self.goal)
         )

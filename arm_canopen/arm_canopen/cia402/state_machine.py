@@ -13,6 +13,7 @@ from enum import IntEnum
 from ..standard.drive import Controlword, DriveState
 
 _S = DriveState
+RESET_PULSE = 0.05  # [s] for which bit 7 of a fault reset is set, and then cleared
 
 
 class Command(IntEnum):
@@ -97,13 +98,16 @@ def next_command(state: DriveState, target: DriveState) -> Command:
     return _HOLD[target]  # transitions 5 to 10 lead down directly
 
 
-def fault_reset(state: DriveState, controlword: int) -> int:
-    """Return the controlword that resets a fault by its rising edge.
+def fault_reset(state: DriveState, elapsed: float) -> int:
+    """Return the controlword that resets a fault by its rising edge, again and again.
+
+    Each level lasts long enough for a drive that looks at the controlword less often than the
+    master sends it.
 
     Args:
         state: State that the drive shows.
-        controlword: Word sent before; while its bit 7 is set, one without it must come first.
+        elapsed: Time since the reset was asked for in [s].
     """
-    if state is not DriveState.FAULT or controlword & Controlword.FAULT_RESET:
+    if state is not DriveState.FAULT or int(elapsed / RESET_PULSE) % 2:
         return Command.DISABLE_VOLTAGE
     return Command.FAULT_RESET
