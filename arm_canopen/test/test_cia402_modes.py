@@ -525,3 +525,24 @@ def test_a_fault_reset_reaches_a_drive_that_looks_less_often(every: int) -> None
     net.run(0.3)
     net.do(JOINT, 'recover')
     assert net.drives[JOINT].state is DriveState.OPERATION_ENABLED
+
+
+def test_a_drive_that_interpolates_only_in_motion_is_no_warning() -> None:
+    """In mode 7 some clear bit 12 at standstill; targets are reached, and nothing is reported."""
+    net = booted()
+    enable(net, OperationMode.INTERPOLATED_POSITION)
+    drive = net.devices[JOINT].drive
+    assert drive is not None
+
+    def alters(sender: str, frame: Frame) -> Frame:
+        if frame.can_id != 0x180 + NODE_ID or abs(drive.velocity) > 1e-6:
+            return frame
+        data = frame.data
+        return frame._replace(data=data[:1] + bytes((data[1] & ~0x10,)) + data[2:])
+
+    net.wire.alters = alters
+    for target in (0.3, 0.6, 0.1):
+        net.commands[JOINT].set_target(target)
+        net.run(2.0)
+        assert motor(net) == pytest.approx(target, abs=1e-3)
+    assert net.told(Severity.WARNING) == []

@@ -15,7 +15,7 @@ from ..master.remote_node import RemoteNode
 from ..master.scheduler import Scheduler, Task
 from ..standard.drive import DriveState, mode_title, OperationMode, Statusword
 from ..standard.objects import Index
-from .cyclic_position import CyclicPosition
+from .cyclic_position import CyclicPosition, InterpolatedPosition
 from .feed_forward import FeedForward
 from .following_watch import FollowingWatch
 from .moded_drive import ModedDrive
@@ -289,7 +289,8 @@ class Drive(ModedDrive):
             return
         bit = bool(self.statusword & FOLLOWS_COMMAND)
         before, self._follows = self._follows, bit
-        if before and not bit:
+        rests = isinstance(mode, InterpolatedPosition) and not mode.velocity
+        if before and not bit and not rests:  # in mode 7 bit 12 may go where nothing moves
             self.released(Refusal(RefusalCause.NOT_FOLLOWING, 'bit 12'))
             self.warn(f'does not follow its set-points any more (bit 12): {self.describe()}')
         if isinstance(mode, CyclicPosition):
