@@ -13,6 +13,8 @@ from rclpy.signals import SignalHandlerOptions
 
 from dds_network import restrict_dds
 
+from .type_support import load_type_support
+
 
 def init_ros(args: Sequence[str] | None = None, context: Context | None = None) -> None:
     """Initialise rclpy without its signal handlers, with DDS on the networks that are open.
@@ -26,6 +28,7 @@ def init_ros(args: Sequence[str] | None = None, context: Context | None = None) 
         RuntimeError: ROS does not accept the arguments, or its environment variables.
     """
     restrict_dds(os.environ)
+    load_type_support()
     rclpy.init(  # noqa: TID251  # the one place
         args=None if args is None else list(args),
         context=context,
