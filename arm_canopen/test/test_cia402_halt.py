@@ -175,7 +175,7 @@ def test_a_queued_move_after_a_halt_goes_at_once() -> None:
 
 
 def test_a_target_that_is_not_taken_does_not_end_the_halt() -> None:
-    """Without an acknowledge the drive stays halted, and that is said."""
+    """Without an acknowledge it stays halted but for 50 ms, and both answer and log say so."""
     net = running_in(OperationMode.PROFILE_POSITION)
     net.commands[JOINT].set_target(2.0)
     net.run(0.4)
@@ -187,7 +187,11 @@ def test_a_target_that_is_not_taken_does_not_end_the_halt() -> None:
         return frame._replace(data=bytes((frame.data[0] & ~0x10,)) + frame.data[1:])
 
     net.wire.alters = deaf
-    net.commands[JOINT].set_target(0.0)
+    commands, begin = net.commands[JOINT], motor(net)
+    with pytest.raises(DriveError, match='stays halted'):
+        net.result(commands.give(lambda: commands.set_target(0.0)))
+    net.run(0.2)
+    assert abs(motor(net) - begin) < BRAKING_MAX / 5
     assert_rests(net, 4.0)
     assert net.drives[JOINT].halted
     assert any('stays halted' in text for text in net.told(Severity.WARNING))

@@ -13,7 +13,9 @@ from ..master.scheduler import Promise, Scheduler, Task
 from ..standard.drive import DriveState, OperationMode
 from ..standard.target_objects import TARGET_OBJECTS
 from .drive import Drive
+from .halt import RESUME_TIMEOUT
 from .homing import home, HomingProgress
+from .moded_drive import NOT_TAKEN
 from .modes import NoMode
 from .position_modes import Move, ProfilePosition
 from .recovery import Recovery
@@ -22,6 +24,8 @@ from .stop_commands import StopCommands
 from .streaming import TargetStream
 
 T = TypeVar('T')
+
+TAKEN_TIMEOUT = RESUME_TIMEOUT + 1.0  # [s] after which nothing leads the drive out of its halt
 
 
 class DriveCommands(StopCommands):
@@ -82,6 +86,26 @@ class DriveCommands(StopCommands):
         """
         answer = self._set(target)
         self._stream.end('a single target')
+        return answer
+
+    def give(self, command: Callable[[], str]) -> Promise[str]:
+        """Give a target or a move; the promise ends when a halted drive has taken it.
+
+        Args:
+            command: Calls :meth:`set_target` or :meth:`move`, and returns its answer.
+        """
+        return self._scheduler.spawn(self._given(command))
+
+    async def _given(self, command: Callable[[], str]) -> str:
+        drive, steps, mode = self.drive, self._steps, self.drive.mode
+        answer = command()
+        if not drive.halt.leaving:
+            return answer
+        await steps.until(lambda: not drive.halt.leaving, TAKEN_TIMEOUT, 'its target')
+        if drive.halt.unanswered:
+            raise DriveError(f'{drive.name} stays halted: {NOT_TAKEN}')
+        if drive.halted or not drive.stays_enabled or drive.mode is not mode:
+            raise steps.refused('was stopped before it had taken the target')
         return answer
 
     def stream_target(self, target: float) -> None:

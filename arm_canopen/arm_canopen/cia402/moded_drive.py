@@ -16,6 +16,11 @@ from .position_modes import NEW_SET_POINT
 from .refusal import Refusal, RefusalCause
 from .target_limits import check_target
 
+NOT_TAKEN = (
+    'it has not taken its new target (bit 12); ~/disable and ~/enable make it forget the moves '
+    'that it holds'
+)
+
 
 class ModedDrive(ObservedDrive):
     """An axis and its modes of operation.
@@ -159,14 +164,14 @@ class ModedDrive(ObservedDrive):
         """Advance the mode by a cycle, and the halt; return their bits of the controlword."""
         bits = self.mode.step(now, period, self.statusword)
         halt = self.halt.bits(self.mode)  # at its end bit 8 goes a cycle after the new target
-        if not self.halt.advance(now, self.mode):
+        if not self.halt.advance(now, period, self.mode):
             self.mode.brake()
-            self.warn(
-                'stays halted: it has not taken its new target (bit 12); ~/disable and ~/enable '
-                'make it forget the moves that it holds'
-            )
+            self.warn(f'stays halted: {NOT_TAKEN}')
+            return self.halt.bits(self.mode)
         if bits & NEW_SET_POINT:
-            halt = self.halt.bits(self.mode)  # ends with the edge where no acknowledge will come
+            halt = self.halt.bits(
+                self.mode
+            )  # ends with the edge where no acknowledge comes before
         if self.halt.bits(self.mode) and self.mode.cyclic:
             self.mode.preload(self._actual())  # from there it goes on
         return bits | halt

@@ -101,6 +101,22 @@ class Mode(ABC):
         return True
 
     @property
+    def offered(self) -> bool:
+        """Whether a target is shown to the drive that it has not acknowledged yet."""
+        return False
+
+    def offer_again(self) -> None:  # noqa: B027  # most modes have nothing to acknowledge
+        """Take a target back that is not acknowledged, and show it anew."""
+
+    def goes_on_unanswered(self) -> bool:
+        """Conclude from an acknowledge that does not come, though nothing was in its way.
+
+        Returns:
+            Whether the target counts as taken all the same.
+        """
+        return False
+
+    @property
     def setpoint(self) -> float | None:
         """Position last commanded in user units, None in a mode that commands none."""
         return None

@@ -140,6 +140,11 @@ class ProfilePosition(Mode):
         return self._taken
 
     @property
+    def offered(self) -> bool:
+        """Whether bit 4 is set and bit 12 awaited; not where it was set before (full buffer)."""
+        return self.handshake is Handshake.OFFERED
+
+    @property
     def waiting(self) -> int:
         """Number of moves that have not been handed over."""
         return len(self._queue)
@@ -292,6 +297,27 @@ class ProfilePosition(Mode):
             if imposed is not None and not self._queue:
                 self._queue.append(imposed)
 
+    def offer_again(self) -> None:
+        """Clear bit 4 until the drive has seen that, and offer the newest target."""
+        if self.handshake is not Handshake.OFFERED:
+            return
+        if self._offered is not None and not self._is_replaced:
+            self._queue.appendleft(self._offered)
+        self._withdraw()
+
+    def goes_on_unanswered(self) -> bool:
+        """Count a set-point as taken where the drive has never acknowledged one."""
+        if self._acknowledges is None and self.handshake is Handshake.OFFERED:
+            self._never_acknowledged()
+            return True
+        return False
+
+    @property
+    def _is_replaced(self) -> bool:
+        """Whether the next move makes the one that is offered needless."""
+        move = self._queue[0].move if self._queue else None
+        return move is not None and move.immediate and not move.relative
+
     def _watch_acknowledge(self, now: float, *, acknowledged: bool) -> None:
         if acknowledged:
             self._taken = self._acknowledges = True
@@ -312,8 +338,8 @@ class ProfilePosition(Mode):
         self._acknowledges = False
         offered = self._offered
         if offered is not None and offered.move.immediate and not offered.move.relative:
-            if not self._queue:
-                self._queue.append(offered)
+            if not self._is_replaced:
+                self._queue.appendleft(offered)
         else:
             self._taken = True
         self._withdraw()

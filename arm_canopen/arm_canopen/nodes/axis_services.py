@@ -90,7 +90,7 @@ class AxisServices:
         self._offer(name, lambda: self._commands.select_mode(mode))
 
     def _set_target(self, request: COTargetDouble.Request) -> Future[str]:
-        return self._call(lambda: self._commands.set_target(request.target))
+        return self._give(lambda: self._commands.set_target(request.target))
 
     def _answer_target(self, response: COTargetDouble.Response, future: Future[str]) -> None:
         error = future.exception()
@@ -105,7 +105,7 @@ class AxisServices:
             immediate=not request.queue,
             blend=request.blend,
         )
-        return self._call(lambda: self._commands.move(move))
+        return self._give(lambda: self._commands.move(move))
 
     def _answer_move(self, response: MoveService.Response, future: Future[str]) -> None:
         error = future.exception()
@@ -126,6 +126,13 @@ class AxisServices:
                 lambda: self._node.get_logger().warning(f'{self._place}/target: {reason}')
             )
         self._refusal = reason
+
+    def _give(self, command: Callable[[], str]) -> Future[str]:
+        def run() -> Promise[str]:
+            self._node.admit()
+            return self._commands.give(command)
+
+        return self._thread.run(run)
 
     def _call(self, command: Callable[[], Any]) -> Future[Any]:
         def run() -> Any:  # noqa: ANN401
