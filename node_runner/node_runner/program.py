@@ -13,6 +13,7 @@ from rclpy.node import Node
 from rclpy.utilities import try_shutdown
 
 from dds_network import NETWORK_VARIABLE, NetworkChoiceError
+from realtime_loop import unsettle_memory
 
 from .exceptions import ParameterError
 from .joining import init_ros
@@ -75,6 +76,7 @@ def run_program(
     finally:
         bridge.close()
         try_shutdown()
+        unsettle_memory()
 
 
 def run_node(

@@ -3,7 +3,7 @@
 """What every thread that owns a cycle needs: deadlines without bursts, priority, memory."""
 
 from .cycle_timer import Cycle, CycleTimer
-from .privileges import Outcome, PRIORITY_MAX, raise_priority, settle_memory
+from .privileges import Outcome, PRIORITY_MAX, raise_priority, settle_memory, unsettle_memory
 
 __all__ = [
     'PRIORITY_MAX',
@@ -12,4 +12,5 @@ __all__ = [
     'Outcome',
     'raise_priority',
     'settle_memory',
+    'unsettle_memory',
 ]

@@ -79,6 +79,16 @@ def settle_memory() -> Outcome:
     return Outcome(granted=True, text='the memory is locked')
 
 
+def unsettle_memory() -> None:
+    """Let the garbage collector have what :func:`settle_memory` kept from it; for the end.
+
+    Libraries list on standard error what is still there when the interpreter ends.
+    """
+    if gc.get_freeze_count():
+        gc.unfreeze()
+        gc.collect()
+
+
 def _may_lock() -> bool:
     """Whether locking has no limit; below one, a process that grows would end by it."""
     if resource.getrlimit(resource.RLIMIT_MEMLOCK)[0] == resource.RLIM_INFINITY:

@@ -128,3 +128,16 @@ def test_the_garbage_collector_leaves_alone_what_is_there() -> None:
     )
     assert int(frozen) > 1000
     assert gc.isenabled()
+
+
+def test_at_the_end_the_garbage_collector_has_it_back() -> None:
+    """A cycle that was frozen is collected, before the interpreter ends."""
+    left = in_process(
+        'import gc, weakref; from realtime_loop import settle_memory, unsettle_memory\n'
+        'class Thing: pass\n'
+        'thing = Thing(); thing.own = thing; seen = weakref.ref(thing)\n'
+        'settle_memory(); del thing; gc.collect()\n'
+        'print(seen() is not None, end=" ")\n'
+        'unsettle_memory(); print(seen() is None, gc.get_freeze_count())'
+    )
+    assert left == 'True True 0'

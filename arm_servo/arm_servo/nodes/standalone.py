@@ -7,7 +7,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
-import gc
 import math
 import sys
 import threading
@@ -154,10 +153,7 @@ def run_standalone(
         Exit code: 0, or 1 when the arm cannot be built.
     """
     sys.setswitchinterval(SWITCH_INTERVAL)
-    code = run_program(name, lambda stop: _serve(build, stop), ServoError, args=args)
-    gc.unfreeze()
-    gc.collect()  # ruckig would list what is still there when the interpreter ends
-    return code
+    return run_program(name, lambda stop: _serve(build, stop), ServoError, args=args)
 
 
 class Farewell(threading.Event):
