@@ -11,9 +11,10 @@ from .parameter_reader import ParameterReader
 from .program import run_node, run_program
 from .realtime import declare_thread_priority, raise_thread_priority, settle_process_memory
 from .signals import stop_on_signals
-from .spinning import make_executor, spin, WAKE_PERIOD
+from .spinning import LINGER, make_executor, spin, WAKE_PERIOD
 
 __all__ = [
+    'LINGER',
     'WAKE_PERIOD',
     'ParameterError',
     'ParameterReader',

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 import threading
+import time
 
 from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
@@ -15,6 +16,9 @@ from .log_bridge import log_as
 
 WAKE_PERIOD = 0.1
 """How late the end may be noticed, in [s]."""
+
+LINGER = 0.3
+"""Time in [s] for an action to see the end of its goal, and for the result to reach the client."""
 
 
 def make_executor() -> Executor:
@@ -30,7 +34,13 @@ def make_executor() -> Executor:
     return EventsExecutor()
 
 
-def spin(nodes: Iterable[Node], stop: threading.Event, executor: Executor | None = None) -> None:
+def spin(
+    nodes: Iterable[Node],
+    stop: threading.Event,
+    executor: Executor | None = None,
+    *,
+    linger: float = 0.0,
+) -> None:
     """Serve nodes until an event is set, or until ``rclpy.shutdown``.
 
     The nodes are still there afterwards; destroying them is up to the caller.
@@ -39,6 +49,7 @@ def spin(nodes: Iterable[Node], stop: threading.Event, executor: Executor | None
         nodes: The nodes to serve.
         stop: Ends it within :data:`WAKE_PERIOD`.
         executor: What serves them; :func:`make_executor` chooses when it is None.
+        linger: Time for which they are served after that in [s], see :data:`LINGER`.
     """
     executor = executor or make_executor()
     for node in nodes:
@@ -48,6 +59,9 @@ def spin(nodes: Iterable[Node], stop: threading.Event, executor: Executor | None
         # the unbounded spin() of some EventsExecutors burns a core and runs nothing
         while ok() and not stop.is_set():
             executor.spin_once(timeout_sec=WAKE_PERIOD)
+        end = time.monotonic() + linger
+        while ok() and (left := end - time.monotonic()) > 0.0:
+            executor.spin_once(timeout_sec=min(left, WAKE_PERIOD))
     except ExternalShutdownException:
         pass
     finally:

@@ -40,3 +40,20 @@ def test_spin_serves_until_the_end(
         node.destroy_node()
     finally:
         try_shutdown()
+
+
+def test_spin_lingers(isolation: Isolation) -> None:
+    """What is due soon after the event is done, as the result of a goal that has just ended."""
+    rclpy.init(args=[], domain_id=isolation.domain_id)
+    try:
+        node = rclpy.create_node('spinner')
+        called, stop = threading.Event(), threading.Event()
+        stop.set()
+        node.create_timer(0.01, called.set)
+        spin([node], stop)
+        assert not called.is_set()
+        spin([node], stop, linger=PATIENCE / 20)
+        assert called.is_set()
+        node.destroy_node()
+    finally:
+        try_shutdown()

@@ -15,6 +15,7 @@ from rclpy.node import Node
 
 from node_runner import (
     declare_thread_priority,
+    LINGER,
     log_as,
     ParameterReader,
     refuse_misspelt,
@@ -153,7 +154,7 @@ def _stop(processes: Sequence[MasterProcess], others: Sequence[Node]) -> None:
 
     with ThreadPoolExecutor(1) as pool:
         stopping = pool.submit(stop)
-        spin(others, stopped)
+        spin(others, stopped, linger=LINGER if others else 0.0)
         stopping.result()
 
 

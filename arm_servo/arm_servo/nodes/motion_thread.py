@@ -138,6 +138,7 @@ class MotionThread:
 
     Attributes:
         error: What a cycle has raised; the arm was braked, and no cycle follows.
+        ended: Set when the last cycle is over.
     """
 
     def __init__(
@@ -154,6 +155,7 @@ class MotionThread:
             begin: Called once in the thread, before the first cycle.
         """
         self.error: Exception | None = None
+        self.ended = threading.Event()
         self._cycle, self._period = cycle, period
         self._begin = begin
         self._failed: Callable[[], None] = lambda: None
@@ -175,11 +177,6 @@ class MotionThread:
         self._cycle.closing = 'the program ends'
         self._ending.set()
 
-    @property
-    def ended(self) -> bool:
-        """Whether the thread has ended."""
-        return not self._thread.is_alive()
-
     def stop(self) -> None:
         """Bring the arm to rest, and wait for the end."""
         self.end()
@@ -199,6 +196,8 @@ class MotionThread:
                     lambda _, period: self._cycle.brake(period),
                     lambda now: self._cycle.at_rest or now > begin + LAST_STOP,
                 )
+        finally:
+            self.ended.set()
 
     def _ends(self, now: float) -> bool:
         if not self._ending.is_set():

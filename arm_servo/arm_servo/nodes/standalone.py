@@ -7,7 +7,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
-import math
 import sys
 import threading
 import time
@@ -17,6 +16,7 @@ from sensor_msgs.msg import JointState
 
 from node_runner import (
     declare_thread_priority,
+    LINGER,
     ParameterReader,
     raise_thread_priority,
     run_program,
@@ -40,9 +40,6 @@ SWITCH_INTERVAL = 0.0005
 
 THREAD_PRIORITY = 40
 """SCHED_FIFO priority of the loop, unless a parameter says another; that of moveit_servo."""
-
-LAST_WORDS = 0.2
-"""How long clients are answered after the arm has come to rest at the end in [s]."""
 
 MakeNode = Callable[[str], Node]
 """Makes the node of a name; it lives until the program ends."""
@@ -156,23 +153,6 @@ def run_standalone(
     return run_program(name, lambda stop: _serve(build, stop), ServoError, args=args)
 
 
-class Farewell(threading.Event):
-    """Set a moment after the arm has come to rest, so that goals are told how they end."""
-
-    def __init__(self, thread: MotionThread) -> None:
-        """Wait for a thread that ends."""
-        super().__init__()
-        self._thread = thread
-        self._since = math.inf
-
-    def is_set(self) -> bool:
-        """Whether nothing is left to be said."""
-        now = time.monotonic()
-        if self._thread.ended:
-            self._since = min(self._since, now)
-        return now > self._since + LAST_WORDS
-
-
 def _serve(build: Callable[[MakeNode], MotionThread], stop: threading.Event) -> None:
     nodes: list[Node] = []
     with ExitStack() as stack:
@@ -192,6 +172,6 @@ def _serve(build: Callable[[MakeNode], MotionThread], stop: threading.Event) -> 
         nodes[0].get_logger().info('ready for commands')
         spin(nodes, stop)
         thread.end()
-        spin(nodes, Farewell(thread))
+        spin(nodes, thread.ended, linger=LINGER)  # goals get their results
     if thread.error is not None:
         raise thread.error
