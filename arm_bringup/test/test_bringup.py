@@ -38,7 +38,7 @@ def test_ctrl_c_ends_it_with_0_after_the_master_the_listeners_and_the_slaves(
     workspace: SmallWorkspace,
 ) -> None:
     """Every process says good-bye in its turn; nothing is left in the temporary folder."""
-    with workspace.bringup('panda', '--simulate', '--can', 'udp_multicast') as process:
+    with workspace.bringup('panda', '--simulate', '--can', 'auto') as process:
         seen = read_until(process, 'all is ready')
         process.send_signal(signal.SIGINT)
         rest, _ = process.communicate(timeout=PATIENCE)
@@ -66,7 +66,7 @@ def test_a_master_that_dies_ends_it_with_its_last_words(workspace: SmallWorkspac
     workspace.install(
         'arm_canopen', 'master', then="print('[FATAL] [master]: no bus'); sys.exit(3)"
     )
-    code, output = workspace.run('panda', '--simulate', '--can', 'udp_multicast')
+    code, output = workspace.run('panda', '--simulate', '--can', 'auto')
     assert code == 1
     tail = output.split('bringup')[-1]
     assert 'master ended with exit code 3' in tail

@@ -148,7 +148,7 @@ def test_a_position_that_is_not_known_is_never_told() -> None:
             net.power_on(JOINT)
         for _ in range(300):
             net.run(PERIOD)
-            if not drive.fresh:
+            if not drive.objects.fresh(net.now):  # no TPDOs of it
                 told.append(drive.feedback().position)
     assert told == pytest.approx([0.5] * len(told), abs=2 / SCALE)
     assert told

@@ -156,7 +156,7 @@ def test_a_port_in_use_is_left_alone(isolation: Isolation, tmp_path: Path) -> No
             with RunningProcess([*doctor, '--port', str(peer.link)], isolation.env) as process:
                 process.wait()
                 assert 'hardware_node (process' in process.output
-                assert '/joint_states: ' in process.output
+                assert 'joint_states: ' in process.output
                 assert 'controller_node, robot_state_publisher not running' in process.output
             assert running.is_running()
 

@@ -26,7 +26,13 @@ from arm_bringup.session import (
 )
 from arm_bringup.stack import MOTION_MASTER
 from arm_servo import load_limits, RobotModel, ServoError
-from process_supervisor import parse_with_ros, RosOptions, SupervisorError, USAGE_ERROR
+from process_supervisor import (
+    namespaced_parameters,
+    parse_with_ros,
+    RosOptions,
+    SupervisorError,
+    USAGE_ERROR,
+)
 from process_supervisor.arguments import seconds_from
 from process_supervisor.demo import perform
 from process_supervisor.display import Display
@@ -76,8 +82,8 @@ def demo_files(robot: Robot, folder: Path, ros: RosOptions) -> Sequence[Path]:
         ros: Options of all nodes.
     """
     values = {
-        f'/**/{controller_name(robot)}': {'ros__parameters': {'state_publish_rate': RATE}},
-        '/**/servo_node': {
+        controller_name(robot): {'ros__parameters': {'state_publish_rate': RATE}},
+        'servo_node': {
             'ros__parameters': {
                 'moveit_servo': {
                     'command_in_type': 'speed_units',
@@ -88,7 +94,8 @@ def demo_files(robot: Robot, folder: Path, ros: RosOptions) -> Sequence[Path]:
     }
     path = folder / 'demo.yaml'
     path.write_text(json.dumps(values), encoding='utf-8')
-    return [*motion_files(robot, folder, ros), path]
+    # the later of two equal names wins; a pattern of an earlier file loses to any name
+    return [*motion_files(robot, folder, ros), namespaced_parameters(path, ros, folder)]
 
 
 def build_model(robot: Robot, urdf: str) -> RobotModel:
