@@ -22,7 +22,8 @@ def running(
 ) -> Iterator[subprocess.Popen[str]]:
     """Start the program; it is gone afterwards."""
     process = subprocess.Popen(
-        [*prefix, sys.executable, str(PROGRAM), *words],
+        # tests that run under nohup ignore SIGHUP, which the program would inherit
+        ['env', '--default-signal=HUP', *prefix, sys.executable, str(PROGRAM), *words],
         env=isolation.env,
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
