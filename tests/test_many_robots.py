@@ -46,6 +46,7 @@ class Robot(ABC):
 
     package: str
     ready: str
+    repeat = 0.05  # [s] between two commands of its operator
 
     def __init__(self, name: str, isolation: Isolation, client: RosClient, folder: Path) -> None:
         """Start the bring-up; listen to the robot."""
@@ -119,6 +120,7 @@ class Dog(Robot):
     """The quadruped, lying."""
 
     package, ready = 'quad_bringup', 'all is ready'
+    repeat = 1.0  # [s] each key is a process of tmux
 
     def arguments(self) -> Sequence[str]:
         """Return that it is one in physics."""
@@ -168,7 +170,7 @@ def moves_alone(robot: Robot, others: Sequence[Robot]) -> None:
         def moved() -> bool:
             return distance(robot.place(), before[robot.name]) > FAR
 
-        timer = robot.client.node.create_timer(0.05, move)
+        timer = robot.client.node.create_timer(robot.repeat, move)
         try:
             robot.client.spin_until(moved, MOVING, 'motion')
         except AssertionError as error:
