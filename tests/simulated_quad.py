@@ -127,8 +127,16 @@ class SimulatedQuad:
 
     def clear_fault(self) -> None:
         """Ask the controller to forget its fault, until what it misses is back."""
-        name = '/controller_node/clear_fault'
-        self.client.spin_until(lambda: self.client.trigger(name).success, PATIENCE, 'clear fault')
+
+        def cleared() -> bool:
+            try:
+                return bool(self.client.trigger('/controller_node/clear_fault', 5.0).success)
+            except (
+                AssertionError
+            ):  # DDS loses the answer to a client that a new server does not know
+                return False
+
+        self.client.spin_until(cleared, PATIENCE, 'clear fault')
 
     def spin(self, seconds: float) -> None:
         """Serve callbacks until the robot's clock has gone on by so many seconds."""
