@@ -131,9 +131,7 @@ class SimulatedQuad:
         def cleared() -> bool:
             try:
                 return bool(self.client.trigger('/controller_node/clear_fault', 5.0).success)
-            except (
-                AssertionError
-            ):  # DDS loses the answer to a client that a new server does not know
+            except AssertionError:  # DDS loses answers to a client that a new server does not know
                 return False
 
         self.client.spin_until(cleared, PATIENCE, 'clear fault')
