@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
+import time
 
 import pytest
 from small_play import Show, Supervisor
@@ -41,16 +42,19 @@ class Client:
         self.called += services
         if self._refuses in services:
             raise CallError(f'{self._refuses}: fault')
-        if services == ['/wave/stop']:
+        if services == ['wave/stop']:
             self.figures = replace(self.figures, wave='idle')
         return dict.fromkeys(services, '')
 
     def wait_until(self, condition: Callable[[], bool], timeout: float, what: str) -> None:
         """Wait as the real one does."""
         self._when(what)
+        end = time.monotonic() + timeout
         while not condition():
             if self.given_up():
                 raise GivenUpError(what)
+            if time.monotonic() > end:
+                raise CallError(f'no {what} within {timeout:g} s')
 
     def listen(self, duration: float) -> None:
         """Nothing comes in."""
@@ -76,12 +80,12 @@ def test_all_joints_are_enabled_before_the_wave_and_the_wave_stops_before_the_pr
     play = Play(JOINTS, 'cyclic_position_mode', show, duration=0.01)
     run(play, supervisor, client)
     assert client.called == [
-        '/joint1/init',
-        '/joint2/init',
-        '/joint1/cyclic_position_mode',
-        '/joint2/cyclic_position_mode',
-        '/wave/start',
-        '/wave/stop',
+        'joint1/init',
+        'joint2/init',
+        'joint1/cyclic_position_mode',
+        'joint2/cyclic_position_mode',
+        'wave/start',
+        'wave/stop',
     ]
     assert set(client.called) == set(client.prepared)
     assert show.phases == ['booting', 'enabling', 'waving', 'stopping']
@@ -95,11 +99,11 @@ def test_all_joints_are_enabled_before_the_wave_and_the_wave_stops_before_the_pr
 
 def test_a_drive_that_refuses_ends_the_demo_with_its_reason() -> None:
     """No wave is started, and there is no summary of one."""
-    supervisor, client = Supervisor(), Client(refuses='/joint2/init')
+    supervisor, client = Supervisor(), Client(refuses='joint2/init')
     play = Play(JOINTS, 'cyclic_position_mode', Show(), duration=1.0)
     run(play, supervisor, client)
-    assert supervisor.outcome == Outcome(1, '/joint2/init: fault')
-    assert '/wave/start' not in client.called
+    assert supervisor.outcome == Outcome(1, 'joint2/init: fault')
+    assert 'wave/start' not in client.called
     assert play.result.summary == []
     assert client.closed
 
@@ -116,7 +120,7 @@ def test_ctrl_c_stops_the_wave_first() -> None:
     play = Play(JOINTS, 'cyclic_position_mode', Show(), duration=None)
     run(play, supervisor, client)
     assert answers == [False, True]
-    assert client.called[-1] == '/wave/stop'
+    assert client.called[-1] == 'wave/stop'
     assert play.left
 
 
@@ -134,14 +138,15 @@ def test_a_supervisor_that_stops_ends_the_demo(what: str) -> None:
     assert client.closed
 
 
-def test_a_defect_in_the_demo_stops_the_processes() -> None:
+@pytest.mark.parametrize('defect', [ZeroDivisionError, SystemExit])
+def test_a_defect_in_the_demo_stops_the_processes(defect: type[BaseException]) -> None:
     """Whatever it is: drives must not stay enabled because a picture could not be drawn."""
 
     def when(what: str) -> None:
-        raise ZeroDivisionError('in the picture')
+        raise defect('in the picture')
 
     supervisor, client = Supervisor(), Client(when=when)
-    with pytest.raises(ZeroDivisionError):
+    with pytest.raises(defect):
         run(Play(JOINTS, 'cyclic_position_mode', Show(), duration=1.0), supervisor, client)
-    assert supervisor.outcome == Outcome(1, 'ZeroDivisionError: in the picture')
+    assert supervisor.outcome == Outcome(1, f'{defect.__name__}: in the picture')
     assert client.closed

@@ -123,7 +123,7 @@ class Play(ABC, Generic[ClientT]):
             pass  # the supervisor knows why
         except CallError as error:
             supervisor.stop(Outcome(1, str(error)))
-        except Exception as error:
+        except BaseException as error:
             supervisor.stop(Outcome(1, f'{type(error).__name__}: {error}'))
             raise
         finally:
