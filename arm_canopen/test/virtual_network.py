@@ -249,6 +249,7 @@ class VirtualNetwork:
         self.allows_defects = False
         self.feedback_times: list[tuple[float, float]] = []
         self.stations: dict[str, Station] = {}
+        self._due: dict[str, float] = {}
         self.devices: dict[str, Device] = {}
         self._config = config
         self._dictionaries = dict(dictionaries or {})
@@ -306,6 +307,7 @@ class VirtualNetwork:
     def power_off(self, name: str) -> None:
         """Cut the supply of a device."""
         self.stations.pop(name)
+        self._due.pop(name, None)
         self.devices.pop(name, None)
 
     def start(self) -> None:
@@ -316,12 +318,14 @@ class VirtualNetwork:
     def run(self, duration: float) -> None:
         """Let time pass in [s]."""
         end = self.now + duration
+        self._look(*self.stations)
         while self._step(end):
             pass
 
     def run_until(self, condition: Callable[[], bool], timeout: float = BOOT_TIME_MAX) -> float:
         """Let time pass until a condition holds; returns how long that took in [s]."""
         begin = self.now
+        self._look(*self.stations)
         while not condition():
             assert self._step(begin + timeout), f'not within {timeout:g} s; {self.story()}'
         return self.now - begin
@@ -393,21 +397,24 @@ class VirtualNetwork:
 
     def _step(self, end: float) -> bool:
         """Go on to the next event; returns False when there is none until ``end``."""
-        due = {name: station.next_deadline() for name, station in self.stations.items()}
-        deadlines = [self.network.scheduler.next_deadline(), *due.values()]
-        events = [time for time in deadlines if time is not None]
+        due = min(self._due.values(), default=NEVER)
+        time = min(self.wire.next_arrival, self._cycle_at, due)
+        deadline = self.network.scheduler.next_deadline()
+        if deadline is not None:
+            time = min(time, deadline)
         if self._cycle_at < NEVER:
-            events.append(self.network.next_update)
-        time = min(self.wire.next_arrival, self._cycle_at, *events, NEVER)
+            time = min(time, self.network.next_update)
         if time > end:
             self.now = end
             return False
         self.now = max(self.now, time)
+        late = [name for name, deadline in self._due.items() if deadline <= self.now]
         while self.wire.next_arrival <= self.now:
             self._deliver(*self.wire.take())
-        for name, deadline in due.items():  # what the frames have made due is the next event
-            if deadline is not None and deadline <= self.now and name in self.stations:
+        for name in late:  # what the frames have made due is the next event
+            if name in self.stations:
                 self.stations[name].advance(self.now)
+                self._look(name)
         if self._cycle_at < NEVER:
             self._serve_master()
         return True
@@ -426,5 +433,17 @@ class VirtualNetwork:
         if sender != 'master' and self._cycle_at < NEVER:
             self.network.receive(frame)
         for name, station in list(self.stations.items()):
-            if name != sender:
-                station.receive(frame, self.now)
+            if name == sender or (isinstance(station, Device) and _ignores(station, frame)):
+                continue
+            station.receive(frame, self.now)
+            self._look(name)
+
+    def _look(self, *names: str) -> None:
+        """Keep when stations have something to do; only what happens to them changes it."""
+        for name in names:
+            deadline = self.stations[name].next_deadline()
+            self._due[name] = NEVER if deadline is None else deadline
+
+
+def _ignores(device: Device, frame: Frame) -> bool:
+    return frame.can_id not in device.handlers and not frame.is_remote
