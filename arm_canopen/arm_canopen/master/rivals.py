@@ -16,17 +16,14 @@ import time
 
 from ..can.bus import Bus
 from ..can.frame import Frame
-from ..config.master_model import MasterConfig
 from ..config.model import BusConfig
 from ..exceptions import BusError, RivalError
 from ..standard.cob_id import CobId
 from ..standard.nmt import ALL_NODES, parse_nmt
 from .events import Event, EventKind, Report, Severity
 
-LISTEN_MIN = 0.1  # [s] a master that runs may be held up by its computer for so long
-LISTEN_MAX = 0.2  # [s] what a start may take longer when nobody is there
+LISTENING_TIME = 0.2  # [s] a start takes longer by it; a master that runs may be held up as long
 SIGNS_TOLD = 3
-PERIODS = 2  # of SYNC in which a master that runs shows itself
 
 
 class Telling(IntEnum):
@@ -113,16 +110,6 @@ class RivalWatch:
             self._report(Event(EventKind.BUS, self._severity, '', text))
 
 
-def listening_time(master: MasterConfig) -> float:
-    """Return for how long another master is listened for in [s].
-
-    It most likely runs with the same bus.yml, so it shows itself with each SYNC.
-    """
-    if not (master.start and master.sync_period):
-        return LISTEN_MAX
-    return min(max(PERIODS * master.sync_period, LISTEN_MIN), LISTEN_MAX)
-
-
 def listen(
     bus: Bus, config: BusConfig, clock: Callable[[], float] = time.monotonic
 ) -> Counter[Sign]:
@@ -138,7 +125,7 @@ def listen(
     """
     signs, heard = RivalSigns(config), Counter[Sign]()
     begin = clock()
-    end = begin + listening_time(config.master)
+    end = begin + LISTENING_TIME
     while (left := end - clock()) > 0.0:
         try:
             frames = bus.receive(left)
@@ -165,7 +152,7 @@ def refuse_rival(bus: Bus, config: BusConfig) -> None:
     if heard:
         raise RivalError(
             f'another master is on {bus.name}: it sent {describe(heard)} in '
-            f'{listening_time(config.master):g} s. Nothing was sent, as a start resets the '
+            f'{LISTENING_TIME:g} s. Nothing was sent, as a start resets the '
             'devices that it leads. End it, choose another can_interface_name, or, if it has '
             'devices of its own, go on beside it with -p beside_master:=true'
         )

@@ -20,6 +20,7 @@ from node_runner import (
     ParameterReader,
     refuse_misspelt,
     run_program,
+    settle_process_memory,
     spin,
 )
 
@@ -131,6 +132,8 @@ def _serve(
             for node in (node for process in processes for node in extend(process)):
                 stack.callback(node.destroy_node)
                 others.append(node)
+        # it takes long: between listening and the first word another master could come
+        settle_process_memory(nodes[0])
         try:
             with ThreadPoolExecutor() as pool:  # all buses before the first word on any of them
                 list(pool.map(MasterProcess.listen, processes))

@@ -13,7 +13,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.node import Node
 from rclpy.time import Time
 
-from node_runner import raise_thread_priority, settle_process_memory
+from node_runner import raise_thread_priority
 
 from ..can.bus import Bus
 from ..can.frame import Frame
@@ -129,7 +129,6 @@ class MasterProcess:
         """Boot the devices and start the cycle."""
         self._started = True
         self._output.start()
-        settle_process_memory(self._node)
         what, priority = 'the CANopen cycle', self._thread_priority
         self._thread.start(lambda: raise_thread_priority(self._node, priority, what))
 
