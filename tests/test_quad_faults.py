@@ -84,6 +84,25 @@ def test_a_controller_killed_in_mid_trot_leaves_no_leg_in_the_air(quad: Simulate
     check_upright(quad)
 
 
+def test_a_controller_that_was_frozen_moves_nothing_until_it_is_asked(
+    quad: SimulatedQuad,
+) -> None:
+    """It wakes when the bridge has folded the legs: the robot stays down, a fault says why."""
+    quad.set_mode('walk')
+    quad.walk(1.5)
+    quad.processes['controller'].signal(signal.SIGSTOP)
+    quad.spin(3.0)
+    quad.processes['controller'].signal(signal.SIGCONT)
+    woken = time.monotonic()
+    quad.processes['controller'].wait_for('fault, pause')
+    quad.spin(1.5)
+    check_upright(quad)
+    joints = quad.joints[-1]
+    lying = [pose_positions(Pose.LIE)[name] for name in joints.name]
+    assert list(joints.position) == pytest.approx(lying, abs=0.15)
+    assert quad.tap.largest_step(since=woken) < RESUMED
+
+
 def test_a_killed_bridge_is_told_and_its_successor_goes_on_smoothly(quad: SimulatedQuad) -> None:
     """The controller stops by itself; after the fault is cleared it walks again."""
     quad.set_mode('walk')

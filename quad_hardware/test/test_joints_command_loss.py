@@ -181,3 +181,23 @@ def test_a_robot_that_is_lost_is_not_brought_down_later(cut: str) -> None:
     assert not line.commander.goes_down
     assert line.commander.go_down(STAND, now + 1.0) is None
     assert line.commander.miss(STAND, 0.0, now + 2.0) == ''
+
+
+@pytest.mark.parametrize('descended', [0.1, 0.8, 10.0])
+def test_a_controller_that_wakes_begins_softly_where_the_legs_are(descended: float) -> None:
+    """It was frozen, and goes on with its trot while the robot goes down, or lies."""
+    line = Line()
+    now = line.walk(2.0) + line.commander.timeout
+    line.commander.miss(STAND, 0.0, now)
+    place, end = STAND, now + descended
+    while now < end and line.commander.goes_down:
+        now += PERIOD
+        if command := line.commander.go_down(place, now):
+            place = dict(zip(NAMES, command.targets, strict=True))
+    for tick in range(1, 10):
+        before = place
+        command = line.commander.take([0.5, 0.2, 0.9] * 4, before, now + tick * PERIOD)
+        assert command is not None
+        place = dict(zip(NAMES, command.targets, strict=True))
+        speed = max(abs(place[name] - before[name]) for name in NAMES) / PERIOD
+        assert speed <= 2.0 + 20.0 * (tick - 1) * PERIOD + 1e-9

@@ -30,6 +30,9 @@ from .status import Event, EventKind, Output, Status
 
 MAX_STEP = 0.05  # [s] after a longer pause the gait goes on where it was instead of leaping
 
+STREAM_TIMEOUT = 0.5
+"""After a pause of the controller in motion [s], the hardware node lays the robot down."""
+
 UPRIGHT_STATES = GAIT_STATES | {State.POLICY, State.FAULT}
 """States in which the robot is on its legs, and what is wrong with it is a fault."""
 
@@ -200,6 +203,8 @@ class Controller:
         """
         events = [Event(EventKind.REPEATED, text) for text in self._health.take(measurement, dt)]
         self._commands.pass_time(dt)
+        if dt > STREAM_TIMEOUT and self._limiter.last and not self._machine.at_rest:
+            events += self._wake(dt, self._limiter.last)
         last = self._limiter.last or self._start()
         if last is None:
             return Output(None, None, self._machine.title, False, tuple(events))
@@ -232,6 +237,17 @@ class Controller:
         targets = self._limiter.start(self._health.joints.positions)
         self._machine.hold(targets)
         return targets
+
+    def _wake(self, pause: float, last: Targets) -> list[Event]:
+        """Begin anew after a pause [s] in motion, with the next joint states: these are old."""
+        reason = (
+            f'the controller itself stood still for {pause:.1f} s in motion, so the hardware node '
+            'has laid the robot down; look at what kept it, and let it stand up again'
+        )
+        events = self._latch_fault(Fault.PAUSE, reason, last)
+        self._health.forget_joints()
+        self._limiter.reset()
+        return events
 
     def _watch(self, last: Targets) -> list[Event]:
         """Latch faults of a robot that is on its legs, or on its way down."""

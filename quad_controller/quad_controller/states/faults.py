@@ -24,6 +24,7 @@ class Fault(Enum):
     FALLEN = 'fall'
     BATTERY = 'battery'
     TARGET = 'target'
+    PAUSE = 'pause'
 
 
 REACTIONS: Mapping[Fault, Reaction] = {
@@ -32,6 +33,7 @@ REACTIONS: Mapping[Fault, Reaction] = {
     Fault.FALLEN: Reaction.HOLD,  # legs in the air find no ground, and may be jammed
     Fault.BATTERY: Reaction.LIE_DOWN,
     Fault.TARGET: Reaction.HOLD,
+    Fault.PAUSE: Reaction.LIE_DOWN,  # the hardware node has begun it
 }
 
 

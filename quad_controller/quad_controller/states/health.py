@@ -85,6 +85,10 @@ class Health:
         """
         self._refusals[what] = reason, 0.0
 
+    def forget_joints(self) -> None:
+        """Wait for the next joint states: something else has moved the joints meanwhile."""
+        self.joints, self.joints_age = None, math.inf
+
     @property
     def tilt(self) -> tuple[float, float] | None:
         """Roll and pitch in [rad], None when they are not known any more."""

@@ -48,6 +48,10 @@ class StepLimiter:
         self._last = tuple(positions)
         return self._last
 
+    def reset(self) -> None:
+        """Forget what was let through: joints were moved by something else."""
+        self._last = None
+
     def step(self, targets: Sequence[float], dt: float) -> Targets:
         """Return what may be sent instead of some targets.
 

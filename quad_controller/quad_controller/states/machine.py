@@ -102,6 +102,11 @@ class StateMachine:
         return self.state.value if self.motion.finished else f'to {self.state.value}'
 
     @property
+    def at_rest(self) -> bool:
+        """Whether no leg is on its way anywhere."""
+        return self.motion.settled and self.motion.finished
+
+    @property
     def reachable(self) -> bool:
         """Whether the gait's last step was within the legs' reach."""
         return self.motion is not self._walk or self._walk.reachable

@@ -70,8 +70,10 @@ class JointCommander:
         """
         self.counters = CommandCounters()
         self._joints = joints
-        self._limiter = CommandLimiter(joints, limiter)
-        self._loss = CommandLoss(joints, reaction)
+        # two streams: one that wakes after the way down begins anew, however the legs moved
+        self._commanded = CommandLimiter(joints, limiter)
+        self._descent = CommandLimiter(joints, limiter)
+        self._loss = CommandLoss(joints, reaction, limiter.stream_timeout)
         self._send_angles, self._obstacle, self._warn = send, obstacle, warn
         self._last_targets: tuple[float, ...] = ()
         self.timeout = self._loss.timeout
@@ -88,11 +90,12 @@ class JointCommander:
 
     def lose(self) -> None:
         """Begin anew with the next command, for the robot was lost; any thread may call it."""
-        self._limiter.reset()
+        self._commanded.reset()
+        self._descent.reset()
 
     def forget(self) -> None:
         """Begin anew with the next command, and do not miss it: servos were let go, or not."""
-        self._limiter.reset()
+        self.lose()
         self._loss.forget()
         self._last_targets = ()
 
@@ -111,7 +114,7 @@ class JointCommander:
             place: Where the joints are [rad], [m]; empty when the robot was not seen lately.
             now: Time [s].
         """
-        command = self._send(positions, place, now)
+        command = self._send(self._commanded, positions, place, now)
         if command is not None:
             self._loss.commanded(command.targets, now)
             self.counters.loss = ''
@@ -138,21 +141,27 @@ class JointCommander:
     def go_down(self, place: Mapping[str, float], now: float) -> Command | None:
         """Send the next targets on the way down; None for nothing, at its end too."""
         positions = self._loss.step(now)
-        command = None if positions is None else self._send(positions, place, now)
+        command = None
+        if positions is not None:
+            command = self._send(self._descent, positions, place, now)
         if command is None:
             self._loss.forget()
         return command
 
     def _send(
-        self, positions: Sequence[float], place: Mapping[str, float], now: float
+        self,
+        stream: CommandLimiter,
+        positions: Sequence[float],
+        place: Mapping[str, float],
+        now: float,
     ) -> Command | None:
         try:
-            self._limiter.check(positions)
+            stream.check(positions)
             if not place:
                 self._drop()
                 return None
             measured = [place.get(name) for name in self._joints.names]
-            command = self._limiter.step(positions, measured, now)
+            command = stream.step(positions, measured, now)
         except CommandError as error:
             self.refuse(error)
             return None
