@@ -119,6 +119,34 @@ def test_what_an_imu_does_not_measure_is_not_taken_for_zero() -> None:
     assert gravity(sample(imu(force=-1.0)), GravitySource.ACCEL) == (0.0, 0.0, -1.0)
 
 
+@pytest.mark.parametrize('yaw', [1e6, math.inf])
+def test_an_unknown_heading_does_not_make_roll_and_pitch_uncertain(yaw: float) -> None:
+    """An IMU without a compass says so in the variance of yaw, and levels all the same."""
+    message = imu()
+    message.orientation_covariance[0] = message.orientation_covariance[4] = 1e-4
+    message.orientation_covariance[8] = yaw
+    assert sample(message).deviation == pytest.approx(0.01)
+
+
+@pytest.mark.parametrize('index', [0, 4])
+@pytest.mark.parametrize('variance', [1.0, math.inf])
+def test_an_uncertain_roll_or_pitch_is_uncertain(index: int, variance: float) -> None:
+    """Each of the two alone."""
+    message = imu()
+    message.orientation_covariance[index] = variance
+    assert sample(message).is_uncertain
+
+
+@pytest.mark.parametrize('index', [0, 4, 8])
+@pytest.mark.parametrize('variance', [math.nan, -0.5])
+def test_a_variance_that_is_none_is_refused_by_name(index: int, variance: float) -> None:
+    """It is not taken for certain."""
+    message = imu()
+    message.orientation_covariance[index] = variance
+    with pytest.raises(ValueError, match=rf'orientation_covariance\[{index}\] .*{variance}'):
+        sample(message)
+
+
 @given(angles, angles, angles, st.floats(0.1, 3.0))
 def test_body_pose_is_read_from_a_quaternion(
     roll: float, pitch: float, yaw: float, length: float

@@ -22,6 +22,8 @@ from ..states.measurement import ImuSample
 UNMEASURED = -1.0  # first covariance of what an IMU does not measure (sensor_msgs/Imu, REP 145)
 
 
+_VARIANCES = 0, 4, 8  # of roll, pitch and yaw in a covariance
+
 IMU_NUMBERS = tuple(
     f'{part}.{axis}'
     for part, axes in (
@@ -42,13 +44,20 @@ def imu_sample(message: Imu, numbers: Sequence[float]) -> ImuSample:
         numbers: As :data:`IMU_NUMBERS` names them.
 
     Raises:
-        ValueError: The orientation is not measured.
+        ValueError: The orientation is not measured, or a variance of it is none.
     """
-    if message.orientation_covariance[0] == UNMEASURED:
+    covariance = message.orientation_covariance
+    if covariance[0] == UNMEASURED:
         raise ValueError(
             'the imu has no orientation (orientation_covariance[0] is -1), which walking needs; '
             'filter it, or set require_imu to false'
         )
+    for index in _VARIANCES:
+        if not covariance[index] >= 0.0:  # neither is NaN
+            raise ValueError(
+                f'imu: orientation_covariance[{index}] is no variance: {covariance[index]:g}; '
+                'publish 0 or more, all zeros where it is unknown (REP 145)'
+            )
     x, y, z, w, *rest = numbers
     (rx, ry, rz), (fx, fy, fz) = rest[:3], rest[3:]
     return ImuSample(
@@ -58,7 +67,7 @@ def imu_sample(message: Imu, numbers: Sequence[float]) -> ImuSample:
         (0.0, 0.0, 0.0)
         if message.linear_acceleration_covariance[0] == UNMEASURED
         else (fx, fy, fz),
-        math.sqrt(max(*message.orientation_covariance[::4], 0.0)),
+        math.sqrt(max(covariance[0], covariance[4])),
     )
 
 

@@ -49,7 +49,8 @@ class ImuSample:
         orientation: Unit quaternion of the body in the world, x, y, z, w.
         angular_velocity: In [rad/s]; None when it is not measured.
         acceleration: Specific force in [m/s^2]: +9.81 along z at rest (REP 145).
-        deviation: Standard deviation of the orientation in [rad]; 0 when it is not said.
+        deviation: Standard deviation of roll or pitch, the larger one, in [rad]; 0 when it is not
+            said. A heading is only held against itself, so that of yaw does not matter.
     """
 
     orientation: tuple[float, float, float, float]
