@@ -98,7 +98,7 @@ def test_with_a_dead_imu_the_joints_are_reported_and_obey(rig: NodeRig) -> None:
 
 def test_beyond_limits_is_taken_to_them_and_told(rig: NodeRig) -> None:
     """The servo ends at the limit of the URDF."""
-    rig.stream([2.0, *HOME[1:]], 1.0)
+    rig.stream([2.0, 0.0, 0.0] * 4, 1.0)
     rig.wait_for_status('joint commands', DiagnosticStatus.WARN, 'fl_hip_joint')
     assert rig.peer.angles[13] == pytest.approx(math.degrees(0.5236), abs=0.02)
 
@@ -184,6 +184,19 @@ def test_commands_that_end_at_rest_leave_the_posture(rig: NodeRig) -> None:
     count = len(rig.peer.commands)
     rig.hear('/joint_states', 50)
     assert len(rig.peer.commands) == count
+
+
+def test_a_leg_that_is_held_in_the_air_comes_down_with_the_end_of_commands(rig: NodeRig) -> None:
+    """As when a controller in fault held there, and was ended."""
+    rig.stream([0.0, 0.9, -0.3, *POSE[3:]], 1.5)
+    told = rig.wait_for_status('joint commands', DiagnosticStatus.ERROR, 'lies down')
+    assert 'in the air' in told.message
+    lying = [math.degrees(angle) for angle in pose_positions(Pose.LIE).values()]
+    rig.client.spin_until(
+        lambda: [rig.peer.angles[m] for m in LEGS_ORDER] == pytest.approx(lying, abs=0.1),
+        TIMEOUT,
+        'lying pose',
+    )
 
 
 def test_a_node_that_ends_in_motion_folds_the_legs_first(

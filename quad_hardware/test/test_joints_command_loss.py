@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 import itertools
 import math
@@ -14,15 +14,29 @@ from hypothesis import strategies as st
 import pytest
 
 from quad_description import movable_joints, Pose, pose_positions, robot_urdf
+from quad_hardware.estimation.feet import Feet, raised_feet
 from quad_hardware.joints import JointCommander, JointMap, LimiterSettings, servo_of
 from quad_hardware.joints.command_loss import CommandLoss, LossReaction, SPEED
 
 JOINTS = JointMap(servo_of(joint) for joint in movable_joints(robot_urdf('lite')))
 NAMES = JOINTS.names
+FEET = Feet(robot_urdf('lite'), NAMES)
 PERIOD = 0.02  # [s]
 STAND = pose_positions(Pose.STAND)
 STANDING = [STAND[name] for name in NAMES]
 LYING = [pose_positions(Pose.LIE)[name] for name in NAMES]
+
+
+def raised(targets: Sequence[float]) -> Sequence[str]:
+    """Feet that are in the air [names]."""
+    return raised_feet(FEET.poses(targets))
+
+
+def command_loss(
+    reaction: LossReaction = LossReaction.LIE, joints: JointMap = JOINTS
+) -> CommandLoss:
+    """What is watched."""
+    return CommandLoss(joints, raised, reaction)
 
 
 def stream(loss: CommandLoss, duration: float, swing: float, start: float = 0.0) -> float:
@@ -49,9 +63,9 @@ def descend(loss: CommandLoss, now: float) -> list[list[float]]:
 @pytest.mark.parametrize('swing', [0.1, 0.3])
 def test_a_stream_that_breaks_off_in_motion_brings_the_robot_down(swing: float) -> None:
     """From where the joints are, softly, to the lying pose, and then nothing is sent."""
-    loss = CommandLoss(JOINTS)
+    loss = command_loss()
     now = stream(loss, 2.0, swing)
-    assert loss.in_motion
+    assert 'moved' in loss.hazard
     assert loss.begin(STAND, 0.1, now) == ''
     way = descend(loss, now)
     assert way[0] == pytest.approx(STANDING)
@@ -59,22 +73,49 @@ def test_a_stream_that_breaks_off_in_motion_brings_the_robot_down(swing: float) 
     steps = [abs(b - a) for one, two in itertools.pairwise(way)
              for a, b in zip(one, two, strict=True)]  # fmt: skip
     assert max(steps) <= SPEED * PERIOD * 1.01
-    assert not loss.in_motion
+    assert not loss.hazard
 
 
 @pytest.mark.parametrize(('duration', 'swing'), [(2.0, 0.0), (2.0, 0.02), (0.3, 0.3)])
 def test_commands_that_end_at_rest_leave_a_posture(duration: float, swing: float) -> None:
     """Standing, levelling, a person who tries a servo for a moment: nothing moves by itself."""
-    loss = CommandLoss(JOINTS)
+    loss = command_loss()
     stream(loss, duration, swing)
-    assert not loss.in_motion
+    assert not loss.hazard
 
 
 def test_rest_at_the_end_counts() -> None:
     """A robot that walked and then stood for half a second stands."""
-    loss = CommandLoss(JOINTS)
+    loss = command_loss()
     stream(loss, 0.5, 0.0, start=stream(loss, 2.0, 0.3))
-    assert not loss.in_motion
+    assert not loss.hazard
+
+
+@pytest.mark.parametrize('legs', [('fl',), ('br',), ('fr', 'bl')])
+def test_a_leg_that_is_held_in_the_air_is_no_rest(legs: tuple[str, ...]) -> None:
+    """A controller that holds in the middle of a trot, for a fault, and then ends."""
+    loss = command_loss()
+    held = {**STAND, **{f'{leg}_thigh_joint': STAND[f'{leg}_thigh_joint'] + 0.3 for leg in legs}}
+    for tick in range(100):
+        loss.commanded([held[name] for name in NAMES], tick * PERIOD)
+    assert all(f'{leg}_foot' in loss.hazard for leg in legs)
+    assert loss.begin(held, 0.1, 2.5) == ''
+    assert descend(loss, 2.5)[-1] == pytest.approx(LYING)
+
+
+@given(st.floats(-0.1, 0.1), st.floats(-0.1, 0.1), st.floats(-0.1, 0.1))
+def test_a_body_that_leans_stands(roll: float, height: float, pitch: float) -> None:
+    """On a slope, or leaning over its feet: all of them stand in a plane."""
+    loss = command_loss()
+    place = dict(STAND)
+    for leg in ('fl', 'fr', 'bl', 'br'):
+        end = 1.0 if leg[0] == 'f' else -1.0
+        place[f'{leg}_hip_joint'] += roll
+        place[f'{leg}_thigh_joint'] += height + end * pitch
+        place[f'{leg}_calf_joint'] -= 2.0 * (height + end * pitch)
+    for tick in range(100):
+        loss.commanded([place[name] for name in NAMES], tick * PERIOD)
+    assert not loss.hazard
 
 
 @pytest.mark.parametrize(
@@ -89,7 +130,7 @@ def test_it_says_why_it_may_not(
     place: dict[str, float], tilt: float, reaction: LossReaction, named: str
 ) -> None:
     """Nobody knows where the legs are, the robot lies on its side, or it is not wanted."""
-    loss = CommandLoss(JOINTS, reaction)
+    loss = command_loss(reaction)
     now = stream(loss, 2.0, 0.3)
     assert named in loss.begin(place, tilt, now)
     assert loss.step(now) is None
@@ -98,28 +139,28 @@ def test_it_says_why_it_may_not(
 def test_a_robot_of_others_holds() -> None:
     """Where joints have other names, no lying pose is known."""
     first, *rest = JOINTS.servos
-    loss = CommandLoss(JointMap([replace(first, joint='left_front_hip'), *rest]))
+    loss = command_loss(joints=JointMap([replace(first, joint='left_front_hip'), *rest]))
     now = stream(loss, 2.0, 0.3)
     assert 'left_front_hip' in loss.begin({**STAND, 'left_front_hip': 0.0}, None, now)
 
 
 def test_without_an_attitude_it_comes_down_all_the_same() -> None:
     """A dead IMU is no reason to stay on two legs."""
-    loss = CommandLoss(JOINTS)
+    loss = command_loss()
     assert loss.begin(STAND, None, stream(loss, 2.0, 0.3)) == ''
 
 
 @given(st.floats(0.0, 3.0))
 def test_whoever_commands_ends_the_way_down(after: float) -> None:
     """At any moment of it, and its own stream begins anew."""
-    loss = CommandLoss(JOINTS)
+    loss = command_loss()
     now = stream(loss, 2.0, 0.3) + 1.0
     loss.begin(STAND, 0.0, now)
     while loss.goes_down and loss.step(now) and now < after:
         now += PERIOD
     loss.commanded(STANDING, now)
     assert loss.step(now + PERIOD) is None
-    assert not loss.in_motion
+    assert not loss.hazard
 
 
 class Line:
@@ -131,7 +172,8 @@ class Line:
         self.obstacle = ''
         self.commander = JointCommander(
             JOINTS, LimiterSettings(), LossReaction.LIE,
-            send=self._send, obstacle=lambda: self.obstacle, warn=self.warned.append,
+            raised=raised, send=self._send,
+            obstacle=lambda: self.obstacle, warn=self.warned.append,
         )  # fmt: skip
 
     def _send(self, angles: Mapping[int, float]) -> bool:

@@ -12,7 +12,7 @@ from ..joints import JointMap
 from ..link.state import RobotState
 from .battery import Battery, BatteryFilter
 from .board_watch import BoardWatch
-from .feet import Feet
+from .feet import Feet, raised_feet
 from .filters import AttitudeRate, JointRate
 from .gravity import GravityCheck
 from .imu_mounting import ImuMounting
@@ -130,6 +130,10 @@ class Estimator:
             targets: Positions of the first joints, in their order [rad].
         """
         self._odometry.command(time, self._feet.poses(self._padded(targets)))
+
+    def raised_feet(self, targets: Sequence[float]) -> tuple[str, ...]:
+        """Return the feet that are in the air at targets of the first joints [rad]."""
+        return raised_feet(self._feet.poses(self._padded(targets)))
 
     def update(self, state: RobotState) -> Estimate | None:
         """Take a report; return None when it cannot be. :meth:`walk` comes next."""

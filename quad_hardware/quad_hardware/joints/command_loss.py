@@ -1,15 +1,16 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What becomes of a robot whose joint commands break off while its legs move.
+"""What becomes of a robot whose joint commands break off while its legs move, or hang in the air.
 
 A controller that dies in the middle of a trot leaves two legs in the air, and the servos hold
-them there. Commands that end while all targets rest leave a posture that somebody chose: it stays.
+them there; so does one that held there for a fault, and then ended. Commands that end at rest
+with all feet on the ground leave a posture that somebody chose: it stays.
 """
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 import math
@@ -49,19 +50,24 @@ class _Descent:
 
 
 class CommandLoss:
-    """Watches a stream of commands, and brings the robot down when it breaks off in motion.
+    """Watches a stream of commands, and brings the robot down when its end leaves it no posture.
 
     Attributes:
         timeout: A pause after which a stream has ended [s].
     """
 
     def __init__(
-        self, joints: JointMap, reaction: LossReaction = LossReaction.LIE, timeout: float = 0.5
+        self,
+        joints: JointMap,
+        raised: Callable[[Sequence[float]], Sequence[str]],
+        reaction: LossReaction = LossReaction.LIE,
+        timeout: float = 0.5,
     ) -> None:
         """Begin without a stream.
 
         Args:
             joints: The robot's.
+            raised: Names the feet that are in the air at targets of the legs [rad].
             reaction: What it does.
             timeout: A pause after which a stream has ended [s].
         """
@@ -71,7 +77,7 @@ class CommandLoss:
         pose = pose_positions(Pose.LIE)
         self._lying = {s.joint: min(max(pose[s.joint], s.lower), s.upper) for s in servos
                        if s.joint in pose}  # fmt: skip
-        self._reaction = reaction
+        self._raised, self._reaction = raised, reaction
         self._began_at = self._last_at = -math.inf
         self._recent: deque[tuple[float, tuple[float, ...]]] = deque()
         self._descent: _Descent | None = None
@@ -99,12 +105,15 @@ class CommandLoss:
         self._recent.clear()
 
     @property
-    def in_motion(self) -> bool:
-        """Whether the legs moved at the end of the last stream."""
-        if self._last_at - self._began_at < MIN_STREAM:
-            return False
+    def hazard(self) -> str:
+        """How the last stream ended, if that is nothing to be left so; else nothing."""
+        if not self._recent or self._last_at - self._began_at < MIN_STREAM:
+            return ''
         columns = zip(*(targets for _, targets in self._recent), strict=True)
-        return any(max(column) - min(column) > MIN_MOTION for column in columns)
+        if any(max(column) - min(column) > MIN_MOTION for column in columns):
+            return 'while the legs moved'
+        raised = self._raised(self._recent[-1][1])
+        return f'with {" or ".join(raised)} in the air' if raised else ''
 
     def begin(self, place: Mapping[str, float], tilt: float | None, now: float) -> str:
         """Go down from now on, or say why not. The stream is forgotten.

@@ -26,7 +26,7 @@ class CommandCounters:
         reason: Why the last one was refused, or which joints were clamped.
         troubled: Something was refused or clamped since the last look.
         largest_step: Of a target since the last look [rad].
-        loss: What became of the robot when commands broke off in motion; empty while they come.
+        loss: What became of the robot when commands broke off; empty while they come.
     """
 
     received: int = 0
@@ -54,6 +54,7 @@ class JointCommander:
         limiter: LimiterSettings,
         reaction: LossReaction,
         *,
+        raised: Callable[[Sequence[float]], Sequence[str]],
         send: Callable[[Mapping[int, float]], bool],
         obstacle: Callable[[], str],
         warn: Callable[[str], None],
@@ -64,6 +65,7 @@ class JointCommander:
             joints: Of the robot.
             limiter: How fast targets may move.
             reaction: What the robot does when commands break off while its legs move.
+            raised: Names the feet that are in the air at targets of the legs [rad].
             send: Has servo angles sent, by motor id [deg]; returns whether they are.
             obstacle: Says why nothing is sent.
             warn: Takes what is the matter with a command.
@@ -73,15 +75,15 @@ class JointCommander:
         # two streams: one that wakes after the way down begins anew, however the legs moved
         self._commanded = CommandLimiter(joints, limiter)
         self._descent = CommandLimiter(joints, limiter)
-        self._loss = CommandLoss(joints, reaction, limiter.stream_timeout)
+        self._loss = CommandLoss(joints, raised, reaction, limiter.stream_timeout)
         self._send_angles, self._obstacle, self._warn = send, obstacle, warn
         self._last_targets: tuple[float, ...] = ()
         self.timeout = self._loss.timeout
 
     @property
-    def in_motion(self) -> bool:
-        """Whether the legs moved at the end of the last stream of commands."""
-        return self._loss.in_motion
+    def hazard(self) -> str:
+        """How the last stream ended, if that is nothing to be left so; else nothing."""
+        return self._loss.hazard
 
     @property
     def goes_down(self) -> bool:
@@ -121,20 +123,20 @@ class JointCommander:
         return command
 
     def miss(self, place: Mapping[str, float], tilt: float | None, now: float) -> str:
-        """Bring the robot down, if its commands broke off in motion; return what it does.
+        """Bring the robot down, if the end of its commands is a hazard; return what it does.
 
         Args:
             place: As in :meth:`take`.
             tilt: Of the body [rad]; None when nobody knows.
             now: Time [s].
         """
-        if not self._loss.in_motion:
+        hazard = self._loss.hazard
+        if not hazard:
             return ''
         reason = self._loss.begin(place, tilt, now)
         does = f'holds as it is, for {reason}' if reason else 'lies down'
         self.counters.loss = (
-            f'joint commands broke off while the legs moved: the robot {does}; '
-            'is the controller running?'
+            f'joint commands broke off {hazard}: the robot {does}; is the controller running?'
         )
         return self.counters.loss
 

@@ -66,15 +66,16 @@ class HardwareNode(Node):
         super().__init__('hardware_node')
         self._settings = settings = declare_parameters(self)
         self._joints = settings.joints
+        self._estimator = Estimator(settings.urdf, settings.joints, settings.estimator)
         self._commander = JointCommander(
             settings.joints,
             settings.limiter,
             settings.command_loss,
+            raised=self._estimator.raised_feet,
             send=self._send_angles,
             obstacle=self._obstacle,
             warn=self._warn,
         )
-        self._estimator = Estimator(settings.urdf, settings.joints, settings.estimator)
         self._driver = Driver(settings.link, self._report, self._link_changed)
         self._latest: tuple[RobotState, Estimate] | None = None  # while the link is running
         self._joint_states = Stream(
@@ -106,7 +107,7 @@ class HardwareNode(Node):
 
     def end(self) -> None:
         """Close the port; the servos hold their last target, at rest."""
-        if self._commander.in_motion:
+        if self._commander.hazard:
             self._miss_commands()
         while self._commander.goes_down:
             self._go_down()
@@ -194,7 +195,7 @@ class HardwareNode(Node):
             self._silence.reset()
 
     def _miss_commands(self) -> None:
-        """Bring the robot down when its commands broke off in motion, or say why not."""
+        """Bring the robot down when the end of its commands is a hazard, or say why not."""
         self._silence.cancel()
         now, latest = time.monotonic(), self._latest
         attitude = latest[1].attitude if latest is not None else None

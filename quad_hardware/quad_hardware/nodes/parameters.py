@@ -79,7 +79,7 @@ class NodeSettings:
         urdf: What it is.
         joints: Its servos.
         limiter: How fast targets may move.
-        command_loss: What the robot does when commands break off while its legs move.
+        command_loss: What the robot does when commands break off while its legs move or hang.
         estimator: How its reports are read.
         frames: Names of the frames.
         deviations: Published with the IMU.
