@@ -6,7 +6,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from ..master.process_image import Writer
+from ..master.process_image import IN_THE_IMAGE, Writer
+from ..master.scheduler import Promise
 from ..standard.drive import Controlword, OperationMode
 from .modes import Actual, fitting, Mode, NO_BITS
 from .setpoint_profile import ProfileLimits, SetpointProfile
@@ -45,18 +46,19 @@ class CyclicPosition(Mode):
         """Whether the profile is on the way to a single target."""
         return self._profile.target is not None and not self._profile.at_rest
 
-    def preload(self, actual: Actual) -> None:
+    def preload(self, actual: Actual) -> Promise[None]:
         """Hold the actual position."""
         self._streamed = None
         position = self._units.position_commanded(actual.position_inc)
         self._profile = SetpointProfile(position, actual.velocity)
-        self._target.write(actual.position_inc)
+        return self._target.deliver(actual.position_inc)
 
-    def set_target(self, target: float) -> None:
+    def set_target(self, target: float) -> Promise[None]:
         """Go to a single target by a profile."""
         # refuse now what could not be sent on arrival
         fitting(self._target, self._units.position_to_device(target))
         self._profile.target = target
+        return IN_THE_IMAGE
 
     @property
     def velocity(self) -> float:

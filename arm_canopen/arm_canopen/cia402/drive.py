@@ -12,7 +12,7 @@ from ..exceptions import CanopenError, CodecError, SdoError
 from ..master.events import Severity
 from ..master.process_image import Output
 from ..master.remote_node import RemoteNode
-from ..master.scheduler import Scheduler, Task
+from ..master.scheduler import Promise, Scheduler, Task
 from ..standard.drive import DriveState, mode_title, OperationMode, Statusword
 from ..standard.objects import Index
 from .cyclic_position import CyclicPosition, InterpolatedPosition
@@ -199,9 +199,13 @@ class Drive(ModedDrive):
     def _is_without_power(self) -> bool:
         return self.state not in (DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE)
 
-    def resume(self) -> None:
-        """End a halt as soon as the drive has the new target, so that no old one revives."""
-        self.halt.leave(self._scheduler.now)
+    def resume(self, delivery: Promise[None]) -> None:
+        """End a halt as soon as the drive has the new target, so that no old one revives.
+
+        Args:
+            delivery: Of the new target.
+        """
+        self.halt.leave(self._scheduler.now, delivery)
 
     def stream(self, setpoint: Setpoint) -> None:
         """Follow a motion source in this cycle.

@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import Any, TypeVar
 
 from ..exceptions import DriveError
-from ..master.scheduler import Promise, Scheduler, Task
+from ..master.scheduler import completed, Promise, Scheduler, Task
 from ..standard.drive import DriveState, OperationMode
 from ..standard.target_objects import TARGET_OBJECTS
 from .drive import Drive
@@ -40,6 +40,7 @@ class DriveCommands(StopCommands):
         super().__init__(drive, scheduler)
         self._scheduler = scheduler
         self._running = ''
+        self._delivery = completed()  # of the target or move that was commanded last
         self._task: Task[str] | None = None
         self._stream = TargetStream(drive, scheduler, self._steps)
         self._recovery = Recovery(
@@ -89,7 +90,7 @@ class DriveCommands(StopCommands):
         return answer
 
     def give(self, command: Callable[[], str]) -> Promise[str]:
-        """Give a target or a move; the promise ends when a halted drive has taken it.
+        """Give a target or a move; the promise ends when the drive has it, and no halt keeps it.
 
         Args:
             command: Calls :meth:`set_target` or :meth:`move`, and returns its answer.
@@ -99,6 +100,11 @@ class DriveCommands(StopCommands):
     async def _given(self, command: Callable[[], str]) -> str:
         drive, steps, mode = self.drive, self._steps, self.drive.mode
         answer = command()
+        delivery = self._delivery
+        patience = TAKEN_TIMEOUT + drive.node.config.sdo_timeout
+        await steps.until(lambda: delivery.done, patience, 'its target')
+        if delivery.error is not None:
+            raise steps.refused(f'has not taken its target ({delivery.error})')
         if not drive.halt.leaving:
             return answer
         await steps.until(lambda: not drive.halt.leaving, TAKEN_TIMEOUT, 'its target')
@@ -116,7 +122,7 @@ class DriveCommands(StopCommands):
         """
         self._stream.admit()
         self._set(target)
-        self._stream.follow()
+        self._stream.follow(self._delivery)
 
     def move(self, move: Move) -> str:
         """Hand a move to the drive in mode 1, with all that the mode offers.
@@ -132,9 +138,9 @@ class DriveCommands(StopCommands):
             move = replace(move, immediate=True)  # the halt has ended the moves before it
         destination = self._named(lambda: mode.destination(move))
         drive.check_target(destination)
-        self._named(lambda: mode.move(move))
+        delivery = self._named(lambda: mode.move(move))
         self._stream.end('a single move')
-        self._resume()
+        self._resume(delivery if move.immediate else completed())
         how = 'at once' if move.immediate and mode.waiting == 1 else 'after the moves before it'
         return f'to {destination:g}, {how}'
 
@@ -233,8 +239,7 @@ class DriveCommands(StopCommands):
         drive = self.drive
         self._require_obedience()
         drive.check_target(target)
-        self._named(lambda: drive.mode.set_target(target))
-        self._resume()
+        self._resume(self._named(lambda: drive.mode.set_target(target)))
         return f'target {target:g} in mode {drive.mode.number.title}'
 
     def _named(self, ask: Callable[[], T]) -> T:
@@ -257,8 +262,9 @@ class DriveCommands(StopCommands):
             return  # which says itself that it has no target
         raise steps.refused(f'takes no target: it {refusal}')
 
-    def _resume(self) -> None:
-        self.drive.resume()
+    def _resume(self, delivery: Promise[None]) -> None:
+        self._delivery = delivery
+        self.drive.resume(delivery)
         self.drive.released(Refusal(RefusalCause.SINGLE_TARGET))
 
     async def _enable_in(self, mode: OperationMode) -> str:

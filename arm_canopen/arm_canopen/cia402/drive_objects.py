@@ -114,13 +114,9 @@ class DriveObjects:
     def profile_target_writer(self, mode: OperationMode) -> Writer | None:
         """Return a writer for the target of a profile mode, by SDO where no PDO carries it."""
         index, subindex = TARGET_OBJECTS[mode]
-        mapped = self.target_writer(index, subindex)
-        if mapped is not None:
-            return mapped
         entry = self._node.config.dictionary.get(self.at(index), subindex)
-        if entry is None or not entry.access.writable:
-            return None
-        return self._node.target_writer(self.at(index), subindex)
+        writer = self._node.writer(self.at(index), subindex)
+        return None if writer.by_sdo and (entry is None or not entry.access.writable) else writer
 
     def held_position(self, mode: OperationMode) -> int | None:
         """Target of a cyclic position mode that the RPDOs carry in [inc], None when none does."""

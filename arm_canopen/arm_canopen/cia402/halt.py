@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from ..master.scheduler import completed, Promise
 from ..standard.drive import Controlword, OperationMode
 from .modes import Mode, NO_BITS
 
@@ -31,6 +32,7 @@ class Halt:
         """Begin without a halt."""
         self.held = self.unanswered = False
         self._leaving_since: float | None = None
+        self._delivery = completed()
         self._offered_since: float | None = None
         self._ends_in: OperationMode | None = None
         self._released = False  # bit 8 is taken back, and the acknowledge is awaited
@@ -51,10 +53,16 @@ class Halt:
         self._forget()
         self.held = False
 
-    def leave(self, now: float) -> None:
-        """End it when the drive has taken the target that was commanded at this time in [s]."""
+    def leave(self, now: float, delivery: Promise[None]) -> None:
+        """End it when the drive has taken the target that was commanded at this time in [s].
+
+        Args:
+            now: Steady time in [s].
+            delivery: Of the target; where the drive refuses it, the halt goes on.
+        """
         if self.held:
             self._leaving_since = now
+            self._delivery = delivery
             self.unanswered = False
 
     def end_in(self, mode: OperationMode) -> None:
@@ -81,6 +89,9 @@ class Halt:
         if self._ends_in is mode.number:
             self.release()
         if self._leaving_since is None:
+            return True
+        if self._delivery.error is not None:
+            self.hold()
             return True
         if mode.taken:
             self.release()

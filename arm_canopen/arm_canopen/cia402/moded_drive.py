@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from ..config.drive_model import DriveConfig
 from ..master.remote_node import RemoteNode
-from ..master.scheduler import Scheduler
+from ..master.scheduler import Promise, Scheduler
 from ..standard.drive import DriveState, mode_title, OperationMode
 from .cyclic_position import CyclicPosition
 from .mode_table import build_modes
@@ -93,8 +93,11 @@ class ModedDrive(ObservedDrive):
     @property
     def holding_mode(self) -> Mode | None:
         """Mode whose target acts on the drive: it is powered and displays that mode."""
-        if self.state is not DriveState.OPERATION_ENABLED:
-            return None
+        return self.shown_mode if self.state is DriveState.OPERATION_ENABLED else None
+
+    @property
+    def shown_mode(self) -> Mode | None:
+        """Mode that the drive displays; None where it is none of :attr:`modes`."""
         shown = self.objects.mode_display
         return next((mode for mode in self.modes.values() if mode.number == shown), None)
 
@@ -125,19 +128,25 @@ class ModedDrive(ObservedDrive):
     def select(self, mode: Mode) -> None:
         """Command another mode, preloaded with where the drive is, or where it is held.
 
+        A target that goes by SDO is in the drive before (``sequences.py``).
         A halt goes on: until the drive shows the new mode, it may still have a target of the old.
         """
-        held = self.holding_mode
-        if held is not None and held is mode:
-            self.mode = mode
-            return
-        actual = self._actual()
+        if self.holding_mode is not mode and not mode.by_sdo:
+            self.preload(mode)
+        self.mode = mode
+
+    def preload(self, mode: Mode) -> Promise[None]:
+        """Let the target of a mode be where the drive is, or where it is held.
+
+        Returns:
+            Done when the drive has it.
+        """
+        held, actual = self.holding_mode, self._actual()
         if isinstance(held, CyclicPosition):
             # under load the drive is not quite where it is held, and would sag to where it is
             position_inc = self.units.position_to_device(held.setpoint)
             actual = actual._replace(position_inc=position_inc, velocity=held.velocity)
-        mode.preload(actual)
-        self.mode = mode
+        return mode.preload(actual)
 
     def select_back(self, mode: Mode) -> None:
         """Command the mode of before after a switch that failed; the drive is halted in it."""
@@ -191,12 +200,12 @@ class ModedDrive(ObservedDrive):
         return self.halt.bits(held)
 
     def _preload_all(self) -> None:
-        """Let every target be where the drive is, also those of modes that are not selected.
+        """Let every target in an RPDO be where the drive is, also of modes that are not selected.
 
         A drive may stay in the mode that it had, whatever was selected; of two modes with one
         target object the selected one writes last.
         """
         actual = self._actual()
-        for mode in self.modes.values():
-            mode.preload(actual)
-        self.mode.preload(actual)
+        for mode in (*self.modes.values(), self.mode):
+            if not mode.by_sdo:
+                mode.preload(actual)

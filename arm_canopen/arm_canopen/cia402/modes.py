@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 from ..exceptions import DriveError
 from ..master.process_image import Writer
+from ..master.scheduler import completed, Promise
 from ..standard.drive import Controlword, OperationMode
 
 NO_BITS = 0  # bits are plain numbers in the cycle, where operators of IntFlag cost too much
@@ -65,13 +66,25 @@ class Mode(ABC):
     halts_by_bit = True
     cyclic = False
 
-    @abstractmethod
-    def preload(self, actual: Actual) -> None:
-        """Forget any target and command what holds the drive where it is."""
+    @property
+    def by_sdo(self) -> bool:
+        """Whether its target goes by SDO, because no RPDO carries it."""
+        return False
 
     @abstractmethod
-    def set_target(self, target: float) -> None:
+    def preload(self, actual: Actual) -> Promise[None]:
+        """Forget any target and command what holds the drive where it is.
+
+        Returns:
+            Done when the drive has it; whatever stood in its target object before acts no more.
+        """
+
+    @abstractmethod
+    def set_target(self, target: float) -> Promise[None]:
         """Take a single target in user units.
+
+        Returns:
+            Done when the drive has it; rejected when it has refused it, or was stopped before.
 
         Raises:
             DriveError: The mode has no target, or the value does not fit.
@@ -127,10 +140,11 @@ class NoMode(Mode):
 
     number = OperationMode.NO_MODE
 
-    def preload(self, actual: Actual) -> None:
+    def preload(self, actual: Actual) -> Promise[None]:
         """Have nothing to preload."""
+        return completed()
 
-    def set_target(self, target: float) -> None:
+    def set_target(self, target: float) -> Promise[None]:
         """Refuse every target."""
         raise DriveError('no mode of operation is selected; call ~/position_mode or another first')
 
@@ -152,11 +166,12 @@ class Homing(Mode):
         """Wait for the start."""
         self.started = False
 
-    def preload(self, actual: Actual) -> None:
+    def preload(self, actual: Actual) -> Promise[None]:
         """Have nothing to preload: without bit 4 nothing moves."""
         self.started = False
+        return completed()
 
-    def set_target(self, target: float) -> None:
+    def set_target(self, target: float) -> Promise[None]:
         """Refuse every target."""
         raise DriveError('the drive is homing and takes no target')
 

@@ -6,12 +6,13 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 import math
 
 from ..exceptions import DriveError
 from ..master.process_image import Writer
+from ..master.scheduler import completed, Promise
 from ..standard.drive import Controlword, OperationMode, Statusword
 from .modes import Actual, fitting, Mode
 from .units import Units
@@ -75,11 +76,13 @@ class Waiting:
         value: What is written to 0x607A.
         move: The move.
         destination: Where it ends in user units.
+        delivery: Done when the drive has the value.
     """
 
     value: int
     move: Move
     destination: float
+    delivery: Promise[None] = field(default_factory=Promise, compare=False)
 
 
 class ProfilePosition(Mode):
@@ -127,7 +130,13 @@ class ProfilePosition(Mode):
         self._taken = False
         self._acknowledges: bool | None = None  # None until the drive has shown it
         self._offered: Waiting | None = None
+        self._delivery = completed()
         self.handshake = Handshake.IDLE
+
+    @property
+    def by_sdo(self) -> bool:
+        """Whether no RPDO carries 0x607A."""
+        return self._target.by_sdo
 
     @property
     def setpoint(self) -> float | None:
@@ -149,21 +158,21 @@ class ProfilePosition(Mode):
         """Number of moves that have not been handed over."""
         return len(self._queue)
 
-    def preload(self, actual: Actual) -> None:
+    def preload(self, actual: Actual) -> Promise[None]:
         """Write the actual position as the target, without announcing it."""
         self._forget()
         self._bits = CHANGE_IMMEDIATELY
         self._setpoint = self._reference = self._units.position_commanded(actual.position_inc)
-        self._target.write(actual.position_inc)
+        return self._target.deliver(actual.position_inc)
 
     def brake(self) -> None:
         """Forget what the drive has not taken; what it has taken is halted by bit 8."""
         self._forget()
         self._reference = None
 
-    def set_target(self, target: float) -> None:
+    def set_target(self, target: float) -> Promise[None]:
         """Go to a position at once."""
-        self.move(Move(target))
+        return self.move(Move(target))
 
     def destination(self, move: Move) -> float:
         """Return where a move ends, in user units.
@@ -181,8 +190,11 @@ class ProfilePosition(Mode):
             )
         return reference + move.target
 
-    def move(self, move: Move) -> None:
+    def move(self, move: Move) -> Promise[None]:
         """Queue a move for the handshake.
+
+        Returns:
+            Done when the drive has its value, or a newer one that has replaced it.
 
         Raises:
             DriveError: The value does not fit 0x607A, too many moves wait, or it is relative and
@@ -192,12 +204,14 @@ class ProfilePosition(Mode):
         value = fitting(self._target, (to_device or self._units.position_to_device)(move.target))
         waiting = Waiting(value, move, self.destination(move))
         if move.immediate and not move.relative:
-            self._queue.clear()
+            while self._queue:
+                self._queue.popleft().delivery.follow(waiting.delivery)
         elif len(self._queue) >= QUEUE_MAX:
             raise DriveError(
                 f'{QUEUE_MAX} moves wait for the drive already; send the next one later'
             )
         self._queue.append(waiting)
+        return waiting.delivery
 
     def step(self, now: float, period: float, statusword: int) -> int:
         """Advance the handshake."""
@@ -205,8 +219,7 @@ class ProfilePosition(Mode):
         if self.handshake is Handshake.OFFERED:
             self._watch_acknowledge(now, acknowledged=acknowledged)
         elif self.handshake is Handshake.WRITTEN:
-            if self._target.delivered:
-                self._offer(now, acknowledged=acknowledged)
+            self._watch_delivery(now, acknowledged=acknowledged)
         elif self.handshake in (Handshake.WITHDRAWN, Handshake.IMPOSED):
             self._show_edge(now)
         elif self.handshake is Handshake.AWAITED:
@@ -228,7 +241,7 @@ class ProfilePosition(Mode):
         return self._acknowledges is not False or not waits
 
     def _forget(self) -> None:
-        self._queue.clear()
+        self._drop_waiting('it was stopped before the drive had it')
         self._imposed = None
         self._taken = False
         if self.handshake in (Handshake.OFFERED, Handshake.IMPOSED):
@@ -242,15 +255,34 @@ class ProfilePosition(Mode):
         if not self._queue:
             return
         self._offered = waiting = self._queue.popleft()
-        self._target.write(waiting.value)
+        self._delivery = self._target.deliver(waiting.value)
+        waiting.delivery.follow(self._delivery)
         self._bits = waiting.move.bits
-        self._setpoint = self._reference = waiting.destination
-        if self._target_leads or not self._target.delivered:
+        self._reference = waiting.destination
+        if self._target_leads or not self._delivery.done:
             self.handshake = Handshake.WRITTEN
         else:
+            self._watch_delivery(now, acknowledged=acknowledged)
+
+    def _watch_delivery(self, now: float, *, acknowledged: bool) -> None:
+        """Offer what the drive has; what it has refused moves nothing, nor what counts from it."""
+        if self._delivery.error is not None:
+            self.handshake = Handshake.IDLE
+            self._reference = None
+            self._drop_waiting(
+                f'the drive does not have the move before it: {self._delivery.error}'
+            )
+        elif self._delivery.done:
             self._offer(now, acknowledged=acknowledged)
 
+    def _drop_waiting(self, reason: str) -> None:
+        """Forget the moves that have not been handed over."""
+        while self._queue:
+            self._queue.popleft().delivery.reject(DriveError(reason))
+
     def _offer(self, now: float, *, acknowledged: bool) -> None:
+        if self._offered is not None:
+            self._setpoint = self._offered.destination
         self._offered_at = now
         self._cycles_left = EDGE_CYCLES
         self._taken |= self._acknowledges is False

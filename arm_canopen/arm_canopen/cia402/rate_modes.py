@@ -11,7 +11,8 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Callable
 
-from ..master.process_image import Writer
+from ..master.process_image import IN_THE_IMAGE, Writer
+from ..master.scheduler import completed, Promise
 from ..standard.drive import OperationMode
 from .modes import Actual, fitting, Mode, NO_BITS
 from .units import Units
@@ -34,18 +35,33 @@ class DriveRamped(Mode):
         """
         self._units = units
         self._target = target
+        self._delivery = completed()
 
-    def set_target(self, target: float) -> None:
+    @property
+    def by_sdo(self) -> bool:
+        """Whether no RPDO carries the target."""
+        return self._target.by_sdo
+
+    @property
+    def taken(self) -> bool:
+        """Whether the drive has the value that was commanded last."""
+        return self._delivery.done and self._delivery.error is None
+
+    def set_target(self, target: float) -> Promise[None]:
         """Command a value."""
-        self._target.write(fitting(self._target, self._to_device(target)))
+        return self._deliver(fitting(self._target, self._to_device(target)))
 
     def brake(self) -> None:
         """Command standstill; the drive makes the ramp."""
-        self._target.write(0)
+        self._deliver(0)
 
     def step(self, now: float, period: float, statusword: int) -> int:
         """Leave all to the drive."""
         return self.bits
+
+    def _deliver(self, value: int) -> Promise[None]:
+        self._delivery = self._target.deliver(value)
+        return self._delivery
 
     @abstractmethod
     def _to_device(self, target: float) -> int:
@@ -57,9 +73,9 @@ class ProfileVelocity(DriveRamped):
 
     number = OperationMode.PROFILE_VELOCITY
 
-    def preload(self, actual: Actual) -> None:
+    def preload(self, actual: Actual) -> Promise[None]:
         """Command standstill."""
-        self._target.write(0)
+        return self._deliver(0)
 
     def _to_device(self, target: float) -> int:
         return self._units.velocity_to_device(target)
@@ -80,9 +96,9 @@ class ProfileTorque(DriveRamped):
 
     number = OperationMode.PROFILE_TORQUE
 
-    def preload(self, actual: Actual) -> None:
+    def preload(self, actual: Actual) -> Promise[None]:
         """Command the torque that the drive has, so that it drops no load."""
-        self._target.write(actual.torque)
+        return self._deliver(actual.torque)
 
     def brake(self) -> None:
         """Leave it to bit 8: no torque at all would drop a load."""
@@ -110,11 +126,12 @@ class MasterRamped(Mode):
         self._value = 0.0
         self._goal = 0.0
 
-    def set_target(self, target: float) -> None:
+    def set_target(self, target: float) -> Promise[None]:
         """Ramp to a value."""
         # refuse now what could not be sent on arrival
         fitting(self._target, self._to_device(target))
         self._goal = target
+        return IN_THE_IMAGE
 
     def brake(self) -> None:
         """Ramp to zero."""
@@ -143,10 +160,10 @@ class CyclicVelocity(MasterRamped):
         """Whether standstill is commanded."""
         return self._value == 0.0
 
-    def preload(self, actual: Actual) -> None:
+    def preload(self, actual: Actual) -> Promise[None]:
         """Begin at the actual velocity, and brake from it."""
         self._value, self._goal = self._units.velocity_commanded(actual.velocity_dev), 0.0
-        self._target.write(actual.velocity_dev)
+        return self._target.deliver(actual.velocity_dev)
 
     def _to_device(self, target: float) -> int:
         return self._units.velocity_to_device(target)
@@ -163,10 +180,10 @@ class CyclicTorque(MasterRamped):
     def brake(self) -> None:
         """Leave it to bit 8."""
 
-    def preload(self, actual: Actual) -> None:
+    def preload(self, actual: Actual) -> Promise[None]:
         """Keep the torque that the drive has, so that it drops no load."""
         self._value = self._goal = self._units.effort_commanded(actual.torque)
-        self._target.write(actual.torque)
+        return self._target.deliver(actual.torque)
 
     def _to_device(self, target: float) -> int:
         return self._units.effort_to_device(target)

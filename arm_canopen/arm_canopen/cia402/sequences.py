@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from ..exceptions import DriveError, SdoError, SdoTimeoutError
+from ..exceptions import CodecError, DriveError, SdoError, SdoTimeoutError
 from ..master.events import Severity
 from ..master.scheduler import Scheduler
 from ..standard.drive import DriveState, OperationMode, Statusword
@@ -71,15 +71,36 @@ class DriveSequences:
         """Lead to a state.
 
         Raises:
-            DriveError: It is not reached; then the drive is led to Switch On Disabled.
+            DriveError: It is not reached; then the drive is led to Switch On Disabled. It is not
+                enabled where it does not take the value that holds it.
         """
         drive = self.drive
+        if goal is DriveState.OPERATION_ENABLED and not drive.stays_enabled:
+            await self._preload(drive.mode, 'is not enabled')
+            if drive.shown_mode is not drive.mode:  # in which it may stay
+                await self._preload(drive.shown_mode, 'is not enabled')
         drive.goal = goal
         try:
             await self.until(lambda: drive.state is goal, self.quirks.state_timeout, goal.title)
         except BaseException:  # also when it is cancelled: nobody waits for the rest of the way
             drive.goal = DriveState.SWITCH_ON_DISABLED
             raise
+
+    async def _preload(self, mode: Mode | None, consequence: str) -> None:
+        """Write the holding value of a mode whose target goes by SDO, whatever the drive has.
+
+        Raises:
+            DriveError: The drive does not confirm it, and might act on what stands there.
+        """
+        if mode is None or not mode.by_sdo:
+            return
+        try:
+            await self.drive.preload(mode)
+        except (SdoError, CodecError) as error:
+            raise self.refused(
+                f'{consequence}: it does not take the target that holds it in mode '
+                f'{mode.number.title} ({error})'
+            ) from error
 
     async def come_to_rest(self) -> None:
         """Halt what moves before another mode ends it with a jerk; the drive stays halted.
@@ -140,6 +161,7 @@ class DriveSequences:
         leave = enabled and switching_state is not DriveState.OPERATION_ENABLED
         drive.released(Refusal(RefusalCause.MODE_SELECTED, mode.number.title))
         await self.come_to_rest()
+        await self._preload(mode, 'is not switched')
         if leave:
             await self.reach(switching_state)
         if mode.number is OperationMode.INTERPOLATED_POSITION:

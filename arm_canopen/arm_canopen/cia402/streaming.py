@@ -8,7 +8,7 @@ import math
 
 from ..exceptions import DriveError
 from ..master.events import Severity
-from ..master.scheduler import Scheduler, Task
+from ..master.scheduler import Promise, Scheduler, Task
 from .drive import Drive
 from .sequences import DriveSequences, STOP_TIMEOUT
 
@@ -48,8 +48,9 @@ class TargetStream:
                 f'a new one begins after a pause of {pause:g} ms'
             )
 
-    def follow(self) -> None:
-        """A target was taken: stop the drive when no other one follows."""
+    def follow(self, delivery: Promise[None]) -> None:
+        """A target was commanded: stop the drive when it refuses it, or no other one follows."""
+        delivery.when_done(self._note_delivery)
         self._goes_on_until = self._scheduler.now + self._drive.config.target_timeout
         if self._watch is None or self._watch.done:
             self._watch = self._scheduler.background(self._watch_for_pause())
@@ -63,6 +64,14 @@ class TargetStream:
         self._ended_by = by
         if self._watch is not None:
             self._watch.cancel(DriveError('the stream was ended by a command'))
+
+    def _note_delivery(self, delivery: Promise[None]) -> None:
+        drive = self._drive
+        if delivery.error is None or self._ended_by or not drive.accepts_targets:
+            return
+        self.end('a target that the drive did not take')
+        drive.hold()
+        drive.warn(f'stopped: it has not taken a target of the stream ({delivery.error})')
 
     async def _watch_for_pause(self) -> None:
         while self._scheduler.now < self._goes_on_until:

@@ -1,12 +1,13 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Objects that no PDO carries: polled, or written when they change, by SDO outside the cycle."""
+"""Objects that no PDO carries: polled, or written by SDO outside the cycle."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections import deque
+from typing import NamedTuple, TYPE_CHECKING
 
-from ..exceptions import CodecError, SdoAbortError, SdoError, SdoTimeoutError
+from ..exceptions import CodecError, SdoError, SdoTimeoutError
 from ..standard.pdo import Number
 from .events import EventKind, Severity
 from .process_image import Limits, Source
@@ -16,6 +17,8 @@ if TYPE_CHECKING:
     from .remote_objects import RemoteObjects
 
 WRITE_PAUSE = 0.05  # [s] between two writes of a value of which the newest counts
+REFUSED_PAUSE = 1.0  # [s] before a value that was refused is written again, doubled each time
+DOUBLED_MAX = 5  # times
 
 
 class BackgroundReader:
@@ -46,57 +49,29 @@ class BackgroundReader:
         return self.value is None or now - self.timestamp > self._stale_after
 
 
-class BackgroundWriter:
-    """An object that no RPDO carries; it is written by SDO when it changes."""
+class QueuedWrite(NamedTuple):
+    """A value that waits for its transfer.
 
-    def __init__(self, node: RemoteObjects, index: int, subindex: int) -> None:
-        """Remember nothing written yet."""
-        self._node = node
-        self._address = (index, subindex)
-        self._written: Number | None = None
-        self._failing = False
-        self._open = 0
-
-    @property
-    def limits(self) -> Limits:
-        """Smallest and largest value that the object holds, by its type in the EDS."""
-        return self._node.limits(*self._address)
-
-    @property
-    def delivered(self) -> bool:
-        """Whether the device has confirmed the last value."""
-        return not self._open and not self._failing
-
-    def write(self, value: Number) -> None:
-        """Queue the write unless this is the value that was written last."""
-        if value == self._written or not self._node.online:
-            return
-        self._written = value
-        self._open += 1
-        self._node.write_object(*self._address, value).when_done(self._check)
-
-    def forget(self) -> None:
-        """The device restarted: write again whatever comes."""
-        self._written = None
-        self._failing = False
-
-    def _check(self, promise: Promise[None]) -> None:
-        self._open -= 1
-        failing, self._failing = self._failing, promise.error is not None
-        if promise.error is None or not self._node.online:
-            return
-        if not isinstance(promise.error, SdoAbortError):
-            self._written = None  # it did not arrive; a value that was refused is not repeated
-        if not failing:
-            self._node.report(EventKind.PDO, Severity.WARNING, str(promise.error))
-
-
-class LatestWriter:
-    """An object that is written by SDO, of which only the newest value counts.
-
-    One transfer is on its way at a time, and there is a pause between two, so that a value that
-    changes all the time does not fill the bus.
+    Attributes:
+        value: The value.
+        written: Done when the device has it.
+        pause: Time in [s] in which no other one follows, so that a value that changes all the
+            time does not fill the bus.
     """
+
+    value: Number
+    written: Promise[None]
+    pause: float = 0.0
+
+
+class SdoWriter:
+    """An object that no RPDO carries: its values go by SDO, one at a time and in their order.
+
+    Attributes:
+        by_sdo: It goes by SDO.
+    """
+
+    by_sdo = True
 
     def __init__(
         self, node: RemoteObjects, scheduler: Scheduler, index: int, subindex: int
@@ -105,49 +80,100 @@ class LatestWriter:
         self._node = node
         self._scheduler = scheduler
         self._address = (index, subindex)
-        self._wanted: Number | None = None
-        self._held: Number | None = None
+        self._queue: deque[QueuedWrite] = deque()
         self._busy = False
-        self._failing = False
+        self._last: Number | None = None  # that was asked for
+        self._failed = False  # its transfer
+        self._failures = 0  # in a row
+        self._write_again_at = 0.0
 
     @property
     def limits(self) -> Limits:
         """Smallest and largest value that the object holds, by its type in the EDS."""
         return self._node.limits(*self._address)
 
-    @property
-    def delivered(self) -> bool:
-        """Whether the device has confirmed the last value."""
-        return self._wanted == self._held
-
     def write(self, value: Number) -> None:
-        """Have the device hold a value as soon as possible."""
-        self._wanted = value
-        if value != self._held and not self._busy and self._node.online:
-            self._scheduler.background(self._deliver())
+        """Have the device hold a value, cycle by cycle; each change of it is sent.
+
+        What was lost is sent again at once, and what was refused ever less often.
+        """
+        if value == self._last and not self._is_due():
+            return
+        if self._node.online:
+            self._enqueue(QueuedWrite(value, Promise()))
+
+    def deliver(self, value: Number) -> Promise[None]:
+        """Send a value once, whatever the device has; of those that wait the newest counts.
+
+        Returns:
+            Done when the device has this value or a newer one; rejected with what the device, or
+            the silence, says.
+        """
+        entry = QueuedWrite(value, Promise(), WRITE_PAUSE)
+        while self._queue:
+            self._queue.popleft().written.follow(entry.written)
+        self._enqueue(entry)
+        return entry.written
 
     def forget(self) -> None:
         """The device restarted: write again whatever comes."""
-        self._wanted = self._held = None
+        while self._queue:
+            self._queue.popleft().written.reject(self._offline())
+        self._last = None
+        self._failed = False
+        self._failures = 0
 
-    async def _deliver(self) -> None:
+    def _is_due(self) -> bool:
+        """Whether the last value is to be sent again."""
+        return self._failed and not self._busy and self._scheduler.now >= self._write_again_at
+
+    def _enqueue(self, entry: QueuedWrite) -> None:
+        self._last, self._failed = entry.value, False
+        self._queue.append(entry)
+        if not self._busy:
+            self._scheduler.background(self._work())
+
+    async def _work(self) -> None:
         self._busy = True
         try:
-            while self._wanted is not None and self._wanted != self._held and self._node.online:
-                value = self._wanted
+            while self._queue:
+                value, written, pause = self._queue.popleft()
                 try:
-                    await self._node.write_object(*self._address, value)
+                    await self._transfer(value)
                 except (SdoError, CodecError) as error:
-                    self._failed(error)
-                    if not isinstance(error, SdoTimeoutError):
-                        break  # what was refused is not repeated before somebody asks again
+                    self._note_failure(error, repeats=not pause)
+                    written.reject(error)
                 else:
-                    self._held, self._failing = value, False
-                await self._scheduler.timer(WRITE_PAUSE)
+                    self._failures = 0
+                    written.resolve(None)
+                if pause:
+                    await self._scheduler.timer(pause)
         finally:
             self._busy = False
 
-    def _failed(self, error: Exception) -> None:
-        if not self._failing and self._node.online:
-            self._node.report(EventKind.PDO, Severity.WARNING, str(error))
-        self._failing = True
+    async def _transfer(self, value: Number) -> None:
+        if not self._node.online:
+            raise self._offline()
+        await self._node.write_object(*self._address, value)
+
+    def _note_failure(self, error: Exception, *, repeats: bool) -> None:
+        """Report the first failure, and keep values from piling up behind those that follow."""
+        while len(self._queue) > 1:
+            self._queue.popleft().written.follow(self._queue[-1].written)
+        self._failed = not self._queue
+        if not self._node.online:
+            return
+        lost = isinstance(error, SdoTimeoutError)  # the time-out was pause enough
+        pause = 0.0 if lost else REFUSED_PAUSE * 2**self._failures
+        if not self._failures:
+            hint = (
+                f'; it is sent again in {pause:g} s, then ever less often'
+                if repeats and pause
+                else ''
+            )
+            self._node.report(EventKind.PDO, Severity.WARNING, f'{error}{hint}')
+        self._write_again_at = self._scheduler.now + pause
+        self._failures = min(self._failures + 1, DOUBLED_MAX)
+
+    def _offline(self) -> SdoError:
+        return SdoError(f'{self._node.name} is offline')

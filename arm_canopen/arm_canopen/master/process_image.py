@@ -17,11 +17,14 @@ from ..config.model import PdoConfig
 from ..exceptions import CodecError
 from ..standard.datatypes import DataType, integer_range
 from ..standard.pdo import MappedObject, Number, PdoCodec, SYNCHRONOUS_MAX
+from .scheduler import completed, Promise
 
 EVENT_DRIVEN = 254  # transmission types from which on a PDO has an event timer (CiA 301, table 72)
 REPEAT_SHARE = 0.5  # of the deadline of an RPDO, after which it is repeated
 PERIODS_MISSED = 3  # periods of a TPDO, or of a poll, without a new value
 STALE_AFTER = 0.5  # [s] without a new value, where its period is shorter
+IN_THE_IMAGE = completed()
+"""What leaves with the PDOs of this cycle counts as delivered."""
 
 StartValue: TypeAlias = Callable[[MappedObject], Number]
 Limits: TypeAlias = tuple[Number, Number]
@@ -244,11 +247,21 @@ class Writer(Protocol):
         """Smallest and largest value that the object holds."""
 
     @property
-    def delivered(self) -> bool:
-        """Whether the last value leaves with the PDOs of this cycle at the latest."""
+    def by_sdo(self) -> bool:
+        """Whether it goes by SDO, because no RPDO carries it."""
 
     def write(self, value: Number) -> None:
-        """Set the value; it leaves with the next PDO, or by SDO when it changed.
+        """Have the device hold a value, cycle by cycle; by SDO it leaves when it changed.
+
+        Raises:
+            CodecError: The object cannot hold it; the one before is kept.
+        """
+
+    def deliver(self, value: Number) -> Promise[None]:
+        """Send a value once, whatever the device has; of those that wait the newest counts.
+
+        Returns:
+            Done when the device has it, or will have it with the PDOs of this cycle.
 
         Raises:
             CodecError: The object cannot hold it; the one before is kept.
@@ -283,7 +296,10 @@ class OutputWriter:
 
     Attributes:
         limits: Smallest and largest value that the object holds.
+        by_sdo: It does not go by SDO.
     """
+
+    by_sdo = False
 
     def __init__(self, places: Sequence[tuple[Output, int]]) -> None:
         """Point to the object: RPDOs, and its position in each."""
@@ -292,11 +308,6 @@ class OutputWriter:
         self._mapped = output.config.mapping[position]
         self.limits = limits_of(self._mapped.data_type)
         self._low, self._high = self.limits
-
-    @property
-    def delivered(self) -> bool:
-        """RPDOs leave in every cycle."""
-        return True
 
     def write(self, value: Number) -> None:
         """Set the value for the next PDOs.
@@ -312,6 +323,11 @@ class OutputWriter:
             )
         for values, position in self._places:
             values[position] = value
+
+    def deliver(self, value: Number) -> Promise[None]:
+        """Set the value for the next PDOs, which leave in this cycle; errors as of a write."""
+        self.write(value)
+        return IN_THE_IMAGE
 
 
 class ProcessImage:

@@ -14,7 +14,7 @@ from ..exceptions import CodecError, SdoError
 from ..standard.datatypes import decode, encode, Value
 from ..standard.dictionary import ObjectEntry
 from ..standard.objects import is_controlword
-from .background_objects import BackgroundReader, BackgroundWriter, LatestWriter
+from .background_objects import BackgroundReader, SdoWriter
 from .events import Event, EventKind, Report, Severity
 from .process_image import (
     Limits,
@@ -75,7 +75,7 @@ class RemoteObjects:
         self._scheduler = scheduler
         self._report = report
         self._polled: dict[tuple[int, int], BackgroundReader] = {}
-        self._background_writers: list[BackgroundWriter | LatestWriter] = []
+        self._sdo_writers: list[SdoWriter] = []
 
     def report(self, kind: EventKind, severity: Severity, text: str) -> None:
         """Tell the owner of the network something about this device."""
@@ -91,18 +91,12 @@ class RemoteObjects:
         return self._polled.setdefault((index, subindex), reader)
 
     def writer(self, index: int, subindex: int = 0) -> Writer:
-        """Return a writer for an object, by RPDO when it is mapped, else by SDO on change."""
+        """Return a writer for an object, by RPDO when it is mapped, else by SDO."""
         mapped = self.image.writer(index, subindex)
         if mapped is not None:
             return mapped
-        writer = BackgroundWriter(self, index, subindex)
-        self._background_writers.append(writer)
-        return writer
-
-    def target_writer(self, index: int, subindex: int = 0) -> Writer:
-        """Return a writer by SDO for a value of which only the newest counts."""
-        writer = LatestWriter(self, self._scheduler, index, subindex)
-        self._background_writers.append(writer)
+        writer = SdoWriter(self, self._scheduler, index, subindex)
+        self._sdo_writers.append(writer)
         return writer
 
     async def poll(self, period: float) -> None:
@@ -185,5 +179,5 @@ class RemoteObjects:
         self.sdo.cancel_all(reason)
         for entry in self._polled.values():
             entry.value = None
-        for writer in self._background_writers:
+        for writer in self._sdo_writers:
             writer.forget()

@@ -35,6 +35,17 @@ class Promise(Generic[T]):
         """Give an error as the result; ignored when there is one already."""
         self._finish(None, error)
 
+    def follow(self, other: Promise[T]) -> None:
+        """Have the result that another promise gets."""
+
+        def finish(done: Promise[T]) -> None:
+            if done.error is None:
+                self.resolve(done.result())
+            else:
+                self.reject(done.error)
+
+        other.when_done(finish)
+
     def abandon(self) -> None:
         """Be done without a result, and without telling those who wait; nobody does any more."""
         self.done = True

@@ -1,0 +1,318 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Targets that no RPDO carries: confirmed before they act, refused in words, written once."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import cycle
+
+import pytest
+from virtual_network import bus_config, drive_config, every_mode, PERIOD, SCALE, VirtualNetwork
+
+from arm_canopen.cia402.position_modes import Move
+from arm_canopen.config.model import NodeConfig
+from arm_canopen.device.faults import BusFault, FaultInjection
+from arm_canopen.exceptions import DriveError
+from arm_canopen.master.events import Severity
+from arm_canopen.master.scheduler import Promise
+from arm_canopen.standard.drive import DriveState, OperationMode
+
+JOINT, NODE_ID = 'joint1', 2
+REQUEST = 0x600 + NODE_ID
+DOWNLOADS = frozenset({0x22, 0x23, 0x27, 0x2B, 0x2F})
+POSITION, VELOCITY, VL_VELOCITY, TORQUE = 0x607A, 0x60FF, 0x6042, 0x6071
+TARGETS = {
+    OperationMode.PROFILE_POSITION: POSITION,
+    OperationMode.VELOCITY: VL_VELOCITY,
+    OperationMode.PROFILE_VELOCITY: VELOCITY,
+    OperationMode.PROFILE_TORQUE: TORQUE,
+}
+SIZES = {POSITION: 4, VELOCITY: 4, VL_VELOCITY: 2, TORQUE: 2}
+
+
+def unmapped() -> NodeConfig:
+    """Return a drive whose RPDOs carry controlword and mode only."""
+    config = every_mode(drive_config(JOINT, NODE_ID))
+    return replace(config, rpdos=config.rpdos[:1])
+
+
+def booted(config: NodeConfig | None = None) -> VirtualNetwork:
+    """Boot such a drive."""
+    net = VirtualNetwork(bus_config(config or unmapped()))
+    net.boot()
+    return net
+
+
+def running_in(mode: OperationMode) -> VirtualNetwork:
+    """Boot such a drive, enable it, and select a mode."""
+    net = booted()
+    net.do(JOINT, 'init')
+    net.select(JOINT, mode)
+    return net
+
+
+def motor(net: VirtualNetwork) -> float:
+    """Return where the motor really is in [rad]."""
+    drive = net.devices[JOINT].drive
+    assert drive is not None
+    return drive.position / SCALE
+
+
+def leave_behind(net: VirtualNetwork, index: int, value: int) -> None:
+    """Let another client have written an object of the drive."""
+    data = value.to_bytes(SIZES[index], 'little', signed=True)
+    net.devices[JOINT].store.write(index, 0, data, net.now)
+
+
+def refuse(net: VirtualNetwork, index: int) -> None:
+    """Let the drive abort all transfers of an object."""
+    fault = FaultInjection(BusFault.SDO_ABORT, object=(index, 0), abort=0x08000022)
+    net.devices[JOINT].faults.inject(fault, net.now)
+
+
+def accept(net: VirtualNetwork) -> None:
+    """Let the drive take everything again."""
+    net.devices[JOINT].faults.end(net.now)
+
+
+def downloads(net: VirtualNetwork, since: float = 0.0) -> list[int]:
+    """Return the objects that the master has written by SDO."""
+    frames = net.frames(REQUEST, since=since)
+    return [int.from_bytes(d[1:3], 'little') for d in frames if d[0] in DOWNLOADS]
+
+
+def give(net: VirtualNetwork, target: float) -> Promise[str]:
+    """Command a target as the service ~/target does."""
+    commands = net.commands[JOINT]
+    return commands.give(lambda: commands.set_target(target))
+
+
+# ------------------------------------------------------------------ nothing stale acts
+
+
+@pytest.mark.parametrize('mode', TARGETS)
+def test_what_others_left_in_the_target_moves_nothing_at_enable(mode: OperationMode) -> None:
+    """The holding value is written whatever the master wrote before, ahead of the enable."""
+    net = running_in(mode)
+    net.do(JOINT, 'disable')
+    leave_behind(net, TARGETS[mode], 3_000)
+    begin, before = net.now, motor(net)
+    net.do(JOINT, 'enable')
+    net.run(1.0)
+    assert motor(net) == pytest.approx(before, abs=1e-3)
+    assert downloads(net, since=begin) == [TARGETS[mode]]
+
+
+@pytest.mark.parametrize('mode', TARGETS)
+def test_what_others_left_in_the_target_moves_nothing_at_a_switch(mode: OperationMode) -> None:
+    """Also where the drive stays enabled, and the mode was left a moment ago."""
+    net = running_in(mode)
+    other = OperationMode.PROFILE_POSITION
+    if mode is other:
+        other = OperationMode.PROFILE_VELOCITY
+    net.select(JOINT, other)
+    leave_behind(net, TARGETS[mode], 3_000)
+    before = motor(net)
+    net.select(JOINT, mode)
+    net.run(1.0)
+    assert motor(net) == pytest.approx(before, abs=1e-3)
+
+
+@pytest.mark.parametrize('mode', TARGETS)
+def test_a_refused_holding_value_keeps_the_drive_disabled(mode: OperationMode) -> None:
+    """The answer has the object and the reason of the drive."""
+    net = running_in(mode)
+    net.do(JOINT, 'disable')
+    leave_behind(net, TARGETS[mode], 3_000)
+    refuse(net, TARGETS[mode])
+    with pytest.raises(DriveError, match=f'0x{TARGETS[mode]:04X}.*present device state'):
+        net.do(JOINT, 'enable')
+    net.run(0.5)
+    assert net.drives[JOINT].state is not DriveState.OPERATION_ENABLED
+    accept(net)
+    assert 'Operation enabled' in net.do(JOINT, 'enable')
+
+
+def test_a_refused_holding_value_keeps_the_mode() -> None:
+    """The mode of before stays selected, and halted."""
+    net = running_in(OperationMode.PROFILE_POSITION)
+    leave_behind(net, VELOCITY, 3_000)
+    refuse(net, VELOCITY)
+    before = motor(net)
+    with pytest.raises(DriveError, match='0x60FF'):
+        net.select(JOINT, OperationMode.PROFILE_VELOCITY)
+    net.run(0.5)
+    assert net.drives[JOINT].objects.mode_display == OperationMode.PROFILE_POSITION
+    assert motor(net) == pytest.approx(before, abs=1e-3)
+    net.result(give(net, 0.2))
+    net.run(2.0)
+    assert motor(net) == pytest.approx(0.2, abs=1e-3)
+
+
+# ------------------------------------------------------------------ taken means delivered
+
+
+@pytest.mark.parametrize('mode', [OperationMode.PROFILE_VELOCITY, OperationMode.PROFILE_TORQUE])
+def test_the_end_of_a_halt_does_not_overtake_its_target(mode: OperationMode) -> None:
+    """However late it arrives, bit 8 goes after the new target has come."""
+    net = running_in(mode)
+    net.do(JOINT, 'halt')
+    net.run(0.2)
+    begin = net.now
+    fault = FaultInjection(BusFault.SDO_DELAY, delay=0.15)  # within the SDO time-out
+    net.devices[JOINT].faults.inject(fault, begin)
+    net.result(give(net, 0.3))
+    assert net.now - begin > 0.15
+    words = [s for s in net.wire.log if s.frame.can_id == 0x200 + NODE_ID and s.time >= begin]
+    halted = [bool(sent.frame.data[1]) for sent in words if sent.time < begin + 0.15]
+    assert all(halted)
+
+
+def test_a_target_that_is_refused_at_the_end_of_a_halt_leaves_it_halted() -> None:
+    """And the next one, which is taken, ends it."""
+    net = running_in(OperationMode.PROFILE_VELOCITY)
+    net.result(give(net, 0.4))
+    net.run(1.0)
+    net.do(JOINT, 'halt')
+    refuse(net, VELOCITY)
+    with pytest.raises(DriveError, match='present device state'):
+        net.result(give(net, -0.3))
+    net.run(1.0)
+    assert net.drives[JOINT].halted
+    assert abs(net.drives[JOINT].rate) < 0.01
+    accept(net)
+    net.result(give(net, -0.3))
+    net.run(1.0)
+    assert net.drives[JOINT].rate == pytest.approx(-0.3, abs=0.02)
+
+
+# ------------------------------------------------------------------ refused targets
+
+
+@pytest.mark.parametrize('mode', TARGETS)
+def test_a_refused_target_is_answered_with_the_reason(mode: OperationMode) -> None:
+    """What the drive did before goes on, and the next target is executed."""
+    net = running_in(mode)
+    refuse(net, TARGETS[mode])
+    with pytest.raises(DriveError, match='present device state'):
+        net.result(give(net, 0.4 if mode is not OperationMode.PROFILE_TORQUE else 100.0))
+    net.run(1.0)
+    assert motor(net) == pytest.approx(0.0, abs=1e-3)
+    accept(net)
+    target = 0.3 if mode is not OperationMode.PROFILE_TORQUE else 200.0
+    assert 'target' in net.result(give(net, target))
+    net.run(3.0)
+    assert motor(net) > 0.05
+    if mode is OperationMode.PROFILE_POSITION:
+        assert motor(net) == pytest.approx(target, abs=1e-3)
+
+
+def test_a_target_that_is_not_answered_is_no_success() -> None:
+    """A drive that is silent says nothing of what it has taken; the next target moves it."""
+    net = running_in(OperationMode.PROFILE_POSITION)
+    net.wire.loses = lambda sender, frame: frame.can_id == REQUEST
+    with pytest.raises(DriveError, match='did not answer'):
+        net.result(give(net, 0.4))
+    net.wire.loses = lambda sender, frame: False
+    net.run(1.0)
+    assert motor(net) == pytest.approx(0.0, abs=1e-3)
+    net.result(give(net, 0.3))
+    net.run(2.0)
+    assert motor(net) == pytest.approx(0.3, abs=1e-3)
+
+
+def test_the_moves_behind_a_refused_one_are_dropped() -> None:
+    """Each counts from the one before, so none of them would end where it should."""
+    net = running_in(OperationMode.PROFILE_POSITION)
+    commands = net.commands[JOINT]
+    refuse(net, POSITION)
+    commands.move(Move(0.1))
+    commands.move(Move(0.2, immediate=False))
+    commands.move(Move(0.2, relative=True, immediate=False))
+    net.run(1.0)
+    accept(net)
+    net.run(2.0)
+    assert motor(net) == pytest.approx(0.0, abs=1e-3)
+    with pytest.raises(DriveError, match='absolute position first'):
+        commands.move(Move(0.1, relative=True))
+
+
+def test_of_targets_that_come_faster_than_they_are_written_the_newest_counts() -> None:
+    """Each is answered when the drive has the newest."""
+    net = running_in(OperationMode.PROFILE_VELOCITY)
+    begin = net.now
+    answers = [give(net, 0.01 * n) for n in range(1, 30)]
+    net.run(1.0)
+    assert all('target' in answered.result() for answered in answers)
+    assert len(downloads(net, since=begin)) <= 2
+    assert net.drives[JOINT].rate == pytest.approx(0.29, abs=0.02)
+
+
+def test_a_stream_whose_targets_are_refused_stops_the_axis() -> None:
+    """Nobody waits for an answer, so it is a warning, and the stream has ended."""
+    net = running_in(OperationMode.PROFILE_VELOCITY)
+    commands = net.commands[JOINT]
+    net.result(give(net, 0.2))
+    net.run(0.5)
+    refuse(net, VELOCITY)
+    begin, refused = net.now, ''
+    for _ in range(50):
+        try:
+            commands.stream_target(0.3)
+        except DriveError as error:
+            refused = str(error)
+        net.run(PERIOD)
+    assert 'was ended by a target that the drive did not take' in refused
+    assert len(downloads(net, since=begin)) < 5
+    net.run(1.0)
+    assert abs(net.drives[JOINT].rate) < 0.01
+
+
+# ------------------------------------------------------------------ nothing unasked
+
+
+def test_only_the_target_of_the_mode_is_written() -> None:
+    """From boot to a mode and back, 0x6042 and 0x6071 belong to whoever else uses them."""
+    net = booted()
+    net.run(1.0)
+    assert not set(downloads(net)) & set(TARGETS.values())
+    net.do(JOINT, 'init')
+    assert not set(downloads(net)) & set(TARGETS.values())
+    net.select(JOINT, OperationMode.PROFILE_VELOCITY)
+    net.do(JOINT, 'disable')
+    net.do(JOINT, 'enable')
+    net.run(1.0)
+    assert set(downloads(net)) & set(TARGETS.values()) == {VELOCITY}
+
+
+def test_a_drive_that_is_moved_by_hand_is_not_written_to() -> None:
+    """Disabled, and its position changing in each cycle."""
+    net = running_in(OperationMode.PROFILE_POSITION)
+    net.do(JOINT, 'disable')
+    noise = cycle((b'\x00', b'\x05'))
+    net.wire.alters = lambda sender, frame: (
+        frame._replace(data=next(noise) + frame.data[1:])
+        if frame.can_id == 0x280 + NODE_ID
+        else frame
+    )
+    begin = net.now
+    net.run(2.0)
+    assert downloads(net, since=begin) == []
+
+
+def test_a_controlword_that_is_refused_is_written_seldom() -> None:
+    """Once, then ever less often, with one warning; taken again, it is written as it changes."""
+    config = unmapped()
+    mode_only = replace(config.rpdos[0], mapping=config.rpdos[0].mapping[1:])
+    net = booted(replace(config, rpdos=(mode_only,)))
+    net.do(JOINT, 'init')
+    refuse(net, 0x6040)
+    begin = net.now
+    promise = net.begin(JOINT, 'disable')
+    net.run(4.0)
+    assert 2 <= downloads(net, since=begin).count(0x6040) <= 4
+    assert len([text for text in net.told(Severity.WARNING) if '0x6040' in text]) == 1
+    accept(net)
+    net.run_until(lambda: promise.done, 10.0)
+    net.run_until(lambda: net.drives[JOINT].state is not DriveState.OPERATION_ENABLED, 10.0)
