@@ -21,6 +21,7 @@ from virtual_network import (
 
 from arm_canopen.config.checks import check_bus
 from arm_canopen.config.model import NodeConfig
+from arm_canopen.device.faults import BusFault, FaultInjection
 from arm_canopen.exceptions import CanopenError
 from arm_canopen.standard.nmt import NmtCommand
 
@@ -29,6 +30,7 @@ NODE_ID = 5
 OUTPUTS = (0x6083, 0)  # stands for the outputs of a module
 MASK = (0x6084, 0)
 COB_ID, SYNC_COB_ID = 0x205, 0x305
+JOINT, SPEEDS = 'joint', 0x502
 
 
 def module(**changes: object) -> NodeConfig:
@@ -129,6 +131,78 @@ def test_an_sdo_write_to_an_object_of_a_drive_that_is_mapped_stays() -> None:
     net.run(0.2)
     (speed,) = struct.unpack('<I', net.result(node.sdo.read(0x6081, 0, 0.2)))
     assert speed == 2_000
+
+
+def drive_with_speed_mapped() -> VirtualNetwork:
+    """Boot a drive that has its profile velocity of 10000 in an RPDO, which leaves each cycle."""
+    config = drive_config(JOINT, 2)
+    speeds = pdo(4, SPEEDS, (0x6081, 0))
+    net = VirtualNetwork(bus_config(replace(config, rpdos=(*config.rpdos, speeds))))
+    net.boot()
+    return net
+
+
+def speeds(net: VirtualNetwork, since: float) -> list[int]:
+    """Return the profile velocities that the RPDO has carried."""
+    return [struct.unpack('<I', data)[0] for data in net.frames(SPEEDS, since=since)]
+
+
+def inject(net: VirtualNetwork, fault: BusFault, **settings: float) -> None:
+    """Let the drive answer the SDO for its profile velocity so."""
+    injection = FaultInjection(fault, object=(0x6081, 0), **settings)  # type: ignore[arg-type]
+    net.devices[JOINT].faults.inject(injection, net.now)
+
+
+def test_an_sdo_write_is_not_undone_while_its_answer_is_awaited() -> None:
+    """The device may have taken it at once, so the RPDO carries it from when the request left."""
+    net = drive_with_speed_mapped()
+    net.devices[JOINT].faults.inject(FaultInjection(BusFault.SDO_DELAY, delay=0.1), net.now)
+    begin = net.now
+    net.result(net.network.nodes[JOINT].write_object(0x6081, 0, 2_000))
+    assert net.now - begin > 0.1
+    assert set(speeds(net, since=begin + 1e-6)) == {2_000}
+
+
+def test_an_sdo_write_that_is_refused_leaves_the_rpdo_as_it_was() -> None:
+    """The device keeps its value, so the RPDO must not bring another one."""
+    net = drive_with_speed_mapped()
+    inject(net, BusFault.SDO_ABORT)
+    promise = net.network.nodes[JOINT].write_object(0x6081, 0, 2_000)
+    net.run_until(lambda: promise.done)
+    assert promise.error is not None
+    begin = net.now
+    net.run(0.2)
+    assert set(speeds(net, since=begin)) == {10_000}
+
+
+def test_a_value_published_meanwhile_outlives_a_write_that_is_refused() -> None:
+    """Set back is only what the request has set."""
+    net = drive_with_speed_mapped()
+    node = net.network.nodes[JOINT]
+    inject(net, BusFault.SDO_SILENCE)
+    promise = node.write_object(0x6081, 0, 2_000)
+    net.run(0.05)
+    net.network.publish_object(node, 0x6081, 0, 3_000)
+    net.run_until(lambda: promise.done)
+    assert promise.error is not None
+    begin = net.now
+    net.run(0.2)
+    assert set(speeds(net, since=begin)) == {3_000}
+
+
+def test_a_write_that_waits_in_the_queue_changes_no_rpdo_yet() -> None:
+    """Of two writes the first one's value leaves until the second one is on its way."""
+    net = drive_with_speed_mapped()
+    node = net.network.nodes[JOINT]
+    net.devices[JOINT].faults.inject(FaultInjection(BusFault.SDO_DELAY, delay=0.1), net.now)
+    node.write_object(0x6081, 0, 2_000)
+    promise = node.write_object(0x6081, 0, 4_000)
+    begin = net.now + 1e-6
+    net.run(0.09)
+    assert set(speeds(net, since=begin)) == {2_000}
+    net.result(promise)
+    net.run(0.1)
+    assert speeds(net, since=begin)[-1] == 4_000
 
 
 def test_a_device_that_restarts_is_asked_again() -> None:

@@ -10,7 +10,7 @@ from ..config.drive_model import DriveConfig
 from ..config.drive_units import COARSE_SCALE
 from ..exceptions import SdoError
 from ..master.remote_node import RemoteNode
-from ..master.scheduler import Scheduler, Task
+from ..master.scheduler import Promise, Scheduler, Task
 from ..standard.drive import OperationMode
 from ..standard.objects import AXIS_OFFSET
 from .parameters import DriveParameters, ParameterReader, REFRESHED
@@ -54,7 +54,7 @@ class ParameterUpkeep:
         self._warn = warn
         self._asking: Task[None] | None = None
         self._outdated = False
-        node.sdo.on_written.append(self._object_written)
+        node.sdo.on_download.append(self._object_downloaded)
 
     def begin(self) -> None:
         """Ask a device that was booted."""
@@ -67,9 +67,15 @@ class ParameterUpkeep:
         if self._asking is not None:
             self._asking.cancel(SdoError(reason))
 
-    def _object_written(self, index: int, subindex: int, data: bytes) -> None:
-        """One of the objects may have been changed through this master, by whomever."""
-        if not self.known or index - self._offset not in REFRESHED:
+    def _object_downloaded(
+        self, index: int, subindex: int, data: bytes, end: Promise[None]
+    ) -> None:
+        """One of the objects may be changed through this master, by whomever."""
+        if index - self._offset in REFRESHED:
+            end.when_done(self._object_written)
+
+    def _object_written(self, end: Promise[None]) -> None:
+        if not self.known or end.error is not None:
             return
         self._outdated = True
         if self._asking is None or self._asking.done:

@@ -70,7 +70,7 @@ class RemoteObjects:
             send_last=is_controlword,
         )
         self.sdo = SdoClient(config.node_id, config.name, scheduler, send)
-        self.sdo.on_written.append(self._object_written)
+        self.sdo.on_download.append(self._object_downloaded)
         self.online = False
         self._scheduler = scheduler
         self._report = report
@@ -161,8 +161,13 @@ class RemoteObjects:
             return refused
         return self.sdo.write(index, subindex, data, self.config.sdo_timeout)
 
-    def _object_written(self, index: int, subindex: int, data: bytes) -> None:
-        """An SDO has changed an object: an RPDO that carries it must not change it back."""
+    def _object_downloaded(
+        self, index: int, subindex: int, data: bytes, end: Promise[None]
+    ) -> None:
+        """An SDO is about to change an object: an RPDO that carries it must not change it back.
+
+        The device may take the value long before its answer is here.
+        """
         mapped = self.image.mapped_output(index, subindex)
         if mapped is None or index in self.config.commanded_indices:
             return
@@ -170,8 +175,17 @@ class RemoteObjects:
             value = decode(mapped.data_type, data)
         except CodecError:
             return
-        if isinstance(value, (int, float)):
-            self.image.store(index, subindex, value)
+        before = self.image.commanded(index, subindex)
+        if before is None or not isinstance(value, (int, float)):
+            return
+        self.image.store(index, subindex, value)
+
+        def set_back(end: Promise[None]) -> None:
+            unchanged = self.image.commanded(index, subindex) == value  # by whoever publishes
+            if end.error is not None and unchanged:
+                self.image.store(index, subindex, before)
+
+        end.when_done(set_back)
 
     def _forget_objects(self, reason: str) -> None:
         """The device went away, or restarted: what it said and was told is no longer true."""

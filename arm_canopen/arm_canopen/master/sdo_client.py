@@ -28,6 +28,7 @@ from .sdo_channel import response, SdoChannel, SdoCounters
 
 T = TypeVar('T')
 Transfer: TypeAlias = Coroutine[Promise[Any], None, T]
+DownloadHook: TypeAlias = Callable[[int, int, bytes, Promise[None]], None]
 
 BLOCK_MIN = 256  # [byte] from which on a value is written in blocks
 SIZE_MAX = 16 << 20  # [byte] that a device may announce
@@ -39,7 +40,8 @@ class SdoClient:
 
     Attributes:
         node_id: The device.
-        on_written: Called with index, sub-index and data after each download that succeeded.
+        on_download: Called when the request of a download leaves, with index, sub-index, data and
+            the promise of its end.
     """
 
     def __init__(
@@ -47,7 +49,7 @@ class SdoClient:
     ) -> None:
         """Take the way to the bus; arguments as of :class:`SdoChannel`."""
         self.node_id = node_id
-        self.on_written: list[Callable[[int, int, bytes], None]] = []
+        self.on_download: list[DownloadHook] = []
         self._name = name
         self._scheduler = scheduler
         self._channel = SdoChannel(node_id, name, scheduler, send)
@@ -76,7 +78,7 @@ class SdoClient:
         Returns:
             Promise of the bytes; rejected with SdoAbortError or SdoTimeoutError.
         """
-        return self._enqueue(self._upload(index, subindex, timeout, block=block))
+        return self._enqueue(self._upload(index, subindex, timeout, block=block), Promise())
 
     def write(
         self, index: int, subindex: int, data: bytes, timeout: float, *, repeat: bool = False
@@ -93,9 +95,14 @@ class SdoClient:
         Returns:
             Promise of the end; rejected with SdoAbortError or SdoTimeoutError.
         """
-        promise = self._enqueue(self._download(index, subindex, data, timeout, repeat=repeat))
-        promise.when_done(lambda done: self._note_write(index, subindex, data, done))
-        return promise
+        promise: Promise[None] = Promise()
+
+        def leave() -> None:
+            for hook in self.on_download:
+                hook(index, subindex, data, promise)
+
+        download = self._download(index, subindex, data, timeout, leave, repeat=repeat)
+        return self._enqueue(download, promise)
 
     def cancel_all(self, reason: str) -> None:
         """Reject every transfer, because the device restarted or went away."""
@@ -115,13 +122,7 @@ class SdoClient:
         """Take an answer of the device."""
         self._channel.receive(frame.data)
 
-    def _note_write(self, index: int, subindex: int, data: bytes, done: Promise[None]) -> None:
-        if done.error is None:
-            for callback in self.on_written:
-                callback(index, subindex, data)
-
-    def _enqueue(self, transfer: Transfer[T]) -> Promise[T]:
-        promise: Promise[T] = Promise()
+    def _enqueue(self, transfer: Transfer[T], promise: Promise[T]) -> Promise[T]:
         self._queue.append((transfer, promise))
         if not self._busy:
             self._scheduler.background(self._work())
@@ -177,10 +178,18 @@ class SdoClient:
         return bytes(data)
 
     async def _download(
-        self, index: int, subindex: int, data: bytes, timeout: float, *, repeat: bool
+        self,
+        index: int,
+        subindex: int,
+        data: bytes,
+        timeout: float,
+        leave: Callable[[], None],
+        *,
+        repeat: bool,
     ) -> None:
         channel = self._channel
         await channel.begin(index, subindex, timeout)
+        leave()
         if len(data) >= BLOCK_MIN and self._has_blocks:
             try:
                 await write_blocks(channel, self._scheduler, data, timeout)
