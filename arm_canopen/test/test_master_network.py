@@ -20,7 +20,7 @@ from virtual_network import (
 from arm_canopen.can.frame import Frame
 from arm_canopen.exceptions import SdoAbortError, SdoTimeoutError
 from arm_canopen.master.events import EventKind, Severity
-from arm_canopen.master.network import UPDATE_SHARE
+from arm_canopen.master.network import NEVER, UPDATE_SHARE
 from arm_canopen.master.status import node_status
 from arm_canopen.standard.nmt import nmt_frame, NmtCommand, NmtState
 
@@ -374,12 +374,49 @@ def test_the_masters_heartbeat_comes_from_the_cycle() -> None:
     assert len(net.frames(HEARTBEAT + 1)) == before
 
 
+@pytest.mark.parametrize('broken', ['update', 'on_cycle'])
+def test_no_heartbeat_vouches_for_set_points_that_nobody_updates(
+    broken: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """SYNC goes on, and devices that watch the master find it dead."""
+    net = network('a', heartbeat_producer=0.1)
+    net.boot()
+    net.allows_defects = True
+
+    def starve(now: float, period: float) -> None:
+        net.network.next_update = NEVER
+        if broken == 'on_cycle':
+            raise ZeroDivisionError
+
+    monkeypatch.setattr(net.network, broken, starve)
+    begin = net.now
+    net.run(1.0)
+    assert len(net.frames(0x080, since=begin)) == pytest.approx(1.0 / PERIOD, abs=2)
+    assert net.frames(HEARTBEAT + 1, since=begin) == []
+
+
+def test_feedback_of_an_overdue_update_is_stamped_with_the_sync_that_it_answered() -> None:
+    """The one before, as the answers to the new one have not come yet."""
+    net = network('a')
+    net.boot()
+    stamps: list[float] = []
+    net.network.on_feedback = stamps.append
+    net.run_until(lambda: net.network.next_update == NEVER)
+    first = net.now + PERIOD
+    for time in (first, first + PERIOD):
+        net.network.sync()
+        net.network.cycle(time, PERIOD)
+    net.network.update(first + PERIOD, PERIOD)
+    assert stamps == [first]
+
+
 def test_heartbeats_do_not_crowd_after_a_pause() -> None:
     """A cycle that comes late sends one heartbeat, and the next a period later."""
     net = network(heartbeat_producer=0.1)
     net.network.start(net.now)
     for moment in (0.0, 0.1, 0.47, 0.48, 0.49, 0.56, 0.57, 0.58):
         net.network.cycle(net.now + moment, PERIOD)
+        net.network.update(net.now + moment, PERIOD)
     assert len(net.frames(HEARTBEAT + 1)) == 4
 
 

@@ -9,6 +9,7 @@ from concurrent.futures import Future
 from pathlib import Path
 import threading
 import time
+from types import SimpleNamespace
 
 import pytest
 
@@ -17,6 +18,7 @@ from arm_canopen.can.virtual import VirtualBus, VirtualWire
 from arm_canopen.config.master_model import MasterConfig
 from arm_canopen.config.model import BusConfig
 from arm_canopen.exceptions import BusError
+from arm_canopen.master import runner
 from arm_canopen.master.network import Network
 from arm_canopen.master.runner import NetworkThread
 from arm_canopen.master.scheduler import Promise
@@ -111,6 +113,53 @@ def test_nobody_waits_for_a_thread_that_has_ended(bench: Bench) -> None:
         with pytest.raises(BusError, match='the CANopen master has ended'):
             future.result(PATIENCE)
     never.resolve(None)
+
+
+class SlowBus(VirtualBus):
+    """A bus in virtual time, on a computer that takes long for each look at it.
+
+    Attributes:
+        now: The time in [s].
+        look: What a look takes in [s].
+    """
+
+    def __init__(self, look: float) -> None:
+        """Start at no particular time."""
+        super().__init__('here', VirtualWire())
+        self.now = 100.0  # [s]
+        self.look = look
+
+    def receive(self, timeout: float) -> list[Frame]:
+        """Let the time pass."""
+        self.now += timeout + self.look
+        return super().receive(0.0)
+
+
+@pytest.mark.parametrize('look', [0.1, 0.6, 1.1, 3.3])  # of the period
+def test_each_cycle_that_begins_late_updates_the_set_points(
+    look: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """However late: where SYNC goes on, so do the drives and their motion."""
+    period = 0.01
+    bus = SlowBus(look * period)
+    monkeypatch.setattr(runner, 'time', SimpleNamespace(monotonic=lambda: bus.now))
+    master = MasterConfig(1, sync_period=period, cycle_period=period)
+    done = threading.Event()
+    order: list[str] = []
+
+    def send(frame: Frame) -> None:
+        if frame.can_id == CobId.SYNC:
+            order.append('sync')
+        if len(order) > 40:
+            done.set()
+
+    network = Network(BusConfig(Path('bus.yml'), master, ()), send, lambda event: None)
+    network.on_cycle = lambda now, period: order.append('update')
+    thread = NetworkThread(bus, network)
+    thread.start()
+    assert done.wait(PATIENCE)
+    thread.stop()
+    assert order[:40] == ['sync', 'update'] * 20
 
 
 def test_published_jitter_is_that_of_sync_on_the_bus() -> None:

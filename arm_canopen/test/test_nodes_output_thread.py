@@ -56,9 +56,13 @@ class Slow:
         self.thread.start()
         assert held_up.wait(DEADLINE)
 
+    def release(self) -> None:
+        """Let it work again."""
+        self._gate.set()
+
     def go_on(self) -> None:
         """Let it work off everything, and end it."""
-        self._gate.set()
+        self.release()
         self.thread.stop()
 
 
@@ -82,6 +86,28 @@ def test_streams_do_not_grow_while_ros_is_slow(slow: Slow) -> None:
     left_out = 20 * WAITING_MAX * STREAMS - len(slow.done)
     assert len(slow.log.warnings) == 1
     assert slow.log.warnings[0].startswith(f'{left_out} messages were left out')
+
+
+def test_a_stream_never_goes_back(slow: Slow) -> None:
+    """Where the queue empties and fills again while the newest waits, nothing overtakes it."""
+    reached, gate = threading.Event(), threading.Event()
+
+    def hold_up_again() -> None:
+        reached.set()
+        gate.wait(DEADLINE)
+
+    slow.thread.post(lambda: None)
+    slow.thread.post(hold_up_again)
+    for _ in range(WAITING_MAX - 2):
+        slow.thread.post(lambda: None)
+    slow.thread.post_stream('stream', partial(slow.done.append, 1))
+    slow.release()
+    assert reached.wait(DEADLINE)
+    slow.thread.post_stream('stream', partial(slow.done.append, 2))
+    slow.thread.post_stream('stream', partial(slow.done.append, 3))
+    gate.set()
+    slow.go_on()
+    assert slow.done in ([3], [1, 2, 3])
 
 
 def test_answers_are_never_left_out(slow: Slow) -> None:

@@ -174,25 +174,29 @@ class Network:
         overdue = self.next_update < NEVER
         self.next_update = now
         if self._syncs:
-            self._begin_round(now)
-            if self._sync.pending and not overdue:
-                self.next_update = now + UPDATE_SHARE * period
+            self._sync.start(now)
+            self._contain_each(lambda node: node.expect_answers())
+            self._feedback_due = True
+            if not overdue:  # what an overdue update takes has answered the SYNC before
+                self._sync_time = now
+                if self._sync.pending:
+                    self.next_update = now + UPDATE_SHARE * period
         self.advance(now)
-        self._contain(partial(self._heartbeat.advance, now, self.state))
         self._contain(partial(self._time.advance, now))
 
     def update(self, now: float, period: float) -> None:
         """Run drives and motion sources, and send the RPDOs that the next SYNC makes valid.
 
         Due at :attr:`next_update`: when all TPDOs of the SYNC have come, or half a period after
-        it without those that are missing.
+        it without those that are missing. The heartbeat leaves from here, so that devices stop by
+        themselves when nobody updates their set-points.
 
         Args:
             now: Steady time of the cycle in [s].
             period: Time to the next cycle in [s].
         """
         self.next_update = NEVER
-        self._contain(partial(self.on_cycle, now, period))
+        updated = self._contain(partial(self.on_cycle, now, period))
         if self.state is NmtState.OPERATIONAL:
             for node in self.nodes.values():
                 if node.online:
@@ -200,6 +204,8 @@ class Network:
         if self._feedback_due:
             self._feedback_due = False
             self._contain(partial(self.on_feedback, self._sync_time))
+        if updated:
+            self._contain(partial(self._heartbeat.advance, now, self.state))
 
     @property
     def _syncs(self) -> bool:
@@ -217,12 +223,18 @@ class Network:
             except Exception as error:  # noqa: BLE001, PERF203
                 node.fail(error, output)
 
-    def _contain(self, step: Callable[[], object]) -> None:
-        """Let a step of the cycle that fails keep no other one from being done."""
+    def _contain(self, step: Callable[[], object]) -> bool:
+        """Let a step of the cycle that fails keep no other one from being done.
+
+        Returns:
+            Whether it has been done.
+        """
         try:
             step()
         except Exception as error:  # noqa: BLE001
             self._report_defect(error)
+            return False
+        return True
 
     def _contain_each(self, step: Callable[[RemoteNode], object]) -> None:
         """Do a step for each device; one for which it fails is stopped, the others go on."""
@@ -340,12 +352,6 @@ class Network:
         for node in self.nodes.values():
             if node_id in (ALL_NODES, node.config.node_id):
                 node.note_command(command)
-
-    def _begin_round(self, now: float) -> None:
-        self._sync.start(now)
-        self._contain_each(lambda node: node.expect_answers())
-        self._sync_time = now
-        self._feedback_due = True
 
     def _round_complete(self) -> None:
         """Update now, unless that is done already in this cycle."""

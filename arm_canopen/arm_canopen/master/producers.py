@@ -42,7 +42,7 @@ class Periodic:
 
 
 class HeartbeatProducer:
-    """The master's heartbeat, sent from the cycle, so that a hung cycle stops it."""
+    """The master's heartbeat, sent with the set-points, so that it ends when they do."""
 
     def __init__(self, node_id: int, period: float, send: Callable[[Frame], None]) -> None:
         """Take node id, period in [s] and the way to the bus."""

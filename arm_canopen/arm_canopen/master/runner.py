@@ -168,6 +168,7 @@ class NetworkThread:
             self._guarded(partial(self.network.note_pause, cycle.late))
         self._guarded(partial(self.network.cycle, now, self.period))
         self._take([frame for frame in frames if frame.timestamp >= now])
+        self._update_when_due(now)  # the deadline may have passed before anybody looks again
 
     def _serve_until(self, deadline: float) -> None:
         """Take frames, hand-overs and timers, and update, until the next SYNC is due."""
@@ -183,8 +184,11 @@ class NetworkThread:
             if now >= deadline:
                 return
             self._guarded(partial(network.advance, now))
-            if now >= network.next_update:
-                self._guarded(partial(network.update, self._cycle_time, self.period))
+            self._update_when_due(now)
+
+    def _update_when_due(self, now: float) -> None:
+        if now >= self.network.next_update:
+            self._guarded(partial(self.network.update, self._cycle_time, self.period))
 
     def _receive(self, timeout: float) -> list[Frame]:
         try:

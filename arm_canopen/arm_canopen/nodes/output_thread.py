@@ -70,15 +70,15 @@ class OutputThread:
             key: The stream.
             work: The function.
         """
-        if self._queue.qsize() < WAITING_MAX:
-            self._queue.put(work)
-            return
         with self._lock:
             waits = key in self._newest
-            self._newest[key] = work
+            if not waits and self._queue.qsize() < WAITING_MAX:
+                self._queue.put(work)
+                return
+            self._newest[key] = work  # also when there is room again: nothing overtakes it
             self._left_out += waits
-        if not waits:
-            self._queue.put(partial(self._run_newest, key))
+            if not waits:
+                self._queue.put(partial(self._run_newest, key))
 
     def _run_newest(self, key: Hashable) -> None:
         with self._lock:
