@@ -293,6 +293,23 @@ def test_axis_without_a_range_is_at_rest() -> None:
 
 
 @pytest.mark.parametrize(
+    ('axes', 'at_stops'),
+    [
+        ({}, True),
+        ({Axis.LEFT_Y: 1.0}, True),
+        ({Axis.LEFT_Y: 0.5}, False),
+        ({Axis.LEFT_X: 0.7, Axis.LEFT_Y: -0.7}, True),
+        ({Axis.RIGHT_X: -1.0, Axis.LEFT_Y: 0.3}, False),
+        ({Axis.RIGHT_TRIGGER: 1.0, Axis.DPAD_X: 1.0}, True),
+        ({Axis.RIGHT_TRIGGER: 0.6}, False),
+    ],
+)
+def test_a_stick_may_rest_at_its_end(axes: dict[Axis, float], at_stops: bool) -> None:
+    """There, at the rim, and in the middle, a living hand changes nothing."""
+    assert GamepadState(axes).at_stops is at_stops
+
+
+@pytest.mark.parametrize(
     ('pressed', 'grip'),
     [
         ((), Grip.RELEASED),

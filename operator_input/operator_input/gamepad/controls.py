@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
+import math
 
 
 class Axis(Enum):
@@ -47,6 +48,11 @@ class Button(Enum):
     RIGHT_STICK = 'right_stick'
 
 
+AT_STOP = 0.95  # way of a stick or trigger at which it may lean against its end
+STICKS = (Axis.LEFT_X, Axis.LEFT_Y), (Axis.RIGHT_X, Axis.RIGHT_Y)
+TRIGGERS = Axis.LEFT_TRIGGER, Axis.RIGHT_TRIGGER
+
+
 @dataclass(frozen=True, slots=True)
 class GamepadState:
     """Where everything is at one moment.
@@ -69,6 +75,18 @@ class GamepadState:
             axis: Which.
         """
         return self.axes.get(axis, 0.0)
+
+    @property
+    def at_stops(self) -> bool:
+        """Whether every stick and trigger is in its middle or at its end.
+
+        There a living hand need not change anything; between, it trembles.
+        """
+        ways = [
+            *(math.hypot(self.axis(x), self.axis(y)) for x, y in STICKS),
+            *(self.axis(trigger) for trigger in TRIGGERS),
+        ]
+        return all(way == 0.0 or way >= AT_STOP for way in ways)
 
     def pressed_since(self, before: GamepadState) -> frozenset[Button]:
         """Return the buttons that went down.

@@ -36,11 +36,14 @@ class Deadman:
         turbo: Held too, or alone: fast; None for no such button.
         timeout: Time without any change of the gamepad [s] after which a motion ends: receivers of
             wireless ones repeat the last state when the pad is out of reach or its battery empty.
+        stop_timeout: The same while sticks and triggers lean against their ends or rest, where a
+            pad in a hand has nothing to report either [s].
     """
 
     enable: Button | None = Button.LEFT_SHOULDER
     turbo: Button | None = Button.RIGHT_SHOULDER
     timeout: float = 3.0
+    stop_timeout: float = 10.0
 
     def grip(self, state: GamepadState) -> Grip:
         """Say what the person allows.
@@ -53,6 +56,10 @@ class Deadman:
         if self.enable is None or is_pressed(self.enable, state):
             return Grip.HELD
         return Grip.RELEASED
+
+    def patience(self, state: GamepadState) -> float:
+        """Return for how long a gamepad may report no change while it moves something [s]."""
+        return max(self.timeout, self.stop_timeout) if state.at_stops else self.timeout
 
 
 def is_pressed(button: Button, state: GamepadState) -> bool:

@@ -61,7 +61,7 @@ class GamepadSession(Session[Command]):
         self.step(time.monotonic())
         if self._deadman.expired and not self._had_expired:
             self.warn(
-                f'the gamepad has not changed for {self._deadman.timeout:g} s (deadman_timeout), '
+                f'the gamepad has not changed for {self._deadman.timeout:g} s, '
                 'so the motion ended; is it on, and in reach? Release and press the deadman'
             )
         self._had_expired = self._deadman.expired

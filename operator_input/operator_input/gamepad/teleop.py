@@ -17,8 +17,8 @@ from .deadman import Deadman, Grip
 class DeadmanTeleop(ABC, Generic[Command]):
     """Publishes what a gamepad wants; pure, time is handed in.
 
-    A motion ends when the gamepad has not changed for the time-out of the deadman, which has to be
-    released and pressed anew then.
+    A motion ends when the gamepad has not changed for longer than a hand holds it so still; the
+    deadman has to be released and pressed anew then.
 
     Attributes:
         state: What the gamepad said last.
@@ -46,8 +46,8 @@ class DeadmanTeleop(ABC, Generic[Command]):
 
     @property
     def timeout(self) -> float:
-        """Time without any change of the gamepad [s] after which a motion ends."""
-        return self._deadman.timeout
+        """Time without any change of the gamepad [s] after which a motion ends, as it is held."""
+        return self._deadman.patience(self.state)
 
     @abstractmethod
     def wanted(self) -> Command | None:

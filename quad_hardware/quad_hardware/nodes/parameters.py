@@ -136,7 +136,7 @@ def declare_parameters(node: Node) -> NodeSettings:
             'command_loss',
             LossReaction.LIE.value,
             {reaction.value: reaction for reaction in LossReaction},
-            'what the robot does when commands break off while its legs move',
+            'what the robot does when commands break off while its legs move or hang in the air',
         ),
         estimator=estimator,
         frames=_frames(read),

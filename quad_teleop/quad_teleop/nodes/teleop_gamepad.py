@@ -72,6 +72,12 @@ class TeleopGamepad(Node):
                 timeout=read.number(
                     'deadman_timeout', 3.0, (0.5, 3600.0), 'without any change of the gamepad [s]'
                 ),
+                stop_timeout=read.number(
+                    'deadman_stop_timeout',
+                    10.0,
+                    (0.5, 3600.0),
+                    'the same, sticks at their ends [s]',
+                ),
             ),
             declare_steps(self),
             declare_stream(self),
