@@ -495,16 +495,38 @@ def test_the_buffer_of_mode_7_is_emptied_first() -> None:
     assert last_write < first_seven
 
 
-def test_a_drive_that_refuses_mode_zero_is_never_sent_it() -> None:
-    """Quirk `no_mode_zero`: once it shows a mode, that is the one in its RPDO, after boot, too."""
-    dictionary = with_defaults(drive_dictionary(), {(0x6060, 0): 1, (0x6061, 0): 1})
-    config = full_drive(dictionary=dictionary.for_node(NODE_ID), scales={'quirks': 'no_mode_zero'})
-    net = VirtualNetwork(bus_config(config))
+@pytest.mark.parametrize('told', [0, 1, 3], ids='EDS default {}'.format)
+@pytest.mark.parametrize('mapped', [True, False], ids=['RPDO', 'SDO'])
+def test_a_drive_that_refuses_mode_zero_is_never_sent_it(told: int, mapped: bool) -> None:
+    """Quirk `no_mode_zero`: from boot on it is sent the mode that it has, not its EDS default."""
+    dictionary = with_defaults(drive_dictionary(), {(0x6060, 0): told}).for_node(NODE_ID)
+    config = full_drive(dictionary=dictionary, scales={'quirks': 'no_mode_zero'})
+    if not mapped:
+        first = replace(config.rpdos[0], mapping=config.rpdos[0].mapping[:1])
+        config = replace(config, rpdos=(first, *config.rpdos[1:]))
+    has = with_defaults(drive_dictionary(), {(0x6060, 0): 1, (0x6061, 0): 1}).for_node(NODE_ID)
+    net = VirtualNetwork(bus_config(config), dictionaries={JOINT: has})
     net.boot()
     net.run(0.2)
     net.do(JOINT, 'init')
     net.run(0.2)
-    assert {data[2] for data in net.frames(0x200 + NODE_ID)} == {1}
+    assert modes_sent(net, mapped=mapped) == ({1} if mapped else set())
+    net.select(JOINT, OperationMode.PROFILE_VELOCITY)
+    net.power_off(JOINT)
+    net.run(1.0)
+    begin = net.now
+    net.power_on(JOINT)
+    net.run_until(net.all_ready)
+    net.run(0.2)
+    assert modes_sent(net, mapped=mapped, since=begin) == ({1} if mapped else set())
+
+
+def modes_sent(net: VirtualNetwork, *, mapped: bool, since: float = 0.0) -> set[int]:
+    """Return the values of 0x6060 that the drive was sent, by RPDO or by SDO."""
+    if mapped:
+        return {data[2] for data in net.frames(0x200 + NODE_ID, since=since)}
+    requests = net.frames(0x600 + NODE_ID, since=since)
+    return {data[4] for data in requests if data[:3] == b'\x2f\x60\x60'}
 
 
 @pytest.mark.parametrize('every', [1, 2, 3, 4])

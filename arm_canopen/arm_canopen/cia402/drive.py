@@ -249,7 +249,7 @@ class Drive(ModedDrive):
         number = int(self._mode_shown.number)
         if number or not self._quirks.no_mode_zero:
             self.objects.mode.write(number)
-        elif self.objects.mode_display:
+        elif self.objects.mode_display and not self.objects.mode.by_sdo:
             self.objects.mode.write(self.objects.mode_display)  # keeps the mode that it has
 
     def _take_over(self) -> None:

@@ -8,7 +8,7 @@ from contextlib import suppress
 
 from ..exceptions import BootError, CodecError, SdoAbortError, SdoError
 from ..standard.datatypes import decode
-from ..standard.objects import AXIS_OFFSET, OFFSETS
+from ..standard.objects import AXIS_OFFSET, Index, OFFSETS
 from ..standard.pdo import MappedObject, Number
 from .process_image import Output
 from .remote_node import RemoteNode
@@ -38,8 +38,8 @@ async def preset_outputs(node: RemoteNode) -> None:
 async def read_outputs(node: RemoteNode, timeout: float) -> None:
     """Let each RPDO of a device that was configured carry what the device has.
 
-    What its driver commands is left to the driver. What cannot be read is taken from bus.yml or
-    the EDS.
+    What its driver commands is left to the driver, except for the mode of operation: the drive may
+    be one that must not be sent mode 0. What cannot be read is taken from bus.yml or the EDS.
 
     Args:
         node: The device.
@@ -61,6 +61,8 @@ async def read_outputs(node: RemoteNode, timeout: float) -> None:
 def _is_led(node: RemoteNode, index: int) -> bool:
     """Tell whether the driver of a drive says what an object carries."""
     first_axis = index - (index - AXES_START) // AXIS_OFFSET * AXIS_OFFSET
+    if first_axis == Index.MODE_OF_OPERATION:
+        return False
     offset = node.config.is_drive and first_axis in OFFSETS
     return offset or index in node.config.commanded_indices
 
