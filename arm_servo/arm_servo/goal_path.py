@@ -24,7 +24,7 @@ OVER = 1.02
 """How far the speed of a segment may exceed a limit; it is walked slower then."""
 
 LONGER = (1.1, 0.5)
-"""Share, and time in [s], by which a path may take longer than asked.
+"""Share, and time in [s], by which a path may take longer than its last time_from_start.
 
 As much as MoveIt waits for by default: allowed_execution_duration_scaling,
 allowed_goal_duration_margin.
@@ -92,19 +92,21 @@ def build_path(
     answer = _tried(points, limits, state)
     if isinstance(answer, GoalPath):
         return answer
+    if points.asked == 0.0:
+        raise refuse(f'{answer.reason}; give the trajectory a time_from_start')
     factor = _sufficient(points, limits, state, answer.factor)
     raise refuse(f'{answer.reason}; give the trajectory {factor:.2f} times the time')
 
 
 def _tried(points: Points, limits: JointLimits, state: MotionState) -> GoalPath | _Haste:
     """Return the path through points, or why there is too little time for it."""
-    answer = _walkable(points, 0.0, limits, state)
+    answer = _walkable(points, limits, state)
     if isinstance(answer, GoalPath) or points.times[0] == 0.0:
         return answer
     for share in APPROACHES:  # only the way from the present motion to the first point is longer
         more = share * (float(points.times[0]) + LEAST)
         try:
-            later = _walkable(points.delayed(more), more, limits, state)
+            later = _walkable(points.delayed(more), limits, state)
         except GoalError:  # it would swing out beyond a limit
             return answer
         if isinstance(later, GoalPath):
@@ -112,10 +114,8 @@ def _tried(points: Points, limits: JointLimits, state: MotionState) -> GoalPath 
     return answer
 
 
-def _walkable(
-    points: Points, delay: float, limits: JointLimits, state: MotionState
-) -> GoalPath | _Haste:
-    """Return the path through points that were delayed, or why there is too little time."""
+def _walkable(points: Points, limits: JointLimits, state: MotionState) -> GoalPath | _Haste:
+    """Return the path through points, or why there is too little time."""
     path = _given(points, limits, state)
     demand = Timing(path, limits).fastest
     if demand.share > OVER:
@@ -125,10 +125,10 @@ def _walkable(
     stretched, demand = timing.stretched(), timing.plainest
     if stretched is None:
         return _Haste(_words(demand, limits), timing.demand.share)
-    most = LONGER[0] * (path.duration - delay) + LONGER[1]
+    most = LONGER[0] * points.asked + LONGER[1]
     if stretched.duration > most:
         return _Haste(_words(demand, limits), stretched.duration / most)
-    late = stretched.duration - path.duration + delay
+    late = stretched.duration - points.asked
     if late < 0.01:
         return GoalPath(stretched, '')
     cause = f'{QUANTITIES[demand.quantity][1]} of {limits.names[demand.joint]}'

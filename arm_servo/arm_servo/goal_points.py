@@ -28,12 +28,16 @@ NEAREST = 0.05
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Points:
-    """A checked trajectory in the arm's order: times (k), the rest (k, n) or None."""
+    """A checked trajectory in the arm's order: times (k), the rest (k, n) or None.
+
+    ``asked`` is the time_from_start of its last point in [s], which delays do not change.
+    """
 
     times: Array
     positions: Array
     velocities: Array | None
     accelerations: Array | None
+    asked: float
 
     def at(self, place: int) -> PathPoint:
         """Return the place that a point is; at rest where it does not say."""
@@ -55,6 +59,7 @@ class Points:
             self.positions,
             None if self.velocities is None else self.velocities / factor,
             None if self.accelerations is None else self.accelerations / factor**2,
+            self.asked * factor,
         )
 
     def delayed(self, by: float) -> Points:
@@ -128,6 +133,7 @@ def _ordered(
         _filled([p.accelerations for p in goal.points], places, still)
         if has_accelerations
         else None,
+        float(times[-1]),
     )
 
 
@@ -207,6 +213,7 @@ def _upcoming(points: Points, age: float) -> Points:
         points.positions[left],
         None if points.velocities is None else points.velocities[left],
         None if points.accelerations is None else points.accelerations[left],
+        float(times[-1]),
     )
 
 
@@ -215,7 +222,7 @@ def _by_the_short_way(points: Points, limits: JointLimits, state: MotionState) -
     turn = 2 * math.pi
     turns = np.round((state.position - points.positions[0]) / turn) * turn
     shifted = points.positions + np.where(limits.continuous, turns, 0.0)
-    return Points(points.times, shifted, points.velocities, points.accelerations)
+    return replace(points, positions=shifted)
 
 
 def _check_span(positions: Array, limits: JointLimits, place: str) -> None:

@@ -112,7 +112,9 @@ def test_time_optimal_plans_are_followed_exactly(
     goal = time_optimal(limits, begin, end, kind, step)
     if kind == 'p':  # corners at full speed are more than joints can do
         goal = slowed(goal, 2.0)
-    execution = core.follow(goal)
+    assume(not refusal(core, goal))  # so short that the jerk alone takes longer than clients wait
+    execution = core.execution
+    assert execution is not None
     states, off = follow(core, execution)
     assert execution.ending is not None
     assert execution.ending.code is GoalCode.SUCCESSFUL
@@ -293,3 +295,34 @@ def test_set_points_that_leave_the_path_end_the_trajectory() -> None:
     assert execution.ending is not None
     assert execution.ending.code is GoalCode.PATH_TOLERANCE_VIOLATED
     assert re.search(r'prbt_joint_\d: the set-point is \+0\.02', execution.ending.reason)
+
+
+@pytest.mark.parametrize('name', ROBOTS)
+@settings(max_examples=8, deadline=None)
+@given(
+    seed=st.integers(0, 10**6),
+    time=st.floats(0.1, 1.0),
+    count=st.integers(1, 4),
+    begun=st.sampled_from([0.0, 0.0, 0.07]),
+)
+def test_what_is_late_counts_from_the_last_time_from_start(
+    name: str, seed: int, time: float, count: int, begun: float
+) -> None:
+    """As a client's monitor counts: at most 1.1 times that and 0.5 s, and the words say it."""
+    rng, limits, core = np.random.default_rng(seed), robot(name).limits, core_of(name)
+    rows = ready(name) + rng.uniform(-0.4, 0.4, (count, len(limits)))
+    rows = np.clip(rows, limits.lower, limits.upper)
+    points = [
+        GoalPoint(begun + time * (number + 1), tuple(row)) for number, row in enumerate(rows)
+    ]
+    goal = TrajectoryGoal(limits.names, points, age=begun)
+    asked = points[-1].time - begun
+    assume(not refusal(core, goal))
+    execution = core.execution
+    assert execution is not None
+    assert execution.duration <= 1.1 * asked + 0.5 + 1e-9
+    follow(core, execution)
+    assert execution.ending is not None
+    found = re.search(r'(\S+) s later than asked', execution.ending.reason)
+    told = float(found[1]) if found else 0.0
+    assert told == pytest.approx(execution.duration - asked, abs=0.011)
