@@ -9,6 +9,7 @@ first joint, 50 times a second; ``watch`` prints "moving" and "still" as /joint_
 from __future__ import annotations
 
 import json
+import math
 import sys
 
 from control_msgs.msg import JointJog
@@ -18,7 +19,9 @@ from rclpy.time import Time
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
-MOVING = 0.02  # [rad/s]
+JOINT = 'panda_joint1'
+WAY = 0.03  # [rad] three tenths of a second of the jog
+REST = 1.0  # [s] without going so far
 
 
 def call(node: Node, service: str, seconds: float) -> None:
@@ -39,7 +42,7 @@ def jog(node: Node) -> None:
     publisher = node.create_publisher(JointJog, 'servo_node/delta_joint_cmds', 10)
 
     def publish() -> None:
-        message = JointJog(joint_names=['panda_joint1'], velocities=[0.1])
+        message = JointJog(joint_names=[JOINT], velocities=[0.1])
         message.header.stamp = node.get_clock().now().to_msg()
         publisher.publish(message)
 
@@ -48,15 +51,24 @@ def jog(node: Node) -> None:
 
 
 def watch(node: Node) -> None:
-    """Print each change between motion and rest, with the time on the system clock [s]."""
-    last: list[str] = []
+    """Print each change between motion and rest, with the time on the system clock [s].
+
+    A single command that comes late makes no motion: an arm that is jogged goes on.
+    """
+    place, since = math.nan, 0.0  # [rad], [s] where the first joint was when it last moved
+    last = ''
 
     def take(message: JointState) -> None:
-        state = 'moving' if max(map(abs, message.velocity)) > MOVING else 'still'
-        if last != [state]:
-            last[:] = [state]
-            stamp = Time.from_msg(message.header.stamp).nanoseconds * 1e-9
-            sys.stdout.write(f'{state} {stamp:.3f}\n')
+        nonlocal place, since, last
+        now = Time.from_msg(message.header.stamp).nanoseconds * 1e-9
+        position = message.position[message.name.index(JOINT)]
+        moved = abs(position - place) > WAY
+        if moved or math.isnan(place):
+            place, since = position, now
+        state = 'moving' if moved else 'still' if now - since > REST else last
+        if state != last:
+            last = state
+            sys.stdout.write(f'{state} {now:.3f}\n')
             sys.stdout.flush()
 
     node.create_subscription(JointState, 'joint_states', take, 10)
