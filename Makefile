@@ -14,8 +14,10 @@ ARGS ?=
 
 WORKSPACE = cd tools && $(or $(PYTHON),python3) -m workspace $(if $(PYTHON),--python $(PYTHON))
 IN_ENVIRONMENT = bash -c '. "$(CURDIR)/env.sh" && exec "$$@"' environment
+# some containers set PYTHONDONTWRITEBYTECODE: every worker and process would compile all that it imports
+PYTEST = $(IN_ENVIRONMENT) env -u PYTHONDONTWRITEBYTECODE python -m pytest -n auto --dist loadgroup
 
-.PHONY: help demo demo-arm demo-quad test build lint bench chaos soak setup pins clean distclean
+.PHONY: help demo demo-arm demo-quad test check build lint bench chaos soak setup pins clean distclean
 .DEFAULT_GOAL := help
 
 help:
@@ -23,6 +25,7 @@ help:
 	@echo 'make demo-arm   jog it and send it trajectories, with what was measured (ROBOT=gp110)'
 	@echo 'make demo-quad  watch a simulated quadruped walk (DURATION=20 ends it after that)'
 	@echo 'make test       build everything and run all tests'
+	@echo 'make check      lint, types, and the tests that take no time: between two edits'
 	@echo 'make build      build every package; then: source env.sh'
 	@echo 'make lint       ruff, its formatter, mypy'
 	@echo 'make bench      print the figures'
@@ -45,10 +48,13 @@ demo-arm: system
 	@$(WORKSPACE) build arm_motion_bringup
 	@$(IN_ENVIRONMENT) ros2 run arm_motion_bringup demo $(ROBOT) $(if $(DURATION),--duration $(DURATION))
 
-# some containers set PYTHONDONTWRITEBYTECODE: every worker and process would compile all that it imports
 test: system
 	@$(WORKSPACE) build --dev
-	@$(IN_ENVIRONMENT) env -u PYTHONDONTWRITEBYTECODE python -m pytest -n auto --dist loadgroup $(ARGS)
+	@$(PYTEST) $(ARGS)
+
+check: lint
+	@$(WORKSPACE) build --dev
+	@$(PYTEST) -q -m 'not scenario and not slow' $(ARGS)
 
 build: system
 	@$(WORKSPACE) build

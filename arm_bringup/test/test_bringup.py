@@ -15,6 +15,8 @@ import pytest
 from small_bringup import read_until, SmallWorkspace
 from small_processes import PATIENCE
 
+pytestmark = pytest.mark.slow
+
 PANDA = Path(__file__).parents[1] / 'robots' / 'panda'
 
 READY = {

@@ -20,6 +20,8 @@ from arm_canopen.master.events import Severity
 from arm_canopen.standard.datatypes import DataType
 from arm_canopen.standard.drive import DriveState, OperationMode
 
+pytestmark = pytest.mark.slow
+
 JOINTS = ('joint1', 'joint2', 'joint3')
 SPEED = 0.2  # [rad/s]
 

@@ -25,6 +25,8 @@ from arm_canopen.exceptions import DriveError
 from arm_canopen.master.events import Severity
 from arm_canopen.standard.drive import Controlword, DriveState, OperationMode, Statusword
 
+pytestmark = pytest.mark.slow
+
 JOINT = 'joint1'
 NODE_ID = 2
 STATUS_PDO = 0x180 + NODE_ID

@@ -33,6 +33,8 @@ from arm_canopen.standard.cob_id import CobId, rpdo_default
 from arm_canopen.standard.drive import OperationMode
 from arm_canopen.standard.pdo import PdoCodec, SYNCHRONOUS_MAX
 
+pytestmark = pytest.mark.slow
+
 JOINT, NODE_ID = 'joint1', 2
 CONTROLWORD, MODE, POSITION, VELOCITY, INTERPOLATION = 0x6040, 0x6060, 0x607A, 0x60FF, 0x60C1
 NEW_SET_POINT, HALT, ENABLED = 0x10, 0x100, 0x0F

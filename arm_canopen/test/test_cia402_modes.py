@@ -33,6 +33,8 @@ from arm_canopen.exceptions import DriveError
 from arm_canopen.master.events import Severity
 from arm_canopen.standard.drive import DriveState, OperationMode
 
+pytestmark = pytest.mark.slow
+
 JOINT = 'joint1'
 CLEAR = b'\xc4\x60\x06'  # 0x60C4:06 in an SDO
 NODE_ID = 2

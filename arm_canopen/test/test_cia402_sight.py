@@ -14,6 +14,8 @@ from arm_canopen import AxisFeedback, Refusal, RefusalCause
 from arm_canopen.exceptions import DriveError
 from arm_canopen.standard.drive import DriveState, OperationMode
 
+pytestmark = pytest.mark.slow
+
 JOINTS = ('joint1', 'joint2', 'joint3')
 BLIND = 'joint2'
 SPEED = 1.0  # [rad/s]

@@ -20,6 +20,8 @@ from arm_canopen.config import load_eds
 from arm_canopen.device.faults import BusFault, FaultInjection
 from arm_canopen.device.runner import DeviceRunner
 
+pytestmark = pytest.mark.slow
+
 BUS = """\
 master:
   node_id: 1

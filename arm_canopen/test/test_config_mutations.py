@@ -11,6 +11,8 @@ import pytest
 
 from arm_canopen.config import load_bus
 
+pytestmark = pytest.mark.slow
+
 SNIPPETS = (
     *('[', ']', '{', '}', ':', ' ', '    ', '- ', '*a', '&a ', '<<: *a', '!!int x', '? ', '|'),
     *('null', 'true', '-1', '0x', '08', '1:2', '.inf', '1e400', '9' * 90, '٣', '\t', '\x85', '~'),

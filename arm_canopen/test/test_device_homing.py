@@ -11,6 +11,8 @@ import pytest
 
 from arm_canopen.device.switches import Switches
 
+pytestmark = pytest.mark.slow
+
 REACHED, ATTAINED, ERROR = 0x400, 0x1000, 0x2000
 START, HALT = 0x10, 0x100
 

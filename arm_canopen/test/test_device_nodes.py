@@ -20,6 +20,8 @@ import pytest
 
 from arm_canopen.can import open_bus
 
+pytestmark = pytest.mark.slow
+
 rclpy = pytest.importorskip('rclpy')
 
 PACKAGE = Path(__file__).parents[1]

@@ -26,6 +26,8 @@ from arm_canopen.can import Frame, open_bus
 from arm_canopen.can.plugin import ArmCanopenBus
 from arm_canopen.device.runner import DeviceRunner
 
+pytestmark = pytest.mark.slow
+
 # python-canopen has no types
 make_node: Any = BaseNode402
 make_network: Any = canopen.Network

@@ -9,6 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 import pytest
 
+pytestmark = pytest.mark.slow
+
 NEW = ENABLE | 0x10
 IMMEDIATE = 0x20
 RELATIVE = 0x40

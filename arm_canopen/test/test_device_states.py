@@ -22,6 +22,8 @@ from arm_canopen.standard.dictionary import ObjectDictionary
 from arm_canopen.standard.drive import drive_state
 from arm_canopen.standard.drive import DriveState as State
 
+pytestmark = pytest.mark.slow
+
 NOT_READY, SOD, READY, ON, OE, QS, REACTION, FAULT = tuple(State)[1:]
 
 TO_STATE = {

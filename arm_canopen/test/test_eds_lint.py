@@ -17,6 +17,8 @@ import pytest
 from arm_canopen.cli.main import main
 from arm_canopen.config.eds_lint import EdsReport, lint_eds
 
+pytestmark = pytest.mark.slow
+
 REPOSITORY = Path(__file__).parents[2]
 OWN_FILES = sorted(
     path

@@ -11,6 +11,8 @@ import pytest
 
 from arm_canopen.config import load_bus, load_eds
 
+pytestmark = pytest.mark.slow
+
 SNIPPETS = (
     *('[', ']', '=', ';', '0x', '-', '+', '$NODEID+', '\n', '\r', '\0', '\xff', '٣', '9' * 60),
     *('[1A00sub1]', '[2000]', 'CompactSubObj=254', 'CompactSubObj=-1', 'ObjectType=0x8'),

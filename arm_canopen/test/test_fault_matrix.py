@@ -32,6 +32,8 @@ from arm_canopen.exceptions import DriveError, SdoError
 from arm_canopen.master.events import EventKind, Severity
 from arm_canopen.standard.drive import DriveState, OperationMode
 
+pytestmark = pytest.mark.slow
+
 FAULTY, WITNESS = 'joint1', 'joint2'
 NODE_ID = 2  # of the faulty one
 SPEED = 0.5  # [rad/s]

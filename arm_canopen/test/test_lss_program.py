@@ -21,6 +21,8 @@ from arm_canopen.config import load_eds
 from arm_canopen.device.runner import DeviceRunner
 from arm_canopen.standard.lss import LssState
 
+pytestmark = pytest.mark.slow
+
 PACKAGE = Path(__file__).parents[1]
 DEADLINE = 30.0  # [s]
 SERIAL = 0x100

@@ -24,6 +24,8 @@ from arm_canopen.master.network import NEVER, UPDATE_SHARE
 from arm_canopen.master.status import node_status
 from arm_canopen.standard.nmt import nmt_frame, NmtCommand, NmtState
 
+pytestmark = pytest.mark.slow
+
 SYNC, EMCY, HEARTBEAT = 0x080, 0x080, 0x700
 CONSUMER_TIME = 0.3  # [s] of the sample drives
 

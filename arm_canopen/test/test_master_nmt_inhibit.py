@@ -13,6 +13,8 @@ from arm_canopen.master.events import EventKind
 from arm_canopen.standard.cob_id import CobId
 from arm_canopen.standard.nmt import NmtCommand
 
+pytestmark = pytest.mark.slow
+
 NODE_IDS = range(2, 9)
 SDO_DOWNLOAD = 1  # command specifier of an initiated download (CiA 301, 7.2.4.3.3)
 

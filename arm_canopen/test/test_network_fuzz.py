@@ -13,6 +13,8 @@ from arm_canopen.can.frame import Frame
 from arm_canopen.standard.drive import DriveState, OperationMode
 from arm_canopen.standard.nmt import ALL_NODES, NmtCommand, NmtState
 
+pytestmark = pytest.mark.slow
+
 FRAMES = 50_000  # for each seed
 BURST = 100  # frames between two looks
 RECOVERY_TIME = 30.0  # [s] in which the master has booted the devices again

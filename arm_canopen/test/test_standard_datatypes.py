@@ -23,6 +23,8 @@ from arm_canopen.standard.datatypes import (
     Value,
 )
 
+pytestmark = pytest.mark.slow
+
 INTEGERS = [*SIGNED_BITS, *UNSIGNED_BITS]
 CTYPES_FORMATS = {
     DataType.INTEGER8: '<b',

@@ -20,6 +20,8 @@ from arm_canopen.standard.datatypes import (
 from arm_canopen.standard.objects import PDO_BITS_MAX
 from arm_canopen.standard.pdo import MappedObject, Number, PdoCodec
 
+pytestmark = pytest.mark.slow
+
 MAPPABLE = sorted(FIXED_BITS)
 
 

@@ -28,6 +28,8 @@ from arm_servo.requests import JogRequest
 from arm_servo.servo import PoseCommand
 from arm_servo.set_point import Source
 
+pytestmark = pytest.mark.slow
+
 SETTLED = 400
 """Cycles in which everything has come to rest."""
 

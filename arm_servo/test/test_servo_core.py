@@ -24,6 +24,8 @@ from arm_servo.otg import Generator
 from arm_servo.report import Cause
 from arm_servo.set_point import SetPoint, Source
 
+pytestmark = pytest.mark.slow
+
 Action = Callable[[MotionCore, float, np.random.Generator], object]
 
 

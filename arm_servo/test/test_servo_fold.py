@@ -13,6 +13,8 @@ from servo_robots import ready, robot, ROBOTS
 from arm_servo.core import MotionCore
 from arm_servo.report import Cause, MotionReport
 
+pytestmark = pytest.mark.slow
+
 # place of the elbow, and the angle at which the arm is straight
 ELBOW = {
     'panda': (3, -2.0 * math.atan2(0.0825, 0.35)),

@@ -19,6 +19,8 @@ from arm_servo.otg import MotionState
 from arm_servo.report import Cause, Limiter
 from arm_servo.servo import JointCommand, PoseCommand, TwistCommand
 
+pytestmark = pytest.mark.slow
+
 SPEED = np.array([0.1] * 3 + [0.3] * 3)  # [m/s], [rad/s]
 
 TWISTS = [sign * SPEED * axis for axis in np.eye(6) for sign in (1.0, -1.0)]

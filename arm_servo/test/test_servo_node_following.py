@@ -15,6 +15,8 @@ from arm_servo.exceptions import GoalCode
 from arm_servo.limits import JointLimits
 from arm_servo.nodes.following import FollowingLimits, FollowingWatch
 
+pytestmark = pytest.mark.slow
+
 
 def test_jogging_an_arm_that_stands_still_runs_no_further_than_the_limit() -> None:
     """Set-points stop a little ahead of the arm, smoothly, and the joint is named."""

@@ -9,12 +9,15 @@ from dataclasses import replace
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 import numpy as np
+import pytest
 from servo_commands import jog, move_by, twist
 from servo_drives import Drives, PERIOD
 
 from arm_servo.exceptions import ServoError
 from arm_servo.gateway import MOTIONS
 from arm_servo.goal import GoalPoint, TrajectoryGoal
+
+pytestmark = pytest.mark.slow
 
 NUDGES = st.lists(st.floats(-0.3, 0.3), min_size=7, max_size=7)
 TWISTS = st.lists(st.floats(-0.3, 0.3), min_size=6, max_size=6)

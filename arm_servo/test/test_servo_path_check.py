@@ -23,6 +23,8 @@ from arm_servo.path_check import PathCheck, STEP
 from arm_servo.requests import DisplacementRequest
 from arm_servo.set_point import Source
 
+pytestmark = pytest.mark.slow
+
 PERIOD = 0.01
 
 

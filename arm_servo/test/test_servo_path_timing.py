@@ -27,6 +27,8 @@ from arm_servo.path import linear, Path
 from arm_servo.path_rounding import rounded
 from arm_servo.path_timing import Timing
 
+pytestmark = pytest.mark.slow
+
 EXACT = 5e-4
 """What counts as on the path in [rad]: a cycle sees a step of the jerk as one."""
 

@@ -15,6 +15,8 @@ from arm_servo.core import MotionCore
 from arm_servo.exceptions import GoalError
 from arm_servo.goal import GoalPoint, TrajectoryGoal
 
+pytestmark = pytest.mark.slow
+
 PERIOD = 0.01
 CLEAR = 0.0045
 """Clearance of a stop in [m], and a little for sliding along."""

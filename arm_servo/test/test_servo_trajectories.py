@@ -25,6 +25,8 @@ from arm_servo.otg import MotionState
 from arm_servo.path import cubic, linear, Path, PathPoint, quintic
 from arm_servo.tolerances import tolerances
 
+pytestmark = pytest.mark.slow
+
 
 def core_of(name: str, execution: ExecutionSettings | None = None) -> MotionCore:
     """Return a core of a robot in its pose to start from."""

@@ -12,6 +12,8 @@ import sys
 from isolation import Isolation
 import pytest
 
+pytestmark = pytest.mark.slow
+
 PROGRAM = Path(__file__).with_name('runner_program.py')
 PATIENCE = 30.0  # [s]
 

@@ -14,6 +14,8 @@ import pytest
 from small_bringup import read_until, SmallWorkspace
 from small_processes import PATIENCE
 
+pytestmark = pytest.mark.slow
+
 READY = {
     ('quad_hardware', 'fake_xgo'): 'fake_xgo: lite at {--link} -> /dev/pts/7',
     ('quad_hardware', 'hardware_node'): '[INFO] [hardware_node]: running: {port}',

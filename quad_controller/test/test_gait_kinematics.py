@@ -18,6 +18,8 @@ from quad_controller.model.quadruped import quadruped
 from quad_controller.model.tree import link_poses
 from quad_gait_urdf import Build, urdf
 
+pytestmark = pytest.mark.slow
+
 BUILDS = {
     'xgo': Build(),
     'positive hips': Build(hip_sign=1),

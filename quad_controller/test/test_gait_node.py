@@ -32,6 +32,8 @@ from quad_msgs.srv import SetMode
 if TYPE_CHECKING:
     from isolation import Isolation
 
+pytestmark = pytest.mark.slow
+
 NODE = [sys.executable, '-m', 'quad_controller.nodes.controller_node', '--ros-args']
 ROBOT = quadruped(robot_urdf())
 PERIOD = 0.02  # [s]

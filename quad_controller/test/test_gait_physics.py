@@ -25,6 +25,8 @@ from quad_hardware.sim.physics import Robot
 from quad_hardware.sim.servo import ServoParameters
 from quad_hardware.sim.terrain import Terrain
 
+pytestmark = pytest.mark.slow
+
 LEVEL = math.radians(5.0)
 
 

@@ -28,6 +28,8 @@ from quad_gait_physics import MODEL, PhysicsRig
 from quad_gait_policies import FakeNetwork, metadata, STAND, write_policy
 from quad_gait_rig import ARM_ROBOT, ROBOT, tilted, UPRIGHT
 
+pytestmark = pytest.mark.slow
+
 SHIPPED = Path(__file__).parents[1] / 'policies' / 'trot_imitation.onnx'
 PERIOD = 0.02  # [s]
 STILL = JointSample(STAND, (0.0,) * 12)

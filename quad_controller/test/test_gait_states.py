@@ -24,6 +24,8 @@ from quad_controller.states.modes import MODES, State
 from quad_controller.states.parameters import StateParameters
 from quad_gait_rig import ARM_ROBOT, FOLDED, PERIOD, Rig, ROBOT, StillPolicy, tilted, UPRIGHT
 
+pytestmark = pytest.mark.slow
+
 STAND = GaitGenerator(ROBOT, GaitParameters()).stand_targets
 FORWARD = Velocity(0.1)
 

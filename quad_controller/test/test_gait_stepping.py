@@ -21,6 +21,8 @@ from quad_controller.gait.velocity import REST, Velocity
 from quad_controller.model.quadruped import quadruped
 from quad_gait_urdf import urdf
 
+pytestmark = pytest.mark.slow
+
 ROBOT = quadruped(urdf())
 NEUTRAL = ROBOT.footprint(0.085, [0.0] * 12)
 PERIOD = 0.02  # [s]

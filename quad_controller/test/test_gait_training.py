@@ -23,6 +23,8 @@ from quad_controller.policy.options import PolicyOptions
 from quad_controller.states.measurement import ImuSample, JointSample
 from quad_gait_physics import MODEL, PhysicsRig
 
+pytestmark = pytest.mark.slow
+
 
 class Lesson:
     """The teacher as a policy: what is imitated has to walk."""

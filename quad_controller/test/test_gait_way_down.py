@@ -20,6 +20,8 @@ from quad_controller.states.modes import State
 from quad_controller.states.parameters import StateParameters
 from quad_gait_rig import PERIOD, Rig, ROBOT, StillPolicy, tilted, UPRIGHT
 
+pytestmark = pytest.mark.slow
+
 STAND = GaitGenerator(ROBOT, GaitParameters()).stand_targets
 LYING = ROBOT.legs[0].hip[2] - StateParameters().lie_height  # [m] of the feet, below the body
 FORWARD = Velocity(0.1)

@@ -27,6 +27,8 @@ from tf2_msgs.msg import TFMessage
 from quad_description import movable_joints, Pose, pose_positions, robot_urdf, standing_height
 from quad_description.motion import sweep, SWEEP_DURATION
 
+pytestmark = pytest.mark.slow
+
 PACKAGE = Path(__file__).parents[1]
 JOINTS = movable_joints(robot_urdf('lite'))
 REST = pose_positions(Pose.STAND)

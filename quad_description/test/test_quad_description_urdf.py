@@ -28,6 +28,8 @@ from quad_description import (
 from quad_description.urdf_command import run
 from quad_kinematics import centre_of_mass, inertia, link_pose, mass, parse, rotation
 
+pytestmark = pytest.mark.slow
+
 SIDE = {'fl': 1, 'fr': -1, 'bl': 1, 'br': -1}
 BUILDS = [(preset, arm) for preset in PRESETS for arm in (False, True)]
 builds = pytest.mark.parametrize(('preset', 'arm'), BUILDS)

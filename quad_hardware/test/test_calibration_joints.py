@@ -30,6 +30,8 @@ from quad_hardware.joints import JointServo
 from quad_hardware.protocol import NEW, OLD, Protocol
 from quad_pty_peer import PtyPeer
 
+pytestmark = pytest.mark.slow
+
 KNEE = JointServo('fl_calf_joint', 11, lower=-1.134, upper=0.8727)
 
 

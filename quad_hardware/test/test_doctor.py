@@ -23,6 +23,8 @@ from quad_hardware.link import latency_timer, SerialPort
 from quad_hardware.protocol import OLD
 from quad_pty_peer import PtyPeer
 
+pytestmark = pytest.mark.slow
+
 URDF = robot_urdf('lite')
 NAMES = tuple(joint.name for joint in movable_joints(URDF))
 LINKS = [word.split('"')[1] for word in URDF.split('<link ')[1:]]

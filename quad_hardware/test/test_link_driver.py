@@ -20,6 +20,8 @@ from quad_hardware.link.old_dialect import OldDialect
 from quad_hardware.protocol import LEG_MOTORS, NEW, OLD
 from quad_pty_peer import PtyPeer
 
+pytestmark = pytest.mark.slow
+
 TIMEOUT = 15.0  # [s] for anything to happen
 LEGS = dict.fromkeys(LEG_MOTORS, 0.0)
 

@@ -14,6 +14,8 @@ import pytest
 from sim_old_client import OldClient
 from sim_serial import PATIENCE, serve, Served
 
+pytestmark = pytest.mark.slow
+
 # byte = 255 * (angle - low) / (high - low) of the lite's servos: calf, thigh, hip [deg]
 RANGES = ((-70.0, 50.0), (-70.0, 90.0), (-30.0, 30.0))
 

@@ -25,6 +25,8 @@ from quad_hardware.protocol import (
 )
 from quad_hardware.sim.board import LONGEST_LAG
 
+pytestmark = pytest.mark.slow
+
 KINEMATIC = ('--physics', 'none', '--noise', 'none')
 LIMITS = movable_joints(robot_urdf('lite'))
 QUESTION = {

@@ -17,6 +17,8 @@ import pytest
 from ros2_frontend.cli.arguments import positive_float, positive_int, unsigned_int
 from ros2_frontend.cli.commands import Command, COMMANDS, Group
 
+pytestmark = pytest.mark.slow
+
 EVERY_COMMAND = [
     (name, *verb)
     for name, command in COMMANDS.items()
