@@ -15,7 +15,7 @@ from virtual_network import (
     VirtualNetwork,
 )
 
-from arm_canopen.cia402.sequences import SHUTDOWN_MAX
+from arm_canopen.cia402.stop_sequence import SHUTDOWN_MAX
 from arm_canopen.config.model import NodeConfig
 from arm_canopen.exceptions import DriveError
 from arm_canopen.standard.drive import DriveState, OperationMode

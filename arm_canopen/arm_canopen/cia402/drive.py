@@ -5,19 +5,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import suppress
 
 from ..config.drive_model import DriveConfig
-from ..exceptions import CanopenError, CodecError, SdoError
+from ..exceptions import CanopenError, SdoError
 from ..master.events import Severity
 from ..master.process_image import Output
 from ..master.remote_node import RemoteNode
 from ..master.scheduler import Promise, Scheduler, Task
 from ..standard.drive import DriveState, mode_title, OperationMode, Statusword
-from ..standard.objects import Index
 from .cyclic_position import CyclicPosition, InterpolatedPosition
 from .feed_forward import FeedForward
-from .following_watch import FollowingWatch
+from .following_watch import Following, FollowingWatch, MARGIN_TIME
 from .moded_drive import ModedDrive
 from .modes import NO_BITS
 from .motion import AxisFeedback, Setpoint
@@ -25,10 +23,12 @@ from .observed_drive import FAULTY
 from .quirks import quirks_of
 from .refusal import Refusal, RefusalCause
 from .state_machine import Command, fault_reset, next_command
+from .stop_sequence import StopSequence
 from .target_limits import check_feed_forward
 
 FOLLOWS_COMMAND = int(Statusword.FOLLOWS_COMMAND)
-STOP_BY_SDO_TIME = 2.0  # [s] for a quick stop, before the power is taken all the same
+FOLLOWING_ERROR = int(Statusword.FOLLOWING_ERROR)
+POSITION_AGE_MAX = 0.25  # [s] of a position at which an axis may be held
 UNSEEN_STOP_TIME = 1.0  # [s] in which a motion source may lead a silent drive to rest on its path
 
 
@@ -43,6 +43,7 @@ class Drive(ModedDrive):
         period: Length of the last cycle in [s].
         interrupted: Mode in which it was enabled when its device was lost, None otherwise.
         feed_forward: What a motion source tells ahead.
+        stop: Takes it out of operation; while that runs, nothing else leads it.
         released: Called with the cause when a motion source loses the drive.
         on_ready: Called when state and parameters are known after each boot.
     """
@@ -65,7 +66,7 @@ class Drive(ModedDrive):
         self.interrupted: OperationMode | None = None
         self.feed_forward = FeedForward(self.objects, self.units)
         self._streamed = False
-        self._failure = ''
+        self.stop = StopSequence(self, scheduler)
         self._controlword = 0
         self._reset_began: float | None = None
         self._quirks = quirks_of(self.config.quirks)
@@ -154,6 +155,8 @@ class Drive(ModedDrive):
                 bits = self._step_mode(now, period)
             else:
                 bits = self._hold_without_target(edge=edge)
+        if self._commands_enabled and self.objects.controlword_muted and not self.stop.running:
+            raise CanopenError('the RPDO with its controlword is kept back, with another axis')
         self._send(command, bits)
 
     def fail(self, error: Exception, output: Output | None = None) -> None:
@@ -165,39 +168,28 @@ class Drive(ModedDrive):
             error: Why; one that the drive itself could not have caused is a defect.
             output: An RPDO of its device that cannot be sent.
         """
-        if self.state is DriveState.OPERATION_ENABLED:
-            self.goal = DriveState.QUICK_STOP_ACTIVE
-        elif self.goal is not None:
-            self.goal = DriveState.SWITCH_ON_DISABLED
-        unreachable = output is not None and self.objects.is_controlled_by(output)
+        text = str(error)
+        if not isinstance(error, CanopenError):
+            text = f'a defect in the CANopen master: {type(error).__name__}: {error}'
+        self._take_out(Refusal(RefusalCause.CYCLE_FAILED, text), text)
         try:
             self._send(self._command())
             self.feed_forward.end()
         except Exception:  # noqa: BLE001  # what keeps it from being led may keep this from it, too
-            unreachable = True
-        text = str(error)
-        if not isinstance(error, CanopenError):
-            text = f'a defect in the CANopen master: {type(error).__name__}: {error}'
-        if text != self._failure:
-            self._failure = text
-            self.released(Refusal(RefusalCause.CYCLE_FAILED, text))
-            self.report(Severity.ERROR, f'stopped: {text}')
-            if unreachable and self.node.online:
-                self._scheduler.background(self._stop_by_sdo())
+            self.stop.use_sdo()
+        if output is not None and self.objects.is_controlled_by(output):
+            self.stop.use_sdo()
 
-    async def _stop_by_sdo(self) -> None:
-        """Take the power from a drive to which no controlword can be sent by RPDO."""
-        place = self.objects.at(Index.CONTROLWORD)
-        try:
-            await self.node.write_object(place, 0, int(Command.QUICK_STOP))
-            with suppress(TimeoutError):
-                await self._scheduler.until(self._is_without_power, STOP_BY_SDO_TIME)
-            await self.node.write_object(place, 0, int(Command.DISABLE_VOLTAGE))
-        except (SdoError, CodecError) as error:
-            self.report(Severity.ERROR, f'cannot be stopped: {error}; cut its power')
-
-    def _is_without_power(self) -> bool:
-        return self.state not in (DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE)
+    def _take_out(self, refusal: Refusal, text: str) -> None:
+        """Stop and disable it, once until it is enabled again, whatever else goes wrong then."""
+        if self.goal is not None:
+            self.goal = DriveState.SWITCH_ON_DISABLED
+        if self.failure:
+            return
+        self.failure = text
+        self.stop.begin()
+        self.released(refusal)
+        self.report(Severity.ERROR, f'stopped: {text}')
 
     def resume(self, delivery: Promise[None]) -> None:
         """End a halt as soon as the drive has the new target, so that no old one revives.
@@ -289,7 +281,10 @@ class Drive(ModedDrive):
         mode = self.mode
         if not (mode.cyclic and self.accepts_targets):
             self._follows = False
-            self._following.clear()
+            if mode.cyclic and self.acts:
+                self._following.lose_sight()
+            else:
+                self._following.clear()
             return
         bit = bool(self.statusword & FOLLOWS_COMMAND)
         before, self._follows = self._follows, bit
@@ -303,19 +298,29 @@ class Drive(ModedDrive):
     def _watch_position(self, mode: CyclicPosition) -> None:
         setpoint = mode.setpoint
         position = self.units.position_commanded(self.objects.position or 0)
-        velocity = self.parameters.profile.velocity
-        if self._following.follows(self._scheduler.now, setpoint, position, velocity):
+        shown = mode.number is OperationMode.CYCLIC_POSITION and bool(
+            self.statusword & FOLLOWING_ERROR
+        )
+        now = self._scheduler.now
+        margin = MARGIN_TIME * self.parameters.profile.velocity
+        window = self.parameters.following_window or margin
+        following = self._following.judge(
+            now, setpoint, position, margin=min(margin, window), window=window, error=shown
+        )
+        if following is Following.FOLLOWS:
             return
         self._following.clear()
+        where = f'commanded to {setpoint:g}, it is at {position:g}'
+        refusal = Refusal(RefusalCause.NOT_FOLLOWING, where)
+        age = now - self.objects.position_timestamp
+        text = f'it does not follow its set-points ({where})'
+        if following is Following.LASTING_ERROR or age > POSITION_AGE_MAX:
+            self._take_out(refusal, f'{text}. Can it hold its load, and is the axis free?')
+            return
         self.hold()
         mode.preload(self._actual())  # so that it does not jump when set-points reach it again
-        where = f'commanded to {setpoint:g}, it is at {position:g}'
-        self.released(Refusal(RefusalCause.NOT_FOLLOWING, where))
-        self.report(
-            Severity.ERROR,
-            f'stopped: it does not follow its set-points ({where}). Do its RPDOs arrive, and is '
-            'the axis free?',
-        )
+        self.released(refusal)
+        self.report(Severity.ERROR, f'stopped: {text}. Do its RPDOs arrive, and is the axis free?')
 
     def _command(self) -> Command:
         if self.resetting and self.state is DriveState.FAULT:
@@ -323,14 +328,13 @@ class Drive(ModedDrive):
                 self._reset_began = self._scheduler.now
             return Command(fault_reset(self.state, self._scheduler.now - self._reset_began))
         self._reset_began = None
-        return (
-            Command.DISABLE_VOLTAGE if self.goal is None else next_command(self.state, self.goal)
-        )
+        goal = self.goal if self.stop.goal is None else self.stop.goal
+        return Command.DISABLE_VOLTAGE if goal is None else next_command(self.state, goal)
 
     def _state_changed(self, before: DriveState) -> None:
         left = before is DriveState.OPERATION_ENABLED
         if self.state is DriveState.OPERATION_ENABLED:
-            self._failure = ''
+            self.failure = ''
         if left:
             self.halt.release()
         if self.state in FAULTY and before not in FAULTY:
@@ -366,7 +370,8 @@ class Drive(ModedDrive):
         self._unseen_since = None
         self._following.clear()
         self.halt.release()
-        self.error = ''
+        self.stop.abandon(reason)
+        self.error = self.failure = ''
         self._lose_sight()
         self.mode = self._mode_shown = self._mode_led = self.modes[OperationMode.NO_MODE]
         cause = RefusalCause.OFFLINE

@@ -37,6 +37,11 @@ class DriveObjects:
         )
         self.controlword = node.writer(self.at(Index.CONTROLWORD))
         self.mode = node.writer(self.at(Index.MODE_OF_OPERATION))
+        self._controlling = [
+            output
+            for output in node.image.outputs
+            if any(mapped.index == self.at(Index.CONTROLWORD) for mapped in output.config.mapping)
+        ]
 
     def at(self, index: int) -> int:
         """Return the index of an object of the profile for this axis."""
@@ -54,8 +59,17 @@ class DriveObjects:
 
     def is_controlled_by(self, output: Output) -> bool:
         """Tell whether an RPDO carries the controlword of this axis."""
-        place = self.at(Index.CONTROLWORD)
-        return any(mapped.index == place for mapped in output.config.mapping)
+        return output in self._controlling
+
+    @property
+    def controlword_muted(self) -> bool:
+        """Whether an RPDO with the controlword of this axis is kept back."""
+        return any(output.muted for output in self._controlling)
+
+    def mute_controlword(self, *, muted: bool = True) -> None:
+        """Keep every RPDO back that carries the controlword of this axis, or send it again."""
+        for output in self._controlling:
+            output.muted = muted
 
     def fresh(self, now: float) -> bool:
         """Tell whether the state is known and young enough to act on, at a steady time in [s].
@@ -70,6 +84,11 @@ class DriveObjects:
     def timestamp(self) -> float:
         """Steady time of the oldest value of the state in [s]."""
         return min(source.timestamp for source in self._sources)
+
+    @property
+    def position_timestamp(self) -> float:
+        """Steady time of 0x6064 in [s]."""
+        return self._position.source.timestamp
 
     @property
     def statusword(self) -> int:

@@ -5,9 +5,21 @@
 from __future__ import annotations
 
 from collections import deque
+from enum import Enum
 
 WINDOW = 0.5  # [s] of set-points among which the position has to be
 MARGIN_TIME = 0.1  # [s] of the profile velocity by which it may be beside them
+LASTING = 1.0  # [s] of a following error after which the axis is taken out of operation
+MOVED_SHARE = 0.1  # share of the margin by which set-points have to move to count as a motion
+FOLLOWED_SHARE = 0.5  # share of the motion of the set-points that an axis makes at least
+
+
+class Following(Enum):
+    """What the positions of the last half second show."""
+
+    FOLLOWS = 'it follows'
+    LEFT_BEHIND = 'the set-points moved, and it did not'
+    LASTING_ERROR = 'it has been beside its set-points for too long'
 
 
 class FollowingWatch:
@@ -15,33 +27,72 @@ class FollowingWatch:
 
     A drive that has lost its RPDOs goes on to report that it follows: it compares itself with the
     last set-point that reached it. Its position is then left behind by the set-points, and would
-    jump to them when the RPDOs arrive again.
+    jump to them when the RPDOs arrive again. An axis that a load pulls away from set-points that
+    stand is another matter: a new set-point where it is would let the load pull it further.
     """
 
     def __init__(self) -> None:
         """Begin without set-points."""
-        self._setpoints: deque[tuple[float, float]] = deque()
+        self._samples: deque[tuple[float, float, float]] = deque()
+        self._beside_since: float | None = None
+        self._unseen_from: float | None = None  # set-point when the axis was seen last
 
     def clear(self) -> None:
         """Forget the set-points: the axis is not led by them any more."""
-        self._setpoints.clear()
+        self._samples.clear()
+        self._beside_since = self._unseen_from = None
 
-    def follows(self, now: float, setpoint: float, position: float, velocity: float) -> bool:
-        """Take the set-point of this cycle and tell whether the axis follows.
+    def lose_sight(self) -> None:
+        """The axis is led on, but its positions are too old to be judged."""
+        if self._samples:
+            setpoint = self._samples[0][1]  # positions count as too old after some time only
+            self.clear()
+            self._unseen_from = setpoint
+
+    def judge(
+        self,
+        now: float,
+        setpoint: float,
+        position: float,
+        *,
+        margin: float,
+        window: float,
+        error: bool,
+    ) -> Following:
+        """Take set-point and position of this cycle and judge whether the axis follows.
 
         Args:
             now: Steady time in [s].
             setpoint: Position commanded last in user units.
             position: Actual position in user units.
-            velocity: Profile velocity of the axis in user units per second.
+            margin: How far an axis that has stopped to move may be beside its set-points in user
+                units.
+            window: How far one that moves, or is pulled by a load, may lastingly be beside them
+                in user units; not below the margin.
+            error: The drive itself shows a following error.
         """
-        setpoints = self._setpoints
-        setpoints.append((now, setpoint))
-        while setpoints[0][0] < now - WINDOW:
-            setpoints.popleft()
-        margin = MARGIN_TIME * velocity
-        if abs(position - setpoint) <= margin:
-            return True
-        low = min(value for _, value in setpoints)
-        high = max(value for _, value in setpoints)
-        return low - margin <= position <= high + margin
+        samples, unseen_from = self._samples, self._unseen_from
+        self._unseen_from = None
+        samples.append((now, setpoint, position))
+        while samples[0][0] < now - WINDOW:
+            samples.popleft()
+        if not error and abs(position - setpoint) <= margin:
+            self._beside_since = None
+            return Following.FOLLOWS
+        if unseen_from is not None and abs(setpoint - unseen_from) > MOVED_SHARE * margin:
+            return Following.LEFT_BEHIND
+        setpoints = [sample[1] for sample in samples]
+        low, high = min(setpoints), max(setpoints)
+        beside = max(low - position, position - high)
+        positions = [sample[2] for sample in samples]
+        way = max(positions) - min(positions)
+        left = high - low > MOVED_SHARE * margin and way < FOLLOWED_SHARE * (high - low)
+        if left and (error or beside > margin):
+            return Following.LEFT_BEHIND
+        if not error and beside <= window:
+            self._beside_since = None
+            return Following.FOLLOWS
+        if self._beside_since is None:
+            self._beside_since = now
+        lasting = now - self._beside_since > LASTING
+        return Following.LASTING_ERROR if lasting else Following.FOLLOWS

@@ -23,6 +23,8 @@ from .units import clamp, INT16_MAX, INT32_MAX, Units
 from .velocity_estimate import VelocityEstimate
 
 FAULTY = (DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE)
+REST_SHARE = 0.01  # share of the profile velocity below which an axis counts as standing
+REST_MIN, REST_MAX = 0.002, 0.02  # [unit/s] between which that lies: noise, and what still moves
 
 
 class ObservedDrive:
@@ -39,6 +41,7 @@ class ObservedDrive:
         fresh: Its state was known in the last cycle, and young enough to act on.
         halt: What keeps it halted.
         error: 0x603F in words when it was faulted last, else empty.
+        failure: Why the master stopped it, until it is enabled again; else empty.
     """
 
     def __init__(self, node: RemoteNode, scheduler: Scheduler, config: DriveConfig) -> None:
@@ -59,6 +62,7 @@ class ObservedDrive:
         self.fresh = False
         self.halt = Halt()
         self.error = ''
+        self.failure = ''
         self._position = math.nan
         self._scheduler = scheduler
         self._upkeep = ParameterUpkeep(node, config, self.units, scheduler, self.warn)
@@ -102,6 +106,21 @@ class ObservedDrive:
         return max(abs(self.velocity), abs(self.rate))
 
     @property
+    def stands(self) -> bool:
+        """Whether the axis stands; a real encoder is never quite still.
+
+        Both what 0x606C tells and what the position shows have to be slow, and fresh.
+        """
+        rest = max(REST_MIN, min(REST_MAX, REST_SHARE * self.parameters.profile.velocity))
+        return self.fresh and self.speed <= rest
+
+    def ramp_time(self, longest: float) -> float:
+        """Return how long it brakes on its way out in [s], by the slower of its ramps."""
+        told = self.parameters
+        ramp = min(told.quick_stop_deceleration, told.profile.deceleration)
+        return min(longest, self.speed / ramp)
+
+    @property
     def effort(self) -> float:
         """Actual torque in user units."""
         return self.units.effort_from_device(self.objects.torque)
@@ -142,6 +161,8 @@ class ObservedDrive:
             parts.append('halted')
         if self.error:
             parts.append(f'error {self.error}')
+        if self.failure:
+            parts.append(f'the master stopped it: {self.failure}')
         if self.node.emergencies.last is not None:
             parts.append(f'EMCY {self.node.emergencies.last}')
         if self.node.left_operational and self.node.nmt_state is not None:

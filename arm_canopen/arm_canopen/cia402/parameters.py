@@ -19,6 +19,7 @@ READ_TIMEOUT = 0.5  # [s] nothing waits for these answers, so a slow device has 
 DEFAULT_VELOCITY = 0.5  # [unit/s] for drives without 0x6081: slow, but moving
 DEFAULT_ACCELERATION = 1.0  # [unit/s^2] for drives without 0x6083
 DEFAULT_PROFILE = ProfileLimits(DEFAULT_VELOCITY, DEFAULT_ACCELERATION, DEFAULT_ACCELERATION)
+NO_WINDOW = (0, 0xFFFF_FFFF)  # values of 0x6065 with which nothing is monitored
 DEFAULT_TORQUE_SLOPE_DEV = 1000.0  # [device units/s]: from 0 to the rated torque in a second
 
 REFRESHED = frozenset(
@@ -26,6 +27,7 @@ REFRESHED = frozenset(
         Index.HOMING_METHOD,
         Index.SOFTWARE_POSITION_LIMIT,
         Index.MAX_PROFILE_VELOCITY,
+        Index.FOLLOWING_ERROR_WINDOW,
         Index.MAX_TORQUE,
         Index.PROFILE_VELOCITY,
         Index.PROFILE_ACCELERATION,
@@ -47,6 +49,7 @@ class DriveParameters:
         position_limits: Software limits 0x607D in user units, lower first.
         speed_limit: 0x607F in user units per second.
         effort_limit: 0x6072 in user units.
+        following_window: 0x6065 in user units; None where nothing is monitored, too.
         profile: Limits for profiles of the master's own, from 0x6081, 0x6083 and 0x6084.
         quick_stop_deceleration: 0x6085 in user units per second squared.
         torque_slope: Greatest change of a torque that the master ramps, in user units per second,
@@ -61,6 +64,7 @@ class DriveParameters:
     position_limits: tuple[float, float] | None = None
     speed_limit: float | None = None
     effort_limit: float | None = None
+    following_window: float | None = None
     profile: ProfileLimits = DEFAULT_PROFILE
     quick_stop_deceleration: float = DEFAULT_ACCELERATION
     torque_slope: float = DEFAULT_TORQUE_SLOPE_DEV
@@ -104,6 +108,7 @@ class ParameterReader:
         units = self._units
         slope = await self._read(Index.TORQUE_SLOPE)
         effort = await self._read(Index.MAX_TORQUE)
+        window = await self._read(Index.FOLLOWING_ERROR_WINDOW)
         speed = await self._read(Index.MAX_PROFILE_VELOCITY)
         profile = await self._profile()
         quick_stop = await self._read(Index.QUICK_STOP_DECELERATION)
@@ -113,6 +118,7 @@ class ParameterReader:
             position_limits=await self._position_limits(),
             speed_limit=abs(units.velocity_commanded(speed)) if speed else None,
             effort_limit=abs(units.effort_commanded(effort)) if effort else None,
+            following_window=self._following_window(window),
             profile=profile,
             quick_stop_deceleration=self._in_units(quick_stop, profile.deceleration),
             torque_slope=abs(units.effort_commanded(slope or DEFAULT_TORQUE_SLOPE_DEV)),
@@ -133,6 +139,11 @@ class ParameterReader:
         convert = self._units.position_commanded  # as targets go, which they are limits of
         ends = sorted((convert(lower), convert(upper)))
         return ends[0], ends[1]
+
+    def _following_window(self, window: int | None) -> float | None:
+        if window is None or window in NO_WINDOW:
+            return None
+        return abs(window / self._units.position_raw(1.0))
 
     async def _profile(self) -> ProfileLimits:
         velocity = await self._read(Index.PROFILE_VELOCITY)

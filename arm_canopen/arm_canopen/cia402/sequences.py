@@ -16,18 +16,13 @@ from .modes import Mode
 from .observed_drive import FAULTY
 from .quirks import quirks_of
 from .refusal import Refusal, RefusalCause
+from .stop_sequence import STOP_TIMEOUT
 from .target_limits import TORQUE_MODES
 
 BUFFER_CLEAR = 6  # sub-index of 0x60C4 (CiA 402-2, clause 12)
 BUFFER_EMPTY, BUFFER_OPEN = 0, 1
 BUFFER_ATTEMPTS = 4
 READY_TIMEOUT = 2.0  # [s] from operational to the first PDOs and parameters
-STOP_TIMEOUT = 2.0  # [s] to come to rest, beside the time of the ramp
-RAMP_MAX = 10.0  # [s] that a ramp may take on the way out; then the power goes all the same
-SHUTDOWN_MAX = STOP_TIMEOUT + (STOP_TIMEOUT + RAMP_MAX) + STOP_TIMEOUT
-"""Longest time of a shutdown in [s]: to begin the stop, to come to rest, to lose the power."""
-REST_SHARE = 0.01  # share of the profile velocity below which an axis counts as standing
-REST_MIN, REST_MAX = 0.002, 0.02  # [unit/s] between which that lies: noise, and what still moves
 SETTLE_CYCLES = 3  # of SYNC after which an answer shows what a command has done
 
 
@@ -52,10 +47,14 @@ class DriveSequences:
             to_stop: A drive whose state is not fresh is ready, too.
 
         Raises:
-            DriveError: It is offline, or does not tell them.
+            DriveError: It is offline, is just being stopped, or does not tell them.
         """
         drive = self.drive
         self._require_operational()
+        if drive.stop.running and not to_stop:
+            raise self.refused('is being stopped')
+        await drive.stop.ended()
+        drive.objects.mute_controlword(muted=False)  # what is commanded next goes by RPDO again
 
         def ready() -> bool:
             known = to_stop and drive.state is not DriveState.UNKNOWN
@@ -128,9 +127,7 @@ class DriveSequences:
         ramp = drive.speed / drive.parameters.profile.deceleration  # [s]
         drive.hold()
         await self.settle()
-        await self.until(
-            lambda: drive.mode.braked and self.is_slow(), timeout + ramp, 'standstill'
-        )
+        await self.until(lambda: drive.mode.braked and drive.stands, timeout + ramp, 'standstill')
 
     async def reset_fault(self) -> None:
         """Reset a fault if there is one."""
@@ -228,7 +225,8 @@ class DriveSequences:
         drive = self.drive
 
         def hopeless() -> bool:
-            return not drive.node.online or (drive.state in FAULTY and not drive.resetting)
+            faulted = drive.state in FAULTY and not drive.resetting
+            return not drive.node.online or faulted or drive.stop.running
 
         try:
             await self._scheduler.until(lambda: condition() or hopeless(), timeout)
@@ -237,38 +235,6 @@ class DriveSequences:
         if not condition():
             await drive.know_error()
             raise self.refused(f'did not reach {what}')
-
-    def ramp_time(self) -> float:
-        """Return how long the drive brakes on its way out in [s], by the slower of its ramps."""
-        told = self.drive.parameters
-        ramp = min(told.quick_stop_deceleration, told.profile.deceleration)
-        return min(RAMP_MAX, self.drive.speed / ramp)
-
-    async def settled(self, condition: Callable[[], bool], ramp: float = 0.0) -> None:
-        """Wait for a condition on the way out; there is nobody to raise an error to.
-
-        Args:
-            condition: What is waited for.
-            ramp: Time that the drive takes to brake in [s].
-        """
-        drive = self.drive
-
-        def settled() -> bool:
-            return condition() or drive.state in (*FAULTY, DriveState.UNKNOWN)
-
-        try:
-            await self._scheduler.until(settled, STOP_TIMEOUT + ramp)
-        except TimeoutError:
-            drive.report(Severity.ERROR, f'did not come to rest in time: {drive.describe()}')
-
-    def is_slow(self) -> bool:
-        """Whether the axis stands; a real encoder is never quite still.
-
-        Both what 0x606C tells and what the position shows have to be slow, and fresh.
-        """
-        drive = self.drive
-        rest = max(REST_MIN, min(REST_MAX, REST_SHARE * drive.parameters.profile.velocity))
-        return drive.fresh and drive.speed <= rest
 
     def require_no_fault(self) -> None:
         """Refuse to go on with a drive that is faulted."""

@@ -68,19 +68,11 @@ class StopCommands:
 
     async def shutdown(self) -> str:
         """Bring the drive to rest and take its power away; never raises."""
-        drive, steps = self.drive, self._steps
+        drive = self.drive
         drive.interrupted = None
         drive.released(Refusal(RefusalCause.SHUTDOWN))
-        ramp = steps.ramp_time()
-        if drive.state is DriveState.OPERATION_ENABLED:
-            drive.goal = DriveState.QUICK_STOP_ACTIVE
-            await steps.settled(lambda: drive.state is not DriveState.OPERATION_ENABLED)
-        # option codes 5 to 8 hold in Quick Stop Active: wait for rest, then let go
-        await steps.settled(
-            lambda: drive.state is not DriveState.QUICK_STOP_ACTIVE or steps.is_slow(), ramp
-        )
         drive.goal = DriveState.SWITCH_ON_DISABLED
-        await steps.settled(lambda: drive.state is DriveState.SWITCH_ON_DISABLED)
+        await drive.stop.run()
         return drive.describe()
 
     async def _ready_to_stop(self, reason: str) -> None:

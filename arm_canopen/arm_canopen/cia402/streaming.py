@@ -10,7 +10,8 @@ from ..exceptions import DriveError
 from ..master.events import Severity
 from ..master.scheduler import Promise, Scheduler, Task
 from .drive import Drive
-from .sequences import DriveSequences, STOP_TIMEOUT
+from .sequences import DriveSequences
+from .stop_sequence import STOP_TIMEOUT
 
 
 class TargetStream:
@@ -94,7 +95,7 @@ class TargetStream:
         halted = drive.halt
 
         def ended() -> bool:
-            stands = drive.mode.braked and steps.is_slow()
+            stands = drive.mode.braked and drive.stands
             return stands or not drive.accepts_targets or not halted.held or halted.leaving
 
         await steps.settle()

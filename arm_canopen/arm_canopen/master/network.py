@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from functools import partial
+from traceback import walk_tb
 from typing import TypeAlias
 
 from ..can.frame import Frame
@@ -96,7 +97,7 @@ class Network:
         self._sync_time = 0.0
         self._feedback_due = self._round_open = False
         self._watch_at = 0.0
-        self._defects: dict[str, float] = {}  # when each may be reported again
+        self._defects: dict[object, float] = {}  # when each may be reported again, by its place
         self._sync_counter = SyncCounter(master.sync_overflow)
         self._heartbeat = HeartbeatProducer(master.node_id, master.heartbeat_producer, self.send)
         self._time = TimeProducer(
@@ -310,10 +311,12 @@ class Network:
         return self._sync.late
 
     def _report_defect(self, error: BaseException) -> None:
-        text = f'a defect in the CANopen master: {type(error).__name__}: {error}'
-        if self.scheduler.now < self._defects.get(text, 0.0):
+        # by where it was raised, as its text may have other values in it each time
+        place = tuple((frame.f_code, line) for frame, line in walk_tb(error.__traceback__))
+        if self.scheduler.now < self._defects.get(place, 0.0):
             return
-        self._defects[text] = self.scheduler.now + DEFECT_PERIOD
+        self._defects[place] = self.scheduler.now + DEFECT_PERIOD
+        text = f'a defect in the CANopen master: {type(error).__name__}: {error}'
         self._report(Event(EventKind.BUS, Severity.ERROR, '', text))
 
     def _connect(self, rivals: RivalWatch) -> Iterator[tuple[int, Callable[[Frame], None]]]:

@@ -169,13 +169,14 @@ class Output:
         values: Next values in mapping order.
         cyclic: It leaves in every cycle; otherwise when somebody published one of its objects.
         due: It was published, and leaves with the next cycle.
+        muted: It does not leave, because its device is commanded by SDO.
     """
 
     def __init__(self, config: PdoConfig, start: StartValue, *, cyclic: bool = True) -> None:
         """Start with the values that the device has."""
         self.config = config
         self.cyclic = cyclic
-        self.due = False
+        self.due = self.muted = False
         self._repeat_time = REPEAT_SHARE * (config.event_time or 0.0)
         self._left_at: float | None = None
         self.codec = PdoCodec(config.mapping)
@@ -194,7 +195,7 @@ class Output:
         One with a deadline is repeated within it, once somebody has published it.
         """
         if self.cyclic:
-            return True
+            return not self.muted
         repeat = self._left_at is not None and 0.0 < self._repeat_time <= now - self._left_at
         if not self.due and not repeat:
             return False
@@ -207,7 +208,7 @@ class Output:
 
     def reset(self) -> None:
         """The device is another one than before: nothing was published to it."""
-        self.due, self._left_at = False, None
+        self.due, self.muted, self._left_at = False, False, None
 
     def frame(self) -> Frame:
         """Return the frame that carries the present values."""

@@ -88,7 +88,7 @@ class RemoteNode(RemoteObjects):
         self.on_boot_up: Callable[[], None] = lambda: None
         self.on_lost: list[Callable[[str], None]] = []
         self.on_failed: list[Callable[[Exception, Output | None], None]] = []
-        self._failure = ''
+        self._failed = False
         self.on_dropped_out: Callable[[float], None] = lambda pause: None
         self._backoff = DropBackoff()
         self._commanded: NmtCommand | None = None
@@ -149,6 +149,7 @@ class RemoteNode(RemoteObjects):
         self.taken_over = taken_over
         self.image.clear()  # what it sent before it was configured says nothing about now
         self.online = True
+        self._failed = False
         self._backoff.booted(now)
         self.life.start(now)
         self.loss = ''
@@ -176,9 +177,9 @@ class RemoteNode(RemoteObjects):
         """
         for driver_fails in self.on_failed:
             driver_fails(error, output)
-        text = f'{type(error).__name__}: {error}'
-        if not self.on_failed and text != self._failure:
-            self._failure = text
+        if not self.on_failed and not self._failed:
+            self._failed = True  # once for each boot, as the text may be another one each time
+            text = f'{type(error).__name__}: {error}'
             self.report(EventKind.PDO, Severity.ERROR, f'its part of the cycle failed: {text}')
 
     def restarted(self) -> None:

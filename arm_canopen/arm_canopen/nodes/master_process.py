@@ -22,8 +22,8 @@ from ..cia402.drive import Drive
 from ..cia402.drive_commands import DriveCommands
 from ..cia402.motion import MotionSource
 from ..cia402.motion_group import MotionGroup
-from ..cia402.sequences import SHUTDOWN_MAX
 from ..cia402.status import drive_status
+from ..cia402.stop_sequence import SHUTDOWN_MAX
 from ..config.model import BusConfig
 from ..exceptions import CanopenError
 from ..master.events import Event, EventKind, Severity

@@ -1,0 +1,144 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Quick stop, rest, disable: the one way in which the master takes an axis out of operation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from ..exceptions import CodecError, SdoError
+from ..master.events import Severity
+from ..master.scheduler import Scheduler, Task
+from ..standard.drive import DriveState, statusword_text
+from ..standard.objects import Index
+from .observed_drive import FAULTY, ObservedDrive
+from .state_machine import Command
+
+REACTION_TIME = 0.5  # [s] in which a drive shows that it has got a command by RPDO
+STOP_TIMEOUT = 2.0  # [s] to come to rest, beside the time of the ramp
+RAMP_MAX = 10.0  # [s] that a ramp may take on the way out; then the power goes all the same
+SHUTDOWN_MAX = STOP_TIMEOUT + (STOP_TIMEOUT + RAMP_MAX) + STOP_TIMEOUT
+"""Longest time of a shutdown in [s]: to begin the stop, to come to rest, to lose the power."""
+DISABLED = (
+    DriveState.SWITCH_ON_DISABLED,
+    DriveState.NOT_READY_TO_SWITCH_ON,
+    DriveState.UNKNOWN,
+    *FAULTY,
+)
+
+
+class StopSequence:
+    """Stops a drive and takes its power away; every step has a deadline.
+
+    It looks at the process image itself, because it also serves drives whose part of the cycle
+    fails. A drive that does not react is commanded by SDO; then no RPDO carries its controlword
+    any more, which might enable it again.
+
+    Attributes:
+        goal: State that the drive is led to, whatever else is commanded; None while it does not
+            run.
+    """
+
+    def __init__(self, drive: ObservedDrive, scheduler: Scheduler) -> None:
+        """Take the drive and the time; nothing runs before :meth:`begin`."""
+        self.goal: DriveState | None = None
+        self._drive = drive
+        self._scheduler = scheduler
+        self._task: Task[None] | None = None
+        self._sdo_error = ''
+
+    @property
+    def running(self) -> bool:
+        """Whether it has begun and not ended."""
+        return self.goal is not None
+
+    def begin(self) -> None:
+        """Begin, unless it runs already."""
+        if not self.running:
+            self.goal = DriveState.QUICK_STOP_ACTIVE
+            self._task = self._scheduler.background(self._run())
+
+    async def run(self) -> None:
+        """Begin if need be, and wait for the end."""
+        self.begin()
+        await self.ended()
+
+    async def ended(self) -> None:
+        """Wait until it does not run."""
+        await self._within(SHUTDOWN_MAX, lambda: not self.running)
+
+    def abandon(self, reason: str) -> None:
+        """End it, because the device is gone."""
+        if self._task is not None:
+            self._task.cancel(SdoError(reason))
+        self.goal = None
+
+    def use_sdo(self) -> None:
+        """Command the drive by SDO from now on, because its RPDO does not reach it."""
+        objects = self._drive.objects
+        if objects.controlword_muted:
+            return
+        objects.mute_controlword()
+        if self.running:
+            self._write()
+
+    async def _run(self) -> None:
+        """Lead through the steps; what holds already ends a step at once."""
+        drive, objects = self._drive, self._drive.objects
+        self._sdo_error = ''
+        deadline = self._scheduler.now + STOP_TIMEOUT + drive.ramp_time(RAMP_MAX)
+        try:
+            await self._lead(
+                DriveState.QUICK_STOP_ACTIVE,
+                lambda: objects.state is not DriveState.OPERATION_ENABLED,
+            )
+            if not await self._within(deadline - self._scheduler.now, self._rests):
+                drive.report(Severity.ERROR, f'did not come to rest in time: {self._shown()}')
+            await self._lead(DriveState.SWITCH_ON_DISABLED, self._is_disabled)
+            if not await self._within(STOP_TIMEOUT, self._is_disabled):
+                error = f' ({self._sdo_error})' if self._sdo_error else ''
+                text = f'does not show that it is disabled{error}: {self._shown()}'
+                drive.report(Severity.ERROR, f'{text}. Cut its power')
+        finally:
+            self.goal = None
+
+    async def _lead(self, goal: DriveState, reacts: Callable[[], bool]) -> None:
+        """Command a state, by SDO where the drive does not react to its RPDO."""
+        self.goal = goal
+        if self._drive.objects.controlword_muted:
+            self._write()
+        elif not await self._within(REACTION_TIME, reacts):
+            self.use_sdo()
+
+    def _write(self) -> None:
+        """Write the controlword of this step; the step does not wait for the answer."""
+        quick_stop = self.goal is DriveState.QUICK_STOP_ACTIVE
+        command = Command.QUICK_STOP if quick_stop else Command.DISABLE_VOLTAGE
+        self._scheduler.background(self._written(command))
+
+    async def _written(self, command: Command) -> None:
+        place = self._drive.objects.at(Index.CONTROLWORD)
+        try:
+            await self._drive.node.write_object(place, 0, int(command))
+        except (SdoError, CodecError) as error:
+            self._sdo_error = str(error)
+
+    def _shown(self) -> str:
+        drive = self._drive
+        return f'{statusword_text(drive.objects.statusword)}; {drive.speed:.3g} per second'
+
+    def _rests(self) -> bool:
+        state = self._drive.objects.state
+        if state is DriveState.QUICK_STOP_ACTIVE:  # option codes 5 to 8 hold there
+            return self._drive.stands
+        return state is not DriveState.OPERATION_ENABLED
+
+    def _is_disabled(self) -> bool:
+        return self._drive.objects.state in DISABLED
+
+    async def _within(self, timeout: float, condition: Callable[[], bool]) -> bool:
+        try:
+            await self._scheduler.until(condition, timeout)
+        except TimeoutError:
+            return False
+        return True

@@ -1,0 +1,221 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""A drive whose part of the cycle fails: quick stop, rest, disable, in this order and once."""
+
+from __future__ import annotations
+
+from itertools import count
+import struct
+
+import pytest
+from virtual_network import (
+    bus_config,
+    drive_config,
+    MOTION_WRITES,
+    PERIOD,
+    SCALE,
+    sdo_write,
+    VirtualNetwork,
+)
+
+from arm_canopen.device.drive import Drive as SimulatedDrive
+from arm_canopen.exceptions import DriveError
+from arm_canopen.master.events import Severity
+from arm_canopen.standard.drive import DriveState, OperationMode
+
+JOINT, NODE_ID = 'joint1', 2
+RAMP = 1.0  # [s] from full speed to rest
+STANDING = 0.03  # [rad/s]
+RPDOS = {0x200 + NODE_ID, 0x300 + NODE_ID, 0x400 + NODE_ID}
+OPTIONS = pytest.mark.parametrize('option', [2, 6], ids=['605A=2', '605A=6'])
+
+
+class Failing:
+    """A drive at 1 rad/s with a slow quick stop ramp, of which something is going to fail.
+
+    Attributes:
+        net: The network.
+        states: States of the simulated drive since it began to move, without repetitions.
+        fastest: Greatest speed at which it was without power since then in [rad/s].
+    """
+
+    def __init__(self, option: int, monkeypatch: pytest.MonkeyPatch) -> None:
+        """Set it in motion."""
+        slow = (sdo_write(0x6085, 0, round(SCALE / RAMP)), sdo_write(0x605A, 0, option))
+        config = drive_config(JOINT, NODE_ID, sdo_writes=(*MOTION_WRITES, *slow))
+        self.net = VirtualNetwork(bus_config(config))
+        self.net.allows_defects = True
+        self.net.boot()
+        self.net.do(JOINT, 'init')
+        self.net.select(JOINT, OperationMode.CYCLIC_POSITION)
+        self.net.commands[JOINT].set_target(50.0)
+        self.net.run(0.6)
+        assert self.device.velocity / SCALE == pytest.approx(1.0, rel=0.05)
+        self.states = [DriveState.OPERATION_ENABLED]
+        self.fastest = 0.0
+        self._monkeypatch = monkeypatch
+        self._number = count()
+        self.began = self.net.now
+
+    @property
+    def device(self) -> SimulatedDrive:
+        """The simulated drive."""
+        drive = self.net.devices[JOINT].drive
+        assert drive is not None
+        return drive
+
+    def fail(self, owner: object, attribute: str, *, times: float = float('inf')) -> None:
+        """Let something fail from now on, with another text each time."""
+        original = getattr(owner, attribute)
+
+        def broken(*args: object, **settings: object) -> object:
+            number = next(self._number)
+            if number < times:
+                raise ZeroDivisionError(f'injected {number}')
+            return original(*args, **settings)
+
+        self._monkeypatch.setattr(owner, attribute, broken)
+
+    def run(self, duration: float) -> None:
+        """Let time pass in [s], and look at the drive in each cycle."""
+        for _ in range(round(duration / PERIOD)):
+            self.net.run(PERIOD)
+            if self.device.state is not self.states[-1]:
+                self.states.append(self.device.state)
+            if self.device.state is DriveState.SWITCH_ON_DISABLED:
+                self.fastest = max(self.fastest, abs(self.device.velocity) / SCALE)
+
+    @property
+    def errors(self) -> list[str]:
+        """What was reported as an error."""
+        return self.net.told(Severity.ERROR)
+
+    @property
+    def controlwords_by_sdo(self) -> list[int]:
+        """Controlwords that were written by SDO since it moved."""
+        found: list[int] = []
+        for data in self.net.frames(0x600 + NODE_ID, since=self.began):
+            if data[:4] == b'\x2b\x40\x60\x00':
+                found += struct.unpack_from('<H', data, 4)
+        return found
+
+
+def owner_of(failing: Failing, place: str) -> tuple[object, str]:
+    """Return the object and its attribute that a failure is injected into."""
+    drive = failing.net.drives[JOINT]
+    rpdo = failing.net.network.nodes[JOINT].image.outputs[-1]
+    return {
+        'mode': (drive.mode, 'step'),
+        'write': (drive, 'write'),
+        'read': (drive, 'read'),
+        'controlword': (drive.objects.controlword, 'write'),
+        'RPDO': (rpdo, '_pack'),
+    }[place]
+
+
+@OPTIONS
+@pytest.mark.parametrize('times', [1, float('inf')], ids=['once', 'for ever'])
+@pytest.mark.parametrize('place', ['mode', 'write', 'controlword', 'RPDO'])
+def test_the_power_goes_when_the_axis_stands(
+    place: str, times: float, option: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whatever 0x605A says: it is never without power at speed, nor powered for good."""
+    failing = Failing(option, monkeypatch)
+    failing.fail(*owner_of(failing, place), times=times)
+    failing.run(RAMP + 2.0)
+    assert failing.states == [
+        DriveState.OPERATION_ENABLED,
+        DriveState.QUICK_STOP_ACTIVE,
+        DriveState.SWITCH_ON_DISABLED,
+    ]
+    assert failing.fastest < STANDING
+    assert len(failing.errors) == 1, failing.errors
+    unreachable = place == 'RPDO' or (place == 'controlword' and times > 1)
+    assert failing.controlwords_by_sdo == ([2, 0] if unreachable else [])
+
+
+def test_a_drive_that_cannot_be_seen_loses_its_power_at_the_deadline(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It is not waited for for ever that it stands."""
+    failing = Failing(6, monkeypatch)
+    failing.fail(*owner_of(failing, 'read'))
+    failing.run(RAMP + 3.0)
+    assert failing.states[-1] is DriveState.SWITCH_ON_DISABLED
+    assert failing.fastest < STANDING
+    assert len([text for text in failing.errors if 'injected' in text]) == 1
+
+
+@OPTIONS
+def test_a_deaf_drive_is_stopped_by_sdo_and_not_enabled_by_what_comes_later(
+    option: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its RPDOs are kept back before the SDO leaves: none that gets through ends the stop."""
+    failing = Failing(option, monkeypatch)
+    failing.net.wire.loses = lambda sender, frame: frame.can_id in RPDOS
+    failing.fail(*owner_of(failing, 'mode'), times=1)
+    failing.run(0.4)
+    assert not failing.controlwords_by_sdo
+    failing.run(0.4)
+    failing.net.wire.loses = lambda sender, frame: False
+    failing.run(RAMP + 2.0)
+    assert failing.states[-1] is DriveState.SWITCH_ON_DISABLED
+    assert DriveState.OPERATION_ENABLED not in failing.states[1:]
+    assert failing.controlwords_by_sdo == [2, 0]
+    failing.net.do(JOINT, 'enable')
+    assert failing.device.state is DriveState.OPERATION_ENABLED
+
+
+def test_an_axis_is_stopped_whose_rpdo_is_kept_back_with_another_axis(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It would go on with the last controlword that it got."""
+    failing = Failing(6, monkeypatch)
+    failing.net.drives[JOINT].objects.mute_controlword()
+    failing.run(RAMP + 1.0)
+    assert failing.states[-1] is DriveState.SWITCH_ON_DISABLED
+    assert failing.fastest < STANDING
+    assert failing.controlwords_by_sdo == [2, 0]
+    assert len(failing.errors) == 1
+    failing.net.do(JOINT, 'enable')
+
+
+def test_nothing_enables_a_drive_while_it_is_stopped(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A command is refused, a stop waits for the end; then a command does."""
+    failing = Failing(6, monkeypatch)
+    failing.fail(*owner_of(failing, 'mode'), times=1)
+    failing.run(0.2)
+    for verb in ('init', 'enable', 'recover', 'home'):
+        with pytest.raises(DriveError, match='being stopped'):
+            failing.net.do(JOINT, verb)
+    failing.net.do(JOINT, 'disable', preempt=True)
+    assert failing.device.state == DriveState.SWITCH_ON_DISABLED
+    assert abs(failing.device.velocity) / SCALE < STANDING
+    failing.net.do(JOINT, 'enable')
+    assert failing.net.drives[JOINT].state is DriveState.OPERATION_ENABLED
+    assert not failing.net.drives[JOINT].failure
+
+
+def test_what_goes_wrong_after_it_was_enabled_again_is_named_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Each enabling may fail once in the log."""
+    failing = Failing(2, monkeypatch)
+    for number in (1, 2):
+        failing.fail(*owner_of(failing, 'mode'))
+        failing.run(RAMP + 1.0)
+        assert len(failing.errors) == number
+        failing._monkeypatch.undo()
+        failing.net.do(JOINT, 'enable')
+        failing.run(0.5)
+
+
+def test_texts_with_values_do_not_flood_the_log(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Neither those of devices without a drive nor those of the cycle."""
+    failing = Failing(2, monkeypatch)
+    node = failing.net.network.nodes[JOINT]
+    node.on_failed.clear()
+    failing.fail(node, 'expect_answers')
+    failing.fail(failing.net.network._heartbeat, 'advance')
+    failing.run(1.0)
+    assert len(failing.errors) == 2, failing.errors
