@@ -120,7 +120,7 @@ def _simulator(stack: Stack, find: FindExecutable) -> ProcessSpec:
 def _bridge(stack: Stack, parameters: Path, find: FindExecutable) -> ProcessSpec:
     values = {'port': stack.port, 'protocol': stack.protocol, **stack.frames}
     if stack.simulate:  # its IMU is where the description has it
-        values['imu.mounting_checked'] = 'true'
+        values |= {'imu.mounting_checked': 'true', 'imu.rates_checked': 'true'}
     executable = Executable('quad_hardware', 'hardware_node')
     argv = node_argv(executable, find, values, parameters, stack.ros)
     if stack.calibration is not None:

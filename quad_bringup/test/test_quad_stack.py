@@ -92,8 +92,9 @@ def test_hardware_has_no_simulator_and_simulation_has(tmp_path: Path) -> None:
     assert bridge_of(real).link == bridge_of(simulated).link
     assert bridge_of(real).link.path == str(port)
     assert simulator_of(simulated)[0] == port
-    assert not bridge_of(real).estimator.mounting.checked
-    assert bridge_of(simulated).estimator.mounting.checked
+    for part, known in ((real, False), (simulated, True)):
+        mounting = bridge_of(part).estimator.mounting
+        assert mounting.checked is mounting.rates_checked is known
 
 
 @pytest.mark.parametrize(('preset', 'arm'), [('lite', False), ('mini', True)])

@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from typing_extensions import Self
 
 PUSH_PERIOD = 0.02  # [s]
+TURN_TIME = 0.6  # [s] that a hand takes to turn the body
 PACKET = 62  # [B] that an FTDI adapter sends at once; fewer wait for its latency timer
 
 
@@ -53,6 +54,7 @@ class Behaviour:
         corrupt: Share of the bytes sent that are damaged.
         attitude: Roll, pitch, yaw [deg].
         acceleration: Specific force [m/s²].
+        gyro: Signs of the gyro of the old protocol.
         latency: Latency timer of the adapter between robot and host [s]; 0 for none.
     """
 
@@ -60,6 +62,7 @@ class Behaviour:
     corrupt: float = 0.0
     attitude: tuple[float, float, float] = (0.0, 0.0, 0.0)
     acceleration: tuple[float, float, float] = (0.0, 0.0, 9.8)
+    gyro: tuple[float, float, float] = (1.0, 1.0, 1.0)
     latency: float = 0.0
 
 
@@ -92,6 +95,8 @@ class PtyPeer:
     def __post_init__(self) -> None:
         self._stop = threading.Event()
         self._random = random.Random(1)
+        self._turning = threading.Event()
+        self._turn = 0.0, self.behaviour.attitude  # when it began [s], from where [deg]
         self._thread: threading.Thread | None = None
 
     def plug(self) -> None:
@@ -117,6 +122,29 @@ class PtyPeer:
         os.close(self._master)
         os.close(self._slave)
         self.link.unlink(missing_ok=True)
+
+    def turn_to(
+        self, attitude: tuple[float, float, float], acceleration: tuple[float, float, float]
+    ) -> None:
+        """Turn the body by hand, and wait until it was reported for as long as that takes."""
+        self._turn = time.monotonic(), self.behaviour.attitude
+        self.behaviour.attitude, self.behaviour.acceleration = attitude, acceleration
+        self._turning.clear()
+        assert self._turning.wait(10.0)
+
+    def _moved(self) -> tuple[list[float], list[float]]:
+        """Return attitude [deg] and rates of the gyro [deg/s] of now."""
+        began_at, start = self._turn
+        share = (time.monotonic() - began_at) / TURN_TIME
+        pairs = list(zip(start, self.behaviour.attitude, strict=True))
+        if share >= 1.0:
+            self._turning.set()
+            return [end for _, end in pairs], [0.0] * 3
+        rates = [
+            sign * (end - begin) / TURN_TIME
+            for sign, (begin, end) in zip(self.behaviour.gyro, pairs, strict=True)
+        ]
+        return [begin + share * (end - begin) for begin, end in pairs], rates
 
     def _run(self) -> None:
         parser = StreamParser(self.protocol, HOST_KINDS)
@@ -202,10 +230,9 @@ class PtyPeer:
             data = bytes(spans[motor].encode(self.angles[motor]) for motor in motors)
             self._say(Frame(Kind.REPLY, frame.address, data))
         elif frame.address == Register.IMU:
+            attitude, rates = self._moved()
             values = OLD.functions[Register.IMU].pack(
-                acceleration=self.behaviour.acceleration,
-                rate=(0.0, 0.0, 0.0),
-                attitude=self.behaviour.attitude,
+                acceleration=self.behaviour.acceleration, rate=rates, attitude=attitude
             )
             self._say(Frame(Kind.REPLY, frame.address, values))
 

@@ -9,8 +9,9 @@ from dataclasses import replace
 import itertools
 import math
 from pathlib import Path
+from random import Random
 
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 import pytest
 
@@ -27,10 +28,13 @@ from quad_hardware.estimation.rotation import (
     multiply,
     Quaternion,
     rotate,
+    rotation_vector,
     Vector,
     yaw_of,
 )
 from quad_hardware.exceptions import CommandError
+from quad_hardware.link import RobotState
+from quad_hardware.protocol import OLD
 from quad_pty_peer import PtyPeer
 
 SIGNS: list[Vector] = [(x, y, z) for x, y, z in itertools.product((1.0, -1.0), repeat=3)]
@@ -154,6 +158,104 @@ def test_what_fits_no_mounting_is_refused(
         find_mounting(readings)
 
 
+def turned(
+    mounting: ImuMounting, gyro: Vector, bias: float, noise: Callable[[], float]
+) -> dict[Stance, ImuReading]:
+    """What is reported while a person turns the robot from one stance to the next, too.
+
+    Args:
+        mounting: Of the IMU.
+        gyro: What the gyro says for each [rad/s] about its axes.
+        bias: Of the gyro [deg/s].
+        noise: Of the attitude [deg].
+    """
+    ways = {  # roll, pitch, yaw of the body at the ends [rad]
+        Stance.LEVEL: (0.0, 0.0, 0.3),
+        Stance.NOSE_DOWN: (0.0, 0.35, 0.3),
+        Stance.RIGHT_DOWN: (0.35, 0.0, 0.3),
+        Stance.TURNED_LEFT: (0.0, 0.0, 1.1),
+    }
+    readings, start = held(mounting), ways[Stance.LEVEL]
+    for stance, end in ways.items():
+        states, before = [], from_roll_pitch_yaw(*start)
+        for tick in range(90):  # a second to turn, and a while to hold
+            share = min(tick / 50, 1.0)
+            roll, pitch, yaw = (a + share * (b - a) for a, b in zip(start, end, strict=True))
+            body = from_roll_pitch_yaw(roll, pitch, yaw)
+            vector = rotation_vector(multiply(conjugate(before), body))
+            felt = rotate(conjugate(mounting.rotation), vector)
+            x, y, z = (
+                bias + share * math.degrees(angle) / 0.02
+                for share, angle in zip(gyro, felt, strict=True)
+            )
+            r, p, q = (angle + noise() for angle in report(mounting, body).attitude)
+            state = RobotState(tick * 0.02, 0.0, (r, p, q), None, {}, {}, rates=(x, y, z))
+            states.append(state)
+            before = body
+        readings[stance] = replace(readings[stance], on_the_way=tuple(states))
+        start = end
+    return readings
+
+
+@settings(max_examples=25)
+@given(MOUNTINGS, st.sampled_from(SIGNS), st.floats(-3.0, 3.0), st.integers(0, 9))
+def test_turning_the_robot_by_hand_proves_the_signs_of_its_gyro(
+    mounting: ImuMounting, signs: Vector, bias: float, seed: int
+) -> None:
+    """Each axis by the stance that turns about it, whatever hand, bias and noise."""
+    random = Random(seed)
+    found = find_mounting(turned(mounting, signs, bias, lambda: random.uniform(-0.1, 0.1)))
+    assert found.rates_checked
+    for axis in range(3):
+        rates = [0.0, 0.0, 0.0]
+        rates[axis] = 1.0
+        felt = rotate(conjugate(mounting.rotation), (rates[0], rates[1], rates[2]))
+        x, y, z = (math.degrees(rate) for rate in felt)
+        assert found.rate(signed(signs, (x, y, z))) == pytest.approx(rates, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ('gyro', 'named'),
+    [((0.0, 1.0, 1.0), 'about x'), ((1.0, 0.1, 1.0), 'about y'), ((1.0, 1.0, 9.0), 'about z')],
+)
+def test_a_gyro_that_does_not_turn_with_the_body_is_refused(gyro: Vector, named: str) -> None:
+    """A dead axis, or one in another unit: the message names it."""
+    with pytest.raises(CommandError, match=f'gyro.*{named}'):
+        find_mounting(turned(ImuMounting(), gyro, 0.0, lambda: 0.0))
+
+
+def test_a_robot_that_was_not_watched_turning_proves_no_gyro() -> None:
+    """Reports that were missing while it was moved."""
+    readings = turned(ImuMounting(), (1.0, 1.0, 1.0), 0.0, lambda: 0.0)
+    for stance in (Stance.RIGHT_DOWN, Stance.TURNED_LEFT):
+        readings[stance] = replace(readings[stance], on_the_way=())
+    with pytest.raises(CommandError, match=r'gyro.*about x'):
+        find_mounting(readings)
+
+
+def test_a_person_proves_the_gyro_over_the_serial_line(tmp_path: Path) -> None:
+    """In the old protocol, which has one: its signs are in the file, and that they are proven."""
+    output, bodies = tmp_path / 'found.yaml', held(ImuMounting())
+    with PtyPeer(tmp_path / 'port', OLD) as peer:
+        peer.behaviour.gyro = (1.0, -1.0, 1.0)
+
+        def hold(stance: Stance) -> Callable[[], None]:
+            def move() -> None:
+                acceleration = bodies[stance].acceleration
+                assert acceleration is not None
+                peer.turn_to(bodies[stance].attitude, acceleration)
+
+            return move
+
+        script = Script(*((hold(stance), '') for stance in Stance))
+        command = ['imu', '--port', str(peer.link), '--output', str(output)]
+        assert run_calibrate(command, script) == 0, script.said
+    found = read_parameters(output)['imu']
+    assert isinstance(found, dict)
+    assert found['rate_signs'] == [1.0, -1.0, 1.0]
+    assert found['rates_checked'] is True
+
+
 def test_a_person_finds_it_and_the_file_has_it(tmp_path: Path) -> None:
     """By the dialogue, over the serial line: the parameters of hardware_node, and checked."""
     output = tmp_path / 'found.yaml'
@@ -177,4 +279,6 @@ def test_a_person_finds_it_and_the_file_has_it(tmp_path: Path) -> None:
         assert peer.commands == []
     found = read_parameters(output)['imu']
     assert found == imu_parameters(find_mounting(readings))['imu']
-    assert found['mounting_checked'] is True  # type: ignore[index]
+    assert isinstance(found, dict)
+    assert found['mounting_checked'] is True
+    assert 'rates_checked' not in found  # the new protocol reports no gyro

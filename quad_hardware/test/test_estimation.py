@@ -11,6 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
+from quad_description import movable_joints, robot_urdf
+from quad_hardware.estimation import Estimator, EstimatorSettings, ImuMounting, RateSource
 from quad_hardware.estimation.battery import Battery, BatteryFilter, REPORTS
 from quad_hardware.estimation.filters import AttitudeRate, JointRate
 from quad_hardware.estimation.gravity import (
@@ -32,6 +34,7 @@ from quad_hardware.estimation.rotation import (
     yaw_of,
 )
 from quad_hardware.estimation.sample_clock import SampleClock
+from quad_hardware.joints import JointMap, servo_of
 from quad_hardware.link.state import DEVICE_TIME_WRAP, RobotState
 from quad_hardware.protocol import LEG_MOTORS
 
@@ -55,6 +58,29 @@ def spun(rate: Vector, time: float) -> Quaternion:
         return IDENTITY
     x, y, z = (component / speed * math.sin(speed * time / 2) for component in rate)
     return x, y, z, math.cos(speed * time / 2)
+
+
+@pytest.mark.parametrize(
+    ('mounting', 'gyro', 'source', 'checked'),
+    [
+        (ImuMounting(), None, RateSource.AUTO, False),
+        (ImuMounting(checked=True), None, RateSource.AUTO, True),
+        (ImuMounting(checked=True), (0.0, 0.0, 0.0), RateSource.AUTO, False),
+        (ImuMounting(checked=True), (0.0, 0.0, 0.0), RateSource.DIFFERENTIATED, True),
+        (ImuMounting(checked=True, rates_checked=True), (0.0, 0.0, 0.0), RateSource.AUTO, True),
+        (ImuMounting(rates_checked=True), (0.0, 0.0, 0.0), RateSource.AUTO, False),
+    ],
+)
+def test_signs_are_checked_when_those_of_the_gyro_are(
+    mounting: ImuMounting, gyro: Vector | None, source: RateSource, checked: bool
+) -> None:
+    """Where a gyro is reported and used, gravity alone proves nothing about it."""
+    urdf = robot_urdf('lite')
+    joints = JointMap(map(servo_of, movable_joints(urdf)))
+    settings = EstimatorSettings(rate_source=source, mounting=mounting)
+    estimate = Estimator(urdf, joints, settings).update(replace(STATE, rates=gyro))
+    assert estimate is not None
+    assert estimate.signs_checked is checked
 
 
 @given(ROTATIONS, ROTATIONS, VECTORS)

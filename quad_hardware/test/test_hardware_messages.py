@@ -52,6 +52,7 @@ ESTIMATE = Estimate(
     attitude=IDENTITY,
     angular_velocity=(0.1, 0.2, 0.3),
     rate_measured=False,
+    signs_checked=True,
     acceleration=(0.0, 0.0, 9.8),
 )
 ROTATIONS = st.builds(from_roll_pitch_yaw, *[st.floats(-1.2, 1.2)] * 3)
@@ -251,9 +252,23 @@ def test_the_level_of_the_robot(
         **change,  # type: ignore[arg-type]
     )
     health = Health(Battery(charge), error, refused=0, refusal='')
-    status = robot_diagnostic('hardware_node', '/dev/x', state, health, mounting_checked=True)
+    status = robot_diagnostic('hardware_node', '/dev/x', state, health, signs_checked=True)
     assert status.level == level
     assert words in status.message
+
+
+@pytest.mark.parametrize('checked', [True, False])
+def test_an_orientation_whose_signs_nobody_checked_is_uncertain(checked: bool) -> None:
+    """In /imu and /odom, so that nobody levels by it, and in the diagnostics."""
+    estimate = replace(ESTIMATE, signs_checked=checked)
+    imu = messages.imu_form(estimate, DEVIATIONS, 'imu_link')
+    odometry = messages.odometry_form(estimate, DEVIATIONS, FRAMES)
+    expected = DEVIATIONS.orientation if checked else pytest.approx(math.pi / 2)
+    assert imu.orientation == odometry.tilt == expected
+    state = RobotState(0.0, 0.0, (0, 0, 0), (0, 0, 9.8), {}, {})
+    health = Health(Battery(80.0), 0.0, refused=0, refusal='')
+    status = robot_diagnostic('hardware_node', '/dev/x', state, health, signs_checked=checked)
+    assert ('calibrate imu' in status.message) is not checked
 
 
 def test_a_trouble_is_shown_once() -> None:

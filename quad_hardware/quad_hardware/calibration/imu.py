@@ -1,18 +1,31 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""How the IMU is mounted, from how a person tilts the robot: compared with gravity."""
+"""How the IMU is mounted, from how a person tilts the robot: compared with gravity.
+
+The signs of a gyro follow from the way between the stances: it has to turn with the attitude.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from enum import Enum
 import itertools
 import math
 
 from ..estimation.gravity import STANDARD_GRAVITY
 from ..estimation.imu_mounting import ImuMounting
-from ..estimation.rotation import conjugate, from_roll_pitch_yaw, rotate, Vector, yaw_of
+from ..estimation.rotation import (
+    conjugate,
+    from_roll_pitch_yaw,
+    multiply,
+    rotate,
+    rotation_vector,
+    Vector,
+    yaw_of,
+)
 from ..exceptions import CommandError
+from ..link import RobotState
 from .console import Console
 from .robot import HandheldRobot, ImuReading
 
@@ -21,6 +34,10 @@ MIN_TURN = math.radians(20.0)  # [rad]
 MAX_OFF = math.radians(35.0)  # [rad] of a direction in which a person tilts
 MAX_LEVEL_TILT = math.radians(20.0)  # [rad]
 MAX_DISAGREEMENT = math.radians(15.0)  # [rad] between attitude and accelerometer
+TURN_WINDOW = 10  # reports over which turns are compared; their noise would count otherwise
+MAX_GAP = 0.2  # [s] between two reports; over more nobody knows how the gyro turned
+MIN_TURNED = math.radians(3.0)  # [rad] root of the squares of the turns about an axis
+GYRO_SHARES = (0.4, 2.5)  # of the turn of the attitude, that the gyro has to report
 GRAVITY_TOLERANCE = 2.0  # [m/s²] of an accelerometer at rest
 
 
@@ -41,6 +58,7 @@ TILTS: Mapping[Stance, tuple[float, float]] = {
 }
 """Which way up goes in the body, along x and y."""
 
+AXES = (0, 'x'), (1, 'y'), (2, 'z')
 _SIGNS: tuple[Vector, ...] = tuple(
     (x, y, z) for x, y, z in itertools.product((1.0, -1.0), repeat=3)
 )
@@ -78,7 +96,57 @@ def find_mounting(readings: Readings) -> ImuMounting:
             'no mounting of the IMU fits what it reported: '
             f'{_misfit(ImuMounting(), readings)}; hold the robot as it is asked, and try again'
         )
-    return min(fitting, key=_flips)
+    return with_gyro(min(fitting, key=_flips), readings)
+
+
+def with_gyro(mounting: ImuMounting, readings: Readings) -> ImuMounting:
+    """Return a mounting with the signs of the gyro, by how the robot was turned between stances.
+
+    Where no gyro is reported, it stays as it is.
+
+    Raises:
+        CommandError: The gyro does not turn with the attitude; says about which axis.
+    """
+    reports = [[s for s in reading.on_the_way if s.rates] for reading in readings.values()]
+    if not any(reports):
+        return mounting
+    turns = [turn for states in reports for turn in _turns(mounting, states)]
+    x, y, z = (_gyro_sign(axis, [(by[i], to[i]) for by, to in turns]) for i, axis in AXES)
+    return replace(mounting, rate_signs=(x, y, z), rates_checked=True)
+
+
+def _turns(mounting: ImuMounting, states: Sequence[RobotState]) -> Iterator[tuple[Vector, Vector]]:
+    """Return how far gyro and attitude turned in windows of time, about the IMU's axes [rad]."""
+    for begin in range(0, len(states) - TURN_WINDOW, TURN_WINDOW):
+        window = states[begin : begin + TURN_WINDOW + 1]
+        steps = [(b.arrival - a.arrival, b.rates) for a, b in itertools.pairwise(window)]
+        if max(elapsed for elapsed, _ in steps) > MAX_GAP:
+            continue
+        first, last = (mounting.attitude(state.attitude) for state in (window[0], window[-1]))
+        turned = rotation_vector(multiply(conjugate(first), last))
+        x, y, z = (
+            math.radians(sum(elapsed * rates[i] for elapsed, rates in steps if rates))
+            for i, _ in AXES
+        )
+        yield (x, y, z), rotate(conjugate(mounting.rotation), turned)
+
+
+def _gyro_sign(axis: str, turns: Iterable[tuple[float, float]]) -> float:
+    """Return the sign of the gyro about an axis, by its turns and those of the attitude [rad]."""
+    pairs = list(turns)
+    turned = sum(attitude**2 for _, attitude in pairs)
+    if turned < MIN_TURNED**2:
+        raise CommandError(
+            f'gyro: the robot was hardly turned about {axis} of the IMU while it reported; '
+            'turn it quicker from one stance to the next'
+        )
+    share = sum(gyro * attitude for gyro, attitude in pairs) / turned
+    if not GYRO_SHARES[0] <= abs(share) <= GYRO_SHARES[1]:
+        raise CommandError(
+            f'gyro: turned about {axis} of the IMU, it reports {share:.2f} times the turn of the '
+            'attitude; hold the robot by its body, and try again'
+        )
+    return math.copysign(1.0, share)
 
 
 def _candidates() -> Iterator[ImuMounting]:

@@ -67,12 +67,18 @@ def imu_parameters(mounting: ImuMounting) -> Tree:
     x, y, z, w = mounting.rotation
     roll = math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
     pitch = math.asin(min(max(2 * (w * y - z * x), -1.0), 1.0))
+    gyro: Tree = (
+        {'rate_signs': list(mounting.rate_signs), 'rates_checked': True}
+        if mounting.rates_checked
+        else {}
+    )
     return {
         'imu': {
             'mounting': [round(angle, 5) for angle in (roll, pitch, yaw_of(mounting.rotation))],
             'attitude_signs': list(mounting.attitude_signs),
             'acceleration_signs': list(mounting.acceleration_signs),
             'mounting_checked': mounting.checked,
+            **gyro,
         }
     }
 

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 import math
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from typing_extensions import Self
 
 SAMPLES = 15  # reports that one reading is the median of
+LONGEST_WAY = 6000  # reports between two readings, the newest; two minutes
 PATIENCE = 4.0  # [s] for a robot to report
 
 
@@ -33,10 +34,12 @@ class ImuReading:
     Attributes:
         attitude: Roll, pitch, yaw [deg].
         acceleration: Specific force [m/s²]; None where it is not reported.
+        on_the_way: What was reported since the reading before, while the robot was moved.
     """
 
     attitude: Vector
     acceleration: Vector | None
+    on_the_way: Sequence[RobotState] = ()
 
 
 class HandheldRobot:
@@ -51,7 +54,7 @@ class HandheldRobot:
         """
         self._motors = frozenset(motors)
         self._recent: deque[Mapping[int, float]] = deque(maxlen=SAMPLES)
-        self._imu: deque[RobotState] = deque(maxlen=SAMPLES)
+        self._imu: deque[RobotState] = deque(maxlen=LONGEST_WAY)
         self._changed = threading.Condition()
         self._driver = Driver(options, self._take, self._forget)
 
@@ -75,8 +78,9 @@ class HandheldRobot:
             NoAnswerError: The robot does not report, or no number; says why.
         """
         with self._changed:
+            way = tuple(self._imu)
             self._imu.clear()
-            if not self._changed.wait_for(lambda: len(self._imu) == SAMPLES, PATIENCE):
+            if not self._changed.wait_for(lambda: len(self._imu) >= SAMPLES, PATIENCE):
                 raise NoAnswerError(self._driver.status().detail)
             states = list(self._imu)
         roll, pitch, yaw = map(_mean_angle, zip(*(s.attitude for s in states), strict=True))
@@ -84,9 +88,9 @@ class HandheldRobot:
             raise NoAnswerError('the IMU reports no number; switch the robot off and on')
         forces = [state.acceleration for state in states if state.acceleration is not None]
         if not forces:
-            return ImuReading((roll, pitch, yaw), None)
+            return ImuReading((roll, pitch, yaw), None, way)
         x, y, z = map(fmean, zip(*forces, strict=True))
-        return ImuReading((roll, pitch, yaw), (x, y, z))
+        return ImuReading((roll, pitch, yaw), (x, y, z), way)
 
     @contextmanager
     def limp(self) -> Iterator[None]:

@@ -62,6 +62,8 @@ class Estimate:
             the IMU is of no use; rate and acceleration are None, too.
         angular_velocity: Of the body, in base_link [rad/s]; None when it is not wanted.
         rate_measured: The angular velocity is that of a gyro.
+        signs_checked: Somebody has compared the attitude with gravity on this robot, and the gyro
+            with the attitude where it is the gyro's.
         acceleration: Specific force in base_link [m/s²]; None where it is not reported.
     """
 
@@ -72,6 +74,7 @@ class Estimate:
     attitude: Quaternion | None
     angular_velocity: Vector | None
     rate_measured: bool
+    signs_checked: bool
     acceleration: Vector | None
 
 
@@ -150,7 +153,9 @@ class Estimator:
             velocities = self._joint_rate.update(joints_time, positions)
         self._battery.take(state)
         if self._plausibility.imu_problem:
-            return Estimate(time, joints_time, positions, velocities, None, None, False, None)
+            return Estimate(
+                time, joints_time, positions, velocities, None, None, False, False, None
+            )
         if self._boards.restarted(state):
             self._odometry.keep_heading()
         mounting, felt = self._settings.mounting, state.acceleration
@@ -166,6 +171,7 @@ class Estimator:
             attitude=attitude,
             angular_velocity=rate,
             rate_measured=measured,
+            signs_checked=mounting.checked and (mounting.rates_checked or not measured),
             acceleration=acceleration,
         )
 

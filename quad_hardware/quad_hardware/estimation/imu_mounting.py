@@ -35,6 +35,7 @@ class ImuMounting:
         acceleration_signs: Of the specific force along x, y and z; +9.8 upwards at rest.
         rate_signs: Of the angular velocity about x, y and z.
         checked: Somebody has compared it with gravity on this robot.
+        rates_checked: Somebody has compared the signs of the gyro with turning it by hand.
     """
 
     rotation: Quaternion = IDENTITY
@@ -42,6 +43,7 @@ class ImuMounting:
     acceleration_signs: Vector = POSITIVE
     rate_signs: Vector = POSITIVE
     checked: bool = False
+    rates_checked: bool = False
 
     def attitude(self, reported: Vector) -> Quaternion:
         """Return the attitude of base_link for reported roll, pitch and yaw [deg]."""

@@ -29,8 +29,8 @@ FAULTS = {
 """What a fault is called, and what to do."""
 
 UNCHECKED = (
-    'nobody has compared the mounting of the IMU with gravity, so the controller does not level: '
-    'ros2 run quad_hardware calibrate imu'
+    'nobody has compared the IMU with gravity, and its gyro with turning it by hand, so the '
+    'controller does not level: ros2 run quad_hardware calibrate imu'
 )
 """What is said of an attitude whose signs may be wrong."""
 
@@ -93,7 +93,7 @@ class LinkDiagnostic:
 
 
 def robot_diagnostic(
-    node: str, port: str, state: RobotState, health: Health, *, mounting_checked: bool
+    node: str, port: str, state: RobotState, health: Health, *, signs_checked: bool
 ) -> DiagnosticStatus:
     """Describe battery, servos and IMU.
 
@@ -102,10 +102,10 @@ def robot_diagnostic(
         port: Its serial port.
         state: The newest report.
         health: How the robot is.
-        mounting_checked: Somebody has compared the mounting of the IMU with gravity.
+        signs_checked: Somebody has compared the IMU with gravity, and a gyro with turning.
     """
     level, message = DiagnosticStatus.OK, 'no faults'
-    if not mounting_checked:
+    if not signs_checked:
         level, message = DiagnosticStatus.WARN, UNCHECKED
     error, charge, voltage = health.gravity_error, health.battery.charge, health.battery.voltage
     hot = {m: t for m, t in (state.temperatures or {}).items() if t > HOT_SERVO}
@@ -133,7 +133,7 @@ def robot_diagnostic(
         'battery': '' if charge is None else f'{charge:.0f}',
         'voltage': '' if voltage is None else f'{voltage:.2f}',
         'faults': state.faults,
-        'imu_mounting_checked': mounting_checked,
+        'imu_signs_checked': signs_checked,
         'gravity_error': '' if error is None else f'{error:.3f}',
         'hottest_servo': max((state.temperatures or {0: 0.0}).values()),
         'implausible_reports': health.refused,

@@ -258,11 +258,10 @@ class HardwareNode(Node):
             command_diagnostic(name, port, self._commander.counters),
         ]
         if latest is not None:
-            state, _ = latest
+            state, estimate = latest
             health = self._estimator.health()
-            checked = self._settings.estimator.mounting.checked
             array.status.append(
-                robot_diagnostic(name, port, state, health, mounting_checked=checked)
+                robot_diagnostic(name, port, state, health, signs_checked=estimate.signs_checked)
             )
             self._battery.publish(messages.battery(health.battery, now))
         self._diagnostics.publish(array)

@@ -21,6 +21,7 @@ from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
 from ..estimation import Battery, Estimate, OdometryState
+from ..estimation.imu_mounting import UNCHECKED_DEVIATION
 from ..estimation.rotation import about_z, conjugate, multiply, rotate, yaw_of
 from ..estimation.rotation import Quaternion as Rotation
 from .parameters import Deviations, Frames
@@ -103,7 +104,7 @@ def imu_form(estimate: Estimate, deviations: Deviations, frame: str) -> ImuForm:
     """Return the form for what an estimate holds."""
     return ImuForm(
         frame,
-        deviations.orientation,
+        _orientation_deviation(estimate, deviations),
         None if estimate.acceleration is None else deviations.acceleration,
         _rate_deviation(estimate, deviations),
     )
@@ -153,8 +154,8 @@ class OdometryForm:
 def odometry_form(estimate: Estimate, deviations: Deviations, frames: Frames) -> OdometryForm:
     """Return the form for what an estimate holds."""
     child = frames.footprint if frames.footprint_is_parent else frames.base
-    rate = _rate_deviation(estimate, deviations)
-    return OdometryForm(frames.odom, child, deviations.orientation, rate)
+    tilt = _orientation_deviation(estimate, deviations)
+    return OdometryForm(frames.odom, child, tilt, _rate_deviation(estimate, deviations))
 
 
 def odometry_numbers(estimate: Estimate, state: OdometryState, frames: Frames) -> Numbers:
@@ -230,6 +231,12 @@ def battery(state: Battery, stamp: Time) -> BatteryState:
 
 
 _ZERO = (0.0, 0.0, 0.0)
+
+
+def _orientation_deviation(estimate: Estimate, deviations: Deviations) -> float:
+    """Return that of an attitude; whoever levels by one with unknown signs has to be told."""
+    known = deviations.orientation
+    return known if estimate.signs_checked else max(known, UNCHECKED_DEVIATION)
 
 
 def _rate_deviation(estimate: Estimate, deviations: Deviations) -> float | None:

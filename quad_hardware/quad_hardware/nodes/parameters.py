@@ -13,7 +13,6 @@ from node_runner import declare_thread_priority, ParameterReader, refuse_misspel
 from quad_description import DescriptionError, Joint, movable_joints, PRESETS, robot_urdf
 
 from ..estimation import EstimatorSettings, ImuMounting, OdometrySettings, RateSource, SCALES
-from ..estimation.imu_mounting import UNCHECKED_DEVIATION
 from ..estimation.rotation import from_roll_pitch_yaw, Vector
 from ..exceptions import CommandError
 from ..joints import JointMap, JointServo, LimiterSettings, LossReaction, servo_of
@@ -121,7 +120,6 @@ def declare_parameters(node: Node) -> NodeSettings:
         vendor_method=method,
     )
     urdf = _urdf(read)
-    estimator = _estimator(read)
     settings = NodeSettings(
         link=link,
         urdf=urdf,
@@ -138,9 +136,9 @@ def declare_parameters(node: Node) -> NodeSettings:
             {reaction.value: reaction for reaction in LossReaction},
             'what the robot does when commands break off while its legs move or hang in the air',
         ),
-        estimator=estimator,
+        estimator=_estimator(read),
         frames=_frames(read),
-        deviations=_deviations(read, checked=estimator.mounting.checked),
+        deviations=_deviations(read),
         diagnostics_period=read.number('diagnostics_period', 1.0, (0.1, 60.0), 'period [s]'),
         thread_priority=declare_thread_priority(read, THREAD_PRIORITY),
     )
@@ -243,6 +241,11 @@ def _mounting(read: ParameterReader) -> ImuMounting:
             default=False,
             meaning='the mounting was compared with gravity (calibrate imu)',
         ),
+        rates_checked=read.flag(
+            'imu.rates_checked',
+            default=False,
+            meaning='the gyro was compared with turning by hand (calibrate imu)',
+        ),
     )
 
 
@@ -283,12 +286,10 @@ def _frames(read: ParameterReader) -> Frames:
     )
 
 
-def _deviations(read: ParameterReader, *, checked: bool) -> Deviations:
+def _deviations(read: ParameterReader) -> Deviations:
     span = (0.0, 10.0)
-    orientation = read.number('orientation_stddev', 0.02, span, '[rad]')
     return Deviations(
-        # whoever levels by an attitude of which nobody knows the signs has to be told
-        orientation=orientation if checked else max(orientation, UNCHECKED_DEVIATION),
+        orientation=read.number('orientation_stddev', 0.02, span, '[rad]'),
         rate=read.number('angular_velocity_stddev', 0.2, span, 'differentiated [rad/s]'),
         gyro=read.number('gyro_stddev', 0.02, span, 'of a gyro [rad/s]'),
         acceleration=read.number('linear_acceleration_stddev', 0.3, span, '[m/s²]'),
