@@ -19,7 +19,7 @@ from arm_canopen.cli.main import main
 from arm_canopen.config import load_bus
 from arm_canopen.device.runner import DeviceRunner
 from arm_canopen.exceptions import SdoError
-from arm_canopen.master.events import Event, Severity
+from arm_canopen.master.events import Event, EventKind, Severity
 from arm_canopen.master.network import Network
 from arm_canopen.master.runner import NetworkThread
 
@@ -59,8 +59,12 @@ class Robot:
 
     @property
     def complaints(self) -> list[str]:
-        """What the master told that was no good news."""
-        return [str(event) for event in self.events if event.severity >= Severity.WARNING]
+        """What the master told that was no good news, but for a computer that is too busy."""
+        return [
+            str(event)
+            for event in self.events
+            if event.severity >= Severity.WARNING and event.kind is not EventKind.CYCLE
+        ]
 
     def all_online(self) -> bool:
         """Tell whether every device is booted and has not been lost."""

@@ -29,6 +29,7 @@ class EventKind(Enum):
     PDO = 'pdo'
     DRIVE = 'drive'
     BUS = 'bus'
+    CYCLE = 'cycle'
 
 
 @dataclass(frozen=True, slots=True)

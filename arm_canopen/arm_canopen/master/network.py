@@ -349,7 +349,7 @@ class Network:
                 f'; devices that wait {watched * 1000:.0f} ms for the heartbeat of the master '
                 'have taken it for dead'
             )
-        self._report(Event(EventKind.BUS, Severity.WARNING, '', text))
+        self._report(Event(EventKind.CYCLE, Severity.WARNING, '', text))
 
     def _note_nmt(self, command: NmtCommand, node_id: int) -> None:
         for node in self.nodes.values():
