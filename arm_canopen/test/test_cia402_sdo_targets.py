@@ -249,6 +249,20 @@ def test_of_targets_that_come_faster_than_they_are_written_the_newest_counts() -
     assert net.drives[JOINT].rate == pytest.approx(0.29, abs=0.02)
 
 
+@pytest.mark.parametrize('mode', [OperationMode.PROFILE_POSITION, OperationMode.PROFILE_VELOCITY])
+def test_any_number_of_targets_may_come_while_one_is_written(mode: OperationMode) -> None:
+    """A client that does not wait for its answers gets all of them."""
+    net = running_in(mode)
+    net.devices[JOINT].faults.inject(FaultInjection(BusFault.SDO_DELAY, delay=0.1), net.now)
+    answers = []
+    for n in range(2_000):
+        answers.append(give(net, 1e-4 * n))
+        if n % 50 == 0:
+            net.run(PERIOD)
+    net.run(1.0)
+    assert all('target' in answered.result() for answered in answers)
+
+
 def test_a_stream_whose_targets_are_refused_stops_the_axis() -> None:
     """Nobody waits for an answer, so it is a warning, and the stream has ended."""
     net = running_in(OperationMode.PROFILE_VELOCITY)

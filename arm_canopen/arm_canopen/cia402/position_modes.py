@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 import math
 
@@ -204,8 +204,7 @@ class ProfilePosition(Mode):
         value = fitting(self._target, (to_device or self._units.position_to_device)(move.target))
         waiting = Waiting(value, move, self.destination(move))
         if move.immediate and not move.relative:
-            while self._queue:
-                self._queue.popleft().delivery.follow(waiting.delivery)
+            waiting = replace(waiting, delivery=self._replaced())
         elif len(self._queue) >= QUEUE_MAX:
             raise DriveError(
                 f'{QUEUE_MAX} moves wait for the drive already; send the next one later'
@@ -274,6 +273,15 @@ class ProfilePosition(Mode):
             )
         elif self._delivery.done:
             self._offer(now, acknowledged=acknowledged)
+
+    def _replaced(self) -> Promise[None]:
+        """Drop the moves that wait; return the promise that they all end with."""
+        replaced = [move.delivery for move in self._queue if not move.delivery.done]
+        self._queue.clear()
+        delivery: Promise[None] = replaced.pop() if replaced else Promise()
+        for older in replaced:
+            older.follow(delivery)
+        return delivery
 
     def _drop_waiting(self, reason: str) -> None:
         """Forget the moves that have not been handed over."""

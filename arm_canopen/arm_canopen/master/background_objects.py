@@ -109,11 +109,9 @@ class SdoWriter:
             Done when the device has this value or a newer one; rejected with what the device, or
             the silence, says.
         """
-        entry = QueuedWrite(value, Promise(), WRITE_PAUSE)
-        while self._queue:
-            self._queue.popleft().written.follow(entry.written)
-        self._enqueue(entry)
-        return entry.written
+        written = self._queue.pop().written if self._queue else Promise()
+        self._enqueue(QueuedWrite(value, written, WRITE_PAUSE))
+        return written
 
     def forget(self) -> None:
         """The device restarted: write again whatever comes."""
@@ -159,7 +157,7 @@ class SdoWriter:
     def _note_failure(self, error: Exception, *, repeats: bool) -> None:
         """Report the first failure, and keep values from piling up behind those that follow."""
         while len(self._queue) > 1:
-            self._queue.popleft().written.follow(self._queue[-1].written)
+            self._queue.popleft()
         self._failed = not self._queue
         if not self._node.online:
             return
