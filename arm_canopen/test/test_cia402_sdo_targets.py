@@ -153,8 +153,13 @@ def test_a_refused_holding_value_keeps_the_mode() -> None:
 # ------------------------------------------------------------------ taken means delivered
 
 
-@pytest.mark.parametrize('mode', [OperationMode.PROFILE_VELOCITY, OperationMode.PROFILE_TORQUE])
-def test_the_end_of_a_halt_does_not_overtake_its_target(mode: OperationMode) -> None:
+@pytest.mark.parametrize(
+    ('mode', 'target'),
+    [(OperationMode.PROFILE_VELOCITY, 0.3), (OperationMode.PROFILE_TORQUE, 3.0)],
+)
+def test_the_end_of_a_halt_does_not_overtake_its_target(
+    mode: OperationMode, target: float
+) -> None:
     """However late it arrives, bit 8 goes after the new target has come."""
     net = running_in(mode)
     net.do(JOINT, 'halt')
@@ -162,7 +167,7 @@ def test_the_end_of_a_halt_does_not_overtake_its_target(mode: OperationMode) -> 
     begin = net.now
     fault = FaultInjection(BusFault.SDO_DELAY, delay=0.15)  # within the SDO time-out
     net.devices[JOINT].faults.inject(fault, begin)
-    net.result(give(net, 0.3))
+    net.result(give(net, target))
     assert net.now - begin > 0.15
     words = [s for s in net.wire.log if s.frame.can_id == 0x200 + NODE_ID and s.time >= begin]
     halted = [bool(sent.frame.data[1]) for sent in words if sent.time < begin + 0.15]

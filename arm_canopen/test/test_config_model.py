@@ -10,7 +10,16 @@ from pathlib import Path
 from typing import Any
 
 from config_cases import added
-from config_samples import BUS, DRIVE_ROWS, eds_text, errors_of, load_text, Row, write_bus
+from config_samples import (
+    BUS,
+    DRIVE_ROWS,
+    eds_text,
+    errors_of,
+    load_text,
+    Row,
+    TWO_AXES_EDS,
+    write_bus,
+)
 import pytest
 
 from arm_canopen.config import DriveConfig, Identity, NodeConfig, PdoConfig
@@ -24,8 +33,6 @@ from arm_canopen.config.settings import DeviceSettings, MasterSettings, Options
 from arm_canopen.exceptions import ConfigError
 from arm_canopen.standard.datatypes import DataType
 from arm_canopen.standard.drive import DriveState
-
-TWO_AXES_EDS = Path(__file__).parents[1] / 'eds' / 'cia402_two_axes.eds'
 
 
 @pytest.mark.parametrize(
@@ -202,6 +209,22 @@ def test_a_drive_with_two_axes(tmp_path: Path) -> None:
     unnamed = added('joint1', 'num_channels: 2')
     (node,) = load_text(tmp_path, unnamed, eds=eds).nodes
     assert [axis.name for axis in node.axes] == ['joint1_0', 'joint1_1']
+
+
+@pytest.mark.parametrize('name', ['left arm', '1st', ''])
+def test_a_channel_has_a_name_that_a_ros_node_can_have(tmp_path: Path, name: str) -> None:
+    """As its device must; each axis gets a node of that name."""
+    text = added('joint1', f"num_channels: 2\nchannel_names: [elbow, '{name}']")
+    (error,) = errors_of(write_bus(tmp_path, text, eds=TWO_AXES_EDS.read_text()))
+    assert 'is no name for a ROS node' in error.message
+
+
+def test_two_devices_have_no_axis_of_one_name(tmp_path: Path) -> None:
+    """Each axis is a joint, with a node of its own."""
+    text = added('joint1', 'num_channels: 2\nchannel_names: [joint2, elbow]')
+    text += '  joint2: {node_id: 5}\n'
+    errors = errors_of(write_bus(tmp_path, text, eds=TWO_AXES_EDS.read_text()))
+    assert ["both have an axis 'joint2'" in error.message for error in errors] == [True]
 
 
 def test_all_pdos_of_the_eds_appear(tmp_path: Path) -> None:

@@ -6,6 +6,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 from config_cases import added
 from config_samples import DRIVE_ROWS, eds_text, load_text, Row, write_bus
@@ -14,11 +16,17 @@ from virtual_network import (
     bus_config,
     drive_config,
     drive_dictionary,
+    SCALE,
     sdo_write,
     VirtualNetwork,
     with_defaults,
 )
 
+from arm_canopen.cia402.modes import Mode
+from arm_canopen.cia402.motion import Setpoint
+from arm_canopen.cia402.parameters import DriveParameters
+from arm_canopen.cia402.target_limits import check_target
+from arm_canopen.cia402.units import Units
 from arm_canopen.cli.main import main
 from arm_canopen.config.checks import check_bus, check_file
 from arm_canopen.config.drive_model import DriveConfig
@@ -35,6 +43,14 @@ FACTORS = (
     Row(0x6092, 0, 'Highest sub-index', 5, 'const', '2'),
     Row(0x6092, 1, 'Feed', 7, 'rw', '6283185'),
     Row(0x6092, 2, 'Shaft revolutions', 7, 'rw', '10'),
+)
+POSITION, VELOCITY, TORQUE = (
+    cast('Mode', SimpleNamespace(number=number, setpoint=setpoint))
+    for number, setpoint in (
+        (OperationMode.CYCLIC_POSITION, 0.0),
+        (OperationMode.PROFILE_VELOCITY, None),
+        (OperationMode.CYCLIC_TORQUE, None),
+    )
 )
 EDS = eds_text((*DRIVE_ROWS, *FACTORS))  # 100,000 increments per rad
 
@@ -146,22 +162,66 @@ def test_a_drive_without_scales_moves_as_far_as_with_ros2_canopen() -> None:
     assert net.drives[JOINT].position == pytest.approx(1.5, abs=1e-3)
 
 
-@pytest.mark.parametrize('target', [1.5, -0.4, 3.2, 12_345.0])
-def test_a_target_that_would_be_rounded_away_is_refused(target: float) -> None:
-    """1.0 is a ten-thousandth of an increment: success without motion is no answer."""
+@pytest.mark.parametrize(
+    ('scale', 'target'),
+    [*((1e-4, target) for target in (1.5, -0.4, 3.2, 12_345.0)), (1.0, 1.5), (2.0, 0.3)],
+)
+def test_a_position_that_would_be_rounded_to_another_one_is_refused(
+    scale: float, target: float
+) -> None:
+    """Success at another place, or without motion, is no answer."""
     with pytest.raises(DriveError, match='scale_pos_to_dev'):
-        moved({'scale_pos_to_dev': 1e-4, 'scale_pos_from_dev': 1e4}, target)
+        moved({'scale_pos_to_dev': scale, 'scale_pos_from_dev': 1 / scale}, target)
 
 
-def test_a_target_that_a_coarse_scale_can_express_is_taken() -> None:
-    """20,000 units are two increments."""
-    net = moved({'scale_pos_to_dev': 1e-4, 'scale_pos_from_dev': 1e4}, 20_000.0)
-    assert net.targets(JOINT)[-1] == 2
+@pytest.mark.parametrize('offset', [0.0, 0.3])
+@pytest.mark.parametrize(
+    ('scale', 'target', 'increments'), [(1e-4, 20_000.0, 2), (0.9, 1.111, 1), (SCALE, 1e-5, 0)]
+)
+def test_a_position_within_the_tolerance_is_taken(
+    scale: float, target: float, increments: int, offset: float
+) -> None:
+    """Also by a coarse scale, and a part of an increment of a fine one; offsets count."""
+    units = Units(DriveConfig(scale_pos_to_dev=scale, offset_pos_to_dev=offset))
+    check_target(JOINT, POSITION, DriveParameters(), units, target - offset / scale)
+    assert units.position_to_device(target - offset / scale) == increments
 
 
-def test_small_targets_of_a_fine_scale_are_taken() -> None:
-    """A tenth of an increment is where the drive is, to its resolution."""
-    assert moved({}, 1e-5).targets(JOINT)[-1] == 0
+@pytest.mark.parametrize('mode', [VELOCITY, TORQUE])
+@pytest.mark.parametrize(
+    ('scale', 'target', 'taken'),
+    [
+        (0.3, 5.1, True),  # 1.53 device units; a whole number is not what was asked for
+        (0.3, -1.7, True),
+        (0.3, 1.6, False),
+        (0.3, -1.6, False),
+        (0.3, 0.0, True),
+        (1.0, 0.4, False),
+        (100.0, 0.004, False),
+        (100.0, 0.0006, True),  # of a stream that fades
+    ],
+)
+def test_a_rate_is_refused_only_where_it_would_become_0(
+    mode: Mode, scale: float, target: float, *, taken: bool
+) -> None:
+    """Velocities and torques are rounded, whatever their scale."""
+    units = Units(DriveConfig(scale_vel_to_dev=scale, scale_eff_to_dev=scale))
+    if taken:
+        check_target(JOINT, mode, DriveParameters(), units, target)
+        return
+    with pytest.raises(DriveError, match='would become 0'):
+        check_target(JOINT, mode, DriveParameters(), units, target)
+
+
+@pytest.mark.parametrize('scale', [0.9, 10.0])
+def test_a_path_leads_between_increments(scale: float) -> None:
+    """A motion source is not refused somewhere on its way because increments are whole."""
+    scales = {'scale_pos_to_dev': scale, 'scale_pos_from_dev': 1 / scale}
+    net = VirtualNetwork(bus_config(drive_config(JOINT, 2, scales=scales)))
+    net.boot()
+    net.do(JOINT, 'init')
+    net.select(JOINT, OperationMode.CYCLIC_POSITION)
+    net.drives[JOINT].stream(Setpoint(0.123))
 
 
 def test_a_drive_with_profile_velocity_0_refuses_targets() -> None:

@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from config_cases import added
-from config_samples import BUS, errors_of, load_text, write_bus
+from config_samples import BUS, errors_of, load_text, TWO_AXES_EDS, write_bus
 import pytest
 from virtual_network import bus_config, drive_config, drive_dictionary, VirtualNetwork
 
@@ -18,7 +18,6 @@ from arm_canopen.master.events import Severity
 from arm_canopen.standard.dictionary import ObjectDictionary
 from arm_canopen.standard.drive import DriveState, OperationMode
 
-TWO_AXES_EDS = Path(__file__).parents[1] / 'eds' / 'cia402_two_axes.eds'
 JOINT = 'joint1'
 
 

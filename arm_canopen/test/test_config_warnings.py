@@ -8,7 +8,7 @@ from pathlib import Path
 import re
 
 from config_cases import added
-from config_samples import BUS, eds_text, load_text
+from config_samples import BUS, eds_text, load_text, TWO_AXES_EDS
 import pytest
 
 
@@ -35,6 +35,15 @@ def test_told_with_line_and_key(
     assert text.splitlines()[warning.line - 1].strip() == piece
     assert message in warning.message
     assert warning.remedy
+
+
+def test_scales_of_a_channel_are_checked_as_those_of_a_device(tmp_path: Path) -> None:
+    """Against what counts for its axis, its own and its device's."""
+    text = added('joint1', 'num_channels: 2\nchannels: [{scale_pos_to_dev: 57.3}, {}]')
+    warnings = load_text(tmp_path, text, eds=TWO_AXES_EDS.read_text()).warnings
+    (warning,) = (warning for warning in warnings if 'scale' in warning.message)
+    assert 'is 0.0573, not 1' in warning.message
+    assert warning.key.endswith('scale_pos_to_dev')
 
 
 @pytest.mark.parametrize(

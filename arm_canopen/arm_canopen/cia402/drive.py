@@ -24,7 +24,7 @@ from .quirks import quirks_of
 from .refusal import Refusal, RefusalCause
 from .state_machine import Command, fault_reset, next_command
 from .stop_sequence import StopSequence
-from .target_limits import check_feed_forward
+from .target_limits import check_setpoint
 
 FOLLOWS_COMMAND = int(Statusword.FOLLOWS_COMMAND)
 FOLLOWING_ERROR = int(Statusword.FOLLOWING_ERROR)
@@ -205,11 +205,10 @@ class Drive(ModedDrive):
         Raises:
             DriveError: A value is not finite, does not fit its object or is beyond a limit.
         """
-        self.check_target(setpoint.position)
         if not isinstance(self.mode, CyclicPosition):
             return
+        check_setpoint(self.name, self.mode, self.parameters, setpoint)
         if self.mode.number is OperationMode.CYCLIC_POSITION:
-            check_feed_forward(self.name, self.parameters, setpoint)
             self.feed_forward.follow(setpoint)
         self.mode.stream(setpoint.position)
         self.halt.release()

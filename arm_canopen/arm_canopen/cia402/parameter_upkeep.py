@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from ..config.drive_model import DriveConfig
-from ..config.drive_units import COARSE_SCALE
+from ..config.drive_units import is_coarse
 from ..exceptions import SdoError
 from ..master.remote_node import RemoteNode
 from ..master.scheduler import Promise, Scheduler, Task
@@ -109,8 +109,8 @@ class ParameterUpkeep:
         used = self._config.position_mode in (None, OperationMode.PROFILE_POSITION)
         if used and self.told.profile_velocity_inc == 0:
             self._warn('its profile velocity (0x6081) is 0: targets of mode 1 are refused')
-        scale = abs(self._units.position_raw(1.0))
-        if self._config.scale_from_factor_group and scale < COARSE_SCALE:
+        scale = self._units.position_scale
+        if self._config.scale_from_factor_group and is_coarse(scale):
             self._warn(
                 f'1.0 rad is {scale:g} increments by its factor group: targets between two of '
                 'them are refused'

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import math
 
+from ..config.drive_units import POSITION_TOLERANCE
 from ..exceptions import DriveError
 from ..standard.drive import OperationMode
 from .modes import Mode
@@ -18,7 +19,9 @@ VELOCITY_MODES = (
     OperationMode.PROFILE_VELOCITY,
     OperationMode.CYCLIC_VELOCITY,
 )
-EXPRESSIBLE = 0.01  # share by which a coarse target may be rounded
+NEGLIGIBLE = (
+    1e-3  # [unit/s], [unit of effort]; what is smaller may become 0, as in a stream that fades
+)
 TORQUE_MODES = (OperationMode.PROFILE_TORQUE, OperationMode.CYCLIC_TORQUE)
 
 
@@ -39,7 +42,7 @@ def check_target(
     """
     if mode.setpoint is not None:
         _check_position(name, told.position_limits, target)
-        _check_expressible(name, units.position_raw(target), target, 'scale_pos_to_dev')
+        _check_rounding(name, units, target)
         if mode.number is OperationMode.PROFILE_POSITION and told.profile_velocity_inc == 0:
             raise DriveError(
                 f'{name}: its profile velocity (0x6081) is 0, so it would not move; write it, for '
@@ -47,14 +50,20 @@ def check_target(
             )
     elif mode.number in VELOCITY_MODES:
         _check_size(name, told.speed_limit, target, 'velocity {:g} (0x607F)')
-        _check_expressible(name, units.velocity_raw(target), target, 'scale_vel_to_dev')
+        _check_effect(name, units.velocity_raw(target), target, 'scale_vel_to_dev')
     elif mode.number in TORQUE_MODES:
         _check_size(name, told.effort_limit, target, 'torque {:g} (0x6072)')
-        _check_expressible(name, units.effort_raw(target), target, 'scale_eff_to_dev')
+        _check_effect(name, units.effort_raw(target), target, 'scale_eff_to_dev')
 
 
-def check_feed_forward(name: str, told: DriveParameters, setpoint: Setpoint) -> None:
-    """Refuse a feed-forward beyond what the drive may ever do; errors as for targets."""
+def check_setpoint(name: str, mode: Mode, told: DriveParameters, setpoint: Setpoint) -> None:
+    """Refuse a set-point of a motion source beyond limits; errors as for targets.
+
+    A path leads between increments everywhere, and is off by half of one at most.
+    """
+    _check_position(name, told.position_limits, setpoint.position)
+    if mode.number is not OperationMode.CYCLIC_POSITION:
+        return  # which has no feed-forward
     _check_size(name, told.speed_limit, setpoint.velocity, 'velocity {:g} (0x607F)')
     _check_size(name, told.effort_limit, setpoint.effort, 'torque {:g} (0x6072)')
 
@@ -67,16 +76,24 @@ def _check_position(name: str, limits: tuple[float, float] | None, target: float
         )
 
 
-def _check_expressible(name: str, scaled: float, target: float, key: str) -> None:
-    """Refuse what the object cannot express where one of its units is more than a user unit."""
-    if math.isfinite(scaled) and abs(scaled) < abs(target):
-        rounded = round(scaled)
-        if abs(scaled - rounded) > EXPRESSIBLE * abs(rounded):
-            raise DriveError(
-                f'{name}: target {target:g} is {scaled:g} device units, of which the object has '
-                f'whole ones only, so the drive would go to another one; is {key} in bus.yml '
-                'right? It is device units per user unit'
-            )
+def _check_rounding(name: str, units: Units, target: float) -> None:
+    """Refuse a position that whole increments miss by more than the tolerance."""
+    nearest = units.nearest_position(target)
+    if abs(nearest - target) > POSITION_TOLERANCE:
+        raise DriveError(
+            f'{name}: target {target:g} is between two increments, the nearest is {nearest:g}; is '
+            'scale_pos_to_dev in bus.yml right? It is increments per user unit'
+        )
+
+
+def _check_effect(name: str, scaled: float, target: float, key: str) -> None:
+    """Refuse a velocity or torque that asks for something and would become 0."""
+    if abs(target) > NEGLIGIBLE and math.isfinite(scaled) and round(scaled) == 0:
+        raise DriveError(
+            f'{name}: target {target:g} is {scaled:g} device units, of which the object has whole '
+            f'ones only, so it would become 0; is {key} in bus.yml right? It is device units per '
+            'user unit'
+        )
 
 
 def _check_size(name: str, limit: float | None, target: float, what: str) -> None:

@@ -49,9 +49,16 @@ class Units:
         scaled = position * config.scale_pos_to_dev + config.offset_pos_to_dev
         return _to_integer(position, scaled, INT32_MAX)
 
-    def position_raw(self, position: float) -> float:
-        """Convert a position to increments without its offset, and without rounding."""
-        return position * self._config.scale_pos_to_dev
+    @property
+    def position_scale(self) -> float:
+        """Increments per user unit."""
+        return self._config.scale_pos_to_dev
+
+    def nearest_position(self, position: float) -> float:
+        """Return the position that a whole number of increments stands for."""
+        config = self._config
+        scaled = position * config.scale_pos_to_dev + config.offset_pos_to_dev
+        return self.position_commanded(round(scaled)) if math.isfinite(scaled) else position
 
     def effort_raw(self, effort: float) -> float:
         """Convert a torque to device units, whether or not an object can hold it."""

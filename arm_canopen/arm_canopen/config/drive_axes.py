@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+import re
 from typing import Any
 
 from ..standard.drive import DriveState
@@ -12,9 +13,11 @@ from . import scalars
 from .device_keys import CHANNEL_KEYS, SCALE_KEYS
 from .document import Item, Mapping
 from .drive_model import DriveConfig, RecoveryPolicy
-from .findings import Findings, RefusedError
+from .findings import Findings, Place, RefusedError
 from .section import listing, read_section
 
+ROS_NAME = re.compile(r'[A-Za-z_][A-Za-z0-9_]*')
+SCALE_TOLERANCE = 0.01  # by which the product of the scales of both directions may miss 1
 POLICIES = {policy.value: policy for policy in RecoveryPolicy}
 
 
@@ -30,8 +33,17 @@ def read_drive(section: Mapping, values: dict[str, Any], findings: Findings) -> 
         values['switching_state'] = _switching_state(section, values, findings)
     if 'recovery' in values:
         values['recovery'] = _policy(section.entries['recovery'], values['recovery'], findings)
-    _check_one_rule(section, values, findings)
-    return DriveConfig(**_with_inverse_effort(values))
+    return _with_scales(DriveConfig(), section, values, findings)
+
+
+def check_node_name(name: str, place: Place, findings: Findings) -> None:
+    """Refuse a name of a device or axis that no ROS node can have."""
+    if not ROS_NAME.fullmatch(name):
+        findings.error(
+            place,
+            f'{name!r} is no name for a ROS node',
+            'take letters, digits and underscores, and begin with a letter',
+        )
 
 
 def read_axes(
@@ -49,7 +61,7 @@ def read_axes(
     names = [name] if count == 1 else [f'{name}_{number}' for number in range(count)]
     given = listing(section, 'channel_names', findings)
     if given is not None:
-        names = [_text(item, findings) for item in given.items]
+        names = [_axis_name(item, findings) for item in given.items]
     channels = listing(section, 'channels', findings)
     parts = list(channels.items) if channels is not None else [None] * count
     for what, items, key in (('names', names, 'channel_names'), ('entries', parts, 'channels')):
@@ -79,11 +91,30 @@ def _axis(drive: DriveConfig, part: Item | None, findings: Findings) -> DriveCon
             "write '- {scale_pos_to_dev: 1000.0}' and the like",
         )
         return drive
-    values = _with_inverse_effort(read_section(part, CHANNEL_KEYS, findings))
-    _check_one_rule(part, values, findings)
+    values = read_section(part, CHANNEL_KEYS, findings)
     if any(key in part.entries for key in SCALE_KEYS):
-        values['scale_from_factor_group'] = False
-    return replace(drive, **values)
+        drive = replace(drive, scale_from_factor_group=False)
+    return _with_scales(drive, part, values, findings)
+
+
+def _with_scales(
+    drive: DriveConfig, section: Mapping, values: dict[str, Any], findings: Findings
+) -> DriveConfig:
+    """Return an axis with the values of a section, be it of its device or of its channel."""
+    _check_one_rule(section, values, findings)
+    axis = replace(drive, **_with_inverse_effort(values))
+    for what in ('pos', 'vel', 'eff'):
+        keys = (f'scale_{what}_to_dev', f'scale_{what}_from_dev')
+        given = [section.entries[key].place for key in keys if key in section.entries]
+        product = getattr(axis, keys[0]) * getattr(axis, keys[1])
+        if given and abs(product - 1) > SCALE_TOLERANCE:
+            findings.warning(
+                given[0],
+                f'{keys[0]} times {keys[1]} is {product:g}, not 1: targets and feedback have '
+                'different units',
+                'make one the inverse of the other',
+            )
+    return axis
 
 
 def _switching_state(section: Mapping, values: dict[str, Any], findings: Findings) -> DriveState:
@@ -121,9 +152,11 @@ def _policy(item: Item, text: str, findings: Findings) -> RecoveryPolicy:
     return POLICIES.get(text, RecoveryPolicy.MANUAL)
 
 
-def _text(item: Item, findings: Findings) -> str:
+def _axis_name(item: Item, findings: Findings) -> str:
     try:
-        return scalars.text(item)
+        name = scalars.text(item)
     except RefusedError as reason:
         findings.refuse(item.place, reason)
         return ''
+    check_node_name(name, item.place, findings)
+    return name

@@ -17,8 +17,10 @@ from .factor_group import FACTOR_OBJECTS, FactorGroup, ratio
 
 POSITION_KEY, VELOCITY_KEY = 'scale_pos_to_dev', 'scale_vel_to_dev'
 FACTOR_KEY = 'scale_from_factor_group'
+POSITION_TOLERANCE = 0.01
+"""User units (rad, m) by which a position may miss its target because increments are whole."""
 COARSE_SCALE = 1.0
-"""Device units per user unit below which targets are rounded by more than half a user unit."""
+"""Device units per user unit of velocity below which more than half a user unit becomes 0."""
 SAME_SCALE = 1e-3  # share by which two scales may differ and still be the same
 
 
@@ -84,18 +86,28 @@ def check_units(subject: Subject) -> None:
 
 
 def _check_coarse(subject: Subject, units: AxisUnits) -> None:
-    for key, scale, what in (
-        (POSITION_KEY, units.increments, 'position'),
-        (VELOCITY_KEY, units.velocity, 'velocity'),
+    for key, scale, what, refused in (
+        (POSITION_KEY, units.increments, 'position', 'targets between them are refused'),
+        (VELOCITY_KEY, units.velocity, 'velocity', 'targets below half of that are refused'),
     ):
-        if abs(scale) < COARSE_SCALE:
+        coarse = is_coarse(scale) if key == POSITION_KEY else abs(scale) < COARSE_SCALE
+        if coarse:
             subject.findings.warning(
                 subject.place(key),
                 f'{units.name}: 1.0 is {scale:g} device units of {what}, so one of them is '
-                f'{1 / abs(scale):g} user units: targets between them are refused',
+                f'{1 / abs(scale):g} user units: {refused}',
                 f'correct {key}: it is device units per user unit (ros2_canopen has 1000), the '
                 'inverse of the one from the device',
             )
+
+
+def is_coarse(scale: float) -> bool:
+    """Whether whole increments miss positions by more than the tolerance.
+
+    Args:
+        scale: Increments per user unit.
+    """
+    return 0.5 / abs(scale) > POSITION_TOLERANCE
 
 
 def _check_against_factors(subject: Subject, units: AxisUnits) -> None:

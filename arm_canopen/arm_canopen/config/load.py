@@ -73,6 +73,7 @@ def read_bus(
     periods = [draft.settings.poll_period for draft in drafts]
     master = build_master(layout.master, settings, options, periods, findings)
     unique = _check_node_ids(layout.master, settings.node_id, drafts, findings)
+    _check_axis_names(unique, findings)
     _check_lifecycle(master, drafts, findings)
     around = Surroundings(options, settings, master)
     nodes = tuple(
@@ -140,6 +141,22 @@ def _check_node_ids(
             'give each device an id of its own',
         )
     return unique
+
+
+def _check_axis_names(drafts: Sequence[DeviceDraft], findings: Findings) -> None:
+    """Refuse an axis that has the name of another device's axis: each is a joint of its own."""
+    owners: dict[str, str] = {}
+    for draft in drafts:
+        if draft.config is None:
+            continue
+        for axis in draft.config.axes:
+            owner = owners.setdefault(axis.name, draft.config.name)
+            if owner != draft.config.name:
+                findings.error(
+                    draft.place_of('channel_names'),
+                    f'{draft.config.name} and {owner} both have an axis {axis.name!r}',
+                    'give each a name of its own',
+                )
 
 
 def _with_cob_ids(drafts: Sequence[DeviceDraft], findings: Findings) -> list[DeviceDraft]:

@@ -9,17 +9,15 @@ import re
 
 from .device_keys import DEVICE_KEYS, DRIVE_KEYS
 from .document import Mapping
-from .drive_axes import read_axes, read_drive
+from .drive_axes import check_node_name, read_axes, read_drive
 from .drive_model import DriveConfig
 from .drivers import check_driver
-from .findings import Findings, Place
+from .findings import Findings
 from .master_keys import MASTER_KEYS, OPTION_KEYS
 from .model import BOOT_TIMEOUT, POLL_PERIOD, RETRY_FACTOR, SDO_TIMEOUT
 from .section import read_section, texts
 
-ROS_NAME = re.compile(r'[A-Za-z_][A-Za-z0-9_]*')
 NAMESPACE = re.compile(r'/?([A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*)?')
-SCALE_TOLERANCE = 0.01
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,15 +130,9 @@ def read_device_settings(
     drive_fields = {key.field for key in DRIVE_KEYS}
     drive = read_drive(section, {k: values.pop(k) for k in drive_fields & values.keys()}, findings)
     settings = DeviceSettings(**values)
-    if not ROS_NAME.fullmatch(name):
-        findings.error(
-            section.place,
-            f'{name!r} is no name for a ROS node',
-            'take letters, digits and underscores, and begin with a letter',
-        )
+    check_node_name(name, section.place, findings)
     _check_names(section, settings.namespace, findings)
     check_driver(section, settings.driver, findings, for_master=False)
-    _check_scales(section, drive, findings)
     return settings, read_axes(name, section, settings.num_channels, drive, findings)
 
 
@@ -156,25 +148,3 @@ def _check_names(section: Mapping, namespace: str, findings: Findings) -> None:
             f'{namespace!r} is no ROS namespace',
             "write it like '/left/arm'",
         )
-
-
-def _check_scales(section: Mapping, drive: DriveConfig, findings: Findings) -> None:
-    """Warn when targets and feedback have different units."""
-    scales = {
-        'pos': drive.scale_pos_to_dev * drive.scale_pos_from_dev,
-        'vel': drive.scale_vel_to_dev * drive.scale_vel_from_dev,
-        'eff': drive.scale_eff_to_dev * drive.scale_eff_from_dev,
-    }
-    for axis, product in scales.items():
-        if abs(product - 1) > SCALE_TOLERANCE:
-            findings.warning(
-                _first_place(section, f'scale_{axis}_to_dev', f'scale_{axis}_from_dev'),
-                f'scale_{axis}_to_dev times scale_{axis}_from_dev is {product:g}, not 1: targets '
-                'and feedback have different units',
-                'make one the inverse of the other',
-            )
-
-
-def _first_place(section: Mapping, *names: str) -> Place:
-    given = (section.entries[name].place for name in names if name in section.entries)
-    return next(given, section.place)
