@@ -143,7 +143,7 @@ class ParameterReader:
     def _following_window(self, window: int | None) -> float | None:
         if window is None or window in NO_WINDOW:
             return None
-        return abs(window / self._units.position_raw(1.0))
+        return abs(window / self._units.position_scale)
 
     async def _profile(self) -> ProfileLimits:
         velocity = await self._read(Index.PROFILE_VELOCITY)
