@@ -282,6 +282,8 @@ def test_diff_shows_what_bus_yml_has_otherwise(
     assert '0x1018:01' not in output
     main(['write', 'left', '0x6081', '4321', *arguments])
     main(['write', 'left', '0x1016:1', '0x010258', *arguments])  # 600 ms for node 1
+    for event_timer in ('0x1800:5', '0x1801:5'):
+        main(['write', 'left', event_timer, '100', *arguments])
     capsys.readouterr()
     assert main(['diff', 'left', '--all', *arguments]) == 0
     output = capsys.readouterr().out

@@ -235,7 +235,9 @@ def test_all_pdos_of_the_eds_appear(tmp_path: Path) -> None:
         assert [pdo.configured for pdo in group] == [True] + [False] * 5
         assert [pdo.enabled for pdo in group] == [True, True] + [False] * 4
         assert [pdo.cob_id for pdo in group[:4]] == [base + 0x100 * n + 2 for n in range(4)]
-        assert all(pdo.inhibit_time is pdo.event_time is pdo.sync_start is None for pdo in group)
+        assert all(pdo.inhibit_time is pdo.sync_start is None for pdo in group)
+    assert [pdo.event_time for pdo in tpdos] == [0.1] + [None] * 5  # state, on change
+    assert all(pdo.event_time is None for pdo in rpdos)
 
 
 def test_parameters_of_a_pdo(tmp_path: Path) -> None:

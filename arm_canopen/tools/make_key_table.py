@@ -127,7 +127,8 @@ TEXTS: dict[str, str] = {
     'mapping': 'mapped objects, each with `index` and `sub_index`; without: that of the EDS',
     'sync_start': 'SYNC counter at which it begins',
     'inhibit_time': 'shortest time between two',
-    'event_timer': 'longest time between two; its end is told after three times as long',
+    'event_timer': 'longest time between two; its end is told after three times as long; '
+    "100 for a drive's state on change",
     'event_deadline': 'longest time that the device waits for one',
     'index': 'object',
     'sub_index': 'its sub-index',

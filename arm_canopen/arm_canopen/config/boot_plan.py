@@ -15,6 +15,7 @@ from .model import BusConfig, NodeConfig, PdoConfig, SdoWrite, Written
 from .parameter_values import is_configured
 from .pdo_direction import Direction, RPDO, TPDO
 from .shared_keys import HUNDRED_MICROSECONDS, MILLISECONDS
+from .tpdo_freshness import EVENT_TIMER_SUBINDEX
 
 COB_ID_BITS = COB_ID_INVALID | COB_ID_EXTENDED | CAN_ID_MASK
 """Bits that bus.yml decides of a COB-ID; the device has bit 30 as it can."""
@@ -26,6 +27,7 @@ ERROR_CONTROL = (
     (Index.LIFE_TIME_FACTOR, DataType.UNSIGNED8, 'life_time_factor'),
 )
 WATCH_KEY = 'heartbeat_consumer'
+EVENT_TIMER = 'event_timer'
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,6 +144,8 @@ class _Plan:
             for pdo in pdos:
                 if pdo.configured:
                     yield from self._pdo(direction, pdo)
+                elif pdo.event_time is not None:
+                    yield from self._event_timer(direction, pdo)
         yield from map(_written, node.sdo_writes[leading:])
 
     def _watch(self) -> Iterator[BootWrite]:
@@ -210,13 +214,20 @@ class _Plan:
             cob_id, pdo.cob_id, unsigned, f'{key}.cob_id', requested=is_given, mask=COB_ID_BITS
         )
 
+    def _event_timer(self, direction: Direction, pdo: PdoConfig) -> Iterator[BootWrite]:
+        """Set the event timer alone of a TPDO that is otherwise left as the device has it."""
+        for write in self._parameters(direction, pdo):
+            if write.subindex == EVENT_TIMER_SUBINDEX:
+                yield write
+
     def _parameters(self, direction: Direction, pdo: PdoConfig) -> Iterator[BootWrite]:
         index = direction.communication + pdo.number - 1
-        deadline = 'event_timer' if direction is TPDO else 'event_deadline'
+        deadline = EVENT_TIMER if direction is TPDO else 'event_deadline'
+        event_time = _units(pdo.event_time, MILLISECONDS)
         for subindex, name, data_type, value in (
             (2, 'transmission', DataType.UNSIGNED8, pdo.transmission),
             (3, 'inhibit_time', DataType.UNSIGNED16, _units(pdo.inhibit_time)),
-            (5, deadline, DataType.UNSIGNED16, _units(pdo.event_time, MILLISECONDS)),
+            (EVENT_TIMER_SUBINDEX, deadline, DataType.UNSIGNED16, event_time),
             (6, 'sync_start', DataType.UNSIGNED8, pdo.sync_start),
         ):
             if value is not None:
@@ -244,6 +255,10 @@ class _Plan:
         """Tell whether bus.yml gives a key of a PDO, or a DCF the object."""
         if is_requested(self._bus, self._node, direction.name, str(pdo.number), key):
             return True
+        if key == EVENT_TIMER:  # which a DCF may leave to its default beside other parameters
+            index = direction.communication + pdo.number - 1
+            entry = self._node.dictionary.get(index, EVENT_TIMER_SUBINDEX)
+            return entry is not None and entry.configured
         objects = direction.mapping if key == 'mapping' else direction.communication
         return is_configured(self._node.dictionary, objects + pdo.number - 1)
 

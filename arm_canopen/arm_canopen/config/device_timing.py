@@ -15,11 +15,12 @@ from .device_reader import DeviceDraft
 from .drive_types import check_drive_types
 from .findings import Findings
 from .master_model import MasterConfig
-from .model import NodeConfig
+from .model import NodeConfig, PdoConfig
 from .pdo_direction import Direction, RPDO, TPDO
 from .pdo_resolution import PdoDraft
 from .settings import MasterSettings, Options
 from .shared_keys import MILLISECONDS
+from .tpdo_freshness import with_event_timer
 
 CYCLIC_OBJECTS = ((RPDO, Index.CONTROLWORD, 'enabled'), (TPDO, Index.STATUSWORD, 'watched'))
 """What a drive cannot do without in its PDOs, as no SDO runs inside the cycle."""
@@ -66,9 +67,16 @@ def finish_device(
         guard_time=_guard_time(draft, config.dictionary, producer, findings),
         life_time_factor=_life_time_factor(draft, config.dictionary),
         heartbeat_consumer=_heartbeat_consumer(draft, config.dictionary, master, findings),
-        tpdos=tuple(pdo.config for pdo in draft.pdos if pdo.direction is TPDO),
+        tpdos=_tpdos(draft, config),
         rpdos=tuple(pdo.config for pdo in draft.pdos if pdo.direction is RPDO),
     )
+
+
+def _tpdos(draft: DeviceDraft, config: NodeConfig) -> tuple[PdoConfig, ...]:
+    tpdos = (pdo.config for pdo in draft.pdos if pdo.direction is TPDO)
+    if not config.is_drive:
+        return tuple(tpdos)
+    return tuple(with_event_timer(pdo, config.dictionary) for pdo in tpdos)
 
 
 def _heartbeat_producer(

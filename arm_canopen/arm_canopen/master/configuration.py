@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import math
 import struct
 
 from ..config.boot_plan import (
@@ -19,6 +20,7 @@ from ..config.boot_plan import (
     watch_word,
 )
 from ..config.model import BusConfig, SdoWrite
+from ..config.tpdo_freshness import EVENT_TIMER_SUBINDEX
 from ..exceptions import SdoAbortError, SdoError
 from ..standard.objects import Index, PDO_COUNT_MAX
 from .events import EventKind, Severity
@@ -141,6 +143,14 @@ class Configurator:
             if write.requested:
                 raise SdoError(f'{refused}: correct or remove it there') from error
             self._warn(f'{refused} by default only, so it goes on with what it has')
+            if write.subindex == EVENT_TIMER_SUBINDEX:
+                self._leave_untimed(write.index)
+
+    def _leave_untimed(self, index: int) -> None:
+        """Await a TPDO no more that comes on change only."""
+        for entry in self._node.image.inputs:
+            if entry.config.number == index - Index.TPDO_COMMUNICATION + 1:
+                entry.stale_after = math.inf
 
     async def _holds(self, write: BootWrite) -> bool:
         """Tell whether a device that refused to be written has the value already."""

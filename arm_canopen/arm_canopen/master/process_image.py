@@ -16,10 +16,10 @@ from ..can.frame import Frame
 from ..config.model import PdoConfig
 from ..exceptions import CodecError
 from ..standard.datatypes import DataType, integer_range
-from ..standard.pdo import MappedObject, Number, PdoCodec, SYNCHRONOUS_MAX
+from ..standard.objects import is_state
+from ..standard.pdo import EVENT_DRIVEN, MappedObject, Number, PdoCodec, SYNCHRONOUS_MAX
 from .scheduler import completed, Promise
 
-EVENT_DRIVEN = 254  # transmission types from which on a PDO has an event timer (CiA 301, table 72)
 REPEAT_SHARE = 0.5  # of the deadline of an RPDO, after which it is repeated
 PERIODS_MISSED = 3  # periods of a TPDO, or of a poll, without a new value
 STALE_AFTER = 0.5  # [s] without a new value, where its period is shorter
@@ -123,6 +123,13 @@ class Input:
     def stale(self, now: float) -> bool:
         """Tell whether its values are missing, or too old to act on, at a steady time in [s]."""
         return self.values is None or now - self.timestamp > self.stale_after
+
+    @property
+    def loss_unnoticed(self) -> bool:
+        """Whether it carries state of a drive, and nothing shows that it got lost."""
+        return self.stale_after == math.inf and any(
+            is_state(mapped.index) for mapped in self.config.mapping
+        )
 
     def _longest_silence(self, sync_period: float) -> float:
         if self.synchronous:

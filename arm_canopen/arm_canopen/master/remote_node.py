@@ -153,6 +153,8 @@ class RemoteNode(RemoteObjects):
         self._backoff.booted(now)
         self.life.start(now)
         self.loss = ''
+        if self.config.is_drive:
+            self.pdos.warn_of_losses()
 
     def watch(self, now: float) -> bool:
         """Look for life signs and PDOs that are overdue; tells whether the device was lost now.

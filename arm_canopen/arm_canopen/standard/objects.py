@@ -131,6 +131,15 @@ AXIS_OFFSET = 0x800  # between the objects of two axes of a drive (CiA 402-2, 7.
 AXES_MAX = 8  # axes of one device (CiA 402-2, 7.2)
 _CONTROLWORDS = frozenset(Index.CONTROLWORD + AXIS_OFFSET * axis for axis in range(AXES_MAX))
 _PROFILE_AREA = 0x6000  # first object of the first axis
+_STATE = frozenset(
+    {
+        Index.STATUSWORD,
+        Index.MODE_OF_OPERATION_DISPLAY,
+        Index.POSITION_ACTUAL,
+        Index.VELOCITY_ACTUAL,
+        Index.TORQUE_ACTUAL,
+    }
+)
 _SIGNED = frozenset(
     {
         (Index.VL_TARGET_VELOCITY, 0),
@@ -151,6 +160,12 @@ def is_signed(index: int, subindex: int) -> bool:
     """Tell whether an object of any axis is a position, velocity or torque, which has a sign."""
     axis, offset = divmod(index - _PROFILE_AREA, AXIS_OFFSET)
     return 0 <= axis < AXES_MAX and (_PROFILE_AREA + offset, subindex) in _SIGNED
+
+
+def is_state(index: int) -> bool:
+    """Tell whether an object shows how one of the axes of a drive is, as the cycle reads it."""
+    axis, offset = divmod(index - _PROFILE_AREA, AXIS_OFFSET)
+    return 0 <= axis < AXES_MAX and _PROFILE_AREA + offset in _STATE
 
 
 def is_controlword(index: int) -> bool:

@@ -19,6 +19,7 @@ from .objects import PDO_BITS_MAX
 Number = int | float
 
 SYNCHRONOUS_MAX = 240  # transmission types up to this one follow SYNC (CiA 301, tables 69 and 71)
+EVENT_DRIVEN = 254  # transmission types from which on a PDO has an event timer (CiA 301, table 72)
 
 STRUCT_CODES: dict[DataType, str] = {
     DataType.INTEGER8: 'b',
