@@ -68,9 +68,10 @@ def test_drives_beside_the_arm_are_there() -> None:
 
 
 def test_a_gripper_is_published_with_the_arm(isolation: Isolation) -> None:
-    """Its drive publishes its own joint states; the broadcaster puts them beside the arm's."""
+    """Its own joint states come beside the arm's, stamped when the oldest was measured."""
     rclpy.init(domain_id=isolation.domain_id)
     drives, _ = ready()
+    drives.axes[2] = replace(drives.axes[2], age=0.3)
     heard: list[JointState] = []
     nodes: list[Any] = [Node('joint_state_broadcaster'), Node('gripper')]
     node, gripper = nodes
@@ -95,3 +96,5 @@ def test_a_gripper_is_published_with_the_arm(isolation: Isolation) -> None:
     whole = next(message for message in heard if 'gripper' in message.name)
     assert [*whole.name] == [*drives.source.axes, 'gripper']
     assert whole.position[-1] == 0.04
+    age = time.time() - (whole.header.stamp.sec + 1e-9 * whole.header.stamp.nanosec)
+    assert age >= 0.3

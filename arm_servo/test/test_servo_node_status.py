@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import pytest
 from servo_commands import InlineWorker, jog, move_by, twist
@@ -18,6 +19,7 @@ from arm_servo.gateway import CommandGateway
 from arm_servo.nodes.servo_parameters import UNCHECKED
 from arm_servo.nodes.servo_status import code_of, status_of, StatusCode
 from arm_servo.report import Cause, Limiter, MotionReport
+from arm_servo.set_point import Source
 
 
 def attached(name: str = 'panda', at: Sequence[float] = ()) -> Drives:
@@ -95,6 +97,21 @@ def test_a_stop_of_the_safety_filter_is_no_free_motion() -> None:
             assert 'panda_hand' in words
     assert StatusCode.HALT_FOR_COLLISION in reported
     assert core.model.clearance(core.state.position) > 0.004
+
+
+def test_what_stops_a_trajectory_is_told_too() -> None:
+    """The safety filter holds whatever moves the arm; its code is not only the jog's."""
+    drives = attached()
+    move_by(drives.gateway, {'panda_joint1': 0.3})
+    drives.run(5)
+    snapshot = drives.gateway.snapshot
+    assert snapshot.set_point is not None
+    report = MotionReport(0.0, (Limiter(Cause.COLLISION, 'hand - arm', 0.01, 0.0),))
+    for source in (Source.TARGET, Source.TRAJECTORY):
+        point = replace(snapshot.set_point, source=source, report=report)
+        code, words = status_of(replace(snapshot, source=source, set_point=point), '', '', '')
+        assert code == StatusCode.HALT_FOR_COLLISION
+        assert 'hand - arm' in words
 
 
 def test_the_strongest_limit_is_the_one_that_counts() -> None:

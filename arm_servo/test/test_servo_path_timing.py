@@ -210,6 +210,19 @@ def test_a_little_haste_is_late_and_says_so() -> None:
     kept(robot('panda').limits, states)
 
 
+def test_nothing_takes_longer_than_move_group_waits() -> None:
+    """Its monitor ends an execution after 1.1 times the time asked and 0.5 s: refused before."""
+    durations = []
+    for size in (0.040, 0.042, 0.044, 0.046, 0.048):
+        goal = swinging('panda', size, 2.0)
+        try:
+            durations.append(core_of('panda').follow(goal).duration)
+        except GoalError:
+            continue
+        assert durations[-1] <= 1.1 * goal.points[-1].time + 0.5
+    assert 0 < len(durations) < 5
+
+
 def test_a_bulge_beyond_a_limit_is_refused() -> None:
     """Points within the limits whose speeds lead beyond one between them are refused."""
     limits, core = robot('panda').limits, core_of('panda')

@@ -1,0 +1,130 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What the topics of the servo become: who gets the drives back, for how long, how fast."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from concurrent.futures import Future
+import time
+from typing import Any
+
+from control_msgs.msg import JointJog
+from geometry_msgs.msg import PoseStamped, TwistStamped
+from isolation import Isolation
+import pytest
+import rclpy
+from rclpy.context import Context
+from rclpy.duration import Duration
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from servo_drives import Drives
+
+from arm_servo.nodes.servo import Servo
+from arm_servo.nodes.servo_parameters import declare_servo, PREFIX
+from arm_servo.requests import JogRequest
+from arm_servo.servo import PoseCommand
+
+TWIST, JOG, POSE = 'delta_twist_cmds', 'delta_joint_cmds', 'pose_target_cmds'
+TIMEOUT = 0.5
+
+
+def parameter(name: str, value: float) -> Parameter:
+    """Return a parameter of the servo."""
+    return Parameter(PREFIX + name, value=value)  # type: ignore[no-untyped-call]
+
+
+class Topics:
+    """The servo of drives that follow, and what it gives to the gateway.
+
+    Attributes:
+        prepared: How often the drives were asked for.
+        requests: Jogs so far.
+    """
+
+    def __init__(self, node: Node, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.node = node
+        self.prepared = 0
+        self.requests: list[JogRequest] = []
+        self.drives = Drives()
+        self.drives.attach()
+        self.drives.run(2)
+        gateway = self.drives.gateway
+        monkeypatch.setattr(gateway, 'jog', self._jog)
+        timeout = parameter('incoming_command_timeout', TIMEOUT)
+        node._parameter_overrides[timeout.name] = timeout
+        parameters = declare_servo(node, gateway.model.group)
+        self._servo = Servo(node, gateway, parameters, self._prepare)
+
+    def _prepare(self) -> None:
+        self.prepared += 1
+
+    def _jog(self, request: JogRequest) -> Future[None]:
+        self.requests.append(request)
+        return Future()
+
+    def send(self, topic: str, message: Any, age: float = 0.0) -> None:
+        """Let a message arrive that was sent some time ago in [s]."""
+        sent = self.node.get_clock().now() - Duration(nanoseconds=round(age * 1e9))
+        message.header.stamp = sent.to_msg()
+        (taken,) = (each for each in self.node.subscriptions if each.topic_name.endswith(topic))
+        taken.callback(message)
+
+
+@pytest.fixture
+def topics(isolation: Isolation, monkeypatch: pytest.MonkeyPatch) -> Iterator[Topics]:
+    """A servo_node whose messages the test hands over."""
+    context = Context()
+    rclpy.init(context=context, domain_id=isolation.domain_id)
+    node: Any = Node('servo_node', context=context, enable_rosout=False)
+    try:
+        yield Topics(node, monkeypatch)
+    finally:
+        node.destroy_node()
+        rclpy.shutdown(context=context)
+
+
+def twist(speed: float) -> TwistStamped:
+    """Return a twist along x."""
+    message = TwistStamped()
+    message.twist.linear.x = speed
+    return message
+
+
+def test_a_stream_of_zeros_takes_no_drives_back(topics: Topics) -> None:
+    """An idle joystick leaves halted drives halted; whoever moves it gets them."""
+    for _ in range(5):
+        topics.send(TWIST, twist(0.0))
+        topics.send(JOG, JointJog(joint_names=['panda_joint1'], velocities=[0.0]))
+    assert topics.prepared == 0
+    topics.send(TWIST, twist(0.5))
+    assert topics.prepared == 1
+
+
+@pytest.mark.parametrize(
+    ('topic', 'message'),
+    [
+        (TWIST, twist(0.5)),
+        (JOG, JointJog(joint_names=['panda_joint1'], velocities=[0.5])),
+        (POSE, PoseStamped()),
+    ],
+)
+def test_a_command_lives_from_when_it_was_sent(topics: Topics, topic: str, message: Any) -> None:
+    """What is nearly stale when it arrives expires soon, and not a whole time-out later."""
+    if isinstance(message, PoseStamped):
+        message.pose.orientation.w = 1.0
+    topics.send(topic, message, TIMEOUT - 0.2)
+    (request,) = topics.requests
+    assert 0.0 < request.expires - time.monotonic() <= 0.2
+
+
+def test_a_change_of_the_scales_counts_for_the_next_pose(topics: Topics) -> None:
+    """The speed of the tool and the override, while the servo runs."""
+    message = PoseStamped()
+    message.pose.orientation.w = 1.0
+    changes = {'scale.linear': 0.06, 'override_velocity_scaling_factor': 0.5}
+    topics.node.set_parameters([parameter(name, value) for name, value in changes.items()])
+    topics.send(POSE, message)
+    command = topics.requests[-1].command
+    assert isinstance(command, PoseCommand)
+    assert command.linear_speed == pytest.approx(0.03)
