@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 import struct
 
 import pytest
@@ -172,15 +173,13 @@ def test_the_arm_stops_when_a_drive_does_not_get_its_set_points(mode: OperationM
 def test_a_source_that_goes_on_moves_a_silent_drive_no_further(mode: OperationMode) -> None:
     """What is granted for stopping on the path ends after a second, whatever the source does."""
     arm = Arm(mode)
-    arm.source.refusals = {}
 
     class Careless(Path):
         def update(
             self, now: float, period: float, feedback: Sequence[AxisFeedback]
         ) -> Sequence[float | None]:
-            self.refusals.clear()
             self.losses.clear()
-            return super().update(now, period, feedback)
+            return super().update(now, period, [replace(axis, refusal=None) for axis in feedback])
 
     arm.net.group.attach(careless := Careless())
     arm.net.run(0.5)

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+import struct
 
 import pytest
 from scripted_device import ScriptedDevice, START
@@ -80,13 +81,18 @@ def test_a_device_that_shall_watch_the_master_has_to() -> None:
 
 
 def test_a_cob_id_that_is_right_already_is_not_written() -> None:
-    """A device whose COB-ID is read-only boots with the PDO that it has."""
+    """A device whose COB-ID is read-only boots with the PDO that it has, and is not asked."""
     config = io_config()
     rpdo = replace(config.rpdos[0], cob_id=0x200 + NODE_ID)
     config = replace(config, rpdos=(rpdo,), tpdos=())
     scene = Refusing(config, 'rpdo.1.mapping', refuses={(0x1400, 1): READ_ONLY})
+    asked: list[bytes] = []
+    scene.device.on_request = asked.append
     assert scene.boot() == []
     assert (0x1600, 0, 2) in scene.device.writes
+    right = struct.pack('<I', 0x200 + NODE_ID)  # with bit 31 it is off while its mapping changes
+    written = [request[4:] for request in asked if request[:4] == b'\x23\x00\x14\x01']
+    assert right not in written
 
 
 def test_a_cob_id_that_is_wrong_and_fixed_is_refused_with_the_key() -> None:

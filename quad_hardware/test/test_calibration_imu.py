@@ -16,10 +16,12 @@ from hypothesis import strategies as st
 import pytest
 
 from quad_calibration_script import Script
+from quad_description import movable_joints, robot_urdf
 from quad_hardware.calibration.imu import find_mounting, Readings, Stance
 from quad_hardware.calibration.main import run_calibrate
 from quad_hardware.calibration.parameter_file import imu_parameters, read_parameters
 from quad_hardware.calibration.robot import ImuReading
+from quad_hardware.estimation.estimator import Estimator, EstimatorSettings
 from quad_hardware.estimation.gravity import gravity_from_attitude, STANDARD_GRAVITY
 from quad_hardware.estimation.imu_mounting import ImuMounting
 from quad_hardware.estimation.rotation import (
@@ -33,8 +35,9 @@ from quad_hardware.estimation.rotation import (
     yaw_of,
 )
 from quad_hardware.exceptions import CommandError
+from quad_hardware.joints import JointMap, servo_of
 from quad_hardware.link import RobotState
-from quad_hardware.protocol import OLD
+from quad_hardware.protocol import LEG_MOTORS, OLD
 from quad_pty_peer import PtyPeer
 
 SIGNS: list[Vector] = [(x, y, z) for x, y, z in itertools.product((1.0, -1.0), repeat=3)]
@@ -116,6 +119,39 @@ def test_what_is_found_turns_reports_into_the_attitude_of_the_body(
         for angle in (0.0, 0.5)
     )
     assert math.remainder(turned - level, math.tau) == pytest.approx(0.5, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    'mounting',
+    [YAWED, ImuMounting(YAWED.rotation, (1.0, -1.0, -1.0), (1.0, -1.0, 1.0), (-1.0, 1.0, -1.0))],
+    ids=['yawed', 'yawed, with other signs'],
+)
+def test_reports_are_published_for_the_body(mounting: ImuMounting) -> None:
+    """Attitude, acceleration and turn rate, by the mounting of the parameters."""
+    urdf = robot_urdf('lite')
+    joints = JointMap(servo_of(joint) for joint in movable_joints(urdf))
+    estimator = Estimator(urdf, joints, EstimatorSettings(mounting=mounting))
+    body, turning = from_roll_pitch_yaw(0.2, -0.3, 1.0), (0.5, -1.0, 2.0)
+    seen = report(mounting, body)
+    rates = signed(mounting.rate_signs, rotate(conjugate(mounting.rotation), turning))
+    state = RobotState(
+        arrival=0.0,
+        wire_time=0.001,
+        attitude=seen.attitude,
+        acceleration=seen.acceleration,
+        rates=signed((math.degrees(1.0),) * 3, rates),
+        positions=dict.fromkeys(LEG_MOTORS, 0.0),
+        velocities=dict.fromkeys(LEG_MOTORS, 0.0),
+    )
+    estimate = estimator.update(state)
+    assert estimate is not None
+    assert estimate.attitude is not None
+    assert gravity_from_attitude(estimate.attitude) == pytest.approx(
+        gravity_from_attitude(body), abs=1e-6
+    )
+    up = rotate(conjugate(body), (0.0, 0.0, STANDARD_GRAVITY))
+    assert estimate.acceleration == pytest.approx(up, abs=1e-6)
+    assert estimate.angular_velocity == pytest.approx(turning, abs=1e-9)
 
 
 def test_a_turned_imu_is_a_turned_imu() -> None:

@@ -6,6 +6,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 import math
+from types import SimpleNamespace
+from typing import Any
 
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -18,7 +20,9 @@ from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import Imu
 
 from node_runner.wire import Form, Template
+from quad_description import movable_joints, robot_urdf
 from quad_hardware.estimation import Battery, Estimate, Health, OdometryState
+from quad_hardware.estimation.estimator import Estimator, EstimatorSettings
 from quad_hardware.estimation.rotation import (
     from_roll_pitch_yaw,
     IDENTITY,
@@ -28,7 +32,7 @@ from quad_hardware.estimation.rotation import (
     yaw_of,
 )
 from quad_hardware.estimation.rotation import Quaternion as Rotation
-from quad_hardware.joints import CommandCounters
+from quad_hardware.joints import CommandCounters, JointMap, servo_of
 from quad_hardware.link import DialectCounters, LinkState, LinkStatus, RobotState
 from quad_hardware.nodes import messages
 from quad_hardware.nodes.diagnostics import (
@@ -36,8 +40,9 @@ from quad_hardware.nodes.diagnostics import (
     LinkDiagnostic,
     robot_diagnostic,
 )
+from quad_hardware.nodes.hardware_node import HardwareNode
 from quad_hardware.nodes.parameters import Deviations, Frames
-from quad_hardware.protocol import Fault, ParserCounters
+from quad_hardware.protocol import Fault, LEG_MOTORS, ParserCounters
 
 STAMP = Time(sec=1)
 FRAMES = Frames('odom', 'base_link', 'base_footprint', 'imu_link', False, True)
@@ -109,6 +114,27 @@ def odometry(state: OdometryState, frames: Frames) -> Odometry:
     numbers = messages.odometry_numbers(ESTIMATE, state, frames)
     message: Odometry = form.message(STAMP, numbers)
     return message
+
+
+def test_joints_are_stamped_when_they_were_measured() -> None:
+    """The old protocol asks for them 8 ms before the IMU; who differentiates must know."""
+    urdf = robot_urdf('lite')
+    joints = JointMap(servo_of(joint) for joint in movable_joints(urdf))
+    angles = dict.fromkeys(LEG_MOTORS, 0.0)
+    state = RobotState(5.0, 0.0, (0.0, 0.0, 0.0), None, angles, {}, joints_age=0.008)
+    stamps: dict[str, int] = {}
+
+    def stream(name: str) -> Any:
+        return SimpleNamespace(publish=lambda _form, stamp, _numbers: stamps.update({name: stamp}))
+
+    node: Any = object.__new__(HardwareNode)
+    node._estimator = Estimator(urdf, joints, EstimatorSettings())
+    node._settings = SimpleNamespace(deviations=DEVIATIONS, frames=FRAMES)
+    node._joint_states, node._imu, node._odom = map(stream, ('joints', 'imu', 'odom'))
+    node._tf = stream('tf')
+    node._stamp = lambda monotonic: round(monotonic * 1e3)
+    assert node._report(state) == ''
+    assert stamps == {'joints': 4992, 'imu': 5000, 'odom': 5000, 'tf': 5000}
 
 
 def test_a_differentiated_rate_says_so_by_its_covariance() -> None:

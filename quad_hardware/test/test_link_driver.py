@@ -94,6 +94,17 @@ def test_an_adapter_that_keeps_bytes_back_loses_no_frame(rig: Rig) -> None:
     assert LinkState.STALE not in [state for state, _ in rig.changes]
 
 
+def test_an_adapter_is_asked_to_keep_nothing_back(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its driver in the kernel lowers the timer, where it has one."""
+    asked: list[bool] = []
+    monkeypatch.setattr(serial.Serial, 'set_low_latency_mode', lambda _, on: asked.append(on))
+    with PtyPeer(tmp_path / 'port') as peer:
+        SerialPort(str(peer.link), NEW.baud).close()
+    assert asked == [True]
+
+
 def test_a_command_reaches_the_servos(rig: Rig) -> None:
     """All legs in one frame, and the next reports show it."""
     rig.reports(1)

@@ -12,13 +12,14 @@ from processes import executable
 import pytest
 import rclpy
 from ros_client import RosClient
+from std_srvs.srv import Trigger
 from teleop_robot import PATIENCE, Robot
 
 from quad_teleop.nodes.teleop_gamepad import Session, TeleopGamepad
 
 pytestmark = pytest.mark.scenario
 ABS_X, ABS_Y, ABS_RX, ABS_RY, ABS_HAT0Y = 0, 1, 3, 4, 0x11
-SOUTH, LEFT_SHOULDER, RIGHT_SHOULDER = 0x130, 0x136, 0x137
+SOUTH, LEFT_SHOULDER, RIGHT_SHOULDER, SELECT = 0x130, 0x136, 0x137, 0x13A
 FORWARD = (0.15, 0.0, 0.0)
 
 
@@ -89,6 +90,29 @@ def test_modes_and_body(pad: InjectedDevice, robot: Robot) -> None:
     pad.move(ABS_HAT0Y, -1)
     robot.client.spin_until(lambda: bool(robot.poses), PATIENCE, 'body pose')
     assert robot.poses[0].position.z == pytest.approx(0.005)
+
+
+def test_select_clears_a_fault(pad: InjectedDevice, robot: Robot) -> None:
+    """By the service of the controller; nothing has to be held for it."""
+    cleared: list[Trigger.Request] = []
+
+    def clear(request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        cleared.append(request)
+        response.success = True
+        return response
+
+    service = robot.client.node.create_service(Trigger, 'controller_node/clear_fault', clear)
+
+    def press() -> None:  # again, until the client has found the service
+        pad.press(SELECT)
+        pad.release(SELECT)
+
+    timer = robot.client.node.create_timer(0.2, press)
+    try:
+        robot.client.spin_until(lambda: bool(cleared), PATIENCE, 'clear_fault')
+    finally:
+        robot.client.node.destroy_timer(timer)
+        robot.client.node.destroy_service(service)
 
 
 def test_program_without_a_gamepad_waits_and_ends(isolation: Isolation) -> None:
