@@ -91,6 +91,18 @@ def test_rest_at_the_end_counts() -> None:
     assert not loss.hazard
 
 
+def test_a_robot_that_was_just_laid_down_lies() -> None:
+    """The demo and Ctrl-C end the controller as soon as it says so: nothing has broken off."""
+    loss = command_loss()
+    for tick in range(50):
+        share = 0.5 * (1.0 - math.cos(math.pi * tick / 49))
+        loss.commanded(
+            [stand + share * (lie - stand) for stand, lie in zip(STANDING, LYING, strict=True)],
+            tick * PERIOD,
+        )
+    assert not loss.hazard
+
+
 @pytest.mark.parametrize('legs', [('fl',), ('br',), ('fr', 'bl')])
 def test_a_leg_that_is_held_in_the_air_is_no_rest(legs: tuple[str, ...]) -> None:
     """A controller that holds in the middle of a trot, for a fault, and then ends."""

@@ -19,7 +19,7 @@ from quad_description import Pose, pose_positions
 
 from .mapping import JointMap
 
-MOTION_WINDOW = 0.3  # [s] at the end of a stream, in which targets rested or moved
+MOTION_WINDOW = 0.1  # [s] at the end of a stream, in which targets rested or moved
 MIN_MOTION = 0.05  # [rad] of a target; levelling and noise are less
 MIN_STREAM = 0.5  # [s] a person who tries out a servo sends no stream
 SPEED = 1.0  # [rad/s] of the fastest joint on the way down
