@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import pairwise
+import math
 import struct
 
 from hypothesis import given, Phase, settings
@@ -47,6 +48,7 @@ TARGETS = {
 OBJECTS = ((CONTROLWORD, 0), (MODE, 0), (POSITION, 0), (VELOCITY, 0), (INTERPOLATION, 1))
 BITS = {CONTROLWORD: 16, MODE: 8, POSITION: 32, VELOCITY: 32, INTERPOLATION: 32}
 
+STANDS_AFTER = 0.3  # [s] more than a drive takes to begin a move
 UNSHRUNK = (Phase.explicit, Phase.reuse, Phase.generate)
 """Each example takes half a second; a search for the smallest that fails takes minutes."""
 
@@ -109,9 +111,16 @@ def go(net: VirtualNetwork, *targets: float) -> list[float]:
     ends = []
     for target in targets:
         net.commands[JOINT].set_target(target)
-        net.run(3.0)
+        rest(net)
         ends.append(round(motor(net), 3))
     return ends
+
+
+def rest(net: VirtualNetwork) -> None:
+    """Let the drive go wherever it goes, until it has stood for a while."""
+    end, before = net.now + 3.0, math.nan
+    while net.now < end and before != (before := motor(net)):
+        net.run(STANDS_AFTER)
 
 
 @dataclass

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Damaged bus.yml files: a model or one ConfigError, never anything else."""
 
+from functools import cache
 from pathlib import Path
 import random
 
@@ -9,7 +10,7 @@ from config_mutations import mutated
 from config_samples import ARTICLE_BUS, BUS, eds_text, outcome
 import pytest
 
-from arm_canopen.config import load_bus
+from arm_canopen.config import load_bus, load_eds
 
 pytestmark = pytest.mark.slow
 
@@ -22,15 +23,23 @@ SNIPPETS = (
 )
 
 
+TWO_JOINTS = ARTICLE_BUS.read_text('utf-8').split('  panda_joint3:', maxsplit=1)[0]
+"""The bus of the article without the joints that are like the first two."""
+
+
 @pytest.mark.parametrize('seed', range(8))
-def test_damaged_files_are_read_or_refused(tmp_path: Path, seed: int) -> None:
+def test_damaged_files_are_read_or_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, seed: int
+) -> None:
     """A mutated bus.yml is a bus, or an error whose problems lie within the files."""
+    # the EDS files are whole, and reading them takes longer than all the rest
+    monkeypatch.setattr('arm_canopen.config.eds_files.load_eds', cache(load_eds))
     generator = random.Random(seed)
-    original = ARTICLE_BUS.read_text('utf-8') if seed % 2 else BUS
+    original = TWO_JOINTS if seed % 2 else BUS
     for name in ('drive.eds', 'cia402_slave.eds'):
         (tmp_path / name).write_text(eds_text(), encoding='utf-8')
     path = tmp_path / 'bus.yml'
-    for _ in range(300):
+    for _ in range(200):
         text = mutated(original, SNIPPETS, generator)
         path.write_text(text, encoding='utf-8', newline='')
         lines = len(text.splitlines()) + 1
