@@ -15,7 +15,13 @@ from xml.etree import ElementTree as ET
 
 import yaml
 
-from process_supervisor import Executable, FindExecutable, namespaced_parameters, RosOptions
+from process_supervisor import (
+    EVERY_NODE,
+    Executable,
+    FindExecutable,
+    namespaced_parameters,
+    RosOptions,
+)
 
 from .exceptions import RobotError
 from .robots import Robot
@@ -44,8 +50,8 @@ def motion_files(robot: Robot, folder: Path, ros: RosOptions) -> Sequence[Path]:
     path.write_text(
         json.dumps(
             {
-                '/**': {'ros__parameters': values},
-                '/**/servo_node': {'ros__parameters': {'moveit_servo': moveit_servo}},
+                EVERY_NODE: {'ros__parameters': values},
+                f'{EVERY_NODE}/servo_node': {'ros__parameters': {'moveit_servo': moveit_servo}},
             }
         ),
         encoding='utf-8',

@@ -114,11 +114,12 @@ def _master(
 ) -> ProcessSpec:
     return ProcessSpec(
         name='master',
-        argv=(
-            *node_argv(
-                stack.master, find, {**bus, **stack.master_parameters}, parameters, stack.ros
-            ),
-            *parameter_files(stack.master_files),
+        argv=node_argv(
+            stack.master,
+            find,
+            {**bus, **stack.master_parameters},
+            (parameters, *stack.master_files),
+            stack.ros,
         ),
         environment=LOG_FORMAT,
         ready=MASTER_READY,
@@ -148,24 +149,12 @@ def controller_process(
     """
     return ProcessSpec(
         name='controller',
-        argv=(
-            *node_argv(MOTION_CONTROLLER, find, {}, parameters, ros),
-            *parameter_files(files),
-        ),
+        argv=node_argv(MOTION_CONTROLLER, find, {}, (parameters, *files), ros),
         environment=LOG_FORMAT,
         ready=CONTROLLER_READY,
         ready_timeout=ready_timeout,
         stop_order=MASTER_FIRST,
     )
-
-
-def parameter_files(files: Sequence[Path]) -> list[str]:
-    """Return the arguments that hand over parameter files.
-
-    Args:
-        files: The files; a later one counts more.
-    """
-    return [word for file in files for word in ('--params-file', str(file))]
 
 
 def frame_prefix(ros: RosOptions) -> dict[str, str]:
@@ -177,7 +166,7 @@ def _publisher(stack: Stack, parameters: Path, find: FindExecutable) -> ProcessS
     executable = Executable('arm_canopen', 'canopen_joint_state_publisher')
     return ProcessSpec(
         name='joint_states',
-        argv=node_argv(executable, find, {}, parameters, stack.ros),
+        argv=node_argv(executable, find, {}, (parameters,), stack.ros),
         environment=LOG_FORMAT,
         ready=PUBLISHER_READY,
         ready_timeout=stack.ready_timeout,
@@ -192,7 +181,7 @@ def _state_publisher(stack: Stack, parameters: Path, find: FindExecutable) -> Pr
     values = {'publish_frequency': TF_RATE, **frame_prefix(stack.ros)}
     return ProcessSpec(
         name='robot_state',
-        argv=node_argv(executable, find, values, parameters, stack.ros),
+        argv=node_argv(executable, find, values, (parameters,), stack.ros),
         environment=LOG_FORMAT,
         required=False,
         stop_order=THEN_LISTENERS,

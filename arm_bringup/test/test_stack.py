@@ -4,15 +4,19 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
+from rclpy.context import Context
+from rclpy.node import Node
 import yaml
 
 from arm_bringup.motion import choose_master, MAKE_MOVE, motion_files
 from arm_bringup.robots import Robot
-from arm_bringup.stack import arm_processes, MASTER, MOTION_MASTER, Stack
-from process_supervisor import Executable, ProcessSpec, RosOptions, StartError
+from arm_bringup.stack import arm_processes, controller_process, MASTER, MOTION_MASTER, Stack
+from node_runner import init_ros
+from process_supervisor import EVERY_NODE, Executable, ProcessSpec, RosOptions, StartError
 
 ROBOT = Robot('panda', Path('/robots/panda/bus.yml'), Path('/robots/panda/panda.urdf.xacro'))
 PARAMETERS = Path('/tmp/parameters.yaml')
@@ -47,12 +51,49 @@ def test_the_master_of_motion_publishes_the_joints(tmp_path: Path) -> None:
     stack = Stack(ROBOT, 'can0', simulate=True, master=MOTION_MASTER, master_files=files)
     found = processes(tmp_path, stack, 'arm_servo')
     assert set(found) == {'slaves', 'master'}
-    assert found['master'].argv[-4:] == (
-        '--params-file',
-        '/r/motion.yaml',
-        '--params-file',
-        '/r/controllers.yaml',
+    argv = found['master'].argv
+    named = [Path(argv[n + 1]) for n, word in enumerate(argv) if word == '--params-file']
+    assert named == [PARAMETERS, *files]
+
+
+@pytest.mark.parametrize('words', [('-p', 'rate:=7'), ('--params-file', '/home/me/my.yaml')])
+def test_what_a_person_says_counts_most(tmp_path: Path, words: tuple[str, str]) -> None:
+    """It comes behind all parameters and files of the bring-up."""
+    files = (Path('/r/motion.yaml'), Path('/r/controllers.yaml'))
+    ros = RosOptions('left', words)
+    stack = Stack(ROBOT, 'can0', True, master=MOTION_MASTER, master_files=files, ros=ros)
+    find = Underlay(tmp_path, 'arm_canopen', 'arm_bringup', 'arm_servo', 'robot_viewer').find
+    specs = [
+        *arm_processes(stack, PARAMETERS, find),
+        controller_process(files, PARAMETERS, 1.0, find, ros),
+    ]
+    assert len(specs) == 4
+    assert {spec.argv[-2:] for spec in specs} == {words}
+
+
+@pytest.mark.parametrize('namespace', ['', 'left'])
+@pytest.mark.parametrize('spelling', ['/**', '/**/servo_node', 'servo_node'])
+def test_rcl_takes_what_a_person_says(tmp_path: Path, spelling: str, namespace: str) -> None:
+    """Whatever the robot's own file says of that node, by name or by pattern."""
+    robot = Robot('my', tmp_path / 'bus.yml', tmp_path / 'my.urdf.xacro')
+    robot.semantic.write_text('<robot name="my"/>')
+    own = {'ros__parameters': {'rate': 1}}
+    robot.controllers.write_text(json.dumps({'/**': own, 'servo_node': own}))
+    user = tmp_path / 'user.yaml'
+    user.write_text(
+        json.dumps({RosOptions(namespace).node_name(spelling): {'ros__parameters': {'rate': 9}}})
     )
+    said = ['-p', 'rate:=9'] if spelling == '/**' else ['--params-file', str(user)]
+    ros = RosOptions(namespace, tuple(said))
+    files = motion_files(robot, tmp_path, ros)
+    find = Underlay(tmp_path, 'arm_servo').find
+    argv = controller_process(files[:-1], files[-1], 1.0, find, ros).argv
+    context = Context()
+    init_ros(argv, context)
+    node = Node('servo_node', context=context)
+    overrides = dict(node._parameter_overrides)
+    context.try_shutdown()
+    assert overrides['rate'].value == 9
 
 
 def test_master_without_arm_servo(tmp_path: Path) -> None:
@@ -67,7 +108,7 @@ def test_master_without_arm_servo(tmp_path: Path) -> None:
     robot.limits.touch()
     assert choose_master(robot, full) == (MOTION_MASTER, '')
     (file,) = motion_files(robot, tmp_path, RosOptions())
-    values = yaml.safe_load(file.read_text())['/**']['ros__parameters']
+    values = yaml.safe_load(file.read_text())[EVERY_NODE]['ros__parameters']
     assert values['robot_description_semantic'] == '<robot name="my"/>'
 
 

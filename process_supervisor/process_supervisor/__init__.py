@@ -15,6 +15,7 @@ from .console import explain, Farewell, supervise, USAGE_ERROR
 from .exceptions import CallError, GivenUpError, StartError, SupervisorError
 from .exclusive import exclusive
 from .nodes import (
+    EVERY_NODE,
     Executable,
     find_executable,
     FindExecutable,
@@ -34,6 +35,7 @@ from .terminal import is_smart, LineWriter, Painter, severity_of, wants_colour
 __version__ = '0.1.0'
 
 __all__ = [
+    'EVERY_NODE',
     'LOG_FORMAT',
     'POLITE',
     'USAGE_ERROR',

@@ -4,11 +4,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 import json
 import os
 from pathlib import Path
+from typing import Any
 
 from .exceptions import StartError
 from .ros_options import RosOptions
@@ -22,6 +23,12 @@ LOG_FORMAT = {
     'PYTHONUNBUFFERED': '1',
 }
 """Short lines without colours: a bring-up adds its own, and searches in them."""
+
+ANY_NODE = '/**'
+EVERY_NODE = f'{ANY_NODE}{ANY_NODE}'
+"""All nodes, in files of our own. rcl keeps one entry per spelling, and a later entry counts more:
+what a person says by -p or of /**, which is the same, comes behind ours in this way."""
+VALUES = 'ros__parameters'
 
 FindExecutable = Callable[[str, str], 'Path | None']
 """Package and executable to its file; None when the package does not exist."""
@@ -78,7 +85,7 @@ def node_argv(
     executable: Executable,
     find: FindExecutable,
     values: Mapping[str, str] | None = None,
-    parameters: Path | None = None,
+    parameters: Sequence[Path] = (),
     ros: RosOptions | None = None,
 ) -> tuple[str, ...]:
     """Make the command line of a node.
@@ -87,8 +94,9 @@ def node_argv(
         executable: What to run.
         find: Finds executables.
         values: ROS parameters as the command line takes them.
-        parameters: A ROS parameter file.
-        ros: Options of all nodes.
+        parameters: ROS parameter files, of this program's own or of
+            :func:`namespaced_parameters`; a later one counts more.
+        ros: Options of all nodes; what a person says there counts most.
 
     Returns:
         Program and arguments.
@@ -105,8 +113,8 @@ def node_argv(
     if not os.access(file, os.X_OK):
         raise StartError(f'{file} does not exist; build the workspace (make build)')
     argv = [str(file), '--ros-args']
-    if parameters is not None:
-        argv += ['--params-file', str(parameters)]
+    for parameter_file in parameters:
+        argv += ['--params-file', str(parameter_file)]
     for name, value in (values or {}).items():
         argv += ['-p', f'{name}:={value}']
     return (*argv, *(ros.node_arguments if ros is not None else ()))
@@ -120,11 +128,13 @@ def write_parameters(file: Path, urdf: str) -> None:
         urdf: The description.
     """
     # a JSON string is a YAML string, whatever characters are in it
-    file.write_text(f'/**:\n  ros__parameters:\n    robot_description: {json.dumps(urdf)}\n')
+    file.write_text(
+        f'{EVERY_NODE}:\n  ros__parameters:\n    robot_description: {json.dumps(urdf)}\n'
+    )
 
 
 def namespaced_parameters(file: Path, ros: RosOptions, folder: Path) -> Path:
-    """Make a parameter file that names its nodes reach them in a namespace.
+    """Make a parameter file reach its nodes in a namespace, and count less than a person's words.
 
     Args:
         file: A ROS parameter file.
@@ -132,26 +142,43 @@ def namespaced_parameters(file: Path, ros: RosOptions, folder: Path) -> Path:
         folder: Where to write the copy.
 
     Returns:
-        The file itself where there is no namespace.
+        The copy.
 
     Raises:
-        StartError: It is no YAML map.
+        StartError: It is no parameter file.
     """
-    if not ros.namespace:
-        return file
     import yaml
 
+    moved: dict[str, object] = {}
     try:
-        nodes = dict(yaml.safe_load(file.read_text(encoding='utf-8')) or {})
-    except (OSError, yaml.YAMLError, TypeError, ValueError) as error:
+        for name, values in _nodes_of(yaml.safe_load(file.read_text(encoding='utf-8')) or {}):
+            full = ros.node_name(name)
+            if full.startswith(ANY_NODE):
+                full = f'{ANY_NODE}{full}'
+            moved = _merged(moved, {full: {VALUES: values}})
+    except (OSError, yaml.YAMLError, TypeError, AttributeError, ValueError) as error:
         raise StartError(f'{file}: no ROS parameter file: {error}') from error
-    moved = {
-        name if name.startswith('/**') else ros.resolve(name.lstrip('/')): values
-        for name, values in nodes.items()
-    }
     copy = folder / f'{ros.namespace.replace("/", "-")}-{file.name}'
     copy.write_text(json.dumps(moved), encoding='utf-8')  # JSON is YAML
     return copy
+
+
+def _nodes_of(table: Mapping[str, Any], within: str = '') -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield the nodes of a parameter file and their parameters; namespaces may be nested."""
+    for name, entry in table.items():
+        full = f'{within}/{name.strip("/")}'
+        if VALUES in entry:
+            yield full, dict(entry[VALUES] or {})
+        yield from _nodes_of({key: entry[key] for key in entry if key != VALUES}, full)
+
+
+def _merged(base: Mapping[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:
+    """Return both, the second one's where they differ."""
+    both = dict(base)
+    for key, value in more.items():
+        nested = isinstance(value, dict) and isinstance(both.get(key), dict)
+        both[key] = _merged(both[key], value) if nested else value
+    return both
 
 
 def ros_domain(environment: Mapping[str, str]) -> str:

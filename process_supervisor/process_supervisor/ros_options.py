@@ -13,8 +13,10 @@ from .exceptions import StartError
 
 _BEGIN, _END = '--ros-args', '--'
 _REMAPS = frozenset({'-r', '--remap'})
+_PARAMETERS = frozenset({'-p', '--param'})
 _NAMESPACE_RULE = re.compile(r'(?:[^:]*:)?__ns:=(.*)')
 _NAME_RULE = re.compile(r'(?:[^:]*:)?__(?:node|name):=')
+_NODE_PARAMETER = re.compile(r'([\w/*]+):([^:=]+:=.*)', re.ASCII | re.DOTALL)
 _NAMESPACE = re.compile(r'/?[A-Za-z_]\w*(?:/[A-Za-z_]\w*)*', re.ASCII)
 
 
@@ -38,8 +40,13 @@ class RosOptions:
     @property
     def node_arguments(self) -> tuple[str, ...]:
         """Words for the command line of a node, behind its ``--ros-args``."""
-        rule = ('-r', f'__ns:=/{self.namespace}') if self.namespace else ()
-        return (*rule, *self.arguments)
+        words = ['-r', f'__ns:=/{self.namespace}'] if self.namespace else []
+        for option, value in _pairs(self.arguments):
+            of_node = _NODE_PARAMETER.fullmatch(value) if option in _PARAMETERS else None
+            if of_node is not None:
+                value = f'{self.node_name(of_node[1])}:{of_node[2]}'  # noqa: PLW2901
+            words += [option, value] if value else [option]
+        return tuple(words)
 
     @property
     def hint(self) -> str:
@@ -49,6 +56,15 @@ class RosOptions:
     def resolve(self, name: str) -> str:
         """Return the full name of a relative one."""
         return f'/{self.frame_prefix}{name}'
+
+    def node_name(self, name: str) -> str:
+        """Return the full name of a node that a file or an argument names for parameters.
+
+        A name with the namespace has it already, and a pattern is one of full names.
+        """
+        full = f'/{name.strip("/")}'
+        inside = full.startswith(('/*', f'/{self.namespace}/'))
+        return full if inside or not self.namespace else self.resolve(full[1:])
 
     def within(self, namespace: str) -> RosOptions:
         """Return the same in another namespace, unless a person has named one."""

@@ -10,6 +10,7 @@ import pytest
 import yaml
 
 from process_supervisor import (
+    EVERY_NODE,
     Executable,
     first_found,
     node_argv,
@@ -25,7 +26,7 @@ def test_parameters_reach_the_command_line(tmp_path: Path) -> None:
     """The file first, so that single values win over it."""
     file = tmp_path / 'some_node'
     file.touch(mode=0o755)
-    argv = node_argv(NODE, lambda package, name: tmp_path / name, {'a': '1'}, Path('p.yaml'))
+    argv = node_argv(NODE, lambda package, name: tmp_path / name, {'a': '1'}, [Path('p.yaml')])
     assert argv == (str(file), '--ros-args', '--params-file', 'p.yaml', '-p', 'a:=1')
 
 
@@ -54,7 +55,7 @@ def test_a_description_survives_the_parameter_file(tmp_path: Path, urdf: str) ->
     file = tmp_path / 'parameters.yaml'
     write_parameters(file, urdf)
     assert yaml.safe_load(file.read_text()) == {
-        '/**': {'ros__parameters': {'robot_description': urdf}}
+        EVERY_NODE: {'ros__parameters': {'robot_description': urdf}}
     }
 
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+import json
 from pathlib import Path
 
 import pytest
@@ -18,6 +19,7 @@ from process_supervisor import (
     node_argv,
     parse_with_ros,
     RosOptions,
+    StartError,
 )
 
 
@@ -90,15 +92,62 @@ def test_a_namespace_of_a_file_counts_less() -> None:
     assert RosOptions().within('/right/').namespace == 'right'
 
 
-def test_parameter_files_follow_their_nodes(tmp_path: Path) -> None:
-    """Names of nodes get the namespace, patterns stay; without one it is the file itself."""
-    file = tmp_path / 'controllers.yaml'
+def moved(document: object, ros: RosOptions, folder: Path) -> object:
+    """Return what becomes of a parameter file."""
+    file = folder / 'controllers.yaml'
+    file.write_text(json.dumps(document))
+    return yaml.safe_load(namespaced_parameters(file, ros, folder).read_text())
+
+
+@pytest.mark.parametrize(
+    ('name', 'full'),
+    [
+        ('servo_node', '/left/servo_node'),
+        ('/servo_node', '/left/servo_node'),
+        ('/left/servo_node', '/left/servo_node'),
+        ('left/servo_node', '/left/servo_node'),
+        ('gripper/driver', '/left/gripper/driver'),
+        ('/left/**', '/left/**'),
+        ('/*/servo_node', '/*/servo_node'),
+        ('/**/servo_node', '/**/**/servo_node'),
+        ('/**', '/**/**'),
+    ],
+)
+def test_parameter_files_follow_their_nodes(tmp_path: Path, name: str, full: str) -> None:
+    """Names of nodes get the namespace that they do not have; patterns go on to match."""
     values = {'ros__parameters': {'rate': 2.0}}
-    file.write_text(yaml.safe_dump({'servo_node': values, '/arm': values, '/**': values}))
-    moved = namespaced_parameters(file, RosOptions('left'), tmp_path)
-    assert yaml.safe_load(moved.read_text()) == {
-        '/left/servo_node': values,
-        '/left/arm': values,
-        '/**': values,
+    assert moved({name: values}, RosOptions('left'), tmp_path) == {full: values}
+
+
+def test_all_parameters_of_a_node_are_kept(tmp_path: Path) -> None:
+    """In nested namespaces, and by several spellings of one node."""
+    document = {
+        'left': {'servo_node': {'ros__parameters': {'rate': 2.0}}},
+        'servo_node': {'ros__parameters': {'scale': {'linear': 1.0}}},
+        '/servo_node': {'ros__parameters': {'scale': {'joint': 3.0}, 'rate': 4.0}},
     }
-    assert namespaced_parameters(file, RosOptions(), tmp_path) == file
+    expected = {'rate': 4.0, 'scale': {'linear': 1.0, 'joint': 3.0}}
+    node = {'/left/servo_node': {'ros__parameters': expected}}
+    assert moved(document, RosOptions('left'), tmp_path) == node
+
+
+@pytest.mark.parametrize('document', ['text', [1], {'servo_node': 1}, {'a': {'b': 'c'}}])
+def test_what_is_no_parameter_file_is_refused(tmp_path: Path, document: object) -> None:
+    """By name, before anything starts."""
+    with pytest.raises(StartError, match='no ROS parameter file'):
+        moved(document, RosOptions('left'), tmp_path)
+
+
+@pytest.mark.parametrize(
+    ('word', 'handed_over'),
+    [
+        ('servo_node:rate:=2', '/left/servo_node:rate:=2'),
+        ('/left/servo_node:rate:=2', '/left/servo_node:rate:=2'),
+        ('rate:=2', 'rate:=2'),
+        ('url:=http://x:=y', 'url:=http://x:=y'),
+    ],
+)
+def test_parameters_for_one_node_reach_it_in_its_namespace(word: str, handed_over: str) -> None:
+    """A person names the node as the bring-up without namespace has it, or in full."""
+    assert RosOptions('left', ('-p', word)).node_arguments[-1] == handed_over
+    assert RosOptions('left', ('-r', 'servo_node:a:=b')).node_arguments[-1] == 'servo_node:a:=b'

@@ -122,12 +122,10 @@ def _bridge(stack: Stack, parameters: Path, find: FindExecutable) -> ProcessSpec
     if stack.simulate:  # its IMU is where the description has it
         values |= {'imu.mounting_checked': 'true', 'imu.rates_checked': 'true'}
     executable = Executable('quad_hardware', 'hardware_node')
-    argv = node_argv(executable, find, values, parameters, stack.ros)
-    if stack.calibration is not None:
-        argv = (*argv, '--params-file', str(stack.calibration))
+    files = (parameters,) if stack.calibration is None else (parameters, stack.calibration)
     return ProcessSpec(
         name='hardware',
-        argv=argv,
+        argv=node_argv(executable, find, values, files, stack.ros),
         environment=LOG_FORMAT,
         ready=HARDWARE_READY,
         ready_timeout=stack.ready_timeout,
@@ -142,7 +140,7 @@ def _controller(stack: Stack, parameters: Path, find: FindExecutable) -> Process
     executable = Executable('quad_controller', 'controller_node')
     return ProcessSpec(
         name='controller',
-        argv=node_argv(executable, find, values, parameters, stack.ros),
+        argv=node_argv(executable, find, values, (parameters,), stack.ros),
         environment=LOG_FORMAT,
         ready=CONTROLLER_READY,
         ready_timeout=stack.ready_timeout,
@@ -159,7 +157,7 @@ def _state_publisher(stack: Stack, parameters: Path, find: FindExecutable) -> Pr
     values = {'publish_frequency': f'{TF_RATE}', **stack.frames}
     return ProcessSpec(
         name='robot_state',
-        argv=node_argv(executable, find, values, parameters, stack.ros),
+        argv=node_argv(executable, find, values, (parameters,), stack.ros),
         environment=LOG_FORMAT,
         ready=PUBLISHER_READY,
         ready_timeout=stack.ready_timeout,
