@@ -31,7 +31,7 @@ def check_robot(robot: Robot) -> list[Finding]:
     findings: list[Finding] = []
     drives, joints, urdf = [], [], ''
     try:
-        drives = [drive.name for drive in read_drives(robot)]
+        drives = [joint for drive in read_drives(robot) for joint in drive.joints]
     except RobotError as problem:
         tool = 'ros2 run arm_canopen canopen check'
         findings.append(error('bus.yml', str(problem), f'{tool} {robot.bus_config} tells more'))

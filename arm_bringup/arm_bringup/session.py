@@ -258,5 +258,5 @@ def session(
             ros,
         )
         processes = arm_processes(wanted, parameters, find_executable)
-        names = [drive.name for drive in drives]
+        names = [joint for drive in drives for joint in drive.joints]
         yield Session(robot, bus, names, ros, stream_mode_service(drives), urdf, processes)

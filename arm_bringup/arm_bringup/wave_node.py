@@ -44,9 +44,8 @@ class WaveNode(Node):
             'URDF of the robot as XML; the wave stays within its joint limits',
         )
         refuse_misspelt(self)
-        drives = [node.name for node in master.bus.nodes if node.is_drive]
         style = WaveStyle()
-        self._source = WaveSource(plan_wave(joint_limits(urdf), drives, style), style)
+        self._source = WaveSource(plan_wave(joint_limits(urdf), master.bus.joints, style), style)
         self._left: dict[str, str] = {}
         self._diagnostics = self.create_publisher(DiagnosticArray, 'diagnostics', 10)
         self.create_service(Trigger, '~/start', self._start)

@@ -107,6 +107,24 @@ def test_without_the_files_of_motion(robot: Robot) -> None:
     assert 'gp110.srdf and limits.yaml' in finding.problem
 
 
+def test_channels_of_a_drive_are_joints(robot: Robot) -> None:
+    """By the names of the channels, not by that of their device."""
+    eds = Path(__file__).parents[2] / 'arm_canopen' / 'eds' / 'cia402_two_axes.eds'
+    shutil.copy(eds, robot.folder)
+    replace(
+        robot.bus_config,
+        ' joint_2_l:\n',
+        f' shoulder:\n    dcf: {eds.name}\n    num_channels: 2\n'
+        '    channel_names: [joint_2_l, joint_3_u]\n',
+    )
+    replace(
+        robot.bus_config,
+        ' joint_3_u:\n    node_id',
+        ' tool:\n    driver: ros2_canopen::ProxyDriver\n    node_id',
+    )
+    assert [finding for finding in check_robot(robot) if finding.severity is ERROR] == []
+
+
 def test_exit_code(robot: Robot, capsys: pytest.CaptureFixture[str]) -> None:
     """0 when all is well, 1 with an error, 2 for what is no robot."""
     assert main([f'{robot.folder}/']) == 0

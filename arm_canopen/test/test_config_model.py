@@ -206,9 +206,8 @@ def test_a_drive_with_two_axes(tmp_path: Path) -> None:
     assert [axis.scale_from_factor_group for axis in node.axes] == [False, False]
     assert [axis.offset_pos_to_dev for axis in node.axes] == [0.0, 7.0]
     assert {axis.homing_timeout for axis in node.axes} == {3.0}
-    unnamed = added('joint1', 'num_channels: 2')
-    (node,) = load_text(tmp_path, unnamed, eds=eds).nodes
-    assert [axis.name for axis in node.axes] == ['joint1_0', 'joint1_1']
+    unnamed = load_text(tmp_path, added('joint1', 'num_channels: 2'), eds=eds)
+    assert unnamed.joints == unnamed.node('joint1').joints == ('joint1_0', 'joint1_1')
 
 
 @pytest.mark.parametrize('name', ['left arm', '1st', ''])

@@ -181,6 +181,11 @@ class NodeConfig:
         """The device is driven by the CiA 402 driver."""
         return 'Cia402' in self.driver
 
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of the joints that it drives: its own, or those of its channels."""
+        return tuple(axis.name for axis in self.axes) if self.is_drive else ()
+
 
 @dataclass(frozen=True, slots=True)
 class Problem:
@@ -226,6 +231,11 @@ class BusConfig:
     nodes: tuple[NodeConfig, ...]
     warnings: tuple[Problem, ...] = ()
     written: Mapping[tuple[str, ...], Written] = field(default_factory=dict, compare=False)
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of all joints that its drives have, in the order of the file."""
+        return tuple(joint for node in self.nodes for joint in node.joints)
 
     def place_of(self, *names: str) -> Written:
         """Return where a key stands, or else the nearest thing around it that does."""

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from rclpy.publisher import Publisher
 from rclpy.time import Time
 from sensor_msgs.msg import JointState
 
@@ -24,7 +25,7 @@ class DriveNode(DeviceNode):
 
     Attributes:
         axes: Its axes.
-        listened: Somebody listens to ``~/joint_states``.
+        listened: Somebody listens to its joint states.
     """
 
     @destroyed_when_refused
@@ -47,9 +48,12 @@ class DriveNode(DeviceNode):
         self.axes = [commands.drive for commands in axes]
         names = [axis.name for axis in self.axes]
         self._owned = device.config.commanded_indices
-        self._joint_states = self.create_publisher(JointState, '~/joint_states', 10)
-        zeros = [0.0] * len(names)
-        self._message = JointState(name=names, position=zeros, velocity=zeros, effort=zeros)
+        self._joint_states = [(self._publisher('~'), _message(names), slice(None))]
+        if len(names) > 1:  # and each channel as a drive of its own
+            self._joint_states += [
+                (self._publisher(name), _message([name]), slice(number, number + 1))
+                for number, name in enumerate(names)
+            ]
         self.listened = False
         self._axis_services = [
             AxisServices(self, commands, self._place(name), thread, output)
@@ -59,7 +63,9 @@ class DriveNode(DeviceNode):
     def update_listeners(self) -> None:
         """Look who listens, so that only what is heard is published."""
         super().update_listeners()
-        self.listened = self._joint_states.get_subscription_count() > 0
+        self.listened = any(
+            publisher.get_subscription_count() for publisher, _, _ in self._joint_states
+        )
 
     def owns_object(self, index: int) -> bool:
         """Whether the drive writes an object itself in each cycle."""
@@ -73,14 +79,22 @@ class DriveNode(DeviceNode):
 
     def publish_joint_state(self, stamp: Time, sample: list[tuple[float, float, float]]) -> None:
         """Publish the state of the joints at the time of a SYNC."""
-        message = self._message
-        message.header.stamp = stamp.to_msg()
-        for number, (position, velocity, effort) in enumerate(sample):
-            message.position[number] = position
-            message.velocity[number] = velocity
-            message.effort[number] = effort
-        self._joint_states.publish(message)
+        for publisher, message, axes in self._joint_states:
+            message.header.stamp = stamp.to_msg()
+            for number, (position, velocity, effort) in enumerate(sample[axes]):
+                message.position[number] = position
+                message.velocity[number] = velocity
+                message.effort[number] = effort
+            publisher.publish(message)
+
+    def _publisher(self, name: str) -> Publisher:
+        return self.create_publisher(JointState, f'{name}/joint_states', 10)
 
     def _place(self, axis: str) -> str:
         """Return what the names of an axis' services begin with."""
         return '~' if len(self.axes) == 1 else axis
+
+
+def _message(joints: list[str]) -> JointState:
+    zeros = [0.0] * len(joints)
+    return JointState(name=joints, position=zeros, velocity=zeros, effort=zeros)

@@ -86,7 +86,7 @@ class Motion:
         self._broadcaster = JointStateBroadcaster(
             broadcaster,
             self._gateway,
-            [name for name in self._drives(self._master) if name not in model.joints],
+            [name for name in self._master.bus.joints if name not in model.joints],
             active=broadcasts,
         )
         period = self._master.bus.master.sync_period
@@ -103,12 +103,8 @@ class Motion:
             manager.get_logger().warning(note)
         self._attaching = manager.create_timer(ATTACH_PERIOD, self._attach_first)
 
-    @staticmethod
-    def _drives(master: MasterProcess) -> list[str]:
-        return [node.name for node in master.bus.nodes if node.is_drive]
-
     def _check_drives(self, master: MasterProcess, joints: Sequence[str]) -> None:
-        drives = self._drives(master)
+        drives = master.bus.joints
         missing = [name for name in joints if name not in drives]
         if missing:
             raise ModelError(
