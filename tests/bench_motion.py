@@ -36,7 +36,7 @@ from arm_canopen.standard.cob_id import CobId
 from arm_servo import load_limits, MotionCore, RobotModel, SetPoint
 from arm_servo.arrays import Array
 from arm_servo.commands import twist_command
-from arm_servo.gateway import CommandGateway
+from arm_servo.gateway import CommandGateway, start_worker
 from arm_servo.nodes.following import FollowingLimits, FollowingWatch
 from arm_servo.nodes.joint_feedback import JointFeedback
 from arm_servo.nodes.motion_thread import MotionCycle, MotionThread
@@ -281,7 +281,7 @@ def loop(period: float) -> Rows:
         (folder / 'panda.srdf').read_text(encoding='utf-8'),
         load_limits(folder / 'limits.yaml'),
     )
-    gateway = CommandGateway(MotionCore(model))
+    gateway = CommandGateway(MotionCore(model), start_worker())
     feedback = JointFeedback(model.joints, 1e9)
     feedback.take(model.joints, READY, [0.0] * len(READY), time.monotonic())
     late: list[float] = []

@@ -50,7 +50,7 @@ class Arm:
         ]
         self.net = VirtualNetwork(bus_config(*nodes))
         self.joints = joints
-        self.gateway = CommandGateway(core, lambda: self.net.now, InlineWorker())
+        self.gateway = CommandGateway(core, InlineWorker(), lambda: self.net.now)
         self.source = DriveSource(self.gateway)
         self.net.boot()
         for name in joints:

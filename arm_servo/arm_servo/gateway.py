@@ -113,6 +113,13 @@ _Order = Callable[[_Cycle], bool]
 """Carried out in a cycle; False for again in the next one."""
 
 
+def start_worker() -> Executor:
+    """Start the thread that prepares motions; the cycle hands over to it, and starts none."""
+    worker = ThreadPoolExecutor(1, thread_name_prefix='motion preparation')
+    worker.submit(lambda: None)  # an executor starts its thread with the first piece of work
+    return worker
+
+
 class CommandGateway:
     """Commands to one motion core from any thread, carried out by the thread that steps it.
 
@@ -128,22 +135,21 @@ class CommandGateway:
     def __init__(
         self,
         core: MotionCore,
+        worker: Executor,
         clock: Callable[[], float] = time.monotonic,
-        worker: Executor | None = None,
     ) -> None:
         """Wait for the arm.
 
         Args:
             core: The core; from here on it is the gateway's.
+            worker: Prepares motions, one after the other; see :func:`start_worker`.
             clock: Steady time, the one of the cycle.
-            worker: Prepares motions, one after the other; by default a thread that begins with
-                the first of them.
         """
         self.model: RobotModel = core.model
         self.refused = -math.inf
         self._core = core
         self._clock = clock
-        self._worker = worker or ThreadPoolExecutor(1, thread_name_prefix='motion preparation')
+        self._worker = worker
         self._orders: deque[_Order] = deque()
         self._snapshot = Snapshot(0.0, None, None, 'the cycle has not begun yet')
         self._lock = threading.Lock()  # of the four below; held for a few instructions only

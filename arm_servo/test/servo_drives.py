@@ -36,7 +36,7 @@ class Drives:
         """Let the drives be ready to follow."""
         self.now = 100.0
         self.gateway = CommandGateway(
-            MotionCore(robot(name)), lambda: self.now, worker or InlineWorker()
+            MotionCore(robot(name)), worker or InlineWorker(), lambda: self.now
         )
         self.source = DriveSource(self.gateway)
         self.axes = [

@@ -50,7 +50,7 @@ class Elsewhere:
         self.points: list[SetPoint] = []
         self._way: deque[Array] = deque()
         self.gateway = CommandGateway(
-            MotionCore(model), lambda: self.now, worker or InlineWorker()
+            MotionCore(model), worker or InlineWorker(), lambda: self.now
         )
         self.feedback = JointFeedback(model.joints, 0.2)
         watch = FollowingWatch(model.limits, following or FollowingLimits(), PERIOD)

@@ -4,9 +4,10 @@
 
 from __future__ import annotations
 
-from concurrent.futures import Future
+from concurrent.futures import Executor, Future
 from dataclasses import replace
 from itertools import pairwise
+import threading
 
 import numpy as np
 import pytest
@@ -15,14 +16,14 @@ from servo_drives import Drives, PERIOD
 
 from arm_canopen import Refusal, RefusalCause
 from arm_servo.exceptions import CommandError, GoalCode, GoalError, NotReadyError, StateMovedError
-from arm_servo.gateway import MAX_ATTEMPTS, MAX_QUEUED_MOTIONS, MotionCommand
+from arm_servo.gateway import MAX_ATTEMPTS, MAX_QUEUED_MOTIONS, MotionCommand, start_worker
 from arm_servo.goal import GoalPoint, TrajectoryGoal
 from arm_servo.set_point import Source
 
 JOINT = 'panda_joint1'
 
 
-def ready(worker: SteppedWorker | None = None) -> Drives:
+def ready(worker: Executor | None = None) -> Drives:
     """Return drives that follow."""
     drives = Drives(worker=worker)
     drives.attach()
@@ -204,6 +205,28 @@ def test_displacements_add_up_and_are_reached() -> None:
     assert drives.gateway.snapshot.source is Source.NONE
     assert drives.path[-1][0] - begin[0] == pytest.approx(0.2, abs=1e-6)
     assert np.array(drives.path)[-1, 1:] == pytest.approx(begin[1:], abs=1e-6)
+
+
+def test_no_thread_is_started_in_a_cycle(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Not even by the first motion: the thread that prepares it is there from the start."""
+    cycle = threading.get_ident()
+    started: list[str] = []
+    start = threading.Thread.start
+
+    def noted(thread: threading.Thread) -> None:
+        if threading.get_ident() == cycle:
+            started.append(thread.name)
+        start(thread)
+
+    worker = start_worker()
+    drives = ready(worker)
+    monkeypatch.setattr(threading.Thread, 'start', noted)
+    command = move_by(drives.gateway, {JOINT: 0.02})
+    drives.run()  # which hands it over
+    worker.shutdown()
+    begun(drives, command)
+    assert command.future.exception() is None
+    assert started == []
 
 
 def test_a_displacement_into_contact_is_refused_and_nothing_moves() -> None:

@@ -83,7 +83,7 @@ def test_a_direction_that_is_lost_is_told() -> None:
 def test_a_stop_of_the_safety_filter_is_no_free_motion() -> None:
     """Where nothing else brakes in front of contact, it does, with code and links."""
     core = MotionCore(robot('panda'), CoreSettings(servo=UNCHECKED))
-    gateway = CommandGateway(core, lambda: 100.0, InlineWorker())
+    gateway = CommandGateway(core, InlineWorker(), lambda: 100.0)
     core.reset(ready('panda'))
     jog(gateway, {'panda_joint6': -1.0}, 100.0, 60.0)
     reported = set()

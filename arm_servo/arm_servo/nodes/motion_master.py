@@ -20,7 +20,7 @@ from node_runner import destroyed_if_refused
 from ..core import MotionCore
 from ..core_settings import CoreSettings
 from ..exceptions import ModelError, ServoError
-from ..gateway import CommandGateway
+from ..gateway import CommandGateway, start_worker
 from .controller_manager import ControllerManager, trajectory_entry
 from .drive_source import DriveSource
 from .joint_state_broadcaster import JointStateBroadcaster
@@ -77,7 +77,7 @@ class Motion:
             jogging.clearance,
             check_self_collision=trajectory.check,
         )
-        self._gateway = CommandGateway(MotionCore(model, settings))
+        self._gateway = CommandGateway(MotionCore(model, settings), start_worker())
         self._source = DriveSource(self._gateway)
         self._servo = Servo(servo, self._gateway, jogging, self._prepare)
         self._controller = TrajectoryController(

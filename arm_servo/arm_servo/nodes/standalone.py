@@ -27,7 +27,7 @@ from node_runner import (
 from ..core import MotionCore
 from ..core_settings import CoreSettings
 from ..exceptions import ServoError
-from ..gateway import CommandGateway
+from ..gateway import CommandGateway, start_worker
 from ..model import RobotModel
 from .following import FollowingLimits, FollowingWatch
 from .joint_feedback import JointFeedback
@@ -115,7 +115,7 @@ def make_loop(
     """
     for note in model.notes:
         node.get_logger().warning(note)
-    gateway = CommandGateway(MotionCore(model, settings))
+    gateway = CommandGateway(MotionCore(model, settings), start_worker())
     feedback = JointFeedback(model.joints, loop.joint_timeout)
 
     def take(message: JointState) -> None:
