@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, MutableMapping
 
+from .exceptions import NetworkChoiceError
 from .host import read_interfaces
 from .profile import is_own_profile, profile_file
 from .reach import Reach, resolve_reach
@@ -26,21 +27,29 @@ _OFF = 'OFF'
 _PROFILE_DECIDES = 'SYSTEM_DEFAULT'
 
 
-def has_own_transports(environ: Mapping[str, str]) -> bool:
-    """Whether a person configures the transports: by a profile of his own, or another rmw."""
-    profile = environ.get(PROFILE_VARIABLE, '')
-    other_rmw = not environ.get(_RMW_VARIABLE, _FAST_DDS).startswith(_FAST_DDS)
-    return other_rmw or bool(profile and not is_own_profile(profile))
+def own_transports(environ: Mapping[str, str]) -> str:
+    """Return by what a person configures the transports himself; empty when he does not."""
+    rmw, profile = environ.get(_RMW_VARIABLE, ''), environ.get(PROFILE_VARIABLE, '')
+    if rmw and not rmw.startswith(_FAST_DDS):
+        return f'{_RMW_VARIABLE}={rmw}'
+    return f'{PROFILE_VARIABLE}={profile}' if profile and not is_own_profile(profile) else ''
 
 
 def selected_reach(environ: Mapping[str, str]) -> Reach:
     """Return what a person has opened.
 
     Raises:
-        NetworkChoiceError: He names what does not exist.
+        NetworkChoiceError: He names what does not exist, or what his own transports would ignore.
     """
-    text = environ.get(NETWORK_VARIABLE, '')
-    return resolve_reach(text, read_interfaces()) if text.strip() else Reach()
+    text = environ.get(NETWORK_VARIABLE, '').strip()
+    if not text:
+        return Reach()
+    if own := own_transports(environ):
+        raise NetworkChoiceError(
+            f'{text!r} would have no effect, as {own} decides which networks DDS uses; unset one '
+            'of the two'
+        )
+    return resolve_reach(text, read_interfaces())
 
 
 def dds_variables(environ: Mapping[str, str], reach: Reach) -> dict[str, str]:
@@ -53,7 +62,7 @@ def dds_variables(environ: Mapping[str, str], reach: Reach) -> dict[str, str]:
     Raises:
         NetworkChoiceError: The profile cannot be written.
     """
-    if has_own_transports(environ):
+    if own_transports(environ):
         return {}
     shared_memory = environ.get(_TRANSPORTS_VARIABLE) != 'UDPv4'
     profile = profile_file(reach, shared_memory=shared_memory)
@@ -77,7 +86,7 @@ def restrict_dds(environ: MutableMapping[str, str]) -> Reach:
         What is open.
 
     Raises:
-        NetworkChoiceError: ``DDS_NETWORK`` names what does not exist.
+        NetworkChoiceError: As of :func:`selected_reach`.
     """
     reach = selected_reach(environ)
     environ.update(dds_variables(environ, reach))
@@ -95,7 +104,7 @@ def open_dds(environ: MutableMapping[str, str], names: str | None) -> str:
         What is open, for people.
 
     Raises:
-        NetworkChoiceError: They do not exist.
+        NetworkChoiceError: As of :func:`selected_reach`.
     """
     if names is not None:
         environ[NETWORK_VARIABLE] = names
@@ -107,18 +116,18 @@ def describe_dds(environ: Mapping[str, str]) -> str:
     """Return what DDS is open to, for people.
 
     Raises:
-        NetworkChoiceError: ``DDS_NETWORK`` names what does not exist.
+        NetworkChoiceError: As of :func:`selected_reach`.
     """
-    if has_own_transports(environ):
-        decider = environ.get(PROFILE_VARIABLE) or environ.get(_RMW_VARIABLE)
-        return f'{decider} decides which networks DDS uses; it may be open to all of them'
-    return selected_reach(environ).describe()
+    reach = selected_reach(environ)
+    if own := own_transports(environ):
+        return f'{own} decides which networks DDS uses; it may be open to all of them'
+    return reach.describe()
 
 
 def is_this_host(environ: Mapping[str, str]) -> bool:
     """Whether DDS of a process with this environment reaches nothing but this host.
 
     Raises:
-        NetworkChoiceError: ``DDS_NETWORK`` names what does not exist.
+        NetworkChoiceError: As of :func:`selected_reach`.
     """
-    return not has_own_transports(environ) and selected_reach(environ).is_this_host
+    return selected_reach(environ).is_this_host and not own_transports(environ)

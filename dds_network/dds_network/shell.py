@@ -12,9 +12,9 @@ import sys
 from .environment import (
     dds_variables,
     describe_dds,
-    has_own_transports,
     LOCALHOST_ONLY_VARIABLE,
     NETWORK_VARIABLE,
+    own_transports,
     PEERS_VARIABLE,
     RANGE_VARIABLE,
     selected_reach,
@@ -32,7 +32,7 @@ def notices(environ: Mapping[str, str], reach: Reach) -> Iterator[str]:
         environ: The environment before it is changed.
         reach: What DDS may use.
     """
-    if has_own_transports(environ) or not reach.is_this_host:
+    if own_transports(environ) or not reach.is_this_host:
         yield describe_dds(environ)
         return
     asked = [

@@ -8,6 +8,7 @@ import xml.etree.ElementTree as ET
 import pytest
 
 from dds_network import (
+    describe_dds,
     Interface,
     is_this_host,
     NETWORK_VARIABLE,
@@ -92,6 +93,29 @@ def test_transports_of_a_person_are_left_alone(own: dict[str, str]) -> None:
     restrict_dds(environ)
     assert environ == own
     assert not is_this_host(environ)
+
+
+@pytest.mark.parametrize('named', ['lo', 'localhost', 'no.such.interface.invalid'])
+@pytest.mark.parametrize(
+    'own', [{PROFILE_VARIABLE: '/home/me/dds.xml'}, {'RMW_IMPLEMENTATION': 'rmw_cyclonedds_cpp'}]
+)
+def test_a_choice_that_would_be_ignored_is_refused(own: dict[str, str], named: str) -> None:
+    """By the variable or by --network: nobody believes that it counts, not that it is closed."""
+    environ = {NETWORK_VARIABLE: named, **own}
+    (decider,) = own.items()
+    for call in (restrict_dds, describe_dds, is_this_host, lambda env: open_dds(env, None)):
+        with pytest.raises(NetworkChoiceError, match='='.join(decider)):
+            call(environ)
+    with pytest.raises(NetworkChoiceError, match='unset one of the two'):
+        open_dds(dict(own), named)
+    assert environ == {NETWORK_VARIABLE: named, **own}
+
+
+def test_a_profile_of_our_own_is_no_foreign_one() -> None:
+    """Processes that we start get ours, and the variable beside it."""
+    environ = {NETWORK_VARIABLE: 'localhost', 'RMW_IMPLEMENTATION': 'rmw_fastrtps_cpp'}
+    restrict_dds(environ)
+    assert restrict_dds(environ) == Reach()
 
 
 def test_discovery_that_is_off_stays_off() -> None:

@@ -9,9 +9,10 @@ import os
 
 import rclpy
 from rclpy.context import Context
+from rclpy.logging import get_logger
 from rclpy.signals import SignalHandlerOptions
 
-from dds_network import restrict_dds
+from dds_network import describe_dds, is_this_host, restrict_dds
 
 from .type_support import load_type_support
 
@@ -19,12 +20,14 @@ from .type_support import load_type_support
 def init_ros(args: Sequence[str] | None = None, context: Context | None = None) -> None:
     """Initialise rclpy without its signal handlers, with DDS on the networks that are open.
 
+    A process that can be reached from outside this host logs so.
+
     Args:
         args: Command line; None for the process's own.
         context: What to initialise; None for the default one.
 
     Raises:
-        NetworkChoiceError: ``DDS_NETWORK`` names what does not exist.
+        NetworkChoiceError: ``DDS_NETWORK`` names what does not exist, or would be ignored.
         RuntimeError: ROS does not accept the arguments, or its environment variables.
     """
     restrict_dds(os.environ)
@@ -34,3 +37,5 @@ def init_ros(args: Sequence[str] | None = None, context: Context | None = None) 
         context=context,
         signal_handler_options=SignalHandlerOptions.NO,
     )
+    if not is_this_host(os.environ):
+        get_logger('dds_network').warning(describe_dds(os.environ))
