@@ -16,11 +16,12 @@ from .exceptions import (
     NotReadyError,
     ServoError,
 )
-from .execution import Execution, ExecutionSettings, Feedback, Outcome, Phase
+from .execution import Execution, ExecutionSettings, Feedback, Phase
 from .goal import GoalPoint, GoalRules, JointTolerance, TrajectoryGoal
 from .limits import JointLimits, load_limits
 from .model import Pose, RobotModel
 from .otg import MotionState
+from .outcome import Outcome
 from .parameter_check import check_parameters
 from .report import Cause, Limiter, MotionReport
 from .servo import ServoSettings

@@ -4,19 +4,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable
+
 import numpy as np
 
-from .arrays import Array, frozen
+from .arrays import Array
 from .core_settings import CoreSettings
 from .exceptions import GoalCode
-from .execution import Execution, Outcome, Phase
+from .execution import Execution
 from .jogging import Jogging
 from .model import RobotModel
 from .otg import Generator, hard_brake, MotionState
+from .outcome import Outcome
 from .report import MotionReport
 from .servo import Command
 from .set_point import Source
 from .single_target import SingleTarget
+
+Motion = Execution | SingleTarget
+"""What has a goal, and an outcome once it ended."""
 
 
 class CommandArbiter:
@@ -25,6 +31,8 @@ class CommandArbiter:
     Attributes:
         active: What moves the arm.
         execution: The trajectory that was followed last; None before the first.
+        target: The single target that was aimed at last; None before the first.
+        jogger: Who has jogged last.
     """
 
     def __init__(self, model: RobotModel, generator: Generator, settings: CoreSettings) -> None:
@@ -38,26 +46,30 @@ class CommandArbiter:
         self._limits = model.limits
         self._generator = generator
         self._jogging = Jogging(model, settings.servo)
-        self._single = SingleTarget(model.limits, generator)
         self.active = Source.NONE
         self.execution: Execution | None = None
+        self.target: SingleTarget | None = None
+        self.jogger: Hashable = None
 
     @property
-    def target(self) -> Array | None:
-        """Where a single target takes the arm in [rad]; None without one."""
-        return self._single.target
+    def motion(self) -> Motion | None:
+        """The trajectory or the single target that moves the arm; None without one."""
+        if self.active is Source.TRAJECTORY:
+            return self.execution
+        return self.target if self.active is Source.TARGET else None
 
-    def jog(self, command: Command, fresh_until: float) -> None:
+    def jog(self, command: Command, fresh_until: float, client: Hashable) -> None:
         """Let a jog command move the arm.
 
         Args:
             command: The command.
             fresh_until: Steady time until which it counts in [s].
+            client: Who asks.
         """
         if self.active is not Source.JOG:
             self.release('jogging took over')
             self._jogging.begin()
-        self.active = Source.JOG
+        self.active, self.jogger = Source.JOG, client
         self._jogging.take(command, fresh_until)
 
     @property
@@ -83,39 +95,47 @@ class CommandArbiter:
         self.release('a new trajectory took over')
         self.active, self.execution = Source.TRAJECTORY, execution
 
-    def aim(self, target: Array, max_speed: float) -> None:
+    def aim(self, target: SingleTarget) -> None:
         """Let a single target move the arm.
 
         Args:
-            target: Positions in [rad], within the limits.
-            max_speed: Greatest speed of a joint in [rad/s].
+            target: The target.
         """
-        if self.active is not Source.TARGET:
-            self.release('a single target took over')
-        self.active = Source.TARGET
-        self._single.target, self._single.max_speed = frozen(target), max_speed
+        if self.active is Source.TARGET:  # displacements add up: what was asked before is in it
+            self.end(Outcome(GoalCode.SUCCESSFUL, 'a further target goes on from it'))
+        self.release('a single target took over')
+        self.active, self.target = Source.TARGET, target
 
-    def stop(self, reason: str) -> None:
+    def stop(self, outcome: Outcome) -> None:
         """Come to rest: a trajectory on its path, anything else in the shortest time.
 
         Args:
-            reason: Why, for the trajectory that this ends.
+            outcome: How the motion ends.
         """
         if self.active is Source.TRAJECTORY and self.execution is not None:
-            self.execution.stop(Outcome(GoalCode.SUCCESSFUL, reason, canceled=True))
+            self.execution.stop(outcome)
             return
-        self.release(reason)
+        self.end(outcome)
+        self.release(outcome.reason)
 
     def release(self, reason: str) -> None:
         """Take the arm from what moves it; it comes to rest unless something else takes over.
 
         Args:
-            reason: Why, for the trajectory that this ends.
+            reason: Why, for the motion that this ends.
         """
-        if self.active is Source.TRAJECTORY and self.execution is not None:
-            self.execution.abandon(Outcome(GoalCode.INVALID_GOAL, reason))
+        self.end(Outcome(GoalCode.INVALID_GOAL, reason))
         self._jogging.end()
-        self.active, self._single.target = Source.NONE, None
+        self.active = Source.NONE
+
+    def end(self, outcome: Outcome) -> None:
+        """End the trajectory or the single target that moves the arm.
+
+        Args:
+            outcome: How.
+        """
+        if self.motion is not None:
+            self.motion.end(outcome)
 
     def step(
         self,
@@ -143,8 +163,8 @@ class CommandArbiter:
             wanted = None if velocity is None else self._toward(state, velocity, period)
         elif self.active is Source.TRAJECTORY and self.execution is not None:
             wanted = self.execution.step(state, measured, speed_scaling, period)
-        elif self.active is Source.TARGET:
-            wanted = self._single.step(state, speed_scaling, period)
+        elif self.active is Source.TARGET and self.target is not None:
+            wanted = self.target.step(state, speed_scaling, period)
         if wanted is None:
             wanted = self._toward(state, np.zeros(len(self._limits)), period)
         return wanted, report
@@ -157,11 +177,12 @@ class CommandArbiter:
             now: Steady time in [s].
             paused: Whether jogging comes to rest in spite of a command.
         """
-        source, execution = self.active, self.execution
-        done = source is Source.TRAJECTORY and execution and execution.phase is Phase.DONE
-        arrived = source is Source.TARGET and self._single.reached(state)
+        source, motion = self.active, self.motion
+        if isinstance(motion, SingleTarget):
+            motion.arrive(state)
+        done = motion is not None and motion.outcome is not None
         stale = paused or self._jogging.stale(now)
-        if done or arrived or (source is Source.JOG and stale and not state.moving):
+        if done or (source is Source.JOG and stale and not state.moving):
             self.release('')
         return source
 

@@ -18,16 +18,17 @@ import math
 import numpy as np
 
 from .arrays import Array, checked
-from .command_arbiter import CommandArbiter
+from .command_arbiter import CommandArbiter, Motion
 from .commands import by_joint, duration_of, in_base, pose_command, twist_command
 from .core_settings import CoreSettings
 from .exceptions import CommandError, GoalCode, NotReadyError, StateMovedError
-from .execution import Execution, Feedback, Outcome
+from .execution import Execution, Feedback
 from .goal import TrajectoryGoal
 from .model import Pose, RobotModel
 from .otg import Generator, MotionState
-from .preparation import CommandBasis, JointGoalPlan, Preparation, Prepared, PreparedTrajectory
-from .report import Cause
+from .outcome import Outcome
+from .preparation import CommandBasis, Preparation, Prepared
+from .report import Cause, Limiter
 from .requests import DisplacementRequest, JogRequest, MotionRequest, TargetRequest
 from .safety_filter import SafetyFilter
 from .servo import Command, JointCommand
@@ -35,6 +36,8 @@ from .set_point import SetPoint, Source
 
 DISPLACED = 0.01
 """How far the arm may be from where a trajectory was prepared in [rad]."""
+
+PAUSED = 'the arm is paused; resume first (~/resume of the trajectory controller)'
 
 
 class MotionCore:
@@ -91,6 +94,11 @@ class MotionCore:
         return self._arbiter.execution
 
     @property
+    def motion(self) -> Motion | None:
+        """The trajectory or the single target that moves the arm; None without one."""
+        return self._arbiter.motion
+
+    @property
     def feedback(self) -> Feedback | None:
         """Where the trajectory is; None without one."""
         return None if self.execution is None else self.execution.feedback
@@ -112,12 +120,13 @@ class MotionCore:
         Raises:
             NotReadyError: The position of the arm is not known yet.
         """
+        target = self._arbiter.target if self.source is Source.TARGET else None
         return CommandBasis(
             self.state,
             self._sequence,
             self.source,
             self.speed_scaling,
-            self._arbiter.target,
+            None if target is None else target.target,
             self.execution,
         )
 
@@ -156,46 +165,58 @@ class MotionCore:
             prepared: What :meth:`prepare` returned.
 
         Raises:
-            CommandError: Another command or a stop came after it was prepared.
-            StateMovedError: The arm is elsewhere than where a trajectory was prepared.
+            StateMovedError: Another command or a stop came after it was prepared, or the arm is
+                elsewhere than where a trajectory was: it may begin when it is prepared again.
+            CommandError: The arm is paused, and a single target would begin later, by surprise.
             NotReadyError: The position of the arm is not known yet.
         """
-        if isinstance(prepared, JointGoalPlan):
-            if prepared.sequence != self._sequence:
-                raise CommandError(
-                    f'{self._last_change} before this command had begun; send it again'
-                )
-            self._changed('another command came')
-            self._arbiter.aim(prepared.target, prepared.max_speed)
+        state, motion = self.state, prepared.motion
+        if motion is None:
             return
-        self._check_place(prepared)
-        self._changed('another command came')
-        self._arbiter.follow(prepared.execution)
+        if prepared.basis.sequence != self._sequence:
+            raise StateMovedError(
+                GoalCode.INVALID_GOAL,
+                f'{self._last_change} before this command had begun; send it again',
+            )
+        if isinstance(motion, Execution):
+            self._check_place(prepared.basis.state, state)
+            self._changed('another command came')
+            self._arbiter.follow(motion)
+        else:
+            self._check_held()
+            self._changed('another command came')
+            self._arbiter.aim(motion)
 
     def ignores(self, request: JogRequest) -> bool:
-        """Whether a jog asks for standing still, and nobody jogs: it stops nothing else."""
-        return request.is_zero and self.source is not Source.JOG
+        """Whether a jog asks for standing still, and its client is not jogging."""
+        jogs = self.source is Source.JOG and self._arbiter.jogger == request.client
+        return request.is_zero and not jogs
 
-    def commit_jog(self, request: JogRequest) -> None:
+    def commit_jog(self, request: JogRequest, now: float) -> None:
         """Jog from now on; there is nothing to prepare, the safety filter sees every step.
 
         Args:
             request: What is asked.
+            now: Steady time in [s].
 
         Raises:
             CommandError: The arm is paused.
-            NotReadyError: The position of the arm is not known yet.
+            NotReadyError: The request has expired, or the position of the arm is not known yet.
         """
         state = self.state
         if self.ignores(request):
             return
-        if self._paused:
-            raise CommandError(
-                'the arm is paused; resume first (~/resume of the trajectory controller)'
+        if now > request.expires:
+            raise NotReadyError(
+                f'expired {now - request.expires:.2f} s before the cycle; send commands more'
+                ' often than they expire (incoming_command_timeout)'
             )
+        if self._paused:
+            raise CommandError(PAUSED)
         command = in_base(self._model, state.position, request)
-        self._changed('another command came')
-        self._arbiter.jog(command, request.expires)
+        if not request.is_zero:  # that ends the jog, and no other command
+            self._changed('a jog took over')
+        self._arbiter.jog(command, request.expires, request.client)
 
     def twist(
         self,
@@ -266,9 +287,10 @@ class MotionCore:
             GoalError: It is refused; what moves the arm goes on.
             NotReadyError: The position of the arm is not known yet.
         """
-        prepared = self._preparation.trajectory(goal, self.basis)
-        self.commit(prepared)
-        return prepared.execution
+        basis = self.basis
+        execution = self._preparation.trajectory(goal, basis)
+        self.commit(Prepared(execution, basis))
+        return execution
 
     def move_to(self, positions: Mapping[str, float], max_speed: float = math.inf) -> None:
         """Move joints to positions in the shortest time, and rest there.
@@ -302,10 +324,28 @@ class MotionCore:
         """Come to rest: a trajectory on its path, anything else in the shortest time.
 
         Args:
-            reason: Why, for the trajectory that this ends.
+            reason: Why, for the motion that this ends.
         """
-        self._changed('the arm was stopped')
-        self._arbiter.stop(reason)
+        self._stop(Outcome(GoalCode.SUCCESSFUL, reason, canceled=True))
+
+    def fail(self, reason: str, code: GoalCode = GoalCode.INVALID_GOAL) -> None:
+        """Come to rest as by :meth:`stop`, because something has gone wrong.
+
+        Args:
+            reason: What, for the motion that this ends.
+            code: Code of its outcome.
+        """
+        self._stop(Outcome(code, reason))
+
+    def abandon(self, reason: str) -> None:
+        """End at once what moves the arm, which does not follow any more.
+
+        Args:
+            reason: Why, for the motion that this ends.
+        """
+        if self.source is not Source.NONE:
+            self._changed('the arm did not follow')
+            self._arbiter.release(reason)
 
     def pause(self) -> None:
         """Come to rest, a trajectory on its path; jogging is refused until :meth:`resume`."""
@@ -353,8 +393,7 @@ class MotionCore:
         self._state = after
         if limiter is not None:
             report = report.with_limiter(limiter)
-            if limiter.cause is Cause.COLLISION:
-                self._give_up_catching_up(limiter.name)
+            self._give_up(limiter, is_at_rest=not (state.moving or after.moving))
         source = self._arbiter.ended(after, now, paused=self._paused)
         return SetPoint(after, source, report)
 
@@ -376,34 +415,48 @@ class MotionCore:
             return None
         return 0.0
 
-    def _give_up_catching_up(self, links: str) -> None:
-        """End a trajectory that cannot be met without contact; the arm comes to rest."""
-        if self.source is Source.TRAJECTORY and self.execution is not None:
-            self.execution.abandon(
-                Outcome(
-                    GoalCode.PATH_TOLERANCE_VIOLATED,
-                    f'{links} would collide while the arm catches up with the path; begin at rest,'
-                    ' or give the first point more time',
-                )
+    def _give_up(self, limiter: Limiter, *, is_at_rest: bool) -> None:
+        """End a motion that the safety filter does not let go on; the arm comes to rest."""
+        is_target, code = self.source is Source.TARGET, GoalCode.PATH_TOLERANCE_VIOLATED
+        if limiter.cause is Cause.COLLISION:
+            where = (
+                'on the way to the target from where the arm is; go around that'
+                if is_target
+                else 'while the arm catches up with the path; begin at rest, or give the first'
+                ' point more time'
             )
+            self._arbiter.end(Outcome(code, f'{limiter.name} would collide {where}'))
+        elif is_target and is_at_rest:
+            self._arbiter.end(Outcome(code, f'no way to the target from here: {limiter}'))
+
+    def _stop(self, outcome: Outcome) -> None:
+        self._changed('the arm was stopped')
+        self._arbiter.stop(outcome)
+
+    def _check_held(self) -> None:
+        """Refuse what would wait, and begin when nobody expects it any more."""
+        if self._paused:
+            raise CommandError(PAUSED)
+        if self._speed == 0.0:
+            raise CommandError('the speed override is 0; raise it first (~/speed_scaling_input)')
 
     def _changed(self, what: str) -> None:
         """Count a command or a stop: what was prepared before it is void."""
         self._sequence += 1
         self._last_change = what
 
-    def _check_place(self, prepared: PreparedTrajectory) -> None:
+    def _check_place(self, planned: MotionState, state: MotionState) -> None:
         """Make sure that the arm is where a trajectory was prepared; else its way is another."""
-        off = np.abs(self.state.position - prepared.state.position)
+        off = np.abs(state.position - planned.position)
         joint = int(np.argmax(off))
         if off[joint] > DISPLACED:
             raise StateMovedError(
                 GoalCode.INVALID_GOAL,
                 f'{self._model.joints[joint]} was moved by {off[joint]:.3f} rad while the'
-                ' trajectory was planned, and its path was checked from there only; end what'
-                ' moves the arm, and send it again',
+                ' trajectory was planned, and its path was checked from there only; send it'
+                ' again, or end what moves the arm first',
             )
 
     def _jog(self, command: Command, now: float, duration: float | None) -> None:
         counts = duration_of(duration, self._settings.timeout)
-        self.commit_jog(JogRequest(command, now + counts))
+        self.commit_jog(JogRequest(command, now + counts), now)

@@ -17,6 +17,7 @@ from .goal import GoalRules, JointTolerance, TrajectoryGoal
 from .goal_path import build_path
 from .limits import JointLimits
 from .otg import Generator, MotionState
+from .outcome import Outcome
 from .path import Path
 from .tolerances import tolerances
 from .trajectory_timer import TrajectoryTimer
@@ -41,21 +42,6 @@ class Phase(Enum):
     SETTLING = 'settling'
     STOPPING = 'stopping'
     DONE = 'done'
-
-
-@dataclass(frozen=True, slots=True)
-class Outcome:
-    """How a trajectory ended.
-
-    Attributes:
-        code: Code of the action's result.
-        reason: Why, in words.
-        canceled: Whether it was asked to end.
-    """
-
-    code: GoalCode
-    reason: str
-    canceled: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,6 +139,11 @@ class Execution:
         )
 
     @property
+    def outcome(self) -> Outcome | None:
+        """How it ended; None while it goes on."""
+        return self.ending if self.phase is Phase.DONE else None
+
+    @property
     def path(self) -> Path:
         """The path that it follows."""
         return self._path
@@ -185,8 +176,8 @@ class Execution:
         if self.phase in {Phase.FOLLOWING, Phase.SETTLING}:
             self.phase, self.ending = Phase.STOPPING, outcome
 
-    def abandon(self, outcome: Outcome) -> None:
-        """End at once: something else moves the arm now.
+    def end(self, outcome: Outcome) -> None:
+        """End at once, unless it has ended: something else moves the arm now, or nothing.
 
         Args:
             outcome: How it ended.

@@ -21,19 +21,22 @@ from concurrent.futures import (
 )
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from itertools import count
 import math
 import threading
 import time
 from typing import Any
 
 from .arrays import Array
+from .command_arbiter import Motion
 from .core import MotionCore
 from .exceptions import GoalCode, NotReadyError, StateMovedError
-from .execution import Execution, Outcome
+from .execution import Execution
 from .goal import TrajectoryGoal
 from .model import RobotModel
 from .otg import MotionState
-from .preparation import CommandBasis, Prepared, PreparedTrajectory
+from .outcome import Outcome, refused
+from .preparation import CommandBasis, Prepared
 from .requests import JogRequest, MotionRequest
 from .set_point import SetPoint, Source
 from .snapshot import MAX_CYCLE_AGE, Snapshot
@@ -73,25 +76,41 @@ JOGGING = (Source.JOG, Source.TARGET)
 
 MOTIONS = (*JOGGING, Source.TRAJECTORY)
 
+CANCELED = Outcome(GoalCode.SUCCESSFUL, 'canceled before it began', canceled=True)
+NOTHING = Outcome(GoalCode.SUCCESSFUL, 'a displacement by nothing')
+
 
 @dataclass(slots=True, eq=False)
 class MotionCommand:
-    """A motion from its request to its begin.
+    """A motion from its request to its end.
 
     Attributes:
         request: What is asked.
+        number: Its place among all commands and stops.
+        requested: Steady time of the request in [s].
         future: Its execution, or None for a single target, once it began; else why it is refused.
-        execution: The execution once it began; None before, and for a single target.
+        ended: How it ended, whatever became of it; set once, at the latest when the cycle fails.
+        motion: What moves the arm for it, once it began.
     """
 
     request: MotionRequest
-    stop_count: int
+    number: int
     requested: float
     future: Future[Execution | None] = field(default_factory=Future)
-    execution: Execution | None = None
+    ended: Future[Outcome] = field(default_factory=Future)
+    motion: Motion | None = None
     attempts: int = MAX_ATTEMPTS
     is_canceled: bool = False
-    is_begun: bool = False
+
+    @property
+    def execution(self) -> Execution | None:
+        """The execution once a trajectory began."""
+        return self.motion if isinstance(self.motion, Execution) else None
+
+    def end(self, outcome: Outcome) -> None:
+        """Note how it ended, unless that is known."""
+        with suppress(InvalidStateError):
+            self.ended.set_result(outcome)
 
     @property
     def source(self) -> Source:
@@ -152,9 +171,10 @@ class CommandGateway:
         self._worker = worker
         self._orders: deque[_Order] = deque()
         self._snapshot = Snapshot(0.0, None, None, 'the cycle has not begun yet')
+        self._begun: list[MotionCommand] = []  # of the cycle
         self._lock = threading.Lock()  # of the four below; held for a few instructions only
-        self._stop_counts = dict.fromkeys(MOTIONS, 0)
-        self._stop_reasons = dict.fromkeys(MOTIONS, '')
+        self._numbers = count(1)
+        self._void_up_to: dict[Source, tuple[int, str]] = dict.fromkeys(MOTIONS, (0, ''))
         self._waiting: deque[MotionCommand] = deque()
         self._preparing: MotionCommand | None = None
 
@@ -176,15 +196,16 @@ class CommandGateway:
         if len(self._orders) >= MAX_QUEUED_JOGS:
             future.set_exception(NotReadyError(f'{MAX_QUEUED_JOGS} commands wait for the cycle'))
             return future
-        stop_count, since = self._stop_counts[Source.JOG], self._clock()
-        if not request.is_zero:
-            self._void([Source.TARGET], 'a jog took over')
+        with self._lock:
+            number, since = next(self._numbers), self._clock()
 
         def commit(cycle: _Cycle) -> bool:
             try:
                 if not self._core.ignores(request):
-                    self._admit(Source.JOG, stop_count, since, cycle)
-                    self._core.commit_jog(request)
+                    self._admit(Source.JOG, number, since, cycle)
+                    self._core.commit_jog(request, cycle.now)
+                    if not request.is_zero:  # the newest command counts: older ones never begin
+                        self._void((Source.TARGET, Source.TRAJECTORY), 'a jog took over', number)
             except Exception as error:  # noqa: BLE001  # whoever commanded it is told
                 future.set_exception(error)
             else:
@@ -200,16 +221,16 @@ class CommandGateway:
         Args:
             request: What is asked.
         """
-        command = MotionCommand(request, 0, self._clock())
         with self._lock:
-            command.stop_count = self._stop_counts[command.source]
+            command = MotionCommand(request, next(self._numbers), self._clock())
             is_full = len(self._waiting) >= MAX_QUEUED_MOTIONS
             if not is_full:
                 self._waiting.append(command)
         if is_full:
-            command.future.set_exception(
-                NotReadyError(f'{MAX_QUEUED_MOTIONS} motions wait already; send them more slowly')
+            error = NotReadyError(
+                f'{MAX_QUEUED_MOTIONS} motions wait already; send them more slowly'
             )
+            self._refuse(command, error)
         self._prepare_next()
         return command
 
@@ -222,15 +243,14 @@ class CommandGateway:
         """
 
         def stop(_cycle: _Cycle) -> bool:
-            if command.execution is not None:
-                command.execution.stop(Outcome(GoalCode.SUCCESSFUL, reason, canceled=True))
-            elif command.is_begun and self._core.source is Source.TARGET:
+            if command.motion is not None and command.motion is self._core.motion:
                 self._core.stop(reason)
             return True
 
         # the mark first: a commit that has missed it comes before the order
         command.is_canceled = True
-        command.future.cancel()
+        if command.future.cancel():
+            command.end(CANCELED)
         self._orders.append(stop)
 
     def stop(self, sources: Iterable[Source], reason: str) -> None:
@@ -316,6 +336,7 @@ class CommandGateway:
         """
         self._carry_out(_Cycle(now, period, blocked))
         set_point = self._core.step(now, period, measured)
+        self._report_ends()
         self._snapshot = Snapshot(
             now,
             set_point,
@@ -332,18 +353,14 @@ class CommandGateway:
         return set_point
 
     def fail(self, reason: str, code: GoalCode = GoalCode.INVALID_GOAL) -> None:
-        """Bring the arm to rest, a trajectory on its path; the trajectory ends with the reason.
+        """Bring the arm to rest, a trajectory on its path; the motion ends with the reason.
 
         Args:
             reason: What has gone wrong, and where.
-            code: Code of the trajectory's result.
+            code: Code of the motion's outcome.
         """
         self._void(MOTIONS, reason)
-        execution = self._core.execution
-        if self._core.source is Source.TRAJECTORY and execution is not None:
-            execution.stop(Outcome(code, reason))
-        else:
-            self._core.stop(reason)
+        self._core.fail(reason, code)
 
     def idle(
         self, now: float, measured: MotionState | None, blocked: str, ages: Array | None = None
@@ -358,10 +375,9 @@ class CommandGateway:
         """
         if self._snapshot.set_point is not None:
             self._void(MOTIONS, blocked)
+        self._core.abandon(blocked)  # it ended at the latest when the arm came to rest
+        self._report_ends()
         self._carry_out(_Cycle(now, self._snapshot.period, blocked))
-        execution = self._core.execution
-        if execution is not None:  # it ended at the latest when the arm came to rest
-            execution.abandon(Outcome(GoalCode.INVALID_GOAL, blocked))
         self._snapshot = Snapshot(
             now,
             None,
@@ -373,12 +389,40 @@ class CommandGateway:
             ages=ages,
         )
 
-    def _void(self, sources: Iterable[Source], reason: str) -> None:
-        """Refuse what was requested for some sources so far."""
+    def abandon(self, now: float, reason: str) -> None:
+        """End all that was commanded, for a cycle that has failed: none may follow.
+
+        Args:
+            now: Steady time.
+            reason: What has failed, with the remedy.
+        """
+        self._void(MOTIONS, reason)
+        with self._lock:  # their turn does not come
+            waiting, self._waiting = self._waiting, deque()
+        for command in waiting:
+            self._refuse(command, NotReadyError(reason))
+        self.idle(now, self._snapshot.measured, reason)
+
+    def _void(self, sources: Iterable[Source], reason: str, number: int | None = None) -> None:
+        """Refuse what was requested for some sources before a number; by default so far."""
         with self._lock:
+            number = next(self._numbers) if number is None else number
             for source in sources:
-                self._stop_counts[source] += 1
-                self._stop_reasons[source] = reason
+                if self._void_up_to[source][0] < number:
+                    self._void_up_to[source] = number, reason
+
+    def _check_void(self, source: Source, number: int) -> None:
+        """Refuse what another command or a stop has made void."""
+        up_to, reason = self._void_up_to[source]
+        if number < up_to:
+            raise NotReadyError(f'stopped before it had begun: {reason}')
+
+    def _report_ends(self) -> None:
+        """Report how motions have ended."""
+        for command in self._begun.copy():
+            if command.motion is None or command.motion.outcome is not None:
+                self._begun.remove(command)
+                command.end((command.motion and command.motion.outcome) or NOTHING)
 
     def _carry_out(self, cycle: _Cycle) -> None:
         for _ in range(len(self._orders)):
@@ -386,11 +430,9 @@ class CommandGateway:
             if not order(cycle):
                 self._orders.append(order)
 
-    def _admit(self, source: Source, stop_count: int, since: float, cycle: _Cycle) -> None:
-        """Refuse a motion that was stopped before it began, or that the arm cannot follow."""
-        if self._stop_counts[source] != stop_count:
-            reason = self._stop_reasons[source]
-            raise NotReadyError(f'stopped before it had begun: {reason}')
+    def _admit(self, source: Source, number: int, since: float, cycle: _Cycle) -> None:
+        """Refuse a motion that is void before it began, or that the arm cannot follow."""
+        self._check_void(source, number)
         if cycle.blocked:
             self.refused = cycle.now
             raise NotReadyError(cycle.blocked)
@@ -416,7 +458,7 @@ class CommandGateway:
 
     def _hand_out(self, command: MotionCommand, since: float, cycle: _Cycle) -> None:
         """Have a motion prepared from the state of this cycle."""
-        self._admit(command.source, command.stop_count, since, cycle)
+        self._admit(command.source, command.number, since, cycle)
         basis = self._core.basis
         self._worker.submit(
             lambda: self._guarded(command, lambda: self._prepare(command, basis, cycle))
@@ -455,7 +497,7 @@ class CommandGateway:
             since = cycle.now if is_stopped else ordered
             if not self._guarded(
                 command,
-                lambda: self._admit(command.source, command.stop_count, since, cycle),
+                lambda: self._admit(command.source, command.number, since, cycle),
             ):
                 return True
             if not is_stopped:
@@ -478,6 +520,7 @@ class CommandGateway:
         self._orders.append(rest)
 
     def _order_commit(self, command: MotionCommand, prepared: Prepared, begin: float) -> None:
+        self._check_void(command.source, command.number)  # no cycle may come that does
         ordered = max(self._clock(), begin)
 
         def commit(cycle: _Cycle) -> bool:
@@ -493,12 +536,12 @@ class CommandGateway:
         self, command: MotionCommand, prepared: Prepared, since: float, cycle: _Cycle
     ) -> None:
         """Begin a motion, if nothing came in between."""
-        self._admit(command.source, command.stop_count, since, cycle)
+        self._admit(command.source, command.number, since, cycle)
         self._core.commit(prepared)
-        execution = prepared.execution if isinstance(prepared, PreparedTrajectory) else None
-        command.execution, command.is_begun = execution, True
+        command.motion = prepared.motion
+        self._begun.append(command)
         with suppress(InvalidStateError):  # canceled in this moment: the order behind it stops it
-            command.future.set_result(execution)
+            command.future.set_result(command.execution)
 
     def _guarded(self, command: MotionCommand, step: Callable[[], Any]) -> bool:
         """Take a step of a motion; return whether it was not refused."""
@@ -525,6 +568,7 @@ class CommandGateway:
                 command.future.cancel()
             else:
                 command.future.set_exception(error)
+        command.end(CANCELED if isinstance(error, CancelledError) else refused(error))
         self._end(command)
 
     def _end(self, command: MotionCommand) -> None:

@@ -15,16 +15,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .arrays import Array, Mask
+from .command_arbiter import Motion
 from .commands import by_joint
 from .core_settings import CoreSettings
 from .exceptions import CommandError, GoalCode, GoalError
 from .execution import Execution
 from .goal import TrajectoryGoal
 from .model import RobotModel
-from .otg import Generator, MotionState
+from .otg import Generator, MotionState, Plan
 from .path_check import PathCheck
 from .requests import DisplacementRequest, MotionRequest
 from .set_point import Source
+from .single_target import SingleTarget
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,34 +63,16 @@ class CommandBasis:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class JointGoalPlan:
-    """A single target whose way is clear.
+class Prepared:
+    """A motion whose path is clear.
 
     Attributes:
-        target: Positions to rest at in [rad].
-        max_speed: Greatest speed of a joint in [rad/s].
-        sequence: Number of commands before it; another one makes it void.
+        motion: What begins; None for a displacement by nothing, which is no command.
+        basis: From what it was planned; it does not begin from anything else.
     """
 
-    target: Array
-    max_speed: float
-    sequence: int
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class PreparedTrajectory:
-    """A trajectory whose path is clear.
-
-    Attributes:
-        execution: Its execution.
-        state: Commanded state from which it was planned; elsewhere it does not begin.
-    """
-
-    execution: Execution
-    state: MotionState
-
-
-Prepared = JointGoalPlan | PreparedTrajectory
+    motion: Motion | None
+    basis: CommandBasis
 
 
 class Preparation:
@@ -123,14 +107,14 @@ class Preparation:
             CommandError: The request is refused.
         """
         if isinstance(request, TrajectoryGoal):
-            return self.trajectory(request, basis)
+            return Prepared(self.trajectory(request, basis), basis)
         if isinstance(request, DisplacementRequest):
             target = self._displaced(request.displacements, basis)
+            if request.is_zero:
+                return Prepared(None, basis)
         else:
             target = self._aimed(*self._by_joint(request.positions, 'positions'), basis)
-        plan = self._joint_goal(target, request.max_speed, basis)
-        self._check_joint_goal(plan, basis.state)
-        return plan
+        return Prepared(self._single_target(target, request.max_speed, basis), basis)
 
     def _by_joint(self, values: Mapping[str, float], what: str) -> tuple[Array, Mask]:
         return by_joint(self._model, values, what)
@@ -151,7 +135,7 @@ class Preparation:
         target: Array = np.where(moved, positions, np.clip(stay, limits.lower, limits.upper))
         return target
 
-    def _joint_goal(self, target: Array, max_speed: float, basis: CommandBasis) -> JointGoalPlan:
+    def _single_target(self, target: Array, max_speed: float, basis: CommandBasis) -> SingleTarget:
         if not max_speed > 0.0:
             raise CommandError(f'greatest speed of a joint {max_speed} rad/s: it must be above 0')
         limits = self._limits
@@ -162,11 +146,12 @@ class Preparation:
                 f'{limits.names[joint]}: {target[joint]:.4f} is beyond its limits'
                 f' {limits.lower[joint]:.4f}..{limits.upper[joint]:.4f}'
             )
-        return JointGoalPlan(target, max_speed, basis.sequence)
+        motion = SingleTarget(target, max_speed, self._generator)
+        self._check_single_target(motion.plan(basis.state, basis.speed_scaling))
+        return motion
 
-    def _check_joint_goal(self, goal: JointGoalPlan, state: MotionState) -> None:
-        """Make sure that no links meet on the way to a single target."""
-        plan = self._generator.to_state(state, MotionState.at_rest(goal.target))
+    def _check_single_target(self, plan: Plan | None) -> None:
+        """Make sure that no links meet on the way to a single target, as it is driven."""
         if self._check is None or plan is None:
             return
 
@@ -180,7 +165,7 @@ class Preparation:
                 ' to the target; go around that (check_self_collision switches this off)'
             )
 
-    def trajectory(self, goal: TrajectoryGoal, basis: CommandBasis) -> PreparedTrajectory:
+    def trajectory(self, goal: TrajectoryGoal, basis: CommandBasis) -> Execution:
         """Plan a trajectory and check its path.
 
         Raises:
@@ -204,7 +189,7 @@ class Preparation:
                 f'{" and ".join(found.links)} would collide at {found.time:.2f} s of the'
                 ' trajectory; lead it around that (check_self_collision switches this off)',
             )
-        return PreparedTrajectory(execution, basis.state)
+        return execution
 
     def _begin(
         self, goal: TrajectoryGoal, state: MotionState

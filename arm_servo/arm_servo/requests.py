@@ -7,7 +7,7 @@ A trajectory is asked for by a :class:`~.goal.TrajectoryGoal`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
 import math
 
@@ -25,11 +25,13 @@ class JogRequest:
         expires: Steady time at which the request expires in [s].
         frame: Link, or pose in the base, about whose origin a twist turns and along whose axes it
             is given, and in which a pose is given; None for the tip, and for the base.
+        client: Who asks: standing still is a command only for whoever is jogging.
     """
 
     command: Command
     expires: float
     frame: str | Pose | None = None
+    client: Hashable = None
 
     @property
     def is_zero(self) -> bool:
@@ -50,6 +52,11 @@ class DisplacementRequest:
 
     displacements: Mapping[str, float]
     max_speed: float = math.inf
+
+    @property
+    def is_zero(self) -> bool:
+        """Whether it asks for standing still."""
+        return not any(self.displacements.values())
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,13 +4,12 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
-from .arrays import Array
-from .limits import JointLimits
-from .otg import Generator, MotionState
+from .arrays import Array, frozen
+from .exceptions import GoalCode
+from .otg import Generator, MotionState, Plan
+from .outcome import Outcome
 
 ARRIVED = 1e-6
 """How near to the target the set-points must be to have arrived in [rad]."""
@@ -23,22 +22,35 @@ class SingleTarget:
     """Plans to one target, anew in every cycle.
 
     Attributes:
-        target: Positions in [rad]; None without one.
-        max_speed: Greatest speed of a joint on the way there in [rad/s].
+        target: Positions in [rad].
+        outcome: How it ended; None while it goes on.
     """
 
-    def __init__(self, limits: JointLimits, generator: Generator) -> None:
-        """Wait for a target.
+    def __init__(self, target: Array, max_speed: float, generator: Generator) -> None:
+        """Aim.
 
         Args:
-            limits: Limits of the joints.
+            target: Positions in [rad], within the limits.
+            max_speed: Greatest speed of a joint on the way there in [rad/s].
             generator: Plans at full speed.
         """
-        self._limits = limits
-        self._full = self._planner = generator
-        self._planned_for = (1.0, math.inf)
-        self.target: Array | None = None
-        self.max_speed = math.inf
+        self.target = frozen(target)
+        self.outcome: Outcome | None = None
+        self._max_speed, self._generator = max_speed, generator
+        self._planned_for, self._planner = 0.0, generator
+
+    def plan(self, state: MotionState, speed_scaling: float) -> Plan | None:
+        """Return the way to the target as it is driven; None where there is none.
+
+        Args:
+            state: Commanded state of the joints.
+            speed_scaling: Share of the speed, 0 to 1.
+        """
+        speed_scaling = max(speed_scaling, SLOWEST)
+        if speed_scaling != self._planned_for:
+            self._planned_for = speed_scaling
+            self._planner = self._generator.slowed(speed_scaling, self._max_speed)
+        return self._planner.to_state(state, MotionState.at_rest(self.target))
 
     def step(self, state: MotionState, speed_scaling: float, period: float) -> MotionState | None:
         """Return the next state; None to come to rest.
@@ -48,21 +60,28 @@ class SingleTarget:
             speed_scaling: Share of the speed, 0 to 1.
             period: Time to the next step in [s].
         """
-        if self.target is None or speed_scaling == 0.0:
+        if speed_scaling == 0.0:
             return None
-        if (speed_scaling, self.max_speed) != self._planned_for:
-            self._planned_for = speed_scaling, self.max_speed
-            self._planner = self._full.slowed(max(speed_scaling, SLOWEST), self.max_speed)
-        there = MotionState.at_rest(self.target)
-        plan = self._planner.to_state(state, there)
+        plan = self.plan(state, speed_scaling)
         if plan is None:
+            if not state.moving:
+                self.end(Outcome(GoalCode.INVALID_GOAL, 'no motion leads to the target'))
             return None
-        return there if plan.duration <= period else plan.at(period)
+        return MotionState.at_rest(self.target) if plan.duration <= period else plan.at(period)
 
-    def reached(self, state: MotionState) -> bool:
-        """Whether a state rests at the target."""
-        return (
-            self.target is not None
-            and not state.moving
-            and bool(np.allclose(state.position, self.target, atol=ARRIVED))
-        )
+    def arrive(self, state: MotionState) -> None:
+        """End where a state rests at the target.
+
+        Args:
+            state: Commanded state of the joints.
+        """
+        if not state.moving and np.allclose(state.position, self.target, atol=ARRIVED):
+            self.end(Outcome(GoalCode.SUCCESSFUL, 'the target is reached'))
+
+    def end(self, outcome: Outcome) -> None:
+        """End, unless it has ended.
+
+        Args:
+            outcome: How.
+        """
+        self.outcome = self.outcome or outcome

@@ -10,8 +10,8 @@ from concurrent.futures import Executor, Future
 from typing import Any
 
 from arm_servo.commands import by_joint, twist_command
-from arm_servo.execution import Outcome
 from arm_servo.gateway import CommandGateway, MotionCommand
+from arm_servo.outcome import Outcome
 from arm_servo.requests import DisplacementRequest, JogRequest
 from arm_servo.servo import JointCommand
 

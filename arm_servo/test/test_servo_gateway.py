@@ -9,16 +9,23 @@ from dataclasses import replace
 from itertools import pairwise
 import threading
 
+from hypothesis import given, settings
+from hypothesis import strategies as st
 import numpy as np
 import pytest
 from servo_commands import jog, move_by, SteppedWorker, twist
 from servo_drives import Drives, PERIOD
 
 from arm_canopen import Refusal, RefusalCause
+from arm_servo.commands import by_joint
 from arm_servo.exceptions import CommandError, GoalCode, GoalError, NotReadyError, StateMovedError
 from arm_servo.gateway import MAX_ATTEMPTS, MAX_QUEUED_MOTIONS, MotionCommand, start_worker
 from arm_servo.goal import GoalPoint, TrajectoryGoal
+from arm_servo.requests import JogRequest
+from arm_servo.safety_filter import SafetyFilter
+from arm_servo.servo import JointCommand
 from arm_servo.set_point import Source
+from arm_servo.single_target import SingleTarget
 
 JOINT = 'panda_joint1'
 
@@ -121,12 +128,12 @@ def test_an_arm_that_was_moved_meanwhile_is_planned_for_again(always: bool) -> N
     drives = ready(worker)
     there = wave(drives, 2).points[0].positions
     goal = TrajectoryGoal(drives.gateway.model.joints, [GoalPoint(4.0, there)])
+    jog(drives.gateway, {JOINT: 0.5}, drives.now, 60.0 if always else 0.5)
+    drives.run(30)
     command = drives.gateway.request(goal)
     plans = 0
     for cycle in range(400):
         drives.run()
-        if always or plans == 0:
-            jog(drives.gateway, {JOINT: 0.5}, drives.now, 0.3)
         if cycle % 30 == 29:  # the arm has moved since the plan's basis
             plans += worker.run()
         if command.future.done():
@@ -294,3 +301,172 @@ def test_a_zero_is_no_command_to_an_arm_that_does_not_follow() -> None:
     drives.run()
     assert zero.exception() is None
     assert drives.gateway.refused == -np.inf
+
+
+def test_zeros_of_another_client_do_not_touch_a_jog() -> None:
+    """Standing still is a command only for whoever is jogging; another's stream is none."""
+    drives = ready()
+    velocities = {JOINT: 0.4}
+    still = JointCommand(*by_joint(drives.gateway.model, {JOINT: 0.0}, 'velocities'))
+    moving = JointCommand(*by_joint(drives.gateway.model, velocities, 'velocities'))
+    for _ in range(100):
+        drives.gateway.jog(JogRequest(moving, drives.now + 0.1, client='keyboard'))
+        drives.gateway.jog(JogRequest(still, drives.now + 0.1, client='gamepad'))
+        drives.run()
+    speeds = np.diff(np.array(drives.path)[-20:, 0]) / PERIOD
+    assert speeds == pytest.approx(0.4, abs=1e-3)
+    drives.gateway.jog(JogRequest(still, drives.now + 0.1, client='keyboard'))
+    drives.run(40)
+    assert drives.path[-1].tolist() == drives.path[-2].tolist()
+
+
+def test_displacements_by_nothing_change_nothing() -> None:
+    """Neither a trajectory, nor a jog, nor a drive that somebody halted; what is wrong is told."""
+    drives = ready()
+    command = drives.gateway.request(wave(drives, 20))
+    begun(drives, command)
+    drives.run(30)
+    nothing = move_by(drives.gateway, {JOINT: 0.0})
+    wrong = move_by(drives.gateway, {'elbow': 0.0})
+    drives.run(4)
+    assert nothing.future.result(0.0) is None
+    assert nothing.ended.result(0.0).code is GoalCode.SUCCESSFUL
+    assert isinstance(wrong.future.exception(0.0), CommandError)
+    assert command.motion is not None
+    assert command.motion.outcome is None
+    drives.run(300)
+    assert command.ended.result(0.0).code is GoalCode.SUCCESSFUL
+    jog(drives.gateway, {JOINT: 0.4}, drives.now, 10.0)
+    drives.run(20)
+    move_by(drives.gateway, {JOINT: 0.0})
+    drives.run(4)
+    assert drives.gateway.snapshot.source is Source.JOG
+
+
+@pytest.mark.parametrize('points', [20, 60])
+@given(st.integers(0, 8), st.integers(0, 8))
+@settings(max_examples=15, deadline=None)
+def test_a_trajectory_does_not_take_the_arm_from_a_newer_jog(
+    points: int, before: int, after: int
+) -> None:
+    """It was still being planned when the jog came: the newest command counts."""
+    worker = SteppedWorker()
+    drives = ready(worker)
+    command = drives.gateway.request(wave(drives, points))
+    drives.run(before)
+    jog(drives.gateway, {JOINT: 0.4}, drives.now, 30.0)
+    drives.run(after)
+    for _ in range(10):
+        worker.run()
+        drives.run()
+    assert isinstance(command.future.exception(0.0), NotReadyError)
+    assert 'jog' in command.ended.result(0.0).reason
+    assert drives.gateway.snapshot.source is Source.JOG
+
+
+def test_a_jog_that_is_refused_ends_nothing() -> None:
+    """One that has expired, or one in a pause: what was requested before it begins."""
+    worker = SteppedWorker()
+    drives = ready(worker)
+    begin = drives.path[-1]
+    command = move_by(drives.gateway, {JOINT: 0.1})
+    drives.run()
+    late = jog(drives.gateway, {JOINT: 0.4}, drives.now, -0.2)
+    drives.run()
+    worker.run()
+    drives.run(100)
+    assert isinstance(late.exception(0.0), NotReadyError)
+    assert command.ended.result(0.0).code is GoalCode.SUCCESSFUL
+    assert drives.path[-1][0] - begin[0] == pytest.approx(0.1, abs=1e-6)
+
+
+def test_a_jog_that_has_expired_is_refused_and_does_not_end_a_trajectory() -> None:
+    """A command that is older than its time-out is none."""
+    drives = ready()
+    command = drives.gateway.request(wave(drives, 20))
+    begun(drives, command)
+    drives.run(30)
+    late = jog(drives.gateway, {JOINT: 0.4}, drives.now, -0.05)
+    drives.run(2)
+    with pytest.raises(NotReadyError, match=r'expired 0\.06 s'):
+        late.result(0.0)
+    assert drives.gateway.snapshot.source is Source.TRAJECTORY
+
+
+@pytest.mark.parametrize('is_overridden', [False, True])
+def test_displacements_in_a_pause_are_refused_and_do_not_pile_up(is_overridden: bool) -> None:
+    """None of them moves the arm at the resume, when nobody expects it any more."""
+    drives = ready()
+    if is_overridden:
+        drives.gateway.override(0.0)
+    else:
+        drives.gateway.pause()
+    drives.run()
+    commands = [move_by(drives.gateway, {JOINT: 0.02}) for _ in range(10)]
+    drives.run(30)
+    for command in commands:
+        with pytest.raises(CommandError, match='override is 0' if is_overridden else 'paused'):
+            command.future.result(0.0)
+    begin = drives.path[-1].tolist()
+    drives.gateway.resume()
+    drives.gateway.override(1.0)
+    drives.run(50)
+    assert drives.path[-1].tolist() == begin
+    move_by(drives.gateway, {JOINT: 0.02})
+    drives.run(50)
+    assert drives.path[-1][0] - begin[0] == pytest.approx(0.02, abs=1e-6)
+
+
+@pytest.mark.parametrize('worked', [0, 1, 2])
+def test_when_the_core_raises_every_command_ends_with_words(
+    worked: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """No further cycle comes: what moves, is prepared or waits ends once, and says why."""
+    worker = SteppedWorker()
+    drives = ready(worker)
+    commands = [drives.gateway.request(wave(drives, 20)) for _ in range(3)]
+    for _ in range(worked):
+        drives.run(4)
+        worker.run()
+    drives.run(5)
+    jogged = jog(drives.gateway, {JOINT: 0.0}, drives.now)
+    ends: list[str] = []
+    for command in commands:
+        command.ended.add_done_callback(lambda future: ends.append(future.result().reason))
+
+    def fail(*_: object) -> None:
+        raise ArithmeticError('no number')
+
+    monkeypatch.setattr(SafetyFilter, 'step', fail)
+    with pytest.raises(ArithmeticError):
+        drives.run()
+    while worker.run():  # what was planned meanwhile has no cycle to begin in
+        pass
+    assert len(ends) == len(commands)
+    began = max(worked - 1, 0)
+    assert all('ArithmeticError: no number' in reason for reason in ends[began:])
+    assert jogged.done()
+    assert drives.gateway.snapshot.set_point is None
+    assert 'ArithmeticError' in drives.gateway.snapshot.blocked
+    monkeypatch.undo()
+    drives.attach()
+    drives.run(20)
+    assert len(ends) == len(commands)
+    assert drives.gateway.snapshot.source is Source.NONE
+
+
+def test_a_displacement_that_the_safety_filter_stops_ends_with_words() -> None:
+    """The target state ends, and with it the command, where links would come too near."""
+    drives = ready()
+    command = move_by(drives.gateway, {'panda_joint6': -0.4})
+    drives.run(5)
+    # from elsewhere than where its way was checked
+    motion = command.motion
+    assert isinstance(motion, SingleTarget)
+    motion.target = motion.target + np.array([0.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0])
+    drives.run(300)
+    ended = command.ended.result(0.0)
+    assert ended.code is GoalCode.PATH_TOLERANCE_VIOLATED
+    assert 'panda_hand would collide' in ended.reason
+    assert drives.gateway.snapshot.source is Source.NONE
+    assert drives.path[-1].tolist() == drives.path[-2].tolist()

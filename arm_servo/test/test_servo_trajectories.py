@@ -19,9 +19,10 @@ from arm_servo.arrays import Array
 from arm_servo.core import MotionCore
 from arm_servo.core_settings import CoreSettings
 from arm_servo.exceptions import GoalCode, GoalError
-from arm_servo.execution import ExecutionSettings, Outcome, Phase
+from arm_servo.execution import ExecutionSettings, Phase
 from arm_servo.goal import GoalPoint, GoalRules, JointTolerance, TrajectoryGoal
 from arm_servo.otg import MotionState
+from arm_servo.outcome import Outcome
 from arm_servo.path import cubic, linear, Path, PathPoint, quintic
 from arm_servo.tolerances import tolerances
 

@@ -102,6 +102,7 @@ class DriveSource:
             reason = f'was let go, because the motion core raised {what}; {COMMAND}'
             self._released = dict.fromkeys(self._axes, reason)
             self._following, self._lost = False, ''
+            self._gateway.abandon(now, reason)
             raise
 
     def _update(

@@ -74,6 +74,13 @@ class MotionCycle:
             now: Steady time in [s].
             period: Time to the next cycle in [s].
         """
+        try:
+            self._step(now, period)
+        except Exception as error:
+            self._gateway.abandon(now, f'the motion core raised {type(error).__name__}: {error}')
+            raise
+
+    def _step(self, now: float, period: float) -> None:
         measured, blocked = self._feedback.state(now)
         blocked = self.closing or blocked or self._kept(now)
         if not self._following and not blocked and measured is not None:

@@ -4,10 +4,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import Future
+from dataclasses import replace
 from functools import partial
 import time
+import traceback
 from typing import Any
 
 from control_msgs.msg import JointJog
@@ -17,10 +19,12 @@ from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from ..exceptions import ModelError, NotReadyError, ServoError
+from ..exceptions import GoalCode, ModelError, NotReadyError, ServoError
 from ..gateway import CommandGateway, JOGGING
+from ..outcome import Outcome
 from ..requests import DisplacementRequest, JogRequest
 from .command_converter import CommandConverter
+from .publishers import Publishers
 from .refusals import Refusals
 from .ros_numbers import seconds
 from .servo_modes import CommandKind, ServoModes
@@ -73,29 +77,44 @@ class Servo:
             (CommandKind.JOINT_JOG, JointJog, parameters.joint_topic, self.converter.jog),
             (CommandKind.POSE, PoseStamped, parameters.pose_topic, self.converter.pose),
         ):
-            node.create_subscription(message, topic, partial(self._take, kind, convert), 10)
+            take = partial(self._take, kind, convert, Publishers())
+            node.create_subscription(message, topic, take, 10)
         node.add_on_set_parameters_callback(self._check_scales)
         node.add_post_set_parameters_callback(self._rescale)
         node.create_timer(1.0 / parameters.status_rate, self._publish_status)
 
-    def _take(self, kind: CommandKind, convert: Convert, message: Any) -> None:  # noqa: ANN401  # messages have no type
-        begin = time.monotonic()
+    def _take(
+        self,
+        kind: CommandKind,
+        convert: Convert,
+        publishers: Publishers,
+        message: Any,  # noqa: ANN401  # messages have no type
+        info: Mapping[str, int | None],
+    ) -> None:
+        begin, client = time.monotonic(), (kind, publishers.of(info))
         try:
             age = self._checked_age(message)
             self._modes.admit(kind)
             request = convert(message, begin - age)
-            is_zero = isinstance(request, JogRequest) and request.is_zero
-            if not is_zero and begin - self._last > FRESH:
+            if not request.is_zero and begin - self._last > FRESH:
                 self._prepare()
         except ServoError as error:
             self._refuse(str(error))
             return
-        if not is_zero:
+        except Exception as error:  # noqa: BLE001  # a message must not end the program
+            self._refuse(f'{type(error).__name__}: {error}')
+            self._node.get_logger().error(
+                f'a {kind.name} command raised {traceback.format_exc()}', throttle_duration_sec=5.0
+            )
+            return
+        if not request.is_zero:
             self._last = begin
         if isinstance(request, JogRequest):
-            self._gateway.jog(request).add_done_callback(self._note)
-        else:
-            self._gateway.request(request).future.add_done_callback(self._note)
+            self._gateway.jog(replace(request, client=client)).add_done_callback(self._note)
+            return
+        command = self._gateway.request(request)
+        command.future.add_done_callback(self._note)
+        command.ended.add_done_callback(self._note_end)
 
     def _checked_age(self, message: Any) -> float:  # noqa: ANN401
         """Return how long ago a message was sent in [s]."""
@@ -119,6 +138,11 @@ class Servo:
             self._refuse(str(error))
         else:
             self._refusals.clear()
+
+    def _note_end(self, future: Future[Outcome]) -> None:
+        """Remember why a displacement did not get to its end."""
+        if future.result().code is GoalCode.PATH_TOLERANCE_VIOLATED:
+            self._refuse(future.result().reason)
 
     def _refuse(self, reason: str) -> None:
         self._refusals.note(reason, time.monotonic())

@@ -15,10 +15,11 @@ from rclpy.action.server import ActionServer, CancelResponse
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 
-from ..exceptions import GoalCode, GoalError, ServoError
-from ..execution import Execution, Outcome, Phase
+from ..exceptions import GoalCode, ServoError
+from ..execution import Execution
 from ..gateway import CommandGateway, MotionCommand
 from ..goal import TrajectoryGoal
+from ..outcome import Outcome, refused
 from .trajectory_messages import difference, point_of
 
 START_TIMEOUT = 5.0
@@ -49,21 +50,7 @@ class _Goal:
         """Return how it has ended; None while it goes on."""
         if self.command is None:
             return self.outcome
-        execution, future = self.command.execution, self.command.future
-        if execution is not None:
-            return execution.ending if execution.phase is Phase.DONE else None
-        if future.cancelled():
-            return Outcome(GoalCode.SUCCESSFUL, 'canceled before it began', canceled=True)
-        error = future.exception() if future.done() else None
-        return None if error is None else refusal(error)
-
-
-def refusal(error: BaseException) -> Outcome:
-    """Return the outcome of a goal that is refused."""
-    code = error.code if isinstance(error, GoalError) else GoalCode.INVALID_GOAL
-    if isinstance(error, ServoError):
-        return Outcome(code, str(error))
-    return Outcome(code, f'the goal could not be planned: {type(error).__name__}: {error}')
+        return self.command.ended.result() if self.command.ended.done() else None
 
 
 class TrajectoryAction:
@@ -113,9 +100,9 @@ class TrajectoryAction:
         try:
             goal.command = self._follow(self._convert(handle.request))
         except ServoError as error:
-            goal.outcome = refusal(error)
+            goal.outcome = refused(error)
         except Exception as error:  # noqa: BLE001  # a goal must not end the program
-            goal.outcome = refusal(error)
+            goal.outcome = refused(error)
             self._node.get_logger().error(traceback.format_exc())
 
     def _cancel(self, handle: Any) -> CancelResponse:  # noqa: ANN401

@@ -1,0 +1,36 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""How a motion ends."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from .exceptions import GoalCode, GoalError, ServoError
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """How a motion ended.
+
+    Attributes:
+        code: Code of the action's result.
+        reason: Why, in words.
+        canceled: Whether it was asked to end.
+    """
+
+    code: GoalCode
+    reason: str
+    canceled: bool = False
+
+
+def refused(error: BaseException) -> Outcome:
+    """Return the outcome of a motion that does not begin.
+
+    Args:
+        error: Why.
+    """
+    code = error.code if isinstance(error, GoalError) else GoalCode.INVALID_GOAL
+    if isinstance(error, ServoError):
+        return Outcome(code, str(error))
+    return Outcome(code, f'the motion could not be planned: {type(error).__name__}: {error}')
