@@ -127,7 +127,8 @@ def _walkable(points: Points, limits: JointLimits, state: MotionState) -> GoalPa
         return _Haste(_words(demand, limits), timing.demand.share)
     most = LONGER[0] * points.asked + LONGER[1]
     if stretched.duration > most:
-        return _Haste(_words(demand, limits), stretched.duration / most)
+        enough = (stretched.duration - LONGER[1]) / LONGER[0]
+        return _Haste(_words(demand, limits), enough / max(points.asked, 1e-9))
     late = stretched.duration - points.asked
     if late < 0.01:
         return GoalPath(stretched, '')

@@ -8,7 +8,7 @@ from dataclasses import replace
 import math
 import re
 
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 import numpy as np
 import pytest
@@ -169,6 +169,7 @@ def quick(name: str, end: Array, time: float) -> TrajectoryGoal:
 @pytest.mark.parametrize('name', ROBOTS)
 @settings(max_examples=4, deadline=None)
 @given(seed=st.integers(0, 10**6), time=st.floats(0.02, 0.5), count=st.integers(1, 4))
+@example(seed=573804, time=0.5, count=2)
 def test_the_factor_of_a_refusal_suffices(name: str, seed: int, time: float, count: int) -> None:
     """What was refused for its time is accepted with as much more of it as the words say."""
     rng, limits = np.random.default_rng(seed), robot(name).limits
