@@ -4,8 +4,10 @@
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import replace
 from itertools import cycle
+import random
 
 import pytest
 from virtual_network import bus_config, drive_config, every_mode, PERIOD, SCALE, VirtualNetwork
@@ -192,6 +194,21 @@ def test_a_target_that_is_refused_at_the_end_of_a_halt_leaves_it_halted() -> Non
     assert net.drives[JOINT].rate == pytest.approx(-0.3, abs=0.02)
 
 
+def test_moves_of_which_the_first_is_refused_leave_a_halted_axis_halted_at_once() -> None:
+    """The ones behind it are not waited for, and are answered when they are queued."""
+    net = running_in(OperationMode.PROFILE_POSITION)
+    net.do(JOINT, 'halt')
+    refuse(net, POSITION)
+    commands = net.commands[JOINT]
+    first = commands.give(lambda: commands.move(Move(0.1)))
+    second = commands.give(lambda: commands.move(Move(0.2, immediate=False)))
+    net.run(0.5)
+    assert isinstance(first.error, DriveError)
+    assert second.done
+    assert net.drives[JOINT].halted
+    assert not net.drives[JOINT].halt.leaving
+
+
 # ------------------------------------------------------------------ refused targets
 
 
@@ -335,3 +352,85 @@ def test_a_controlword_that_is_refused_is_written_seldom() -> None:
     accept(net)
     net.run_until(lambda: promise.done, 10.0)
     net.run_until(lambda: net.drives[JOINT].state is not DriveState.OPERATION_ENABLED, 10.0)
+
+
+# ------------------------------------------------------------------ all of it in any order
+
+SELECTED = (
+    OperationMode.PROFILE_POSITION,
+    OperationMode.VELOCITY,
+    OperationMode.PROFILE_VELOCITY,
+)
+
+
+class Client:
+    """Commands a drive at random, which is silent, refuses, and is written to by others.
+
+    Attributes:
+        net: The network.
+        commanded: A target may be in force, or on its way.
+        log: What was done.
+    """
+
+    def __init__(self, seed: int) -> None:
+        """Enable the drive."""
+        self.net = booted()
+        self.net.do(JOINT, 'init')
+        self.commanded = False
+        self.log: list[str] = []
+        self._random = random.Random(seed)
+
+    def act(self) -> None:
+        """Do one thing."""
+        often = (self._give, self._stop, self._select)
+        seldom = (self._enable, self._leave_behind, self._disturb, self._calm)
+        act = self._random.choice((*often, *often, *seldom))
+        self.log.append(act.__name__)
+        with contextlib.suppress(DriveError):
+            act()
+
+    def _give(self) -> None:
+        answered = give(self.net, self._random.uniform(-0.3, 0.3))
+        self.net.run(self._random.choice((0.0, 0.005, 0.05, 0.3, 1.0)))
+        self.commanded |= not answered.done or answered.error is None
+
+    def _stop(self) -> None:
+        self.commanded = False
+        self.net.do(JOINT, self._random.choice(('halt', 'disable')), preempt=True)
+
+    def _select(self) -> None:
+        if 'already' not in self.net.select(JOINT, self._random.choice(SELECTED)):
+            self.commanded = False
+
+    def _enable(self) -> None:
+        self.net.do(JOINT, 'enable')
+
+    def _leave_behind(self) -> None:
+        drive = self.net.drives[JOINT]
+        acting = TARGETS.get(OperationMode(drive.objects.mode_display))
+        idle = [index for index in TARGETS.values() if index != acting or not drive.acts]
+        leave_behind(self.net, self._random.choice(idle), self._random.randint(-3_000, 3_000))
+
+    def _disturb(self) -> None:
+        if self._random.random() < 0.5:
+            refuse(self.net, self._random.choice(list(TARGETS.values())))
+        else:
+            self.net.wire.loses = lambda sender, frame: frame.can_id == REQUEST
+
+    def _calm(self) -> None:
+        accept(self.net)
+        self.net.wire.loses = lambda sender, frame: False
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('seed', range(8))
+def test_nothing_moves_that_was_not_commanded(seed: int) -> None:
+    """Stopped, switched or enabled, the axis rests until a target came after that."""
+    client = Client(seed)
+    for _ in range(30):
+        client.act()
+        if not client.commanded:
+            client.net.run(1.0)
+            before = motor(client.net)
+            client.net.run(0.3)
+            assert motor(client.net) == pytest.approx(before, abs=1e-3), client.log

@@ -140,7 +140,9 @@ class DriveCommands(StopCommands):
         drive.check_target(destination)
         delivery = self._named(lambda: mode.move(move))
         self._stream.end('a single move')
-        self._resume(delivery if move.immediate else completed())
+        self._resume(delivery)
+        if not move.immediate:
+            self._delivery = completed()  # answered when it is queued, not when its turn comes
         how = 'at once' if move.immediate and mode.waiting == 1 else 'after the moves before it'
         return f'to {destination:g}, {how}'
 
