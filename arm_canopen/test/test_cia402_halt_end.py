@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from enum import auto, Enum
 from functools import partial
+import math
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -40,6 +41,7 @@ OLD = 3.0  # [rad] the target that a halt gives up; the axis never gets there
 BRAKING = 0.1  # [rad] from the profile velocity, 1 rad/s, at 5 rad/s^2
 ACCURACY = 5e-3  # [rad]
 ANSWER_MAX = 3.5  # [s] to the answer and the end of the move
+RESTS_AFTER = 0.3  # [s] without a motion after the answer
 HALT_OPTION = 0x605D
 
 
@@ -115,10 +117,14 @@ def answer(net: VirtualNetwork, target: float) -> tuple[str, float]:
     allowed = max(0.0, target - begin)
     commands = net.commands[JOINT]
     promise = commands.give(lambda: commands.set_target(target))
-    beyond = 0.0
+    beyond, last, still = 0.0, math.nan, 0
     for _ in range(round(ANSWER_MAX / PERIOD)):
         net.run(PERIOD)
-        beyond = max(beyond, motor(net) - begin - allowed)
+        still = still + 1 if promise.done and motor(net) == last else 0
+        if still * PERIOD > RESTS_AFTER:
+            break
+        last = motor(net)
+        beyond = max(beyond, last - begin - allowed)
     assert promise.done
     return ('' if promise.error is not None else str(promise.result())), beyond
 
