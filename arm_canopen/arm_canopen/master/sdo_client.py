@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Coroutine
+from functools import partial
 from typing import Any, TypeAlias, TypeVar
 
 from ..can.frame import Frame
@@ -27,7 +28,7 @@ from .sdo_block_client import read_blocks, write_blocks
 from .sdo_channel import response, SdoChannel, SdoCounters
 
 T = TypeVar('T')
-Transfer: TypeAlias = Coroutine[Promise[Any], None, T]
+Transfer: TypeAlias = Callable[[], Coroutine[Promise[Any], None, T]]
 DownloadHook: TypeAlias = Callable[[int, int, bytes, Promise[None]], None]
 
 BLOCK_MIN = 256  # [byte] from which on a value is written in blocks
@@ -78,7 +79,8 @@ class SdoClient:
         Returns:
             Promise of the bytes; rejected with SdoAbortError or SdoTimeoutError.
         """
-        return self._enqueue(self._upload(index, subindex, timeout, block=block), Promise())
+        upload = partial(self._upload, index, subindex, timeout, block=block)
+        return self._enqueue(upload, Promise())
 
     def write(
         self, index: int, subindex: int, data: bytes, timeout: float, *, repeat: bool = False
@@ -101,7 +103,7 @@ class SdoClient:
             for hook in self.on_download:
                 hook(index, subindex, data, promise)
 
-        download = self._download(index, subindex, data, timeout, leave, repeat=repeat)
+        download = partial(self._download, index, subindex, data, timeout, leave, repeat=repeat)
         return self._enqueue(download, promise)
 
     def cancel_all(self, reason: str) -> None:
@@ -110,8 +112,7 @@ class SdoClient:
         if self._running is not None:
             self._channel.cancel()
             self._running.cancel(SdoError(f'{self._name}: {reason}'))
-        for coroutine, promise in queue:
-            coroutine.close()
+        for _, promise in queue:
             promise.reject(SdoError(f'{self._name}: {reason}'))
 
     def restarted(self) -> None:
@@ -134,7 +135,7 @@ class SdoClient:
             transfer, promise = self._queue.popleft()
             try:
                 # a task of its own, so that it can be ended wherever it waits
-                self._running = self._scheduler.spawn(transfer)
+                self._running = self._scheduler.spawn(transfer())
                 result = await self._running
             except Exception as error:  # noqa: BLE001  # belongs to whoever asked
                 promise.reject(error)
