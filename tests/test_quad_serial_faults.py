@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 import math
 import re
+import signal
 from typing import Any, TYPE_CHECKING
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -79,6 +80,9 @@ def tilt(quad: SimulatedQuad) -> float:
 STOPPED = ('controller', 'fault, .*joint states')
 """The controller stops the robot by itself, and says why."""
 
+GONE = 'connecting: .* was hung up'
+"""What the bridge says of a port that has vanished."""
+
 HELD = ('controller', 'fault, .*(joint states|attitude|imu)|joint states are .* ms old; holding')
 """It holds the legs until a report comes through, or stops when that takes too long."""
 
@@ -112,6 +116,27 @@ def test_a_broken_line_is_told_and_survived(
 def said(quad: SimulatedQuad, speaker: str, reason: str) -> int:
     """Return how often a process has given a reason so far."""
     return sum(bool(re.search(reason, line)) for line in quad.processes[speaker].lines)
+
+
+def test_a_robot_that_is_killed_is_named_and_its_successor_walks(quad: SimulatedQuad) -> None:
+    """Its terminal is gone without a farewell; the one that comes lies until it is asked."""
+    diagnostics = quad.client.listen(DiagnosticArray, '/diagnostics')
+    bridge, controller = quad.processes['hardware'], quad.processes['controller']
+    count = said(quad, 'hardware', GONE), said(quad, 'controller', STOPPED[1])
+    quad.walk(0.5)
+    quad.processes['fake_xgo'].signal(signal.SIGKILL)
+    bridge.wait_for(GONE, count=count[0] + 1)
+    controller.wait_for(STOPPED[1], count=count[1] + 1)
+    running = said(quad, 'hardware', 'running: ')
+    quad.start('fake_xgo')
+    bridge.wait_for('running: ', count=running + 1)
+    quad.truth.clear()
+    quad.spin(1.0)
+    lying = quad.truth[-1].pose.pose.position.z
+    quad.spin(1.0)
+    assert quad.truth[-1].pose.pose.position.z == pytest.approx(lying, abs=0.005)
+    walk_again(quad)
+    assert largest_step(diagnostics) < LARGEST_STEP
 
 
 def test_with_a_dead_imu_the_robot_is_laid_down(quad: SimulatedQuad) -> None:
