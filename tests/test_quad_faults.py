@@ -14,7 +14,8 @@ import pytest
 from simulated_quad import SimulatedQuad
 
 from quad_bringup.demo.track import tilt_of
-from quad_description import Pose, pose_positions
+from quad_description import Pose, pose_positions, robot_urdf
+from quad_hardware.estimation.feet import Feet, raised_feet
 from quad_msgs.msg import JointCommand
 
 pytestmark = pytest.mark.scenario
@@ -49,6 +50,19 @@ def tilt(quad: SimulatedQuad) -> float:
     return tilt_of((rotation.x, rotation.y, rotation.z, rotation.w))
 
 
+def trot_until_a_foot_is_up(quad: SimulatedQuad) -> None:
+    """Walk, and return as soon as a foot has left the ground."""
+    quad.set_mode('walk')
+    quad.walk(1.5)
+    feet = Feet(robot_urdf(), list(quad.joints[-1].name))
+    for up in (False, True):
+        quad.client.spin_until(
+            lambda up=up: bool(raised_feet(feet.poses(quad.joints[-1].position))) is up,  # type: ignore[misc]
+            5.0,
+            'a step',
+        )
+
+
 def kill(quad: SimulatedQuad, name: str) -> float:
     """Kill a process; return when, in steady time [s]."""
     quad.processes[name].signal(signal.SIGKILL)
@@ -64,8 +78,7 @@ def check_upright(quad: SimulatedQuad) -> None:
 
 def test_a_controller_killed_in_mid_trot_leaves_no_leg_in_the_air(quad: SimulatedQuad) -> None:
     """The bridge folds the legs and says so; a new controller moves nothing until it is asked."""
-    quad.set_mode('walk')
-    quad.walk(1.5)
+    trot_until_a_foot_is_up(quad)
     killed = kill(quad, 'controller')
     quad.processes['hardware'].wait_for('commands broke off')
     quad.spin(3.0)
@@ -88,8 +101,7 @@ def test_a_controller_that_was_frozen_moves_nothing_until_it_is_asked(
     quad: SimulatedQuad,
 ) -> None:
     """It wakes when the bridge has folded the legs: the robot stays down, a fault says why."""
-    quad.set_mode('walk')
-    quad.walk(1.5)
+    trot_until_a_foot_is_up(quad)
     quad.processes['controller'].signal(signal.SIGSTOP)
     quad.spin(3.0)
     quad.processes['controller'].signal(signal.SIGCONT)

@@ -36,7 +36,10 @@ class SmallWorkspace:
     Attributes:
         folder: Where they are installed; the bring-up has its temporary files there, too.
         environment: Of the bring-up.
+        setup: Statements that its process runs first.
     """
+
+    setup = ''
 
     def __init__(
         self,
@@ -89,7 +92,8 @@ class SmallWorkspace:
     @contextlib.contextmanager
     def bringup(self, *arguments: str) -> Iterator[subprocess.Popen[str]]:
         """Start a bring-up."""
-        code = f'import sys; from {self._package}.bringup import main; sys.exit(main())'
+        run = f'import sys; from {self._package}.bringup import main; sys.exit(main())'
+        code = f'{self.setup}\n{run}'
         with subprocess.Popen(
             [sys.executable, '-c', code, *arguments],
             env=self.environment,

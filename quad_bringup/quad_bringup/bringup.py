@@ -19,7 +19,7 @@ from process_supervisor import (
 )
 
 from .exceptions import BringupError
-from .leaving import join_ros, lie_down
+from .leaving import join_ros, lie_down, stand_still
 from .session import add_arguments, session
 
 HINT = """in a second terminal:
@@ -42,7 +42,8 @@ def parse(argv: Sequence[str]) -> tuple[argparse.Namespace, RosOptions]:
         description='Bring a quadruped up: serial bridge, controller and /tf; with --simulate '
         'also the robot itself, in physics, on a pseudo-serial port. It stays as it is until it '
         'is told to stand up: by teleop_keyboard, or by /set_mode. Ctrl-C lets it lie down and '
-        'ends everything; Ctrl-C again ends it at once, and the servos hold their last position.',
+        'ends everything; Ctrl-C again ends it at once, and the servos hold their last position '
+        '(the bridge folds legs that were walking).',
     )
     where = parser.add_mutually_exclusive_group(required=True)
     where.add_argument(
@@ -60,7 +61,8 @@ def parse(argv: Sequence[str]) -> tuple[argparse.Namespace, RosOptions]:
     parser.add_argument(
         '--hold',
         action='store_true',
-        help='at Ctrl-C end at once and let the servos hold, instead of lying down first',
+        help='at Ctrl-C let the robot end its gait and the servos hold it standing, '
+        'instead of lying down first',
     )
     add_arguments(parser)
     return parse_with_ros(parser, argv)
@@ -81,7 +83,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             hint = HINT.format(hint=ros.hint, set_mode=ros.resolve('set_mode'))
             sys.stdout.write(f'{quad.title}\n{hint}\n')
             join = partial(join_ros, namespace=ros.namespace)
-            farewell = None if arguments.hold else partial(lie_down, make_client=join)
+            end = stand_still if arguments.hold else lie_down
+            farewell = partial(end, make_client=join)
             return supervise(quad.processes, farewell=farewell).exit_code
     except (BringupError, SupervisorError) as error:
         sys.stderr.write(f'{error}\n')

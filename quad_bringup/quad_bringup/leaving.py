@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The robot lies down before its controller is stopped, if it is on its feet."""
+"""The robot lies down before its controller is stopped, or stands still, if it is on its feet."""
 
 from __future__ import annotations
 
@@ -12,13 +12,17 @@ from process_supervisor import CallError, GivenUpError
 HEAR_TIMEOUT = 5.0
 """Longest time in [s] to hear what the controller is doing."""
 LIE_TIMEOUT = 10.0
-"""Longest time in [s] for it to lie."""
-FAULT, LYING = 'fault', 'lie'
+"""Longest time in [s] for it to lie, or to stand still."""
+FAULT, LYING, STANDING = 'fault', 'lie', 'stand'
 """States of the controller after a fault, and at the end."""
 ON_ITS_FEET = frozenset({'stand', 'walk', 'turn', 'policy', FAULT})
 """States of the controller in which the legs may carry the body."""
+STEPPING = frozenset({'walk', 'turn', 'policy'})
+"""States of the controller in which a leg may be in the air."""
 ON_THE_WAY = 'to '
 """In front of a state that is not reached yet."""
+TO_STAND = ON_THE_WAY + STANDING
+"""It stands up, or ends its gait."""
 
 
 class Client(Protocol):
@@ -64,19 +68,49 @@ def lie_down(
         given_up: True when it is no longer wanted.
         make_client: Joins the ROS graph.
     """
-    client = make_client(given_up)
+    _leave(_lie_down, 'lying down', say, make_client(given_up))
+
+
+def stand_still(
+    say: Callable[[str], None], given_up: Callable[[], bool], make_client: MakeClient = join_ros
+) -> None:
+    """Let the robot end its gait, if it walks, so that it is left standing on all its feet.
+
+    Args:
+        say: Takes what the user is told.
+        given_up: True when it is no longer wanted.
+        make_client: Joins the ROS graph.
+    """
+    _leave(_stand_still, 'standing still', say, make_client(given_up))
+
+
+def _leave(
+    end: Callable[[Client, Callable[[str], None]], None],
+    what: str,
+    say: Callable[[str], None],
+    client: Client,
+) -> None:
     try:
-        _lie_down(client, say)
+        client.wait_until(lambda: bool(client.state), HEAR_TIMEOUT, 'the state of the controller')
+        end(client, say)
     except GivenUpError:
-        say('stopping without lying down')
+        say(f'stopping without {what}')
     except CallError as error:
-        say(f'stopping without lying down: {error}')
+        say(f'stopping without {what}: {error}')
     finally:
         client.close()
 
 
+def _stand_still(client: Client, say: Callable[[str], None]) -> None:
+    if client.state.removeprefix(ON_THE_WAY) not in STEPPING and client.state != TO_STAND:
+        return
+    say('standing still first; Ctrl-C again stops at once')
+    client.set_mode(STANDING, LIE_TIMEOUT)
+    ends = {STANDING, FAULT}
+    client.wait_until(lambda: client.state in ends, LIE_TIMEOUT, 'it to stand still')
+
+
 def _lie_down(client: Client, say: Callable[[str], None]) -> None:
-    client.wait_until(lambda: bool(client.state), HEAR_TIMEOUT, 'the state of the controller')
     if client.state.removeprefix(ON_THE_WAY) not in ON_ITS_FEET:
         return
     say('lying down first; Ctrl-C again stops at once')

@@ -23,6 +23,14 @@ READY = {
     ('robot_viewer', 'robot_state_publisher'): '[INFO] [publisher]: Robot initialized',
 }
 
+LIES = """
+from types import SimpleNamespace
+from quad_bringup import bringup
+robot = SimpleNamespace(state='lie', wait_until=lambda *_: None, close=lambda: None)
+bringup.join_ros = lambda given_up, namespace: robot
+"""
+"""The small controller is in no ROS graph."""
+
 
 @pytest.fixture
 def workspace(tmp_path: Path, isolation: Isolation) -> SmallWorkspace:
@@ -30,12 +38,13 @@ def workspace(tmp_path: Path, isolation: Isolation) -> SmallWorkspace:
     sources = ('quad_bringup', 'quad_description', 'process_supervisor', 'dds_network')
     workspace = SmallWorkspace(tmp_path, 'quad_bringup', READY, sources)
     workspace.environment['ROS_DOMAIN_ID'] = str(isolation.domain_id)
+    workspace.setup = LIES
     return workspace
 
 
 def test_ctrl_c_ends_it_with_0_in_order(workspace: SmallWorkspace) -> None:
     """The controller first, the simulator last; nothing is left in the temporary folder."""
-    with workspace.bringup('--simulate', '--hold') as process:
+    with workspace.bringup('--simulate') as process:
         seen = read_until(process, 'all is ready')
         process.send_signal(signal.SIGINT)
         rest, _ = process.communicate(timeout=PATIENCE)
@@ -103,7 +112,7 @@ def test_a_second_bring_up_on_the_same_port_is_refused(workspace: SmallWorkspace
     port, name = workspace.folder / 'port', workspace.folder / 'other_name'
     port.touch()
     name.symlink_to(port)
-    with workspace.bringup('--port', str(port), '--hold') as first:
+    with workspace.bringup('--port', str(port)) as first:
         read_until(first, 'all is ready')
         for arguments, what in (
             (['--port', str(name), '--namespace', 'dog'], 'port'),
@@ -123,7 +132,7 @@ def test_simulations_in_other_namespaces_run_side_by_side(workspace: SmallWorksp
     with contextlib.ExitStack() as stack:
         running, ports = [], set()
         for side in ('left', 'right'):
-            arguments = ('--simulate', '--hold', '--namespace', side)
+            arguments = ('--simulate', '--namespace', side)
             running.append(stack.enter_context(workspace.bringup(*arguments)))
             seen = read_until(running[-1], 'all is ready')
             ports.add(next(line for line in seen.splitlines() if 'simulated, on' in line))

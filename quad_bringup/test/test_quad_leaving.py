@@ -9,7 +9,7 @@ from collections.abc import Callable
 import pytest
 
 from process_supervisor import CallError, GivenUpError
-from quad_bringup.leaving import lie_down
+from quad_bringup.leaving import lie_down, stand_still
 
 
 class Controller:
@@ -44,15 +44,15 @@ class Controller:
         self.closed = True
 
 
-def leave(controller: Controller, *, given_up: bool = False) -> list[str]:
-    """Let it lie down; return what was said."""
+def leave(controller: Controller, *, given_up: bool = False, hold: bool = False) -> list[str]:
+    """Let it lie down, or stand still; return what was said."""
     said: list[str] = []
 
     def make_client(asked: Callable[[], bool]) -> Controller:
         controller.given_up = asked
         return controller
 
-    lie_down(said.append, lambda: given_up, make_client)
+    (stand_still if hold else lie_down)(said.append, lambda: given_up, make_client)
     assert controller.closed
     return said
 
@@ -66,6 +66,31 @@ def test_a_robot_on_its_feet_lies_down(state: str) -> None:
     said = leave(controller)
     assert controller.modes == ['lie']
     assert said == ['lying down first; Ctrl-C again stops at once']
+
+
+@pytest.mark.parametrize('state', ['walk', 'turn', 'policy', 'to walk', 'to stand'])
+def test_a_robot_that_is_to_hold_ends_its_gait_first(state: str) -> None:
+    """So that no foot is in the air when its servos hold; the user is told how not to wait."""
+    controller = Controller(state)
+    assert leave(controller, hold=True) == ['standing still first; Ctrl-C again stops at once']
+    assert (controller.modes, controller.state) == (['stand'], 'stand')
+
+
+@pytest.mark.parametrize('state', ['stand', 'lie', 'to lie', 'relax', 'fault'])
+def test_a_robot_that_is_to_hold_and_does_not_walk_is_left_as_it_is(state: str) -> None:
+    """Without a word."""
+    controller = Controller(state)
+    assert leave(controller, hold=True) == []
+    assert controller.modes == []
+
+
+def test_a_robot_that_is_to_hold_and_does_not_stop_is_left() -> None:
+    """It refuses, or fails: said, or seen, and no error."""
+    refusing, failing = Controller('walk'), Controller('walk')
+    refusing.refusal = 'no attitude'
+    failing.outcomes = ['fault']
+    assert leave(refusing, hold=True)[-1].startswith('stopping without standing still')
+    assert leave(failing, hold=True) == ['standing still first; Ctrl-C again stops at once']
 
 
 def test_a_robot_that_fails_on_its_way_down_is_asked_once_more() -> None:

@@ -269,6 +269,24 @@ def test_a_controller_that_wakes_from_a_pause_in_motion_lies_down_from_where_it_
     assert rig.is_in(State.LIE)
 
 
+def test_stand_is_where_all_feet_stand() -> None:
+    """A robot that walked is on its way there until its gait has ended."""
+    rig = standing()
+    rig.ask('walk')
+    rig.run(1.0, FORWARD)
+    rig.ask('stand')
+    titles: list[str] = []
+    while not titles or titles[-1] != 'stand':
+        rig.step(FORWARD)
+        titles.append(rig.controller.status.title)
+        assert len(titles) < 200
+    assert titles[0] == 'to stand'
+    assert len(titles) > 5
+    resting = rig.positions
+    rig.run(0.5, FORWARD)
+    assert rig.positions == pytest.approx(resting, abs=0.02)
+
+
 def test_a_pause_at_rest_is_no_fault() -> None:
     """Standing in mode walk, as it stood before; the velocity of before the pause is stale."""
     rig = standing()

@@ -7,7 +7,6 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from contextlib import ExitStack
-import math
 from pathlib import Path
 from typing import Any, TYPE_CHECKING
 
@@ -126,13 +125,15 @@ class Rig(ABC):
         self.client.node.destroy_timer(timer)
 
     def swing(self, duration: float) -> None:
-        """Publish commands of legs that swing, 50 times a second, and break off [s]."""
+        """Publish commands of a trot, 50 times a second, that break off in the air [s]."""
         count, sent = round(duration / 0.02), 0
 
         def send() -> None:
             nonlocal sent
             sent += 1
-            self.command([0.2 * math.sin(0.3 * sent), 0.6, -0.3] * 4)
+            up = 0.3 if sent // 7 % 2 else -0.3
+            thighs = (0.6 + up, 0.6 - up, 0.6 - up, 0.6 + up)
+            self.command([angle for thigh in thighs for angle in (0.0, thigh, -0.3)])
 
         timer = self.client.node.create_timer(0.02, send)
         self.client.spin_until(lambda: sent >= count, TIMEOUT, 'stream of commands')

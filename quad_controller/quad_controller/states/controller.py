@@ -31,7 +31,7 @@ from .status import Event, EventKind, Output, Status
 MAX_STEP = 0.05  # [s] after a longer pause the gait goes on where it was instead of leaping
 
 STREAM_TIMEOUT = 0.5
-"""After a pause of the controller in motion [s], the hardware node lays the robot down."""
+"""After it [s], the hardware node lays a robot down that was left with a leg in the air."""
 
 UPRIGHT_STATES = GAIT_STATES | {State.POLICY, State.FAULT}
 """States in which the robot is on its legs, and what is wrong with it is a fault."""
@@ -242,7 +242,7 @@ class Controller:
         """Begin anew after a pause [s] in motion, with the next joint states: these are old."""
         reason = (
             f'the controller itself stood still for {pause:.1f} s in motion, so the hardware node '
-            'has laid the robot down; look at what kept it, and let it stand up again'
+            'may have laid the robot down; look at what kept it, and let it stand up again'
         )
         events = self._latch_fault(Fault.PAUSE, reason, last)
         self._health.forget_joints()

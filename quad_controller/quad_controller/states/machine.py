@@ -98,8 +98,9 @@ class StateMachine:
 
     @property
     def title(self) -> str:
-        """Name of the state, with the way to it as long as it stands up or lies down."""
-        return self.state.value if self.motion.finished else f'to {self.state.value}'
+        """Name of the state, with the way to it as long as it stands up, lies down or stops."""
+        there = self.at_rest if self.state is State.STAND else self.motion.finished
+        return self.state.value if there else f'to {self.state.value}'
 
     @property
     def at_rest(self) -> bool:

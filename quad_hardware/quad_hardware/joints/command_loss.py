@@ -1,15 +1,14 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What becomes of a robot whose joint commands break off while its legs move, or hang in the air.
+"""What becomes of a robot whose joint commands break off while a leg is in the air.
 
 A controller that dies in the middle of a trot leaves two legs in the air, and the servos hold
-them there; so does one that held there for a fault, and then ended. Commands that end at rest
-with all feet on the ground leave a posture that somebody chose: it stays.
+them there; so does one that held there for a fault, and then ended. A robot on all its feet stays
+as it is, whether it moved or somebody chose its posture.
 """
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
@@ -19,8 +18,6 @@ from quad_description import Pose, pose_positions
 
 from .mapping import JointMap
 
-MOTION_WINDOW = 0.1  # [s] at the end of a stream, in which targets rested or moved
-MIN_MOTION = 0.05  # [rad] of a target; levelling and noise are less
 MIN_STREAM = 0.5  # [s] a person who tries out a servo sends no stream
 SPEED = 1.0  # [rad/s] of the fastest joint on the way down
 MIN_DURATION = 1.0  # [s]
@@ -50,7 +47,7 @@ class _Descent:
 
 
 class CommandLoss:
-    """Watches a stream of commands, and brings the robot down when its end leaves it no posture.
+    """Watches a stream of commands, and brings the robot down when they leave a leg in the air.
 
     Attributes:
         timeout: A pause after which a stream has ended [s].
@@ -79,7 +76,7 @@ class CommandLoss:
                        if s.joint in pose}  # fmt: skip
         self._raised, self._reaction = raised, reaction
         self._began_at = self._last_at = -math.inf
-        self._recent: deque[tuple[float, tuple[float, ...]]] = deque()
+        self._last: Sequence[float] = ()
         self._descent: _Descent | None = None
 
     @property
@@ -92,27 +89,20 @@ class CommandLoss:
         self._descent = None
         if now - self._last_at > self.timeout:
             self._began_at = now
-            self._recent.clear()
-        self._last_at = now
-        self._recent.append((now, tuple(targets[: len(self._legs)])))
-        while self._recent[0][0] < now - MOTION_WINDOW:
-            self._recent.popleft()
+        self._last_at, self._last = now, targets[: len(self._legs)]
 
     def forget(self) -> None:
         """Forget the stream: the robot was lost or let go, and is not moved unasked."""
         self._descent = None
         self._began_at = self._last_at = -math.inf
-        self._recent.clear()
+        self._last = ()
 
     @property
     def hazard(self) -> str:
         """How the last stream ended, if that is nothing to be left so; else nothing."""
-        if not self._recent or self._last_at - self._began_at < MIN_STREAM:
+        if not self._last or self._last_at - self._began_at < MIN_STREAM:
             return ''
-        columns = zip(*(targets for _, targets in self._recent), strict=True)
-        if any(max(column) - min(column) > MIN_MOTION for column in columns):
-            return 'while the legs moved'
-        raised = self._raised(self._recent[-1][1])
+        raised = self._raised(self._last)
         return f'with {" or ".join(raised)} in the air' if raised else ''
 
     def begin(self, place: Mapping[str, float], tilt: float | None, now: float) -> str:

@@ -78,7 +78,7 @@ class NodeSettings:
         urdf: What it is.
         joints: Its servos.
         limiter: How fast targets may move.
-        command_loss: What the robot does when commands break off while its legs move or hang.
+        command_loss: What the robot does when commands break off with a leg in the air.
         estimator: How its reports are read.
         frames: Names of the frames.
         deviations: Published with the IMU.
@@ -134,7 +134,7 @@ def declare_parameters(node: Node) -> NodeSettings:
             'command_loss',
             LossReaction.LIE.value,
             {reaction.value: reaction for reaction in LossReaction},
-            'what the robot does when commands break off while its legs move or hang in the air',
+            'what the robot does when commands break off with a leg in the air',
         ),
         estimator=_estimator(read),
         frames=_frames(read),
