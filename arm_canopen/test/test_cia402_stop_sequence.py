@@ -7,6 +7,7 @@ from __future__ import annotations
 from itertools import count
 import struct
 
+from diagnostic_msgs.msg import DiagnosticStatus
 import pytest
 from virtual_network import (
     bus_config,
@@ -18,9 +19,11 @@ from virtual_network import (
     VirtualNetwork,
 )
 
+from arm_canopen.cia402.status import drive_status
 from arm_canopen.device.drive import Drive as SimulatedDrive
 from arm_canopen.exceptions import DriveError
 from arm_canopen.master.events import Severity
+from arm_canopen.nodes.diagnostics import drive_diagnostic
 from arm_canopen.standard.drive import DriveState, OperationMode
 
 JOINT, NODE_ID = 'joint1', 2
@@ -188,12 +191,15 @@ def test_nothing_enables_a_drive_while_it_is_stopped(monkeypatch: pytest.MonkeyP
     for verb in ('init', 'enable', 'recover', 'home'):
         with pytest.raises(DriveError, match='being stopped'):
             failing.net.do(JOINT, verb)
+    status = drive_status(failing.net.drives[JOINT], failing.net.now)
+    assert drive_diagnostic('bus', status).level == DiagnosticStatus.ERROR
+    assert 'injected' in status.summary
     failing.net.do(JOINT, 'disable', preempt=True)
     assert failing.device.state == DriveState.SWITCH_ON_DISABLED
     assert abs(failing.device.velocity) / SCALE < STANDING
     failing.net.do(JOINT, 'enable')
     assert failing.net.drives[JOINT].state is DriveState.OPERATION_ENABLED
-    assert not failing.net.drives[JOINT].failure
+    assert not drive_status(failing.net.drives[JOINT], failing.net.now).failure
 
 
 def test_what_goes_wrong_after_it_was_enabled_again_is_named_again(

@@ -24,6 +24,7 @@ class DriveStatus:
         statusword: 0x6041 in words.
         warning: The statusword shows a warning or an internal limit.
         error: 0x603F in words, empty when none is known.
+        failure: Why the master stopped it, until it is enabled again; else empty.
         fresh: State, position and velocity are young enough to act on.
         age: Age of the oldest of them in [s]; infinite while they are unknown.
         position: Actual position in user units.
@@ -39,6 +40,7 @@ class DriveStatus:
     statusword: str
     warning: bool
     error: str
+    failure: str
     fresh: bool
     age: float
     position: float
@@ -73,6 +75,7 @@ def drive_status(drive: Drive, now: float) -> DriveStatus:
         statusword=statusword_text(word),
         warning=bool(word & (Statusword.WARNING | Statusword.INTERNAL_LIMIT)),
         error=drive.error,
+        failure=drive.failure,
         fresh=drive.fresh,
         age=drive.age,
         position=drive.position,

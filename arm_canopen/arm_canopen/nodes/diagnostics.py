@@ -70,7 +70,7 @@ def drive_diagnostic(bus: str, status: DriveStatus) -> DiagnosticStatus:
     if level == DiagnosticStatus.OK:
         message = status.summary
     stale = status.state is not DriveState.UNKNOWN and not status.fresh
-    if status.faulted or stale:
+    if status.faulted or status.failure or stale:
         level = DiagnosticStatus.ERROR
     elif level == DiagnosticStatus.OK and status.warning:
         level = DiagnosticStatus.WARN
