@@ -68,7 +68,7 @@ class Topics:
         sent = self.node.get_clock().now() - Duration(nanoseconds=round(age * 1e9))
         message.header.stamp = sent.to_msg()
         (taken,) = (each for each in self.node.subscriptions if each.topic_name.endswith(topic))
-        taken.callback(message, {})
+        taken.callback(message)
 
 
 @pytest.fixture

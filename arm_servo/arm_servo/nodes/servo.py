@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import replace
 from functools import partial
@@ -24,7 +24,6 @@ from ..gateway import CommandGateway, JOGGING
 from ..outcome import Outcome
 from ..requests import DisplacementRequest, JogRequest
 from .command_converter import CommandConverter
-from .publishers import Publishers
 from .refusals import Refusals
 from .ros_numbers import seconds
 from .servo_modes import CommandKind, ServoModes
@@ -77,21 +76,13 @@ class Servo:
             (CommandKind.JOINT_JOG, JointJog, parameters.joint_topic, self.converter.jog),
             (CommandKind.POSE, PoseStamped, parameters.pose_topic, self.converter.pose),
         ):
-            take = partial(self._take, kind, convert, Publishers())
-            node.create_subscription(message, topic, take, 10)
+            node.create_subscription(message, topic, partial(self._take, kind, convert), 10)
         node.add_on_set_parameters_callback(self._check_scales)
         node.add_post_set_parameters_callback(self._rescale)
         node.create_timer(1.0 / parameters.status_rate, self._publish_status)
 
-    def _take(
-        self,
-        kind: CommandKind,
-        convert: Convert,
-        publishers: Publishers,
-        message: Any,  # noqa: ANN401  # messages have no type
-        info: Mapping[str, int | None],
-    ) -> None:
-        begin, client = time.monotonic(), (kind, publishers.of(info))
+    def _take(self, kind: CommandKind, convert: Convert, message: Any) -> None:  # noqa: ANN401  # messages have no type
+        begin = time.monotonic()
         try:
             age = self._checked_age(message)
             self._modes.admit(kind)
@@ -110,7 +101,9 @@ class Servo:
         if not request.is_zero:
             self._last = begin
         if isinstance(request, JogRequest):
-            self._gateway.jog(replace(request, client=client)).add_done_callback(self._note)
+            # the events executor hands out no publisher, so topic and frame tell who asks
+            request = replace(request, client=(kind, message.header.frame_id))
+            self._gateway.jog(request).add_done_callback(self._note)
             return
         command = self._gateway.request(request)
         command.future.add_done_callback(self._note)
