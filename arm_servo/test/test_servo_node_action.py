@@ -49,7 +49,6 @@ def handle(goal: object) -> Any:
         goal_id=SimpleNamespace(uuid=bytes(16)),
         request=SimpleNamespace(goal=goal, trajectory=SimpleNamespace(points=[])),
         is_cancel_requested=False,
-        _update_state=lambda _event: None,
         publish_feedback=lambda _feedback: None,
         abort=lambda: None,
         succeed=lambda: None,

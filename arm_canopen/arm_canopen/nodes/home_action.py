@@ -11,10 +11,10 @@ import math
 import time
 from typing import Any, TYPE_CHECKING
 
-from rclpy.action.server import ActionServer, CancelResponse
-from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.action.server import CancelResponse
 
 from arm_msgs.action import Home
+from node_runner.action_goals import serve_goals
 
 from ..cia402.drive_commands import DriveCommands
 from ..cia402.homing import HomingProgress
@@ -60,18 +60,16 @@ class HomeAction:
         self._thread = thread
         self._output = output
         self._goals: dict[bytes, _Homing] = {}
-        self._server = ActionServer(
+        self._server = serve_goals(
             node,
             Home,
             name,
-            execute_callback=self._conclude,
-            handle_accepted_callback=self._start,
-            cancel_callback=self._cancel,
+            start=self._start,
+            conclude=self._conclude,
+            cancel=self._cancel,
         )
 
     def _start(self, goal: Any) -> None:  # noqa: ANN401  # rclpy has no types here
-        # goal.execute() would end the goal when its callback returns, which is now
-        goal._update_state(rclpy_implementation.GoalEvent.EXECUTE)  # noqa: SLF001
         homing = _Homing()
         self._goals[bytes(goal.goal_id.uuid)] = homing
         # made and destroyed in the executor only: it may be about to run the timer

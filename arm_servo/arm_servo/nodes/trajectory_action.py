@@ -11,9 +11,10 @@ import traceback
 from typing import Any
 
 from control_msgs.action import FollowJointTrajectory
-from rclpy.action.server import ActionServer, CancelResponse
-from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.action.server import CancelResponse
 from rclpy.node import Node
+
+from node_runner.action_goals import serve_goals
 
 from ..exceptions import GoalCode, ServoError
 from ..execution import Execution
@@ -83,19 +84,17 @@ class TrajectoryAction:
         self._convert = convert
         self._follow = follow
         self._goals: dict[bytes, _Goal] = {}
-        self._server = ActionServer(
+        self._server = serve_goals(
             node,
             FollowJointTrajectory,
             '~/follow_joint_trajectory',
-            execute_callback=self._conclude,
-            handle_accepted_callback=self._start,
-            cancel_callback=self._cancel,
+            start=self._start,
+            conclude=self._conclude,
+            cancel=self._cancel,
         )
         node.create_timer(1.0 / rate, self._watch)
 
     def _start(self, handle: Any) -> None:  # noqa: ANN401  # rclpy has no types here
-        # handle.execute() would end the goal when its callback returns, which is now
-        handle._update_state(rclpy_implementation.GoalEvent.EXECUTE)  # noqa: SLF001
         goal = self._goals[bytes(handle.goal_id.uuid)] = _Goal(handle)
         try:
             goal.command = self._follow(self._convert(handle.request))
