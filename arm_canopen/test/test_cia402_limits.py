@@ -109,6 +109,26 @@ def test_a_long_quick_stop_is_waited_for(option: int) -> None:
     assert not [text for text in net.told() if 'did not come to rest' in text]
 
 
+@pytest.mark.parametrize(
+    ('option', 'state'),
+    [
+        (2, DriveState.SWITCH_ON_DISABLED),
+        (5, DriveState.QUICK_STOP_ACTIVE),
+        (6, DriveState.QUICK_STOP_ACTIVE),
+        (7, DriveState.QUICK_STOP_ACTIVE),
+    ],
+)
+def test_a_quick_stop_at_rest_ends_where_its_option_says(option: int, state: DriveState) -> None:
+    """With 5 to 7 the axis is held in Quick stop active, although there was nothing to brake."""
+    net = enabled(with_writes((0x605A, 0, option)), OperationMode.PROFILE_POSITION)
+    net.do(JOINT, 'quick_stop', preempt=True)
+    net.run(1.0)
+    assert net.drives[JOINT].state is state
+    drive = net.devices[JOINT].drive
+    assert drive is not None
+    assert drive.state is state
+
+
 def test_a_stop_without_end_is_not_waited_for_for_ever() -> None:
     """With next to no deceleration the power goes after the longest time, and that is said."""
     config = with_writes((0x6085, 0, 100), (0x605A, 0, 6))
