@@ -183,6 +183,25 @@ def test_an_axis_is_stopped_whose_rpdo_is_kept_back_with_another_axis(
     failing.net.do(JOINT, 'enable')
 
 
+def test_a_drive_that_could_not_be_stopped_is_stopped_when_it_is_asked_for_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Neither RPDO nor SDO reaches it at first, which is reported with the remedy."""
+    failing = Failing(6, monkeypatch)
+    failing.fail(*owner_of(failing, 'controlword'))
+    failing.net.wire.loses = lambda sender, frame: frame.can_id == 0x600 + NODE_ID
+    failing.run(RAMP + 6.0)
+    assert failing.states == [DriveState.OPERATION_ENABLED]
+    assert 'Cut its power' in failing.errors[-1]
+    reported = len(failing.errors)
+    failing.run(2.0)
+    assert len(failing.errors) == reported
+    failing.net.wire.loses = lambda sender, frame: False
+    failing.net.do(JOINT, 'disable', preempt=True)
+    assert failing.device.state is DriveState.SWITCH_ON_DISABLED
+    assert abs(failing.device.velocity) / SCALE < STANDING
+
+
 def test_nothing_enables_a_drive_while_it_is_stopped(monkeypatch: pytest.MonkeyPatch) -> None:
     """A command is refused, a stop waits for the end; then a command does."""
     failing = Failing(6, monkeypatch)

@@ -53,6 +53,8 @@ class DriveSequences:
         self._require_operational()
         if drive.stop.running and not to_stop:
             raise self.refused('is being stopped')
+        if drive.failure:
+            await drive.stop.run()  # once more, as the first may not have reached the drive
         await drive.stop.ended()
         drive.objects.mute_controlword(muted=False)  # what is commanded next goes by RPDO again
 
