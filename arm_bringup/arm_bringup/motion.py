@@ -13,14 +13,14 @@ import json
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
-import yaml
-
 from process_supervisor import (
     EVERY_NODE,
     Executable,
     FindExecutable,
     namespaced_parameters,
+    parameters_by_node,
     RosOptions,
+    StartError,
 )
 
 from .exceptions import RobotError
@@ -72,13 +72,11 @@ def controller_name(robot: Robot) -> str:
         RobotError: A file cannot be read as what it should be.
     """
     try:
-        table = (
-            yaml.safe_load(robot.controllers.read_text()) if robot.controllers.is_file() else {}
-        )
-        manager = table.get('controller_manager', {}).get('ros__parameters', {})
+        table = parameters_by_node(robot.controllers) if robot.controllers.is_file() else {}
         group = ET.parse(robot.semantic).getroot().find('group')  # noqa: S314  the robot's own
-    except (yaml.YAMLError, AttributeError, ET.ParseError) as error:
+    except (StartError, ET.ParseError) as error:
         raise RobotError(f'{robot.folder}: {error}') from error
+    manager = table.get('controller_manager', {}).get('ros__parameters', {})
     first = '' if group is None else group.get('name', '')
     return str(manager.get('controller_name', f'{first}_controller'))
 

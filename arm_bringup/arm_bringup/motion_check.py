@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any, TYPE_CHECKING
 
-import yaml
+from process_supervisor import parameters_by_node, StartError
 
 from .findings import error, Finding, warning
 from .robots import Robot
@@ -116,12 +116,12 @@ def _controllers(robot: Robot, model: RobotModel) -> Iterable[Finding]:
         return
     place = robot.controllers.name
     try:
-        table = yaml.safe_load(robot.controllers.read_text(encoding='utf-8'))
+        table = parameters_by_node(robot.controllers)
         manager = table.get('controller_manager', {}).get('ros__parameters', {})
         name = manager.get('controller_name', f'{model.group}_controller')
         constraints = table.get(name, {}).get('ros__parameters', {}).get('constraints', {})
         refused = check_parameters(model, table)
-    except (yaml.YAMLError, AttributeError, TypeError) as problem:
+    except (StartError, AttributeError, TypeError) as problem:
         yield error(place, f'not a parameter file: {problem}', 'see robots/gp110/controllers.yaml')
         return
     if name not in table:

@@ -8,9 +8,11 @@ from pathlib import Path
 import shutil
 
 import pytest
+import yaml
 
 from arm_bringup.check import check_robot, main
 from arm_bringup.findings import Severity
+from arm_bringup.motion import controller_name
 from arm_bringup.robots import find_robot, Robot
 
 ROBOTS = Path(__file__).parents[1] / 'robots'
@@ -105,6 +107,20 @@ def test_without_the_files_of_motion(robot: Robot) -> None:
     (finding,) = check_robot(robot)
     assert finding.severity is WARNING
     assert 'gp110.srdf and limits.yaml' in finding.problem
+
+
+@pytest.mark.parametrize('name', ['/left/{}', '/**/{}', 'cell/left/{}'])
+def test_nodes_of_controllers_yaml_may_have_a_namespace(robot: Robot, name: str) -> None:
+    """They are looked at all the same, and the controller keeps its name."""
+    plain = controller_name(robot)
+    table = yaml.safe_load(robot.controllers.read_text())
+    named = {name.format(node): values for node, values in table.items()}
+    robot.controllers.write_text(yaml.safe_dump(named))
+    assert check_robot(robot) == []
+    replace(robot.controllers, 'goal_time', 'goal_tim')
+    assert [finding.severity for finding in check_robot(robot)] == [ERROR]
+    replace(robot.controllers, f'controller_name: {plain}', 'controller_name: arm')
+    assert controller_name(robot) == 'arm'
 
 
 def test_channels_of_a_drive_are_joints(robot: Robot) -> None:

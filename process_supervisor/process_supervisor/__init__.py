@@ -23,6 +23,7 @@ from .nodes import (
     LOG_FORMAT,
     namespaced_parameters,
     node_argv,
+    parameters_by_node,
     ros_domain,
     write_parameters,
 )
@@ -65,6 +66,7 @@ __all__ = [
     'is_smart',
     'namespaced_parameters',
     'node_argv',
+    'parameters_by_node',
     'parse_with_ros',
     'ros_domain',
     'severity_of',

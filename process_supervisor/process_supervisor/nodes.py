@@ -147,20 +147,43 @@ def namespaced_parameters(file: Path, ros: RosOptions, folder: Path) -> Path:
     Raises:
         StartError: It is no parameter file.
     """
-    import yaml
-
     moved: dict[str, object] = {}
-    try:
-        for name, values in _nodes_of(yaml.safe_load(file.read_text(encoding='utf-8')) or {}):
-            full = ros.node_name(name)
-            if full.startswith(ANY_NODE):
-                full = f'{ANY_NODE}{full}'
-            moved = _merged(moved, {full: {VALUES: values}})
-    except (OSError, yaml.YAMLError, TypeError, AttributeError, ValueError) as error:
-        raise StartError(f'{file}: no ROS parameter file: {error}') from error
+    for name, values in _read_parameters(file):
+        full = ros.node_name(name)
+        if full.startswith(ANY_NODE):
+            full = f'{ANY_NODE}{full}'
+        moved = _merged(moved, {full: {VALUES: values}})
     copy = folder / f'{ros.namespace.replace("/", "-")}-{file.name}'
     copy.write_text(json.dumps(moved), encoding='utf-8')  # JSON is YAML
     return copy
+
+
+def parameters_by_node(file: Path) -> dict[str, Any]:
+    """Read a parameter file by the own names of its nodes, whatever namespaces it names.
+
+    Args:
+        file: A ROS parameter file.
+
+    Returns:
+        The parameters of each node below ``ros__parameters``; what is for all nodes as ``/**``.
+
+    Raises:
+        StartError: It is no parameter file.
+    """
+    found: dict[str, Any] = {}
+    for name, values in _read_parameters(file):
+        own = name.rpartition('/')[2]
+        found = _merged(found, {ANY_NODE if own.strip('*') == '' else own: {VALUES: values}})
+    return found
+
+
+def _read_parameters(file: Path) -> list[tuple[str, dict[str, Any]]]:
+    import yaml
+
+    try:
+        return list(_nodes_of(yaml.safe_load(file.read_text(encoding='utf-8')) or {}))
+    except (OSError, yaml.YAMLError, TypeError, AttributeError, ValueError) as error:
+        raise StartError(f'{file}: no ROS parameter file: {error}') from error
 
 
 def _nodes_of(table: Mapping[str, Any], within: str = '') -> Iterator[tuple[str, dict[str, Any]]]:
