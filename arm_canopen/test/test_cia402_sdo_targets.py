@@ -244,6 +244,17 @@ def test_a_target_that_is_not_answered_is_no_success() -> None:
     assert motor(net) == pytest.approx(0.3, abs=1e-3)
 
 
+@pytest.mark.parametrize('verb', ['halt', 'disable', 'quick_stop'])
+def test_a_stop_before_the_target_is_in_the_drive_is_no_success(verb: str) -> None:
+    """Whatever the drive answers later: the target moves nothing any more."""
+    net = running_in(OperationMode.PROFILE_VELOCITY)
+    net.devices[JOINT].faults.inject(FaultInjection(BusFault.SDO_DELAY, delay=0.15), net.now)
+    answered = give(net, 0.4)
+    net.do(JOINT, verb, preempt=True)
+    with pytest.raises(DriveError, match='stopped before'):
+        net.result(answered)
+
+
 def test_the_moves_behind_a_refused_one_are_dropped() -> None:
     """Each counts from the one before, so none of them would end where it should."""
     net = running_in(OperationMode.PROFILE_POSITION)

@@ -101,16 +101,21 @@ class DriveCommands(StopCommands):
         drive, steps, mode = self.drive, self._steps, self.drive.mode
         answer = command()
         delivery = self._delivery
-        patience = TAKEN_TIMEOUT + drive.node.config.sdo_timeout
-        await steps.until(lambda: delivery.done, patience, 'its target')
+
+        def stopped() -> bool:
+            halted = drive.halted and not drive.halt.leaving
+            return halted or not drive.stays_enabled or drive.mode is not mode
+
+        await steps.until(
+            lambda: stopped() or (delivery.done and not drive.halt.leaving),
+            TAKEN_TIMEOUT + drive.node.config.sdo_timeout,
+            'its target',
+        )
         if delivery.error is not None:
             raise steps.refused(f'has not taken its target ({delivery.error})')
-        if not drive.halt.leaving:
-            return answer
-        await steps.until(lambda: not drive.halt.leaving, TAKEN_TIMEOUT, 'its target')
         if drive.halt.unanswered:
             raise DriveError(f'{drive.name} stays halted: {NOT_TAKEN}')
-        if drive.halted or not drive.stays_enabled or drive.mode is not mode:
+        if stopped():
             raise steps.refused('was stopped before it had taken the target')
         return answer
 
