@@ -128,6 +128,24 @@ def test_a_device_that_refuses_its_event_timer_is_named() -> None:
     assert len([text for text in net.told() if 'on change only' in text]) == 1
 
 
+def test_a_drive_in_operation_is_taken_over_and_gets_its_event_timer() -> None:
+    """Its PDOs are those of the bus.yml all the same; its loss is noticed from then on."""
+    timed = replace(on_change(), reset_communication=False)
+    untimed = tuple(replace(tpdo, event_time=None) for tpdo in timed.tpdos)
+    net = VirtualNetwork(bus_config(replace(timed, tpdos=untimed)))
+    net.boot()
+    net.do(JOINT, 'init')
+    net._config = replace(bus_config(timed), written={(JOINT,): Written()})
+    net.replace_master()
+    net.start()
+    net.run(2.0)
+    assert net.network.nodes[JOINT].taken_over
+    assert net.drives[JOINT].fresh
+    net.wire.loses = lambda sender, frame: frame.can_id in TPDOS
+    net.run(1.0)
+    assert not net.drives[JOINT].fresh
+
+
 def loaded(tmp_path: Path, tpdos: str) -> BusConfig:
     """Return the bus of a drive with these TPDOs."""
     file = tmp_path / 'bus.yml'

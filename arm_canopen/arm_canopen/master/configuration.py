@@ -13,6 +13,7 @@ from ..config.boot_plan import (
     BootWrite,
     choose_slot,
     ERROR_CONTROL,
+    EVENT_TIMER,
     final_values,
     is_requested,
     WATCH_KEY,
@@ -20,7 +21,6 @@ from ..config.boot_plan import (
     watch_word,
 )
 from ..config.model import BusConfig, SdoWrite
-from ..config.tpdo_freshness import EVENT_TIMER_SUBINDEX
 from ..exceptions import SdoAbortError, SdoError
 from ..standard.objects import Index, PDO_COUNT_MAX
 from .events import EventKind, Severity
@@ -80,14 +80,14 @@ class Configurator:
             await self._bring(write)
 
     async def write_error_control(self) -> None:
-        """Have the device send its heartbeat or be guarded, and watch the master.
+        """Have the device send its heartbeat or be guarded, its TPDOs come, and watch the master.
 
         Raises:
             SdoError: As with :meth:`apply`.
         """
         await self._watch_master()
         for write in self._plan:
-            if write.index in LIFE_SIGNS:
+            if write.index in LIFE_SIGNS or _is_own_timer(write):
                 await self._bring(write)
 
     async def differences(self) -> list[str]:
@@ -98,7 +98,7 @@ class Configurator:
         """
         found = []
         for write in final_values(self._plan):
-            if write.index not in PDO_OBJECTS:
+            if write.index not in PDO_OBJECTS or _is_own_timer(write):
                 continue
             present = await self.read_number(*write.address)
             mask = write.mask or (1 << 8 * len(write.data)) - 1
@@ -143,7 +143,7 @@ class Configurator:
             if write.requested:
                 raise SdoError(f'{refused}: correct or remove it there') from error
             self._warn(f'{refused} by default only, so it goes on with what it has')
-            if write.subindex == EVENT_TIMER_SUBINDEX:
+            if _is_own_timer(write):
                 self._leave_untimed(write.index)
 
     def _leave_untimed(self, index: int) -> None:
@@ -199,3 +199,8 @@ class Configurator:
 
     def _warn(self, text: str) -> None:
         self._node.report(EventKind.BOOT, Severity.WARNING, text)
+
+
+def _is_own_timer(write: BootWrite) -> bool:
+    """Tell whether a write sets the event timer of a TPDO that nobody has asked for."""
+    return write.key.endswith(EVENT_TIMER) and not write.requested
