@@ -128,6 +128,7 @@ class MotionCore:
             self.speed_scaling,
             None if target is None else target.target,
             self.execution,
+            None if self.execution is None else self.execution.timer(self.speed_scaling),
         )
 
     def reset(self, positions: Sequence[float] | Array, reason: str = 'the arm was reset') -> None:
@@ -158,11 +159,12 @@ class MotionCore:
         """
         return self._preparation.prepare(request, basis)
 
-    def commit(self, prepared: Prepared) -> None:
+    def commit(self, prepared: Prepared, elapsed: float = 0.0) -> None:
         """Begin a motion; where it is off, the arm catches up smoothly.
 
         Args:
             prepared: What :meth:`prepare` returned.
+            elapsed: Time since its basis in [s], by which one that begins later waits less.
 
         Raises:
             StateMovedError: Another command or a stop came after it was prepared, or the arm is
@@ -181,6 +183,7 @@ class MotionCore:
         if isinstance(motion, Execution):
             self._check_place(prepared.basis.state, state)
             self._changed('another command came')
+            motion.elapse(elapsed)
             self._arbiter.follow(motion)
         else:
             self._check_held()

@@ -20,7 +20,7 @@ from .otg import Generator, MotionState
 from .outcome import Outcome
 from .path import Path
 from .tolerances import tolerances
-from .trajectory_timer import TrajectoryTimer
+from .trajectory_timer import TimerState, TrajectoryTimer
 
 ARRIVED = 1e-6
 """How near to the end the set-points must be to have arrived in [rad]."""
@@ -69,13 +69,18 @@ class Feedback:
         time: Time of the trajectory in [s].
         desired: What the trajectory says now.
         actual: What was measured.
-        speed_scaling: Seconds of the trajectory per second.
+        timer: How it runs through the trajectory.
     """
 
     time: float
     desired: MotionState
     actual: MotionState
-    speed_scaling: float
+    timer: TimerState
+
+    @property
+    def speed_scaling(self) -> float:
+        """Seconds of the trajectory per second."""
+        return self.timer.speed_scaling
 
 
 class Execution:
@@ -134,9 +139,8 @@ class Execution:
         self.phase = Phase.FOLLOWING
         self.on_path = False
         begin_point = self._path.at(0.0)
-        self.feedback = Feedback(
-            0.0, MotionState.at_rest(begin_point.position), state, speed_scaling
-        )
+        timer = TimerState(0.0, self._timer.speed_scaling, 0.0, speed_scaling, wait)
+        self.feedback = Feedback(0.0, MotionState.at_rest(begin_point.position), state, timer)
 
     @property
     def outcome(self) -> Outcome | None:
@@ -153,19 +157,32 @@ class Execution:
         """How long its path lasts at full speed in [s]."""
         return self._path.duration
 
-    def foreseen(self, ahead: float) -> MotionState:
-        """Return where it will be at its present speed; for any thread.
+    def foreseen(self, ahead: float, timer: TimerState | None = None) -> MotionState:
+        """Return where it will be when nothing comes in between; for any thread.
 
         Args:
-            ahead: Time from the last step in [s]; less than 0 is the past.
+            ahead: Time from the state of the timer in [s]; less than 0 is the past.
+            timer: State of its timer; by default that of the last step.
         """
-        feedback, path = self.feedback, self._path
-        here = path.at(feedback.time + feedback.speed_scaling * max(ahead - self._waiting, 0.0))
-        return MotionState(
-            here.position,
-            here.velocity * feedback.speed_scaling,
-            here.acceleration * feedback.speed_scaling**2,
-        )
+        timer = timer or self.feedback.timer
+        return self._state(*TrajectoryTimer.foreseen(self._limits, self._path, timer, ahead)[:3])
+
+    def timer(self, speed_scaling: float) -> TimerState:
+        """Return how it runs from now on.
+
+        Args:
+            speed_scaling: Wanted speed scaling, 0 to 1.
+        """
+        return self.feedback.timer._replace(wanted=self._wanted(speed_scaling))
+
+    def elapse(self, time: float) -> None:
+        """Wait for less time: some has passed since it was planned.
+
+        Args:
+            time: How much in [s].
+        """
+        if self._waiting > 0.0:
+            self._waiting -= time
 
     def stop(self, outcome: Outcome) -> None:
         """Come to rest on the path, and end.
@@ -201,19 +218,15 @@ class Execution:
             The state to command next; None to come to rest: it does not begin yet, or there is no
             way to follow.
         """
-        if not self._begun and self._waits(speed_scaling):
+        if not self._begun and self._waits(speed_scaling, period):
             return self._wait(state, speed_scaling, period)
         self._begun = True
         self._check(state, measured, period)
-        if self.phase is Phase.STOPPING:
-            speed_scaling = 0.0
-        elif self._off > MET:  # joints that give their utmost for the path cannot catch up
-            speed_scaling = min(speed_scaling, CHASING)
-        self._timer.step(self._path, speed_scaling, period)
+        self._timer.step(self._path, self._wanted(speed_scaling), period)
         following = self._catch_up.step(state, self._ahead(period), period)
         self.on_path = following is not None and self._catch_up.exact
         desired = self._ahead(period)(period)
-        self.feedback = Feedback(self._timer.time, desired, measured, self._timer.speed_scaling)
+        self.feedback = Feedback(self._timer.time, desired, measured, self._timer.state)
         self._advance(following)
         return following
 
@@ -222,9 +235,16 @@ class Execution:
         """Whether it is yet to begin."""
         return not self._begun
 
-    def _waits(self, speed_scaling: float) -> bool:
+    def _wanted(self, speed_scaling: float) -> float:
+        """Return the speed scaling to go to where another one is wanted."""
+        if self.phase is Phase.STOPPING:
+            return 0.0
+        # joints that give their utmost for the path cannot catch up
+        return min(speed_scaling, CHASING) if self._off > MET else speed_scaling
+
+    def _waits(self, speed_scaling: float, period: float) -> bool:
         """Whether it does not begin now: before its time, or at rest in a pause or a stop."""
-        if self._waiting > 0.0:
+        if self._waiting > 0.5 * period:
             return True
         if not self._begins_at_rest:
             return False
@@ -234,7 +254,8 @@ class Execution:
     def _wait(self, state: MotionState, speed_scaling: float, period: float) -> MotionState | None:
         """Come to rest where the path begins, and wait there; all is planned already."""
         self._waiting -= period
-        self.feedback = replace(self.feedback, speed_scaling=speed_scaling)
+        timer = TimerState(0.0, speed_scaling, 0.0, speed_scaling, max(self._waiting, 0.0))
+        self.feedback = replace(self.feedback, timer=timer)
         if self.phase is Phase.STOPPING:
             self.phase = Phase.DONE
             return None
@@ -246,18 +267,21 @@ class Execution:
 
     def _ahead(self, period: float) -> Callable[[float], MotionState]:
         """Return where the path will be, by the time from now in [s]."""
-        timer, path = self._timer, self._path
+        timer = self._timer
 
         def ahead(time: float) -> MotionState:
-            at, speed_scaling, change = timer.ahead(time - period)
-            here = path.at(at)
-            return MotionState(
-                here.position,
-                here.velocity * speed_scaling,
-                here.acceleration * speed_scaling**2 + here.velocity * change,
-            )
+            return self._state(*timer.ahead(time - period))
 
         return ahead
+
+    def _state(self, time: float, speed_scaling: float, change: float) -> MotionState:
+        """Return the state at a time of the path that runs at a speed scaling."""
+        here = self._path.at(time)
+        return MotionState(
+            here.position,
+            here.velocity * speed_scaling,
+            here.acceleration * speed_scaling**2 + here.velocity * change,
+        )
 
     def _check(self, state: MotionState, measured: MotionState, period: float) -> None:
         """Check the tolerances at the present place."""

@@ -471,12 +471,12 @@ class CommandGateway:
             self._order_commit(command, self._core.prepare(request, basis), cycle.now)
             return
         elapsed = cycle.now - command.requested
-        if not basis.state.moving and basis.source is Source.NONE:
-            prepared = self._core.prepare(_aged(request, elapsed), basis)
-            self._order_commit(command, prepared, cycle.now)
+        at_rest = not basis.state.moving and basis.source is Source.NONE
+        if at_rest and not request.age:  # it begins whenever it begins
+            self._order_commit(command, self._core.prepare(request, basis), cycle.now)
             return
         needed = _preparation_time(request)
-        if basis.source is not Source.TRAJECTORY and needed > MAX_FORESIGHT:
+        if not at_rest and basis.source is not Source.TRAJECTORY and needed > MAX_FORESIGHT:
             # nobody can foresee a jog for so long; a goal that is refused does not stop it
             rest = replace(basis, state=MotionState.at_rest(basis.state.position))
             self._core.prepare(_aged(request, elapsed), rest)
@@ -485,7 +485,7 @@ class CommandGateway:
         cycles = max(MIN_CYCLES_AHEAD, math.ceil(needed / cycle.period) + 1)
         ahead = cycles * cycle.period
         prepared = self._core.prepare(_aged(request, elapsed + ahead), basis.foreseen(ahead))
-        self._order_commit(command, prepared, cycle.now + ahead - 0.5 * cycle.period)
+        self._order_commit(command, prepared, cycle.now + ahead)
 
     def _order_rest(self, command: MotionCommand) -> None:
         """Bring the arm to rest for a trajectory, and prepare it from there."""
@@ -519,29 +519,28 @@ class CommandGateway:
 
         self._orders.append(rest)
 
-    def _order_commit(self, command: MotionCommand, prepared: Prepared, begin: float) -> None:
+    def _order_commit(self, command: MotionCommand, prepared: Prepared, planned: float) -> None:
+        """Have a motion begin at the time for which it was planned, or as soon as can be."""
         self._check_void(command.source, command.number)  # no cycle may come that does
-        ordered = max(self._clock(), begin)
+        ordered = max(self._clock(), planned)
+
+        def begin(cycle: _Cycle) -> None:
+            self._admit(command.source, command.number, ordered, cycle)
+            self._core.commit(prepared, cycle.now - planned)
+            command.motion = prepared.motion
+            self._begun.append(command)
+            # canceled in this moment: the order behind it stops it
+            with suppress(InvalidStateError):
+                command.future.set_result(command.execution)
 
         def commit(cycle: _Cycle) -> bool:
-            if begin > cycle.now and not cycle.blocked:
+            if planned > cycle.now + 0.5 * cycle.period and not cycle.blocked:
                 return False
-            if self._guarded(command, lambda: self._commit(command, prepared, ordered, cycle)):
+            if self._guarded(command, lambda: begin(cycle)):
                 self._end(command)
             return True
 
         self._orders.append(commit)
-
-    def _commit(
-        self, command: MotionCommand, prepared: Prepared, since: float, cycle: _Cycle
-    ) -> None:
-        """Begin a motion, if nothing came in between."""
-        self._admit(command.source, command.number, since, cycle)
-        self._core.commit(prepared)
-        command.motion = prepared.motion
-        self._begun.append(command)
-        with suppress(InvalidStateError):  # canceled in this moment: the order behind it stops it
-            command.future.set_result(command.execution)
 
     def _guarded(self, command: MotionCommand, step: Callable[[], Any]) -> bool:
         """Take a step of a motion; return whether it was not refused."""

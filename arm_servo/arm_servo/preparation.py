@@ -27,6 +27,7 @@ from .path_check import PathCheck
 from .requests import DisplacementRequest, MotionRequest
 from .set_point import Source
 from .single_target import SingleTarget
+from .trajectory_timer import TimerState
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,6 +41,7 @@ class CommandBasis:
         speed_scaling: Share of the speed of trajectories and targets, 0 to 1.
         target: Where a single target takes the arm in [rad]; None without one.
         execution: The trajectory that was followed last; None before the first.
+        timer: How that runs; None for how it ran in its last step.
     """
 
     state: MotionState
@@ -48,6 +50,7 @@ class CommandBasis:
     speed_scaling: float = 1.0
     target: Array | None = None
     execution: Execution | None = None
+    timer: TimerState | None = None
 
     def foreseen(self, ahead: float) -> CommandBasis:
         """Return the basis some time later, when nothing comes in between.
@@ -56,7 +59,7 @@ class CommandBasis:
             ahead: Time from now in [s].
         """
         if self.source is Source.TRAJECTORY and self.execution is not None:
-            return replace(self, state=self.execution.foreseen(ahead))
+            return replace(self, state=self.execution.foreseen(ahead, self.timer))
         state = self.state
         there = state.position + ahead * state.velocity
         return replace(self, state=MotionState(there, state.velocity, 0.0 * state.acceleration))

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import ruckig
 
@@ -30,6 +32,28 @@ FLOOR = 0.2
 
 SOON = 0.01
 """How far ahead on the path its own jerk is looked for in [s]."""
+
+
+FORESIGHT_STEP = 0.01
+"""Step in which a change of the speed scaling is foreseen in [s]."""
+
+
+class TimerState(NamedTuple):
+    """Where a timer is.
+
+    Attributes:
+        time: Time of the path in [s].
+        speed_scaling: Seconds of the path per second.
+        change: Change of the speed scaling in [1/s].
+        wanted: Speed scaling that it goes to.
+        waiting: Time until it begins in [s].
+    """
+
+    time: float
+    speed_scaling: float
+    change: float
+    wanted: float
+    waiting: float = 0.0
 
 
 class TrajectoryTimer:
@@ -59,6 +83,11 @@ class TrajectoryTimer:
         self.time = 0.0
         self.speed_scaling = speed_scaling
         self.change = 0.0
+
+    @property
+    def state(self) -> TimerState:
+        """Where it is."""
+        return TimerState(self.time, self.speed_scaling, self.change, self._wanted)
 
     def begin(self, speed_scaling: float) -> None:
         """Begin at a speed scaling, from rest on a path that begins at rest."""
@@ -119,6 +148,30 @@ class TrajectoryTimer:
             return
         values = (each[0] for each in trajectory.at_time(period))
         self.time, self.speed_scaling, self.change = values
+
+    @classmethod
+    def foreseen(
+        cls, limits: JointLimits, path: Path, state: TimerState, ahead: float
+    ) -> TimerState:
+        """Return where a timer will be when nothing comes in between.
+
+        Args:
+            limits: Limits of the joints.
+            path: The path that it runs through.
+            state: Where it is.
+            ahead: Time from now in [s]; less than 0 is the past, at the present speed.
+        """
+        left = ahead - state.waiting if ahead > state.waiting else min(ahead, 0.0)
+        timer = cls(limits, state.speed_scaling)
+        timer.time, timer.change = state.time, state.change
+        while left > FORESIGHT_STEP and (timer.change or timer.speed_scaling != state.wanted):
+            timer.step(path, state.wanted, FORESIGHT_STEP)
+            left -= FORESIGHT_STEP
+        if left > 0.0:
+            timer.step(path, state.wanted, left)
+        else:
+            timer.time += left * timer.speed_scaling
+        return timer.state
 
     def _room(self, path: Path, sense: float) -> tuple[float, float]:
         """Return how fast the speed scaling may change in [1/s], and that in [1/s2]."""

@@ -470,3 +470,69 @@ def test_a_displacement_that_the_safety_filter_stops_ends_with_words() -> None:
     assert 'panda_hand would collide' in ended.reason
     assert drives.gateway.snapshot.source is Source.NONE
     assert drives.path[-1].tolist() == drives.path[-2].tolist()
+
+
+@pytest.mark.parametrize('before', ['rest', 'jog', 'trajectory'])
+@pytest.mark.parametrize('points', [20, 60])
+@given(st.integers(0, 25), st.sampled_from([-0.5, -0.9, -0.3]))
+@settings(max_examples=6, deadline=None)
+def test_a_stamped_trajectory_keeps_its_times(
+    before: str, points: int, worked: int, age: float
+) -> None:
+    """However long its preparation takes: it begins at its stamp, and not that much later."""
+    worker = SteppedWorker()
+    drives = ready(worker)
+    if before == 'trajectory':
+        drives.gateway.request(wave(drives, 40))
+        drives.run(2)
+        worker.run()
+        drives.run(10)
+    elif before == 'jog':
+        jog(drives.gateway, {JOINT: 0.05}, drives.now, 0.05)
+        drives.run(3)
+    requested = drives.now
+    command = drives.gateway.request(replace(wave(drives, points), age=age))
+    drives.run(1 + (worked if age < -0.4 and before == 'rest' else 0))
+    for _ in range(120):
+        worker.run()
+        drives.run()
+    execution = command.future.result(0.0)
+    assert execution is not None
+    due = drives.now - requested + age
+    assert execution.feedback.time == pytest.approx(due, abs=1.6 * PERIOD)
+
+
+@pytest.mark.parametrize('points', [20, 60])
+@given(
+    st.integers(0, 40),
+    st.sampled_from([(1.0, 0.5), (0.4, 1.0), (1.0, 0.1), (0.5, 0.0)]),
+    st.integers(0, 12),
+)
+@settings(max_examples=15, deadline=None)
+def test_a_trajectory_takes_over_while_the_speed_override_changes(
+    points: int, since: int, speeds: tuple[float, float], worked: int
+) -> None:
+    """Where the first one will be is foreseen with the change of its speed."""
+    worker = SteppedWorker()
+    drives = ready(worker)
+    drives.gateway.override(speeds[0])
+    far = drives.path[-1] + np.array([2.0, 0, 0, 0, 0, 0, 0])
+    swing = TrajectoryGoal(drives.gateway.model.joints, [GoalPoint(2.5, far.tolist())])
+    drives.gateway.request(swing)
+    drives.run(2)
+    worker.run()
+    drives.run(120)
+    drives.gateway.override(speeds[1])
+    drives.run(since)
+    begin = len(drives.path) - 2
+    there = GoalPoint(6.0, (drives.path[-1] + 0.1).tolist())
+    steps = [GoalPoint(4.0 + 0.02 * n, (drives.path[-1] + 0.1).tolist()) for n in range(points)]
+    goal = TrajectoryGoal(drives.gateway.model.joints, [*steps, there])
+    command = drives.gateway.request(goal)
+    for cycle in range(60):
+        if cycle >= worked:
+            worker.run()
+        drives.run()
+    assert command.execution is not None, command.future.exception(0.0)
+    drives.run(60)
+    assert (rates(drives, begin) <= 1.02 * drives.gateway.model.limits.acceleration).all()
