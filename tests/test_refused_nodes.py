@@ -61,7 +61,7 @@ def wave() -> Node:
         (Display, 'rate:=1000', 'rate is 1000: it must be 1.0 to 200.0'),
         (JointStatePublisher, 'robot_description:=none', 'not XML'),
         (JointStatePublisher, 'robot_descripton:=none', "did you mean 'robot_description'"),
-        (wave, 'robot_description:=none', ''),
+        (wave, 'robot_description:=none', 'no XML'),
     ],
 )
 def test_a_refused_node_leaves_nothing_in_the_graph(

@@ -32,7 +32,9 @@ def test_every_line_is_pinned_and_hashed(name: str) -> None:
         assert '--hash=sha256:' in entry
 
 
-@pytest.mark.parametrize(('one', 'other'), itertools.combinations(pinned_names(FOLDER)[1:], 2))
+@pytest.mark.parametrize(
+    ('one', 'other'), list(itertools.combinations(pinned_names(FOLDER)[1:], 2))
+)
 def test_files_agree_on_versions(one: str, other: str) -> None:
     """What is tested on wheels runs beside /opt/ros/jazzy; no package undoes another's set-up."""
     ours, theirs = pins(one), pins(other)
