@@ -8,7 +8,9 @@ from collections.abc import Iterator
 from contextlib import ExitStack
 import math
 from pathlib import Path
+import re
 import sys
+import threading
 from typing import Any, TYPE_CHECKING
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -18,12 +20,15 @@ from processes import RunningProcess
 import pytest
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
+import rclpy
 from ros_client import RosClient
 from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import String
 
+from node_runner import ParameterError
+from quad_controller.exceptions import QuadControllerError
 from quad_controller.model.quadruped import quadruped
-from quad_controller.nodes.controller_node import LATCHED_QOS
+from quad_controller.nodes.controller_node import ControllerNode, LATCHED_QOS
 from quad_description import robot_urdf
 from quad_gait_policies import metadata, write_policy
 from quad_msgs.msg import JointCommand
@@ -228,17 +233,24 @@ def test_a_missing_joint_is_a_fault_that_is_cleared_by_its_service(robot: Robot)
 @pytest.mark.parametrize(
     ('parameter', 'reason'),
     [
-        ('swing_hight:=0.03', "did you mean 'swing_height'"),
         ('gait:=gallop', "gait is 'gallop': it must be trot, crawl or pace"),
         ('nominal_height:=0.5', 'do not reach'),
         ('loop_rate:=fast', "loop_rate is 'fast': it must be a number"),
         ('arm_pose:=[0.5, 1.0]', 'arm_pose has 2 positions'),
     ],
 )
-def test_odd_parameters_end_the_node_with_a_reason(
-    isolation: Isolation, parameter: str, reason: str
-) -> None:
-    """A parameter that makes no sense is told at the start, and nothing runs."""
-    with RunningProcess([*NODE, '-p', parameter], isolation.env) as process:
-        process.wait_for(reason)
+def test_odd_parameters_are_refused_at_the_start(parameter: str, reason: str) -> None:
+    """A parameter that makes no sense is told, and nothing runs."""
+    rclpy.init(args=['--ros-args', '-p', parameter])
+    try:
+        with pytest.raises((ParameterError, QuadControllerError), match=re.escape(reason)):
+            ControllerNode(threading.Event())
+    finally:
+        rclpy.shutdown()
+
+
+def test_an_odd_parameter_ends_the_node_with_a_reason(isolation: Isolation) -> None:
+    """The exit code is 1."""
+    with RunningProcess([*NODE, '-p', 'swing_hight:=0.03'], isolation.env) as process:
+        process.wait_for("did you mean 'swing_height'")
         assert process.wait() == 1
