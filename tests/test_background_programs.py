@@ -1,0 +1,77 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Programs without a node end by SIGINT as background jobs of a script, too.
+
+Shells start those with SIGINT ignored, which a program inherits.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+import signal
+import subprocess
+
+from isolation import Isolation
+from processes import executable, RunningProcess
+import pytest
+
+from quad_pty_peer import PtyPeer
+
+pytestmark = [pytest.mark.scenario, pytest.mark.slow]
+
+POLICY = ['trot_imitation', '--walk', '0.1', '0', '0', '--duration', '600']
+IGNORING = ['env', '--ignore-signal=INT']
+
+
+@pytest.mark.parametrize(
+    ('command', 'begun'),
+    [
+        (['operator_input', 'show_gamepad', '--device', 'no such pad'], 'no gamepad yet'),
+        (
+            [
+                'quad_controller',
+                'check_policy',
+                'trot_imitation',
+                '--walk',
+                '0.1',
+                '0',
+                '0',
+                '--duration',
+                '600',
+            ],
+            'imu frame',
+        ),
+        (['quad_hardware', 'doctor', '--port', '/dev/null', '--duration', '300'], '.'),
+    ],
+    ids=lambda each: each[1] if isinstance(each, list) else '',
+)
+def test_a_program_ends(command: list[str], begun: str, isolation: Isolation) -> None:
+    """Whatever it does at that moment."""
+    package, name, *arguments = command
+    program = [*IGNORING, executable(package, name), *arguments]
+    with RunningProcess(program, isolation.env) as process:
+        process.wait_for(begun, 30.0)
+        process.signal(signal.SIGINT)
+        process.wait(30.0)
+
+
+def test_a_calibration_ends(isolation: Isolation, tmp_path: Path) -> None:
+    """While it waits for the person, and the servos hold."""
+    program = [*IGNORING, executable('quad_hardware', 'calibrate'), 'joints', '--output']
+    with PtyPeer(tmp_path / 'port') as peer:
+        process = subprocess.Popen(
+            [*program, str(tmp_path / 'found.yaml'), '--port', str(peer.link)],
+            env=isolation.env,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        try:
+            assert process.stdout is not None
+            assert '12 joints' in process.stdout.readline()
+            process.send_signal(signal.SIGINT)
+            process.wait(30.0)
+        finally:
+            process.kill()
+            process.communicate()
+        assert peer.torque
