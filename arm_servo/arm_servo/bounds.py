@@ -39,6 +39,8 @@ class BrakeSettings:
         pairs: Greatest number of pairs taken into account.
         approach: Greatest speed of approach per distance to the margin in [1/s].
         braking: Share of acceleration and jerk that braking in front of a limit plans with.
+        joint_margins: Distance from the position limits at which joints come to rest in [rad], one
+            for all or one each.
     """
 
     margin: float = 0.01
@@ -46,6 +48,7 @@ class BrakeSettings:
     pairs: int = 3
     approach: float = 4.0
     braking: float = 0.7
+    joint_margins: tuple[float, ...] = (0.0,)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,8 +56,8 @@ class Bounds:
     """Bounds of the joint speeds in a state.
 
     Attributes:
-        below: Ways left to the lower limits in [rad].
-        above: Ways left to the upper limits in [rad].
+        below: Ways left to the lower limits, less the margins, in [rad].
+        above: Ways left to the upper limits, less the margins, in [rad].
         slowest: Least speeds that can be braked in front of the lower limits in [rad/s].
         fastest: Greatest speeds that can be braked in front of the upper limits in [rad/s].
         lower: Those, and what can be reached soon, in [rad/s].
@@ -88,6 +91,8 @@ class Brakes:
         limits, share = model.limits, settings.braking
         self._model, self._settings, self._limits = model, settings, limits
         self._share = share
+        margins = np.array(settings.joint_margins)
+        self._lower, self._upper = limits.lower + margins, limits.upper - margins
         # what a speed can change by while its acceleration builds up and down, and a little more
         self._change = frozen(
             1.5 * limits.acceleration**2 / limits.jerk + 0.01 * limits.acceleration
@@ -102,7 +107,7 @@ class Brakes:
         """
         settings, limits = self._settings, self._limits
         near = self._model.nearest(state.position, settings.horizon, settings.pairs)
-        ways = np.array((state.position - limits.lower, limits.upper - state.position))
+        ways = np.array((state.position - self._lower, self._upper - state.position))
         below, above = ways
         left = ways - self._lead(state)
         # the last of the way is not run through in a cycle

@@ -68,7 +68,7 @@ def _nodes(model: RobotModel, document: Mapping[str, Any]) -> dict[str, Callable
 
     def servo(node: Node) -> None:
         same_robot(node, model)
-        declare_servo(node, model.group)
+        declare_servo(node, model)
         declare_loop(node, PREFIX)
         declare_output(node, PREFIX, '', TRAJECTORY)
         declare_check(ParameterReader(node, PREFIX))

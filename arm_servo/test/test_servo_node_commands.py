@@ -53,7 +53,7 @@ class Topics:
         monkeypatch.setattr(gateway, 'jog', self._jog)
         timeout = parameter('incoming_command_timeout', TIMEOUT)
         node._parameter_overrides[timeout.name] = timeout
-        parameters = declare_servo(node, gateway.model.group)
+        parameters = declare_servo(node, gateway.model)
         self._servo = Servo(node, gateway, parameters, self._prepare)
 
     def _prepare(self) -> None:

@@ -13,13 +13,15 @@ from servo_drives import Drives, PERIOD
 from servo_robots import ready, robot, STRAIGHT
 
 from arm_canopen import Refusal, RefusalCause
+from arm_servo.bounds import BrakeSettings
 from arm_servo.core import MotionCore
 from arm_servo.core_settings import CoreSettings
 from arm_servo.gateway import CommandGateway
-from arm_servo.nodes.servo_parameters import UNCHECKED
 from arm_servo.nodes.servo_status import code_of, status_of, StatusCode
 from arm_servo.report import Cause, Limiter, MotionReport
+from arm_servo.servo import ServoSettings
 from arm_servo.set_point import Source
+from arm_servo.velocity_ik import IkSettings
 
 
 def attached(name: str = 'panda', at: Sequence[float] = ()) -> Drives:
@@ -82,7 +84,10 @@ def test_a_direction_that_is_lost_is_told() -> None:
 
 def test_a_stop_of_the_safety_filter_is_no_free_motion() -> None:
     """Where nothing else brakes in front of contact, it does, with code and links."""
-    core = MotionCore(robot('panda'), CoreSettings(servo=UNCHECKED))
+    core = MotionCore(
+        robot('panda'),
+        CoreSettings(servo=ServoSettings(ik=IkSettings(brakes=BrakeSettings(pairs=0)))),
+    )
     gateway = CommandGateway(core, InlineWorker(), lambda: 100.0)
     core.reset(ready('panda'))
     jog(gateway, {'panda_joint6': -1.0}, 100.0, 60.0)

@@ -12,12 +12,17 @@ from isolation import Isolation
 import pytest
 import rclpy
 from rclpy.node import Node
-from servo_robots import FOLDER, robot, texts
+from servo_robots import FOLDER, ready, robot, texts
 import yaml
 
 from arm_servo import check_parameters
+from arm_servo.core import MotionCore
+from arm_servo.core_settings import CoreSettings
+from arm_servo.exceptions import ModelError
 from arm_servo.nodes.motion_controller import _build as build_motion_controller
+from arm_servo.nodes.parameter_sheet import ParameterSheet
 from arm_servo.nodes.servo_node import _build as build_servo_node
+from arm_servo.nodes.servo_parameters import declare_servo, ServoParameters
 from arm_servo.nodes.upstream_parameters import check_names
 
 JOINTS = list(robot('panda').joints)
@@ -306,3 +311,57 @@ def test_nodes_begin_with_upstream_parameters(
     assert len(told) == len(made)
     assert any('moveit_servo.use_smoothing' in line for line in told)
     assert not any('moveit_servo.check_collisions' in line for line in told)
+
+
+def servo_parameters(**values: object) -> ServoParameters:
+    """Return what the servo reads of a configuration."""
+    sheet = ParameterSheet('servo_node', {'moveit_servo': values})
+    return declare_servo(sheet.node, robot('panda'))
+
+
+@pytest.mark.parametrize(
+    ('values', 'margin'),
+    [
+        ({}, 0.0),
+        ({'joint_limit_margins': [0.1]}, 0.1),
+        ({'joint_limit_margins': [0.3, *[0.1] * 6]}, 0.3),
+        ({'joint_limit_margin': 0.2}, 0.2),
+    ],
+)
+def test_jogs_come_to_rest_at_the_margins_of_the_joint_limits(
+    values: dict[str, object], margin: float
+) -> None:
+    """Where moveit_servo of Jazzy and of Humble does; an arm beyond one may go back."""
+    settings = CoreSettings(servo=servo_parameters(**values).settings)
+    core, upper = MotionCore(robot('panda'), settings), robot('panda').limits.upper[0]
+    core.reset([upper - 0.5, *ready('panda')[1:].tolist()])
+    for cycle in range(300):
+        core.jog({'panda_joint1': 1.0}, 0.01 * cycle)
+        core.step(0.01 * cycle, 0.01)
+    assert upper - core.state.position[0] == pytest.approx(margin, abs=2e-3)
+    core.reset([upper - 0.05, *ready('panda')[1:].tolist()])
+    for cycle in range(100):
+        core.jog({'panda_joint1': -1.0}, 0.01 * cycle)
+        core.step(0.01 * cycle, 0.01)
+    assert core.state.position[0] < upper - 0.5
+
+
+@pytest.mark.parametrize('threshold', [0.01, 0.03])
+def test_jogs_come_to_rest_at_the_proximity_threshold(threshold: float) -> None:
+    """In front of the other links of the arm."""
+    parameters = servo_parameters(self_collision_proximity_threshold=threshold)
+    core = MotionCore(
+        robot('panda'), CoreSettings(servo=parameters.settings, clearance=parameters.clearance)
+    )
+    core.reset(ready('panda'))
+    for cycle in range(400):
+        core.jog({'panda_joint6': -1.0}, 0.01 * cycle)
+        core.step(0.01 * cycle, 0.01)
+    assert core.model.clearance(core.state.position) == pytest.approx(threshold, abs=2e-3)
+
+
+@pytest.mark.parametrize('margins', [[0.1, 0.1], [-0.1], [3.0]])
+def test_margins_that_do_not_fit_the_joints_are_refused(margins: list[float]) -> None:
+    """With the joint, or the count."""
+    with pytest.raises(ModelError, match='joint_limit_margins'):
+        servo_parameters(joint_limit_margins=margins)

@@ -28,7 +28,7 @@ def _build(make_node: MakeNode) -> MotionThread:
     node, servo = make_node(name), make_node('servo_node')
     same_robot(servo, model)
     trajectory = declare_trajectory(node, model.joints)
-    jogging = declare_servo(servo, model.group)
+    jogging = declare_servo(servo, model)
     loop = declare_loop(node, '')
     output = declare_output(node, '', OUTPUT, ARRAY)
     settings = CoreSettings(

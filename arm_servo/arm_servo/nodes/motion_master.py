@@ -69,7 +69,7 @@ class Motion:
         self.nodes = [manager, controller, servo, broadcaster]
         same_robot(servo, model)
         trajectory = declare_trajectory(controller, model.joints)
-        jogging = declare_servo(servo, model.group)
+        jogging = declare_servo(servo, model)
         settings = CoreSettings(
             jogging.settings,
             trajectory.execution,

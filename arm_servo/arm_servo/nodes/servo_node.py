@@ -22,7 +22,7 @@ from .trajectory_parameters import declare_check
 def _build(make_node: MakeNode) -> MotionThread:
     node = make_node('servo_node')
     model = declare_robot(node)
-    servo = declare_servo(node, model.group)
+    servo = declare_servo(node, model)
     topic = f'{model.group}_controller/joint_trajectory'
     output = declare_output(node, PREFIX, topic, TRAJECTORY)
     settings = CoreSettings(

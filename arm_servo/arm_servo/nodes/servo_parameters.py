@@ -4,16 +4,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 
+import numpy as np
 from rclpy.node import Node
 
 from node_runner import ParameterReader
 
 from ..bounds import BrakeSettings
-from ..core_settings import CoreSettings
 from ..exceptions import ModelError
+from ..limits import JointLimits
+from ..model import RobotModel
 from ..servo import ServoSettings
 from ..velocity_ik import IkSettings
 
@@ -23,11 +25,8 @@ DEFAULT_LINEAR_SPEED, DEFAULT_ANGULAR_SPEED = 0.4, 0.8
 """Scales of the tool's speeds in [m/s] and [rad/s]."""
 
 
-CLEARANCE = CoreSettings().clearance
-"""Least distance between links that a jog may bring about in [m]."""
-
-UNCHECKED = ServoSettings(ik=IkSettings(brakes=BrakeSettings(pairs=0)))
-"""Jogging that heeds no other links."""
+CLEARANCE_SHARE = 0.5
+"""Share of the distance at which jogs come to rest in front of links that a stop may use up."""
 
 
 class Units(Enum):
@@ -87,23 +86,37 @@ class ServoParameters:
     frame_prefix: str = ''
 
 
-def declare_servo(node: Node, group: str) -> ServoParameters:
+def declare_servo(node: Node, model: RobotModel) -> ServoParameters:
     """Declare the parameters of the servo.
 
     Args:
         node: The node.
-        group: Name of the group that it moves.
+        model: The arm that it moves.
 
     Raises:
-        ModelError: move_group_name is another group, or command_in_type is unknown.
+        ModelError: move_group_name is another group, command_in_type is unknown, or a margin does
+            not fit the joints.
     """
-    read = ParameterReader(node, PREFIX)
+    read, group = ParameterReader(node, PREFIX), model.group
     named = read.text('move_group_name', group, 'group of the SRDF that is moved')
     if named != group:
         raise ModelError(f'{PREFIX}move_group_name is {named!r}, but the group is {group!r}')
     _declare_scales(node)
     read_scales(node)
     checks = read.flag('check_collisions', 'jogs brake in front of other links', default=True)
+    brakes = BrakeSettings()
+    threshold = read.number(
+        'self_collision_proximity_threshold',
+        brakes.margin,
+        (0.001, 0.1),
+        'distance at which jogs come to rest in front of other links [m]',
+    )
+    brakes = replace(
+        brakes,
+        margin=threshold,
+        pairs=brakes.pairs if checks else 0,
+        joint_margins=_joint_margins(read, model.limits),
+    )
     return ServoParameters(
         read.number(
             'incoming_command_timeout',
@@ -124,10 +137,29 @@ def declare_servo(node: Node, group: str) -> ServoParameters:
         read.text('pose_command_in_topic', '~/pose_target_cmds', 'topic of poses'),
         read.text('status_topic', '~/status', 'topic of the status'),
         read.number('status_rate', 25.0, (1.0, 500.0), 'rate of the status [Hz]'),
-        CLEARANCE if checks else None,
-        ServoSettings() if checks else UNCHECKED,
+        CLEARANCE_SHARE * threshold if checks else None,
+        ServoSettings(ik=IkSettings(brakes=brakes)),
         read.text('frame_prefix', '', 'what robot_state_publisher puts before frames in TF'),
     )
+
+
+def _joint_margins(read: ParameterReader, limits: JointLimits) -> tuple[float, ...]:
+    """Read how far from the limits of the joints jogs come to rest: Jazzy's list, or Humble's."""
+    meaning = 'distance from the position limits at which jogs come to rest [rad]'
+    one = read.number('joint_limit_margin', 0.0, (0.0, 10.0), f'{meaning}, of all joints')
+    margins = read.numbers('joint_limit_margins', f'{meaning}: one for all, or one each') or (one,)
+    name = f'{PREFIX}joint_limit_margins'
+    if len(margins) not in {1, len(limits)}:
+        raise ModelError(f'{name} has {len(margins)} numbers; give 1, or {len(limits)}')
+    room = 0.5 * (limits.upper - limits.lower)
+    wrong = (np.array(margins) < 0.0) | (np.array(margins) >= room)
+    if wrong.any():
+        joint = int(np.argmax(wrong))
+        raise ModelError(
+            f'{name} of {limits.names[joint]}: it must be 0 or more, and less than'
+            f' {room[joint]:.3f}'
+        )
+    return margins
 
 
 def read_scales(node: Node) -> Scales:
