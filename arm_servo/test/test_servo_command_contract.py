@@ -21,6 +21,7 @@ from servo_elsewhere import Elsewhere
 
 from arm_canopen import Refusal, RefusalCause
 from arm_servo.arrays import Array
+from arm_servo.commands import twist_command
 from arm_servo.gateway import CommandGateway, JOGGING, MotionCommand
 from arm_servo.goal import GoalPoint, TrajectoryGoal
 from arm_servo.model import combined, Pose
@@ -295,3 +296,94 @@ def test_the_end_of_the_program_is_never_overtaken(
         assert np.abs(path[-1] - begin).max() == 0.0
     assert topics.cycle.at_rest
     assert command is None or command.future.done()
+
+
+def goes_on(path: Array, limits: Array) -> None:
+    """Make sure that no speed jumps."""
+    changes = np.abs(np.diff(path, 2, axis=0)) / PERIOD**2
+    assert (changes <= 1.02 * limits + 1e-6).all()
+
+
+@given(st.sampled_from(sorted(COMMANDS)), STEPS, LATER, st.sampled_from(sorted(COMMANDS)), STEPS)
+@example('long trajectory', ['cycle', 'work', 'cycle'], 0, 'jog', ['cycle'])
+@example('stamped trajectory', ['cycle'], 0, 'displacement', ['cycle'])
+@example('displacement', ['cycle', 'work'], 0, 'twist', ['cycle'])
+@settings(max_examples=80, deadline=None)
+def test_the_newest_of_two_commands_counts(
+    older: str, steps: list[str], later: int, newer: str, more: list[str]
+) -> None:
+    """Every kind at every moment of every other: none takes the arm from a newer one."""
+    arm = bench()
+    first, *_ = run_to_stop(arm, older, steps, later)
+    arm.take(['cycle'])
+    second = COMMANDS[newer](arm.gateway, arm.arm.now, arm.at)
+    arm.take(more)
+    was_newer = False
+    for _ in range(60):
+        arm.take(['work', 'cycle'])
+        source = arm.gateway.snapshot.source
+        if newer in {'twist', 'jog', 'pose'}:
+            assert source is Source.JOG
+            continue
+        assert second is not None
+        is_newer = second.motion is not None
+        assert is_newer or not was_newer
+        was_newer = is_newer
+        if is_newer and source is not Source.NONE:
+            kind = Source.TRAJECTORY if newer in TRAJECTORIES else Source.TARGET
+            assert source is kind
+    if newer in JOGS and newer != 'displacement':
+        assert first is None or first.ended.done()
+    else:
+        assert second is not None
+        assert second.motion is not None, second.future.exception()
+        if first is not None and older != newer:
+            assert first.ended.done()
+    assert isinstance(arm.arm, Drives)
+    goes_on(np.array(arm.arm.path), arm.gateway.model.limits.acceleration)
+
+
+@given(st.sampled_from(sorted(COMMANDS)), STEPS, LATER, st.booleans())
+@settings(max_examples=30, deadline=None)
+def test_a_command_of_nothing_changes_nothing(
+    kind: str, steps: list[str], later: int, is_displaced: bool
+) -> None:
+    """Zeros of somebody else, at every moment of every command: it goes on as without them."""
+    paths = []
+    for is_disturbed in (False, True):
+        arm = bench()
+        assert isinstance(arm.arm, Drives)
+        run_to_stop(arm, kind, steps, later)
+        for _ in range(30):
+            if is_disturbed and is_displaced:
+                move_by(arm.gateway, {arm.gateway.model.joints[0]: 0.0})
+            elif is_disturbed:
+                still = twist_command(arm.gateway.model, [0.0] * 6, None, None)
+                arm.gateway.jog(JogRequest(still, arm.arm.now + 1.0, client='somebody else'))
+            arm.take(['work', 'work', 'cycle'])
+        paths.append(np.array(arm.arm.path))
+    if is_displaced and kind in {'displacement', *TRAJECTORIES}:
+        return  # they are prepared one after the other, so it begins at another cycle
+    assert paths[1] == pytest.approx(paths[0], abs=1e-12)
+
+
+@given(st.sampled_from(sorted(COMMANDS)), STEPS, LATER)
+@settings(max_examples=30, deadline=None)
+def test_a_core_that_raises_ends_every_command(kind: str, steps: list[str], later: int) -> None:
+    """At every moment of every command: it ends once, with words, and nothing begins after it."""
+    arm = bench()
+    drives = arm.arm
+    assert isinstance(drives, Drives)
+    command, *_ = run_to_stop(arm, kind, steps, later)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(arm.gateway._core, 'step', lambda *_: 1 // 0)
+        with pytest.raises(ZeroDivisionError):
+            drives.run()
+    if command is not None and command.motion is None:
+        arm.take(['work'] * 3)
+    assert command is None or 'ZeroDivisionError' in command.ended.result(0.0).reason
+    assert arm.gateway.snapshot.source is Source.NONE
+    drives.attach()
+    begin = arm.where
+    path = arm.settle()
+    assert np.abs(path[-1] - begin).max() == 0.0

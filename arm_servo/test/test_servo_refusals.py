@@ -27,7 +27,7 @@ from operator_input import OperatorInputError
 
 def motion() -> Motion:
     """Make the motion nodes on a bus without drives."""
-    bus: Any = SimpleNamespace(bus=SimpleNamespace(nodes=[], file='bus.yml'))
+    bus: Any = SimpleNamespace(bus=SimpleNamespace(nodes=[], joints=(), file='bus.yml'))
     return Motion(bus)
 
 
