@@ -4,11 +4,13 @@ import ast
 import importlib
 import os
 from pathlib import Path
+import signal
 import subprocess
 import sys
 
 import pytest
 
+from workspace import cli
 from workspace.layout import this_checkout
 from workspace.system import PYTHON_NEWEST, PYTHON_OLDEST
 
@@ -103,3 +105,15 @@ def test_the_start_leaves_a_virtual_environment() -> None:
     else:
         assert not Path(better).is_relative_to(sys.prefix)
         assert Path(better).resolve() == Path(sys.executable).resolve()
+
+
+def test_an_interrupt_ends_make_in_the_background_of_a_script(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Shells start such jobs with SIGINT ignored; the code is that of an interrupt."""
+    monkeypatch.setattr(cli, '_run', lambda _: os.kill(os.getpid(), signal.SIGINT))
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        assert cli.main(['missing']) == 130
+    finally:
+        signal.signal(signal.SIGINT, before)
