@@ -33,7 +33,7 @@ REACTIONS: Mapping[Fault, Reaction] = {
     Fault.FALLEN: Reaction.HOLD,  # legs in the air find no ground, and may be jammed
     Fault.BATTERY: Reaction.LIE_DOWN,
     Fault.TARGET: Reaction.HOLD,
-    Fault.PAUSE: Reaction.LIE_DOWN,  # the hardware node has begun it
+    Fault.PAUSE: Reaction.LIE_DOWN,  # the hardware node may have begun it
 }
 
 
