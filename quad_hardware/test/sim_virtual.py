@@ -32,9 +32,9 @@ class VirtualRobot:
         frames = []
         for _ in range(round(duration / TICK)):
             self.now += TICK
-            data = self.line.advance(self.now)
-            self.heard += data
-            frames += self.parser.feed(data)
+            if data := self.line.advance(self.now):
+                self.heard += data
+                frames += self.parser.feed(data)
         return frames
 
     def ask(self, frame: Frame) -> list[Frame]:
