@@ -63,14 +63,15 @@ class Segment:
         return PathPoint(powers @ c, first @ c, second @ c)
 
 
-def shifted(coefficients: Array, by: float) -> Array:
-    """Return the coefficients of a polynomial (6, n) whose time begins later.
+def shifted(coefficients: Array, by: Array) -> Array:
+    """Return the coefficients of polynomials (k, 6, n) whose times begin later.
 
     Args:
-        coefficients: Those of the polynomial (6, n).
-        by: How much later in [s].
+        coefficients: Those of the polynomials (k, 6, n), or of one for all (6, n).
+        by: How much later in [s] (k).
     """
-    moved: Array = (_BINOMIAL * by ** np.maximum(_POWERS - _POWERS[:, None], 0.0)) @ coefficients
+    powers = by[:, None, None] ** np.maximum(_POWERS - _POWERS[:, None], 0.0)
+    moved: Array = (_BINOMIAL * powers) @ coefficients
     return moved
 
 

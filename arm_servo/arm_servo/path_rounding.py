@@ -169,12 +169,7 @@ def _cut(base: Path, starts: Array) -> Array:
     """Return the coefficients of a path between other times (k, 6, n)."""
     middles = 0.5 * (starts[:-1] + starts[1:])
     places = np.searchsorted(base.starts, middles, side='right') - 1
-    return np.array(
-        [
-            shifted(base.coefficients[place], start - base.starts[place])
-            for place, start in zip(places.tolist(), starts[:-1].tolist(), strict=True)
-        ]
-    )
+    return shifted(base.coefficients[places], starts[:-1] - base.starts[places])
 
 
 def _round(pieces: Array, starts: Array, corners: _Corners, corner: int, half: float) -> None:
@@ -194,8 +189,6 @@ def _round(pieces: Array, starts: Array, corners: _Corners, corner: int, half: f
     sharp = np.zeros_like(smooth)
     sharp[1], sharp[2] = jump, 0.5 * bend
     middles = 0.5 * (starts[:-1] + starts[1:])
-    first, last = np.searchsorted(middles, (time - half, time + half)).tolist()
-    for piece in range(first, last):
-        pieces[piece] += shifted(smooth, starts[piece] - (time - half))
-        if middles[piece] > time:
-            pieces[piece] -= shifted(sharp, starts[piece] - time)
+    first, turn, last = np.searchsorted(middles, (time - half, time, time + half)).tolist()
+    pieces[first:last] += shifted(smooth, starts[first:last] - (time - half))
+    pieces[turn:last] -= shifted(sharp, starts[turn:last] - time)
