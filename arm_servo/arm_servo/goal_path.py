@@ -64,9 +64,10 @@ class GoalPath:
 
 @dataclass(frozen=True, slots=True)
 class _Haste:
-    """Why there is too little time, and how many times the time may suffice."""
+    """Why there is too little time, at what time, and how many times the time may suffice."""
 
     reason: str
+    time: float
     factor: float
 
 
@@ -101,10 +102,11 @@ def build_path(
 def _tried(points: Points, limits: JointLimits, state: MotionState) -> GoalPath | _Haste:
     """Return the path through points, or why there is too little time for it."""
     answer = _walkable(points, limits, state)
-    if isinstance(answer, GoalPath) or points.times[0] == 0.0:
+    approach = float(points.times[0])
+    if isinstance(answer, GoalPath) or approach == 0.0 or answer.time > 2.0 * approach + LEAST:
         return answer
     for share in APPROACHES:  # only the way from the present motion to the first point is longer
-        more = share * (float(points.times[0]) + LEAST)
+        more = share * (approach + LEAST)
         try:
             later = _walkable(points.delayed(more), limits, state)
         except GoalError:  # it would swing out beyond a limit
@@ -119,16 +121,16 @@ def _walkable(points: Points, limits: JointLimits, state: MotionState) -> GoalPa
     path = _given(points, limits, state)
     demand = Timing(path, limits).fastest
     if demand.share > OVER:
-        return _Haste(_words(demand, limits), demand.share)
+        return _Haste(_words(demand, limits), demand.time, demand.share)
     path = rounded(path, limits)
     timing = Timing(path, limits)
     stretched, demand = timing.stretched(), timing.plainest
     if stretched is None:
-        return _Haste(_words(demand, limits), timing.demand.share)
+        return _Haste(_words(demand, limits), demand.time, timing.demand.share)
     most = LONGER[0] * points.asked + LONGER[1]
     if stretched.duration > most:
         enough = (stretched.duration - LONGER[1]) / LONGER[0]
-        return _Haste(_words(demand, limits), enough / max(points.asked, 1e-9))
+        return _Haste(_words(demand, limits), demand.time, enough / max(points.asked, 1e-9))
     late = stretched.duration - points.asked
     if late < 0.01:
         return GoalPath(stretched, '')
