@@ -55,6 +55,8 @@ SLICE = 0.05
 """Time in [s] for which each robot's callbacks are served in turn."""
 LOST, LATE = 'frames_lost', 'missed_pdos'
 """Counters of the master: frames that the kernel dropped, TPDOs that came after their cycle."""
+PATIENCE = 20.0
+"""Longest time in [s] until it walks."""
 AT_THE_END = 1
 """SYNCs whose answers may not be there yet."""
 
@@ -157,8 +159,7 @@ class Robots:
         self._reports = arm.client.listen(DiagnosticArray, '/diagnostics')
         assert self._client.wait_for_server(20.0)
         arm.follow()
-        quad.stand()
-        quad.set_mode('walk')
+        self._walk()
         self._away = False
         self._sent = self._client.send_goal_async(goal_to(READY, WAY_TIME))
         self._result = None
@@ -175,7 +176,16 @@ class Robots:
         self.quad.tap.forget()
         self._continue()
         if self.quad.state != 'walk':
-            self.failures.append(f'quadruped: {self.quad.state}')
+            self.failures.append(f'quadruped: {self.quad.processes["controller"].lines[-1]}')
+            self._walk()
+
+    def _walk(self) -> None:
+        quad = self.quad
+        if 'fault' in quad.state:
+            quad.clear_fault()
+        quad.stand()
+        quad.set_mode('walk')
+        quad.client.spin_until(lambda: quad.state == 'walk', PATIENCE, 'walking')
 
     def _continue(self) -> None:
         if self._result is None:
