@@ -29,6 +29,7 @@ EVERY_NODE = f'{ANY_NODE}{ANY_NODE}'
 """All nodes, in files of our own. rcl keeps one entry per spelling, and a later entry counts more:
 what a person says by -p or of /**, which is the same, comes behind ours in this way."""
 VALUES = 'ros__parameters'
+YAML_TAG = 'tag:yaml.org,2002:'
 
 FindExecutable = Callable[[str, str], 'Path | None']
 """Package and executable to its file; None when the package does not exist."""
@@ -147,14 +148,16 @@ def namespaced_parameters(file: Path, ros: RosOptions, folder: Path) -> Path:
     Raises:
         StartError: It is no parameter file.
     """
+    import yaml
+
     moved: dict[str, object] = {}
-    for name, values in _read_parameters(file):
+    for name, values in _read_parameters(file, _verbatim):
         full = ros.node_name(name)
         if full.startswith(ANY_NODE):
             full = f'{ANY_NODE}{full}'
         moved = _merged(moved, {full: {VALUES: values}})
     copy = folder / f'{ros.namespace.replace("/", "-")}-{file.name}'
-    copy.write_text(json.dumps(moved), encoding='utf-8')  # JSON is YAML
+    copy.write_text(yaml.serialize(_yaml_node(moved)), encoding='utf-8')
     return copy
 
 
@@ -171,19 +174,48 @@ def parameters_by_node(file: Path) -> dict[str, Any]:
         StartError: It is no parameter file.
     """
     found: dict[str, Any] = {}
-    for name, values in _read_parameters(file):
+    for name, values in _read_parameters(file, _interpreted):
         own = name.rpartition('/')[2]
         found = _merged(found, {ANY_NODE if own.strip('*') == '' else own: {VALUES: values}})
     return found
 
 
-def _read_parameters(file: Path) -> list[tuple[str, dict[str, Any]]]:
+def _read_parameters(file: Path, read: Callable[[str], Any]) -> list[tuple[str, dict[str, Any]]]:
     import yaml
 
     try:
-        return list(_nodes_of(yaml.safe_load(file.read_text(encoding='utf-8')) or {}))
+        return list(_nodes_of(read(file.read_text(encoding='utf-8')) or {}))
     except (OSError, yaml.YAMLError, TypeError, AttributeError, ValueError) as error:
         raise StartError(f'{file}: no ROS parameter file: {error}') from error
+
+
+def _interpreted(text: str) -> Any:  # noqa: ANN401  # whatever stands in a file
+    import yaml
+
+    return yaml.safe_load(text)
+
+
+def _verbatim(text: str) -> Any:  # noqa: ANN401
+    """Read mappings, and leave values as they stand: rcl reads 1e-3 and 1:30 otherwise."""
+    import yaml
+
+    def tree(node: yaml.Node | None) -> Any:  # noqa: ANN401
+        if isinstance(node, yaml.MappingNode):
+            return {str(key.value): tree(value) for key, value in node.value}
+        return None if node is None or node.tag == f'{YAML_TAG}null' else node
+
+    return tree(yaml.compose(text, yaml.SafeLoader))
+
+
+def _yaml_node(tree: Any) -> Any:  # noqa: ANN401
+    import yaml
+
+    if tree is None:
+        return yaml.ScalarNode(f'{YAML_TAG}null', 'null')
+    if not isinstance(tree, dict):
+        return tree
+    pairs = [(yaml.ScalarNode(f'{YAML_TAG}str', k), _yaml_node(v)) for k, v in tree.items()]
+    return yaml.MappingNode(f'{YAML_TAG}map', pairs)
 
 
 def _nodes_of(table: Mapping[str, Any], within: str = '') -> Iterator[tuple[str, dict[str, Any]]]:

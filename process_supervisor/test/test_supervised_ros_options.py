@@ -8,8 +8,13 @@ import argparse
 from collections.abc import Sequence
 import json
 from pathlib import Path
+from typing import Any
 
+from isolation import Isolation
 import pytest
+import rclpy
+from rclpy.context import Context
+from rclpy.node import Node
 import yaml
 
 from process_supervisor import (
@@ -129,6 +134,41 @@ def test_all_parameters_of_a_node_are_kept(tmp_path: Path) -> None:
     expected = {'rate': 4.0, 'scale': {'linear': 1.0, 'joint': 3.0}}
     node = {'/left/servo_node': {'ros__parameters': expected}}
     assert moved(document, RosOptions('left'), tmp_path) == node
+
+
+VALUES = """
+  rate: 1e-3
+  time: 1:30
+  day: 2026-01-31
+  text: "1"
+  switch: off
+  gains: [1e-3, 2.0]
+  lines: |
+    one
+    two
+  nested: {a: 0x10, b: {c: 010}}
+"""
+
+
+def test_rcl_reads_the_values_of_a_file_as_they_stand(
+    isolation: Isolation, tmp_path: Path
+) -> None:
+    """PyYAML takes 1e-3 for text, 1:30 for 90 and a date for a date; rcl does not."""
+    file = tmp_path / 'controllers.yaml'
+    file.write_text('node:\n ros__parameters:' + VALUES)
+    found = []
+    for read in (file, namespaced_parameters(file, RosOptions(), tmp_path)):
+        context = Context()
+        arguments = ['--ros-args', '--params-file', str(read)]
+        rclpy.init(args=arguments, context=context, domain_id=isolation.domain_id)
+        node = Node('node', context=context, automatically_declare_parameters_from_overrides=True)
+        parameters: dict[str, Any] = node.get_parameters_by_prefix('')
+        found.append({name: repr(p.value) for name, p in parameters.items()})
+        node.destroy_node()  # type: ignore[no-untyped-call]
+        rclpy.shutdown(context=context)
+    as_it_stands, copied = found
+    assert as_it_stands['rate'] == '0.001'
+    assert copied == as_it_stands
 
 
 @pytest.mark.parametrize('document', ['text', [1], {'servo_node': 1}, {'a': {'b': 'c'}}])
