@@ -144,6 +144,22 @@ def test_an_immediate_move_does_not_wait_for_a_full_drive() -> None:
     assert not net.told(Severity.WARNING)
 
 
+def test_a_move_that_was_answered_as_failed_does_not_follow_later() -> None:
+    """A relative move behind a full drive is withdrawn with its answer, and what is behind it."""
+    net = running_in(OperationMode.PROFILE_POSITION)
+    commands = net.commands[JOINT]
+    for turn in (3.0, 6.0, 9.0):
+        commands.move(Move(turn, immediate=False))
+    failed = commands.give(lambda: commands.move(Move(0.5, relative=True)))
+    commands.move(Move(0.5, relative=True, immediate=False))
+    with pytest.raises(DriveError, match='withdrawn'):
+        net.result(failed)
+    assert any('withdrawn, and 1 behind it' in text for text in net.told(Severity.WARNING))
+    assert 'to 9.1,' in commands.move(Move(0.1, relative=True))
+    go(net, 12.0)
+    assert motor(net) == pytest.approx(9.1, abs=2e-3)
+
+
 class DeafWhileFull:
     """A drive that ignores bit 4 where it rises while bit 12 is set."""
 

@@ -209,6 +209,29 @@ def test_moves_of_which_the_first_is_refused_leave_a_halted_axis_halted_at_once(
     assert not net.drives[JOINT].halt.leaving
 
 
+@pytest.mark.parametrize('mode', [OperationMode.PROFILE_POSITION, OperationMode.PROFILE_VELOCITY])
+def test_a_target_that_came_too_late_for_its_answer_moves_nothing(mode: OperationMode) -> None:
+    """Its SDO waits behind a long transfer of somebody else; the answer is an error by then."""
+    net = running_in(mode)
+    net.result(give(net, 0.0))
+    ahead: Promise[None] = Promise()
+
+    async def occupied(*address: object) -> None:
+        await ahead
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(net.network.nodes[JOINT], 'write_object', occupied)
+        with pytest.raises(DriveError, match='did not reach its target'):
+            net.result(give(net, 0.4))
+    leave_behind(net, TARGETS[mode], 400)
+    ahead.resolve(None)
+    net.run(1.0)
+    assert motor(net) == pytest.approx(0.0, abs=1e-3)
+    net.result(give(net, 0.2))
+    net.run(2.0)
+    assert motor(net) > 0.1
+
+
 # ------------------------------------------------------------------ refused targets
 
 

@@ -16,7 +16,7 @@ from .drive import Drive
 from .halt import RESUME_TIMEOUT
 from .homing import home, HomingProgress
 from .moded_drive import NOT_TAKEN
-from .modes import NoMode
+from .modes import Mode, NoMode
 from .position_modes import Move, ProfilePosition
 from .recovery import Recovery
 from .refusal import Refusal, RefusalCause
@@ -98,9 +98,24 @@ class DriveCommands(StopCommands):
         return self._scheduler.spawn(self._given(command))
 
     async def _given(self, command: Callable[[], str]) -> str:
-        drive, steps, mode = self.drive, self._steps, self.drive.mode
+        drive, mode = self.drive, self.drive.mode
         answer = command()
         delivery = self._delivery
+        try:
+            await self._taken(mode, delivery)
+        except DriveError as error:  # what is said to have failed must not move it later
+            if delivery.done:
+                raise
+            if mode.withdraw(delivery, error):
+                raise DriveError(f'{error}; it is withdrawn') from error
+            if drive.accepts_targets:
+                drive.hold()
+            raise
+        return answer
+
+    async def _taken(self, mode: Mode, delivery: Promise[None]) -> None:
+        """Wait until the drive has what was commanded in a mode, and no halt keeps it."""
+        drive, steps = self.drive, self._steps
 
         def stopped() -> bool:
             halted = drive.halted and not drive.halt.leaving
@@ -117,7 +132,6 @@ class DriveCommands(StopCommands):
             raise DriveError(f'{drive.name} stays halted: {NOT_TAKEN}')
         if stopped():
             raise steps.refused('was stopped before it had taken the target')
-        return answer
 
     def stream_target(self, target: float) -> None:
         """Take one of a stream of targets; when the stream pauses for too long, the drive stops.

@@ -100,6 +100,18 @@ class Mode(ABC):
             statusword: 0x6041 as the drive sent it.
         """
 
+    def withdraw(self, delivery: Promise[None], error: DriveError) -> bool:
+        """Take back a target that the drive does not have yet, by its promise.
+
+        Args:
+            delivery: Of the target; it is rejected.
+            error: Why.
+
+        Returns:
+            Whether that was possible; else it is on its way.
+        """
+        return False
+
     def brake(self) -> None:  # noqa: B027  # most modes leave it to the drive
         """Come to rest by own means, for a halt, a switch or the end of a stream."""
 

@@ -212,6 +212,17 @@ class ProfilePosition(Mode):
         self._queue.append(waiting)
         return waiting.delivery
 
+    def withdraw(self, delivery: Promise[None], error: DriveError) -> bool:
+        """Forget a move that has not been offered, and those behind it, which count from it."""
+        delivery.reject(error)  # where its value is on its way, it is not offered any more
+        deliveries = [waiting.delivery for waiting in self._queue]
+        if delivery in deliveries:
+            place = deliveries.index(delivery)
+            if behind := len(deliveries) - place - 1:
+                self._warn(f'a move was withdrawn, and {behind} behind it, too')
+            self._drop_waiting(f'the move before it was withdrawn: {error}', keep=place)
+        return True
+
     def step(self, now: float, period: float, statusword: int) -> int:
         """Advance the handshake."""
         acknowledged = bool(statusword & ACKNOWLEDGE)
@@ -265,12 +276,12 @@ class ProfilePosition(Mode):
 
     def _watch_delivery(self, now: float, *, acknowledged: bool) -> None:
         """Offer what the drive has; what it has refused moves nothing, nor what counts from it."""
-        if self._delivery.error is not None:
+        withdrawn = self._offered.delivery.error if self._offered is not None else None
+        error = self._delivery.error or withdrawn
+        if error is not None:
             self.handshake = Handshake.IDLE
             self._reference = None
-            self._drop_waiting(
-                f'the drive does not have the move before it: {self._delivery.error}'
-            )
+            self._drop_waiting(f'the drive does not have the move before it: {error}')
         elif self._delivery.done:
             self._offer(now, acknowledged=acknowledged)
 
@@ -283,10 +294,10 @@ class ProfilePosition(Mode):
             older.follow(delivery)
         return delivery
 
-    def _drop_waiting(self, reason: str) -> None:
-        """Forget the moves that have not been handed over."""
-        while self._queue:
-            self._queue.popleft().delivery.reject(DriveError(reason))
+    def _drop_waiting(self, reason: str, *, keep: int = 0) -> None:
+        """Forget the moves that have not been handed over, but for the first ones."""
+        while len(self._queue) > keep:
+            self._queue.pop().delivery.reject(DriveError(reason))
 
     def _offer(self, now: float, *, acknowledged: bool) -> None:
         if self._offered is not None:
