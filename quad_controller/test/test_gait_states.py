@@ -22,6 +22,7 @@ from quad_controller.states.faults import Fault
 from quad_controller.states.measurement import ImuSample, JointSample, Measurement
 from quad_controller.states.modes import MODES, State
 from quad_controller.states.parameters import StateParameters
+from quad_description import raised_feet
 from quad_gait_rig import ARM_ROBOT, FOLDED, PERIOD, Rig, ROBOT, StillPolicy, tilted, UPRIGHT
 
 pytestmark = pytest.mark.slow
@@ -267,6 +268,50 @@ def test_a_controller_that_wakes_from_a_pause_in_motion_lies_down_from_where_it_
     assert rig.largest_step < 1.6 * PERIOD
     assert rig.controller.clear_fault().accepted
     assert rig.is_in(State.LIE)
+
+
+@pytest.mark.parametrize('case', ['fallen', 'joints lost', 'cleared'])
+def test_after_a_pause_with_a_foot_in_the_air_nothing_is_lifted_again(case: str) -> None:
+    """A fault holds a robot in mid-trot: the hardware node lays it down, if that goes on."""
+    rig = standing()
+    rig.ask('walk')
+    rig.run(1.0, FORWARD)
+    while not raised_feet(ROBOT.feet(rig.positions)):
+        rig.step(FORWARD)
+    if case == 'fallen':
+        rig.run(3 * PERIOD, FORWARD)  # the fall is noticed when the other pair is up
+        rig.imu = replace(UPRIGHT, angular_velocity=(20.0, 0.0, 0.0))
+        rig.until(State.FAULT, FORWARD)
+    else:
+        rig.joints = False
+        rig.run(0.6, FORWARD)
+    rig.joints = True
+    assert rig.is_in(State.FAULT)
+    assert raised_feet(ROBOT.feet(rig.positions))
+    rig.run(0.1)
+    if case == 'cleared':
+        assert rig.controller.clear_fault().accepted
+        rig.run(0.1)
+    stale = Measurement(JointSample(rig.positions, (0.0,) * 12), UPRIGHT)
+    assert rig.controller.step(stale, 3.0).targets is None
+    assert any('_foot in the air' in text for text in rig.controller.status.faults)
+    rig.positions = found = tuple([0.05, 1.1, -0.7] * 4)
+    assert rig.step() == pytest.approx(found, abs=0.01)
+    rig.run(3.0)
+    assert not raised_feet(ROBOT.feet(rig.positions))
+    if case != 'cleared':
+        assert rig.positions == pytest.approx(found)
+
+
+def test_a_pause_of_a_robot_that_stands_in_a_fault_leaves_it_so() -> None:
+    """On all its feet nobody lays it down."""
+    rig = standing()
+    rig.imu = None
+    rig.run(1.0)
+    assert rig.is_in(State.FAULT)
+    before = rig.positions
+    assert rig.controller.step(Measurement(), 3.0).targets == pytest.approx(before)
+    assert not any('pause' in text for text in rig.controller.status.faults)
 
 
 def test_stand_is_where_all_feet_stand() -> None:

@@ -3,7 +3,8 @@
 """The XGO quadruped as a URDF, made from its numbers; nothing here imports rclpy."""
 
 from .exceptions import DescriptionError, PresetError
-from .feet import foot_position, standing_height
+from .feet import foot_position, raised_feet, standing_height
+from .joint_commands import STREAM_TIMEOUT
 from .joints import Joint, LEGS, movable_joints
 from .poses import Pose, pose_positions
 from .urdf import PRESETS, robot_urdf
@@ -11,6 +12,7 @@ from .urdf import PRESETS, robot_urdf
 __all__ = [
     'LEGS',
     'PRESETS',
+    'STREAM_TIMEOUT',
     'DescriptionError',
     'Joint',
     'Pose',
@@ -18,6 +20,7 @@ __all__ = [
     'foot_position',
     'movable_joints',
     'pose_positions',
+    'raised_feet',
     'robot_urdf',
     'standing_height',
 ]

@@ -13,8 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from quad_description import movable_joints, Pose, pose_positions, robot_urdf
-from quad_hardware.estimation.feet import Feet, raised_feet
+from quad_description import movable_joints, Pose, pose_positions, raised_feet, robot_urdf
+from quad_hardware.estimation.feet import Feet
 from quad_hardware.joints import JointCommander, JointMap, LimiterSettings, servo_of
 from quad_hardware.joints.command_loss import CommandLoss, LossReaction, SPEED
 from quad_hardware.sim.physics import Robot
@@ -30,7 +30,7 @@ LYING = [pose_positions(Pose.LIE)[name] for name in NAMES]
 
 def raised(targets: Sequence[float]) -> Sequence[str]:
     """Feet that are in the air [names]."""
-    return raised_feet(FEET.poses(targets))
+    return raised_feet([foot.position for foot in FEET.poses(targets)])
 
 
 def command_loss(

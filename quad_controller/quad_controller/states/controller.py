@@ -7,6 +7,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 import math
 
+from quad_description import raised_feet, STREAM_TIMEOUT
+
 from ..gait.body import BodyPose
 from ..gait.generator import GaitGenerator
 from ..gait.parameters import GaitParameters
@@ -29,9 +31,6 @@ from .shadow import Shadow
 from .status import Event, EventKind, Output, Status
 
 MAX_STEP = 0.05  # [s] after a longer pause the gait goes on where it was instead of leaping
-
-STREAM_TIMEOUT = 0.5
-"""After it [s], the hardware node lays a robot down that was left with a leg in the air."""
 
 UPRIGHT_STATES = GAIT_STATES | {State.POLICY, State.FAULT}
 """States in which the robot is on its legs, and what is wrong with it is a fault."""
@@ -203,7 +202,7 @@ class Controller:
         """
         events = [Event(EventKind.REPEATED, text) for text in self._health.take(measurement, dt)]
         self._commands.pass_time(dt)
-        if dt > STREAM_TIMEOUT and self._limiter.last and not self._machine.at_rest:
+        if dt > STREAM_TIMEOUT and self._limiter.last:
             events += self._wake(dt, self._limiter.last)
         last = self._limiter.last or self._start()
         if last is None:
@@ -239,9 +238,16 @@ class Controller:
         return targets
 
     def _wake(self, pause: float, last: Targets) -> list[Event]:
-        """Begin anew after a pause [s] in motion, with the next joint states: these are old."""
+        """Begin anew after a pause [s] in which the hardware node may have laid the robot down.
+
+        It does so by the last targets that it got; in motion those may be others than the last.
+        """
+        raised = raised_feet(self._robot.feet(last))
+        if self._machine.at_rest and not raised:
+            return []
+        left = f'with {" or ".join(raised)} in the air' if raised else 'in motion'
         reason = (
-            f'the controller itself stood still for {pause:.1f} s in motion, so the hardware node '
+            f'the controller itself stood still for {pause:.1f} s {left}, so the hardware node '
             'may have laid the robot down; look at what kept it, and let it stand up again'
         )
         events = self._latch_fault(Fault.PAUSE, reason, last)

@@ -8,11 +8,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 
+from quad_description import raised_feet
+
 from ..joints import JointMap
 from ..link.state import RobotState
 from .battery import Battery, BatteryFilter
 from .board_watch import BoardWatch
-from .feet import Feet, raised_feet
+from .feet import Feet
 from .filters import AttitudeRate, JointRate
 from .gravity import GravityCheck
 from .imu_mounting import ImuMounting
@@ -136,7 +138,7 @@ class Estimator:
 
     def raised_feet(self, targets: Sequence[float]) -> tuple[str, ...]:
         """Return the feet that are in the air at targets of the first joints [rad]."""
-        return raised_feet(self._feet.poses(self._padded(targets)))
+        return raised_feet([foot.position for foot in self._feet.poses(self._padded(targets))])
 
     def update(self, state: RobotState) -> Estimate | None:
         """Take a report; return None when it cannot be. :meth:`walk` comes next."""

@@ -20,7 +20,6 @@ from .rotation import from_roll_pitch_yaw, IDENTITY, multiply, Quaternion, rotat
 
 BASE = 'base_link'
 FEET = tuple(f'{leg}_foot' for leg in LEGS)
-MAX_GAP = 0.005  # [m] above the plane of the other three, of a foot that stands
 _ORIGIN: Vector = (0.0, 0.0, 0.0)
 
 
@@ -99,35 +98,6 @@ class Feet:
             angles: Positions of the joints [rad].
         """
         return [leg.pose(angles) for leg in self._legs]
-
-
-def raised_feet(feet: FootPoses) -> tuple[str, ...]:
-    """Return the feet that are in the air while the other three stand, whatever their plane.
-
-    With one foot or a diagonal pair lifted, the robot rocks: both feet of the diagonal are raised.
-    """
-    raised = []
-    for index, name in enumerate(FEET):
-        a, b, c = (foot.position for other, foot in enumerate(feet) if other != index)
-        normal = _cross(_difference(b, a), _difference(c, a))
-        length = math.copysign(math.hypot(*normal), normal[2])  # up, in the body
-        way = _difference(feet[index].position, a)
-        height = sum(n * w for n, w in zip(normal, way, strict=True))
-        if length and height / length > MAX_GAP:
-            raised.append(name)
-    return tuple(raised)
-
-
-def _difference(one: Vector, other: Vector) -> Vector:
-    return one[0] - other[0], one[1] - other[1], one[2] - other[2]
-
-
-def _cross(one: Vector, other: Vector) -> Vector:
-    return (
-        one[1] * other[2] - one[2] * other[1],
-        one[2] * other[0] - one[0] * other[2],
-        one[0] * other[1] - one[1] * other[0],
-    )
 
 
 def _sum(one: Vector, other: Vector) -> Vector:

@@ -8,6 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 import math
 
+from quad_description import STREAM_TIMEOUT
+
 from ..exceptions import CommandError
 from .mapping import JointMap
 
@@ -29,7 +31,7 @@ class LimiterSettings:
     speed: float = 12.0
     start_speed: float = 2.0
     start_time: float = 0.5
-    stream_timeout: float = 0.5
+    stream_timeout: float = STREAM_TIMEOUT
 
 
 @dataclass(frozen=True, slots=True)

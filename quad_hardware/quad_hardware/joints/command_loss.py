@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from enum import Enum
 import math
 
-from quad_description import Pose, pose_positions
+from quad_description import Pose, pose_positions, STREAM_TIMEOUT
 
 from .mapping import JointMap
 
@@ -58,7 +58,7 @@ class CommandLoss:
         joints: JointMap,
         raised: Callable[[Sequence[float]], Sequence[str]],
         reaction: LossReaction = LossReaction.LIE,
-        timeout: float = 0.5,
+        timeout: float = STREAM_TIMEOUT,
     ) -> None:
         """Begin without a stream.
 
