@@ -55,6 +55,7 @@ def parameters(folder: Path, **values: object) -> list[str]:
         (ServoKeyboardInput, {'sped': 0.1}, "did you mean 'speed'"),
         (ServoKeyboardInput, {'rate': 1}, 'rate is 1: it must be 10.0 to 500.0'),
         (gamepad, {'enable_button': 'eastt'}, "did you mean 'east'"),
+        (gamepad, {'deadman_timeout': 20}, 'must be at least deadman_timeout, 20'),
         (gamepad, {'preset': 'xbux'}, "did you mean 'xbox'"),
     ],
 )

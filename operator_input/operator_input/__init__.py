@@ -4,7 +4,7 @@
 
 from .auto_repeat import AutoRepeat
 from .command_stream import CommandStream
-from .exceptions import DeviceError, OperatorInputError, PresetError, TerminalError
+from .exceptions import DeviceError, OperatorInputError, PresetError, SettingError, TerminalError
 from .held_keys import HeldKeys
 from .keyboard import Keyboard, ReleaseSource
 from .keyboard_session import KeyboardSession
@@ -30,6 +30,7 @@ __all__ = [
     'Quit',
     'ReleaseSource',
     'Session',
+    'SettingError',
     'StatusLine',
     'Style',
     'Suspend',

@@ -7,7 +7,8 @@
     OperatorInputError
     ├── TerminalError (OSError)     there is no terminal to read keys from, or it is gone
     ├── DeviceError (OSError)       an input device cannot be opened or read
-    └── PresetError (ValueError)    no gamepad can be chosen by that preset or expression
+    ├── PresetError (ValueError)    no gamepad can be chosen by that preset or expression
+    └── SettingError (ValueError)   settings make no sense together
 
 Arguments of the wrong kind from a *programmer* stay ``ValueError``/``TypeError``.
 """
@@ -37,4 +38,11 @@ class PresetError(OperatorInputError, ValueError):
     """No gamepad can be chosen by what was asked for.
 
     Scenarios: a preset misspelt (the message lists what there is), a malformed expression.
+    """
+
+
+class SettingError(OperatorInputError, ValueError):
+    """Settings make no sense together.
+
+    Scenarios: a time-out for still sticks that is shorter than the one for all others.
     """

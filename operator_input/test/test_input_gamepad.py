@@ -9,9 +9,18 @@ from hypothesis import strategies as st
 from input_devices import BYTE_STICK, HAT, InjectedDevice, InjectedDevices, STICK, TRIGGER
 import pytest
 
-from operator_input import PresetError
+from operator_input import PresetError, SettingError
 from operator_input.devices import AxisRange
-from operator_input.gamepad import AT_REST, Axis, Button, Deadman, Gamepad, GamepadState, Grip
+from operator_input.gamepad import (
+    AT_REST,
+    Axis,
+    Button,
+    Deadman,
+    Gamepad,
+    GamepadState,
+    Grip,
+    Timeout,
+)
 from operator_input.gamepad.presets import (
     ABS_BRAKE,
     ABS_GAS,
@@ -293,7 +302,7 @@ def test_axis_without_a_range_is_at_rest() -> None:
 
 
 @pytest.mark.parametrize(
-    ('axes', 'at_stops'),
+    ('axes', 'at_full_deflection'),
     [
         ({}, True),
         ({Axis.LEFT_Y: 1.0}, True),
@@ -304,9 +313,9 @@ def test_axis_without_a_range_is_at_rest() -> None:
         ({Axis.RIGHT_TRIGGER: 0.6}, False),
     ],
 )
-def test_a_stick_may_rest_at_its_end(axes: dict[Axis, float], at_stops: bool) -> None:
+def test_a_stick_may_rest_at_its_end(axes: dict[Axis, float], at_full_deflection: bool) -> None:
     """There, at the rim, and in the middle, a living hand changes nothing."""
-    assert GamepadState(axes).at_stops is at_stops
+    assert GamepadState(axes).at_full_deflection is at_full_deflection
 
 
 @pytest.mark.parametrize(
@@ -322,6 +331,16 @@ def test_a_stick_may_rest_at_its_end(axes: dict[Axis, float], at_stops: bool) ->
 def test_deadman(pressed: tuple[Button, ...], grip: Grip) -> None:
     """Only the two buttons allow motion."""
     assert Deadman().grip(GamepadState(buttons=frozenset(pressed))) is grip
+
+
+def test_each_timeout_bounds_a_motion_and_is_named() -> None:
+    """At full deflection the second one counts, which is never shorter than the first."""
+    deadman = Deadman(timeout=0.5, full_deflection_timeout=2.0)
+    partly, fully = (GamepadState({Axis.LEFT_Y: way}) for way in (0.5, 1.0))
+    assert deadman.timeout_at(partly) == Timeout('deadman_timeout', 0.5)
+    assert deadman.timeout_at(fully) == Timeout('deadman_full_deflection_timeout', 2.0)
+    with pytest.raises(SettingError, match='it must be at least deadman_timeout, 3;'):
+        Deadman(full_deflection_timeout=2.0)
 
 
 def test_trigger_as_deadman() -> None:

@@ -216,8 +216,14 @@ class Sticks(DeadmanTeleop[float]):
 class WithPad(GamepadSession[float]):
     """Writes down."""
 
-    def __init__(self, gamepad: Gamepad, record: Record, stop: threading.Event) -> None:
-        self._teleop = Sticks(Deadman(), CommandStream(PERIOD, lambda _: 0.0))
+    def __init__(
+        self,
+        gamepad: Gamepad,
+        record: Record,
+        stop: threading.Event,
+        deadman: Deadman | None = None,
+    ) -> None:
+        self._teleop = Sticks(deadman or Deadman(), CommandStream(PERIOD, lambda _: 0.0))
         super().__init__(gamepad, self._teleop, stop)
         self._record = record
 
@@ -247,16 +253,41 @@ class WithPad(GamepadSession[float]):
         self._record.add('close')
 
 
-@pytest.mark.parametrize('unplugged', [False, True])
-def test_a_gamepad_moves_with_its_deadman(unplugged: bool) -> None:
-    """The stick counts while the deadman is held; then, or without the gamepad, rests follow."""
-    pad = InjectedDevice(
+def xbox_pad() -> InjectedDevice:
+    """Return a pad with two sticks."""
+    return InjectedDevice(
         'Xbox Wireless Controller',
         range(0x130, 0x13F),
         dict.fromkeys(STICKS, STICK),
         vendor=0x045E,
     )
-    record, stop = Record(), threading.Event()
+
+
+@pytest.mark.parametrize(
+    ('position', 'parameter'),
+    [(-32768, 'deadman_full_deflection_timeout'), (-20000, 'deadman_timeout')],
+)
+def test_a_gamepad_that_does_not_change_names_the_timeout(position: int, parameter: str) -> None:
+    """The motion ends, and the person reads which parameter says after which time."""
+    pad, record, stop = xbox_pad(), Record(), threading.Event()
+    deadman = Deadman(timeout=0.05, full_deflection_timeout=0.05)
+    session = WithPad(Gamepad(InjectedDevices(pad)), record, stop, deadman)
+    thread = threading.Thread(target=session.run)
+    thread.start()
+    try:
+        pad.move(ABS_Y, position)
+        pad.press(LEFT_SHOULDER)
+        said = f'the gamepad has not changed for 0.05 s ({parameter}), so the motion ended'
+        record.wait_for(lambda told: any(str(one).startswith(said) for one in told))
+    finally:
+        stop.set()
+        thread.join(PATIENCE)
+
+
+@pytest.mark.parametrize('unplugged', [False, True])
+def test_a_gamepad_moves_with_its_deadman(unplugged: bool) -> None:
+    """The stick counts while the deadman is held; then, or without the gamepad, rests follow."""
+    pad, record, stop = xbox_pad(), Record(), threading.Event()
     session = WithPad(Gamepad(InjectedDevices(pad)), record, stop)
     thread = threading.Thread(target=session.run)
     thread.start()

@@ -57,6 +57,11 @@ def make(isolation: Isolation, node: Callable[[], Node], *parameters: str) -> se
         (TeleopKeyboard, 'repeat_timeout:=0.0', 'repeat_timeout is 0.0'),
         (gamepad, 'preset:=xbux', "did you mean 'xbox'? There are: auto, xbox, ps, generic"),
         (gamepad, 'enable_button:=left_sholder', "'left_sholder': it must be south"),
+        (
+            gamepad,
+            'deadman_full_deflection_timeout:=2.0',
+            'deadman_full_deflection_timeout is 2: it must be at least deadman_timeout, 3',
+        ),
         (gamepad, 'device:="["', "device '[' is neither a path nor an expression"),
         (gamepad, 'turbo_spede:=1.0', "did you mean 'turbo_speed'?"),
         (TwistMux, 'use_stampd:=true', "'use_stampd'; did you mean 'use_stamped'?"),

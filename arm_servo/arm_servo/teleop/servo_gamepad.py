@@ -47,6 +47,7 @@ class ServoGamepad(Node):
         Raises:
             ParameterError: A parameter is misspelt or makes no sense.
             PresetError: There is no preset of that name.
+            SettingError: Parameters make no sense together.
         """
         super().__init__('servo_gamepad')
         read = ParameterReader(self)
@@ -63,6 +64,12 @@ class ServoGamepad(Node):
                 ),
                 timeout=read.number(
                     'deadman_timeout', 3.0, (0.5, 3600.0), 'without any change of the gamepad [s]'
+                ),
+                full_deflection_timeout=read.number(
+                    'deadman_full_deflection_timeout',
+                    10.0,
+                    (0.5, 3600.0),
+                    'the same, what is deflected at its end [s]',
                 ),
             ),
             CommandStream(1.0 / rate, rest_of),

@@ -3,7 +3,7 @@
 """Gamepads: presets, state, hot-plug, deadman."""
 
 from .controls import AT_REST, Axis, Button, GamepadState
-from .deadman import Deadman, DEADMAN_BUTTONS, Grip, is_pressed
+from .deadman import Deadman, DEADMAN_BUTTONS, Grip, is_pressed, Timeout
 from .gamepad import Gamepad
 from .presets import AUTO, PRESETS
 from .session import GamepadSession
@@ -22,5 +22,6 @@ __all__ = [
     'GamepadSession',
     'GamepadState',
     'Grip',
+    'Timeout',
     'is_pressed',
 ]

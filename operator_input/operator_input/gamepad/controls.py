@@ -48,7 +48,7 @@ class Button(Enum):
     RIGHT_STICK = 'right_stick'
 
 
-AT_STOP = 0.95  # way of a stick or trigger at which it may lean against its end
+FULL_DEFLECTION = 0.95  # way of a stick or trigger at which it may lean against its end
 STICKS = (Axis.LEFT_X, Axis.LEFT_Y), (Axis.RIGHT_X, Axis.RIGHT_Y)
 TRIGGERS = Axis.LEFT_TRIGGER, Axis.RIGHT_TRIGGER
 
@@ -77,8 +77,8 @@ class GamepadState:
         return self.axes.get(axis, 0.0)
 
     @property
-    def at_stops(self) -> bool:
-        """Whether every stick and trigger is in its middle or at its end.
+    def at_full_deflection(self) -> bool:
+        """Whether every stick and trigger that is deflected at all is so to its end.
 
         There a living hand need not change anything; between, it trembles.
         """
@@ -86,7 +86,7 @@ class GamepadState:
             *(math.hypot(self.axis(x), self.axis(y)) for x, y in STICKS),
             *(self.axis(trigger) for trigger in TRIGGERS),
         ]
-        return all(way == 0.0 or way >= AT_STOP for way in ways)
+        return all(way == 0.0 or way >= FULL_DEFLECTION for way in ways)
 
     def pressed_since(self, before: GamepadState) -> frozenset[Button]:
         """Return the buttons that went down.

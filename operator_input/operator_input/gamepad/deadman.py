@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
 
+from ..exceptions import SettingError
 from .controls import Axis, Button, GamepadState
 
 DEADMAN_BUTTONS: Mapping[str, Button | None] = {
@@ -28,6 +29,19 @@ class Grip(Enum):
 
 
 @dataclass(frozen=True, slots=True)
+class Timeout:
+    """How long something may last.
+
+    Attributes:
+        parameter: Name of the parameter that says so.
+        duration: Time [s].
+    """
+
+    parameter: str
+    duration: float
+
+
+@dataclass(frozen=True, slots=True)
 class Deadman:
     """Which buttons allow motion.
 
@@ -36,14 +50,24 @@ class Deadman:
         turbo: Held too, or alone: fast; None for no such button.
         timeout: Time without any change of the gamepad [s] after which a motion ends: receivers of
             wireless ones repeat the last state when the pad is out of reach or its battery empty.
-        stop_timeout: The same while sticks and triggers lean against their ends or rest, where a
+        full_deflection_timeout: The same while what is deflected leans against its end, where a
             pad in a hand has nothing to report either [s].
+
+    Raises:
+        SettingError: The second time is shorter than the first.
     """
 
     enable: Button | None = Button.LEFT_SHOULDER
     turbo: Button | None = Button.RIGHT_SHOULDER
     timeout: float = 3.0
-    stop_timeout: float = 10.0
+    full_deflection_timeout: float = 10.0
+
+    def __post_init__(self) -> None:
+        if self.full_deflection_timeout < self.timeout:
+            raise SettingError(
+                f'deadman_full_deflection_timeout is {self.full_deflection_timeout:g}: it must be '
+                f'at least deadman_timeout, {self.timeout:g}; raise it, or lower deadman_timeout'
+            )
 
     def grip(self, state: GamepadState) -> Grip:
         """Say what the person allows.
@@ -57,9 +81,11 @@ class Deadman:
             return Grip.HELD
         return Grip.RELEASED
 
-    def patience(self, state: GamepadState) -> float:
-        """Return for how long a gamepad may report no change while it moves something [s]."""
-        return max(self.timeout, self.stop_timeout) if state.at_stops else self.timeout
+    def timeout_at(self, state: GamepadState) -> Timeout:
+        """Return for how long a gamepad may report no change while it moves something."""
+        if state.at_full_deflection:
+            return Timeout('deadman_full_deflection_timeout', self.full_deflection_timeout)
+        return Timeout('deadman_timeout', self.timeout)
 
 
 def is_pressed(button: Button, state: GamepadState) -> bool:

@@ -60,8 +60,9 @@ class GamepadSession(Session[Command]):
             self.step(time.monotonic())
         self.step(time.monotonic())
         if self._deadman.expired and not self._had_expired:
+            timeout = self._deadman.timeout
             self.warn(
-                f'the gamepad has not changed for {self._deadman.timeout:g} s, '
+                f'the gamepad has not changed for {timeout.duration:g} s ({timeout.parameter}), '
                 'so the motion ended; is it on, and in reach? Release and press the deadman'
             )
         self._had_expired = self._deadman.expired

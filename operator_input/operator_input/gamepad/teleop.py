@@ -11,7 +11,7 @@ from typing import Generic
 from ..command_stream import CommandStream
 from ..session import Command
 from .controls import AT_REST, GamepadState
-from .deadman import Deadman, Grip
+from .deadman import Deadman, Grip, Timeout
 
 
 class DeadmanTeleop(ABC, Generic[Command]):
@@ -45,9 +45,9 @@ class DeadmanTeleop(ABC, Generic[Command]):
         return Grip.RELEASED if self.expired else self._deadman.grip(self.state)
 
     @property
-    def timeout(self) -> float:
-        """Time without any change of the gamepad [s] after which a motion ends, as it is held."""
-        return self._deadman.patience(self.state)
+    def timeout(self) -> Timeout:
+        """Time without any change of the gamepad after which a motion ends, as it is held."""
+        return self._deadman.timeout_at(self.state)
 
     @abstractmethod
     def wanted(self) -> Command | None:
@@ -71,13 +71,13 @@ class DeadmanTeleop(ABC, Generic[Command]):
         """
         if self._is_alive or not self._moves:
             self._is_alive, self._changed_at = False, now
-        elif now - self._changed_at >= self.timeout:
+        elif now - self._changed_at >= self.timeout.duration:
             self.expired = True
         return self._stream.step(self.wanted(), now)
 
     def due(self, _now: float) -> float:
         """Return when step() has to be called at the latest [s]; may be infinite."""
-        expires = self._changed_at + self.timeout if self._moves else math.inf
+        expires = self._changed_at + self.timeout.duration if self._moves else math.inf
         return min(self._stream.due(), expires)
 
     @property

@@ -72,11 +72,11 @@ class TeleopGamepad(Node):
                 timeout=read.number(
                     'deadman_timeout', 3.0, (0.5, 3600.0), 'without any change of the gamepad [s]'
                 ),
-                stop_timeout=read.number(
-                    'deadman_stop_timeout',
+                full_deflection_timeout=read.number(
+                    'deadman_full_deflection_timeout',
                     10.0,
                     (0.5, 3600.0),
-                    'the same, sticks at their ends [s]',
+                    'the same, what is deflected at its end [s]',
                 ),
             ),
             declare_steps(self),
