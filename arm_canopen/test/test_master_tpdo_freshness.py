@@ -6,10 +6,18 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+import re
 import struct
 
 import pytest
-from virtual_network import bus_config, drive_config, DRIVE_EDS, SCALE, VirtualNetwork
+from virtual_network import (
+    bus_config,
+    drive_config,
+    DRIVE_EDS,
+    SCALE,
+    VirtualNetwork,
+    with_defaults,
+)
 
 from arm_canopen import RefusalCause
 from arm_canopen.config import load_bus
@@ -18,7 +26,9 @@ from arm_canopen.config.checks import check_bus
 from arm_canopen.config.model import BusConfig, NodeConfig, Written
 from arm_canopen.config.tpdo_freshness import with_event_timer
 from arm_canopen.device.drive import Drive as SimulatedDrive
+from arm_canopen.device.faults import BusFault, FaultInjection
 from arm_canopen.master.events import Severity
+from arm_canopen.master.process_image import Input, SyncRound
 from arm_canopen.standard.dictionary import ObjectDictionary
 from arm_canopen.standard.drive import DriveState, OperationMode
 
@@ -90,7 +100,7 @@ def test_a_drive_whose_tpdos_stop_to_come_on_change_is_not_fresh(mode: Operation
     blind.net.wire.loses = lambda sender, frame: False
     blind.net.run(3.0)
     assert blind.net.drives[JOINT].accepts_targets
-    assert not [text for text in blind.net.told(Severity.WARNING) if 'on change only' in text]
+    assert not [text for text in blind.net.told(Severity.WARNING) if 'nobody notices' in text]
 
 
 @STREAMED
@@ -102,7 +112,7 @@ def test_an_axis_is_not_held_at_a_position_of_unknown_age(
 ) -> None:
     """Where nothing tells that it is old, the drive is stopped by its own ramp, and disabled."""
     blind = Blind(config, mode)
-    (warning,) = [text for text in blind.net.told(Severity.WARNING) if 'on change only' in text]
+    (warning,) = [text for text in blind.net.told(Severity.WARNING) if 'nobody notices' in text]
     assert 'TPDO 1, 2' in warning
     velocities = blind.lose_tpdos()
     assert min(velocities) > -0.02
@@ -119,13 +129,50 @@ def test_a_device_that_refuses_its_event_timer_is_named() -> None:
     net.boot()
     net.run(2.0)
     assert net.drives[JOINT].fresh
-    warnings = [text for text in net.told(Severity.WARNING) if 'on change only' in text]
+    warnings = [text for text in net.told(Severity.WARNING) if 'nobody notices' in text]
     assert len(warnings) == 1
     net.power_off(JOINT)
     net.run(0.5)
     net.power_on(JOINT)
     net.run_until(net.all_ready)
-    assert len([text for text in net.told() if 'on change only' in text]) == 1
+    assert len([text for text in net.told() if 'nobody notices' in text]) == 1
+
+
+def test_a_timer_that_is_taken_at_the_next_boot_counts_again() -> None:
+    """The loss is noticed from then on, and a device that refuses it once more is named again."""
+    net = VirtualNetwork(replace(bus_config(on_change()), written={(JOINT,): Written()}))
+    refused = FaultInjection(BusFault.SDO_ABORT, object=(0x1800, 5), abort=0x06090030)
+    net.start()
+    for refuses in (True, False, True):
+        begin = len(net.told(Severity.WARNING))
+        net.power_off(JOINT)
+        net.run(0.5)
+        device = net.power_on(JOINT)
+        if refuses:
+            device.faults.inject(refused, net.now)
+        net.run_until(net.all_ready)
+        told = net.told(Severity.WARNING)[begin:]
+        assert any('TPDO 1: nobody notices' in text for text in told) is refuses
+        net.run(2.0)
+        assert net.drives[JOINT].fresh
+        net.wire.loses = lambda sender, frame: frame.can_id == 0x180 + NODE_ID
+        net.run(1.0)
+        assert net.drives[JOINT].fresh is refuses
+        net.wire.loses = lambda sender, frame: False
+
+
+@pytest.mark.parametrize(
+    ('timer', 'inhibit', 'expected'),
+    [(0, 0, 0.1), (50, 0, 0.05), (10_000, 0, 0.1), (10_000, 2000, 0.4), (50, 2000, 0.4)],
+)
+def test_the_timer_of_the_eds_is_no_longer_than_ours(
+    timer: int, inhibit: int, expected: float
+) -> None:
+    """A loss is noticed after 0.3 s, unless the device sends less often (0x1800:03 in 0.1 ms)."""
+    config, defaults = drive_config(JOINT, NODE_ID), {(0x1800, 5): timer, (0x1800, 3): inhibit}
+    dictionary = with_defaults(config.dictionary, defaults)
+    tpdo = replace(config.tpdos[0], transmission=255)
+    assert with_event_timer(tpdo, dictionary).event_time == pytest.approx(expected)
 
 
 def test_a_drive_in_operation_is_taken_over_and_gets_its_event_timer() -> None:
@@ -146,12 +193,15 @@ def test_a_drive_in_operation_is_taken_over_and_gets_its_event_timer() -> None:
     assert not net.drives[JOINT].fresh
 
 
-def loaded(tmp_path: Path, tpdos: str) -> BusConfig:
-    """Return the bus of a drive with these TPDOs."""
+def loaded(
+    tmp_path: Path, tpdos: str, sync_period: int = 10_000, *, eds: Path | str = DRIVE_EDS
+) -> BusConfig:
+    """Return the bus of a drive with these TPDOs, and a time between two SYNCs in [us]."""
     file = tmp_path / 'bus.yml'
+    master = f'{{node_id: 1, driver: ros2_canopen::MasterDriver, sync_period: {sync_period}}}'
     file.write_text(
-        'master: {node_id: 1, driver: ros2_canopen::MasterDriver, sync_period: 10000}\n'
-        f'joint1:\n  node_id: 2\n  dcf: {DRIVE_EDS}\n'
+        f'master: {master}\n'
+        f'joint1:\n  node_id: 2\n  dcf: {eds}\n'
         f'  driver: ros2_canopen::Cia402Driver\n{tpdos}'
     )
     return load_bus(file)
@@ -180,17 +230,31 @@ def test_the_event_timer_by_default(tmp_path: Path, keys: str, time: float | Non
     assert [write.requested for write in writes] == ['event_timer' in keys] * len(writes)
 
 
+@pytest.mark.parametrize('sync_period', [10_000, 0])
 @pytest.mark.parametrize(
-    ('keys', 'warned'),
+    ('keys', 'lossy', 'lossy_without_sync'),
     [
-        ('transmission: 255', False),
-        ('transmission: 255, event_timer: 0', True),
-        ('transmission: 0', True),
-        ('transmission: 1', False),
+        ('transmission: 255', False, False),
+        ('transmission: 255, event_timer: 0', True, True),
+        ('transmission: 0', True, True),
+        ('transmission: 1', False, True),
+        ('from EDS: 252', True, True),
+        ('from EDS: 253', True, True),
     ],
 )
-def test_check_names_what_may_get_lost(tmp_path: Path, keys: str, *, warned: bool) -> None:
-    """Before anything runs, at the place of the key."""
-    report = check_bus(loaded(tmp_path, f'  tpdo:\n    1: {{{keys}}}\n'))
-    found = [str(problem) for problem in report.warnings]
-    assert any('TPDO 1 comes on change only' in text for text in found) is warned
+def test_check_and_boot_name_what_may_get_lost(
+    tmp_path: Path, keys: str, sync_period: int, *, lossy: bool, lossy_without_sync: bool
+) -> None:
+    """The one before anything runs, at the place of the key, the other when it does."""
+    if keys.startswith('from EDS'):
+        eds = DRIVE_EDS.read_text().split('[1800sub2]')
+        eds[1] = re.sub('DefaultValue=.*', f'DefaultValue={keys[-3:]}', eds[1], count=1)
+        (tmp_path / 'other.eds').write_text('[1800sub2]'.join(eds))
+        bus = loaded(tmp_path, '', sync_period, eds='other.eds')
+    else:
+        bus = loaded(tmp_path, f'  tpdo:\n    1: {{{keys}}}\n', sync_period)
+    found = [str(problem) for problem in check_bus(bus).warnings]
+    expected = lossy if sync_period else lossy_without_sync
+    assert any('when TPDO 1 gets lost' in text for text in found) is expected
+    sync = SyncRound(lambda: None, period=bus.master.sync_period)
+    assert Input(bus.nodes[0].tpdos[0], sync).loss_unnoticed is expected

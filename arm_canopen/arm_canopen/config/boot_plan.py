@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from ..standard.cob_id import CAN_ID_MASK, COB_ID_EXTENDED, COB_ID_INVALID
 from ..standard.datatypes import DataType, encode
 from ..standard.nmt import ConsumerHeartbeatTime
-from ..standard.objects import Index
+from ..standard.objects import Index, PDO_COUNT_MAX
 from .model import BusConfig, NodeConfig, PdoConfig, SdoWrite, Written
 from .parameter_values import is_configured
 from .pdo_direction import Direction, RPDO, TPDO
@@ -27,7 +27,7 @@ ERROR_CONTROL = (
     (Index.LIFE_TIME_FACTOR, DataType.UNSIGNED8, 'life_time_factor'),
 )
 WATCH_KEY = 'heartbeat_consumer'
-EVENT_TIMER = 'event_timer'
+TIMER_KEY = 'event_timer'
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +63,13 @@ class BootWrite:
     def place(self) -> str:
         """The object, for messages."""
         return f'0x{self.index:04X}:{self.subindex:02X}'
+
+    @property
+    def is_own_timer(self) -> bool:
+        """Whether it sets the event timer of a TPDO that nobody has asked for."""
+        number = self.index - TPDO.communication
+        is_timer = 0 <= number < PDO_COUNT_MAX and self.subindex == EVENT_TIMER_SUBINDEX
+        return is_timer and not self.requested
 
     def over(self, present: int) -> bytes:
         """Return the data with the bits that do not count as they are in a present value."""
@@ -222,7 +229,7 @@ class _Plan:
 
     def _parameters(self, direction: Direction, pdo: PdoConfig) -> Iterator[BootWrite]:
         index = direction.communication + pdo.number - 1
-        deadline = EVENT_TIMER if direction is TPDO else 'event_deadline'
+        deadline = TIMER_KEY if direction is TPDO else 'event_deadline'
         event_time = _units(pdo.event_time, MILLISECONDS)
         for subindex, name, data_type, value in (
             (2, 'transmission', DataType.UNSIGNED8, pdo.transmission),
@@ -255,7 +262,7 @@ class _Plan:
         """Tell whether bus.yml gives a key of a PDO, or a DCF the object."""
         if is_requested(self._bus, self._node, direction.name, str(pdo.number), key):
             return True
-        if key == EVENT_TIMER:  # which a DCF may leave to its default beside other parameters
+        if key == TIMER_KEY:  # which a DCF may leave to its default beside other parameters
             index = direction.communication + pdo.number - 1
             entry = self._node.dictionary.get(index, EVENT_TIMER_SUBINDEX)
             return entry is not None and entry.configured

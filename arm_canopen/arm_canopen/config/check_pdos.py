@@ -9,7 +9,7 @@ from ..standard.pdo import SYNCHRONOUS_MAX
 from .check_subject import object_name, Subject
 from .model import PdoConfig
 from .pdo_direction import Direction, TPDO
-from .tpdo_freshness import comes_on_change_only
+from .tpdo_freshness import longest_silence, loss_unnoticed
 
 RESTLESS = frozenset({Index.POSITION_ACTUAL, Index.VELOCITY_ACTUAL, Index.TORQUE_ACTUAL})
 """Objects that change all the time, also at rest."""
@@ -20,8 +20,8 @@ LATE_FACTOR = 1.5  # periods that a frame may come late before its deadline stri
 def check_pdos(subject: Subject) -> None:
     """Check every PDO in use."""
     for direction, pdo in subject.pdos():
-        if direction is TPDO and subject.node.is_drive and comes_on_change_only(pdo):
-            _warn_of_loss(subject, pdo)
+        if direction is TPDO and subject.node.is_drive:
+            _check_loss(subject, pdo)
         if SYNCHRONOUS_MAX < pdo.transmission < 254:
             _check_reserved(subject, direction, pdo)
         if pdo.sync_start:
@@ -34,13 +34,14 @@ def check_pdos(subject: Subject) -> None:
             _check_events(subject, direction, pdo)
 
 
-def _warn_of_loss(subject: Subject, pdo: PdoConfig) -> None:
-    subject.findings.warning(
-        subject.pdo_place(TPDO, pdo, 'transmission'),
-        f'TPDO {pdo.number} comes on change only (transmission {pdo.transmission}, no event '
-        'timer): when it gets lost nobody notices, and the drive is led by what it sent before',
-        "write 'transmission: 1' (with SYNC), or 255 and 'event_timer: 100'",
-    )
+def _check_loss(subject: Subject, pdo: PdoConfig) -> None:
+    if loss_unnoticed(pdo, longest_silence(pdo, subject.bus.master.sync_period)):
+        subject.findings.warning(
+            subject.pdo_place(TPDO, pdo, 'transmission'),
+            f'nobody notices when TPDO {pdo.number} gets lost (transmission {pdo.transmission}, '
+            'no event timer or SYNC), and the drive is led by what it sent before',
+            "write 'transmission: 1' (with SYNC), or 255 and 'event_timer: 100'",
+        )
 
 
 def _check_reserved(subject: Subject, direction: Direction, pdo: PdoConfig) -> None:

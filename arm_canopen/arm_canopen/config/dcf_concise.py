@@ -15,7 +15,7 @@ from ..standard.cob_id import COB_ID_INVALID
 from ..standard.datatypes import DataType, encode
 from ..standard.dictionary import ObjectEntry
 from ..standard.objects import Index, PDO_COUNT_MAX
-from .boot_plan import boot_writes, BootWrite, EVENT_TIMER
+from .boot_plan import boot_writes, BootWrite
 from .model import BusConfig, NodeConfig, SdoWrite
 from .pdo_direction import RPDO, TPDO
 
@@ -74,8 +74,11 @@ def _u32(index: int, subindex: int, value: int) -> SdoWrite:
 
 
 def _is_needed(node: NodeConfig, write: BootWrite, *, complete: bool) -> bool:
-    """Tell whether dcfgen writes it: no mapping or timer of our own, and no defaults."""
-    if not write.requested and (write.index in MAPPINGS or write.key.endswith(EVENT_TIMER)):
+    """Tell whether dcfgen writes it: no mapping or timer of our own, and no defaults.
+
+    Our boot tries those, and goes on where the device refuses them; another master would fail.
+    """
+    if write.is_own_timer or (write.index in MAPPINGS and not write.requested):
         return False
     if complete or not write.unless_default:
         return True

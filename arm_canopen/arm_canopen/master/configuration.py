@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-import math
 import struct
 
 from ..config.boot_plan import (
@@ -13,7 +12,6 @@ from ..config.boot_plan import (
     BootWrite,
     choose_slot,
     ERROR_CONTROL,
-    EVENT_TIMER,
     final_values,
     is_requested,
     WATCH_KEY,
@@ -87,7 +85,7 @@ class Configurator:
         """
         await self._watch_master()
         for write in self._plan:
-            if write.index in LIFE_SIGNS or _is_own_timer(write):
+            if write.index in LIFE_SIGNS or write.is_own_timer:
                 await self._bring(write)
 
     async def differences(self) -> list[str]:
@@ -98,7 +96,7 @@ class Configurator:
         """
         found = []
         for write in final_values(self._plan):
-            if write.index not in PDO_OBJECTS or _is_own_timer(write):
+            if write.index not in PDO_OBJECTS or write.is_own_timer:
                 continue
             present = await self.read_number(*write.address)
             mask = write.mask or (1 << 8 * len(write.data)) - 1
@@ -134,6 +132,8 @@ class Configurator:
             data = write.over(present)
             if present == int.from_bytes(data, 'little'):
                 return
+        if write.is_own_timer:
+            self._rely_on_timer(write.index, taken=True)
         try:
             await self.write(SdoWrite(*write.address, data))
         except SdoAbortError as error:
@@ -143,14 +143,14 @@ class Configurator:
             if write.requested:
                 raise SdoError(f'{refused}: correct or remove it there') from error
             self._warn(f'{refused} by default only, so it goes on with what it has')
-            if _is_own_timer(write):
-                self._leave_untimed(write.index)
+            if write.is_own_timer:
+                self._rely_on_timer(write.index, taken=False)
 
-    def _leave_untimed(self, index: int) -> None:
-        """Await a TPDO no more that comes on change only."""
+    def _rely_on_timer(self, index: int, *, taken: bool) -> None:
+        """Await a TPDO by its event timer, or no more, until the next boot."""
         for entry in self._node.image.inputs:
             if entry.config.number == index - Index.TPDO_COMMUNICATION + 1:
-                entry.stale_after = math.inf
+                entry.rely_on_timer(taken=taken)
 
     async def _holds(self, write: BootWrite) -> bool:
         """Tell whether a device that refused to be written has the value already."""
@@ -199,8 +199,3 @@ class Configurator:
 
     def _warn(self, text: str) -> None:
         self._node.report(EventKind.BOOT, Severity.WARNING, text)
-
-
-def _is_own_timer(write: BootWrite) -> bool:
-    """Tell whether a write sets the event timer of a TPDO that nobody has asked for."""
-    return write.key.endswith(EVENT_TIMER) and not write.requested

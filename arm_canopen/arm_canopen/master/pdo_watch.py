@@ -34,7 +34,7 @@ class PdoWatch:
         self._every_sync = [entry for entry in inputs if entry.every_sync]
         self._synchronous = {entry.config.number for entry in inputs if entry.synchronous}
         self._stopped: set[int] = set()
-        self._warned_of_losses = False
+        self._may_get_lost = ''  # numbers of TPDOs, as at the last boot
         for entry in inputs:
             entry.on_short = self._tell_short
 
@@ -43,16 +43,16 @@ class PdoWatch:
         self._stopped.clear()
 
     def warn_of_losses(self) -> None:
-        """Report once which TPDOs of a drive may get lost without anybody noticing."""
+        """Report which TPDOs of a drive may get lost unnoticed, unless the last boot did."""
         numbers = ', '.join(
             str(entry.config.number) for entry in self._inputs if entry.loss_unnoticed
         )
-        if numbers and not self._warned_of_losses:
-            self._warned_of_losses = True
+        before, self._may_get_lost = self._may_get_lost, numbers
+        if numbers and numbers != before:
             self._warn(
-                f'TPDO {numbers}: comes on change only, so nobody notices when it gets lost, and '
-                'the drive is led by what it sent before. Write transmission: 1, or event_timer: '
-                '100 where the device has it'
+                f'TPDO {numbers}: nobody notices when it gets lost, and the drive is led by what '
+                'it sent before. Write transmission: 1 (with SYNC), or 255 and event_timer: 100 '
+                'where the device has it'
             )
 
     def expect(self) -> None:

@@ -14,15 +14,13 @@ from typing import Protocol, TypeAlias
 
 from ..can.frame import Frame
 from ..config.model import PdoConfig
+from ..config.tpdo_freshness import longest_silence, loss_unnoticed
 from ..exceptions import CodecError
 from ..standard.datatypes import DataType, integer_range
-from ..standard.objects import is_state
-from ..standard.pdo import EVENT_DRIVEN, MappedObject, Number, PdoCodec, SYNCHRONOUS_MAX
+from ..standard.pdo import MappedObject, Number, PdoCodec, SYNCHRONOUS_MAX
 from .scheduler import completed, Promise
 
 REPEAT_SHARE = 0.5  # of the deadline of an RPDO, after which it is repeated
-PERIODS_MISSED = 3  # periods of a TPDO, or of a poll, without a new value
-STALE_AFTER = 0.5  # [s] without a new value, where its period is shorter
 IN_THE_IMAGE = completed()
 """What leaves with the PDOs of this cycle counts as delivered."""
 
@@ -92,7 +90,7 @@ class Input:
         on_short: Called with this input and the length when one is too short.
         awaited: It was expected after the last SYNC and has not come.
         stale_after: Age in [s] from which its values are too old to act on; infinite for a TPDO
-            that comes on change only, and may well be silent.
+            that has no time to come in, and may well be silent.
     """
 
     def __init__(self, config: PdoConfig, sync: SyncRound) -> None:
@@ -106,7 +104,7 @@ class Input:
         self.listener: Callable[[Input], None] | None = None
         self.on_short: Callable[[Input, int], None] = lambda entry, length: None
         self.awaited = False
-        self.stale_after = self._longest_silence(sync.period)
+        self.stale_after = longest_silence(config, sync.period)
         self._sync = sync
         self._unpack = self.codec.unpack
 
@@ -127,17 +125,12 @@ class Input:
     @property
     def loss_unnoticed(self) -> bool:
         """Whether it carries state of a drive, and nothing shows that it got lost."""
-        return self.stale_after == math.inf and any(
-            is_state(mapped.index) for mapped in self.config.mapping
-        )
+        return loss_unnoticed(self.config, self.stale_after)
 
-    def _longest_silence(self, sync_period: float) -> float:
-        if self.synchronous:
-            period = PERIODS_MISSED * self.config.transmission * sync_period
-            return max(STALE_AFTER, period) if sync_period > 0.0 else math.inf
-        event_time = self.config.event_time or 0.0
-        timed = self.config.transmission >= EVENT_DRIVEN and event_time > 0.0
-        return PERIODS_MISSED * event_time if timed else math.inf
+    def rely_on_timer(self, *, taken: bool) -> None:
+        """Await it by its event timer, or no more where the device has not taken that."""
+        silence = longest_silence(self.config, self._sync.period)
+        self.stale_after = silence if taken else math.inf
 
     def clear(self) -> None:
         """Forget the values, because the device restarted or went away."""

@@ -10,22 +10,14 @@ import math
 
 from ..can.frame import Frame
 from ..config.model import NodeConfig
+from ..config.tpdo_freshness import PERIODS_MISSED, STALE_AFTER
 from ..exceptions import CodecError, SdoError
 from ..standard.datatypes import decode, encode, Value
 from ..standard.dictionary import ObjectEntry
 from ..standard.objects import is_controlword
 from .background_objects import BackgroundReader, SdoWriter
 from .events import Event, EventKind, Report, Severity
-from .process_image import (
-    Limits,
-    limits_of,
-    PERIODS_MISSED,
-    ProcessImage,
-    Reader,
-    STALE_AFTER,
-    SyncRound,
-    Writer,
-)
+from .process_image import Limits, limits_of, ProcessImage, Reader, SyncRound, Writer
 from .scheduler import Promise, Scheduler
 from .sdo_client import SdoClient
 from .start_values import start_value
