@@ -19,6 +19,7 @@ from virtual_network import (
     VirtualNetwork,
 )
 
+from arm_canopen.cia402.drive_objects import DriveObjects
 from arm_canopen.cia402.status import drive_status
 from arm_canopen.device.drive import Drive as SimulatedDrive
 from arm_canopen.exceptions import DriveError
@@ -174,12 +175,14 @@ def test_an_axis_is_stopped_whose_rpdo_is_kept_back_with_another_axis(
 ) -> None:
     """It would go on with the last controlword that it got."""
     failing = Failing(6, monkeypatch)
-    failing.net.drives[JOINT].objects.mute_controlword()
+    other = DriveObjects(failing.net.network.nodes[JOINT])
+    other.mute_controlword()
     failing.run(RAMP + 1.0)
     assert failing.states[-1] is DriveState.SWITCH_ON_DISABLED
     assert failing.fastest < STANDING
     assert failing.controlwords_by_sdo == [2, 0]
     assert len(failing.errors) == 1
+    other.unmute_controlword()
     failing.net.do(JOINT, 'enable')
 
 
@@ -200,6 +203,103 @@ def test_a_drive_that_could_not_be_stopped_is_stopped_when_it_is_asked_for_again
     failing.net.do(JOINT, 'disable', preempt=True)
     assert failing.device.state is DriveState.SWITCH_ON_DISABLED
     assert abs(failing.device.velocity) / SCALE < STANDING
+
+
+@pytest.mark.parametrize('verb', ['', 'shutdown'])
+def test_a_stop_whose_sdo_is_not_answered_goes_by_rpdo_again(
+    verb: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What kept its RPDO back was over at once; a shutdown ends the stop as well."""
+    failing = Failing(6, monkeypatch)
+    failing.fail(*owner_of(failing, 'controlword'), times=2)
+    failing.net.wire.loses = lambda sender, frame: frame.can_id == 0x600 + NODE_ID
+    if verb:
+        failing.net.begin(JOINT, verb, preempt=True)
+    failing.run(RAMP + 3.0)
+    assert failing.states == [
+        DriveState.OPERATION_ENABLED,
+        DriveState.QUICK_STOP_ACTIVE,
+        DriveState.SWITCH_ON_DISABLED,
+    ]
+    assert failing.fastest < STANDING
+    assert len(failing.errors) == 1, failing.errors
+
+
+def test_a_shutdown_begins_by_rpdo_and_says_when_the_drive_keeps_its_power(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The stop before has ended with the RPDO kept back, and no SDO is answered."""
+    failing = Failing(6, monkeypatch)
+    failing.net.wire.loses = lambda sender, frame: frame.can_id in {*RPDOS, 0x600 + NODE_ID}
+    failing.fail(*owner_of(failing, 'controlword'), times=2)
+    failing.run(10.0)
+    with pytest.raises(DriveError, match='joint1 is not disabled; cut its power'):
+        failing.net.do(JOINT, 'shutdown', preempt=True)
+    failing.net.drives[JOINT].objects.mute_controlword()
+    failing.net.wire.loses = lambda sender, frame: frame.can_id == 0x600 + NODE_ID
+    failing.net.do(JOINT, 'shutdown', preempt=True)
+    assert failing.device.state is DriveState.SWITCH_ON_DISABLED
+
+
+def test_a_drive_that_could_not_be_stopped_is_not_said_to_be_enabled(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It is still in Operation Enabled; and the next failure stops it as the first one would."""
+    failing = Failing(6, monkeypatch)
+    failing.fail(*owner_of(failing, 'controlword'), times=3)
+    failing.net.wire.loses = lambda sender, frame: frame.can_id in {*RPDOS, 0x600 + NODE_ID}
+    failing.run(10.0)
+    with pytest.raises(DriveError, match='could not be stopped; cut its power'):
+        failing.net.do(JOINT, 'enable')
+    failing.net.wire.loses = lambda sender, frame: False
+    failing.net.do(JOINT, 'enable')
+    failing.net.commands[JOINT].set_target(50.0)
+    failing.net.run(0.6)
+    assert failing.device.velocity / SCALE == pytest.approx(1.0, rel=0.05)
+    failing.states = [DriveState.OPERATION_ENABLED]
+    reported = len(failing.errors)
+    failing.net.drives[JOINT].fail(ZeroDivisionError())
+    failing.run(RAMP + 1.0)
+    assert failing.states[1:] == [DriveState.QUICK_STOP_ACTIVE, DriveState.SWITCH_ON_DISABLED]
+    assert failing.fastest < STANDING
+    assert len(failing.errors) == reported + 1
+
+
+def test_a_drive_that_keeps_its_power_is_stopped_again_and_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """As soon as an SDO reaches it the stop works; that it failed is told once."""
+    failing = Failing(6, monkeypatch)
+    failing.fail(*owner_of(failing, 'controlword'))
+    failing.net.wire.loses = lambda sender, frame: frame.can_id == 0x600 + NODE_ID
+    failing.run(20.0)
+    assert failing.states == [DriveState.OPERATION_ENABLED]
+    assert len(failing.errors) == 3, failing.errors
+    failing.net.wire.loses = lambda sender, frame: False
+    failing.run(8.0)
+    assert failing.states[-1] is DriveState.SWITCH_ON_DISABLED
+    assert failing.fastest < STANDING
+    assert len(failing.errors) == 3, failing.errors
+
+
+@pytest.mark.parametrize('cycles', range(1, 4))
+def test_a_failure_while_it_is_enabled_stays_named_until_the_next_enabling(
+    cycles: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also where the drive comes to Operation Enabled by a command that was on its way."""
+    failing = Failing(6, monkeypatch)
+    failing.net.do(JOINT, 'shutdown', preempt=True)
+    enabling = failing.net.begin(JOINT, 'enable')
+    drive = failing.net.drives[JOINT]
+    failing.net.run_until(lambda: bool(drive._controlword & 0x8))
+    failing.net.run(PERIOD * (cycles - 1))
+    drive.fail(ZeroDivisionError('injected'))
+    failing.run(RAMP + 1.0)
+    with pytest.raises(DriveError, match='injected'):
+        enabling.result()
+    assert failing.device.state is DriveState.SWITCH_ON_DISABLED
+    assert 'injected' in drive.failure
+    assert len(failing.errors) == 1, failing.errors
 
 
 def test_nothing_enables_a_drive_while_it_is_stopped(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -181,13 +181,14 @@ class Drive(ModedDrive):
             self.stop.use_sdo()
 
     def _take_out(self, refusal: Refusal, text: str) -> None:
-        """Stop and disable it, once until it is enabled again, whatever else goes wrong then."""
+        """Stop and disable it; only the first cause is told until it is enabled again."""
         if self.goal is not None:
             self.goal = DriveState.SWITCH_ON_DISABLED
-        if self.failure:
+        first, self.failure = not self.failure, self.failure or text
+        if first or not self.stop.disabled:
+            self.stop.begin(quiet=not first)
+        if not first:
             return
-        self.failure = text
-        self.stop.begin()
         self.released(refusal)
         self.report(Severity.ERROR, f'stopped: {text}')
 
@@ -332,8 +333,6 @@ class Drive(ModedDrive):
 
     def _state_changed(self, before: DriveState) -> None:
         left = before is DriveState.OPERATION_ENABLED
-        if self.state is DriveState.OPERATION_ENABLED:
-            self.failure = ''
         if left:
             self.halt.release()
         if self.state in FAULTY and before not in FAULTY:

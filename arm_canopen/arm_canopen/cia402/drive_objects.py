@@ -63,13 +63,33 @@ class DriveObjects:
 
     @property
     def controlword_muted(self) -> bool:
-        """Whether an RPDO with the controlword of this axis is kept back."""
-        return any(output.muted for output in self._controlling)
+        """Whether an RPDO with the controlword of this axis is kept back, for whichever axis."""
+        return any(output.kept_back_by for output in self._controlling)
 
-    def mute_controlword(self, *, muted: bool = True) -> None:
-        """Keep every RPDO back that carries the controlword of this axis, or send it again."""
+    @property
+    def mutes_controlword(self) -> bool:
+        """Whether it is kept back for this axis."""
+        return any(self in output.kept_back_by for output in self._controlling)
+
+    def mute_controlword(self) -> None:
+        """Keep every RPDO back that carries the controlword of this axis."""
         for output in self._controlling:
-            output.muted = muted
+            output.kept_back_by.add(self)
+
+    def unmute_controlword(self) -> None:
+        """Send them again, as far as no other axis keeps them back."""
+        for output in self._controlling:
+            output.kept_back_by.discard(self)
+
+    def can_send(self, controlword: int) -> bool:
+        """Set the controlword, and tell whether the RPDOs that carry it can be sent with it."""
+        try:
+            self.controlword.write(controlword)
+            for output in self._controlling:
+                output.frame()
+        except Exception:  # noqa: BLE001  # whatever made the cycle fail may last
+            return False
+        return True
 
     def fresh(self, now: float) -> bool:
         """Tell whether the state is known and young enough to act on, at a steady time in [s].

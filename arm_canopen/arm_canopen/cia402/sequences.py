@@ -47,7 +47,7 @@ class DriveSequences:
             to_stop: A drive whose state is not fresh is ready, too.
 
         Raises:
-            DriveError: It is offline, is just being stopped, or does not tell them.
+            DriveError: It is offline, is being stopped or could not be, or does not tell them.
         """
         drive = self.drive
         self._require_operational()
@@ -56,7 +56,9 @@ class DriveSequences:
         if drive.failure:
             await drive.stop.run()  # once more, as the first may not have reached the drive
         await drive.stop.ended()
-        drive.objects.mute_controlword(muted=False)  # what is commanded next goes by RPDO again
+        if drive.failure and not (to_stop or drive.stop.disabled):
+            raise self.refused('could not be stopped; cut its power')
+        drive.objects.unmute_controlword()  # what is commanded next goes by RPDO again
 
         def ready() -> bool:
             known = to_stop and drive.state is not DriveState.UNKNOWN
@@ -77,15 +79,29 @@ class DriveSequences:
         """
         drive = self.drive
         if goal is DriveState.OPERATION_ENABLED and not drive.stays_enabled:
-            await self._preload(drive.mode, 'is not enabled')
-            if drive.shown_mode is not drive.mode:  # in which it may stay
-                await self._preload(drive.shown_mode, 'is not enabled')
+            await self._begin_enabling()
         drive.goal = goal
         try:
             await self.until(lambda: drive.state is goal, self.quirks.state_timeout, goal.title)
         except BaseException:  # also when it is cancelled: nobody waits for the rest of the way
             drive.goal = DriveState.SWITCH_ON_DISABLED
             raise
+
+    async def _begin_enabling(self) -> None:
+        """Leave what stopped it before behind, and have it hold where it is.
+
+        Raises:
+            DriveError: It is being stopped again, or does not take the value that holds it.
+        """
+        drive = self.drive
+        if drive.stop.running:
+            raise self.refused('is being stopped')
+        drive.failure = ''
+        await self._preload(drive.mode, 'is not enabled')
+        if drive.shown_mode is not drive.mode:  # in which it may stay
+            await self._preload(drive.shown_mode, 'is not enabled')
+        if drive.failure:
+            raise self.refused('is not enabled')
 
     async def _preload(self, mode: Mode | None, consequence: str) -> None:
         """Write the holding value of a mode whose target goes by SDO, whatever the drive has.

@@ -67,12 +67,18 @@ class StopCommands:
         return f'nothing to stop: {drive.describe()}'
 
     async def shutdown(self) -> str:
-        """Bring the drive to rest and take its power away; never raises."""
+        """Bring the drive to rest and take its power away.
+
+        Raises:
+            DriveError: It does not show that its power is away.
+        """
         drive = self.drive
         drive.interrupted = None
         drive.released(Refusal(RefusalCause.SHUTDOWN))
         drive.goal = DriveState.SWITCH_ON_DISABLED
         await drive.stop.run()
+        if not drive.stop.disabled:
+            raise self._steps.refused('is not disabled; cut its power')
         return drive.describe()
 
     async def _ready_to_stop(self, reason: str) -> None:

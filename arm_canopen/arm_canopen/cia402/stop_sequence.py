@@ -32,7 +32,7 @@ class StopSequence:
 
     It looks at the process image itself, because it also serves drives whose part of the cycle
     fails. A drive that does not react is commanded by SDO; then no RPDO carries its controlword
-    any more, which might enable it again.
+    any more, which might enable it again. Where the SDO fails, the RPDO leaves again if it can.
 
     Attributes:
         goal: State that the drive is led to, whatever else is commanded; None while it does not
@@ -46,20 +46,34 @@ class StopSequence:
         self._scheduler = scheduler
         self._task: Task[None] | None = None
         self._sdo_error = ''
+        self._quiet = False
 
     @property
     def running(self) -> bool:
         """Whether it has begun and not ended."""
         return self.goal is not None
 
-    def begin(self) -> None:
-        """Begin, unless it runs already."""
+    @property
+    def disabled(self) -> bool:
+        """Whether the drive shows that its power is away, or shows nothing at all."""
+        return self._drive.objects.state in DISABLED
+
+    def begin(self, *, quiet: bool = False) -> None:
+        """Begin, unless it runs already; what kept the RPDO from the drive before may be over.
+
+        Args:
+            quiet: Do not report what goes wrong: it is tried again and again.
+        """
         if not self.running:
+            self._quiet = quiet
+            self._drive.objects.unmute_controlword()
             self.goal = DriveState.QUICK_STOP_ACTIVE
             self._task = self._scheduler.background(self._run())
 
     async def run(self) -> None:
         """Begin if need be, and wait for the end."""
+        if self._quiet:
+            self.abandon('begun anew')  # what has failed in it may work now
         self.begin()
         await self.ended()
 
@@ -68,7 +82,7 @@ class StopSequence:
         await self._within(SHUTDOWN_MAX, lambda: not self.running)
 
     def abandon(self, reason: str) -> None:
-        """End it, because the device is gone."""
+        """End it where it is."""
         if self._task is not None:
             self._task.cancel(SdoError(reason))
         self.goal = None
@@ -76,7 +90,7 @@ class StopSequence:
     def use_sdo(self) -> None:
         """Command the drive by SDO from now on, because its RPDO does not reach it."""
         objects = self._drive.objects
-        if objects.controlword_muted:
+        if objects.mutes_controlword:
             return
         objects.mute_controlword()
         if self.running:
@@ -93,14 +107,17 @@ class StopSequence:
                 lambda: objects.state is not DriveState.OPERATION_ENABLED,
             )
             if not await self._within(deadline - self._scheduler.now, self._rests):
-                drive.report(Severity.ERROR, f'did not come to rest in time: {self._shown()}')
-            await self._lead(DriveState.SWITCH_ON_DISABLED, self._is_disabled)
-            if not await self._within(STOP_TIMEOUT, self._is_disabled):
+                self._report('did not come to rest in time')
+            await self._lead(DriveState.SWITCH_ON_DISABLED, lambda: self.disabled)
+            if not await self._within(STOP_TIMEOUT, lambda: self.disabled):
                 error = f' ({self._sdo_error})' if self._sdo_error else ''
-                text = f'does not show that it is disabled{error}: {self._shown()}'
-                drive.report(Severity.ERROR, f'{text}. Cut its power')
+                self._report(f'does not show that it is disabled{error}', '. Cut its power')
         finally:
             self.goal = None
+
+    def _report(self, what: str, remedy: str = '') -> None:
+        if not self._quiet:
+            self._drive.report(Severity.ERROR, f'{what}: {self._shown()}{remedy}')
 
     async def _lead(self, goal: DriveState, reacts: Callable[[], bool]) -> None:
         """Command a state, by SDO where the drive does not react to its RPDO."""
@@ -117,11 +134,14 @@ class StopSequence:
         self._scheduler.background(self._written(command))
 
     async def _written(self, command: Command) -> None:
-        place = self._drive.objects.at(Index.CONTROLWORD)
+        objects = self._drive.objects
+        place = objects.at(Index.CONTROLWORD)
         try:
             await self._drive.node.write_object(place, 0, int(command))
         except (SdoError, CodecError) as error:
             self._sdo_error = str(error)
+            if objects.mutes_controlword and objects.can_send(int(command)):
+                objects.unmute_controlword()
 
     def _shown(self) -> str:
         drive = self._drive
@@ -132,9 +152,6 @@ class StopSequence:
         if state is DriveState.QUICK_STOP_ACTIVE:  # option codes 5 to 8 hold there
             return self._drive.stands
         return state is not DriveState.OPERATION_ENABLED
-
-    def _is_disabled(self) -> bool:
-        return self._drive.objects.state in DISABLED
 
     async def _within(self, timeout: float, condition: Callable[[], bool]) -> bool:
         try:

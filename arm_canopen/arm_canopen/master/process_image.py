@@ -169,14 +169,15 @@ class Output:
         values: Next values in mapping order.
         cyclic: It leaves in every cycle; otherwise when somebody published one of its objects.
         due: It was published, and leaves with the next cycle.
-        muted: It does not leave, because its device is commanded by SDO.
+        kept_back_by: Axes that are commanded by SDO; while there are any, it does not leave.
     """
 
     def __init__(self, config: PdoConfig, start: StartValue, *, cyclic: bool = True) -> None:
         """Start with the values that the device has."""
         self.config = config
         self.cyclic = cyclic
-        self.due = self.muted = False
+        self.due = False
+        self.kept_back_by: set[object] = set()
         self._repeat_time = REPEAT_SHARE * (config.event_time or 0.0)
         self._left_at: float | None = None
         self.codec = PdoCodec(config.mapping)
@@ -195,7 +196,7 @@ class Output:
         One with a deadline is repeated within it, once somebody has published it.
         """
         if self.cyclic:
-            return not self.muted
+            return not self.kept_back_by
         repeat = self._left_at is not None and 0.0 < self._repeat_time <= now - self._left_at
         if not self.due and not repeat:
             return False
@@ -208,7 +209,8 @@ class Output:
 
     def reset(self) -> None:
         """The device is another one than before: nothing was published to it."""
-        self.due, self.muted, self._left_at = False, False, None
+        self.due, self._left_at = False, None
+        self.kept_back_by.clear()
 
     def frame(self) -> Frame:
         """Return the frame that carries the present values."""
