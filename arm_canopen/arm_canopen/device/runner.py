@@ -4,9 +4,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 import logging
+import math
 from queue import SimpleQueue
 import threading
 import time
@@ -15,6 +16,7 @@ from typing import Any, TypeVar
 from ..can.bus import Bus
 from ..can.frame import Frame
 from ..exceptions import BusError
+from ..standard.cob_id import CobId, NODE_ID_MAX
 from .device import Device
 from .host import DeviceHost
 
@@ -22,6 +24,7 @@ Result = TypeVar('Result')
 
 IDLE_WAIT = 1.0  # [s] longest wait when no device has a deadline
 RETRY_PAUSE = 0.1  # [s] between two looks at a bus that went away
+STALL = 0.1  # [s] that a frame has waited when devices count as having stood still
 
 logger = logging.getLogger(__name__)
 
@@ -126,6 +129,8 @@ class DeviceRunner:
                 time.sleep(RETRY_PAUSE)
             return []
         self._bus_failed = self._bus_failed and not frames
+        if frames and time.monotonic() - (frames[0].timestamp or math.inf) > STALL:
+            return newest_process_data(frames)
         return frames
 
     def _send(self, frame: Frame) -> None:
@@ -139,6 +144,25 @@ class DeviceRunner:
         if not self._bus_failed:
             self._bus_failed = True
             logger.error('%s', error)
+
+
+def newest_process_data(frames: Sequence[Frame]) -> list[Frame]:
+    """Return what the mailboxes of a CAN controller hold of frames that nobody took in time.
+
+    A device that stood still sees the newest set-point, and does not follow all those of the past.
+    Of SDO, NMT and LSS, whose clients wait for their answers, all is kept.
+    """
+    newest = {frame.can_id: frame for frame in frames}
+    return [
+        frame
+        for frame in frames
+        if not _is_process_data(frame.can_id) or newest[frame.can_id] is frame
+    ]
+
+
+def _is_process_data(can_id: int) -> bool:
+    heartbeat = 0 < can_id - CobId.HEARTBEAT <= NODE_ID_MAX
+    return CobId.SYNC <= can_id < CobId.SDO_RESPONSE or heartbeat
 
 
 def _tell_defect(device: Device, error: Exception) -> None:
