@@ -4,32 +4,47 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+import math
 import signal
 import threading
+from time import monotonic
 
 ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 """Ctrl-C, what stops services, and the closing of the terminal."""
 
+SAME_WISH = 0.5
+"""A SIGINT this soon after the first signal in [s] is its echo: a key that bounces, or a signal to
+a process and to its group."""
 
-def stop_on_signals(*, patient: bool = False) -> threading.Event:
+
+def stop_on_signals(
+    *, patient: bool = False, clock: Callable[[], float] = monotonic
+) -> threading.Event:
     """Set an event at the first signal of :data:`ENDING`; nothing is torn in the middle.
 
-    A second SIGINT ends the process at once. A SIGTERM or SIGHUP does not: what stops processes
-    (``ros2 launch``, say) sends one when the first signal seems to do nothing, while a robot comes
-    to rest. A SIGHUP that is ignored already stays so, as ``nohup`` wants it.
+    A second SIGINT, later than :data:`SAME_WISH`, ends the process at once. A SIGTERM or SIGHUP
+    does not: what stops processes (``ros2 launch``, say) sends one when the first signal seems to
+    do nothing, while a robot comes to rest. A SIGHUP that is ignored already stays so, as
+    ``nohup`` wants it.
 
     Initialise rclpy by :func:`.init_ros`; :func:`.run_program` does both.
 
     Args:
         patient: Not even a second SIGINT ends the process at once; for programs that have to leave
             a terminal as it was.
+        clock: Returns steady time in [s].
     """
     stop = threading.Event()
+    first = math.inf
 
     def handle(number: int, _frame: object) -> None:
-        if stop.is_set() and number == signal.SIGINT and not patient:
+        nonlocal first
+        now = clock()
+        if now - first >= SAME_WISH and number == signal.SIGINT and not patient:
             signal.signal(number, signal.SIG_DFL)
             signal.raise_signal(number)
+        first = min(first, now)
         stop.set()
 
     for number in ENDING:

@@ -96,17 +96,17 @@ class Runner:
             specs: The processes.
             write: Takes each line of output, with the name of the process first.
             notify: Takes each notice of the supervision.
-            on_interrupt: Asked at Ctrl-C before everything is stopped; true when it takes care
-                of stopping, false or None to stop at once.
+            on_interrupt: As in :class:`.Supervision`.
         """
         self._write = write
-        self._on_interrupt = on_interrupt
         self._children: dict[str, _Child] = {}
         self._guardian: GuardianLink | None = None
         self._selector = selectors.DefaultSelector()
         self._wake_read, self._wake_write = socket.socketpair()
         self._requests: queue.SimpleQueue[Outcome] = queue.SimpleQueue()
-        self._supervision = Supervision(specs, self._start, self._send, notify)
+        self._supervision = Supervision(
+            specs, self._start, self._send, notify, on_interrupt=on_interrupt
+        )
         self._restore: list[Callable[[], object]] = []
 
     def __enter__(self) -> Runner:
@@ -230,9 +230,4 @@ class Runner:
             self._supervision.stop(self._requests.get(), time.monotonic())
         for number in numbers:
             if number in LEAVE_SIGNALS:
-                self._interrupt()
-
-    def _interrupt(self) -> None:
-        deferred, self._on_interrupt = self._on_interrupt, None
-        if deferred is None or self.phase is Phase.STOPPING or not deferred():
-            self._supervision.interrupt(time.monotonic())
+                self._supervision.interrupt(time.monotonic())

@@ -19,6 +19,10 @@ from .stopping import StopSequence
 LAST_LINES = 12
 """How many lines of a process are kept to explain its end."""
 
+SAME_WISH = 0.5
+"""An interrupt this soon after another one in [s] is its echo: a key that bounces, or a signal to
+a process and to its group."""
+
 GOOD_ENDS = (0, -Signals.SIGINT, -Signals.SIGTERM)
 """Return codes of a process that did what it was asked to when it was stopped."""
 
@@ -94,6 +98,8 @@ class Supervision:
         start: Callable[[ProcessSpec], None],
         send: Callable[[str, Signals], None],
         notify: Callable[[Notice], None],
+        *,
+        on_interrupt: Callable[[], bool] | None = None,
     ) -> None:
         """Take the plan; nothing is started yet.
 
@@ -102,6 +108,8 @@ class Supervision:
             start: Starts one; raises :class:`.StartError` when that is not possible.
             send: Sends a signal to a running one.
             notify: Tells the user something.
+            on_interrupt: Asked at the first interrupt before everything is stopped; true when it
+                takes care of stopping, false or None to stop at once.
 
         Raises:
             ValueError: Two processes have the same name.
@@ -110,6 +118,8 @@ class Supervision:
         self.outcome: Outcome | None = None
         self._start = start
         self._notify = notify
+        self._on_interrupt = on_interrupt
+        self._interrupted = math.inf
         self._begun = 0.0
         self._stopping = StopSequence(send)
         self._children: dict[str, _Child] = {}
@@ -195,15 +205,19 @@ class Supervision:
             self._check_ready(now)
 
     def interrupt(self, now: float) -> None:
-        """Ctrl-C: stop; again: stop at once.
+        """Ctrl-C: stop; again, later than :data:`SAME_WISH`: stop at once.
 
         Args:
             now: Steady time in [s].
         """
+        if 0.0 <= now - self._interrupted < SAME_WISH:
+            return
+        self._interrupted = now
+        deferred, self._on_interrupt = self._on_interrupt, None
         if self.phase is Phase.STOPPING:
             self._say('forced: killing ' + ', '.join(self.running), Severity.WARNING)
             self._stopping.force(now)
-        else:
+        elif deferred is None or not deferred():
             self._say('stopping; Ctrl-C again kills everything at once')
             self.stop(Outcome(0, 'stopped by the user'), now)
 

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from signal import Signals
 
 import pytest
@@ -22,12 +23,19 @@ from process_supervisor import (
 class Bench:
     """A supervision whose processes are names in a list."""
 
-    def __init__(self, *specs: ProcessSpec, missing: str = '') -> None:
+    def __init__(
+        self,
+        *specs: ProcessSpec,
+        missing: str = '',
+        on_interrupt: Callable[[], bool] | None = None,
+    ) -> None:
         self.missing = missing
         self.started: list[str] = []
         self.sent: list[tuple[str, Signals]] = []
         self.notices: list[Notice] = []
-        self.supervision = Supervision(specs, self._start, self._send, self.notices.append)
+        self.supervision = Supervision(
+            specs, self._start, self._send, self.notices.append, on_interrupt=on_interrupt
+        )
         self.supervision.begin(0.0)
 
     def _start(self, spec: ProcessSpec) -> None:
@@ -133,12 +141,40 @@ def test_a_second_interrupt_kills_everybody_and_is_no_success() -> None:
     """Forced: drives may still be enabled, so the exit code is not 0."""
     bench = Bench(SLAVES, MASTER)
     bench.supervision.interrupt(5.0)
-    bench.supervision.interrupt(5.1)
+    bench.supervision.interrupt(5.5)
     assert {('master', Signals.SIGKILL), ('slaves', Signals.SIGKILL)} < set(bench.sent)
-    bench.supervision.exited('master', -9, 5.2)
-    bench.supervision.exited('slaves', -9, 5.2)
+    bench.supervision.exited('master', -9, 5.6)
+    bench.supervision.exited('slaves', -9, 5.6)
     assert bench.outcome.exit_code == 1
     assert 'master had to be killed' in bench.outcome.reason
+
+
+def test_an_echo_of_an_interrupt_kills_nobody() -> None:
+    """Two signals a few milliseconds apart are one wish: drives come to rest and are disabled."""
+    bench = Bench(SLAVES, MASTER)
+    bench.supervision.interrupt(5.0)
+    bench.supervision.interrupt(5.003)
+    bench.supervision.interrupt(5.49)
+    assert bench.sent == [('master', Signals.SIGINT)]
+
+
+def test_the_first_interrupt_can_be_taken_over() -> None:
+    """Then its echo does nothing either; the next interrupt stops, and the one after it kills."""
+    asked: list[int] = []
+
+    def take() -> bool:
+        asked.append(1)
+        return True
+
+    bench = Bench(MASTER, on_interrupt=take)
+    bench.supervision.interrupt(5.0)
+    bench.supervision.interrupt(5.003)
+    assert (asked, bench.sent) == ([1], [])
+    bench.supervision.interrupt(6.0)
+    bench.supervision.interrupt(6.003)
+    assert (asked, bench.sent) == ([1], [('master', Signals.SIGINT)])
+    bench.supervision.interrupt(7.0)
+    assert bench.sent[-1] == ('master', Signals.SIGKILL)
 
 
 def test_a_process_that_does_not_stop_is_killed_in_the_end() -> None:

@@ -72,13 +72,13 @@ def test_ctrl_c_again_ends_a_farewell(
     given_up_in_time = threading.Event()
 
     def farewell(say: Say, given_up: GivenUp) -> None:
-        signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
         wait = threading.Event()
-        for _ in range(round(PATIENCE / 0.01)):
+        for _ in range(round(PATIENCE / 0.1)):
+            signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
             if given_up():
                 given_up_in_time.set()
                 return
-            wait.wait(0.01)
+            wait.wait(0.1)
 
     CtrlC(monkeypatch, 'all is ready')
     outcome, _ = run_until(capsys, 'good', farewell=farewell)
