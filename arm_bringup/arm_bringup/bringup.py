@@ -126,9 +126,9 @@ def _controllers(arguments: argparse.Namespace, ros: RosOptions) -> int:
     apply_network(arguments)
     robot = locate(arguments.robot)
     ros = in_namespace_of_bus(ros, read_drives(robot))
-    if not robot.movable:
+    if robot.lacking:
         raise RobotError(
-            f'{robot.name} lacks {robot.semantic.name} and {robot.limits.name}: '
+            f'{robot.name} lacks {robot.lacking}: '
             f'ros2 run arm_bringup check {arguments.robot} tells more'
         )
     with tempfile.TemporaryDirectory(prefix='arm_bringup-') as folder:

@@ -70,12 +70,11 @@ def _meant(name: str, names: Sequence[str]) -> str:
 
 
 def _motion(robot: Robot, urdf: str, joints: Sequence[str]) -> list[Finding]:
-    missing = [path.name for path in (robot.semantic, robot.limits) if not path.is_file()]
-    if missing:
+    if robot.lacking:
         return [
             warning(
                 f'{robot.name}/',
-                f'{" and ".join(missing)} not there: no trajectories, no jogging',
+                f'lacks {robot.lacking} for trajectories and jogging',
                 'write them as in robots/gp110/: the group to move, and the limits of its joints',
             )
         ]

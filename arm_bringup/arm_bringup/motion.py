@@ -93,7 +93,6 @@ def choose_master(robot: Robot, find: FindExecutable) -> tuple[Executable, str]:
     """
     if find(MOTION_MASTER.package, MOTION_MASTER.name) is None:
         return MASTER, MAKE_MOVE
-    if not robot.movable:
-        need = f'{robot.semantic.name} and {robot.limits.name}'
-        return MASTER, f'{robot.name} lacks {need} for trajectories and jogging'
+    if robot.lacking:
+        return MASTER, f'{robot.name} lacks {robot.lacking} for trajectories and jogging'
     return MOTION_MASTER, ''

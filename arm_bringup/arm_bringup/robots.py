@@ -64,9 +64,10 @@ class Robot:
         return self.folder / 'controllers.yaml'
 
     @property
-    def movable(self) -> bool:
-        """Whether it has all that trajectories and jogging need."""
-        return self.semantic.is_file() and self.limits.is_file()
+    def lacking(self) -> str:
+        """Names of the files that it lacks for trajectories and jogging; empty when it moves."""
+        files = (self.semantic, self.limits)
+        return ' and '.join(path.name for path in files if not path.is_file())
 
 
 def installed_robots_folder() -> Path:

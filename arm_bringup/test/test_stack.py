@@ -104,8 +104,9 @@ def test_master_without_arm_servo(tmp_path: Path) -> None:
     assert choose_master(robot, bare) == (MASTER, MAKE_MOVE)
     assert choose_master(robot, full)[0] == MASTER
     assert 'lacks my.srdf and limits.yaml' in choose_master(robot, full)[1]
-    robot.semantic.write_text('<robot name="my"/>')
     robot.limits.touch()
+    assert 'my lacks my.srdf for' in choose_master(robot, full)[1]
+    robot.semantic.write_text('<robot name="my"/>')
     assert choose_master(robot, full) == (MOTION_MASTER, '')
     (file,) = motion_files(robot, tmp_path, RosOptions())
     values = yaml.safe_load(file.read_text())[EVERY_NODE]['ros__parameters']

@@ -241,6 +241,21 @@ def test_drives_with_the_same_trouble_are_named_together() -> None:
     )
 
 
+def test_a_drive_on_its_way_to_a_single_target_is_waited_for_or_halted() -> None:
+    """The command that is refused is the next one already: it does not take the drive back."""
+    drives = Drives()
+    single = Refusal(RefusalCause.SINGLE_TARGET)
+    axes = [replace(axis, followable=False, refusal=single) for axis in drives.axes[:2]]
+    assert why_not(axes[:1], {}) == (
+        'panda_joint1 moves to a single target; wait until it stands, or call its ~/halt; then the'
+        ' next command takes it back'
+    )
+    assert why_not(axes, {}) == (
+        'panda_joint1, panda_joint2 move to a single target; wait until they stand, or call their'
+        ' ~/halt; then the next command takes them back'
+    )
+
+
 def test_the_cause_is_told_and_not_what_followed_from_it() -> None:
     """A master that shuts down disables the drives: that they are disabled is a consequence."""
     drives = attached()

@@ -182,9 +182,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments, ros = parse(sys.argv[1:] if argv is None else argv)
     try:
         robot = locate(arguments.robot)
-        if not robot.movable:
+        if robot.lacking:
             raise RobotError(
-                f'{robot.name} lacks {robot.semantic.name} and {robot.limits.name}: '
+                f'{robot.name} lacks {robot.lacking}: '
                 f'ros2 run arm_bringup check {arguments.robot} tells more'
             )
         with session(

@@ -26,7 +26,7 @@ REMEDIES: Mapping[RefusalCause, str] = {
     RefusalCause.OTHER_MODE: MODE,
     RefusalCause.MODE_SELECTED: MODE,
     RefusalCause.HALTED: COMMAND,
-    RefusalCause.SINGLE_TARGET: COMMAND,
+    RefusalCause.SINGLE_TARGET: f'wait until it stands, or call its ~/halt; then {COMMAND}',
     RefusalCause.OTHER_SOURCE: COMMAND,
     RefusalCause.COMMANDED: COMMAND,
     RefusalCause.NOT_FOLLOWING: 'free its way; the next command takes it back',
@@ -40,6 +40,9 @@ SILENT_SHARE = 0.5
 
 PLURAL = {'is': 'are', 'has': 'have', 'was': 'were', 'does': 'do', 'moves': 'move'}
 """Words with which reasons begin, as they are said of several drives."""
+
+OBJECTS = {' its ': ' their ', 'takes it': 'takes them', 'it stands': 'they stand'}
+"""What reasons say of one drive, as it is said of several."""
 
 Released = Mapping[str, Refusal | str]
 """Drives that were taken away, with what happened."""
@@ -111,5 +114,6 @@ def _words(cause: Refusal | str) -> str:
 def _of_several(reason: str) -> str:
     """Return what is said of one drive, said of several."""
     verb, rest = reason.split(' ', 1)
-    several = rest.replace(' its ', ' their ').replace('takes it', 'takes them')
-    return f'{PLURAL.get(verb, verb)} {several}'
+    for one, many in OBJECTS.items():
+        rest = rest.replace(one, many)
+    return f'{PLURAL.get(verb, verb)} {rest}'
