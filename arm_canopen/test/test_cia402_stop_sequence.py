@@ -205,6 +205,21 @@ def test_a_drive_that_could_not_be_stopped_is_stopped_when_it_is_asked_for_again
     assert abs(failing.device.velocity) / SCALE < STANDING
 
 
+def test_a_stop_by_sdo_waits_for_no_other_sdo(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Neither for those in the queue nor for answers that get lost."""
+    failing = Failing(6, monkeypatch)
+    failing.net.wire.loses = lambda sender, frame: frame.can_id == 0x580 + NODE_ID
+    node = failing.net.network.nodes[JOINT]
+    for _ in range(30):
+        node.sdo.read(0x1018, 1, 0.2)
+    failing.fail(*owner_of(failing, 'RPDO'))
+    failing.run(2 * PERIOD)
+    assert failing.device.state is DriveState.QUICK_STOP_ACTIVE
+    failing.run(RAMP + 0.5)
+    assert failing.states[-1] is DriveState.SWITCH_ON_DISABLED
+    assert failing.fastest < STANDING
+
+
 @pytest.mark.parametrize('verb', ['', 'shutdown'])
 def test_a_stop_whose_sdo_is_not_answered_goes_by_rpdo_again(
     verb: str, monkeypatch: pytest.MonkeyPatch

@@ -554,6 +554,44 @@ def test_cancelling_ends_all_and_leaves_the_client_ready(progress: int) -> None:
     assert line.defects == []
 
 
+@pytest.mark.parametrize('progress', [0, 1, 2], ids=['asked', 'first segment', 'second segment'])
+def test_an_urgent_write_ends_what_runs_and_passes_what_waits(progress: int) -> None:
+    """Those that wait come after it; the one that ran is told why."""
+    line = Line()
+    server = SdoByteServer(values={(0x1018, 1): b'0123456789abcdef', (0x1018, 2): b'*'})
+    running, waiting = read(line), read(line, subindex=2)
+    for _ in range(progress):
+        answer = server.answer(line.sent.pop(0))
+        assert answer is not None
+        line.receive(answer)
+    line.sent.clear()
+    urgent = [
+        line.client.write(0x6040, 0, data, TIMEOUT, urgent=True) for data in (b'\2\0', b'\0\0')
+    ]
+    with pytest.raises(SdoError, match='joint1: made way for an urgent SDO'):
+        running.result()
+    assert [data[0] for data in line.sent] == [0x80, 0x2B], 'aborted, then written'
+    assert not waiting.done
+    line.serve(server.answer)
+    assert all(promise.result() is None for promise in urgent)
+    assert server.values[0x6040, 0] == b'\0\0', 'they changed places'
+    assert waiting.result() == b'*'
+    assert line.defects == []
+
+
+def test_an_urgent_write_leaves_while_an_answer_to_the_same_object_is_owed() -> None:
+    """The device may hear what it does not answer."""
+    line = Line()
+    for data, request in (
+        (b'\2\0', '2B 40 60 00 02 00 00 00'),
+        (b'\0\0', '2B 40 60 00' + '00' * 4),
+    ):
+        line.client.write(0x6040, 0, data, TIMEOUT, urgent=True)
+        line.expect(request)
+        line.pass_time(TIMEOUT)
+        line.sent.clear()
+
+
 def test_who_asks_again_when_cancelled_is_served_after_it() -> None:
     """A caller that repeats at once does not get lost in the clearing."""
     line = Line()

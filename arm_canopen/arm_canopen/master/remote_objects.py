@@ -143,15 +143,24 @@ class RemoteObjects:
         patience = self.config.sdo_timeout if timeout is None else timeout
         return decode(entry.data_type, await self.sdo.read(index, subindex, patience))
 
-    def write_object(self, index: int, subindex: int, value: Value) -> Promise[None]:
-        """Write an object by SDO, encoded by its type in the EDS; errors reject the promise."""
+    def write_object(
+        self, index: int, subindex: int, value: Value, *, urgent: bool = False
+    ) -> Promise[None]:
+        """Write an object by SDO, encoded by its type in the EDS; errors reject the promise.
+
+        Args:
+            index: Object index.
+            subindex: Sub-index.
+            value: The value.
+            urgent: It does not wait for other SDOs, as of :meth:`SdoClient.write`.
+        """
         try:
             data = encode(self.entry(index, subindex).data_type, value)
         except (SdoError, CodecError) as error:
             refused: Promise[None] = Promise()
             refused.reject(error)
             return refused
-        return self.sdo.write(index, subindex, data, self.config.sdo_timeout)
+        return self.sdo.write(index, subindex, data, self.config.sdo_timeout, urgent=urgent)
 
     def _object_downloaded(
         self, index: int, subindex: int, data: bytes, end: Promise[None]

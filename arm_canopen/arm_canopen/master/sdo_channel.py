@@ -81,13 +81,21 @@ class SdoChannel:
         self._strays = 0  # frames since the open question that do not answer it
         self._owed: list[Address] = []
 
-    async def begin(self, index: int, subindex: int, timeout: float) -> None:
+    async def begin(
+        self, index: int, subindex: int, timeout: float, *, settle: bool = True
+    ) -> None:
         """Begin a transfer; makes sure that no answer of an earlier one is taken for its own.
+
+        Args:
+            index: Object index.
+            subindex: Sub-index.
+            timeout: Longest time to wait for the answers that are owed in [s].
+            settle: Do wait for them; otherwise one to the same question counts.
 
         Raises:
             SdoTimeoutError: The device does not answer at all.
         """
-        if (index, subindex) in self._owed:
+        if settle and (index, subindex) in self._owed:
             await self._settle(index, subindex, timeout)
         self.address = (index, subindex)
 

@@ -55,6 +55,8 @@ class SdoClient:
         self._scheduler = scheduler
         self._channel = SdoChannel(node_id, name, scheduler, send)
         self._queue: deque[tuple[Transfer[Any], Promise[Any]]] = deque()
+        self._urgent: deque[tuple[Transfer[Any], Promise[Any]]] = deque()
+        self._yields = False  # the transfer that runs ends for an urgent one
         self._busy = False
         self._running: Task[Any] | None = None
         self._has_blocks = True  # as long as the device has not shown the contrary
@@ -83,7 +85,14 @@ class SdoClient:
         return self._enqueue(upload, Promise())
 
     def write(
-        self, index: int, subindex: int, data: bytes, timeout: float, *, repeat: bool = False
+        self,
+        index: int,
+        subindex: int,
+        data: bytes,
+        timeout: float,
+        *,
+        repeat: bool = False,
+        urgent: bool = False,
     ) -> Promise[None]:
         """Queue a download; long values are written in blocks when the device can do that.
 
@@ -93,6 +102,8 @@ class SdoClient:
             data: The value as it is sent.
             timeout: Longest time for each answer of the device in [s].
             repeat: Writing the value twice does no harm, so a lost frame may be sent again.
+            urgent: It leaves at once, and ends the transfer that runs unless that is urgent, too;
+                an answer that is still owed for the object counts as its own.
 
         Returns:
             Promise of the end; rejected with SdoAbortError or SdoTimeoutError.
@@ -103,15 +114,20 @@ class SdoClient:
             for hook in self.on_download:
                 hook(index, subindex, data, promise)
 
-        download = partial(self._download, index, subindex, data, timeout, leave, repeat=repeat)
-        return self._enqueue(download, promise)
+        download = partial(
+            self._download, index, subindex, data, timeout, leave, repeat=repeat, urgent=urgent
+        )
+        self._enqueue(download, promise, urgent=urgent)
+        if urgent and self._yields:
+            self._end_running('made way for an urgent SDO')
+        return promise
 
     def cancel_all(self, reason: str) -> None:
         """Reject every transfer, because the device restarted or went away."""
-        queue, self._queue = self._queue, deque()
-        if self._running is not None:
-            self._channel.cancel()
-            self._running.cancel(SdoError(f'{self._name}: {reason}'))
+        queue = [*self._urgent, *self._queue]
+        self._urgent.clear()
+        self._queue.clear()
+        self._end_running(reason)
         for _, promise in queue:
             promise.reject(SdoError(f'{self._name}: {reason}'))
 
@@ -123,16 +139,26 @@ class SdoClient:
         """Take an answer of the device."""
         self._channel.receive(frame.data)
 
-    def _enqueue(self, transfer: Transfer[T], promise: Promise[T]) -> Promise[T]:
-        self._queue.append((transfer, promise))
+    def _end_running(self, reason: str) -> None:
+        """End the transfer that runs; the next one begins before this returns."""
+        if self._running is not None:
+            self._channel.cancel()
+            self._running.cancel(SdoError(f'{self._name}: {reason}'))
+
+    def _enqueue(
+        self, transfer: Transfer[T], promise: Promise[T], *, urgent: bool = False
+    ) -> Promise[T]:
+        queue = self._urgent if urgent else self._queue
+        queue.append((transfer, promise))
         if not self._busy:
             self._scheduler.background(self._work())
         return promise
 
     async def _work(self) -> None:
         self._busy = True
-        while self._queue:
-            transfer, promise = self._queue.popleft()
+        while self._urgent or self._queue:
+            self._yields = not self._urgent
+            transfer, promise = (self._urgent or self._queue).popleft()
             try:
                 # a task of its own, so that it can be ended wherever it waits
                 self._running = self._scheduler.spawn(transfer())
@@ -142,7 +168,7 @@ class SdoClient:
             else:
                 self.counters.done += 1
                 promise.resolve(result)
-        self._busy, self._running = False, None
+        self._busy, self._running, self._yields = False, None, False
 
     async def _upload(self, index: int, subindex: int, timeout: float, *, block: bool) -> bytes:
         channel = self._channel
@@ -187,9 +213,10 @@ class SdoClient:
         leave: Callable[[], None],
         *,
         repeat: bool,
+        urgent: bool,
     ) -> None:
         channel = self._channel
-        await channel.begin(index, subindex, timeout)
+        await channel.begin(index, subindex, timeout, settle=not urgent)
         leave()
         if len(data) >= BLOCK_MIN and self._has_blocks:
             try:
