@@ -12,10 +12,11 @@ import random
 import pytest
 from virtual_network import bus_config, drive_config, every_mode, PERIOD, SCALE, VirtualNetwork
 
+from arm_canopen.can.frame import Frame
 from arm_canopen.cia402.position_modes import Move
 from arm_canopen.config.model import NodeConfig
 from arm_canopen.device.faults import BusFault, FaultInjection
-from arm_canopen.exceptions import DriveError
+from arm_canopen.exceptions import DriveError, SdoAbortError, SdoTimeoutError
 from arm_canopen.master.events import Severity
 from arm_canopen.master.scheduler import Promise
 from arm_canopen.standard.drive import DriveState, OperationMode
@@ -134,6 +135,26 @@ def test_a_refused_holding_value_keeps_the_drive_disabled(mode: OperationMode) -
     assert net.drives[JOINT].state is not DriveState.OPERATION_ENABLED
     accept(net)
     assert 'Operation enabled' in net.do(JOINT, 'enable')
+
+
+def test_the_mode_that_a_drive_stays_in_is_held_at_enable() -> None:
+    """It does not follow to mode 0; what others left in the target of mode 3 would move it."""
+    net = running_in(OperationMode.PROFILE_VELOCITY)
+
+    def stays_in_mode_3(sender: str, frame: Frame) -> Frame:
+        mode_command = frame.can_id == 0x200 + NODE_ID
+        return frame._replace(data=frame.data[:2] + b'\x03') if mode_command else frame
+
+    net.wire.alters = stays_in_mode_3
+    net.do(JOINT, 'init')
+    net.do(JOINT, 'disable')
+    leave_behind(net, VELOCITY, 3_000)
+    before = motor(net)
+    net.do(JOINT, 'enable')
+    assert net.drives[JOINT].mode.number is OperationMode.NO_MODE
+    assert net.drives[JOINT].objects.mode_display == OperationMode.PROFILE_VELOCITY
+    net.run(1.0)
+    assert motor(net) == pytest.approx(before, abs=1e-3)
 
 
 def test_a_refused_holding_value_keeps_the_mode() -> None:
@@ -339,6 +360,27 @@ def test_a_stream_whose_targets_are_refused_stops_the_axis() -> None:
     assert abs(net.drives[JOINT].rate) < 0.01
 
 
+def test_a_target_after_a_stream_is_not_stopped_by_what_was_under_way() -> None:
+    """The drive refuses the last of the stream, which the single target has ended."""
+    net = running_in(OperationMode.PROFILE_VELOCITY)
+    net.run(0.1)  # the writer pauses after the value that holds it
+    commands, node = net.commands[JOINT], net.network.nodes[JOINT]
+    under_way: Promise[None] = Promise()
+
+    async def refused(*address: object) -> None:
+        await under_way
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(node, 'write_object', refused)
+        commands.stream_target(0.1)
+        answered = give(net, 0.3)
+    under_way.reject(SdoAbortError('0x60FF refused', 0x08000022))
+    assert 'target' in net.result(answered)
+    net.run(1.0)
+    assert not net.drives[JOINT].halted
+    assert net.drives[JOINT].rate == pytest.approx(0.3, abs=0.02)
+
+
 # ------------------------------------------------------------------ nothing unasked
 
 
@@ -386,6 +428,31 @@ def test_a_controlword_that_is_refused_is_written_seldom() -> None:
     accept(net)
     net.run_until(lambda: promise.done, 10.0)
     net.run_until(lambda: net.drives[JOINT].state is not DriveState.OPERATION_ENABLED, 10.0)
+
+
+def test_of_values_behind_one_that_failed_only_the_newest_is_sent() -> None:
+    """Whoever delivered one that was dropped is told when the device has the newest."""
+    net = booted()
+    node = net.network.nodes[JOINT]
+    writer, sent = node.writer(VELOCITY), []
+    under_way: Promise[None] = Promise()
+
+    async def write(index: int, subindex: int, value: int) -> None:
+        sent.append(value)
+        if len(sent) == 1:
+            await under_way
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(node, 'write_object', write)
+        writer.write(1)
+        writer.write(2)
+        dropped = writer.deliver(3)
+        writer.write(4)
+        under_way.reject(SdoTimeoutError('did not answer'))
+        net.run(0.2)
+    assert sent == [1, 4]
+    assert dropped.done
+    assert dropped.error is None
 
 
 # ------------------------------------------------------------------ all of it in any order

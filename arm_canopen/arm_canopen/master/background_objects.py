@@ -157,7 +157,7 @@ class SdoWriter:
     def _note_failure(self, error: Exception, *, repeats: bool) -> None:
         """Report the first failure, and keep values from piling up behind those that follow."""
         while len(self._queue) > 1:
-            self._queue.popleft()
+            self._queue.popleft().written.follow(self._queue[-1].written)
         self._failed = not self._queue
         if not self._node.online:
             return
