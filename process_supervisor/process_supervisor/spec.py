@@ -24,11 +24,14 @@ class StopStep:
 
 
 POLITE = (
-    StopStep(Signals.SIGINT, 20.0),
-    StopStep(Signals.SIGTERM, 2.0),
+    StopStep(Signals.SIGTERM, 20.0),
+    StopStep(Signals.SIGINT, 2.0),
     StopStep(Signals.SIGKILL, 2.0),
 )
-"""The usual ladder; 20 s because a master may take 18 s to bring its drives to rest."""
+"""The usual ladder; 20 s because a master may take 18 s to bring its drives to rest.
+
+SIGTERM comes first: by a SIGINT, a Python process that is still importing ends with a traceback.
+"""
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,7 +21,7 @@ import os, signal, sys
 def leave(number, frame):
     os.write(1, b'bye\\n')
     os._exit(0)
-signal.signal(signal.SIGINT, leave)
+signal.signal(signal.SIGTERM, leave)
 arguments = dict(word.split(':=', 1) for word in sys.argv if ':=' in word)
 arguments |= {{word: after for word, after in zip(sys.argv, sys.argv[1:])}}
 print({ready!r}.format_map(arguments), flush=True)

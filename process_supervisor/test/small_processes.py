@@ -18,7 +18,7 @@ PATIENCE = 30.0
 
 QUICK = tuple(
     StopStep(signal, patience)
-    for signal, patience in [(Signals.SIGINT, 0.3), (Signals.SIGTERM, 0.3), (Signals.SIGKILL, 9)]
+    for signal, patience in [(Signals.SIGTERM, 0.3), (Signals.SIGINT, 0.3), (Signals.SIGKILL, 9)]
 )
 """A ladder with little patience, for processes that do not hear."""
 

@@ -109,7 +109,7 @@ def test_the_end_of_a_required_process_ends_all(returncode: int, words: str) -> 
     """Whatever way it ends, also with exit code 0, the rest is stopped and the exit code is 1."""
     bench = Bench(MASTER, SLAVES)
     bench.supervision.exited('slaves', returncode, 1.0)
-    assert bench.sent == [('master', Signals.SIGINT)]
+    assert bench.sent == [('master', Signals.SIGTERM)]
     assert bench.outcome.exit_code == 1
     assert words in bench.outcome.reason
     bench.supervision.exited('master', 0, 2.0)
@@ -128,9 +128,9 @@ def test_interrupt_stops_in_order_and_exits_0() -> None:
     """The master first; the slaves only when it is gone."""
     bench = Bench(SLAVES, MASTER)
     bench.supervision.interrupt(5.0)
-    assert bench.sent == [('master', Signals.SIGINT)]
+    assert bench.sent == [('master', Signals.SIGTERM)]
     bench.supervision.exited('master', 0, 6.0)
-    assert bench.sent == [('master', Signals.SIGINT), ('slaves', Signals.SIGINT)]
+    assert bench.sent == [('master', Signals.SIGTERM), ('slaves', Signals.SIGTERM)]
     bench.supervision.exited('slaves', -2, 6.5)
     assert bench.supervision.phase is Phase.STOPPED
     assert bench.outcome == Outcome(0, 'stopped by the user')
@@ -155,7 +155,7 @@ def test_an_echo_of_an_interrupt_kills_nobody() -> None:
     bench.supervision.interrupt(5.0)
     bench.supervision.interrupt(5.003)
     bench.supervision.interrupt(5.49)
-    assert bench.sent == [('master', Signals.SIGINT)]
+    assert bench.sent == [('master', Signals.SIGTERM)]
 
 
 def test_the_first_interrupt_can_be_taken_over() -> None:
@@ -172,7 +172,7 @@ def test_the_first_interrupt_can_be_taken_over() -> None:
     assert (asked, bench.sent) == ([1], [])
     bench.supervision.interrupt(6.0)
     bench.supervision.interrupt(6.003)
-    assert (asked, bench.sent) == ([1], [('master', Signals.SIGINT)])
+    assert (asked, bench.sent) == ([1], [('master', Signals.SIGTERM)])
     bench.supervision.interrupt(7.0)
     assert bench.sent[-1] == ('master', Signals.SIGKILL)
 
@@ -186,8 +186,8 @@ def test_a_process_that_does_not_stop_is_killed_in_the_end() -> None:
         assert deadline is not None
         bench.supervision.advance(deadline)
     assert [signal for _, signal in bench.sent] == [
-        Signals.SIGINT,
         Signals.SIGTERM,
+        Signals.SIGINT,
         Signals.SIGKILL,
     ]
     assert 'not even SIGKILL ended master' in bench.notices[-1].text
@@ -205,7 +205,7 @@ def test_the_first_reason_stays() -> None:
 def test_what_cannot_be_started_stops_what_was() -> None:
     """A missing executable is reported; those started before it are stopped."""
     bench = Bench(SLAVES, MASTER, missing='master')
-    assert bench.sent == [('slaves', Signals.SIGINT)]
+    assert bench.sent == [('slaves', Signals.SIGTERM)]
     assert bench.outcome.reason == 'master cannot be started: no such file'
 
 
