@@ -185,3 +185,26 @@ def test_verdicts(
     found, when = judged(setpoint, position)
     assert found is verdict
     assert when == pytest.approx(time, abs=0.05)
+
+
+@pytest.mark.parametrize(
+    ('setpoint', 'position', 'verdict'),
+    [
+        (0.5, 0.0, Following.LEFT_BEHIND),
+        (0.5, 0.45, Following.FOLLOWS),
+        (0.0, -0.5, Following.FOLLOWS),
+    ],
+    ids=['stuck', 'followed', 'droop'],
+)
+def test_an_axis_that_was_led_on_unseen_is_judged_by_its_first_position(
+    setpoint: float, position: float, verdict: Following
+) -> None:
+    """Set-points that moved meanwhile have left it behind; a droop may pass."""
+    watch = FollowingWatch()
+    limits = {'margin': 0.1, 'window': 0.1}
+    for cycle in range(10):
+        seen = watch.judge(cycle * PERIOD, 0.0, 0.0, error=False, **limits)
+        assert seen is Following.FOLLOWS
+    watch.lose_sight()
+    watch.lose_sight()
+    assert watch.judge(1.0, setpoint, position, error=False, **limits) is verdict
