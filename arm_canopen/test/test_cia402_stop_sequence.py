@@ -173,7 +173,7 @@ def test_a_deaf_drive_is_stopped_by_sdo_and_not_enabled_by_what_comes_later(
 def test_an_axis_is_stopped_whose_rpdo_is_kept_back_with_another_axis(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """It would go on with the last controlword that it got."""
+    """It would go on with the last controlword that it got; enabling it frees no RPDO."""
     failing = Failing(6, monkeypatch)
     other = DriveObjects(failing.net.network.nodes[JOINT])
     other.mute_controlword()
@@ -182,6 +182,9 @@ def test_an_axis_is_stopped_whose_rpdo_is_kept_back_with_another_axis(
     assert failing.fastest < STANDING
     assert failing.controlwords_by_sdo == [2, 0]
     assert len(failing.errors) == 1
+    with pytest.raises(DriveError, match='did not reach Operation enabled'):
+        failing.net.do(JOINT, 'enable')
+    assert other.controlword_muted, 'the RPDO carries what the other axis must not get'
     other.unmute_controlword()
     failing.net.do(JOINT, 'enable')
 
