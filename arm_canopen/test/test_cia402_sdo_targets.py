@@ -22,7 +22,7 @@ from arm_canopen.master.scheduler import Promise
 from arm_canopen.standard.drive import DriveState, OperationMode
 
 JOINT, NODE_ID = 'joint1', 2
-REQUEST = 0x600 + NODE_ID
+REQUEST, ANSWER = 0x600 + NODE_ID, 0x580 + NODE_ID
 DOWNLOADS = frozenset({0x22, 0x23, 0x27, 0x2B, 0x2F})
 POSITION, VELOCITY, VL_VELOCITY, TORQUE = 0x607A, 0x60FF, 0x6042, 0x6071
 TARGETS = {
@@ -286,6 +286,23 @@ def test_a_target_that_is_not_answered_is_no_success() -> None:
     net.result(give(net, 0.3))
     net.run(2.0)
     assert motor(net) == pytest.approx(0.3, abs=1e-3)
+
+
+@pytest.mark.parametrize('mode', [m for m in TARGETS if m != OperationMode.PROFILE_POSITION])
+def test_a_target_whose_answer_is_lost_does_not_go_on_moving(mode: OperationMode) -> None:
+    """The drive has it, and nobody knows: as the answer is an error, the axis is halted."""
+    net = running_in(mode)
+    net.run(0.1)
+    net.wire.loses = lambda sender, frame: frame.can_id == ANSWER
+    with pytest.raises(DriveError, match='did not answer'):
+        net.result(give(net, 0.4 if mode is not OperationMode.PROFILE_TORQUE else 200.0))
+    net.run(1.0)
+    assert abs(net.drives[JOINT].rate) < 0.01
+    net.wire.loses = lambda sender, frame: False
+    net.run(0.5)
+    net.result(give(net, 0.2 if mode is not OperationMode.PROFILE_TORQUE else 200.0))
+    net.run(1.0)
+    assert net.drives[JOINT].rate > 0.1
 
 
 @pytest.mark.parametrize('verb', ['halt', 'disable', 'quick_stop'])

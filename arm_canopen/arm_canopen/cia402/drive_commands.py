@@ -8,7 +8,7 @@ from collections.abc import Callable, Coroutine
 from dataclasses import replace
 from typing import Any, TypeVar
 
-from ..exceptions import DriveError
+from ..exceptions import DriveError, SdoTimeoutError
 from ..master.scheduler import completed, Promise, Scheduler, Task
 from ..standard.drive import DriveState, OperationMode
 from ..standard.target_objects import TARGET_OBJECTS
@@ -104,7 +104,7 @@ class DriveCommands(StopCommands):
         try:
             await self._taken(mode, delivery)
         except DriveError as error:  # what is said to have failed must not move it later
-            if delivery.done:
+            if delivery.done and not isinstance(delivery.error, SdoTimeoutError):
                 raise
             if mode.withdraw(delivery, error):
                 raise DriveError(f'{error}; it is withdrawn') from error
