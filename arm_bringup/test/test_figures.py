@@ -115,8 +115,8 @@ texts = st.dictionaries(
 def test_no_text_in_a_status_is_an_error(name: str, values: dict[str, str]) -> None:
     """What is missing or is no number is shown as unknown."""
     figures = Figures().updated([status(name, **values)])
-    assert progress_line(figures, JOINTS)
-    assert summary_lines(figures, JOINTS, 1.0)
+    lines = [progress_line(figures, JOINTS), *summary_lines(figures, JOINTS, 1.0)]
+    assert not any(word in line for line in lines for word in ('nan', 'inf'))
     assert problems(figures, JOINTS)
 
 

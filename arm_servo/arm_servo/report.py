@@ -41,7 +41,8 @@ class Limiter:
         if self.cause is Cause.COLLISION:
             return f'collision: {self.name} at {1e3 * self.amount:.0f} mm, {self.factor:.2f}x'
         if self.cause is Cause.JOINT_POSITION:
-            return f'joint limit: {self.name}, {self.amount:.3f} left, {self.factor:.2f}x'
+            left = round(self.amount, 3) + 0.0  # never -0.000
+            return f'joint limit: {self.name}, {left:.3f} left, {self.factor:.2f}x'
         if self.cause is Cause.JOINT_VELOCITY:
             return f'joint speed: {self.name} would need {self.amount:.2f}, {self.factor:.2f}x'
         return f'{self.cause.value}: {self.name}, {self.factor:.2f}x'

@@ -24,7 +24,10 @@ def seconds_from(least: float, *, finite: bool = True) -> Callable[[str], float]
     """
 
     def read(text: str) -> float:
-        value = float(text)
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
         if not (value > 0 and value >= least) or (finite and math.isinf(value)):
             bound = f'of at least {least:g}' if least else 'above 0'
             raise argparse.ArgumentTypeError(f'{text} is no number of seconds {bound}')

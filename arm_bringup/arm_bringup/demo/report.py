@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+import math
 
 from .figures import AxisFigures, BusFigures, DriveFigures, Figures
 
@@ -20,9 +21,9 @@ def bus_line(bus: BusFigures) -> str:
     Args:
         bus: Its figures.
     """
-    jitter = f'{1000 * bus.jitter_p50:.2f}/{1000 * bus.jitter_p99:.2f} ms'
+    jitter = f'{_known(1000 * bus.jitter_p50, 2)}/{_known(1000 * bus.jitter_p99, 2)} ms'
     return (
-        f'{bus.frames_per_second:.0f} frames/s, load {bus.load:.0f} %, lost {bus.lost}, '
+        f'{_known(bus.frames_per_second)} frames/s, load {_known(bus.load)} %, lost {bus.lost}, '
         f'cycle jitter p50/p99 {jitter}, missed PDOs {bus.missed_pdos}'
     )
 
@@ -35,7 +36,7 @@ def progress_line(figures: Figures, joints: Sequence[str]) -> str:
         joints: Names of all joints of the demo.
     """
     errors = [axis.error_max for axis in figures.axes.values()]
-    worst = f', path error {1000 * max(errors):.1f} mrad' if errors else ''
+    worst = f', path error {_known(1000 * max(errors), 1)} mrad' if errors else ''
     enabled = f'{figures.enabled}/{len(joints)} joints enabled'
     return f'{enabled}, {bus_line(figures.bus)}{worst}'
 
@@ -54,8 +55,9 @@ def summary_lines(figures: Figures, joints: Sequence[str], duration: float) -> l
         f'{"path error max [mrad]":>21}  {"rms":>6}'
     )
     rows = [
-        f'{name:<{width}}  {axis.lowest:10.3f}  {axis.highest:8.3f}  {axis.moved:6.3f}  '
-        f'{1000 * axis.error_max:21.2f}  {1000 * axis.error_rms:6.2f}'
+        f'{name:<{width}}  {_known(axis.lowest, 3):>10}  {_known(axis.highest, 3):>8}  '
+        f'{_known(axis.moved, 3):>6}  {_known(1000 * axis.error_max, 2):>21}  '
+        f'{_known(1000 * axis.error_rms, 2):>6}'
         for name in joints
         for axis in [figures.axes.get(name, AxisFigures())]
     ]
@@ -65,6 +67,10 @@ def summary_lines(figures: Figures, joints: Sequence[str], duration: float) -> l
         *rows,
         bus_line(figures.bus),
     ]
+
+
+def _known(value: float, digits: int = 0) -> str:
+    return f'{value:.{digits}f}' if math.isfinite(value) else '-'
 
 
 def problems(figures: Figures, joints: Sequence[str]) -> list[str]:

@@ -104,7 +104,9 @@ def _run(node: Node, populate: Populate, default_bus: str, stop: threading.Event
         refuse_misspelt(node)
         FaultServices(node, runner, population.names)
         settle_process_memory(node)
-        runner.start(lambda: raise_thread_priority(node, priority, 'the simulated devices'))
+        runner.start(
+            lambda: raise_thread_priority(node, priority, 'the loop of the simulated devices')
+        )
         try:
             node.get_logger().info(f'{population.what} on {bus.name}')
             spin([node], stop)
