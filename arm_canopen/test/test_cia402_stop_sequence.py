@@ -21,10 +21,12 @@ from virtual_network import (
 
 from arm_canopen.cia402.drive_objects import DriveObjects
 from arm_canopen.cia402.status import drive_status
+from arm_canopen.cia402.stop_sequence import SHUTDOWN_MAX
 from arm_canopen.device.drive import Drive as SimulatedDrive
 from arm_canopen.exceptions import DriveError
 from arm_canopen.master.events import Severity
 from arm_canopen.nodes.diagnostics import drive_diagnostic
+from arm_canopen.nodes.master_process import leave_device
 from arm_canopen.standard.drive import DriveState, OperationMode
 
 JOINT, NODE_ID = 'joint1', 2
@@ -257,6 +259,22 @@ def test_a_shutdown_begins_by_rpdo_and_says_when_the_drive_keeps_its_power(
     failing.net.wire.loses = lambda sender, frame: frame.can_id == 0x600 + NODE_ID
     failing.net.do(JOINT, 'shutdown', preempt=True)
     assert failing.device.state is DriveState.SWITCH_ON_DISABLED
+
+
+@pytest.mark.parametrize('lost', [set(), {*RPDOS, 0x600 + NODE_ID}], ids=['heard', 'deaf'])
+def test_a_device_whose_drive_keeps_its_power_goes_on_to_watch_the_master(
+    lost: set[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """When the master ends, its heartbeat is the last that can stop the drive."""
+    failing = Failing(6, monkeypatch)
+    failing.net.wire.loses = lambda sender, frame: frame.can_id in lost
+    node, scheduler = failing.net.network.nodes[JOINT], failing.net.network.scheduler
+    node.watch_slot = 1
+    leaving = scheduler.spawn(leave_device(node, [failing.net.commands[JOINT]], scheduler))
+    failing.net.run_until(lambda: leaving.done, SHUTDOWN_MAX)
+    assert (leaving.error is not None) is bool(lost)
+    requests = failing.net.frames(0x600 + NODE_ID, since=failing.began)
+    assert any(data[1:4] == b'\x16\x10\x01' for data in requests) is not bool(lost)
 
 
 def test_a_drive_that_could_not_be_stopped_is_not_said_to_be_enabled(

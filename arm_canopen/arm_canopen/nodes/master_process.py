@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from concurrent.futures import Future, wait
 from concurrent.futures import TimeoutError as FutureTimeoutError
 from functools import partial
@@ -31,6 +32,7 @@ from ..master.network import Network
 from ..master.remote_node import RemoteNode
 from ..master.rivals import describe, listen, refuse_rival
 from ..master.runner import NetworkThread
+from ..master.scheduler import Scheduler
 from ..master.status import node_status
 from .device_node import DeviceNode
 from .diagnostics import bus_diagnostic, BusStatus, device_diagnostic, drive_diagnostic
@@ -44,6 +46,18 @@ LAST_WORD_TIMEOUT = 0.5  # [s] for the last /diagnostics
 STOP_TIMEOUT = SHUTDOWN_MAX + 2.0  # [s] for all drives to stop; each has its own shorter limits
 
 JointSample = tuple[DriveNode, list[tuple[float, float, float]]]
+
+
+async def leave_device(
+    device: RemoteNode, axes: Sequence[DriveCommands], scheduler: Scheduler
+) -> None:
+    """Stop the axes of a device, then let the master end without a reaction of the device.
+
+    Raises:
+        DriveError: An axis keeps its power; the device goes on to watch the master, and stops it.
+    """
+    await scheduler.gather([axis.run('shutdown', axis.shutdown(), preempt=True) for axis in axes])
+    await device.unwatch()
 
 
 class MasterProcess:
@@ -139,14 +153,14 @@ class MasterProcess:
         scheduler = self._network.scheduler
 
         async def leave() -> None:
-            stops = [
-                commands.run('shutdown', commands.shutdown(), preempt=True)
-                for commands in self._commands.values()
-            ]
-            await scheduler.gather(stops)
-            await scheduler.gather([scheduler.spawn(node.unwatch()) for node in devices])
+            devices = self._network.nodes.values()
+            await scheduler.gather(
+                [
+                    scheduler.spawn(leave_device(each, self._axes(each), scheduler))
+                    for each in devices
+                ]
+            )
 
-        devices = list(self._network.nodes.values())
         try:
             self._thread.run_coroutine(leave).result(STOP_TIMEOUT)
         except FutureTimeoutError:
