@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 import os
 from pathlib import Path
@@ -41,7 +42,9 @@ if TYPE_CHECKING:
     from typing_extensions import Self
 
 PUSH_PERIOD = 0.02  # [s]
-TURN_TIME = 0.6  # [s] that a hand takes to turn the body
+TURN_REPORTS = 25  # of the IMU, in which a hand turns the body, however late they are
+MAX_GAP = 0.1  # [s] between two of them, of a turn that was seen
+MIN_ELAPSED = 0.005  # [s] between two reports; a gyro has a range
 PACKET = 62  # [B] that an FTDI adapter sends at once; fewer wait for its latency timer
 
 
@@ -96,7 +99,10 @@ class PtyPeer:
         self._stop = threading.Event()
         self._random = random.Random(1)
         self._turning = threading.Event()
-        self._turn = 0.0, self.behaviour.attitude  # when it began [s], from where [deg]
+        self._turned_from = self.behaviour.attitude  # [deg]
+        self._hand: Iterator[float] = iter(())
+        self._share = 1.0  # of the turn
+        self._elapsed = self._reported_at = 0.0  # [s]
         self._thread: threading.Thread | None = None
 
     def plug(self) -> None:
@@ -126,25 +132,39 @@ class PtyPeer:
     def turn_to(
         self, attitude: tuple[float, float, float], acceleration: tuple[float, float, float]
     ) -> None:
-        """Turn the body by hand, and wait until it was reported for as long as that takes."""
-        self._turn = time.monotonic(), self.behaviour.attitude
-        self.behaviour.attitude, self.behaviour.acceleration = attitude, acceleration
+        """Turn the body by hand, and wait until a turn was reported without a gap."""
+        self._turned_from, self._share = self.behaviour.attitude, 0.0
+        self._hand = self._swings()
         self._turning.clear()
-        assert self._turning.wait(10.0)
+        self.behaviour.attitude, self.behaviour.acceleration = attitude, acceleration
+        assert self._turning.wait(30.0)
 
     def _moved(self) -> tuple[list[float], list[float]]:
         """Return attitude [deg] and rates of the gyro [deg/s] of now."""
-        began_at, start = self._turn
-        share = (time.monotonic() - began_at) / TURN_TIME
-        pairs = list(zip(start, self.behaviour.attitude, strict=True))
-        if share >= 1.0:
+        now = time.monotonic()
+        self._elapsed, self._reported_at = max(now - self._reported_at, MIN_ELAPSED), now
+        share = next(self._hand, None)
+        if share is None:
             self._turning.set()
-            return [end for _, end in pairs], [0.0] * 3
+            return list(self.behaviour.attitude), [0.0] * 3
+        step, self._share = (share - self._share) / self._elapsed, share
+        pairs = list(zip(self._turned_from, self.behaviour.attitude, strict=True))
         rates = [
-            sign * (end - begin) / TURN_TIME
+            sign * (end - begin) * step
             for sign, (begin, end) in zip(self.behaviour.gyro, pairs, strict=True)
         ]
         return [begin + share * (end - begin) for begin, end in pairs], rates
+
+    def _swings(self) -> Iterator[float]:
+        """Go there, and back and there again until a swing has no gap; yield where it is."""
+        at, is_seen = 0, False
+        while at == 0 or not is_seen:
+            step, gap = 1 if at == 0 else -1, 0.0
+            for _ in range(TURN_REPORTS):
+                at += step
+                gap = max(gap, self._elapsed)
+                yield at / TURN_REPORTS
+            is_seen |= gap < MAX_GAP
 
     def _run(self) -> None:
         parser = StreamParser(self.protocol, HOST_KINDS)
