@@ -173,7 +173,6 @@ class Robots:
             client.spin_for(SLICE)
         for messages in (self.quad.joints, self.quad.states, self.quad.truth, self._reports):
             del messages[:-1]
-        self.quad.tap.forget()
         self._continue()
         if self.quad.state != 'walk':
             self.failures.append(f'quadruped: {self.quad.processes["controller"].lines[-1]}')
@@ -217,7 +216,7 @@ def soak(duration: float, folder: Path) -> bool:
         reserve() as one,
         reserve() as other,
         MovingArm(one, folder / 'arm') as arm,
-        SimulatedQuad(other, folder / 'quad') as quad,
+        SimulatedQuad(other, folder / 'quad', tapped=False) as quad,
     ):
         robots = Robots(arm, quad)
         processes = {'master': arm.master, 'slaves': arm.slaves, **quad.processes}

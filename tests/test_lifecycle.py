@@ -68,12 +68,14 @@ def test_the_manager_brings_up_and_deactivation_disables(
             assert arm.client.call(COTargetDouble, f'/{joint}/target', request).success
 
         assert change(arm, 'panda_joint2', 'deactivate')
-        assert recorder.last_states()[3] == 'Switch on disabled'
+        off = 'Switch on disabled'
+        arm.client.spin_until(lambda: recorder.last_states()[3] == off, 5.0, 'the last frame')
         assert recorder.last_states()[2] == 'Operation enabled'
         assert not arm.client.trigger('/panda_joint2/enable').success
         assert change(arm, 'lifecycle_manager', 'deactivate')
         assert states(arm) == {'unconfigured'}
-        assert recorder.last_states() == dict.fromkeys(range(2, 9), 'Switch on disabled')
+        all_off = dict.fromkeys(range(2, 9), off)
+        arm.client.spin_until(lambda: recorder.last_states() == all_off, 5.0, 'the last frames')
 
         assert change(arm, 'lifecycle_manager', 'activate')
         arm.init_all()
