@@ -141,7 +141,7 @@ STEPS: dict[str, Callable[[Arm, str, pytest.MonkeyPatch], None]] = {
 }
 
 
-@pytest.mark.parametrize(('step', 'name'), zip(STEPS, itertools.cycle(JOINTS), strict=False))
+@pytest.mark.parametrize(('step', 'name'), list(zip(STEPS, itertools.cycle(JOINTS), strict=False)))
 def test_a_failing_step_stops_its_drive_only(
     step: str, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
