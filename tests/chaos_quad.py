@@ -64,6 +64,7 @@ class QuadVictim:
             self._quad = self._stack.enter_context(SimulatedQuad(isolation, folder))
             self._quad.tap.seed(seed)
             self._diagnostics = self._quad.client.listen(DiagnosticArray, '/diagnostics')
+            self._quad.client.spin_until(lambda: bool(self._quad.truth), PATIENCE, 'the truth')
             self._works_again()
         except BaseException:
             self._stack.close()

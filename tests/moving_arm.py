@@ -103,7 +103,8 @@ class GoalRun:
         self.feedback: list[Any] = []
         self._client = client
         action = trajectory_client(client)
-        assert action.wait_for_server(20.0)
+        # not wait_for_server: the client may have joint states to publish meanwhile
+        client.spin_until(action.server_is_ready, 20.0, 'the action server')
         sent = action.send_goal_async(goal, lambda message: self.feedback.append(message.feedback))
         client.spin_until(sent.done, 10.0, 'acceptance')
         self._handle = sent.result()

@@ -269,6 +269,7 @@ def drive() -> Iterator[Any]:
         network.connect()
         node: Any = make_node(NODE_ID, str(EDS))
         network.add_node(node)
+        node.sdo.RESPONSE_TIMEOUT = ARRIVAL
         try:
             configure(node)
             node.nmt.state = 'OPERATIONAL'
