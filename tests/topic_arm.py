@@ -22,6 +22,9 @@ if TYPE_CHECKING:
     from isolation import Isolation
     from typing_extensions import Self
 
+HEARD = 10
+"""Joint states that somebody has heard, before the arm counts as there."""
+
 
 def standalone(folder: Path, program: str, *arguments: str, semantic: str = '') -> list[str]:
     """Return the command of a program of arm_servo.
@@ -63,12 +66,15 @@ class TopicArm:
         node.create_subscription(
             JointTrajectory, f'{CONTROLLER}/joint_trajectory', self._take_trajectory, 10
         )
+        self._heard = 0
         self.speaking = node.create_timer(0.02, self._speak)
         self.process = self._stack.enter_context(RunningProcess(command, isolation.env))
         self.process.wait_for(ready)
+        self.client.spin_until(lambda: self._heard > HEARD, 20.0, 'somebody who listens')
 
     def _speak(self) -> None:
         self._states.publish(JointState(name=JOINTS, position=self.at))
+        self._heard += self._states.get_subscription_count() > 0
 
     def _take_array(self, message: Float64MultiArray) -> None:
         self.arrays.append(list(message.data))
