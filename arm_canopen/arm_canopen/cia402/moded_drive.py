@@ -203,8 +203,11 @@ class ModedDrive(ObservedDrive):
         """Let every target in an RPDO be where the drive is, also of modes that are not selected.
 
         A drive may stay in the mode that it had, whatever was selected; of two modes with one
-        target object the selected one writes last.
+        target object the selected one writes last. Before its first position the targets stay what
+        the device had when it was booted or taken over: 0 would be a place like any other.
         """
+        if self.objects.position is None:
+            return
         actual = self._actual()
         for mode in (*self.modes.values(), self.mode):
             if not mode.by_sdo:
