@@ -119,6 +119,17 @@ def owner_of(failing: Failing, place: str) -> tuple[object, str]:
     }[place]
 
 
+def assert_stopped_once(failing: Failing) -> None:
+    """Quick stop, rest, disable; never without power at speed, and told once."""
+    assert failing.states == [
+        DriveState.OPERATION_ENABLED,
+        DriveState.QUICK_STOP_ACTIVE,
+        DriveState.SWITCH_ON_DISABLED,
+    ]
+    assert failing.fastest < STANDING
+    assert len(failing.errors) == 1, failing.errors
+
+
 @OPTIONS
 @pytest.mark.parametrize('times', [1, float('inf')], ids=['once', 'for ever'])
 @pytest.mark.parametrize('place', ['mode', 'write', 'controlword', 'RPDO'])
@@ -129,13 +140,7 @@ def test_the_power_goes_when_the_axis_stands(
     failing = Failing(option, monkeypatch)
     failing.fail(*owner_of(failing, place), times=times)
     failing.run(RAMP + 2.0)
-    assert failing.states == [
-        DriveState.OPERATION_ENABLED,
-        DriveState.QUICK_STOP_ACTIVE,
-        DriveState.SWITCH_ON_DISABLED,
-    ]
-    assert failing.fastest < STANDING
-    assert len(failing.errors) == 1, failing.errors
+    assert_stopped_once(failing)
     unreachable = place == 'RPDO' or (place == 'controlword' and times > 1)
     assert failing.controlwords_by_sdo == ([2, 0] if unreachable else [])
 
@@ -236,13 +241,7 @@ def test_a_stop_whose_sdo_is_not_answered_goes_by_rpdo_again(
     if verb:
         failing.net.begin(JOINT, verb, preempt=True)
     failing.run(RAMP + 3.0)
-    assert failing.states == [
-        DriveState.OPERATION_ENABLED,
-        DriveState.QUICK_STOP_ACTIVE,
-        DriveState.SWITCH_ON_DISABLED,
-    ]
-    assert failing.fastest < STANDING
-    assert len(failing.errors) == 1, failing.errors
+    assert_stopped_once(failing)
 
 
 def test_a_shutdown_begins_by_rpdo_and_says_when_the_drive_keeps_its_power(

@@ -203,8 +203,8 @@ class ModedDrive(ObservedDrive):
         """Let every target in an RPDO be where the drive is, also of modes that are not selected.
 
         A drive may stay in the mode that it had, whatever was selected; of two modes with one
-        target object the selected one writes last. Before its first position the targets stay what
-        the device had when it was booted or taken over: 0 would be a place like any other.
+        target object the selected one writes last. Before its first position the targets stay as
+        the boot or the take-over left them: an unknown position is no position 0.
         """
         if self.objects.position is None:
             return
