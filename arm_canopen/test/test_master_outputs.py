@@ -12,8 +12,10 @@ from virtual_network import (
     bus_config,
     drive_config,
     drive_dictionary,
+    every_mode,
     pdo,
     PERIOD,
+    SCALE,
     sdo_write,
     VirtualNetwork,
     with_defaults,
@@ -23,6 +25,7 @@ from arm_canopen.config.checks import check_bus
 from arm_canopen.config.model import NodeConfig
 from arm_canopen.device.faults import BusFault, FaultInjection
 from arm_canopen.exceptions import CanopenError
+from arm_canopen.standard.drive import OperationMode
 from arm_canopen.standard.nmt import NmtCommand
 
 MODULE = 'module'
@@ -151,6 +154,22 @@ def inject(net: VirtualNetwork, fault: BusFault, **settings: float) -> None:
     """Let the drive answer the SDO for its profile velocity so."""
     injection = FaultInjection(fault, object=(0x6081, 0), **settings)  # type: ignore[arg-type]
     net.devices[JOINT].faults.inject(injection, net.now)
+
+
+def test_the_first_targets_of_a_drive_are_where_it_is() -> None:
+    """A drive that comes back is booted, and its first RPDOs leave before its first TPDOs."""
+    net = VirtualNetwork(bus_config(every_mode(drive_config('a', 2))))
+    net.boot()
+    net.do('a', 'init')
+    net.select('a', OperationMode.CYCLIC_POSITION)
+    net.commands['a'].set_target(0.3)
+    net.run(3.0)
+    begin = net.now
+    net.devices['a'].faults.inject(FaultInjection(BusFault.DISCONNECT, duration=1.0), begin)
+    net.run_until(lambda: not net.drives['a'].node.online, 1.0)
+    net.run_until(net.all_ready, 5.0)
+    (at,) = {round(0.3 * SCALE), *net.targets('a', since=begin)}
+    assert at == round(net.drives['a'].position * SCALE)
 
 
 def test_an_sdo_write_is_not_undone_while_its_answer_is_awaited() -> None:

@@ -5,8 +5,6 @@
 from __future__ import annotations
 
 from collections import Counter
-import threading
-from typing import TYPE_CHECKING
 
 import pytest
 from virtual_network import bus_config, drive_config, VirtualNetwork
@@ -23,37 +21,23 @@ from arm_canopen.master.rivals import (
     RivalSigns,
 )
 
-if TYPE_CHECKING:
-    from typing_extensions import Self
-
 BUS = bus_config(drive_config('a', 2), drive_config('b', 3))
 
 
-class Stranger:
-    """Somebody else on the bus who sends a frame again and again, in a thread of its own."""
+class SharedBus(VirtualBus):
+    """A bus on which somebody else sends a frame again and again, whenever it is read."""
 
     def __init__(self, frame: Frame) -> None:
-        """Connect, and wait for the start."""
-        self.wire = VirtualWire()
-        self.bus = VirtualBus('there', self.wire)
+        """Connect both."""
+        wire = VirtualWire()
+        super().__init__('here', wire)
+        self._other = VirtualBus('there', wire)
         self._frame = frame
-        self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._send)
 
-    def __enter__(self) -> Self:
-        """Begin to send."""
-        self._thread.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """End."""
-        self._stop.set()
-        self._thread.join()
-        self.bus.close()
-
-    def _send(self) -> None:
-        while not self._stop.wait(0.005):
-            self.bus.send(self._frame)
+    def receive(self, timeout: float) -> list[Frame]:
+        """Receive what the other one sends now."""
+        self._other.send(self._frame)
+        return super().receive(timeout)
 
 
 @pytest.mark.parametrize(
@@ -69,7 +53,7 @@ class Stranger:
 )
 def test_a_master_that_runs_is_refused_by_name(frame: Frame, words: str) -> None:
     """The refusal names frame, sender and remedies, and nothing was sent."""
-    with Stranger(frame) as stranger, VirtualBus('here', stranger.wire) as bus:
+    with SharedBus(frame) as bus:
         with pytest.raises(RivalError, match='another master is on here') as refusal:
             refuse_rival(bus, BUS)
         assert bus.counters.sent == 0
@@ -91,7 +75,7 @@ def test_a_master_that_runs_is_refused_by_name(frame: Frame, words: str) -> None
 )
 def test_devices_and_tools_are_no_master(frame: Frame) -> None:
     """What a device or somebody who only asks may send does not hold up the start."""
-    with Stranger(frame) as stranger, VirtualBus('here', stranger.wire) as bus:
+    with SharedBus(frame) as bus:
         refuse_rival(bus, BUS)
         assert bus.counters.received > 0
 

@@ -297,7 +297,7 @@ class Drive(ModedDrive):
 
     def _watch_position(self, mode: CyclicPosition) -> None:
         setpoint = mode.setpoint
-        position = self.units.position_commanded(self.objects.position or 0)
+        position = self.units.position_commanded(self._position_inc())
         shown = mode.number is OperationMode.CYCLIC_POSITION and bool(
             self.statusword & FOLLOWING_ERROR
         )

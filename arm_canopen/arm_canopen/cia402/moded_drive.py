@@ -131,7 +131,8 @@ class ModedDrive(ObservedDrive):
         A target that goes by SDO is in the drive before (``sequences.py``).
         A halt goes on: until the drive shows the new mode, it may still have a target of the old.
         """
-        if self.holding_mode is not mode and not mode.by_sdo:
+        known = self.state is not DriveState.UNKNOWN  # else its first position preloads it
+        if known and self.holding_mode is not mode and not mode.by_sdo:
             self.preload(mode)
         self.mode = mode
 
@@ -203,11 +204,8 @@ class ModedDrive(ObservedDrive):
         """Let every target in an RPDO be where the drive is, also of modes that are not selected.
 
         A drive may stay in the mode that it had, whatever was selected; of two modes with one
-        target object the selected one writes last. Before its first position the targets stay as
-        the boot or the take-over left them: an unknown position is no position 0.
+        target object the selected one writes last.
         """
-        if self.objects.position is None:
-            return
         actual = self._actual()
         for mode in (*self.modes.values(), self.mode):
             if not mode.by_sdo:

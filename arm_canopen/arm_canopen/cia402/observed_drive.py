@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 
 from ..config.drive_model import DriveConfig
-from ..exceptions import CodecError, SdoError
+from ..exceptions import CodecError, DriveError, SdoError
 from ..master.events import EventKind, Severity
 from ..master.remote_node import RemoteNode
 from ..master.scheduler import Scheduler
@@ -214,6 +214,9 @@ class ObservedDrive:
 
         The velocity is the lesser of what 0x606C tells and what 0x6064 shows: one that is told
         wrong must not set an axis in motion that stands.
+
+        Raises:
+            DriveError: The position is not known.
         """
         objects = self.objects
         velocity, told = self.rate, objects.velocity
@@ -223,8 +226,15 @@ class ObservedDrive:
             share = 0.0 if shown * velocity <= 0.0 else min(1.0, velocity / shown)
             velocity, velocity_dev = share * shown, share * told
         return Actual(
-            clamp(objects.position or 0, INT32_MAX),
+            clamp(self._position_inc(), INT32_MAX),
             velocity,
             clamp(velocity_dev, INT32_MAX),
             clamp(objects.torque, INT16_MAX),
         )
+
+    def _position_inc(self) -> float:
+        """Return 0x6064 in [inc]; an unknown position is no position 0."""
+        position_inc = self.objects.position
+        if position_inc is None:
+            raise DriveError(f'{self.name}: its position (0x6064) is not known yet')
+        return position_inc

@@ -5,17 +5,24 @@
 from __future__ import annotations
 
 from contextlib import suppress
+from dataclasses import replace
 
 from ..exceptions import BootError, CodecError, SdoAbortError, SdoError
 from ..standard.datatypes import decode
+from ..standard.drive import OperationMode
 from ..standard.objects import AXIS_OFFSET, Index, OFFSETS
 from ..standard.pdo import MappedObject, Number
+from ..standard.target_objects import TARGET_OBJECTS
 from .process_image import Output
 from .remote_node import RemoteNode
 from .start_values import start_value
 
 AXES_START = 0x6000  # objects of the first axis of a drive
 DUMMY_MAX = 0x001F  # objects below stand for gaps in a mapping (CiA 301, 7.4.7.1)
+POSITION_TARGETS = {
+    TARGET_OBJECTS[mode]
+    for mode in (OperationMode.CYCLIC_POSITION, OperationMode.INTERPOLATED_POSITION)
+}
 
 
 async def preset_outputs(node: RemoteNode) -> None:
@@ -38,8 +45,9 @@ async def preset_outputs(node: RemoteNode) -> None:
 async def read_outputs(node: RemoteNode, timeout: float) -> None:
     """Let each RPDO of a device that was configured carry what the device has.
 
-    What its driver commands is left to the driver, except for the mode of operation: the drive may
-    be one that must not be sent mode 0. What cannot be read is taken from bus.yml or the EDS.
+    What its driver commands is left to the driver, except for the mode of operation, as the drive
+    may be one that must not be sent mode 0, and for the position targets: they are where the drive
+    is, before any TPDO says so. What cannot be read is taken from bus.yml or the EDS.
 
     Args:
         node: The device.
@@ -49,22 +57,30 @@ async def read_outputs(node: RemoteNode, timeout: float) -> None:
         SdoError: The device does not answer.
     """
     for output, position, mapped in _mapped(node):
-        entry = node.config.dictionary.get(mapped.index, mapped.subindex)
         value = start_value(node.config, mapped)
-        readable = entry is None or entry.access.readable
-        if readable and not _is_led(node, mapped.index):
+        source = _source(node, mapped)
+        if source is not None and _is_readable(node, source):
             with suppress(SdoAbortError, CodecError):
-                value = await _present(node, mapped, timeout)
+                value = await _present(node, source, timeout)
         output.values[position] = value
 
 
-def _is_led(node: RemoteNode, index: int) -> bool:
-    """Tell whether the driver of a drive says what an object carries."""
-    first_axis = index - (index - AXES_START) // AXIS_OFFSET * AXIS_OFFSET
+def _is_readable(node: RemoteNode, mapped: MappedObject) -> bool:
+    entry = node.config.dictionary.get(mapped.index, mapped.subindex)
+    return entry is None or entry.access.readable
+
+
+def _source(node: RemoteNode, mapped: MappedObject) -> MappedObject | None:
+    """Return the object with the value that an RPDO starts with; None where the driver says it."""
+    index = mapped.index
+    axis = (index - AXES_START) // AXIS_OFFSET * AXIS_OFFSET
+    first_axis = index - axis
+    if node.config.is_drive and (first_axis, mapped.subindex) in POSITION_TARGETS:
+        return replace(mapped, index=Index.POSITION_ACTUAL + axis, subindex=0)
     if first_axis == Index.MODE_OF_OPERATION:
-        return False
+        return mapped
     offset = node.config.is_drive and first_axis in OFFSETS
-    return offset or index in node.config.commanded_indices
+    return None if offset or index in node.config.commanded_indices else mapped
 
 
 def _mapped(node: RemoteNode) -> list[tuple[Output, int, MappedObject]]:
