@@ -21,7 +21,8 @@ from dds_network import restrict_dds
 
 SCENARIOS = Path(__file__).parent / 'tests'
 
-for _marker in Path(__file__).parent.glob('*/resource/*'):
+_ROOT = Path(__file__).parent
+for _marker in [*_ROOT.glob('*/resource/*'), *_ROOT.glob('libraries/*/resource/*')]:
     if (_marker.parents[1] / _marker.name / '__init__.py').is_file():
         importlib.import_module(_marker.name)
 

@@ -30,7 +30,8 @@ READY = {
 @pytest.fixture
 def workspace(tmp_path: Path, prefix: Path, isolation: Isolation) -> SmallWorkspace:
     """Install the small programs, in a ROS domain that nobody else is in."""
-    sources = ('arm_bringup', 'arm_canopen', 'process_supervisor', 'dds_network')
+    libraries = ('libraries/process_supervisor', 'libraries/dds_network')
+    sources = ('arm_bringup', 'arm_canopen', *libraries)
     workspace = SmallWorkspace(tmp_path, 'arm_bringup', READY, sources, [prefix])
     workspace.environment['ROS_DOMAIN_ID'] = str(isolation.domain_id)
     return workspace

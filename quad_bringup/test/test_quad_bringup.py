@@ -35,7 +35,8 @@ bringup.join_ros = lambda given_up, namespace: robot
 @pytest.fixture
 def workspace(tmp_path: Path, isolation: Isolation) -> SmallWorkspace:
     """Install the small programs, in a ROS domain that nobody else is in."""
-    sources = ('quad_bringup', 'quad_description', 'process_supervisor', 'dds_network')
+    libraries = ('libraries/process_supervisor', 'libraries/dds_network')
+    sources = ('quad_bringup', 'quad_description', *libraries)
     workspace = SmallWorkspace(tmp_path, 'quad_bringup', READY, sources)
     workspace.environment['ROS_DOMAIN_ID'] = str(isolation.domain_id)
     workspace.setup = LIES

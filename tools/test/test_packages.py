@@ -120,6 +120,15 @@ def test_a_new_data_file_counts(add_package: Add) -> None:
     assert source_fingerprint(package) != before
 
 
+@pytest.mark.parametrize('build_type', ['ament_cmake', 'ament_python'])
+def test_a_moved_package_counts_where_it_is_linked(add_package: Add, build_type: str) -> None:
+    """Links to where a Python package stood lead nowhere."""
+    here = add_package('pkg', build_type=build_type)
+    there = add_package('pkg', folder='libraries', build_type=build_type)
+    before, after = (source_fingerprint(read_package(at / 'package.xml')) for at in (here, there))
+    assert (before != after) == (build_type == 'ament_python')
+
+
 def test_this_workspace_is_readable() -> None:
     """Every package of the checkout has the name of its folder."""
     packages = find_packages(this_checkout().root)

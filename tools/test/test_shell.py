@@ -21,7 +21,8 @@ def checkout(tmp_path: Path) -> Path:
     venv = root / '.venv'
     (venv / 'bin').mkdir(parents=True)
     shutil.copy(this_checkout().root / 'env.sh', root)
-    shutil.copytree(this_checkout().root / 'dds_network', root / 'dds_network')
+    library = Path('libraries') / 'dds_network'
+    shutil.copytree(this_checkout().root / library, root / library)
     (venv / 'bin' / 'python').symlink_to(sys.executable)
     wheels = Underlay(UnderlayKind.WHEELS, venv)
     write_setup_scripts(venv, wheels, [venv / 'lib', venv / 'more.libs'])
@@ -79,7 +80,8 @@ def test_discovery_stays_on_this_host_unless_asked(checkout: Path) -> None:
         done = shell('bash', '. ./env.sh; env', checkout, **asked)
         assert done.returncode == 0
         found = variables(done.stdout)
-        closed = checkout / 'dds_network' / 'dds_network' / 'dds_network_localhost.xml'
+        package = checkout / 'libraries' / 'dds_network' / 'dds_network'
+        closed = package / 'dds_network_localhost.xml'
         assert found['FASTRTPS_DEFAULT_PROFILES_FILE'] == str(closed)
         assert found['ROS_AUTOMATIC_DISCOVERY_RANGE'] == 'SYSTEM_DEFAULT'
         # what does not open anything is told

@@ -127,12 +127,13 @@ def source_fingerprint(package: Package) -> str:
     """Hash what decides the build's result.
 
     Of a Python package the modules and data files are linked, not copied: their contents do not
-    count, and of the data files (which setup.py lists) only the names do.
+    count, but where they are does, and the names of the data files (which setup.py lists).
     """
-    parts: list[str | bytes] = []
+    linked = package.build_type == 'ament_python'
+    parts: list[str | bytes] = [str(package.folder)] if linked else []
     for path in _files(package.folder):
         name = str(path.relative_to(package.folder))
-        if package.build_type != 'ament_python' or name in _PYTHON_BUILD_FILES:
+        if not linked or name in _PYTHON_BUILD_FILES:
             parts += [name, path.read_bytes()]
         elif path.suffix not in {'.py', '.pyc'}:
             # a link into another package may have led nowhere when this one was built

@@ -13,7 +13,7 @@ import sys
 
 from ..cli.errors import FrontendError
 
-sys.path.append(str(Path(__file__).resolve().parents[4] / 'dds_network'))
+sys.path.append(str(Path(__file__).resolve().parents[4] / 'libraries' / 'dds_network'))
 
 from dds_network import is_this_host, NETWORK_VARIABLE, NetworkChoiceError, restrict_dds
 

@@ -13,8 +13,8 @@ import sys
 
 from small_processes import PATIENCE
 
-SOURCES = Path(__file__).parents[2]
-"""Folder of all packages."""
+SOURCES = Path(__file__).parents[3]
+"""The checkout."""
 
 PROGRAM = """#!{python} -IS
 import os, signal, sys
