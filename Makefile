@@ -45,8 +45,8 @@ demo-quad: system
 	@$(IN_ENVIRONMENT) ros2 run quad_bringup demo $(if $(DURATION),--duration $(DURATION))
 
 demo-arm: system
-	@$(WORKSPACE) build arm_motion_bringup
-	@$(IN_ENVIRONMENT) ros2 run arm_motion_bringup demo $(ROBOT) $(if $(DURATION),--duration $(DURATION))
+	@$(WORKSPACE) build arm_bringup arm_servo
+	@$(IN_ENVIRONMENT) ros2 run arm_bringup motion_demo $(ROBOT) $(if $(DURATION),--duration $(DURATION))
 
 test: system
 	@$(WORKSPACE) build --dev

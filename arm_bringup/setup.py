@@ -36,7 +36,8 @@ setup(
         'console_scripts': [
             'bringup = arm_bringup.bringup:main',
             'check = arm_bringup.check:main',
-            'demo = arm_bringup.demo.main:main',
+            'demo = arm_bringup.demos.wave.main:main',
+            'motion_demo = arm_bringup.demos.motion:main',
             'wave_master = arm_bringup.wave_master:main',
         ],
     },

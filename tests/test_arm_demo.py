@@ -38,7 +38,7 @@ def start(isolation: Isolation, package: str, *arguments: str) -> RunningProcess
 def test_demo_of_motion(isolation: Isolation) -> None:
     """It runs every part, says what was measured, ends with 0 and leaves the drives disabled."""
     with BusRecorder(isolation.bus) as recorder:
-        with start(isolation, 'arm_motion_bringup', 'demo', 'gp110', '--duration', '5') as demo:
+        with start(isolation, 'arm_bringup', 'motion_demo', 'gp110', '--duration', '5') as demo:
             demo.wait_for('to the start pose', 60.0)
             started = psutil.Process(demo.pid).children(recursive=True)
             assert demo.wait(150.0) == 0, demo.output
@@ -51,7 +51,7 @@ def test_demo_of_motion(isolation: Isolation) -> None:
 def test_ctrl_c_in_the_middle_of_the_demo(isolation: Isolation) -> None:
     """The arm comes to rest, the drives are disabled, and what was measured is told."""
     with BusRecorder(isolation.bus) as recorder:
-        with start(isolation, 'arm_motion_bringup', 'demo', 'prbt') as demo:
+        with start(isolation, 'arm_bringup', 'motion_demo', 'prbt') as demo:
             demo.wait_for('a square in the base frame', 90.0)
             demo.signal(signal.SIGINT)
             assert demo.wait(40.0) == 0, demo.output

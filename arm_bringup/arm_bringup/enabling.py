@@ -11,7 +11,7 @@ import time
 
 from process_supervisor import CallError, GivenUpError
 
-from .demo.play import Client
+from .demos.wave.play import Client
 
 PATIENCE = 60.0
 """Longest time for all drives to boot and to be enabled in [s]."""
@@ -50,7 +50,7 @@ def _enable(
     ended: threading.Event,
     namespace: str,
 ) -> None:
-    from .demo.client import ArmClient
+    from .demos.client import ArmClient
 
     client = ArmClient(ended.is_set, namespace)
     init, mode = ([f'{drive}/{name}' for drive in drives] for name in ('init', mode_service))

@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from arm_bringup.demo.figures import AxisFigures, BusFigures, DriveFigures, Figures
-from arm_bringup.demo.report import problems, progress_line, summary_lines, warnings
+from arm_bringup.demos.figures import AxisFigures, BusFigures, DriveFigures, Figures
+from arm_bringup.demos.report import problems, progress_line, summary_lines, warnings
 
 JOINTS = ['joint1', 'joint2']
 

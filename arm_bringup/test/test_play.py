@@ -11,8 +11,8 @@ import time
 import pytest
 from small_play import Show, Supervisor
 
-from arm_bringup.demo.figures import AxisFigures, DriveFigures, Figures
-from arm_bringup.demo.play import Play
+from arm_bringup.demos.figures import AxisFigures, DriveFigures, Figures
+from arm_bringup.demos.wave.play import Play
 from process_supervisor import CallError, GivenUpError, Outcome, Phase
 
 JOINTS = ['joint1', 'joint2']

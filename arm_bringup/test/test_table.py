@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 import pytest
 from rich.console import Console
 
-from arm_bringup.demo.figures import AxisFigures, BusFigures, DriveFigures, Figures
-from arm_bringup.demo.table import (
+from arm_bringup.demos.figures import AxisFigures, BusFigures, DriveFigures, Figures
+from arm_bringup.demos.table import (
     ArmView,
     GAUGE_FROM,
     GAUGE_WIDTH,

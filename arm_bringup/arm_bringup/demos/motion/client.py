@@ -18,12 +18,12 @@ from rclpy.action.client import ActionClient
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from arm_bringup.demo.client import ArmClient
-from arm_bringup.demo.figures import AxisFigures
 from arm_servo import RobotModel
 from arm_servo.arrays import Array
 from process_supervisor import CallError
 
+from ..client import ArmClient
+from ..figures import AxisFigures
 from .figures import MotionFigures
 from .samples import cycles_between, peak_jerk, Sample
 

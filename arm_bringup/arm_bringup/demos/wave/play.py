@@ -12,8 +12,8 @@ from typing import Protocol
 from process_supervisor import play
 from process_supervisor.display import Display
 
-from .figures import Figures
-from .report import problems, summary_lines, warnings
+from ..figures import Figures
+from ..report import problems, summary_lines, warnings
 
 ENABLE_TIMEOUT = 15.0
 """Longest time in [s] for all drives to be enabled."""
@@ -22,7 +22,7 @@ CALL_TIMEOUT = 10.0
 
 
 class Client(play.Client, Protocol):
-    """What the demo needs of ROS; :class:`.client.ArmClient` is the real one."""
+    """What the demo needs of ROS; :class:`..client.ArmClient` is the real one."""
 
     figures: Figures
 

@@ -8,12 +8,12 @@ from collections.abc import Callable
 import math
 import time
 
-from arm_bringup.demo.play import CALL_TIMEOUT, Client, ENABLE_TIMEOUT, Play
-from arm_bringup.demo.report import warnings
 from arm_servo import RobotModel
 from process_supervisor import CallError
 from process_supervisor.play import Result
 
+from ..report import warnings
+from ..wave.play import CALL_TIMEOUT, Client, ENABLE_TIMEOUT, Play
 from .client import MotionClient
 from .course import Course, Left
 from .results import Results

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 import numpy as np
 import pytest
 
-from arm_motion_bringup.demo.samples import (
+from arm_bringup.demos.motion.samples import (
     away_from_line,
     cycles_between,
     peak_jerk,

@@ -6,8 +6,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from arm_bringup.demo.figures import BusFigures
-from arm_bringup.demo.report import bus_line
+from ..figures import BusFigures
+from ..report import bus_line
 
 WORST_LINE = 3e-3
 """Greatest distance of the tool from the line that it is jogged along, in [m]."""

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""``ros2 run arm_motion_bringup demo``: a simulated arm is jogged and follows trajectories."""
+"""``ros2 run arm_bringup motion_demo``: a simulated arm is jogged and follows trajectories."""
 
 from __future__ import annotations
 
@@ -10,21 +10,6 @@ import json
 from pathlib import Path
 import sys
 
-from arm_bringup.demo.figures import Figures
-from arm_bringup.demo.table import ArmView
-from arm_bringup.description import joint_limits
-from arm_bringup.exceptions import BringupError, RobotError
-from arm_bringup.motion import controller_name, motion_files
-from arm_bringup.robots import Robot
-from arm_bringup.session import (
-    add_arguments,
-    locate,
-    robots_epilog,
-    Session,
-    session,
-    SIMULATED_BUS,
-)
-from arm_bringup.stack import MOTION_MASTER
 from arm_servo import load_limits, RobotModel, ServoError
 from process_supervisor import (
     namespaced_parameters,
@@ -37,6 +22,21 @@ from process_supervisor.arguments import seconds_from
 from process_supervisor.demo import perform
 from process_supervisor.display import Display
 
+from ...description import joint_limits
+from ...exceptions import BringupError, RobotError
+from ...motion import controller_name, motion_files
+from ...robots import Robot
+from ...session import (
+    add_arguments,
+    locate,
+    robots_epilog,
+    Session,
+    session,
+    SIMULATED_BUS,
+)
+from ...stack import MOTION_MASTER
+from ..figures import Figures
+from ..table import ArmView
 from .client import MotionClient
 from .course import START
 from .figures import MotionFigures
@@ -57,7 +57,7 @@ def parse(argv: Sequence[str]) -> tuple[argparse.Namespace, RosOptions]:
         What was asked for, and the options of all nodes.
     """
     parser = argparse.ArgumentParser(
-        prog='ros2 run arm_motion_bringup demo',
+        prog='ros2 run arm_bringup motion_demo',
         description='Bring a simulated arm up and move it: a square with the tool in the base '
         'frame and in its own, into the straight arm and back, a trajectory with a speed override '
         'in its middle, and one that is canceled. Ends with what was measured.',

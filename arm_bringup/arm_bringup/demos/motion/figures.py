@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from arm_bringup.demo.figures import Figures
+from ..figures import Figures
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 from rich.console import RenderableType
 from rich.text import Text
 
-from arm_bringup.demo.figures import Figures
-from arm_bringup.demo.report import bus_line
-from arm_bringup.demo.table import ArmView, bus_text, LINES_AROUND, WORDS_FROM
 from process_supervisor.picture import compose, Moment
 
+from ..figures import Figures
+from ..report import bus_line
+from ..table import ArmView, bus_text, LINES_AROUND, WORDS_FROM
 from .figures import MotionFigures
 
 

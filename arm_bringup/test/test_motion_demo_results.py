@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 import numpy as np
 import pytest
 
-from arm_bringup.demo.figures import BusFigures
-from arm_motion_bringup.demo.goals import beside, duration
-from arm_motion_bringup.demo.results import Results, Square
+from arm_bringup.demos.figures import BusFigures
+from arm_bringup.demos.motion.goals import beside, duration
+from arm_bringup.demos.motion.results import Results, Square
 from arm_servo import JointLimits
 
 

@@ -21,12 +21,12 @@ from process_supervisor.arguments import seconds_from
 from process_supervisor.demo import perform
 from process_supervisor.play import REFRESH
 
-from ..description import joint_limits
-from ..exceptions import BringupError
-from ..session import add_arguments, robots_epilog, Session, session, SIMULATED_BUS
-from .figures import Figures
+from ...description import joint_limits
+from ...exceptions import BringupError
+from ...session import add_arguments, robots_epilog, Session, session, SIMULATED_BUS
+from ..figures import Figures
+from ..table import ArmView
 from .play import Client, Play
-from .table import ArmView
 
 WAVE_MASTER = Executable('arm_bringup', 'wave_master')
 """The master of the demo."""
@@ -67,7 +67,7 @@ def join_ros(namespace: str, given_up: Callable[[], bool]) -> Client:
         namespace: That of the arm.
         given_up: True when nothing shall be waited for any more.
     """
-    from .client import ArmClient
+    from ..client import ArmClient
 
     return ArmClient(given_up, namespace)
 
