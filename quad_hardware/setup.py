@@ -21,7 +21,8 @@ setup(
     license='Apache-2.0',
     entry_points={
         'console_scripts': [
-            'fake_xgo = quad_hardware.sim.fake_xgo:main',
+            # the simulated robot's, under the name that it is printed by; quad_sim has it
+            'fake_xgo = quad_sim.fake_xgo:main',
             'calibrate = quad_hardware.calibration.main:main',
             'doctor = quad_hardware.doctor.main:main',
             'hardware_node = quad_hardware.nodes.hardware_node:main',

@@ -99,7 +99,7 @@ def quad_processes(stack: Stack, parameters: Path, find: FindExecutable) -> list
 
 
 def _simulator(stack: Stack, find: FindExecutable) -> ProcessSpec:
-    executable = Executable('quad_hardware', 'fake_xgo')
+    executable = Executable('quad_sim', 'fake_xgo')
     program, *ros_arguments = node_argv(executable, find, ros=stack.ros)
     spoken = 'both' if stack.protocol == 'auto' else stack.protocol
     options = ['--link', stack.port, '--preset', stack.preset, '--protocol', spoken]

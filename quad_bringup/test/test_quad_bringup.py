@@ -17,7 +17,7 @@ from small_processes import PATIENCE
 pytestmark = pytest.mark.slow
 
 READY = {
-    ('quad_hardware', 'fake_xgo'): 'fake_xgo: lite at {--link} -> /dev/pts/7',
+    ('quad_sim', 'fake_xgo'): 'fake_xgo: lite at {--link} -> /dev/pts/7',
     ('quad_hardware', 'hardware_node'): '[INFO] [hardware_node]: running: {port}',
     ('quad_controller', 'controller_node'): '[INFO] [controller_node]: ready: joints known',
     ('robot_viewer', 'robot_state_publisher'): '[INFO] [publisher]: Robot initialized',

@@ -22,10 +22,10 @@ from quad_hardware.calibration.parameter_file import write_parameters as write_c
 from quad_hardware.nodes.parameters import declare_parameters as hardware_parameters
 from quad_hardware.nodes.parameters import NodeSettings as HardwareSettings
 from quad_hardware.protocol import Code, Frame, Kind, NEW, Register, ROBOT_KINDS, StreamParser
-from quad_hardware.sim.options import build, parse_arguments, parse_servo, Simulation
-from quad_hardware.sim.servo import ServoModel
+from quad_sim import ServoModel
+from quad_sim.options import build, parse_arguments, parse_servo, Simulation
 
-OURS = ('quad_hardware', 'quad_controller', 'robot_viewer')
+OURS = ('quad_hardware', 'quad_sim', 'quad_controller', 'robot_viewer')
 
 
 def underlay(folder: Path, *packages: str) -> Callable[[str, str], Path | None]:

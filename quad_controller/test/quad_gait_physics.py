@@ -17,7 +17,7 @@ from quad_controller.states.measurement import ImuSample, JointSample, Measureme
 from quad_controller.states.modes import State
 from quad_controller.states.parameters import StateParameters
 from quad_description import robot_urdf
-from quad_hardware.sim.physics import Robot
+from quad_sim.physics import Robot
 
 PERIOD = 0.02  # [s]
 MODEL = quadruped(robot_urdf())

@@ -21,9 +21,8 @@ from quad_gait_physics import measure, PhysicsRig
 from quad_hardware.estimation import ImuMounting
 from quad_hardware.estimation.imu_mounting import UNCHECKED_DEVIATION
 from quad_hardware.estimation.rotation import about_z, multiply, yaw_of
-from quad_hardware.sim.physics import Robot
-from quad_hardware.sim.servo import ServoParameters
-from quad_hardware.sim.terrain import Terrain
+from quad_sim import ServoParameters, Terrain
+from quad_sim.physics import Robot
 
 pytestmark = pytest.mark.slow
 

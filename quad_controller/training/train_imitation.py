@@ -29,9 +29,8 @@ from quad_controller.policy.observation import ObservationBuilder, TERMS, width
 from quad_controller.policy.options import GravitySource
 from quad_controller.states.measurement import ImuSample
 from quad_description import robot_urdf
-from quad_hardware.sim.physics import Robot
-from quad_hardware.sim.servo import ServoModel
-from quad_hardware.sim.terrain import Terrain
+from quad_sim import ServoModel, Terrain
+from quad_sim.physics import Robot
 
 PERIOD = 0.02  # [s]
 SCALE = 0.25  # [rad] for an action of one, as in the vendor's training

@@ -213,18 +213,3 @@ class NodeRig(Rig):
         for before, after in zip(self.peer.commands, self.peer.commands[1:], strict=False):
             steps += [abs(after[motor] - before[motor]) for motor in after if motor in before]
         return max(steps)
-
-
-class XgoRig(Rig):
-    """The node with the simulated robot, each a process."""
-
-    def _add_robot(self, stack: ExitStack, port: Path) -> None:
-        xgo = [executable('quad_hardware', 'fake_xgo'), '--link', str(port)]
-        process = stack.enter_context(RunningProcess(xgo, self._env))
-        process.wait_for(str(port))
-
-    def reporting(self) -> bool:
-        """Tell whether the newest diagnostic has the link running."""
-        return 'reports arrive' in self.status('serial link').message or (
-            'damaged' in self.status('serial link').message
-        )

@@ -17,7 +17,6 @@ from quad_description import movable_joints, Pose, pose_positions, raised_feet, 
 from quad_hardware.estimation.feet import Feet
 from quad_hardware.joints import JointCommander, JointMap, LimiterSettings, servo_of
 from quad_hardware.joints.command_loss import CommandLoss, LossReaction, SPEED
-from quad_hardware.sim.physics import Robot
 
 JOINTS = JointMap(servo_of(joint) for joint in movable_joints(robot_urdf('lite')))
 NAMES = JOINTS.names
@@ -121,17 +120,6 @@ def test_a_leg_that_is_held_in_the_air_is_no_rest(legs: tuple[str, ...]) -> None
     assert all(f'{leg}_foot' in loss.hazard for leg in legs)
     assert loss.begin(held, 0.1, 2.5) == ''
     assert descend(loss, 2.5)[-1] == pytest.approx(LYING)
-
-
-@pytest.mark.parametrize('legs', [(), ('fl',), ('fr', 'bl'), ('fl', 'bl'), ('bl', 'br')])
-def test_physics_agrees_about_feet_in_the_air(legs: tuple[str, ...]) -> None:
-    """A robot whose legs of one side are lifted, as in a pace, leans and stands on all feet."""
-    held = {**STAND, **{f'{leg}_thigh_joint': STAND[f'{leg}_thigh_joint'] + 0.3 for leg in legs}}
-    robot = Robot(robot_urdf('lite'), seed=1)
-    for pose in (STAND, held):
-        robot.set_targets(pose)
-        robot.step(1.0)
-    assert bool(raised([held[name] for name in NAMES])) is not all(robot.foot_contacts)
 
 
 @given(st.floats(-0.1, 0.1), st.floats(-0.1, 0.1), st.floats(-0.1, 0.1))

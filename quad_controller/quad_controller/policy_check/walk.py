@@ -59,12 +59,10 @@ class Walker:
             QuadControllerError: There is no simulation.
         """
         try:
-            from quad_hardware.sim.physics import Robot
-            from quad_hardware.sim.servo import ServoModel
+            from quad_sim import ServoModel
+            from quad_sim.physics import Robot
         except ImportError as error:
-            raise QuadControllerError(
-                f'a walk needs the simulation of quad_hardware and MuJoCo: {error}'
-            ) from error
+            raise QuadControllerError(f'a walk needs quad_sim and MuJoCo: {error}') from error
         model, states = quadruped(urdf), StateParameters()
         self._robot, self._names = Robot(urdf, ServoModel(servo)), model.names
         self._period = states.period

@@ -1,0 +1,27 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The simulated XGO: physics, servos, and a board that speaks the serial protocols.
+
+Physics in virtual time, without ROS, threads or a serial port (needs MuJoCo)::
+
+    from quad_description import robot_urdf
+    from quad_sim.physics import Robot
+
+    robot = Robot(robot_urdf('lite'))
+    robot.set_targets({'fl_thigh_joint': 0.9})
+    robot.step(0.02)
+    print(robot.base_pose.tilt, robot.imu.specific_force)
+"""
+
+from .exceptions import SetupError, SimulationError, TargetError
+from .plant.servo import ServoModel, ServoParameters
+from .plant.terrain import Terrain
+
+__all__ = [
+    'ServoModel',
+    'ServoParameters',
+    'SetupError',
+    'SimulationError',
+    'TargetError',
+    'Terrain',
+]

@@ -1,0 +1,247 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The board's side of the old protocol: registers that are read and written.
+
+Every register of the table is taken; those that move nothing here (teaching, LED, swinging of the
+body, actions other than 1, 2 and 255) are kept as bytes and otherwise mean nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+import math
+
+from quad_hardware.protocol import (
+    Access,
+    ACTION_RESET,
+    ANGLE_SPANS,
+    BULK_READ_ORDER,
+    Frame,
+    Kind,
+    MOTOR_OF_REGISTER,
+    OLD,
+    Register,
+    scatter,
+    slot_of,
+    Torque,
+)
+
+from .board import Board
+from .walking import DUTY, HEIGHT, LIFT, PERIOD
+
+NEUTRAL = (127, 128)  # the vendor's library encodes zero as 127, its documents as 128
+LIE_DOWN, STAND_UP = 1, 2  # actions, of register 0x3E
+ARM_LEG = 5
+LEG_NAMES = {1: 'fl', 2: 'fr', 3: 'br', 4: 'bl'}
+INT16 = 32767
+LONGEST_ANSWER = OLD.max_length - OLD.overhead  # [B]
+
+_BODY = {0x33: 'x', 0x34: 'y', 0x35: 'z', 0x36: 'roll', 0x37: 'pitch', 0x38: 'yaw'}
+_FEET = range(0x40, 0x4C)
+_ATTITUDE = {0x62: 0, 0x63: 1, 0x64: 2}
+_WHOLE_DEGREES = {0x66: 0, 0x67: 1, 0x68: 2}
+_ORIGIN, _HEIGHT, _MARK_TIME, _TURN, _MIDDLE = 0x06, 0x35, 0x3C, 0x3F, 0x5F
+
+
+class Registers:
+    """Answers frames of the old protocol."""
+
+    def __init__(self, board: Board) -> None:
+        """Begin with empty registers.
+
+        Args:
+            board: What the registers do something to.
+        """
+        self._board = board
+        self._spans = ANGLE_SPANS[board.model]
+        self._writers: dict[int, Callable[[bytes], None]] = {
+            Register.TORQUE: self._switch_torque,
+            Register.VX: self._walk,
+            Register.VY: self._walk,
+            Register.VYAW: self._walk,
+            Register.ACTION: self._act,
+            Register.MOTOR_SPEED: self._set_speed,
+            _ORIGIN: lambda data: board.set_origin() if data == b'\x01' else None,
+            _MARK_TIME: self._mark_time,
+            _TURN: self._turn,
+            _MIDDLE: lambda data: board.go_to_middle() if data == b'\x01' else None,
+            **dict.fromkeys(_BODY, self._pose_body),
+            **dict.fromkeys(_FEET, self._pose_body),
+        }
+        self.restart()
+
+    def restart(self) -> None:
+        """Forget what a host has written, as after switching on."""
+        self._memory: dict[int, bytes] = {}
+
+    def handle(self, frame: Frame, now: float) -> list[Frame]:
+        """Carry a frame out; return what the board answers.
+
+        Args:
+            frame: What the host sent.
+            now: Time [s].
+        """
+        if frame.kind is Kind.WRITE:
+            self._write(frame)
+            return []
+        if len(frame.payload) != 1 or not 0 < frame.payload[0] <= LONGEST_ANSWER:
+            return []
+        payload = self._read(frame.address, frame.payload[0])
+        return [] if payload is None else [Frame(Kind.REPLY, frame.address, payload)]
+
+    # -- reading
+
+    def _read(self, address: int, count: int) -> bytes | None:
+        """Return that many bytes, None from a register that cannot be read."""
+        function = OLD.functions.get(address)
+        if function is None or Access.READ not in function.access:
+            return None
+        if address in MOTOR_OF_REGISTER:
+            data = self._angles()[address - Register.MOTORS :]
+        else:
+            data = self._value(address)
+        return data[:count].ljust(count, b'\0')
+
+    def _angles(self) -> bytes:
+        angles = self._board.servos.angles(self._board.measure())
+        return bytes(
+            self._spans[motor].encode(angles[slot_of(motor)]) for motor in BULK_READ_ORDER
+        )
+
+    def _value(self, address: int) -> bytes:
+        function, board = OLD.functions[address], self._board
+        if address == Register.BATTERY:
+            return bytes((board.battery.percent,))
+        if address == Register.FIRMWARE:
+            return board.firmware.encode('ascii').ljust(function.length, b'\0')
+        if address == Register.IMU:
+            return self._imu()
+        if address in _ATTITUDE:
+            degrees = board.attitude(board.measure())[_ATTITUDE[address]]
+            return function.pack(value=(degrees,))
+        if address in _WHOLE_DEGREES:
+            degrees = board.attitude(board.measure())[_WHOLE_DEGREES[address]]
+            return function.pack(value=(round(degrees) if math.isfinite(degrees) else 0,))
+        if address == _TURN:
+            return b'\x00' if board.turning else b'\x01'  # 1: done
+        return bytes(function.length)
+
+    def _imu(self) -> bytes:
+        measured = self._board.measure()
+        function = OLD.functions[Register.IMU]
+        acceleration, rate, _ = function.fields
+        return function.pack(
+            acceleration=[
+                _clipped(value, acceleration.scale) for value in measured.imu.specific_force
+            ],
+            rate=[
+                _clipped(math.degrees(value), rate.scale)
+                for value in measured.imu.angular_velocity
+            ],
+            attitude=self._board.attitude(measured),
+        )
+
+    # -- writing
+
+    def _write(self, frame: Frame) -> None:
+        motors: dict[int, float] = {}
+        for address, data in scatter(frame.address, frame.payload):
+            function = OLD.functions.get(address)
+            if function is None or not function.accepts(len(data)):
+                continue
+            self._memory[address] = data
+            motor = MOTOR_OF_REGISTER.get(address)
+            if motor is not None:
+                motors[motor] = self._spans[motor].decode(data[0])
+            elif address in self._writers:
+                self._writers[address](data)
+        if motors:
+            self._move(motors)
+
+    def _move(self, angles: dict[int, float]) -> None:
+        self._board.take_servos()
+        if len(angles) == 1:
+            for motor, angle in angles.items():
+                self._board.servos.command_one(motor, angle)
+        else:
+            self._board.servos.command(angles)
+
+    def _set_speed(self, data: bytes) -> None:
+        servos = self._board.servos
+        servos.set_speed(servos.fitted, data[0])
+
+    def _switch_torque(self, data: bytes) -> None:
+        servos, value = self._board.servos, data[0]
+        if value in {Torque.UNLOAD_ALL, Torque.LOAD_ALL}:
+            servos.set_torque(servos.fitted, value == Torque.LOAD_ALL, hold=False)
+            return
+        kind, leg = value & 0xF0, value & 0x0F
+        if kind in {Torque.UNLOAD_LEG, Torque.LOAD_LEG}:
+            motors = [motor for motor in servos.fitted if motor // 10 == leg]
+            servos.set_torque(motors, kind == Torque.LOAD_LEG, hold=False)
+
+    def _act(self, data: bytes) -> None:
+        if data[0] in {ACTION_RESET, STAND_UP}:
+            self._memory.clear()
+            self._board.stand()
+        elif data[0] == LIE_DOWN:
+            self._board.lie_down()
+
+    def _walk(self, _: bytes) -> None:
+        # a step that is so long [mm] takes as long as a foot is on the ground
+        step_time = 1000.0 * DUTY * PERIOD
+        ahead, aside = self._signed(Register.VX), self._signed(Register.VY)
+        turn = math.radians(self._signed(Register.VYAW))
+        self._board.walk((ahead / step_time, aside / step_time, turn))
+
+    def _turn(self, data: bytes) -> None:
+        if len(data) == 2:
+            self._board.turn_by(math.radians(int.from_bytes(data, 'big', signed=True)))
+
+    def _mark_time(self, _: bytes) -> None:
+        walker = self._board.walker
+        walker.marking_time = self._memory[_MARK_TIME] != b'\0'
+        walker.lift = self._decoded(_MARK_TIME) / 1000.0 if walker.marking_time else LIFT
+        self._board.start_gait()
+
+    def _pose_body(self, _: bytes) -> None:
+        walker = self._board.walker
+        body = {name: self._signed(address) for address, name in _BODY.items()}
+        walker.stance = replace(
+            walker.stance,
+            shift=(body['x'] / 1000.0, body['y'] / 1000.0),
+            height=self._height(_HEIGHT),
+            attitude=(
+                math.radians(body['roll']),
+                math.radians(body['pitch']),
+                math.radians(body['yaw']),
+            ),
+            feet={name: self._foot(leg) for leg, name in LEG_NAMES.items()},
+        )
+        self._board.start_gait()
+
+    def _foot(self, leg: int) -> tuple[float, float, float]:
+        """Return how far a host has moved a foot [m]."""
+        x, y, z = _FEET[3 * (leg - 1) : 3 * leg]
+        return self._signed(x) / 1000.0, self._signed(y) / 1000.0, HEIGHT - self._height(z)
+
+    def _height(self, address: int) -> float:
+        """Return a height that was written, taken as one from hip to foot [m]."""
+        return self._decoded(address) / 1000.0 if address in self._memory else HEIGHT
+
+    def _signed(self, address: int) -> float:
+        """Return what was written to a register around zero, in its unit; zero without."""
+        data = self._memory.get(address)
+        if data is None or data[0] in NEUTRAL:
+            return 0.0
+        return self._decoded(address)
+
+    def _decoded(self, address: int) -> float:
+        span = OLD.functions[address].spans[self._board.model]
+        return span.decode(self._memory[address][0])
+
+
+def _clipped(value: float, step: float) -> float:
+    """Return a value that fits a 16-bit number in steps of this size."""
+    return min(max(value, -INT16 * step), INT16 * step)

@@ -1,0 +1,197 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The robot's servos as the board sees them: ids and degrees instead of joints and radians.
+
+A servo's angle is the joint's position in degrees, sign +1 and offset 0, unless it is mounted
+otherwise. The gripper's servo spreads the travel of the jaw over its whole range.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+import math
+
+import numpy as np
+
+from quad_description import Joint
+from quad_hardware.protocol import ANGLE_SPANS, Model, MOTOR_OF_JOINT, MOTOR_ORDER, slot_of
+
+from ..exceptions import SetupError
+from ..plant.plant import Plant
+from ..plant.state import Array, Measurement
+
+GRIPPER = 51
+NO_LOAD_SPEED = 527.0  # [deg/s] 9.2 rad/s: what servo speed 255 means here; no page says it
+MAX_SPEED = 255
+
+
+@dataclass(frozen=True, slots=True)
+class _Scale:
+    gain: float  # [rad/deg], of the gripper [m/deg]
+    offset: float  # [rad], [m]
+
+    def position(self, angle: float) -> float:
+        return self.offset + self.gain * angle
+
+    def angle(self, position: float) -> float:
+        return (position - self.offset) / self.gain
+
+
+@dataclass(frozen=True, slots=True)
+class Mount:
+    """How a servo sits on its joint.
+
+    Attributes:
+        sign: 1, or -1 for one that turns the other way.
+        offset: What the servo reads where the joint is at zero [deg].
+    """
+
+    sign: int = 1
+    offset: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Refuse what is no mounting.
+
+        Raises:
+            SetupError: The message says what is.
+        """
+        if self.sign not in {1, -1} or not abs(self.offset) <= 180.0:
+            raise SetupError(
+                f'servo mounted with sign {self.sign} and offset {self.offset}: '
+                'give 1 or -1, and -180 to 180 degrees'
+            )
+
+
+AS_EXPECTED = Mount()
+
+
+def _scale(joint: Joint, motor: int, model: Model, mount: Mount) -> _Scale:
+    gain, offset = math.pi / 180.0, 0.0
+    if motor == GRIPPER:
+        span = ANGLE_SPANS[model][motor]
+        gain = (joint.upper - joint.lower) / (span.high - span.low)
+        offset = joint.lower - gain * span.low
+    gain *= mount.sign
+    return _Scale(gain, offset - gain * mount.offset)
+
+
+class Servos:
+    """All servos of a robot, by motor id.
+
+    Attributes:
+        fitted: Ids of the servos that the robot has, in the order of the wire.
+        failed: Id of the servo that does not work, None if all do.
+    """
+
+    def __init__(
+        self,
+        plant: Plant,
+        joints: Iterable[Joint],
+        model: Model,
+        mounts: Mapping[int, Mount],
+    ) -> None:
+        """Connect to a robot.
+
+        Args:
+            plant: The robot.
+            joints: Its joints.
+            model: Whose ranges the gripper has.
+            mounts: Servos that are not mounted as a driver expects, by motor id.
+
+        Raises:
+            SetupError: A joint has no motor on this board, or a mounted servo no joint.
+        """
+        self._plant = plant
+        self._joint: dict[int, str] = {}
+        self._scale: dict[int, _Scale] = {}
+        for joint in joints:
+            motor = MOTOR_OF_JOINT.get(joint.name)
+            if motor is None:
+                raise SetupError(f'the board has no servo for joint {joint.name}')
+            self._joint[motor] = joint.name
+            self._scale[motor] = _scale(joint, motor, model, mounts.get(motor, AS_EXPECTED))
+        if unknown := sorted(mounts.keys() - self._joint.keys()):
+            raise SetupError(f'no servo has id {unknown[0]}; there are {sorted(self._joint)}')
+        self._index = {motor: plant.joint_names.index(name) for motor, name in self._joint.items()}
+        # by joint, in the order of the robot's arrays
+        order = sorted(self._index, key=lambda motor: self._index[motor])
+        self._slots = [slot_of(motor) for motor in order]
+        self._gains = np.array([self._scale[motor].gain for motor in order])
+        self._offsets = np.array([self._scale[motor].offset for motor in order])
+        self.fitted = tuple(motor for motor in MOTOR_ORDER if motor in self._joint)
+        self.failed: int | None = None
+        self._speed = dict.fromkeys(self.fitted, MAX_SPEED)
+
+    def command(self, angles: Mapping[int, float], duration: float | None = None) -> None:
+        """Send servos to angles [deg]; servos that the robot lacks are left out.
+
+        Args:
+            angles: By motor id.
+            duration: Time of the way [s]; None for the servo's own.
+        """
+        positions = {
+            self._joint[motor]: self._scale[motor].position(angle)
+            for motor, angle in angles.items()
+            if motor in self._joint
+        }
+        self._plant.set_targets(positions, duration)
+
+    def command_one(self, motor: int, angle: float) -> None:
+        """Send one servo to an angle [deg], at the speed that is set for it."""
+        if motor not in self._joint:
+            return
+        speed = self._speed[motor]
+        if speed >= MAX_SPEED:
+            self.command({motor: angle})
+            return
+        now = self._scale[motor].angle(float(self._plant.joint_targets[self._index[motor]]))
+        self.command({motor: angle}, abs(angle - now) / (NO_LOAD_SPEED * speed / MAX_SPEED))
+
+    def set_speed(self, motors: Iterable[int], speed: int) -> None:
+        """Set how fast single commands are carried out, 1 to 255."""
+        self._speed |= dict.fromkeys(motors, max(speed, 1))
+
+    def set_torque(self, motors: Iterable[int], on: bool, *, hold: bool = True) -> None:
+        """Switch servos on or off; those that the robot lacks or that have failed are left out.
+
+        Args:
+            motors: By id.
+            on: Whether they hold.
+            hold: Those that wake hold where they are, as after switching on; else they go to
+                their last target, as when a host gives the torque back.
+        """
+        names = [
+            self._joint[motor]
+            for motor in motors
+            if motor in self._joint and not (on and motor == self.failed)
+        ]
+        self._plant.set_torque(on, names, hold=hold)
+
+    def fail(self, motor: int | None) -> None:
+        """Let a servo fail: it lets go. The one that had failed works, and holds where it is."""
+        if motor == self.failed:
+            return
+        repaired, self.failed = self.failed, motor
+        if repaired is not None:
+            self.set_torque([repaired], True)
+        if motor is not None:
+            self.set_torque([motor], False)
+
+    def torque_on(self, motor: int) -> bool:
+        """Tell whether a servo holds."""
+        return self._plant.torque_on(self._joint[motor])
+
+    def angles(self, measured: Measurement) -> tuple[float, ...]:
+        """Return angles by slot [deg]; 0 for servos that the robot lacks."""
+        return self.by_slot((measured.positions - self._offsets) / self._gains)
+
+    def speeds(self, measured: Measurement) -> tuple[float, ...]:
+        """Return velocities by slot [deg/s]; 0 for servos that the robot lacks."""
+        return self.by_slot(measured.velocities / self._gains)
+
+    def by_slot(self, values: Array) -> tuple[float, ...]:
+        """Return values of the joints by slot."""
+        slots = np.zeros(len(MOTOR_ORDER))
+        slots[self._slots] = values
+        return tuple(slots.tolist())

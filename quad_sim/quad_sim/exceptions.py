@@ -1,0 +1,33 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Everything that quad_sim raises.
+
+::
+
+    SimulationError (RuntimeError)   the robot cannot be simulated, or its physics blew up
+    ├── SetupError (ValueError)      an option of the simulated robot has no sense
+    └── TargetError (ValueError)     targets of the servos are refused; nothing moves
+"""
+
+from __future__ import annotations
+
+
+class SimulationError(RuntimeError):
+    """The robot cannot be simulated, or its physics blew up.
+
+    Scenarios: MuJoCo is not installed, a servo far too stiff for the time step.
+    """
+
+
+class SetupError(SimulationError, ValueError):
+    """An option of the simulated robot has no sense.
+
+    Scenarios: a URDF without base_link, a link path that is a file, a rate of faults above one.
+    """
+
+
+class TargetError(SimulationError, ValueError):
+    """Targets of the servos are refused.
+
+    Scenarios: NaN or infinite positions, a wrong number of joints, an unknown joint name.
+    """

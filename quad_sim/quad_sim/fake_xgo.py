@@ -1,0 +1,93 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""``ros2 run quad_sim fake_xgo``: a simulated XGO on a pseudo-terminal."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+import signal
+import sys
+from types import FrameType
+
+from .exceptions import SimulationError
+from .line.pseudo_terminal import PseudoTerminal
+from .line.server import Server
+from .options import build, parse_arguments
+
+_ROS_BEGIN, _ROS_END = '--ros-args', '--'
+
+
+def run(argv: Sequence[str] | None = None) -> int:
+    """Simulate until Ctrl-C or SIGTERM; return the exit code."""
+    own, ros = split_ros_arguments(sys.argv[1:] if argv is None else argv)
+    options = parse_arguments(own)
+    try:
+        simulation = build(options)
+        with PseudoTerminal(options.link) as terminal:
+            server = Server(simulation.plant, simulation.line, terminal)
+            with _stopped_by_signals(server):
+                if options.no_ros:
+                    _announce(options, terminal)
+                    server.run()
+                else:
+                    from .fake_xgo_node import serve_with_ros
+
+                    serve_with_ros(server, simulation, ros, lambda: _announce(options, terminal))
+            server.close()
+    except SimulationError as error:
+        sys.stderr.write(f'fake_xgo: {error}\n')
+        return 2 if isinstance(error, ValueError) else 1
+    return 0
+
+
+def main() -> None:
+    """Entry point."""
+    sys.exit(run())
+
+
+def split_ros_arguments(argv: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Return our own arguments and those for ROS, without importing ROS."""
+    own: list[str] = []
+    ros: list[str] = []
+    in_ros = False
+    for word in argv:
+        if word == _ROS_BEGIN:
+            in_ros = True
+        if in_ros:
+            ros.append(word)
+        else:
+            own.append(word)
+        if in_ros and word == _ROS_END:
+            in_ros = False
+    return own, ros
+
+
+@contextmanager
+def _stopped_by_signals(server: Server) -> Iterator[None]:
+    """End the server at SIGINT and SIGTERM."""
+
+    def stop(_number: int, _frame: FrameType | None) -> None:
+        server.stop()
+
+    previous = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
+    finally:
+        for number, handler in previous.items():
+            signal.signal(number, handler)
+
+
+def _announce(options: argparse.Namespace, terminal: PseudoTerminal) -> None:
+    robot = f'{options.preset}{" with arm" if options.arm else ""}'
+    physics = 'in the air' if options.physics == 'none' else f'servos {options.servo}'
+    sys.stdout.write(
+        f'fake_xgo: {robot} ({physics}) at {terminal.link} -> {terminal.device}, '
+        f'protocol {options.protocol}\n'
+    )
+    sys.stdout.flush()
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,174 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The simulated robot's node: pushes and faults by service, and where the robot really is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import TimeoutError as NotDoneError
+import gc
+import math
+import sys
+import threading
+
+from geometry_msgs.msg import Vector3
+from nav_msgs.msg import Odometry
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+from rclpy.utilities import ok, try_shutdown
+from std_srvs.srv import Trigger
+
+from node_runner import init_ros, make_executor
+from quad_msgs.srv import InjectFault, Push
+
+from .board.board import POSE_TIME
+from .exceptions import SetupError
+from .line.faults import FOREVER, make_fault
+from .line.server import Server
+from .options import Simulation
+from .plant.state import Vector
+
+TRUTH_PERIOD = 0.05  # [s]
+PATIENCE = 1.0  # [s] the loop answers within milliseconds
+END_ALL = 'none'
+SWITCH_INTERVAL = 0.0005  # [s] how long a callback may keep the robot from the interpreter
+
+
+class FakeXgoNode(Node):
+    """Offers ``~/push``, ``~/fault``, ``~/stand`` and publishes ``~/ground_truth``."""
+
+    def __init__(self, server: Server, simulation: Simulation) -> None:
+        """Make the services.
+
+        Args:
+            server: The loop in which the robot lives.
+            simulation: The robot.
+        """
+        super().__init__('fake_xgo')
+        self._server, self._simulation = server, simulation
+        self.create_service(Push, '~/push', self._push)
+        self.create_service(InjectFault, '~/fault', self._fault)
+        self.create_service(Trigger, '~/stand', self._stand)
+        self._truth = self.create_publisher(Odometry, '~/ground_truth', 10)
+        self.create_timer(TRUTH_PERIOD, self._publish)
+
+    def _push(self, request: Push.Request, response: Push.Response) -> Push.Response:
+        force, velocity = _vector(request.force), _vector(request.velocity)
+        plant = self._simulation.plant
+
+        def act() -> str:
+            if not any(force) and not any(velocity):
+                raise SetupError('neither force [N] nor velocity [m/s] is given')
+            if any(velocity):
+                plant.kick(velocity)
+            if any(force):
+                plant.push(force, request.duration)
+            return f'pushed with {force} N for {request.duration} s, kicked by {velocity} m/s'
+
+        response.success, response.message = self._do(act)
+        return response
+
+    def _fault(
+        self, request: InjectFault.Request, response: InjectFault.Response
+    ) -> InjectFault.Response:
+        plan = self._simulation.line.faults
+
+        def act() -> str:
+            now = self._server.now
+            plan.prune(now)
+            if request.fault == END_ALL:
+                plan.end_all()
+                return 'all faults have ended'
+            if not (math.isfinite(request.duration) and request.duration >= 0.0):
+                raise SetupError(f'duration {request.duration}: give seconds, 0 for ever')
+            plan.add(make_fault(request.fault, request.settings, now, request.duration or FOREVER))
+            return f'{request.fault} from now on' + (
+                f' for {request.duration} s' if request.duration else ''
+            )
+
+        response.success, response.message = self._do(act)
+        return response
+
+    def _stand(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        def act() -> str:
+            self._simulation.board.stand()
+            return f'stands in {POSE_TIME} s, as after a press of its button'
+
+        response.success, response.message = self._do(act)
+        return response
+
+    def _do(self, action: Callable[[], str]) -> tuple[bool, str]:
+        try:
+            return True, self._server.submit(action).result(PATIENCE)
+        except SetupError as error:
+            return False, str(error)
+        except NotDoneError:
+            return False, 'the simulation does not answer; has it ended?'
+
+    def _publish(self) -> None:
+        truth = self._server.truth
+        message = Odometry()
+        message.header.stamp = self.get_clock().now().to_msg()
+        message.header.frame_id = 'world'
+        message.child_frame_id = 'base_link'
+        pose, twist = message.pose.pose, message.twist.twist
+        pose.position.x, pose.position.y, pose.position.z = truth.pose.position
+        orientation = pose.orientation
+        orientation.x, orientation.y, orientation.z, orientation.w = truth.pose.orientation
+        twist.linear.x, twist.linear.y, twist.linear.z = truth.velocity.linear
+        twist.angular.x, twist.angular.y, twist.angular.z = truth.velocity.angular
+        self._truth.publish(message)
+
+
+def serve_with_ros(
+    server: Server,
+    simulation: Simulation,
+    ros_arguments: Sequence[str],
+    announce: Callable[[], None],
+) -> None:
+    """Run the robot in a thread and its node in this one, until one of them ends.
+
+    Args:
+        server: The loop in which the robot lives.
+        simulation: The robot.
+        ros_arguments: For rclpy.
+        announce: Called when the services are there.
+
+    Raises:
+        SimulationError: What ended the robot.
+    """
+    # the caller has signal handlers that end the server
+    init_ros(ros_arguments)
+    ended: list[BaseException] = []
+    thread = threading.Thread(target=_live, args=(server, ended), name='fake_xgo')
+    executor = make_executor()
+    node = FakeXgoNode(server, simulation)
+    executor.add_node(node)
+    sys.setswitchinterval(SWITCH_INTERVAL)
+    gc.freeze()  # what is there now is there to stay, and need not be looked through
+    thread.start()
+    announce()
+    try:
+        while ok() and thread.is_alive():
+            executor.spin_once(timeout_sec=0.2)
+    except ExternalShutdownException:
+        pass
+    finally:
+        server.stop()
+        thread.join()
+        executor.shutdown()
+        node.destroy_node()
+        try_shutdown()
+    if ended:
+        raise ended[0]
+
+
+def _live(server: Server, ended: list[BaseException]) -> None:
+    try:
+        server.run()
+    except Exception as error:  # noqa: BLE001  told by the thread that can
+        ended.append(error)
+
+
+def _vector(message: Vector3) -> Vector:
+    return message.x, message.y, message.z

@@ -1,0 +1,184 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What may go wrong with a robot and its serial line, and when.
+
+A fault is written ``KIND[,name=value...]``: ``drop,rate=0.01`` or ``silence,at=5,for=2``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+import math
+from types import MappingProxyType
+
+from ..exceptions import SetupError
+
+
+class FaultKind(Enum):
+    """The faults that there are."""
+
+    DROP = 'drop'  # bytes are lost, both ways
+    FLIP = 'flip'  # a bit of a byte is inverted, both ways
+    SILENCE = 'silence'  # the robot hears, and says nothing
+    DEAF = 'deaf'  # the robot hears nothing
+    SLOW = 'slow'  # everything the robot says comes late
+    BROWN_OUT = 'brown_out'  # the supply fails: the board starts anew, its servos without torque
+    UNPLUG = 'unplug'  # the serial port is gone
+    LIMP = 'limp'  # a servo lets go, and the board says that one is silent
+    IMU = 'imu'  # the IMU is dead: the board reports an attitude that is no number
+    BATTERY = 'battery'  # the charge is another one from now on
+
+
+FOREVER = math.inf
+
+
+@dataclass(frozen=True, slots=True)
+class _Setting:
+    default: float
+    lowest: float
+    highest: float
+    meaning: str
+
+
+_RATE = _Setting(0.01, 0.0, 1.0, 'share of the bytes')
+
+SETTINGS: Mapping[FaultKind, Mapping[str, _Setting]] = MappingProxyType(
+    {kind: {} for kind in FaultKind}
+    | {
+        FaultKind.DROP: {'rate': _RATE},
+        FaultKind.FLIP: {'rate': _RATE},
+        FaultKind.SLOW: {'delay': _Setting(0.05, 0.0, 60.0, 'later by [s]')},
+        FaultKind.LIMP: {'motor': _Setting(11.0, 11.0, 54.0, 'id')},
+        FaultKind.BATTERY: {'level': _Setting(5.0, 0.0, 100.0, 'charge [%]')},
+    }
+)
+"""Details of a fault, beside ``at`` and ``for``."""
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """Something that goes wrong for a time.
+
+    Attributes:
+        kind: What.
+        start: From when [s], since the start of the robot.
+        duration: For how long [s]; infinite until it is ended.
+        values: Its details by name.
+    """
+
+    kind: FaultKind
+    start: float = 0.0
+    duration: float = FOREVER
+    values: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Refuse times and details without sense.
+
+        Raises:
+            SetupError: The message says what the fault takes.
+        """
+        known = SETTINGS[self.kind]
+        for name, value in self.values.items():
+            if name not in known:
+                takes = ', '.join(('at', 'for', *known))
+                raise SetupError(f'fault {self.kind.value} has no {name!r}; it takes {takes}')
+            setting = known[name]
+            if not setting.lowest <= value <= setting.highest:
+                raise SetupError(
+                    f'fault {self.kind.value}: {name} {value} ({setting.meaning}) is not '
+                    f'{setting.lowest:g} to {setting.highest:g}'
+                )
+        if not (math.isfinite(self.start) and self.start >= 0.0 and self.duration > 0.0):
+            raise SetupError(
+                f'fault {self.kind.value}: at {self.start} for {self.duration}; '
+                'give times in [s], from zero on'
+            )
+
+    def __getitem__(self, name: str) -> float:
+        """Return a detail, or its default."""
+        return self.values.get(name, SETTINGS[self.kind][name].default)
+
+    @property
+    def end(self) -> float:
+        """When it is over [s]."""
+        return self.start + self.duration
+
+
+def make_fault(
+    name: str, settings: Iterable[str], start: float = 0.0, duration: float = FOREVER
+) -> Fault:
+    """Return a fault from words.
+
+    Args:
+        name: Its kind.
+        settings: ``name=value`` each; ``at`` and ``for`` go before the arguments.
+        start: From when [s].
+        duration: For how long [s].
+
+    Raises:
+        SetupError: A word has no sense; the message lists what there is.
+    """
+    try:
+        kind = FaultKind(name)
+    except ValueError:
+        known = ', '.join(kind.value for kind in FaultKind)
+        raise SetupError(f'there is no fault {name!r}; there are {known}') from None
+    values = dict(_assignment(name, word) for word in settings)
+    start, duration = values.pop('at', start), values.pop('for', duration)
+    return Fault(kind, start, duration, values)
+
+
+def parse_fault(text: str) -> Fault:
+    """Return a fault that is written ``KIND[,name=value...]``.
+
+    Raises:
+        SetupError: The text has no sense; the message lists what there is.
+    """
+    name, *settings = (word.strip() for word in text.split(','))
+    return make_fault(name, settings)
+
+
+def _assignment(fault: str, word: str) -> tuple[str, float]:
+    name, _, value = word.partition('=')
+    try:
+        return name.strip(), float(value)
+    except ValueError:
+        raise SetupError(f'fault {fault}: {word!r} is no name=number') from None
+
+
+class FaultPlan:
+    """The faults of a robot, over its time."""
+
+    def __init__(self, faults: Iterable[Fault] = ()) -> None:
+        """Plan faults.
+
+        Args:
+            faults: What is to come.
+        """
+        self._faults = list(faults)
+
+    def add(self, fault: Fault) -> None:
+        """Plan one more."""
+        self._faults.append(fault)
+
+    def end_all(self) -> None:
+        """Forget all faults, those that are still to come too."""
+        self._faults.clear()
+
+    def active(self, kind: FaultKind, now: float) -> Fault | None:
+        """Return the fault of a kind that goes on at a time, the one planned last."""
+        for fault in reversed(self._faults):
+            if fault.kind is kind and fault.start <= now < fault.end:
+                return fault
+        return None
+
+    def next_change(self, now: float) -> float:
+        """Return when something begins or ends next [s]; infinity for never."""
+        times = (time for fault in self._faults for time in (fault.start, fault.end))
+        return min((time for time in times if time > now), default=FOREVER)
+
+    def prune(self, now: float) -> None:
+        """Forget what is over."""
+        self._faults = [fault for fault in self._faults if fault.end > now]

@@ -1,0 +1,211 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The robot at the end of its serial line: bytes in, bytes out, in a time that is handed in."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+import math
+
+from quad_hardware.protocol import Frame, HOST_KINDS, NEW, OLD, Protocol, StreamParser
+
+from ..board.board import Board
+from ..board.functions import Functions
+from ..board.registers import Registers
+from .faults import Fault, FaultKind, FaultPlan
+from .wire import Arrival, Wire
+
+LATE = 0.05  # [s] after which a state that was due is one of now
+QUIET = 0.05  # [s] of silence in a frame after which its rest is not waited for
+
+
+@dataclass(slots=True)
+class LineStatistics:
+    """What the robot has heard.
+
+    Attributes:
+        frames: Valid frames.
+        hurried: Frames that followed the one before too closely, and were not carried out.
+        garbled: Bytes at a baud rate at which the robot does not listen.
+        pushed: States sent unasked.
+    """
+
+    frames: int = 0
+    hurried: int = 0
+    garbled: int = 0
+    pushed: int = 0
+
+
+class RobotLine:
+    """A board, its serial line in both directions, and the faults of both.
+
+    Attributes:
+        faults: What goes wrong; may be added to.
+        statistics: What the robot has heard.
+        to_robot: The wire from the host.
+        to_host: The wire to the host.
+    """
+
+    def __init__(
+        self,
+        board: Board,
+        speeds: Mapping[int, Protocol] | None = None,
+        *,
+        faults: FaultPlan | None = None,
+        fixed_baud: int = 0,
+        command_gap: float = 0.0,
+        seed: int = 0,
+    ) -> None:
+        """Connect a board.
+
+        Args:
+            board: The robot.
+            speeds: What it speaks, by baud rate [bit/s]; both protocols at their own for None.
+            faults: What goes wrong, and when.
+            fixed_baud: Speed to assume [bit/s] whatever the host sets; 0 for the host's.
+            command_gap: Least time between two frames of the host in the old protocol [s]; a frame
+                that comes sooner is lost, as the vendor warns.
+            seed: Of the damage on the line.
+        """
+        self.faults = faults or FaultPlan()
+        self.statistics = LineStatistics()
+        self.to_robot = Wire(self.faults, FaultKind.DEAF, seed, slow=False)
+        self.to_host = Wire(self.faults, FaultKind.SILENCE, seed + 1, slow=True)
+        self._board = board
+        self._functions, self._registers = Functions(board), Registers(board)
+        self._by_baud = dict(speeds or {NEW.baud: NEW, OLD.baud: OLD})
+        self._forget_partial_frames()
+        self._fixed_baud = fixed_baud
+        self._command_gap = command_gap
+        self._baud = fixed_baud or next(iter(self._by_baud))
+        self._heard_at = self._frame_end = -math.inf
+        self._battery_fault: Fault | None = None
+        self._powered = self._plugged = True
+        self._now = 0.0
+
+    @property
+    def baud(self) -> int:
+        """Speed of the line [bit/s]."""
+        return self._baud
+
+    @property
+    def plugged(self) -> bool:
+        """Whether the port is there, faults considered."""
+        return self._plugged
+
+    def set_baud(self, baud: int) -> None:
+        """Follow the speed that the host has set [bit/s]."""
+        if not self._fixed_baud and baud != self._baud:
+            self._baud = baud
+            self._forget_partial_frames()
+
+    def receive(self, data: bytes, now: float) -> None:
+        """Take bytes that the host has begun to send."""
+        if self._baud not in self._by_baud:
+            self.statistics.garbled += len(data)
+            return
+        self.to_robot.put(data, now, self._baud)
+
+    def advance(self, now: float) -> bytes:
+        """Let time pass; return what has arrived at the host by then."""
+        self._change_faults(now)
+        while (arrival := min(self.to_robot.next_arrival, self._push_time)) <= now:
+            if self._push_time <= self.to_robot.next_arrival:
+                # a process that was held up does not send all that it owes in a burst
+                self._push(arrival if now - arrival < LATE else now)
+            else:
+                for arrived in self.to_robot.take(arrival):
+                    self._hear(arrived)
+        self._board.advance(now)
+        if now - self._heard_at > QUIET:
+            self._give_up_waiting(now)
+        return b''.join(arrived.data for arrived in self.to_host.take(now))
+
+    @property
+    def next_event(self) -> float:
+        """When :meth:`advance` has something to do next, without new bytes [s]."""
+        return min(
+            self.to_robot.next_arrival,
+            self.to_host.next_arrival,
+            self._push_time,
+            self.faults.next_change(self._now),
+        )
+
+    @property
+    def _push_time(self) -> float:
+        return self._functions.next_push
+
+    def _push(self, now: float) -> None:
+        self._board.advance(now)
+        frame = self._functions.push(now)
+        if self._board.awake:
+            self.statistics.pushed += 1
+            self._say(frame, NEW, now)
+
+    def _hear(self, arrived: Arrival) -> None:
+        baud = self._baud
+        protocol, parser = self._by_baud.get(baud), self._parsers.get(baud)
+        if protocol is None or parser is None:
+            return
+        self._board.advance(arrived.end)
+        self._heard_at = arrived.end
+        length = len(arrived.data)
+        begin = arrived.end - length * arrived.seconds_per_byte
+        for frame in parser.feed(arrived.data):
+            size = protocol.overhead + len(frame.payload)
+            # frames of one chunk follow each other without a pause
+            end = min(begin + size * arrived.seconds_per_byte, arrived.end)
+            self._handle(frame, protocol, max(begin, self._frame_end), end, arrived.end)
+            begin = end
+
+    def _handle(
+        self, frame: Frame, protocol: Protocol, begin: float, end: float, now: float
+    ) -> None:
+        gap = begin - self._frame_end
+        self._frame_end = end
+        if not self._board.awake:
+            return
+        if protocol is OLD and gap < self._command_gap:
+            self.statistics.hurried += 1
+            return
+        self.statistics.frames += 1
+        handler = self._functions if protocol is NEW else self._registers
+        for answer in handler.handle(frame, now):
+            self._say(answer, protocol, now)
+
+    def _forget_partial_frames(self) -> None:
+        self._parsers = {
+            baud: StreamParser(protocol, HOST_KINDS) for baud, protocol in self._by_baud.items()
+        }
+
+    def _give_up_waiting(self, now: float) -> None:
+        parser = self._parsers.get(self._baud)
+        if parser is not None and parser.pending:
+            protocol = self._by_baud[self._baud]
+            for frame in parser.expire():
+                self._handle(frame, protocol, now, now, now)
+
+    def _say(self, frame: Frame, protocol: Protocol, now: float) -> None:
+        if self._by_baud.get(self._baud) is protocol:  # the host may have gone on to another speed
+            self.to_host.put(frame.encode(protocol), now, self._baud)
+
+    def _change_faults(self, now: float) -> None:
+        self._now = now
+        active = self.faults.active
+        brown_out = active(FaultKind.BROWN_OUT, now) is not None
+        if brown_out == self._powered:
+            self._powered = not brown_out
+            self._board.advance(now)
+            self._board.switch_power(self._powered)
+            self._functions.restart()
+            self._registers.restart()
+        battery = active(FaultKind.BATTERY, now)
+        if battery is not None and battery is not self._battery_fault:
+            self._board.battery.charge = battery['level']
+        self._battery_fault = battery
+        limp = active(FaultKind.LIMP, now)
+        if self._powered:
+            self._board.servos.fail(None if limp is None else int(limp['motor']))
+        self._board.imu_failed = active(FaultKind.IMU, now) is not None
+        self._plugged = active(FaultKind.UNPLUG, now) is None

@@ -1,0 +1,138 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The simulated robot in real time, between a pseudo-terminal and the clock: one loop."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from concurrent.futures import Future
+from dataclasses import dataclass
+import os
+import select
+import threading
+import time
+from typing import TypeVar
+
+from ..exceptions import SetupError
+from ..plant.plant import Plant
+from ..plant.state import BasePose, BaseVelocity
+from .pseudo_terminal import PseudoTerminal
+from .robot_line import RobotLine
+
+Result = TypeVar('Result')
+
+IDLE_PERIOD = 0.02  # [s] the robot lives on also while nobody talks to it
+TRUTH_PERIOD = 0.02  # [s] between two looks at where it is
+
+
+@dataclass(frozen=True, slots=True)
+class Truth:
+    """Where the robot really is.
+
+    Attributes:
+        time: Of the robot [s].
+        pose: Of base_link in the world.
+        velocity: Of base_link.
+    """
+
+    time: float
+    pose: BasePose
+    velocity: BaseVelocity
+
+
+class Server:
+    """Lets a robot live in real time; :meth:`run` is its loop, for a thread of its own.
+
+    Attributes:
+        truth: Where the robot was last; may be read from any thread.
+        unread: Bytes for the host that nobody has read.
+    """
+
+    def __init__(self, plant: Plant, line: RobotLine, terminal: PseudoTerminal) -> None:
+        """Connect robot and terminal.
+
+        Args:
+            plant: The robot.
+            line: Its board and serial line.
+            terminal: Where programs find it; closing it is up to the caller.
+        """
+        self._plant, self._line, self._terminal = plant, line, terminal
+        self._actions: deque[tuple[Future[object], Callable[[], object]]] = deque()
+        self._wake_read, self._wake_write = os.pipe()
+        os.set_blocking(self._wake_read, False)
+        self._stop = threading.Event()
+        self._start = time.monotonic()
+        self.unread = 0
+        self._look()
+
+    def run(self) -> None:
+        """Serve until :meth:`stop`.
+
+        Raises:
+            SimulationError: The physics blew up, or the port could not be made again.
+        """
+        self._start = time.monotonic()
+        while not self._stop.is_set():
+            self._turn(self.now)
+            wait = min(max(self._line.next_event - self.now, 0.0), IDLE_PERIOD)
+            watched: list[int | PseudoTerminal] = [self._wake_read]
+            if self._terminal.plugged:
+                watched.append(self._terminal)
+            ready, _, _ = select.select(watched, [], [], wait)
+            if self._wake_read in ready:
+                os.read(self._wake_read, 64)
+
+    def stop(self) -> None:
+        """End :meth:`run`; from any thread, also from a signal handler."""
+        self._stop.set()
+        self._wake()
+
+    def close(self) -> None:
+        """Give back what :meth:`stop` and :meth:`submit` need; after the end of :meth:`run`."""
+        os.close(self._wake_read)
+        os.close(self._wake_write)
+
+    def submit(self, action: Callable[[], Result]) -> Future[Result]:
+        """Have something done to the robot between two turns of the loop; from any thread."""
+        future: Future[Result] = Future()
+        self._actions.append((future, action))  # type: ignore[arg-type]
+        self._wake()
+        return future
+
+    @property
+    def now(self) -> float:
+        """Time of the robot [s]."""
+        return time.monotonic() - self._start
+
+    def _wake(self) -> None:
+        os.write(self._wake_write, b'.')
+
+    def _turn(self, now: float) -> None:
+        self._act()
+        terminal, line = self._terminal, self._line
+        if terminal.plugged:
+            data = terminal.read()
+            line.set_baud(terminal.baud)
+            if data:
+                line.receive(data, now)
+        out = line.advance(now)
+        if line.plugged != terminal.plugged:
+            (terminal.plug if line.plugged else terminal.unplug)()
+        if out and terminal.plugged:
+            self.unread += terminal.write(out)
+        if now - self._looked_at >= TRUTH_PERIOD:
+            self._look()
+
+    def _act(self) -> None:
+        while self._actions:
+            future, action = self._actions.popleft()
+            try:
+                future.set_result(action())
+            except (SetupError, ValueError) as error:
+                future.set_exception(error)
+
+    def _look(self) -> None:
+        self._looked_at = self.now
+        plant = self._plant
+        self.truth = Truth(plant.time, plant.base_pose, plant.base_velocity)

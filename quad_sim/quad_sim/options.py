@@ -1,0 +1,221 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The command line of the simulated robot, and the robot that it describes."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+import math
+from pathlib import Path
+
+from quad_description import Pose, pose_positions, PRESETS, robot_urdf
+from quad_hardware.protocol import Model, NEW, OLD, Protocol
+
+from .board.board import Board
+from .board.servos import Mount
+from .exceptions import SetupError, SimulationError
+from .line.faults import FaultKind, FaultPlan, parse_fault, SETTINGS
+from .line.robot_line import RobotLine
+from .plant.noise import BOARD, NONE
+from .plant.plant import KinematicRobot, Plant
+from .plant.servo import ServoModel, ServoParameters
+from .plant.terrain import Terrain
+
+DEFAULT_LINK = Path('/tmp/xgo')  # noqa: S108  the path that the documentation names
+SETTLE_TIME = 1.0  # [s] until a robot that was put down is at rest
+
+_PROTOCOLS: dict[str, tuple[Protocol, ...]] = {'both': (NEW, OLD), 'new': (NEW,), 'old': (OLD,)}
+_NOISE = {'none': NONE, 'board': BOARD}
+
+
+@dataclass(frozen=True, slots=True)
+class Simulation:
+    """A robot and its line, ready to be served.
+
+    Attributes:
+        plant: The robot.
+        board: Its board.
+        line: Its serial line.
+    """
+
+    plant: Plant
+    board: Board
+    line: RobotLine
+
+
+def parse_arguments(argv: Sequence[str]) -> argparse.Namespace:
+    """Read the command line; ends the process with 2 for one that has no sense."""
+    parser = argparse.ArgumentParser(
+        prog='fake_xgo',
+        description='A simulated XGO on a pseudo-terminal that speaks both serial protocols.',
+    )
+    add = parser.add_argument
+    add('--link', type=Path, default=DEFAULT_LINK, help='path of the port (%(default)s)')
+    add('--protocol', choices=_PROTOCOLS, default='both', help='what the board speaks')
+    add('--baud', type=int, default=0, help='speed to assume [bit/s]; 0: what the host sets')
+    add(
+        '--old-baud',
+        type=int,
+        default=OLD.baud,
+        metavar='BAUD',
+        help='speed of the old protocol (%(default)s); programs have switched boards to others',
+    )
+    add('--preset', choices=PRESETS, default='lite', help='the robot (%(default)s)')
+    add('--arm', action='store_true', help='with the arm on its back')
+    add('--trunk-mass', type=float, metavar='KG', help="mass of the trunk, not the preset's")
+    add('--firmware', default='', help='version that the board tells, e.g. L-4.3.3')
+    add('--physics', choices=('mujoco', 'none'), default='mujoco', help='none: in the air')
+    add('--servo', default='firm', help='firm, vendor_rl, or kp=10,kv=0.25,interpolation=0.02')
+    add('--slope', type=float, default=0.0, metavar='DEG', help='of the ground, uphill ahead')
+    add('--friction', type=float, default=0.8, help='of the ground (%(default)s)')
+    add('--start', choices=[pose.value for pose in Pose], default='lie', help='how it begins')
+    add('--noise', choices=_NOISE, default='board', help='of its sensors (%(default)s)')
+    add('--battery', type=float, default=100.0, metavar='PERCENT', help='charge at the start')
+    add(
+        '--command-gap',
+        type=float,
+        default=0.0,
+        metavar='S',
+        help='the board loses frames of '
+        'the old protocol that follow each other faster, e.g. 0.001',
+    )
+    add('--fault', action='append', default=[], metavar='KIND,name=value', help=_fault_help())
+    add('--seed', type=int, default=0, help='of noise and damage (%(default)s)')
+    add(
+        '--mount',
+        action='append',
+        default=[],
+        metavar='ID=SIGN,DEGREES',
+        help='a servo that is mounted otherwise, to practise calibration: 12=-1,4.5',
+    )
+    add('--no-ros', action='store_true', help='without node, services and topics')
+    return parser.parse_args(argv)
+
+
+def build(options: argparse.Namespace) -> Simulation:
+    """Make the robot that a command line describes; it is at rest when this returns.
+
+    Raises:
+        SetupError: An option has no sense.
+        SimulationError: MuJoCo is not installed.
+    """
+    if not 0.0 <= options.battery <= 100.0:
+        raise SetupError(f'--battery {options.battery}: give 0 to 100 percent')
+    if not 0.0 <= options.command_gap < 1.0:
+        raise SetupError(f'--command-gap {options.command_gap}: give 0 to 1 seconds')
+    if len(options.firmware) > 10 or not options.firmware.isascii():
+        raise SetupError(f'--firmware {options.firmware!r}: give up to 10 ASCII characters')
+    faults = FaultPlan(parse_fault(text) for text in options.fault)
+    speeds = _choose_speeds(options.protocol, options.old_baud, options.baud)
+    try:
+        urdf = robot_urdf(options.preset, options.arm, options.trunk_mass)
+    except ValueError as error:
+        raise SetupError(str(error)) from error
+    plant = _make_plant(options, urdf)
+    plant.step(SETTLE_TIME)
+    board = Board(
+        plant,
+        urdf,
+        Model(options.preset),
+        firmware=options.firmware,
+        charge=options.battery,
+        mounts=dict(map(parse_mount, options.mount)),
+    )
+    line = RobotLine(
+        board,
+        speeds,
+        faults=faults,
+        fixed_baud=options.baud,
+        command_gap=options.command_gap,
+        seed=options.seed,
+    )
+    return Simulation(plant, board, line)
+
+
+def parse_servo(text: str) -> ServoModel | ServoParameters:
+    """Return a servo from its name, or from ``name=value,...``.
+
+    Raises:
+        SetupError: The text has no sense; the message says what has.
+    """
+    names = {'kp': 'stiffness', 'kv': 'velocity_gain'} | {
+        name: name for name in ('damping', 'armature', 'friction', 'interpolation')
+    }
+    known = [model.value for model in ServoModel]
+    if text in known:
+        return ServoModel(text)
+    values: dict[str, float] = {}
+    for word in text.split(','):
+        name, _, value = word.partition('=')
+        try:
+            values[names[name.strip()]] = float(value)
+        except (KeyError, ValueError):
+            raise SetupError(
+                f'--servo {text!r}: give {" or ".join(known)}, or {",".join(names)} as name=value'
+            ) from None
+    if 'stiffness' not in values:
+        raise SetupError(f'--servo {text!r} needs kp, in [N m/rad]')
+    return ServoParameters(**values)
+
+
+def parse_mount(text: str) -> tuple[int, Mount]:
+    """Return a motor id and how its servo sits, from ``ID=SIGN[,DEGREES]``.
+
+    Raises:
+        SetupError: The text has no sense; the message says what has.
+    """
+    motor, _, rest = text.partition('=')
+    sign, _, offset = rest.partition(',')
+    try:
+        return int(motor), Mount(int(sign), float(offset or '0'))
+    except SetupError:
+        raise
+    except ValueError:
+        raise SetupError(f'--mount {text!r}: give ID=SIGN,DEGREES, such as 12=-1,4.5') from None
+
+
+def _choose_speeds(name: str, old_baud: int, baud: int) -> Mapping[int, Protocol]:
+    protocols = _PROTOCOLS[name]
+    own = {protocol: protocol.baud for protocol in protocols}
+    if old_baud <= 0:
+        raise SetupError(f'--old-baud {old_baud}: give bits a second, e.g. {OLD.baud}')
+    if OLD in protocols:
+        own[OLD] = old_baud
+    if len(set(own.values())) < len(own):
+        raise SetupError(f'--old-baud {old_baud} is that of the new one; add --protocol old')
+    speeds = {speed: protocol for protocol, speed in own.items()}
+    if baud and baud not in speeds:
+        known = ', '.join(f'{speed} ({protocol.name})' for speed, protocol in speeds.items())
+        raise SetupError(f'--baud {baud}: the board speaks at {known}')
+    return speeds
+
+
+def _make_plant(options: argparse.Namespace, urdf: str) -> Plant:
+    pose = pose_positions(Pose(options.start), options.arm)
+    noise = _NOISE[options.noise]
+    if options.physics == 'none':
+        return KinematicRobot(urdf, pose=pose, noise=noise, seed=options.seed)
+    try:
+        from .physics import Robot
+    except ImportError as error:
+        raise SimulationError(
+            f'physics needs MuJoCo ({error}); install mujoco, or take --physics none'
+        ) from error
+    return Robot(
+        urdf,
+        parse_servo(options.servo),
+        Terrain(math.radians(options.slope), friction=options.friction),
+        options.seed,
+        pose=pose,
+        noise=noise,
+    )
+
+
+def _fault_help() -> str:
+    kinds = ', '.join(
+        f'{kind.value}({", ".join(SETTINGS[kind])})' if SETTINGS[kind] else kind.value
+        for kind in FaultKind
+    )
+    return f'what goes wrong, with at= and for= in seconds; may be given again: {kinds}'

@@ -1,0 +1,7 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The robot in MuJoCo; the only part of the simulation that needs it."""
+
+from .robot import Robot
+
+__all__ = ['Robot']

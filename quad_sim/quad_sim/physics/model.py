@@ -1,0 +1,160 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""A MuJoCo model from the robot's URDF: free base, floor, servos and sensors.
+
+The parts of the robot touch the floor and not each other: joint limits keep the legs apart, and
+the shapes of the links are only drawings.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+from xml.etree import ElementTree as ET
+
+import mujoco
+import numpy as np
+
+from quad_description import Joint, LEGS, movable_joints
+
+from ..exceptions import SetupError
+from ..plant.servo import JAW, ServoParameters
+from ..plant.terrain import Terrain
+
+BASE: Final = 'base_link'
+IMU: Final = 'imu_link'
+FLOOR: Final = 'floor'
+ACCELEROMETER, GYRO = 'accelerometer', 'gyro'
+
+FEET: Final = tuple(f'{leg}_foot' for leg in LEGS)
+_TOUCH_MARGIN = 0.002  # [m] how far the region that feels the ground reaches beyond the foot
+
+
+def _pass_over(_text: str) -> None:
+    """Leave a warning of MuJoCo to those who look at its counters."""
+
+
+def build_model(
+    urdf: str, servo: ServoParameters, terrain: Terrain, timestep: float
+) -> mujoco.MjModel:
+    """Make the model.
+
+    Args:
+        urdf: The robot, with base_link as root, imu_link and feet.
+        servo: What drives its hinges.
+        terrain: What it stands on.
+        timestep: Of the integration [s].
+
+    Returns:
+        A model whose actuators are the movable joints in the order of the URDF.
+
+    Raises:
+        SetupError: The URDF is no such robot.
+    """
+    if mujoco.get_mju_user_warning() is None:  # else it writes a MUJOCO_LOG.TXT where it runs
+        mujoco.set_mju_user_warning(_pass_over)
+    try:
+        spec = mujoco.MjSpec.from_string(_loadable(urdf))
+        _set_options(spec, timestep)
+        _add_base(spec)
+        _add_floor(spec, terrain)
+        for joint in movable_joints(urdf):
+            _add_servo(spec, joint, servo)
+        _add_sensors(spec)
+        return spec.compile()
+    except (ValueError, ET.ParseError) as error:
+        raise SetupError(f'the robot description cannot be simulated: {error}') from error
+
+
+def _loadable(urdf: str) -> str:
+    """Take out what MuJoCo has no place for: frames on floating joints."""
+    root = ET.fromstring(urdf)  # noqa: S314  a robot's own description, not from the network
+    for joint in root.findall("joint[@type='floating']"):
+        child = joint.find('child')
+        name = '' if child is None else child.get('link', '')
+        root.remove(joint)
+        for link in root.findall(f"link[@name='{name}']"):
+            root.remove(link)
+    extension = ET.SubElement(root, 'mujoco')
+    ET.SubElement(extension, 'compiler', fusestatic='false', discardvisual='true')
+    return ET.tostring(root, encoding='unicode')
+
+
+def _set_options(spec: mujoco.MjSpec, timestep: float) -> None:
+    spec.option.timestep = timestep
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    # a blow-up is to be reported, not hidden by a start from the beginning
+    spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
+
+
+def _body(spec: mujoco.MjSpec, name: str) -> mujoco.MjsBody:
+    body = spec.body(name)
+    if body is None:
+        raise SetupError(f'the robot description has no link {name}')
+    return body
+
+
+def _add_base(spec: mujoco.MjSpec) -> None:
+    _body(spec, BASE).add_freejoint(name='base')
+    for geom in spec.geoms:
+        geom.contype, geom.conaffinity = 0, 1
+
+
+def _add_floor(spec: mujoco.MjSpec, terrain: Terrain) -> None:
+    spec.worldbody.add_geom(
+        name=FLOOR,
+        type=mujoco.mjtGeom.mjGEOM_PLANE,
+        size=[0, 0, 1],
+        quat=np.array(terrain.orientation),
+        friction=[terrain.friction, 0.005, 0.0001],  # sliding, MuJoCo's own torsion and rolling
+        priority=1,  # the friction is the floor's, whatever touches it
+        contype=1,
+        conaffinity=0,
+    )
+
+
+def _add_servo(spec: mujoco.MjSpec, joint: Joint, servo: ServoParameters) -> None:
+    hinge = spec.joint(joint.name)
+    if hinge.type == mujoco.mjtJoint.mjJNT_SLIDE:
+        servo = JAW
+    # a number in one version of MuJoCo, coefficients of a polynomial in another
+    hinge.damping = servo.damping if np.isscalar(hinge.damping) else _linear(servo.damping)
+    hinge.armature = servo.armature
+    hinge.frictionloss = servo.friction
+    spec.add_actuator(
+        name=joint.name,
+        target=joint.name,
+        trntype=mujoco.mjtTrn.mjTRN_JOINT,
+        gaintype=mujoco.mjtGain.mjGAIN_FIXED,
+        biastype=mujoco.mjtBias.mjBIAS_AFFINE,
+        gainprm=_padded(servo.stiffness),
+        biasprm=_padded(0.0, -servo.stiffness, -servo.velocity_gain),
+        forcelimited=True,
+        forcerange=[-joint.effort, joint.effort],
+    )
+
+
+def _linear(coefficient: float) -> list[float]:
+    return [coefficient, 0.0, 0.0]
+
+
+def _padded(*values: float) -> list[float]:
+    return [*values, *[0.0] * (10 - len(values))]
+
+
+def _add_sensors(spec: mujoco.MjSpec) -> None:
+    _body(spec, IMU).add_site(name=IMU)
+    for name, kind in (
+        (ACCELEROMETER, mujoco.mjtSensor.mjSENS_ACCELEROMETER),
+        (GYRO, mujoco.mjtSensor.mjSENS_GYRO),
+    ):
+        spec.add_sensor(name=name, type=kind, objtype=mujoco.mjtObj.mjOBJ_SITE, objname=IMU)
+    for foot in FEET:
+        body = _body(spec, foot)
+        radius = float(body.geoms[0].size[0]) + _TOUCH_MARGIN
+        body.add_site(name=foot, size=[radius] * 3)
+        spec.add_sensor(
+            name=foot,
+            type=mujoco.mjtSensor.mjSENS_TOUCH,
+            objtype=mujoco.mjtObj.mjOBJ_SITE,
+            objname=foot,
+        )

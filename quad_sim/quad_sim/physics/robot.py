@@ -1,0 +1,313 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The robot in physics: targets in, time passes, poses and sensor values out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+import math
+from typing import Final
+
+import mujoco
+import numpy as np
+
+from quad_description import movable_joints
+
+from ..exceptions import SetupError, SimulationError
+from ..plant.noise import disturb, Noise, NONE
+from ..plant.servo import ServoModel, ServoParameters
+from ..plant.state import Array, BasePose, BaseVelocity, Imu, Measurement, Vector
+from ..plant.targets import TargetRamp, Targets
+from ..plant.terrain import FLAT, Terrain
+from .inertial import base_rotation, InertialUnit, vector
+from .model import BASE, build_model, FEET
+from .placing import place, start_positions
+
+TIMESTEP: Final = 0.002  # [s]
+STRONGEST: Final = 200.0  # [N] of a push; the robot weighs 7 N
+FASTEST: Final = 10.0  # [m/s] of a kick
+UNSTABLE: Final = (
+    mujoco.mjtWarning.mjWARN_BADQPOS,
+    mujoco.mjtWarning.mjWARN_BADQVEL,
+    mujoco.mjtWarning.mjWARN_BADQACC,
+)
+
+
+class Robot:
+    """A quadruped that stands on the ground, driven by its servos.
+
+    Time passes in :meth:`step` only. Two robots with equal arguments and equal calls have equal
+    states, bit for bit, on one machine.
+
+    Attributes:
+        joint_names: The movable joints in the order of the URDF; all arrays have this order.
+        feet: Links of the feet, in the order of foot_forces.
+    """
+
+    def __init__(
+        self,
+        urdf: str,
+        servo: ServoModel | ServoParameters = ServoModel.FIRM,
+        terrain: Terrain = FLAT,
+        seed: int = 0,
+        *,
+        timestep: float = TIMESTEP,
+        pose: Mapping[str, float] | None = None,
+        noise: Noise = NONE,
+    ) -> None:
+        """Put the robot on the ground.
+
+        Args:
+            urdf: What it is made of.
+            servo: How its servos follow.
+            terrain: What it stands on.
+            seed: Of the sensors' noise.
+            timestep: Of the integration [s].
+            pose: Joint positions at the start [rad]; the standing pose for those left out.
+            noise: What :meth:`measure` adds to the truth.
+
+        Raises:
+            SetupError: The URDF cannot be simulated, or the pose names joints that it lacks.
+        """
+        if not 0.0 < timestep <= 0.01:
+            raise SetupError(f'timestep {timestep} s: give more than 0 and at most 0.01')
+        self._servo = servo.parameters if isinstance(servo, ServoModel) else servo
+        self._terrain, self._noise = terrain, noise
+        self._model = build_model(urdf, self._servo, terrain, timestep)
+        self._data = mujoco.MjData(self._model)
+        joints = movable_joints(urdf)
+        self.joint_names: Final = tuple(joint.name for joint in joints)
+        self.feet: Final = FEET
+        self._qpos = [int(self._model.joint(name).qposadr[0]) for name in self.joint_names]
+        self._qvel = [int(self._model.joint(name).dofadr[0]) for name in self.joint_names]
+        self._touch = [int(self._model.sensor(foot).adr[0]) for foot in FEET]
+        self._inertial = InertialUnit(self._model, self._data)
+        self._gains = self._model.actuator_gainprm.copy(), self._model.actuator_biasprm.copy()
+        self._ramp = TargetRamp(joints, timestep, self._data.ctrl)
+        self._random = np.random.default_rng(seed)
+        self.reset(pose=pose, seed=seed)
+
+    def reset(self, *, pose: Mapping[str, float] | None = None, seed: int = 0) -> None:
+        """Stand on the ground again, as a new robot with these arguments would.
+
+        Args:
+            pose: Joint positions at the start [rad]; the standing pose for those left out.
+            seed: Of the sensors' noise.
+
+        Raises:
+            SetupError: The pose names joints that the robot lacks.
+        """
+        mujoco.mj_resetData(self._model, self._data)
+        self._random = np.random.default_rng(seed)
+        self._steps, self._owed = 0, 0.0
+        self._push_until: int | None = None
+        self.set_torque(True)
+        start = start_positions(self.joint_names, pose or {})
+        self._data.qpos[self._qpos] = start
+        self._ramp.jump(start)
+        place(self._model, self._data, self._terrain)
+        mujoco.mj_forward(self._model, self._data)
+        self._inertial.rest()
+
+    # -- what may be done to it
+
+    def set_targets(self, targets: Targets, duration: float | None = None) -> None:
+        """Give the servos new targets.
+
+        Args:
+            targets: By name, or all in the order of the URDF; [rad], of a gripper [m]. What lies
+                beyond a limit of the URDF is taken to the limit.
+            duration: Time in which the set-point goes there [s]; None for the servo's own.
+
+        Raises:
+            TargetError: A name is unknown, a value is no number, or there are too many or few.
+        """
+        self._ramp.approach(targets, self._servo.interpolation if duration is None else duration)
+
+    def set_torque(
+        self, on: bool, joints: Iterable[str] | None = None, *, hold: bool = True
+    ) -> None:
+        """Switch servos on or off.
+
+        Args:
+            on: Whether they hold.
+            joints: Their names; all for None.
+            hold: One that is switched on holds the position that it has; else it goes to its
+                last target at once.
+
+        Raises:
+            SetupError: There is no such joint.
+        """
+        names = self.joint_names if joints is None else tuple(joints)
+        unknown = sorted(set(names) - set(self.joint_names))
+        if unknown:
+            raise SetupError(f'no joint is named {", ".join(unknown)}')
+        for name in names:
+            index = self.joint_names.index(name)
+            switched_on = on and not self.torque_on(name)
+            for array, original in zip(
+                (self._model.actuator_gainprm, self._model.actuator_biasprm),
+                self._gains,
+                strict=True,
+            ):
+                array[index] = original[index] if on else 0.0
+            if switched_on:
+                place = self._data.qpos[self._qpos[index]] if hold else self._ramp.goal[index]
+                self._ramp.approach({name: float(place)}, 0.0)
+
+    def torque_on(self, joint: str) -> bool:
+        """Tell whether a servo holds."""
+        return bool(self._model.actuator_gainprm[self.joint_names.index(joint), 0] > 0.0)
+
+    def push(self, force: Vector, duration: float = 0.1) -> None:
+        """Push the trunk at its centre of mass; a push that is still going on ends.
+
+        Args:
+            force: [N] in the frame that has the robot's heading: x forward, y left, z up.
+            duration: [s]
+
+        Raises:
+            SetupError: A number is not finite, far too large, or the duration is negative.
+        """
+        if not (math.hypot(*force) <= STRONGEST and 0.0 <= duration < math.inf):
+            raise SetupError(
+                f'push of {force} N for {duration} s: give up to {STRONGEST:g} N for a finite time'
+            )
+        self._data.xfrc_applied[self._base, :3] = self._heading_to_world(force)
+        self._push_until = self._steps + round(duration / self._model.opt.timestep)
+
+    def kick(self, velocity: Vector) -> None:
+        """Change the velocity of the whole robot at once.
+
+        Args:
+            velocity: The change [m/s] in the frame that has the robot's heading.
+
+        Raises:
+            SetupError: A number is not finite, or far too large.
+        """
+        if not math.hypot(*velocity) <= FASTEST:
+            raise SetupError(f'kick of {velocity} m/s: give up to {FASTEST:g} m/s')
+        self._data.qvel[:3] += self._heading_to_world(velocity)
+
+    def step(self, duration: float) -> None:
+        """Let time pass, in whole time steps; what is left over comes with the next call.
+
+        Args:
+            duration: [s]
+
+        Raises:
+            SimulationError: The physics blew up.
+        """
+        self._owed += duration / self._model.opt.timestep
+        count = int(self._owed + 1e-6)
+        self._owed -= count
+        for _ in range(count):
+            self._step_once()
+        # MuJoCo puts such a robot back to its start by itself: only its warnings tell
+        if any(self._data.warning[int(kind)].number for kind in UNSTABLE):
+            raise SimulationError(
+                f'the physics blew up at {self.time:.3f} s; use a softer servo or a shorter step'
+            )
+
+    # -- what may be seen of it
+
+    @property
+    def time(self) -> float:
+        """Time since the start [s]."""
+        return self._steps * float(self._model.opt.timestep)
+
+    @property
+    def mass(self) -> float:
+        """Mass of all of it [kg]."""
+        return float(self._model.body_mass.sum())
+
+    @property
+    def base_pose(self) -> BasePose:
+        """Where base_link is."""
+        x, y, z, qw, qx, qy, qz = self._data.qpos[:7].tolist()
+        return BasePose((x, y, z), (qx, qy, qz, qw))
+
+    @property
+    def base_velocity(self) -> BaseVelocity:
+        """How base_link moves, expressed in base_link."""
+        # MuJoCo has the linear part in the world and the angular part in the body
+        linear = base_rotation(self._data).T @ self._data.qvel[:3]
+        return BaseVelocity(vector(linear), vector(self._data.qvel[3:6]))
+
+    @property
+    def centre_of_mass(self) -> Vector:
+        """Centre of mass of all of it, in the world [m]."""
+        return vector(self._data.subtree_com[self._base])
+
+    @property
+    def joint_positions(self) -> Array:
+        """Positions [rad], of the gripper [m], a copy."""
+        return np.array(self._data.qpos[self._qpos])
+
+    @property
+    def joint_velocities(self) -> Array:
+        """Velocities [rad/s], of the gripper [m/s], a copy."""
+        return np.array(self._data.qvel[self._qvel])
+
+    @property
+    def joint_torques(self) -> Array:
+        """What the servos do [N m], the gripper's [N], a copy."""
+        return np.array(self._data.actuator_force)
+
+    @property
+    def joint_targets(self) -> Array:
+        """Where the servos' set-points are now [rad], of the gripper [m], a copy."""
+        return np.array(self._ramp.values)
+
+    @property
+    def imu(self) -> Imu:
+        """What an ideal IMU feels; its attitude is that of imu_link in the world."""
+        return self._inertial.read()
+
+    @property
+    def foot_forces(self) -> Array:
+        """Normal force of the ground on each foot [N], a copy."""
+        return np.array(self._data.sensordata[self._touch])
+
+    @property
+    def foot_contacts(self) -> tuple[bool, ...]:
+        """Which feet touch the ground."""
+        return tuple(bool(force > 0.0) for force in self.foot_forces)
+
+    def link_position(self, link: str) -> Vector:
+        """Return where the origin of a link is, in the world [m]."""
+        return vector(self._data.body(link).xpos)
+
+    def measure(self) -> Measurement:
+        """Return what the sensors say, with the noise that the robot was made with."""
+        truth = Measurement(
+            time=self.time,
+            imu=self.imu,
+            positions=self.joint_positions,
+            velocities=self.joint_velocities,
+            torques=self.joint_torques,
+            foot_forces=self.foot_forces,
+        )
+        return disturb(truth, self._noise, self._random)
+
+    # -- inside
+
+    @property
+    def _base(self) -> int:
+        return int(self._model.body(BASE).id)
+
+    def _step_once(self) -> None:
+        data = self._data
+        self._ramp.advance()
+        if self._push_until is not None and self._steps >= self._push_until:
+            data.xfrc_applied[self._base] = 0.0
+            self._push_until = None
+        mujoco.mj_step(self._model, data)
+        self._inertial.sample()
+        self._steps += 1
+
+    def _heading_to_world(self, vector: Vector) -> Array:
+        yaw = self.base_pose.roll_pitch_yaw[2]
+        x, y, z = vector
+        cos, sin = math.cos(yaw), math.sin(yaw)
+        return np.array([cos * x - sin * y, sin * x + cos * y, z])

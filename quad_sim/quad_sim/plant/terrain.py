@@ -1,0 +1,71 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The ground that the robot stands on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import math
+
+from ..exceptions import SetupError
+
+STEEPEST = math.radians(45.0)  # [rad] steeper than any foot holds
+
+Quaternion = tuple[float, float, float, float]
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Terrain:
+    """A plane, level or tilted.
+
+    Attributes:
+        angle: How steep it is [rad].
+        direction: Where it rises to, from the world's x axis counter-clockwise [rad].
+        friction: Coefficient of friction under the feet.
+    """
+
+    angle: float = 0.0
+    direction: float = 0.0
+    friction: float = 0.8
+
+    def __post_init__(self) -> None:
+        """Refuse ground that nothing stands on."""
+        if not abs(self.angle) <= STEEPEST:
+            raise SetupError(f'slope of {self.angle} rad: give -{STEEPEST:.2f} to {STEEPEST:.2f}')
+        if not math.isfinite(self.direction):
+            raise SetupError(f'slope direction {self.direction} is no angle')
+        if not 0.0 < self.friction < 10.0:
+            raise SetupError(f'friction {self.friction}: give more than 0 and less than 10')
+
+    @classmethod
+    def slope(cls, angle: float, direction: float = 0.0) -> Terrain:
+        """Return ground that rises with an angle [rad] in a direction [rad]."""
+        return cls(angle, direction)
+
+    @property
+    def normal(self) -> Vector:
+        """Unit vector out of the ground, in the world."""
+        return (
+            -math.sin(self.angle) * math.cos(self.direction),
+            -math.sin(self.angle) * math.sin(self.direction),
+            math.cos(self.angle),
+        )
+
+    @property
+    def orientation(self) -> Quaternion:
+        """Rotation (w, x, y, z) of a robot that stands on it and faces along the world's x axis.
+
+        It turns by the slope about the horizontal axis across the direction of the slope.
+        """
+        half = 0.5 * self.angle
+        return (
+            math.cos(half),
+            math.sin(half) * math.sin(self.direction),
+            -math.sin(half) * math.cos(self.direction),
+            0.0,
+        )
+
+
+FLAT = Terrain()
+"""Level ground."""

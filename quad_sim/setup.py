@@ -1,0 +1,23 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Build description of quad_sim."""
+
+from setuptools import find_packages, setup
+
+setup(
+    name='quad_sim',
+    version='0.1.0',
+    packages=find_packages(include=['quad_sim', 'quad_sim.*']),
+    package_data={'quad_sim': ['py.typed']},
+    data_files=[
+        ('share/ament_index/resource_index/packages', ['resource/quad_sim']),
+        ('share/quad_sim', ['package.xml']),
+    ],
+    install_requires=['setuptools'],
+    zip_safe=True,
+    maintainer='The arm and quad developers',
+    maintainer_email='developers@example.org',
+    description='The XGO quadruped in physics, behind a board that speaks its serial protocols',
+    license='Apache-2.0',
+    entry_points={'console_scripts': ['fake_xgo = quad_sim.fake_xgo:main']},
+)

@@ -1,0 +1,102 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""hardware_node and the simulated robot: it stands up in physics, and survives every fault."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import ExitStack
+import math
+from pathlib import Path
+
+from isolation import reserve
+from processes import executable, RunningProcess
+import pytest
+
+from quad_description import movable_joints, Pose, pose_positions, robot_urdf
+from quad_hardware.joints import LimiterSettings
+from quad_hardware.joints.command import LONGEST_PERIOD
+from quad_msgs.srv import InjectFault
+from quad_node_rig import Rig, TIMEOUT
+
+pytestmark = [pytest.mark.scenario, pytest.mark.xdist_group('sim_hardware_node')]
+
+NAMES = [joint.name for joint in movable_joints(robot_urdf('lite'))]
+STAND = [pose_positions(Pose.STAND)[name] for name in NAMES]
+LARGEST_STEP = LimiterSettings().speed * LONGEST_PERIOD  # [rad]
+
+
+class XgoRig(Rig):
+    """The node with the simulated robot, each a process."""
+
+    def _add_robot(self, stack: ExitStack, port: Path) -> None:
+        xgo = [executable('quad_sim', 'fake_xgo'), '--link', str(port)]
+        process = stack.enter_context(RunningProcess(xgo, self._env))
+        process.wait_for(str(port))
+
+    def reporting(self) -> bool:
+        """Tell whether the newest diagnostic has the link running."""
+        return 'reports arrive' in self.status('serial link').message or (
+            'damaged' in self.status('serial link').message
+        )
+
+
+@pytest.fixture(scope='module')
+def shared_rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[XgoRig]:
+    """The node with a simulated robot, started once."""
+    with reserve() as isolation, XgoRig(isolation, tmp_path_factory.mktemp('xgo') / 'x') as rig:
+        yield rig
+
+
+@pytest.fixture
+def rig(shared_rig: XgoRig) -> XgoRig:
+    """The robot, standing."""
+    shared_rig.stream(STAND, 1.2)
+    shared_rig.heard['/joint_states'].clear()
+    return shared_rig
+
+
+def test_it_stands_up(rig: XgoRig) -> None:
+    """Joints where they were sent, the height that physics has, the footprint on the ground."""
+    rig.stream(STAND, 0.5)
+    joints = rig.hear('/joint_states', 2)
+    assert list(joints.position) == pytest.approx(STAND, abs=0.1)
+    odom = rig.hear('/odom')
+    truth = rig.hear('/fake_xgo/ground_truth')
+    height = truth.pose.pose.position.z
+    assert height > 0.07
+    assert odom.pose.pose.position.z == pytest.approx(height, abs=0.01)
+    to_base, to_footprint = rig.hear('/tf').transforms
+    below = to_footprint.transform.translation
+    assert math.hypot(below.x, below.y, below.z) == pytest.approx(
+        to_base.transform.translation.z, abs=1e-6
+    )
+    assert rig.hear('/imu').linear_acceleration.z == pytest.approx(9.8, abs=0.6)
+
+
+@pytest.mark.parametrize(('fault', 'duration'), [('unplug', 2.0), ('flip', 1.0), ('silence', 0.8)])
+def test_a_fault_ends_in_standing_and_without_a_jump(
+    rig: XgoRig, fault: str, duration: float
+) -> None:
+    """Under a stream of commands; no target moves faster than it may, no joint is wild."""
+    steps = rig.watch_steps()
+    answer = rig.client.call(
+        InjectFault, '/fake_xgo/fault', InjectFault.Request(fault=fault, duration=duration)
+    )
+    assert answer.success, answer.message
+    rig.stream(STAND, duration + 0.5)
+    rig.client.spin_until(rig.reporting, TIMEOUT, 'reports again')
+    rig.stream(STAND, 1.0)
+    assert list(rig.hear('/joint_states').position) == pytest.approx(STAND, abs=0.1)
+    assert max(steps()) <= LARGEST_STEP
+    for message in rig.heard['/joint_states']:
+        assert all(abs(position) < math.pi / 2 + 0.1 for position in message.position)
+
+
+def test_the_old_protocol_does_as_well(rig: XgoRig) -> None:
+    """The same robot, asked in its old protocol: the gyro is measured, joints are coarser."""
+    rig.restart('-p', 'protocol:=old')
+    rig.stream(STAND, 1.2)
+    assert list(rig.hear('/joint_states', 3).position) == pytest.approx(STAND, abs=0.1)
+    covariance = rig.hear('/imu').angular_velocity_covariance
+    assert covariance[0] == pytest.approx(0.02**2)

@@ -1,0 +1,336 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The robot in physics obeys the laws that its users rely on."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+from hypothesis import given
+from hypothesis import strategies as st
+import numpy as np
+import pytest
+
+from quad_description import movable_joints, Pose, pose_positions, robot_urdf
+from quad_sim import ServoModel, ServoParameters, SetupError, SimulationError, TargetError, Terrain
+from quad_sim.physics import Robot
+from quad_sim.plant.noise import BOARD, ENCODER_STEP
+from quad_sim.plant.state import roll_pitch_yaw
+
+URDF = robot_urdf('mini')
+GRAVITY = 9.81  # [m/s2]
+STAND = pose_positions(Pose.STAND)
+
+
+def settled(robot: Robot) -> Robot:
+    """Let the robot come to rest."""
+    robot.step(1.0)
+    return robot
+
+
+def test_a_standing_robot_stands() -> None:
+    """After two seconds it is level, where it was, and the ground carries its weight."""
+    robot = Robot(URDF)
+    robot.step(2.0)
+    assert robot.base_pose.tilt < math.radians(0.5)
+    assert np.linalg.norm(robot.base_pose.position[:2]) < 2e-3
+    assert 0.125 < robot.base_pose.position[2] < 0.130
+    assert robot.foot_contacts == (True,) * 4
+    assert robot.foot_forces.sum() == pytest.approx(robot.mass * GRAVITY, rel=0.01)
+    assert np.abs(robot.joint_positions - list(STAND.values())).max() < 0.02
+
+
+def test_an_accelerometer_at_rest_reads_plus_g_upwards() -> None:
+    """REP 145: +9.81 along z on level ground, and no rotation."""
+    imu = settled(Robot(URDF)).imu
+    assert imu.specific_force == pytest.approx((0, 0, GRAVITY), abs=0.05)
+    assert imu.angular_velocity == pytest.approx((0, 0, 0), abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ('direction', 'roll', 'pitch'), [(0.0, 0, -0.15), (math.pi / 2, 0.15, 0), (math.pi, 0, 0.15)]
+)
+def test_a_slope_tilts_the_robot_and_its_imu(direction: float, roll: float, pitch: float) -> None:
+    """Uphill ahead is nose up; gravity in the body is what the attitude says."""
+    robot = settled(Robot(URDF, terrain=Terrain.slope(0.15, direction)))
+    attitude = robot.base_pose.roll_pitch_yaw
+    assert attitude == pytest.approx((roll, pitch, 0), abs=0.02)
+    r, p, _ = robot.imu.roll_pitch_yaw
+    gravity = np.array([math.sin(p), -math.sin(r) * math.cos(p), -math.cos(r) * math.cos(p)])
+    force = np.array(robot.imu.specific_force)
+    assert -force / np.linalg.norm(force) == pytest.approx(gravity, abs=0.01)
+    assert robot.foot_contacts == (True,) * 4
+
+
+def test_a_falling_robot_weighs_nothing() -> None:
+    """Kicked upwards it leaves the ground, and the accelerometer goes to zero."""
+    robot = settled(Robot(URDF))
+    robot.kick((0, 0, 1.5))
+    robot.step(0.12)
+    assert robot.foot_contacts == (False,) * 4
+    # moving legs and the chip's low-pass leave a rest
+    assert np.linalg.norm(robot.imu.specific_force) < 2.0
+
+
+@given(st.floats(-0.7, 0.7), st.floats(-math.pi, math.pi))
+def test_ground_turns_the_vertical_onto_its_normal(angle: float, direction: float) -> None:
+    """Orientation and normal of a slope say the same, and the yaw stays small."""
+    terrain = Terrain.slope(angle, direction)
+    w, x, y, z = terrain.orientation
+    up = (2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y))
+    assert up == pytest.approx(terrain.normal, abs=1e-9)
+    assert abs(roll_pitch_yaw((x, y, z, w))[2]) <= angle * angle / 2 + 1e-9
+
+
+def test_pose_and_velocity_agree() -> None:
+    """The position's difference is the velocity, turned from the body into the world."""
+    robot = settled(Robot(URDF))
+    robot.kick((0.3, 0.2, 0))
+    robot.step(0.05)
+    before = np.array(robot.base_pose.position)
+    velocity = robot.base_velocity.linear
+    roll, pitch, yaw = robot.base_pose.roll_pitch_yaw
+    robot.step(0.002)
+    moved = (np.array(robot.base_pose.position) - before) / 0.002
+    cy, sy = math.cos(yaw), math.sin(yaw)
+    assert moved[0] == pytest.approx(cy * velocity[0] - sy * velocity[1], abs=0.04)
+    assert moved[1] == pytest.approx(sy * velocity[0] + cy * velocity[1], abs=0.04)
+    assert abs(roll) + abs(pitch) < 0.3
+
+
+def test_a_push_is_an_impulse_in_the_robots_heading() -> None:
+    """On ice, force times duration over mass is the change of speed."""
+    robot = settled(Robot(URDF, terrain=Terrain(friction=1e-3)))
+    robot.push((0, 3.0, 0), 0.1)
+    robot.step(0.1)
+    before = robot.centre_of_mass[1]
+    robot.step(0.1)
+    speed = (robot.centre_of_mass[1] - before) / 0.1
+    assert speed == pytest.approx(3.0 * 0.1 / robot.mass, rel=0.02)
+
+
+def test_a_standing_robot_survives_a_kick() -> None:
+    """0.5 m/s from the side does not throw it over."""
+    robot = settled(Robot(URDF))
+    robot.kick((0, 0.5, 0))
+    robot.step(2.0)
+    assert robot.base_pose.tilt < math.radians(3)
+
+
+def test_equal_robots_have_equal_lives() -> None:
+    """Same seed: the same states and measurements, bit for bit."""
+
+    def life(seed: int) -> tuple[bytes, bytes]:
+        robot = Robot(URDF, seed=seed, noise=BOARD)
+        noisy = b''
+        for tick in range(50):
+            robot.set_targets({'fl_calf_joint': -0.28 + 0.1 * math.sin(0.3 * tick)})
+            robot.step(0.02)
+            measured = robot.measure()
+            noisy += measured.positions.tobytes() + repr(measured.imu).encode()
+        return robot.joint_positions.tobytes() + repr(robot.base_pose).encode(), noisy
+
+    assert life(1) == life(1)
+    assert life(1)[0] == life(2)[0]
+    assert life(1)[1] != life(2)[1]
+
+
+def test_a_reset_robot_is_a_new_one() -> None:
+    """After a reset nothing is left of what happened before."""
+    used, new = Robot(URDF, noise=BOARD), Robot(URDF, noise=BOARD, seed=5)
+    used.set_targets(pose_positions(Pose.LIE))
+    used.push((5, 0, 0), 10.0)
+    used.set_torque(False, ['fl_hip_joint'])
+    used.step(0.301)
+    used.reset(seed=5)
+    for robot in (used, new):
+        robot.step(0.5)
+    assert used.base_pose == new.base_pose
+    assert used.measure().positions.tobytes() == new.measure().positions.tobytes()
+
+
+def test_time_adds_up_whatever_its_pieces() -> None:
+    """What a step leaves over comes with the next one."""
+    one, other = Robot(URDF), Robot(URDF)
+    for _ in range(100):
+        one.step(0.0035)
+    other.step(0.35)
+    assert one.time == pytest.approx(0.35)
+    assert one.base_pose == other.base_pose
+
+
+def test_set_points_go_straight_to_the_target() -> None:
+    """Firm servos interpolate over 20 ms; a duration makes it longer; then they stay."""
+    robot = Robot(URDF)
+    robot.set_targets({'fl_thigh_joint': 1.2})
+    seen = []
+    for _ in range(12):
+        robot.step(0.002)
+        seen.append(robot.joint_targets[1])
+    assert seen == pytest.approx([min(1.0 + 0.02 * k, 1.2) for k in range(1, 13)])
+    robot.set_targets({'fl_thigh_joint': 1.0}, duration=1.0)
+    robot.step(0.5)
+    assert robot.joint_targets[1] == pytest.approx(1.1)
+    # another joint's command does not disturb it
+    robot.set_targets({'fr_thigh_joint': 1.1})
+    robot.step(0.5)
+    assert robot.joint_targets[[1, 4]] == pytest.approx([1.0, 1.1])
+
+
+def test_targets_are_kept_within_the_limits() -> None:
+    """What lies beyond a limit of the URDF is taken to it."""
+    robot = Robot(URDF)
+    robot.set_targets([10.0] * 12)
+    robot.step(0.5)
+    assert robot.joint_targets == pytest.approx([j.upper for j in movable_joints(URDF)])
+
+
+@pytest.mark.parametrize(
+    ('targets', 'message'),
+    [
+        ({'tail_joint': 0.0}, 'no joint is named tail_joint; there are fl_hip_joint'),
+        ({'fl_hip_joint': math.nan, 'fr_hip_joint': 0.1}, 'fl_hip_joint are not finite'),
+        ([0.0] * 11, '12 joints'),
+        ([0.0] * 11 + [math.inf], 'br_calf_joint are not finite'),
+    ],
+)
+def test_a_target_that_is_none_is_refused(
+    targets: dict[str, float] | list[float], message: str
+) -> None:
+    """The message names the joint, and no set-point has moved."""
+    robot = Robot(URDF)
+    before = robot.joint_targets
+    with pytest.raises(TargetError, match=message):
+        robot.set_targets(targets)
+    robot.step(0.1)
+    assert (robot.joint_targets == before).all()
+
+
+def test_a_robot_without_torque_sinks_and_is_caught_where_it_is() -> None:
+    """Off it goes down; on again it holds the position that it has then."""
+    robot = settled(Robot(URDF))
+    height = robot.base_pose.position[2]
+    robot.set_torque(False)
+    robot.step(1.5)
+    assert robot.base_pose.position[2] < height - 0.02
+    assert (robot.joint_torques == 0).all()
+    low = robot.joint_positions
+    robot.set_torque(True)
+    robot.step(0.5)
+    assert np.abs(robot.joint_positions - low).max() < 0.05
+    robot.set_targets(STAND, duration=1.0)
+    robot.step(1.5)
+    assert robot.base_pose.position[2] == pytest.approx(height, abs=5e-3)
+
+
+def test_one_servo_may_be_off() -> None:
+    """Only what is named is switched, and a name that is none is refused."""
+    robot = Robot(URDF)
+    robot.set_torque(False, ['fl_hip_joint'])
+    assert not robot.torque_on('fl_hip_joint')
+    assert robot.torque_on('fr_hip_joint')
+    with pytest.raises(SetupError, match='tail'):
+        robot.set_torque(False, ['tail'])
+
+
+def test_servos_differ_in_how_they_sag() -> None:
+    """The vendor's training actuator is soft, the firm one is not; custom numbers are taken."""
+
+    def sag(servo: ServoModel | ServoParameters) -> float:
+        robot = settled(Robot(URDF, servo))
+        return float(np.abs(robot.joint_positions - robot.joint_targets).max())
+
+    assert sag(ServoModel.FIRM) < 0.01
+    assert sag(ServoModel.VENDOR_RL) > 0.05
+    assert sag(ServoParameters(stiffness=40.0, velocity_gain=0.4)) < sag(ServoModel.FIRM)
+
+
+def test_servos_are_as_strong_and_fast_as_the_urdf_and_the_motor_line_allow() -> None:
+    """No torque above the stall torque, and a free leg stays below the no-load speed."""
+    lifted = Robot(URDF, ServoParameters(stiffness=100.0))
+    efforts = np.array([joint.effort for joint in movable_joints(URDF)])
+    lifted.push((0, 0, 1.02 * lifted.mass * GRAVITY), 2.0)
+    lifted.step(0.5)
+    fastest = 0.0
+    for _ in range(100):
+        lifted.set_targets({'fl_calf_joint': 1.0})
+        lifted.step(0.002)
+        fastest = max(fastest, float(lifted.joint_velocities[2]))
+        assert (np.abs(lifted.joint_torques) <= efforts + 1e-9).all()
+    assert 4.0 < fastest < 9.2 + 0.5
+
+
+def test_the_second_jaw_goes_with_the_first() -> None:
+    """The gripper's mimic joint follows, and the arm's joints are driven."""
+    robot = Robot(robot_urdf('mini', arm=True), pose={'hand_right_joint': 0.01})
+    robot.set_targets({'hand_right_joint': 0.02, 'arm_yaw_joint': 0.5})
+    robot.step(1.0)
+    at = dict(zip(robot.joint_names, robot.joint_positions, strict=True))
+    assert at['hand_right_joint'] == pytest.approx(0.02, abs=1e-3)
+    assert at['arm_yaw_joint'] == pytest.approx(0.5, abs=0.02)
+    right, left = (np.array(robot.link_position(f'hand_{side}')) for side in ('right', 'left'))
+    assert np.linalg.norm(right - left) == pytest.approx(0.04, abs=2e-3)
+
+
+def test_measurements_are_noisy_and_in_steps_of_the_encoder() -> None:
+    """Noise has the size that was asked for, and positions are multiples of the encoder's step."""
+    robot = settled(Robot(URDF, noise=BOARD))
+    rolls = []
+    for _ in range(300):
+        measured = robot.measure()
+        rolls.append(measured.imu.roll_pitch_yaw[0] - robot.imu.roll_pitch_yaw[0])
+        steps = measured.positions / ENCODER_STEP
+        assert np.abs(steps - np.round(steps)).max() < 1e-6
+    assert np.std(rolls) == pytest.approx(BOARD.attitude, rel=0.2)
+
+
+def test_physics_that_blows_up_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A servo that is no servo ends in an error with the remedy, and leaves no file behind."""
+    monkeypatch.chdir(tmp_path)
+    wild = ServoParameters(stiffness=1e9, damping=0.0, armature=0.0)
+    heavy = robot_urdf('mini').replace('effort="0.46"', 'effort="1e12"')
+    robot = Robot(heavy, wild)
+    robot.set_targets([0.3] * 12)
+    with pytest.raises(SimulationError, match='softer servo'):
+        robot.step(4.0)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ('urdf', 'message'),
+    [
+        ('<robot name="a"><link name="x"/></robot>', 'no link base_link'),
+        ('<robot', 'cannot be simulated|no XML'),
+        (URDF.replace('imu_link', 'gyro_link'), 'no link imu_link'),
+    ],
+)
+def test_a_description_that_is_no_quadruped_is_refused(urdf: str, message: str) -> None:
+    """The message says what is missing."""
+    with pytest.raises(SetupError, match=message):
+        Robot(urdf)
+
+
+@pytest.mark.parametrize(
+    ('make', 'message'),
+    [
+        (lambda: ServoParameters(stiffness=-1), 'stiffness -1'),
+        (lambda: ServoParameters(stiffness=0), 'never moves'),
+        (lambda: ServoParameters(stiffness=1, damping=math.nan), 'damping nan'),
+        (lambda: Terrain.slope(1.0), 'slope of 1.0'),
+        (lambda: Terrain.slope(math.nan), 'slope of nan'),
+        (lambda: Terrain(friction=0), 'friction 0'),
+        (lambda: Robot(URDF, timestep=0.5), 'timestep 0.5'),
+        (lambda: Robot(URDF, pose={'tail_joint': 0}), 'tail_joint'),
+        (lambda: Robot(URDF).kick((math.nan, 0, 0)), 'kick'),
+        (lambda: Robot(URDF).kick((0, 0, 11)), 'up to 10 m/s'),
+        (lambda: Robot(URDF).push((0, 0, 0), -1), 'push'),
+        (lambda: Robot(URDF).push((1e3, 0, 0), 1), 'up to 200 N'),
+        (lambda: Robot(URDF).push((0, math.inf, 0), 1), 'push'),
+        (lambda: Robot(URDF).push((1, 0, 0), math.nan), 'push'),
+    ],
+)
+def test_options_without_sense_are_refused(make: object, message: str) -> None:
+    """The message names the option and its value."""
+    with pytest.raises(SetupError, match=message):
+        make()  # type: ignore[operator]

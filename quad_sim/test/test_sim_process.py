@@ -1,0 +1,234 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""fake_xgo as a process: its path, its services and its end."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+import os
+from pathlib import Path
+import re
+import signal
+import subprocess
+import sys
+import time
+from typing import Any
+
+from isolation import Isolation
+from nav_msgs.msg import Odometry
+from processes import executable
+import pytest
+from ros_client import RosClient
+from sim_serial import Listener, PATIENCE
+from std_srvs.srv import Trigger
+
+from quad_hardware.protocol import Code, decode_feedback, Frame, Kind
+from quad_msgs.srv import InjectFault, Push
+from quad_sim.fake_xgo import run, split_ros_arguments
+
+PACKAGE = Path(__file__).parents[1]
+VERSION = Frame(Kind.READ, Code.VERSION)
+READY = 'fake_xgo: '
+
+
+@contextmanager
+def fake_xgo(
+    link: Path, *arguments: str, env: dict[str, str] | None = None
+) -> Iterator[subprocess.Popen[str]]:
+    """Start the simulated robot and wait until its port is there."""
+    command = [sys.executable, '-m', 'quad_sim.fake_xgo', '--link', str(link)]
+    process = subprocess.Popen(
+        [*command, *arguments],
+        cwd=PACKAGE,
+        env=env,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        assert process.stdout is not None
+        assert process.stdout.readline().startswith(READY)
+        yield process
+    finally:
+        if process.poll() is None:
+            process.kill()
+        process.communicate(timeout=PATIENCE)
+
+
+def test_it_works_without_ros_and_leaves_nothing_behind(tmp_path: Path) -> None:
+    """Without ROS nothing of it is imported; SIGTERM ends it with 0 and takes the path away."""
+    link = tmp_path / 'xgo'
+    with fake_xgo(link, '--no-ros', '--physics', 'none') as process:
+        maps = Path(f'/proc/{process.pid}/maps').read_text(encoding='utf-8')
+        assert 'librcl.so' not in maps
+        assert 'libmujoco' not in maps
+        listener = Listener(link)
+        listener.send(VERSION)
+        (answer,) = listener.count(1)
+        assert answer.payload.startswith(b'L-')
+        listener.close()
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(PATIENCE) == 0
+    assert not os.path.lexists(link)
+
+
+def test_a_path_in_use_is_refused_and_a_dead_one_replaced(tmp_path: Path) -> None:
+    """Two robots do not share a path; what a killed one left behind is no hindrance."""
+    link = tmp_path / 'xgo'
+    with fake_xgo(link, '--no-ros', '--physics', 'none') as process:
+        command = [sys.executable, '-m', 'quad_sim.fake_xgo', '--no-ros']
+        second = subprocess.run(
+            [*command, '--physics', 'none', '--link', str(link)],
+            cwd=PACKAGE,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert second.returncode == 2
+        assert 'belongs to another simulated robot' in second.stderr
+        process.kill()
+        process.wait(PATIENCE)
+    assert link.is_symlink()
+    with fake_xgo(link, '--no-ros', '--physics', 'none') as process:
+        process.send_signal(signal.SIGINT)
+        assert process.wait(PATIENCE) == 0
+
+
+@pytest.mark.parametrize('package', ['quad_sim', 'quad_hardware'])
+def test_it_is_found_under_both_names(package: str) -> None:
+    """``ros2 run quad_hardware fake_xgo`` is the name that others have printed."""
+    command = [executable(package, 'fake_xgo'), '--help']
+    result = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert 'A simulated XGO' in result.stdout
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'message'),
+    [
+        (['--servo', 'strong'], 'give firm or vendor_rl, or kp,kv'),
+        (['--servo', 'kv=1'], 'needs kp'),
+        (['--slope', '80'], 'slope of'),
+        (['--friction', '0'], 'friction 0'),
+        (['--battery', '120'], 'give 0 to 100'),
+        (['--firmware', 'much too long'], 'up to 10 ASCII'),
+        (['--protocol', 'old', '--baud', '2000000'], '115200 \\(old\\)'),
+        (['--fault', 'fire'], 'there are drop'),
+        (['--trunk-mass', '0'], 'trunk_mass'),
+        (['--command-gap', '-1'], 'command-gap'),
+        (['--old-baud', '2000000'], 'add --protocol old'),
+        (['--old-baud', '0'], 'give bits a second'),
+        (['--mount', '12'], 'give ID=SIGN,DEGREES'),
+        (['--mount', '12=2'], 'sign 2'),
+        (['--mount', '14=1'], 'no servo has id 14'),
+    ],
+)
+def test_an_option_without_sense_is_told(
+    arguments: list[str], message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Exit code 2, one line with the remedy, and no port."""
+    link = tmp_path / 'xgo'
+    assert run(['--no-ros', '--link', str(link), *arguments]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith('fake_xgo: ')
+    assert error.count('\n') == 1
+    assert re.search(message, error)
+    assert not os.path.lexists(link)
+
+
+def test_a_file_in_the_way_is_left_alone(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """What is no link is never removed."""
+    link = tmp_path / 'xgo'
+    link.write_text('precious', encoding='utf-8')
+    assert run(['--no-ros', '--physics', 'none', '--link', str(link)]) == 2
+    assert link.read_text(encoding='utf-8') == 'precious'
+    missing = tmp_path / 'no' / 'folder'
+    assert run(['--no-ros', '--physics', 'none', '--link', str(missing)]) == 2
+    assert 'cannot be made' in capsys.readouterr().err
+
+
+def test_a_link_to_something_else_is_left_alone(tmp_path: Path) -> None:
+    """A link that no simulated robot has made is not replaced, even if it leads nowhere."""
+    link = tmp_path / 'xgo'
+    link.symlink_to('/dev/ttyUSB99')
+    assert run(['--no-ros', '--physics', 'none', '--link', str(link)]) == 2
+    assert str(link.readlink()) == '/dev/ttyUSB99'
+
+
+def test_ros_arguments_are_kept_apart() -> None:
+    """What stands between --ros-args and -- is for ROS."""
+    own, ros = split_ros_arguments(['--arm', '--ros-args', '-r', '__ns:=/dog', '--', '--no-ros'])
+    assert own == ['--arm', '--no-ros']
+    assert ros == ['--ros-args', '-r', '__ns:=/dog', '--']
+
+
+@pytest.fixture
+def robot(isolation: Isolation, tmp_path: Path) -> Iterator[tuple[RosClient, Path]]:
+    """Give a client in the domain of a simulated robot, and its port."""
+    link = tmp_path / 'xgo'
+    with (
+        fake_xgo(link, '--start', 'stand', env=isolation.env) as process,
+        RosClient(isolation.domain_id) as client,
+    ):
+        yield client, link
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(PATIENCE) == 0
+
+
+def push(client: RosClient, **parts: float) -> Any:
+    """Call the push service."""
+    request = Push.Request()
+    request.velocity.y = parts.get('velocity', 0.0)
+    request.force.y = parts.get('force', 0.0)
+    request.duration = parts.get('duration', 0.0)
+    return client.call(Push, '/fake_xgo/push', request)
+
+
+def test_services_push_the_robot_and_break_its_line(robot: tuple[RosClient, Path]) -> None:
+    """A push moves it, a fault silences it for its time, and nonsense is answered with words."""
+    client, link = robot
+    truth = client.listen(Odometry, '/fake_xgo/ground_truth')
+    client.spin_until(lambda: bool(truth), PATIENCE, 'ground truth')
+    assert 0.12 < truth[-1].pose.pose.position.z < 0.14
+
+    assert push(client, velocity=0.4).success
+    client.spin_until(
+        lambda: any(abs(t.twist.twist.linear.y) > 0.1 for t in truth), PATIENCE, 'motion'
+    )
+    assert push(client, force=1.0, duration=0.1).success
+    refused = push(client)
+    assert (refused.success, 'neither force' in refused.message) == (False, True)
+    refused = push(client, velocity=float('nan'))
+    assert (refused.success, 'up to 10 m/s' in refused.message) == (False, True)
+
+    listener = Listener(link)
+    listener.send(Frame(Kind.WRITE, Code.FEEDBACK, b'\x01'))
+    listener.count(10)
+
+    def fault(name: str, *settings: str, duration: float = 0.0) -> Any:
+        request = InjectFault.Request(fault=name, settings=list(settings), duration=duration)
+        return client.call(InjectFault, '/fake_xgo/fault', request)
+
+    assert fault('silence').success
+    listener.hush(0.1)
+    assert listener.hush(0.2) == 0
+    ended = fault('none')
+    assert (ended.success, ended.message) == (True, 'all faults have ended')
+    listener.count(10)
+    assert fault('battery', 'level=9').success
+    listener.until(
+        lambda: decode_feedback(listener.frames[-1].payload).battery == 9, 'an empty battery'
+    )
+    wrong = fault('fire')
+    assert (wrong.success, 'there are drop, flip' in wrong.message) == (False, True)
+    wrong = fault('drop', 'rate=7')
+    assert (wrong.success, 'is not 0 to 1' in wrong.message) == (False, True)
+    assert not fault('drop', duration=float('nan')).success
+    listener.close()
+
+    assert client.call(Trigger, '/fake_xgo/stand', Trigger.Request()).success
+    begin = time.monotonic()
+    client.spin_until(lambda: time.monotonic() - begin > 0.2, PATIENCE, 'time')
+    assert truth[-1].pose.pose.position.z > 0.1
