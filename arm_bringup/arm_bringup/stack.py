@@ -101,7 +101,7 @@ def _slaves(stack: Stack, bus: Mapping[str, str], find: FindExecutable) -> Proce
         return None
     return ProcessSpec(
         name='slaves',
-        argv=node_argv(Executable('arm_canopen', 'fake_slaves'), find, bus, ros=stack.ros),
+        argv=node_argv(Executable('canopen_sim', 'fake_slaves'), find, bus, ros=stack.ros),
         environment=LOG_FORMAT,
         ready=SLAVES_READY,
         ready_timeout=stack.ready_timeout,

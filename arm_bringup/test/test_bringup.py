@@ -20,7 +20,7 @@ pytestmark = pytest.mark.slow
 PANDA = Path(__file__).parents[1] / 'robots' / 'panda'
 
 READY = {
-    ('arm_canopen', 'fake_slaves'): '[INFO] [fake_slaves]: 7 simulated drives on '
+    ('canopen_sim', 'fake_slaves'): '[INFO] [fake_slaves]: 7 simulated drives on '
     '{can_interface_name}',
     ('arm_canopen', 'master'): '[INFO] [master]: all 7 devices operational',
     ('arm_canopen', 'canopen_joint_state_publisher'): '[INFO] [publisher]: publishing 7 joints: a',
@@ -31,7 +31,7 @@ READY = {
 def workspace(tmp_path: Path, prefix: Path, isolation: Isolation) -> SmallWorkspace:
     """Install the small programs, in a ROS domain that nobody else is in."""
     libraries = ('libraries/process_supervisor', 'libraries/dds_network')
-    sources = ('arm_bringup', 'arm_canopen', *libraries)
+    sources = ('arm_bringup', 'arm_canopen', 'canopen_sim', *libraries)
     workspace = SmallWorkspace(tmp_path, 'arm_bringup', READY, sources, [prefix])
     workspace.environment['ROS_DOMAIN_ID'] = str(isolation.domain_id)
     return workspace
@@ -121,7 +121,7 @@ def test_a_robot_without_its_eds_says_which_file_and_line(workspace: SmallWorksp
 
 def test_a_workspace_that_is_not_built_says_how(workspace: SmallWorkspace) -> None:
     """A missing executable is told with the remedy."""
-    (workspace.folder / 'prefix/lib/arm_canopen/fake_slaves').unlink()
+    (workspace.folder / 'prefix/lib/canopen_sim/fake_slaves').unlink()
     code, output = workspace.run('panda', '--simulate', '--can', 'auto')
     assert code == 2
     assert 'make build' in output

@@ -41,7 +41,8 @@ class Underlay:
 
 def processes(folder: Path, stack: Stack, *packages: str) -> dict[str, ProcessSpec]:
     """Plan a stack on an underlay with arm_canopen and more."""
-    find = Underlay(folder, 'arm_canopen', 'arm_bringup', *packages).find
+    names = ('arm_canopen', 'arm_bringup', 'canopen_sim', *packages)
+    find = Underlay(folder, *names).find
     return {spec.name: spec for spec in arm_processes(stack, PARAMETERS, find)}
 
 
@@ -62,7 +63,8 @@ def test_what_a_person_says_counts_most(tmp_path: Path, words: tuple[str, str]) 
     files = (Path('/r/motion.yaml'), Path('/r/controllers.yaml'))
     ros = RosOptions('left', words)
     stack = Stack(ROBOT, 'can0', True, master=MOTION_MASTER, master_files=files, ros=ros)
-    find = Underlay(tmp_path, 'arm_canopen', 'arm_bringup', 'arm_servo', 'robot_viewer').find
+    names = ('arm_canopen', 'arm_bringup', 'arm_servo', 'canopen_sim', 'robot_viewer')
+    find = Underlay(tmp_path, *names).find
     specs = [
         *arm_processes(stack, PARAMETERS, find),
         controller_process(files, PARAMETERS, 1.0, find, ros),
@@ -175,7 +177,7 @@ def test_the_public_robot_state_publisher_runs_where_it_is_installed(
 def test_a_workspace_that_is_not_built_says_so(tmp_path: Path) -> None:
     """A missing package and a missing executable are told apart."""
     stack = Stack(ROBOT, 'can0', simulate=True)
-    with pytest.raises(StartError, match=r'arm_canopen is not in AMENT_PREFIX_PATH.*make build'):
+    with pytest.raises(StartError, match=r'canopen_sim is not in AMENT_PREFIX_PATH.*make build'):
         arm_processes(stack, PARAMETERS, lambda package, name: None)
     with pytest.raises(StartError, match=r'fake_slaves does not exist.*make build'):
         arm_processes(stack, PARAMETERS, lambda package, name: tmp_path / name)

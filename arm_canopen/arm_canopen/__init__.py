@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""CANopen master, CiA 402 drives and simulated slaves for ROS 2.
+"""CANopen master and CiA 402 drives for ROS 2.
 
 The names here are the public API. Those that need ROS are loaded when they are asked for, so that
 the core can be used without it.

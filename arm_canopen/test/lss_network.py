@@ -12,10 +12,10 @@ from typing import Any, TypeVar
 from device_rig import drive_dictionary, with_defaults
 
 from arm_canopen.can.frame import Frame
-from arm_canopen.device.host import DeviceHost
 from arm_canopen.master.lss_master import LssMaster
 from arm_canopen.master.scheduler import Promise, Scheduler
 from arm_canopen.standard.lss import LssAddress, UNCONFIGURED
+from canopen_sim.host import DeviceHost
 
 T = TypeVar('T')
 

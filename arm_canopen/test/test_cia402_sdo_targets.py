@@ -15,11 +15,11 @@ from virtual_network import bus_config, drive_config, every_mode, PERIOD, SCALE,
 from arm_canopen.can.frame import Frame
 from arm_canopen.cia402.position_modes import Move
 from arm_canopen.config.model import NodeConfig
-from arm_canopen.device.faults import BusFault, FaultInjection
 from arm_canopen.exceptions import DriveError, SdoAbortError, SdoTimeoutError
 from arm_canopen.master.events import Severity
 from arm_canopen.master.scheduler import Promise
 from arm_canopen.standard.drive import DriveState, OperationMode
+from canopen_sim.faults.faults import BusFault, FaultInjection
 
 JOINT, NODE_ID = 'joint1', 2
 REQUEST, ANSWER = 0x600 + NODE_ID, 0x580 + NODE_ID

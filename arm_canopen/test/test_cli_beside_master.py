@@ -17,11 +17,11 @@ import pytest
 from arm_canopen.can import open_bus
 from arm_canopen.cli.main import main
 from arm_canopen.config import load_bus
-from arm_canopen.device.runner import DeviceRunner
 from arm_canopen.exceptions import SdoError
 from arm_canopen.master.events import Event, EventKind, Severity
 from arm_canopen.master.network import Network
 from arm_canopen.master.runner import NetworkThread
+from canopen_sim.runner import DeviceRunner
 
 ARTICLE = Path(__file__).parent / 'data' / 'panda' / 'bus.yml'
 DEADLINE = 20.0  # [s]

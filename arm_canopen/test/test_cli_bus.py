@@ -17,8 +17,8 @@ import pytest
 from arm_canopen.can import Bus, Frame, open_bus
 from arm_canopen.cli.main import main
 from arm_canopen.config import load_eds
-from arm_canopen.device.faults import BusFault, FaultInjection
-from arm_canopen.device.runner import DeviceRunner
+from canopen_sim.faults.faults import BusFault, FaultInjection
+from canopen_sim.runner import DeviceRunner
 
 pytestmark = pytest.mark.slow
 

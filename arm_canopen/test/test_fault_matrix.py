@@ -29,10 +29,10 @@ from virtual_network import (
 from arm_canopen import RefusalCause
 from arm_canopen.can.frame import Frame
 from arm_canopen.config.identity import Identity
-from arm_canopen.device.drive import Drive as SimulatedDrive
 from arm_canopen.exceptions import DriveError, SdoError
 from arm_canopen.master.events import EventKind, Severity
 from arm_canopen.standard.drive import DriveState, OperationMode
+from canopen_sim.drive.drive import Drive as SimulatedDrive
 
 pytestmark = pytest.mark.slow
 

@@ -18,8 +18,8 @@ import pytest
 from arm_canopen.can import Bus, Frame, open_bus
 from arm_canopen.cli.main import main
 from arm_canopen.config import load_eds
-from arm_canopen.device.runner import DeviceRunner
 from arm_canopen.standard.lss import LssState
+from canopen_sim.runner import DeviceRunner
 
 pytestmark = pytest.mark.slow
 
@@ -185,7 +185,7 @@ class Slave:
         """Start it."""
         parameters = ['-p', 'node_id:=255', '-p', f'can_interface_name:={name}']
         self.process = subprocess.Popen(
-            [sys.executable, '-m', 'arm_canopen.nodes.fake_slave', '--ros-args', *parameters],
+            [sys.executable, '-m', 'canopen_sim.nodes.fake_slave', '--ros-args', *parameters],
             env={
                 **os.environ,
                 'PYTHONPATH': os.pathsep.join((str(PACKAGE), os.environ.get('PYTHONPATH', ''))),

@@ -23,10 +23,10 @@ from virtual_network import (
 
 from arm_canopen.config.checks import check_bus
 from arm_canopen.config.model import NodeConfig
-from arm_canopen.device.faults import BusFault, FaultInjection
 from arm_canopen.exceptions import CanopenError
 from arm_canopen.standard.drive import OperationMode
 from arm_canopen.standard.nmt import NmtCommand
+from canopen_sim.faults.faults import BusFault, FaultInjection
 
 MODULE = 'module'
 NODE_ID = 5

@@ -13,14 +13,14 @@ from hypothesis import strategies as st
 import pytest
 
 from arm_canopen.can.frame import Frame
-from arm_canopen.device.object_store import ObjectStore
-from arm_canopen.device.sdo_server import SdoServer
 from arm_canopen.exceptions import SdoAbortError, SdoError, SdoTimeoutError
 from arm_canopen.master.scheduler import Scheduler
 from arm_canopen.master.sdo_block_client import BURST
 from arm_canopen.master.sdo_client import BLOCK_MIN, SdoClient
 from arm_canopen.standard.datatypes import DataType
 from arm_canopen.standard.dictionary import ObjectDictionary, ObjectEntry
+from canopen_sim.objects.object_store import ObjectStore
+from canopen_sim.services.sdo_server import SdoServer
 
 NODE, BLOB = 5, 0x2002
 REQUEST, RESPONSE = 0x600 + NODE, 0x580 + NODE

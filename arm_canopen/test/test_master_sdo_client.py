@@ -15,13 +15,13 @@ import pytest
 from sdo_byte_server import NO_OBJECT, SdoByteServer
 
 from arm_canopen.can.frame import Frame
-from arm_canopen.device.object_store import ObjectStore
-from arm_canopen.device.sdo_server import SdoServer
 from arm_canopen.exceptions import SdoAbortError, SdoError, SdoTimeoutError
 from arm_canopen.master.scheduler import Promise, Scheduler
 from arm_canopen.master.sdo_client import SdoClient
 from arm_canopen.standard.datatypes import DataType
 from arm_canopen.standard.dictionary import ObjectDictionary, ObjectEntry
+from canopen_sim.objects.object_store import ObjectStore
+from canopen_sim.services.sdo_server import SdoServer
 
 NODE = 5
 REQUEST, RESPONSE = 0x600 + NODE, 0x580 + NODE

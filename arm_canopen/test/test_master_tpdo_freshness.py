@@ -25,12 +25,12 @@ from arm_canopen.config.boot_plan import boot_writes
 from arm_canopen.config.checks import check_bus
 from arm_canopen.config.model import BusConfig, NodeConfig, Written
 from arm_canopen.config.tpdo_freshness import with_event_timer
-from arm_canopen.device.drive import Drive as SimulatedDrive
-from arm_canopen.device.faults import BusFault, FaultInjection
 from arm_canopen.master.events import Severity
 from arm_canopen.master.process_image import Input, SyncRound
 from arm_canopen.standard.dictionary import ObjectDictionary
 from arm_canopen.standard.drive import DriveState, OperationMode
+from canopen_sim.drive.drive import Drive as SimulatedDrive
+from canopen_sim.faults.faults import BusFault, FaultInjection
 
 JOINT, NODE_ID = 'joint1', 2
 TPDOS = {0x180 + NODE_ID, 0x280 + NODE_ID}

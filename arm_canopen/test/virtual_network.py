@@ -24,8 +24,6 @@ from arm_canopen.cia402.motion_group import MotionGroup
 from arm_canopen.config import load_eds
 from arm_canopen.config.master_model import MasterConfig
 from arm_canopen.config.model import BusConfig, NodeConfig, PdoConfig, SdoWrite
-from arm_canopen.device.device import Device
-from arm_canopen.device.servo import ServoModel
 from arm_canopen.exceptions import BusError
 from arm_canopen.master.events import Event, Severity
 from arm_canopen.master.network import Network
@@ -34,6 +32,8 @@ from arm_canopen.standard.cob_id import rpdo_default, tpdo_default
 from arm_canopen.standard.dictionary import ObjectDictionary
 from arm_canopen.standard.drive import OperationMode
 from arm_canopen.standard.pdo import MappedObject
+from canopen_sim.device import Device
+from canopen_sim.drive.servo import ServoModel
 
 DRIVE_EDS = Path(__file__).parents[1] / 'eds' / 'cia402_drive.eds'
 FRAME_TIME = 0.00012  # [s] a frame of 8 bytes at 1 Mbit/s

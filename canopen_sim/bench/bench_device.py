@@ -1,0 +1,198 @@
+#!/usr/bin/env python3
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What simulated drives cost, without bus and in virtual time.
+
+Seven drives with the PDOs of the article's bus.yml: in each SYNC cycle every drive gets two RPDOs
+and sends two TPDOs. Where python-canopen's LocalNode does the same thing it stands beside, in the
+same run; it has no drive, no PDO engine and no NMT state machine to compare with.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import math
+from pathlib import Path
+from time import process_time
+from typing import Any
+
+import canopen
+
+from arm_canopen.can.frame import Frame
+from arm_canopen.config import load_eds
+from arm_canopen.standard.sdo import DownloadRequest
+from canopen_sim import DeviceHost
+
+EDS = Path(__file__).parents[2] / 'arm_canopen' / 'eds' / 'cia402_drive.eds'
+NODE_IDS = range(2, 9)
+CYCLES = 2000
+PERIOD = 0.01  # [s]
+REPEAT = 20_000
+
+ARTICLE: tuple[tuple[int, int, int, tuple[int, ...]], ...] = (
+    (0x1800, 0x180, 1, (0x60410010, 0x60610008)),
+    (0x1801, 0x280, 1, (0x60640020, 0x606C0020)),
+    (0x1400, 0x200, 255, (0x60400010, 0x60600008)),
+    (0x1401, 0x300, 255, (0x607A0020, 0x60FF0020)),
+)
+"""Communication record, base of the COB-ID, transmission type and mapping."""
+
+NONE, VELOCITY, CYCLIC = 0, 3, 8
+
+
+class Network:
+    """Seven drives, and a master that sends what it is told to."""
+
+    def __init__(self) -> None:
+        """Boot and configure them."""
+        self.now = 1.0
+        self.frames = 0
+        self.host = DeviceHost(self._count)
+        dictionary = load_eds(EDS).dictionary
+        for node_id in NODE_IDS:
+            self.host.add(node_id, dictionary)
+        self.host.advance(self.now)
+        for node_id in NODE_IDS:
+            self._configure(node_id)
+        self.receive(0, b'\x01\x00')
+
+    def _count(self, _frame: Frame) -> None:
+        self.frames += 1
+
+    def receive(self, can_id: int, data: bytes) -> None:
+        """Let the drives receive a frame."""
+        self.host.receive(Frame(can_id, data), self.now)
+
+    def write(self, node_id: int, index: int, subindex: int, value: int, size: int) -> None:
+        """Write an object by SDO."""
+        data = (value % (1 << 8 * size)).to_bytes(size, 'little')
+        self.receive(0x600 + node_id, DownloadRequest(index, subindex, data, size).encode())
+
+    def _configure(self, node_id: int) -> None:
+        for number in range(4):
+            for record in (0x1400, 0x1800):
+                self.write(node_id, record + number, 1, 1 << 31, 4)
+        for record, base, transmission, mapping in ARTICLE:
+            self.write(node_id, record, 2, transmission, 1)
+            self.write(node_id, record + 0x200, 0, 0, 1)
+            for subindex, word in enumerate(mapping, start=1):
+                self.write(node_id, record + 0x200, subindex, word, 4)
+            self.write(node_id, record + 0x200, 0, len(mapping), 1)
+            self.write(node_id, record, 1, base + node_id, 4)
+        self.write(node_id, 0x1017, 0, 1000, 2)
+
+    def command(self, word: int, mode: int) -> None:
+        """Send controlword and mode to all."""
+        for node_id in NODE_IDS:
+            self.receive(0x200 + node_id, bytes((word, 0, mode)))
+
+    def cycle(self, word: int, mode: int, position: int, velocity: int) -> None:
+        """Do one SYNC cycle: RPDOs to all, then SYNC, then timers."""
+        first = bytes((word, 0, mode))
+        second = position.to_bytes(4, 'little', signed=True)
+        second += velocity.to_bytes(4, 'little', signed=True)
+        for node_id in NODE_IDS:
+            self.receive(0x200 + node_id, first)
+            self.receive(0x300 + node_id, second)
+        self.receive(0x080, b'')
+        self.now += PERIOD
+        if self.host.deadline <= self.now:
+            self.host.advance(self.now)
+
+
+def cycle_cost(mode: int, velocity: int, amplitude: float) -> tuple[float, float]:
+    """Return [us] per cycle of seven drives, and the frames that they sent in each."""
+    network = Network()
+    for word in (0x06, 0x07, 0x0F):
+        network.command(word if mode else 0, mode)
+    network.frames = 0
+    start = process_time()
+    for number in range(CYCLES):
+        position = round(amplitude * (1.0 - math.cos(0.01 * number)))
+        network.cycle(0x0F if mode else 0, mode, position, velocity)
+    return (process_time() - start) / CYCLES * 1e6, network.frames / CYCLES
+
+
+def per_call(function: Callable[[], object], repeat: int = REPEAT) -> float:
+    """Return the CPU time of a call in [us]."""
+    start = process_time()
+    for _ in range(repeat):
+        function()
+    return (process_time() - start) / repeat * 1e6
+
+
+def local_node() -> tuple[Any, Any]:
+    """Return python-canopen's simulated slave and its network, connected to nothing."""
+    make_network: Any = canopen.Network
+    make_node: Any = canopen.LocalNode
+    network = make_network()
+    network.send_message = lambda *_args, **_kwargs: None
+    node = make_node(NODE_IDS[0], str(EDS))
+    network.add_node(node)
+    return network, node
+
+
+def compare_sdo() -> tuple[float, float]:
+    """Return the cost of answering an expedited read in [us]: ours, python-canopen's."""
+    network = Network()
+    request = Frame(0x602, b'\x40\x00\x10\x00\x00\x00\x00\x00')
+    ours = per_call(lambda: network.host.receive(request, network.now))
+    other, _ = local_node()
+    data = bytearray(request.data)
+    return ours, per_call(lambda: other.notify(0x602, data, 0.0))
+
+
+def compare_pdo() -> tuple[float, float, float, float]:
+    """Return [us] of packing and of taking a PDO of two objects: ours, python-canopen's, twice."""
+    network = Network()
+    device = network.host.devices[0]
+    tpdo = device._tpdos.active[1]  # noqa: SLF001
+    frame = Frame(0x302, bytes(8))
+    _, node = local_node()
+    for kind, mapping in (('tpdo', (0x6064, 0x606C)), ('rpdo', (0x607A, 0x60FF))):
+        pdo = getattr(node, kind)[2]
+        for index in mapping:
+            pdo.add_variable(index)
+        pdo.cob_id = 0x282
+
+    def pack() -> bytes:
+        node.tpdo[2][0x6064].raw = 1000
+        node.tpdo[2][0x606C].raw = 1000
+        return bytes(node.tpdo[2].data)
+
+    def take() -> tuple[int, int]:
+        node.rpdo[2].on_message(0x282, bytearray(8), 0.0)
+        return node.rpdo[2][0x607A].raw, node.rpdo[2][0x60FF].raw
+
+    receive = device.handlers[0x302]
+    return (
+        per_call(tpdo.pack),
+        per_call(pack, REPEAT // 10),
+        per_call(lambda: receive(frame, network.now)),
+        per_call(take, REPEAT // 10),
+    )
+
+
+def main() -> None:
+    """Print the figures."""
+    head = 'seven drives, one SYNC cycle (14 RPDOs and a SYNC in)'
+    print(f'{head:<56}{"us":>8}{"frames out":>12}{"% at 10 ms":>13}')
+    for title, mode, velocity, amplitude in (
+        ('disabled', NONE, 0, 0.0),
+        ('enabled, at rest', CYCLIC, 0, 0.0),
+        ('moving, profile velocity', VELOCITY, 500, 0.0),
+        ('moving, cyclic synchronous position', CYCLIC, 0, 2000.0),
+    ):
+        cost, frames = cycle_cost(mode, velocity, amplitude)
+        print(f'  {title:<54}{cost:8.0f}{frames:12.1f}{cost / PERIOD / 1e4:13.2f}')
+    print(f'\n{"one device, [us]":<54}{"ours":>9}{"python-canopen LocalNode":>26}')
+    ours, theirs = compare_sdo()
+    print(f'  {"answer an expedited SDO read":<52}{ours:9.1f}{theirs:26.1f}')
+    pack, their_pack, take, their_take = compare_pdo()
+    print(f'  {"pack a TPDO of two objects":<52}{pack:9.2f}{their_pack:26.2f}')
+    print(f'  {"take an RPDO of two objects":<52}{take:9.2f}{their_take:26.2f}')
+    print('  (LocalNode: by index, and without putting an RPDO into the dictionary)')
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,14 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Simulated CANopen devices: object dictionary, services, faults, and a CiA 402 drive.
+
+The names here are the public API.
+"""
+
+from .device import Device
+from .drive.drive import Drive
+from .drive.servo import ServoModel
+from .host import DeviceHost
+from .runner import DeviceRunner
+
+__all__ = ['Device', 'DeviceHost', 'DeviceRunner', 'Drive', 'ServoModel']

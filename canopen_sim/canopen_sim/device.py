@@ -1,0 +1,343 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""A simulated CANopen device, driven by calls: it owns no bus, no thread and no clock."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from arm_canopen.can.frame import Frame
+from arm_canopen.standard.cob_id import CobId, NODE_ID_MAX, NODE_ID_MIN
+from arm_canopen.standard.device_profile import is_drive
+from arm_canopen.standard.dictionary import ObjectDictionary
+from arm_canopen.standard.lss import UNCONFIGURED
+from arm_canopen.standard.nmt import NmtCommand, NmtState
+from arm_canopen.standard.objects import AXES_MAX, AXIS_OFFSET, Index
+from arm_canopen.standard.sdo import Abort
+
+from .drive.drive import Drive
+from .drive.fault import SharedErrors
+from .drive.servo import ServoModel
+from .faults.injector import FaultInjector
+from .faults.line import FaultLine, Traffic
+from .objects.object_store import ObjectStore
+from .objects.parameter_memory import ParameterMemory
+from .objects.parameter_storage import ParameterStorage
+from .services.emcy_producer import EmcyProducer
+from .services.error_control import Contact
+from .services.heartbeat import HeartbeatProducer
+from .services.lss_slave import LssSlave
+from .services.nmt_slave import boot_up_frame, NmtSlave
+from .services.rpdo import Handler, RpdoEngine
+from .services.sdo_servers import SdoServers
+from .services.services import Services
+from .services.sync_consumer import SyncConsumer
+from .services.time_consumer import TimeConsumer
+from .services.tpdo import TpdoEngine
+from .timed import Timed
+
+SYNC_LENGTH_ERROR = 0x8240
+COMMUNICATION_OBJECTS = (0x1000, 0x1FFF)
+ALL_OBJECTS = (0x0000, 0xFFFF)
+
+
+class Device:
+    """A CANopen device made from its object dictionary; with 0x6040 in it, it is a drive.
+
+    Call :meth:`advance` once to switch it on, then whenever :attr:`deadline` is due, and
+    :meth:`receive` for each frame. All times are on the steady clock in [s].
+
+    Attributes:
+        node_id: CANopen node id; 255 while it has none.
+        first_id: The one that it was made with; LSS may have changed it.
+        store: Present values of all objects.
+        drives: Its axes; none when the device is no drive.
+        clock: What it knows of the network's time.
+        faults: What it does wrong on purpose.
+        handlers: What it does with the frames of each identifier, in its present NMT state;
+            another mapping takes its place when that changes.
+    """
+
+    def __init__(
+        self,
+        node_id: int,
+        dictionary: ObjectDictionary,
+        send: Callable[[Frame], None],
+        *,
+        boot_time: float = 0.0,
+        servo: ServoModel | None = None,
+        handlers_changed: Callable[[], None] | None = None,
+        memory: ParameterMemory | None = None,
+    ) -> None:
+        """Build a device that is switched off.
+
+        Args:
+            node_id: CANopen node id, 1 to 127; 255 for one that LSS has to give an id first. An
+                id that LSS has stored in the memory is stronger.
+            dictionary: Its objects, as load_eds reads them.
+            send: Takes the frames that it sends.
+            boot_time: How long its start takes in [s].
+            servo: Time constants of the motor.
+            handlers_changed: Called when :attr:`handlers` is another mapping.
+            memory: What it keeps without power; by default what lasts as long as the object.
+
+        Raises:
+            ValueError: The node id is out of range.
+        """
+        if not NODE_ID_MIN <= node_id <= NODE_ID_MAX and node_id != UNCONFIGURED:
+            raise ValueError(f'node id {node_id} is not {NODE_ID_MIN} to {NODE_ID_MAX}')
+        self._memory = memory or ParameterMemory()
+        self._dictionary = dictionary
+        self._handlers_changed = handlers_changed
+        self.first_id = node_id
+        self.node_id = self._memory.node_id or node_id
+        self.handlers: Mapping[int, Handler] = {}
+        self.store = ObjectStore(dictionary.for_node(self.node_id))
+        self._line = FaultLine(send, self._send_abort, self._identify)
+        self._send = self._line.send
+        self._nmt = NmtSlave(self.node_id, self, boot_time)
+        self._errors = EmcyProducer(self.store, self._send)
+        self._sync = SyncConsumer(self.store, self._on_sync, self._on_sync_length, self._subscribe)
+        self.drives = self._build_drives(servo or ServoModel())
+        self._build_services()
+        self.faults = FaultInjector(self, self._line)
+        self._powered_parts = self._timed_parts()
+        self._parts = self._powered_parts
+
+    def _build_drives(self, servo: ServoModel) -> tuple[Drive, ...]:
+        shared = SharedErrors(self._errors)
+        return tuple(
+            Drive(self.store, shared, self._sync, servo, number=axis)
+            for axis in range(AXES_MAX)
+            if is_drive(self.store.dictionary)
+            and (Index.CONTROLWORD + axis * AXIS_OFFSET, 0) in self.store
+        )
+
+    def _build_services(self) -> None:
+        node_id, store, send, nmt = self.node_id, self.store, self._send, self._nmt
+        self._sdo = SdoServers(node_id, store, send, self._subscribe)
+        self._producer = HeartbeatProducer(node_id, store, lambda: nmt.state, send)
+        self._contact = Contact(
+            store, nmt, self._errors, self.drives, send=send, subscribe=self._subscribe
+        )
+        self._storage = ParameterStorage(store, self._memory)
+        self._storage.load()
+        self._lss = LssSlave(node_id, store, self._memory, send, nmt.initialise)
+        self.clock = TimeConsumer(store, self._subscribe)
+        self._rpdos = RpdoEngine(
+            store, self._on_pdo_changed, self._errors.tell, self._sync.window_closed
+        )
+        self._tpdos = TpdoEngine(store, self._on_pdo_changed, send)
+        self._services = Services(
+            nmt,
+            self._lss,
+            self._sdo,
+            self._sync,
+            self.clock,
+            self._contact,
+            self._rpdos,
+            self._tpdos,
+        )
+
+    def _timed_parts(self) -> list[Timed]:
+        return [
+            self.faults,
+            self._nmt,
+            self._sdo,
+            self._errors,
+            self._contact.consumer,
+            self._producer,
+            self._contact.guarding,
+            self._rpdos,
+            self._tpdos,
+            *self.drives,
+        ]
+
+    @property
+    def drive(self) -> Drive | None:
+        """The first axis, None when the device is no drive."""
+        return self.drives[0] if self.drives else None
+
+    @property
+    def nmt_state(self) -> NmtState:
+        """NMT state; BOOT_UP stands for Initialisation."""
+        return self._nmt.state
+
+    @property
+    def powered(self) -> bool:
+        """It has power."""
+        return self._parts is self._powered_parts
+
+    @property
+    def deadline(self) -> float:
+        """Steady time in [s] at which :meth:`advance` has something to do."""
+        return min(part.deadline for part in self._parts)
+
+    def next_deadline(self) -> float | None:
+        """Return :attr:`deadline`, or None when the device waits for frames only."""
+        deadline = self.deadline
+        return None if deadline == float('inf') else deadline
+
+    def receive(self, frame: Frame, now: float) -> None:
+        """Take a frame from the bus; what is not for this device is ignored."""
+        if frame.is_extended or frame.is_error:
+            return
+        if frame.is_remote:
+            if self.powered:
+                self._line.receive(frame, now, self._on_remote)
+            return
+        handler = self.handlers.get(frame.can_id)
+        if handler is not None:
+            handler(frame, now)
+
+    def advance(self, now: float) -> None:
+        """Do what is due at steady time ``now`` in [s]."""
+        self._line.now = now
+        if self.powered:
+            self._refresh(now)
+        for part in self._parts:
+            if part.deadline <= now:
+                part.advance(now)
+        self._tpdos.poll(now)
+
+    def switch_off(self, now: float) -> None:
+        """Cut the power: the device falls silent, and the motor runs out."""
+        if not self.powered:
+            return
+        self._line.clear()
+        self._errors.reset()
+        self._errors.allow(False, now)
+        self._producer.stop()
+        self._rpdos.stop(now)
+        self._tpdos.stop()
+        for drive in self.drives:
+            drive.reset(now)
+        self._contact.guarding.reset()
+        self._lss.pending_id = self._memory.node_id or self.first_id
+        self._nmt.switch_off()
+        self._parts = [self.faults]
+        self._subscribe()
+
+    def switch_on(self, now: float, *, position_kept: bool = True) -> None:
+        """Give power again: the device starts, its objects with their defaults.
+
+        Args:
+            now: Steady time in [s].
+            position_kept: The encoder knows where the motor is; otherwise it counts from 0.
+        """
+        if self.powered:
+            return
+        if not position_kept:
+            for drive in self.drives:
+                drive.lose_position(now)
+        self._parts = self._powered_parts
+        self._subscribe()
+        self.advance(now)
+
+    def faults_changed(self) -> None:
+        """Let frames pass through the faults of the line (from the injector)."""
+        self._subscribe()
+
+    def reset(self, command: NmtCommand, now: float) -> None:
+        """Return to the defaults of the whole device or of its communication (from NMT)."""
+        whole = command is NmtCommand.RESET_NODE
+        self._producer.stop()
+        self._rpdos.stop(now)
+        self._tpdos.stop()
+        if self._lss.pending_id != self.node_id:
+            self._renumber(self._lss.pending_id)
+        self._lss.reset()
+        self.clock.reset()
+        self.store.restore(*(ALL_OBJECTS if whole else COMMUNICATION_OBJECTS))
+        self._errors.reset()
+        self._errors.allow(False, now)
+        self._sdo.reset()
+        self._sdo.configure()
+        self._sync.reset()
+        self._rpdos.configure()
+        self._tpdos.configure()
+        for drive in self.drives:
+            if whole:
+                drive.reset(now)
+            else:
+                drive.connection_lost(now)
+                for code in sorted(drive.faults):
+                    self._errors.report(code, now)
+        self._contact.reset()
+        self._subscribe()
+
+    def nmt_changed(self, previous: NmtState, now: float) -> None:
+        """Start and stop services as the NMT state asks (from NMT; CiA 301, table 46)."""
+        state = self._nmt.state
+        if previous is NmtState.BOOT_UP:
+            self._send(boot_up_frame(self.node_id))
+            self._producer.start(now)
+            for drive in self.drives:
+                drive.start(now)
+        if state is NmtState.STOPPED:
+            self._sdo.reset()
+            for drive in self.drives:
+                drive.connection_lost(now)
+        self._errors.allow(state is not NmtState.STOPPED, now)
+        if state is NmtState.OPERATIONAL:
+            self._rpdos.start()
+            self._tpdos.start(now)
+        else:
+            self._rpdos.stop(now)
+            self._tpdos.stop()
+        self._subscribe()
+
+    def _subscribe(self) -> None:
+        """Offer the services of the present NMT state."""
+        handlers = self._services.handlers(self._on_sdo) if self.powered else {}
+        if self._line.faults:
+            guarded = self._line.guarded
+            handlers = {can_id: guarded(handler) for can_id, handler in handlers.items()}
+        self.handlers = handlers
+        if self._handlers_changed is not None:
+            self._handlers_changed()
+
+    def _renumber(self, node_id: int) -> None:
+        """Take another node id; all that follows from it is read again by the reset."""
+        self.node_id = node_id
+        self.store.renumber(self._dictionary.for_node(node_id))
+        guarding = self._contact.guarding
+        for part in (self._nmt, self._sdo, self._producer, guarding, self._lss):
+            part.node_id = node_id
+
+    def _refresh(self, now: float) -> None:
+        """Let the objects hold the values of this time."""
+        for drive in self.drives:
+            drive.advance(now)
+
+    def _on_remote(self, frame: Frame, now: float) -> None:
+        if frame.can_id == CobId.HEARTBEAT + self.node_id:
+            self._contact.guarding.request(now)
+            return
+        self._tpdos.request(frame.can_id, now)
+
+    def _identify(self, frame: Frame, outgoing: bool) -> Traffic:
+        return self._services.identify(frame, outgoing)
+
+    def _send_abort(self, abort: Abort) -> None:
+        self._send(Frame(self._sdo.default.response_id, abort.encode()))
+
+    def _on_sdo(self, frame: Frame, now: float) -> None:
+        self._refresh(now)
+        self._sdo.receive(frame, now)
+        self._tpdos.poll(now)
+
+    def _on_sync(self, counter: int, now: float) -> None:
+        # inputs are sampled before outputs act, as at the SYNC of a real device
+        self._refresh(now)
+        self._tpdos.sync(counter, now)
+        self._rpdos.sync(now)
+        for drive in self.drives:
+            drive.sync(now)
+        self._tpdos.poll(now)
+
+    def _on_sync_length(self, wrong: bool, now: float) -> None:
+        self._errors.tell(SYNC_LENGTH_ERROR, wrong, now)
+
+    def _on_pdo_changed(self, _now: float) -> None:
+        self._subscribe()

@@ -1,0 +1,422 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""A simulated drive: state machine, modes of operation, faults and a motor (CiA 402-2).
+
+The drive looks at its axis when SYNC comes, and otherwise every few milliseconds while anything
+moves or has to be waited for. How often it looks has no influence on the motion, which is known
+in closed form.
+"""
+
+from __future__ import annotations
+
+import math
+
+from arm_canopen.standard.drive import Controlword, STATE_WORDS, Statusword
+from arm_canopen.standard.drive import DriveState as State
+
+from ..objects.object_store import ObjectStore
+from ..timed import NEVER
+from .axis import Axis
+from .fault import DriveFault, SharedErrors
+from .modes.mode import Dwell, Mode, SyncClock, TARGET_REACHED
+from .modes.selection import ModeSelection
+from .objects import DriveObjects, MILLISECOND, NO_WINDOW
+from .servo import ServoModel
+from .state_machine import chosen, POWERED_STATES, StateMachine, VOLTAGE_STATES
+from .states import AbortConnectionOption, FAULT_RESET_BIT, StopOption
+from .switches import INTERLOCK_BIT, Switches
+
+FOLLOWING_ERROR_CODE = 0x8611
+UNDER_VOLTAGE_CODE = 0x3220
+CONNECTION_CODE = 0x8130
+
+DC_VOLTAGE = 48_000  # [mV]
+CONTROL_PERIOD = 0.005  # [s] how often the drive looks at its axis without SYNC
+SYNC_PERIOD_MAX = 0.02  # [s] a slower SYNC is not what the drive waits for
+SYNC_PATIENCE = 1.5  # periods that it waits for a SYNC
+
+HALT = int(Controlword.HALT)
+VOLTAGE_ENABLED = int(Statusword.VOLTAGE_ENABLED)
+REMOTE = int(Statusword.REMOTE)
+INTERNAL_LIMIT = int(Statusword.INTERNAL_LIMIT)
+FOLLOWING_ERROR = int(Statusword.FOLLOWING_ERROR)
+
+
+class Drive:
+    """One axis of a device.
+
+    Attributes:
+        deadline: Steady time in [s] at which it wants to look at its axis.
+        faults: Codes of the faults since the last fault reset.
+        causes: Faults whose cause is still there; no fault reset helps against them.
+    """
+
+    def __init__(
+        self,
+        store: ObjectStore,
+        errors: SharedErrors,
+        clock: SyncClock,
+        model: ServoModel,
+        *,
+        number: int = 0,
+    ) -> None:
+        """Work on the objects of a device.
+
+        Args:
+            store: Objects of the device.
+            errors: Told of faults.
+            clock: What is known of SYNC.
+            model: Time constants of the motor.
+            number: Of the axis in its device, from 0.
+        """
+        self.deadline = NEVER
+        self.faults: set[int] = set()
+        self.causes: set[DriveFault] = set()
+        self._number = number
+        self._objects = objects = DriveObjects(store, number)
+        self._errors = errors
+        self._clock = clock
+        self._axis = Axis(model)
+        self._machine = StateMachine(objects, self._axis, self._begin_mode)
+        self._modes = ModeSelection(objects, self._axis, clock)
+        self._following = Dwell()
+        self._word = 0
+        self._idle = True
+        objects.mode.listener = self._on_mode
+        objects.controlword.listener = self._on_controlword
+        objects.max_velocity.listener = self._on_max_velocity
+        objects.max_motor_speed.listener = self._on_max_velocity
+        for target in (
+            objects.target_position,
+            objects.target_velocity,
+            objects.interpolation_target,
+            objects.vl_target,
+            objects.target_torque,
+        ):
+            target.listener = self._on_setpoint
+
+    @property
+    def state(self) -> State:
+        """State of the power drive system."""
+        return self._machine.state
+
+    @property
+    def _mode(self) -> Mode:
+        return self._modes.current
+
+    @property
+    def position(self) -> float:
+        """Where the motor is in [inc]."""
+        return self._axis.position
+
+    @property
+    def origin(self) -> float:
+        """Where the mechanical zero is in [inc]; homing moves the position, not the axis."""
+        return self._axis.origin
+
+    @property
+    def velocity(self) -> float:
+        """How fast the motor turns in [inc/s]."""
+        return self._axis.velocity
+
+    def reset(self, now: float) -> None:
+        """Start anew with the objects as they are; the motor stays where it is."""
+        self._axis.advance(now)
+        self._machine.reset()
+        self._word = 0
+        self._errors.forget(self._number)
+        self.faults.clear()
+        self._following.clear()
+        self._modes.reset()
+        self._axis.speed = self._objects.speed
+        self._publish(now)
+
+    def lose_position(self, now: float) -> None:
+        """Count from 0 where the motor is, as an incremental encoder does after power-on."""
+        self._axis.advance(now)
+        self._axis.shift(-self._axis.position)
+        self._publish(now)
+
+    def start(self, now: float) -> None:
+        """Become ready for commands; the device has started."""
+        self._machine.start()
+        for fault in sorted(self.causes, key=lambda fault: fault.code):
+            if fault.code:
+                self._fail(fault.code, now, at_once=fault.at_once)
+        self._publish(now)
+
+    def advance(self, now: float) -> None:
+        """Go on to a time; nothing is to be done while the axis rests."""
+        if not self._idle:
+            self._move(now)
+            self._publish(now)
+
+    def sync(self, now: float) -> None:
+        """Take a set-point with SYNC; :meth:`advance` was called for this time before."""
+        if self._machine.operating and self._mode.sync(now):
+            self._schedule(now)
+
+    def raise_fault(self, code: int, now: float | None = None, *, at_once: bool = False) -> None:
+        """Let a fault happen.
+
+        Args:
+            code: Error code for 0x603F and EMCY.
+            now: Steady time in [s]; by default when the drive last looked at its axis.
+            at_once: It leaves no torque to brake with, whatever 0x605E says.
+        """
+        now = self._axis.time if now is None else now
+        self._move(now)
+        self._fail(code, now, at_once=at_once)
+        self._publish(now)
+
+    def inject(self, fault: DriveFault, now: float | None = None, *, lasting: bool = True) -> None:
+        """Let something go wrong.
+
+        Args:
+            fault: What.
+            now: Steady time in [s]; by default when the drive last looked at its axis.
+            lasting: Its cause stays until :meth:`clear`; otherwise a fault reset ends it.
+        """
+        now = self._axis.time if now is None else now
+        if lasting:
+            self.causes.add(fault)
+        if fault is DriveFault.BLOCKED_MOTOR:
+            self.block(now=now)
+        if fault is DriveFault.STO:
+            self.set_voltage(False, now, fault=False)
+        else:
+            self.raise_fault(fault.code, now, at_once=fault.at_once)
+
+    def clear(self, fault: DriveFault, now: float | None = None) -> None:
+        """Take the cause of a fault away; the drive then still waits for a fault reset."""
+        now = self._axis.time if now is None else now
+        self.causes.discard(fault)
+        if fault is DriveFault.BLOCKED_MOTOR:
+            self.release(now)
+        if fault is DriveFault.STO:
+            self.set_voltage(True, now)
+
+    def block(self, at: float | None = None, now: float | None = None) -> None:
+        """Put a mechanical stop in the way.
+
+        Args:
+            at: Position in [inc]; beyond it, as seen from the motor, there is no way. By
+                default the motor is stuck where it is.
+            now: Steady time in [s]; by default when the drive last looked at its axis.
+        """
+        now = self._axis.time if now is None else now
+        self._move(now)
+        here = self._axis.position
+        if at is None:
+            self._axis.set_stops(here, here)
+        elif at >= here:
+            self._axis.set_stops(-math.inf, at)
+        else:
+            self._axis.set_stops(at, math.inf)
+        self._publish(now)
+
+    def release(self, now: float | None = None) -> None:
+        """Take mechanical stops away."""
+        now = self._axis.time if now is None else now
+        self._move(now)
+        self._axis.set_stops(-math.inf, math.inf)
+        self._publish(now)
+
+    def set_load(self, torque: float, now: float | None = None) -> None:
+        """Load the axis, as gravity does.
+
+        Args:
+            torque: What it takes to hold it, in [0.1 % of the rated torque]; a positive load
+                pulls towards negative positions.
+            now: Steady time in [s]; by default when the drive last looked at its axis.
+        """
+        now = self._axis.time if now is None else now
+        self._move(now)
+        self._axis.load = torque
+        if self._machine.operating:
+            self._mode.load_changed(now)
+        self._publish(now)
+
+    def set_switches(self, switches: Switches) -> None:
+        """Put limit switches, home switch and index pulse in other places."""
+        self._axis.switches = switches
+        self._publish(self._axis.time)
+
+    def set_voltage(self, present: bool, now: float | None = None, *, fault: bool = True) -> None:
+        """Supply the power stage, or cut its supply.
+
+        Args:
+            present: There is voltage.
+            now: Steady time in [s]; by default when the drive last looked at its axis.
+            fault: Without it a drive that is switched on faults; otherwise it goes to Switch on
+                disabled, as with safe torque off.
+        """
+        now = self._axis.time if now is None else now
+        self._move(now)
+        self._machine.set_voltage(present, now)
+        if not present and self._machine.state in VOLTAGE_STATES:
+            if fault:
+                self._fail(UNDER_VOLTAGE_CODE, now)
+            else:
+                self._machine.disable()
+        self._publish(now)
+
+    def connection_lost(self, now: float) -> None:
+        """React as 0x6007 says to the loss of the master, if the motor has torque."""
+        if self._machine.state not in POWERED_STATES:
+            return
+        self._move(now)
+        match chosen(self._objects.abort_connection, AbortConnectionOption.FAULT):
+            case AbortConnectionOption.FAULT:
+                self._fail(CONNECTION_CODE, now)
+            case AbortConnectionOption.DISABLE_VOLTAGE:
+                self._machine.disable()
+            case AbortConnectionOption.QUICK_STOP if self._machine.operating:
+                self._machine.quick_stop()
+        self._publish(now)
+
+    def _move(self, now: float) -> None:
+        """Advance the axis to a time, and what depends on where it is."""
+        while self._machine.operating and self._mode.next_event <= now:
+            event = self._mode.next_event
+            self._axis.advance(event)
+            self._mode.event(event)
+        self._axis.advance(now)
+        if self._machine.operating:
+            self._mode.update(now)
+        self._watch_following_error(now)
+        self._machine.advance(now)
+
+    def _watch_following_error(self, now: float) -> None:
+        if self._machine.state not in POWERED_STATES:
+            return
+        window = self._objects.following_window.value
+        beyond = 0 < window < NO_WINDOW and abs(self._axis.following_error) > window
+        timeout = self._objects.following_timeout.value * MILLISECOND
+        self._following.update(beyond, timeout, now)
+        if self._following.reached:
+            self._fail(FOLLOWING_ERROR_CODE, now)
+
+    def _fail(self, code: int, now: float, *, at_once: bool = False) -> None:
+        self.faults.add(code)
+        self._objects.error_code.put(code)
+        self._machine.fault(at_once=at_once)
+        self._errors.report(self._number, code, now)
+
+    def _reset_fault(self, now: float) -> None:
+        if any(fault.code for fault in self.causes):
+            return
+        for code in sorted(self.faults):
+            self._errors.clear(self._number, code, now)
+        self.faults.clear()
+        self._following.clear()
+        self._objects.error_code.put(0)
+        self._machine.reset_fault()
+
+    def _on_controlword(self, now: float) -> None:
+        word, previous = self._objects.controlword.value, self._word
+        if word == previous:
+            return
+        self._move(now)
+        self._word = word
+        if word & ~previous & FAULT_RESET_BIT and self._machine.state is State.FAULT:
+            self._reset_fault(now)
+        self._machine.command(word, now)
+        if self._machine.operating:
+            self._obey_halt(now)
+            self._mode.command(word, previous, now)
+            self._mode.update(now)
+        self._publish(now)
+
+    def _obey_halt(self, now: float) -> None:
+        halted = bool(self._word & HALT)
+        if halted is self._mode.halted:
+            return
+        self._mode.halted = halted
+        if halted:
+            option = chosen(self._objects.halt_option, StopOption.SLOW_DOWN)
+            self._axis.stop(self._machine.deceleration(option))
+            self._mode.halt(now)
+        else:
+            self._mode.resume(now)
+
+    def _on_setpoint(self, now: float) -> None:
+        if self._machine.operating and self._mode.setpoint(now):
+            self._schedule(now)
+
+    def _on_max_velocity(self, now: float) -> None:
+        self._move(now)
+        self._axis.speed = self._objects.speed
+
+    def _on_mode(self, now: float) -> None:
+        self._move(now)
+        if not self._modes.select():
+            return
+        if self._machine.operating:
+            self._begin_mode(now)
+        self._publish(now)
+
+    def _begin_mode(self, now: float) -> None:
+        self._mode.halted = bool(self._word & HALT)
+        self._mode.start(self._word, now)
+        self._mode.update(now)
+
+    def _publish(self, now: float) -> None:
+        """Write what can be seen from outside, and decide when to look again."""
+        objects, axis = self._objects, self._axis
+        objects.statusword.value = self._statusword()
+        objects.position_actual.put(axis.position)
+        objects.position_internal.put(axis.position - axis.origin)
+        objects.velocity_actual.put(axis.velocity)
+        objects.position_demand.put(axis.demand.position)
+        objects.velocity_demand.put(axis.demand.velocity)
+        objects.following_error.put(axis.following_error)
+        inputs = axis.switches.inputs(axis.position - axis.origin)
+        objects.digital_inputs.put(inputs | (0 if self._machine.voltage else INTERLOCK_BIT))
+        objects.vl_demand.put(axis.demand.velocity)
+        objects.vl_actual.put(axis.velocity)
+        self._publish_torque()
+        self._schedule(now)
+
+    def _publish_torque(self) -> None:
+        objects, axis = self._objects, self._axis
+        applied = self._mode.torque if self._machine.operating else None
+        torque = axis.torque if applied is None else applied
+        if applied is None and axis.blocked:  # the position loop pushes as hard as it may
+            torque = objects.held_torque(math.copysign(math.inf, axis.following_error))
+        objects.torque_demand.put(torque)
+        objects.torque_actual.put(torque)
+        objects.current_actual.put(torque)
+        objects.dc_voltage.put(DC_VOLTAGE if self._machine.voltage else 0)
+
+    def _statusword(self) -> int:
+        state = self._machine.state
+        word = STATE_WORDS[state] | REMOTE
+        if self._machine.voltage:
+            word |= VOLTAGE_ENABLED
+        if self._axis.speed_limited or (self._machine.operating and self._mode.limited):
+            word |= INTERNAL_LIMIT
+        if FOLLOWING_ERROR_CODE in self.faults:
+            word |= FOLLOWING_ERROR
+        if state is State.OPERATION_ENABLED:
+            word |= self._mode.status()
+            if self._mode.halted:
+                # during halt "target reached" says that the axis stands (CiA 402-2, table 30)
+                word = word & ~TARGET_REACHED | (TARGET_REACHED if self._axis.settled else 0)
+        elif state is State.QUICK_STOP_ACTIVE and self._axis.settled:
+            word |= TARGET_REACHED
+        return word
+
+    def _schedule(self, now: float) -> None:
+        machine = self._machine
+        waiting = machine.transient or (machine.operating and self._mode.waiting)
+        self._idle = self._axis.settled and not waiting
+        if self._idle:
+            self.deadline = NEVER
+            return
+        period = CONTROL_PERIOD
+        if self._clock.period <= SYNC_PERIOD_MAX and self._clock.alive(now):
+            period = SYNC_PATIENCE * self._clock.period
+        self.deadline = now + period
+        if now < self._axis.motion.end < self.deadline:
+            self.deadline = self._axis.motion.end

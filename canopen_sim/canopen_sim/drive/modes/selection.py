@@ -1,0 +1,84 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Which modes of operation the drive has, and which one is selected (0x6060, 0x6061, 0x6502)."""
+
+from __future__ import annotations
+
+from arm_canopen.standard.datatypes import Value
+from arm_canopen.standard.sdo_abort import AbortCode
+
+from ...objects.object_store import refusal
+from ..axis import Axis
+from ..objects import DriveObjects
+from .cyclic_velocity import CyclicVelocity
+from .homing import Homing
+from .mode import Mode, NoMode, SyncClock
+from .profile_position import ProfilePosition
+from .profile_velocity import ProfileVelocity
+from .streamed_position import CyclicPosition, InterpolatedPosition
+from .torque import CyclicTorque, ProfileTorque
+from .velocity import Velocity
+
+MODES: tuple[type[Mode], ...] = (
+    NoMode,
+    ProfilePosition,
+    Velocity,
+    ProfileVelocity,
+    ProfileTorque,
+    Homing,
+    InterpolatedPosition,
+    CyclicPosition,
+    CyclicVelocity,
+    CyclicTorque,
+)
+
+
+class ModeSelection:
+    """The modes of a drive.
+
+    A mode is there when it is simulated and 0x6502 of the dictionary names it; where the
+    dictionary says nothing, when it has the objects of the mode. Another one is refused to an
+    SDO; from an RPDO it is ignored, and 0x6061 goes on showing the present mode.
+
+    Attributes:
+        current: The selected mode.
+    """
+
+    def __init__(self, objects: DriveObjects, axis: Axis, clock: SyncClock) -> None:
+        """Begin in mode 0."""
+        self._objects = objects
+        self._modes: dict[int, Mode] = {m.number: m(objects, axis, clock) for m in MODES}
+        self.current = self._modes[NoMode.number]
+        objects.mode.check = self._check
+
+    def reset(self) -> None:
+        """Select what the dictionary has as default, as after switching on."""
+        for mode in self._modes.values():
+            mode.reset()
+        supported = self._objects.supported_modes
+        # many EDS files give no default here, and a drive without any mode would be of no use;
+        # others promise more than is simulated
+        promised = supported.value or self._objects.possible_modes
+        supported.value = promised & sum(m.number.support_bit for m in MODES)
+        self.current = self._modes[NoMode.number]
+        self.select()
+
+    def select(self) -> bool:
+        """Select and display what 0x6060 asks for; return whether that is another mode."""
+        number = self._objects.mode.value
+        changed = number != self.current.number and self._supports(number)
+        if changed:
+            self.current = self._modes[number]
+        self._objects.mode_display.put(self.current.number)
+        return changed
+
+    def _supports(self, number: int) -> bool:
+        mode = self._modes.get(number)
+        if mode is None:
+            return False
+        bit = mode.number.support_bit
+        return not bit or bool(bit & self._objects.supported_modes.value)
+
+    def _check(self, value: Value) -> None:
+        if not isinstance(value, int) or not self._supports(value):
+            raise refusal(AbortCode.VALUE_RANGE, self._objects.mode.entry)

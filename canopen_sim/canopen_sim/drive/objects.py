@@ -1,0 +1,219 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The objects of the drive profile that the simulated drive works with (CiA 402-2)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from arm_canopen.standard.drive import OperationMode
+from arm_canopen.standard.objects import AXIS_OFFSET, Index
+from arm_canopen.standard.target_objects import TARGET_OBJECTS
+
+from ..objects.object_store import Integer, ObjectStore
+from .profile import Limits
+
+NOMINAL_TORQUE = 1000  # [0.1 % of the rated torque]
+NO_TORQUE_LIMIT = 0xFFFF
+NO_WINDOW = 0xFFFF_FFFF  # 0x6065 and 0x6067: not monitored
+MILLISECOND = 0.001  # [s]
+UNSET_RAMP = 100_000.0  # [inc/s^2] where a dictionary gives 0 for a ramp
+PERIOD_MIN = 0.001  # [s] shortest interpolation period that is believed
+
+
+class DriveObjects:
+    """All objects of a drive, bound once; units are raw increments.
+
+    Those that a dictionary lacks get a harmless value and stay invisible.
+    """
+
+    def __init__(self, store: ObjectStore, axis: int = 0) -> None:
+        """Bind them.
+
+        Args:
+            store: Objects of the device.
+            axis: Number of the axis from 0; those of axis n stand 0x800 n further on.
+        """
+
+        def bind(index: int, subindex: int = 0, *, default: int = 0) -> Integer:
+            return store.integer(index + axis * AXIS_OFFSET, subindex, default=default)
+
+        self._bind_states(bind)
+        self._bind_actual_values(bind)
+        self._bind_windows(bind)
+        self._bind_targets(bind)
+        self._bind_profile(bind)
+        self._bind_velocity_mode(bind)
+        self._bind_torque(bind)
+        self._dictionary = store.dictionary
+        self._offset = axis * AXIS_OFFSET
+
+    @property
+    def possible_modes(self) -> int:
+        """Bits of 0x6502 for the modes that the objects of the dictionary allow."""
+        modes = [
+            mode
+            for mode, (index, subindex) in TARGET_OBJECTS.items()
+            if (index + self._offset, subindex) in self._dictionary
+        ]
+        if (Index.HOMING_METHOD + self._offset, 0) in self._dictionary:
+            modes.append(OperationMode.HOMING)
+        return sum(mode.support_bit for mode in modes)
+
+    def _bind_states(self, bind: Callable[..., Integer]) -> None:
+        self.abort_connection = bind(Index.ABORT_CONNECTION_OPTION, default=1)
+        self.error_code = bind(Index.ERROR_CODE)
+        self.controlword = bind(Index.CONTROLWORD)
+        self.statusword = bind(Index.STATUSWORD)
+        self.quick_stop_option = bind(Index.QUICK_STOP_OPTION, default=2)
+        self.shutdown_option = bind(Index.SHUTDOWN_OPTION)
+        self.disable_option = bind(Index.DISABLE_OPTION, default=1)
+        self.halt_option = bind(Index.HALT_OPTION, default=1)
+        self.fault_option = bind(Index.FAULT_REACTION_OPTION, default=2)
+        self.mode = bind(Index.MODE_OF_OPERATION)
+        self.mode_display = bind(Index.MODE_OF_OPERATION_DISPLAY)
+        self.supported_modes = bind(Index.SUPPORTED_MODES, default=0xFFFF_FFFF)
+
+    def _bind_actual_values(self, bind: Callable[..., Integer]) -> None:
+        self.position_demand = bind(Index.POSITION_DEMAND)
+        self.position_internal = bind(Index.POSITION_ACTUAL_INTERNAL)
+        self.position_actual = bind(Index.POSITION_ACTUAL)
+        self.velocity_demand = bind(Index.VELOCITY_DEMAND)
+        self.velocity_actual = bind(Index.VELOCITY_ACTUAL)
+        self.following_error = bind(Index.FOLLOWING_ERROR)
+
+    def _bind_windows(self, bind: Callable[..., Integer]) -> None:
+        self.following_window = bind(Index.FOLLOWING_ERROR_WINDOW, default=NO_WINDOW)
+        self.following_timeout = bind(Index.FOLLOWING_ERROR_TIMEOUT)  # [ms]
+        self.position_window = bind(Index.POSITION_WINDOW, default=NO_WINDOW)
+        self.position_window_time = bind(Index.POSITION_WINDOW_TIME)  # [ms]
+        self.velocity_window = bind(Index.VELOCITY_WINDOW, default=100)
+        self.velocity_window_time = bind(Index.VELOCITY_WINDOW_TIME)  # [ms]
+        self.velocity_threshold = bind(Index.VELOCITY_THRESHOLD, default=10)
+        self.velocity_threshold_time = bind(Index.VELOCITY_THRESHOLD_TIME)  # [ms]
+
+    def _bind_targets(self, bind: Callable[..., Integer]) -> None:
+        self.target_position = bind(Index.TARGET_POSITION)
+        self.target_velocity = bind(Index.TARGET_VELOCITY)
+        self.interpolation_target = bind(Index.INTERPOLATION_DATA, 1)
+        self.interpolation_period = bind(Index.INTERPOLATION_PERIOD, 1, default=10)
+        self.interpolation_exponent = bind(Index.INTERPOLATION_PERIOD, 2, default=-3)
+        self.home_offset = bind(Index.HOME_OFFSET)
+        self.position_offset = bind(Index.POSITION_OFFSET)
+        self.velocity_offset = bind(Index.VELOCITY_OFFSET)
+        self.buffer_maximum = bind(Index.INTERPOLATION_CONFIGURATION, 1, default=1)
+        self.buffer_size = bind(Index.INTERPOLATION_CONFIGURATION, 2, default=1)
+        self.buffer_clear = bind(Index.INTERPOLATION_CONFIGURATION, 6, default=1)
+        self.homing_method = bind(Index.HOMING_METHOD)
+        self.homing_speed_switch = bind(Index.HOMING_SPEEDS, 1, default=100)
+        self.homing_speed_zero = bind(Index.HOMING_SPEEDS, 2, default=10)
+        self.homing_acceleration = bind(Index.HOMING_ACCELERATION)
+        self.digital_inputs = bind(Index.DIGITAL_INPUTS)
+
+    def _bind_profile(self, bind: Callable[..., Integer]) -> None:
+        self.limit_low = bind(Index.SOFTWARE_POSITION_LIMIT, 1)
+        self.limit_high = bind(Index.SOFTWARE_POSITION_LIMIT, 2)
+        self.max_velocity = bind(Index.MAX_PROFILE_VELOCITY)
+        self.profile_velocity = bind(Index.PROFILE_VELOCITY)
+        self.profile_acceleration = bind(Index.PROFILE_ACCELERATION)
+        self.profile_deceleration = bind(Index.PROFILE_DECELERATION)
+        self.quick_stop_deceleration = bind(Index.QUICK_STOP_DECELERATION)
+        self.max_motor_speed = bind(Index.MAX_MOTOR_SPEED)
+        self.max_acceleration = bind(Index.MAX_ACCELERATION)
+        self.max_deceleration = bind(Index.MAX_DECELERATION)
+        self.max_slippage = bind(Index.MAX_SLIPPAGE)
+
+    def _bind_velocity_mode(self, bind: Callable[..., Integer]) -> None:
+        self.vl_target = bind(Index.VL_TARGET_VELOCITY)
+        self.vl_demand = bind(Index.VL_VELOCITY_DEMAND)
+        self.vl_actual = bind(Index.VL_VELOCITY_ACTUAL)
+        self.vl_min = bind(Index.VL_VELOCITY_MIN_MAX, 1)
+        self.vl_max = bind(Index.VL_VELOCITY_MIN_MAX, 2)
+        ramps = (Index.VL_ACCELERATION, Index.VL_DECELERATION, Index.VL_QUICK_STOP)
+        self._vl_ramps = [(bind(ramp, 1), bind(ramp, 2, default=1)) for ramp in ramps]
+
+    def _bind_torque(self, bind: Callable[..., Integer]) -> None:
+        self.target_torque = bind(Index.TARGET_TORQUE)
+        self.torque_offset = bind(Index.TORQUE_OFFSET)
+        self.torque_demand = bind(Index.TORQUE_DEMAND)
+        self.torque_actual = bind(Index.TORQUE_ACTUAL)
+        self.current_actual = bind(Index.CURRENT_ACTUAL)
+        self.dc_voltage = bind(Index.DC_LINK_VOLTAGE)
+        self.torque_slope = bind(Index.TORQUE_SLOPE)
+        self.max_torque = bind(Index.MAX_TORQUE, default=NOMINAL_TORQUE)
+        self.positive_torque = bind(Index.POSITIVE_TORQUE_LIMIT, default=NO_TORQUE_LIMIT)
+        self.negative_torque = bind(Index.NEGATIVE_TORQUE_LIMIT, default=NO_TORQUE_LIMIT)
+
+    @property
+    def speed(self) -> float:
+        """Highest speed of the motor in [inc/s]; 0x607F = 0 means no limit."""
+        profile = float(self.max_velocity.value) or float('inf')
+        return min(profile, float(self.max_motor_speed.value) or float('inf'))
+
+    @property
+    def slow_down(self) -> float:
+        """Deceleration of the slow down ramp in [inc/s^2]."""
+        mode = self.mode_display.value
+        if mode == OperationMode.VELOCITY:
+            return self._vl_ramp(1)
+        if mode == OperationMode.HOMING:
+            return self.homing_ramp
+        return _ramp(self.profile_deceleration, self.max_deceleration)
+
+    @property
+    def homing_ramp(self) -> float:
+        """Homing acceleration in [inc/s^2]."""
+        return float(self.homing_acceleration.value) or UNSET_RAMP
+
+    @property
+    def quick_stop(self) -> float:
+        """Deceleration of the quick stop ramp in [inc/s^2]."""
+        if self.mode_display.value == OperationMode.VELOCITY:
+            return self._vl_ramp(2)
+        return float(self.quick_stop_deceleration.value) or UNSET_RAMP
+
+    def _vl_ramp(self, which: int) -> float:
+        speed, time = self._vl_ramps[which]
+        return speed.value / time.value if speed.value and time.value else UNSET_RAMP
+
+    @property
+    def velocity_mode_limits(self) -> Limits:
+        """Limits of the velocity mode: 0x6046, 0x6048 and 0x6049."""
+        highest = float(self.vl_max.value) or float('inf')
+        return Limits(min(highest, self.speed), self._vl_ramp(0), self._vl_ramp(1))
+
+    def held_torque(self, torque: float) -> float:
+        """Return a torque within 0x6072, 0x60E0 and 0x60E1 in [0.1 % of the rated torque]."""
+        high = min(self.max_torque.value, self.positive_torque.value)
+        low = min(self.max_torque.value, self.negative_torque.value)
+        return float(min(max(torque, -low), high))
+
+    def profile(self, velocity: float) -> Limits:
+        """Return the limits of a profile with a velocity in [inc/s], as they are now."""
+        return Limits(
+            min(velocity, self.speed),
+            _ramp(self.profile_acceleration, self.max_acceleration),
+            self.slow_down,
+        )
+
+    @property
+    def setpoint_period(self) -> float:
+        """Interpolation time period 0x60C2 in [s]."""
+        period = self.interpolation_period.value * 10.0**self.interpolation_exponent.value
+        return max(period, PERIOD_MIN)
+
+    def position_limits(self) -> tuple[float, float]:
+        """Return the software position limits in [inc]; infinite when 0x607D sets none."""
+        low, high = self.limit_low.value, self.limit_high.value
+        return (low, high) if low < high else (float('-inf'), float('inf'))
+
+    def within_limits(self, position: float) -> float:
+        """Return the position, or the software limit that is in its way."""
+        low, high = self.position_limits()
+        return min(max(position, low), high)
+
+
+def _ramp(profile: Integer, maximum: Integer) -> float:
+    """Return the ramp of a profile within its maximum; 0 in either means that it is not set."""
+    ramp = float(profile.value) or UNSET_RAMP
+    return min(ramp, float(maximum.value) or UNSET_RAMP)

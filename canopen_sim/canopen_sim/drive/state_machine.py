@@ -1,0 +1,248 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""State machine of the power drive system, device side (CiA 402-2, clause 6)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from enum import Enum
+from functools import partial
+from typing import TypeVar
+
+from arm_canopen.standard.datatypes import Value
+from arm_canopen.standard.drive import DriveState as State
+from arm_canopen.standard.sdo_abort import AbortCode
+
+from ..objects.object_store import Integer, refusal
+from .axis import Axis
+from .objects import DriveObjects
+from .states import (
+    COMMANDED_TRANSITIONS,
+    decode_command,
+    DriveCommand,
+    QuickStopOption,
+    StopOption,
+    Transition,
+)
+
+Option = TypeVar('Option', bound=Enum)
+
+POWERED_STATES = frozenset({State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE})
+LIMIT_FACTOR = 2.0  # of the quick stop ramp, where the motor brakes at its limit
+HALT_OPTIONS = (
+    StopOption.SLOW_DOWN,
+    StopOption.QUICK_STOP,
+    StopOption.CURRENT_LIMIT,
+    StopOption.VOLTAGE_LIMIT,
+)
+
+VOLTAGE_STATES = POWERED_STATES | {State.SWITCHED_ON}
+"""States that need the voltage of the power stage."""
+
+
+class StateMachine:
+    """State of a drive, and the ramps that lie between two states.
+
+    While a ramp leads out of Operation enabled (option codes 0x605B and 0x605C), the drive stays
+    in that state, and changes when the motor stands.
+
+    Attributes:
+        state: Present state.
+        voltage: The power stage is supplied.
+    """
+
+    def __init__(
+        self, objects: DriveObjects, axis: Axis, enabled: Callable[[float], None]
+    ) -> None:
+        """Begin in Not ready to switch on.
+
+        Args:
+            objects: Objects of the drive.
+            axis: What it moves.
+            enabled: Told the time when operation is enabled, also again.
+        """
+        self.state = State.NOT_READY_TO_SWITCH_ON
+        self.voltage = True
+        self._objects = objects
+        self._axis = axis
+        self._enabled = enabled
+        self._word = 0
+        self._pending: Transition | None = None
+        stops = (StopOption.DISABLE, StopOption.SLOW_DOWN)
+        _restrict(objects.quick_stop_option, QuickStopOption)
+        _restrict(objects.shutdown_option, stops)
+        _restrict(objects.disable_option, stops)
+        _restrict(objects.fault_option, StopOption)
+        _restrict(objects.halt_option, HALT_OPTIONS)
+
+    @property
+    def operating(self) -> bool:
+        """The mode of operation moves the axis."""
+        return self.state is State.OPERATION_ENABLED and self._pending is None
+
+    @property
+    def transient(self) -> bool:
+        """The state is left by itself when the motor stands."""
+        if self.state is State.QUICK_STOP_ACTIVE:
+            return not self.quick_stop_option.stays
+        return self._pending is not None or self.state is State.FAULT_REACTION_ACTIVE
+
+    @property
+    def quick_stop_option(self) -> QuickStopOption:
+        """What a quick stop does (0x605A)."""
+        return chosen(self._objects.quick_stop_option, QuickStopOption.QUICK_STOP)
+
+    def start(self) -> None:
+        """Pass transitions 0 and 1: the drive has started."""
+        if self.state is State.NOT_READY_TO_SWITCH_ON:
+            self.state = State.SWITCH_ON_DISABLED
+
+    def reset(self) -> None:
+        """Start anew, as after switching on."""
+        self._word = 0
+        self._power_off(State.NOT_READY_TO_SWITCH_ON)
+
+    def command(self, word: int, now: float) -> None:
+        """Obey a controlword, through as many states as it leads."""
+        self._word = word
+        command = decode_command(word)
+        if command is DriveCommand.ENABLE_OPERATION and self._pending is not None:
+            self._pending = None  # a ramp out of Operation enabled is called off
+            self._enabled(now)
+        while True:
+            transition = COMMANDED_TRANSITIONS.get((self.state, command))
+            if transition is None or not self._go(transition, now):
+                return
+
+    def set_voltage(self, present: bool, now: float) -> None:
+        """Supply the power stage or cut it off; without supply the motor has no torque."""
+        self.voltage = present
+        if present:
+            self.command(self._word, now)
+        elif self.state is State.FAULT_REACTION_ACTIVE:
+            self._power_off(State.FAULT)
+
+    def fault(self, *, at_once: bool = False) -> None:
+        """Pass transition 13, and 14 when there is nothing to be stopped.
+
+        Args:
+            at_once: The fault leaves no torque to brake with, whatever 0x605E says.
+        """
+        if self.state is State.FAULT_REACTION_ACTIVE and at_once:
+            self._power_off(State.FAULT)
+        if self.state in (State.FAULT_REACTION_ACTIVE, State.FAULT):
+            return
+        reaction = chosen(self._objects.fault_option, StopOption.QUICK_STOP)
+        can_brake = self._axis.powered and self.voltage and not at_once
+        if can_brake and reaction is not StopOption.DISABLE:
+            self._pending = None
+            self.state = State.FAULT_REACTION_ACTIVE
+            self._axis.stop(self.deceleration(reaction))
+        else:
+            self._power_off(State.FAULT)
+
+    def reset_fault(self) -> None:
+        """Pass transition 15."""
+        if self.state is State.FAULT:
+            self.state = State.SWITCH_ON_DISABLED
+
+    def quick_stop(self) -> None:
+        """Pass transition 11."""
+        option = self.quick_stop_option
+        if option is QuickStopOption.DISABLE:
+            self._power_off(State.SWITCH_ON_DISABLED)
+            return
+        self._pending = None
+        self.state = State.QUICK_STOP_ACTIVE
+        self._axis.stop(self.deceleration(option.ramp))
+
+    def disable(self) -> None:
+        """Take the torque away at once, as "disable voltage" does."""
+        self._power_off(State.SWITCH_ON_DISABLED)
+
+    def advance(self, now: float) -> None:
+        """Leave a state whose ramp has ended; the axis was advanced before."""
+        if not self.transient or not self._axis.settled:
+            return
+        if self._pending is not None:
+            self._power_off(self._pending.target)
+        elif self.state is State.FAULT_REACTION_ACTIVE:
+            self._power_off(State.FAULT)
+        else:
+            self._power_off(State.SWITCH_ON_DISABLED)
+        self.command(self._word, now)
+
+    def deceleration(self, option: StopOption) -> float:
+        """Return the deceleration of a stop option in [inc/s^2]."""
+        objects = self._objects
+        match option:
+            case StopOption.SLOW_DOWN:
+                return objects.slow_down
+            case StopOption.VENDOR_SLOW:
+                return 0.5 * objects.slow_down
+            case StopOption.CURRENT_LIMIT | StopOption.VOLTAGE_LIMIT:
+                return LIMIT_FACTOR * objects.quick_stop
+        return objects.quick_stop
+
+    def _go(self, transition: Transition, now: float) -> bool:
+        """Pass a transition; return whether the state has changed."""
+        match transition.number:
+            case 3 | 4 if not self.voltage:
+                return False
+            case 4:
+                self._axis.power_on(self._objects.slow_down)
+                return self._enable(now)
+            case 16 if self.quick_stop_option.stays:
+                return self._enable(now)
+            case 16:
+                return False
+            case 5:
+                return self._leave(transition, self._objects.disable_option)
+            case 8:
+                return self._leave(transition, self._objects.shutdown_option)
+            case 9 | 10 | 12:
+                self._power_off(transition.target)
+            case 11:
+                self.quick_stop()
+            case _:
+                self.state = transition.target
+        return True
+
+    def _enable(self, now: float) -> bool:
+        self.state = State.OPERATION_ENABLED
+        self._enabled(now)
+        return True
+
+    def _leave(self, transition: Transition, option: Integer) -> bool:
+        if transition == self._pending:
+            return False
+        slow_down = chosen(option, StopOption.DISABLE) is StopOption.SLOW_DOWN
+        if slow_down and not self._axis.settled:
+            self._pending = transition
+            self._axis.stop(self._objects.slow_down)
+            return False
+        self._power_off(transition.target)
+        return True
+
+    def _power_off(self, state: State) -> None:
+        self._pending = None
+        self._axis.power_off()
+        self.state = state
+
+
+def chosen(variable: Integer, default: Option) -> Option:
+    """Return the option that an object holds, ``default`` for a value without meaning."""
+    try:
+        return type(default)(variable.value)
+    except ValueError:
+        return default
+
+
+def _restrict(variable: Integer, options: Iterable[Enum]) -> None:
+    """Let clients write no other options than these."""
+    variable.check = partial(_check, variable, frozenset(option.value for option in options))
+
+
+def _check(variable: Integer, allowed: frozenset[int], value: Value) -> None:
+    if value not in allowed:
+        raise refusal(AbortCode.VALUE_RANGE, variable.entry)

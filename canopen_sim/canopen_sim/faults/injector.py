@@ -1,0 +1,196 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Begins and ends the faults of one simulated device."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+from arm_canopen.standard.objects import Index
+
+from ..drive.drive import Drive
+from ..drive.fault import DriveFault
+from ..objects.object_store import ObjectStore
+from ..timed import NEVER
+from .faults import BusFault, Fault, FaultInjection
+from .line import AFFECTED, FaultLine, LineFault
+
+IDENTITY_OBJECTS: dict[str, tuple[int, int]] = {
+    'device_type': (Index.DEVICE_TYPE, 0),
+    'vendor': (Index.IDENTITY, 1),
+    'product': (Index.IDENTITY, 2),
+    'revision': (Index.IDENTITY, 3),
+    'serial': (Index.IDENTITY, 4),
+}
+"""Where a device says who it is, by the field of the injection (CiA 301, 7.5.2.2 and 7.5.2.18)."""
+
+POWER_FAULTS = frozenset({BusFault.POWER_OFF, BusFault.REBOOT})
+REBOOT_TIME_MIN = 1e-6  # [s] so that off comes before on
+OTHER_VENDOR = 0x7FFF_FFFF  # what a wrong identity shows when no value is given
+
+
+class Powered(Protocol):
+    """What the injector does with its device."""
+
+    node_id: int
+    store: ObjectStore
+    drives: tuple[Drive, ...]
+
+    def switch_off(self, now: float) -> None:
+        """Cut the power."""
+
+    def switch_on(self, now: float, *, position_kept: bool) -> None:
+        """Give power."""
+
+    def faults_changed(self) -> None:
+        """The line has other faults from now on."""
+
+
+@dataclass(slots=True)
+class ActiveFault:
+    """A fault that goes on.
+
+    Attributes:
+        injection: What was asked for.
+        end: Steady time in [s] at which it ends.
+        line: Its part on the line, None when it has none.
+    """
+
+    injection: FaultInjection
+    end: float
+    line: LineFault | None = None
+
+
+class FaultInjector:
+    """All faults of one device."""
+
+    def __init__(self, device: Powered, line: FaultLine) -> None:
+        """Begin without faults.
+
+        Args:
+            device: The device.
+            line: Its connection to the bus.
+        """
+        self._device = device
+        self._line = line
+        self._active: dict[object, ActiveFault] = {}
+
+    @property
+    def deadline(self) -> float:
+        """Steady time in [s] at which a fault ends or a late frame arrives."""
+        if not self._active:
+            return self._line.deadline
+        return min(self._line.deadline, *(active.end for active in self._active.values()))
+
+    @property
+    def active(self) -> tuple[FaultInjection, ...]:
+        """The faults that go on."""
+        self._forget_exhausted()
+        return tuple(active.injection for active in self._active.values())
+
+    def inject(self, injection: FaultInjection, now: float) -> None:
+        """Begin a fault; the same fault of the same PDO or object ends.
+
+        Args:
+            injection: The fault.
+            now: Steady time in [s].
+
+        Raises:
+            ValueError: It is a fault of a drive, and the device is none or lacks the axis.
+        """
+        self._line.now = now
+        if isinstance(injection.fault, DriveFault) and not self._axes(injection):
+            raise ValueError(
+                f'device {self._device.node_id} has {len(self._device.drives)} axes; '
+                f'{injection.fault.value} needs one'
+            )
+        if injection.fault in POWER_FAULTS:
+            self._cut_power(injection, now)
+            return
+        if isinstance(injection.fault, DriveFault):
+            for drive in self._axes(injection):
+                drive.inject(injection.fault, now, lasting=injection.lasting)
+            if not injection.lasting:
+                return
+        elif injection.fault is BusFault.WRONG_IDENTITY:
+            self._disguise(injection)
+        line = None
+        if injection.fault in AFFECTED:
+            line = LineFault(injection, self._device.node_id)
+        end = now + injection.duration if injection.duration else NEVER
+        self._active[injection.key] = ActiveFault(injection, end, line)
+        self._update_line()
+
+    def end(self, now: float, fault: Fault | None = None) -> None:
+        """End a fault, or all; a device without power is switched on.
+
+        Args:
+            now: Steady time in [s].
+            fault: Which; None for all.
+        """
+        self._line.now = now
+        for key, active in list(self._active.items()):
+            if fault in (None, active.injection.fault):
+                self._active.pop(key, None)
+                self._ended(active.injection, now)
+        self._update_line()
+
+    def advance(self, now: float) -> None:
+        """Let late frames arrive, and end the faults whose time is over."""
+        self._line.advance(now)
+        over = [key for key, active in self._active.items() if active.end <= now]
+        for key in over:
+            active = self._active.pop(key, None)
+            if active is not None:
+                self._ended(active.injection, now)
+        if over:
+            self._update_line()
+
+    def _ended(self, injection: FaultInjection, now: float) -> None:
+        if isinstance(injection.fault, DriveFault):
+            for drive in self._axes(injection):
+                drive.clear(injection.fault, now)
+        elif injection.fault is BusFault.WRONG_IDENTITY:
+            for address in IDENTITY_OBJECTS.values():
+                self._device.store.overlay.pop(address, None)
+        elif injection.fault in POWER_FAULTS:
+            self._device.switch_on(now, position_kept=injection.position_kept)
+
+    def _axes(self, injection: FaultInjection) -> tuple[Drive, ...]:
+        drives = self._device.drives
+        return drives[injection.axis - 1 : injection.axis] if injection.axis else drives
+
+    def _cut_power(self, injection: FaultInjection, now: float) -> None:
+        duration = injection.duration
+        if injection.fault is BusFault.REBOOT:
+            duration = max(duration, REBOOT_TIME_MIN)
+        for fault in POWER_FAULTS:  # off is off, however often it is asked for
+            self._active.pop(replace(injection, fault=fault).key, None)
+        self._device.switch_off(now)
+        end = now + duration if duration else NEVER
+        self._active[injection.key] = ActiveFault(injection, end)
+
+    def _disguise(self, injection: FaultInjection) -> None:
+        store = self._device.store
+        shown = {name: getattr(injection, name) for name in IDENTITY_OBJECTS}
+        if all(value is None for value in shown.values()):
+            shown['vendor'] = OTHER_VENDOR
+        for name, address in IDENTITY_OBJECTS.items():
+            value = shown[name]
+            if value is None or address not in store:
+                store.overlay.pop(address, None)
+            else:
+                store.overlay[address] = int(value).to_bytes(4, 'little')
+
+    def _forget_exhausted(self) -> None:
+        self._active = {
+            key: active
+            for key, active in self._active.items()
+            if active.line is None or not active.line.exhausted
+        }
+
+    def _update_line(self) -> None:
+        self._forget_exhausted()
+        self._line.faults = [a.line for a in self._active.values() if a.line is not None]
+        self._device.faults_changed()

@@ -1,0 +1,64 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""``ros2 run canopen_sim fake_slave``: one simulated device, made from an EDS."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+import sys
+
+from ament_index_python.packages import get_package_share_directory
+from rclpy.node import Node
+
+from arm_canopen.config import load_eds
+from arm_canopen.exceptions import CanopenError
+from arm_canopen.standard.cob_id import NODE_ID_MAX, NODE_ID_MIN
+from arm_canopen.standard.lss import UNCONFIGURED
+from node_runner import ParameterReader
+
+from ..host import DeviceHost
+from .slave_process import memories, Population, run_slaves
+
+DEFAULT_NODE_ID = 2
+
+
+def run_fake_slave(args: Sequence[str] | None = None) -> int:
+    """Simulate one device in this process; return the exit code."""
+    return run_slaves('fake_slave', _populate, default_bus='vcan0', args=args)
+
+
+def main() -> None:
+    """Entry point."""
+    sys.exit(run_fake_slave())
+
+
+def default_eds() -> Path:
+    """Return the EDS of the simulated drive, as installed with this package."""
+    return Path(get_package_share_directory('arm_canopen')) / 'eds' / 'cia402_drive.eds'
+
+
+def _populate(node: Node, host: DeviceHost) -> Population:
+    read = ParameterReader(node)
+    node_id = read.whole(
+        'node_id',
+        DEFAULT_NODE_ID,
+        (NODE_ID_MIN, UNCONFIGURED),
+        'CANopen node id of the device; 255: LSS has to give it one',
+    )
+    if not NODE_ID_MIN <= node_id <= NODE_ID_MAX and node_id != UNCONFIGURED:
+        raise CanopenError(
+            f'node_id {node_id} is not {NODE_ID_MIN} to {NODE_ID_MAX}; {UNCONFIGURED} makes a '
+            'device that LSS has to give an id'
+        )
+    path = read.text('slave_config', '', 'EDS of the device; empty for our own drive')
+    eds = load_eds(path or default_eds())
+    for warning in eds.warnings:
+        node.get_logger().warning(str(warning))
+    device = host.add(node_id, eds.dictionary, memory=memories(node)(node_id))
+    kind = 'drive' if device.drive is not None else 'device'
+    return Population(f'simulated {kind} {node_id} of {eds.path}', {'slave': node_id})
+
+
+if __name__ == '__main__':
+    main()

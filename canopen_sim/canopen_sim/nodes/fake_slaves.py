@@ -1,0 +1,49 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""``ros2 run canopen_sim fake_slaves``: simulated devices for all slaves of a bus.yml."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import sys
+
+from rclpy.node import Node
+
+from arm_canopen.config import load_bus
+from arm_canopen.exceptions import CanopenError
+from node_runner import ParameterReader
+
+from ..host import DeviceHost
+from .slave_process import memories, Population, run_slaves
+
+
+def run_fake_slaves(args: Sequence[str] | None = None) -> int:
+    """Simulate every device of a bus.yml in this process; return the exit code."""
+    return run_slaves('fake_slaves', _populate, default_bus='auto', args=args)
+
+
+def main() -> None:
+    """Entry point."""
+    sys.exit(run_fake_slaves())
+
+
+def _populate(node: Node, host: DeviceHost) -> Population:
+    path = ParameterReader(node).text('bus_config', '', 'bus.yml whose devices are simulated')
+    if not path:
+        raise CanopenError(
+            'no bus_config: give the path of a bus.yml with --ros-args -p bus_config:=FILE'
+        )
+    bus = load_bus(path)
+    for warning in bus.warnings:
+        node.get_logger().warning(str(warning))
+    memory = memories(node)
+    for config in bus.nodes:
+        host.add(config.node_id, config.dictionary, memory=memory(config.node_id))
+    drives = sum(device.drive is not None for device in host.devices)
+    others = len(host.devices) - drives
+    what = f'{drives} simulated drives' + (f' and {others} other devices' if others else '')
+    return Population(what, {config.name: config.node_id for config in bus.nodes})
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,124 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What the nodes of simulated slaves have in common: their parameters, bus and life."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+import threading
+
+from rclpy.node import Node
+
+from arm_canopen.can import open_bus
+from arm_canopen.exceptions import CanopenError
+from node_runner import (
+    declare_thread_priority,
+    log_as,
+    ParameterReader,
+    raise_thread_priority,
+    refuse_misspelt,
+    run_program,
+    settle_process_memory,
+    spin,
+)
+
+from ..faults.scenario import ScenarioPlayer
+from ..faults.scenario_file import load_scenario
+from ..host import DeviceHost
+from ..objects.parameter_memory import ParameterFile, ParameterMemory
+from ..runner import DeviceRunner
+from .fault_services import FaultServices
+
+CAN_INTERFACES = (
+    'can0, vcan0, udp_multicast:239.x.y.z[:port], auto, or INTERFACE:CHANNEL[@BITRATE]'
+)
+
+THREAD_PRIORITY = 30  # SCHED_FIFO: devices answer SYNC in time, and leave the master the way
+STORE_DIRECTORY = 'folder of what the devices store (0x1010, LSS); empty: until they end'
+SCENARIO = 'YAML file with faults and their times; empty for none'
+
+
+@dataclass(frozen=True, slots=True)
+class Population:
+    """The devices of a process.
+
+    Attributes:
+        what: What they are, for the log.
+        names: Their node ids by name.
+    """
+
+    what: str
+    names: Mapping[str, int]
+
+
+Populate = Callable[[Node, DeviceHost], Population]
+
+
+def memories(node: Node) -> Callable[[int], ParameterMemory]:
+    """Declare ``store_directory``; return what gives each device its memory, by node id."""
+    folder = ParameterReader(node).text('store_directory', '', STORE_DIRECTORY)
+
+    def memory(node_id: int) -> ParameterMemory:
+        return (
+            ParameterFile(Path(folder) / f'node_{node_id}.json') if folder else ParameterMemory()
+        )
+
+    return memory
+
+
+def run_slaves(
+    name: str, populate: Populate, *, default_bus: str, args: Sequence[str] | None = None
+) -> int:
+    """Run simulated slaves until Ctrl-C or SIGTERM.
+
+    Args:
+        name: Name of the node.
+        populate: Reads the node's parameters, adds the devices and returns what they are.
+        default_bus: Default of ``can_interface_name``.
+        args: Command line; None for the process's own.
+
+    Returns:
+        Exit code: 0, or 1 when the devices could not be described or the bus not be opened.
+    """
+
+    def body(stop: threading.Event) -> None:
+        node = Node(name)
+        log_as(node)
+        try:
+            _run(node, populate, default_bus, stop)
+        finally:
+            node.destroy_node()
+
+    return run_program(name, body, CanopenError, args=args)
+
+
+def _run(node: Node, populate: Populate, default_bus: str, stop: threading.Event) -> None:
+    interface = ParameterReader(node).text('can_interface_name', default_bus, CAN_INTERFACES)
+    with open_bus(interface) as bus:
+        runner = DeviceRunner(bus)
+        population = populate(node, runner.host)
+        _play_scenario(node, runner.host, population)
+        priority = declare_thread_priority(ParameterReader(node), THREAD_PRIORITY)
+        refuse_misspelt(node)
+        FaultServices(node, runner, population.names)
+        settle_process_memory(node)
+        runner.start(
+            lambda: raise_thread_priority(node, priority, 'the loop of the simulated devices')
+        )
+        try:
+            node.get_logger().info(f'{population.what} on {bus.name}')
+            spin([node], stop)
+        finally:
+            runner.stop()
+
+
+def _play_scenario(node: Node, host: DeviceHost, population: Population) -> None:
+    path = ParameterReader(node).text('scenario', '', SCENARIO)
+    if not path:
+        return
+    drives = frozenset(device.node_id for device in host.devices if device.drive is not None)
+    steps = load_scenario(path, population.names, drives)
+    host.observers.append(ScenarioPlayer(host, steps, node.get_logger().info))
+    node.get_logger().info(f'{len(steps)} steps of {path} will be played')

@@ -1,0 +1,276 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The object dictionary at run time: present values, and the rules of reading and writing them.
+
+Inside the device an object is bound once, as a :class:`Variable`, and then read and written
+through its ``value``; only SDOs look it up by index. What an SDO may do is checked here, with
+the abort codes of CiA 301, table 22.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+from arm_canopen.exceptions import CodecError, SdoAbortError
+from arm_canopen.standard.datatypes import (
+    byte_length,
+    DataType,
+    decode,
+    encode,
+    integer_range,
+    REAL_FORMATS,
+    Value,
+)
+from arm_canopen.standard.dictionary import ObjectDictionary, ObjectEntry
+from arm_canopen.standard.pdo import Number
+from arm_canopen.standard.sdo_abort import abort_text, AbortCode
+
+STRING_BYTES_MAX = 65_536  # [byte] longest string or domain that a client may write
+
+
+def refusal(code: AbortCode, place: object) -> SdoAbortError:
+    """Return the exception that ends an SDO transfer with an abort code.
+
+    Args:
+        code: Why it ends.
+        place: The object, for the message.
+    """
+    return SdoAbortError(f'{place}: {abort_text(code)}', code)
+
+
+class Variable:
+    """The present value of one sub-index.
+
+    Attributes:
+        entry: What the dictionary says of it.
+        value: What it holds.
+        check: Called with a value that an SDO wants to write; raises SdoAbortError to refuse.
+        before_read: Called before an SDO reads it; raises SdoAbortError to refuse.
+        listener: Told the steady time in [s] after an SDO or an RPDO wrote it.
+    """
+
+    __slots__ = ('before_read', 'check', 'entry', 'listener', 'value')
+
+    def __init__(self, entry: ObjectEntry) -> None:
+        """Begin with the default."""
+        self.entry = entry
+        self.value: Value = default_value(entry)
+        self.check: Callable[[Value], None] | None = None
+        self.before_read: Callable[[], None] | None = None
+        self.listener: Callable[[float], None] | None = None
+
+    @property
+    def size(self) -> int | None:
+        """Length in an SDO in [byte], None for strings and domains."""
+        return byte_length(self.entry.data_type)
+
+    def restore(self) -> None:
+        """Take the default again, without telling the listener."""
+        self.value = default_value(self.entry)
+
+    def decoded(self, data: bytes) -> Value:
+        """Return the value of bytes, within the limits of the object.
+
+        Raises:
+            SdoAbortError: The length or the range refuses it.
+        """
+        self.check_length(len(data))
+        try:
+            value = decode(self.entry.data_type, data)
+        except CodecError as error:
+            raise refusal(AbortCode.LENGTH, self.entry) from error
+        self._check_limits(value)
+        return value
+
+    def accept(self, data: bytes) -> Value:
+        """Return the value of bytes that an SDO wants to write.
+
+        Raises:
+            SdoAbortError: The length, the range or the object's own check refuses it.
+        """
+        value = self.decoded(data)
+        if self.check is not None:
+            self.check(value)
+        return value
+
+    def check_length(self, size: int) -> None:
+        """Refuse a transfer of so many [byte] when the type is shorter or longer.
+
+        Raises:
+            SdoAbortError: It is.
+        """
+        expected = self.size
+        if expected is None and size > STRING_BYTES_MAX:
+            raise refusal(AbortCode.OUT_OF_MEMORY, self.entry)
+        if expected is not None and size > expected:
+            raise refusal(AbortCode.LENGTH_HIGH, self.entry)
+        if expected is not None and size < expected:
+            raise refusal(AbortCode.LENGTH_LOW, self.entry)
+
+    def _check_limits(self, value: Value) -> None:
+        if not isinstance(value, (int, float)):
+            return
+        low, high = self.entry.low_limit, self.entry.high_limit
+        if high is not None and value > high:
+            raise refusal(AbortCode.VALUE_HIGH, self.entry)
+        if low is not None and value < low:
+            raise refusal(AbortCode.VALUE_LOW, self.entry)
+
+
+class Scalar(Variable):
+    """A number, the only kind of object that travels in a PDO."""
+
+    __slots__ = ()
+    value: Number
+
+
+class Integer(Scalar):
+    """A whole number.
+
+    Attributes:
+        low: Smallest value of its type.
+        high: Largest value of its type.
+    """
+
+    __slots__ = ('high', 'low')
+    value: int
+
+    def __init__(self, entry: ObjectEntry) -> None:
+        """Begin with the default."""
+        super().__init__(entry)
+        self.low, self.high = integer_range(entry.data_type) or (0, 0)
+
+    def put(self, value: float) -> None:
+        """Store a number, rounded and held within its type."""
+        self.value = min(max(round(value), self.low), self.high)
+
+
+def default_value(entry: ObjectEntry) -> Value:
+    """Return the value after a reset: the dictionary's default, else zero or nothing."""
+    if entry.default is not None:
+        return entry.default
+    if integer_range(entry.data_type) is not None:
+        return 0
+    if entry.data_type in REAL_FORMATS:
+        return 0.0
+    if entry.data_type in (DataType.VISIBLE_STRING, DataType.UNICODE_STRING):
+        return ''
+    return bytes(byte_length(entry.data_type) or 0)
+
+
+def make_variable(entry: ObjectEntry) -> Variable:
+    """Return a variable of the kind that the entry's type asks for."""
+    if integer_range(entry.data_type) is not None:
+        return Integer(entry)
+    return Scalar(entry) if entry.data_type in REAL_FORMATS else Variable(entry)
+
+
+class ObjectStore:
+    """All variables of a device.
+
+    Attributes:
+        dictionary: What it was made from.
+        overlay: What clients read of some objects instead of their values.
+        saved: What some objects hold after a reset instead of their defaults.
+    """
+
+    def __init__(self, dictionary: ObjectDictionary) -> None:
+        """Give every object its default."""
+        self.dictionary = dictionary
+        self.overlay: dict[tuple[int, int], bytes] = {}
+        self.saved: dict[tuple[int, int], Value] = {}
+        self._variables = {entry.address: make_variable(entry) for entry in dictionary}
+
+    def __iter__(self) -> Iterator[Variable]:
+        """Iterate in ascending order of index and sub-index."""
+        return iter(self._variables.values())
+
+    def __contains__(self, address: tuple[int, int]) -> bool:
+        """Tell whether the device has this sub-index."""
+        return address in self._variables
+
+    def find(self, index: int, subindex: int = 0) -> Variable:
+        """Return a variable that a client names.
+
+        Raises:
+            SdoAbortError: There is no such object or sub-index.
+        """
+        variable = self._variables.get((index, subindex))
+        if variable is not None:
+            return variable
+        known = self.dictionary.has_index(index)
+        code = AbortCode.NO_SUBINDEX if known else AbortCode.NO_OBJECT
+        raise refusal(code, f'0x{index:04X}:{subindex:02X}')
+
+    def integer(self, index: int, subindex: int = 0, *, default: int = 0) -> Integer:
+        """Bind an integer object, for the device's own use.
+
+        A device whose dictionary lacks it gets one that nobody outside can see.
+
+        Args:
+            index: Object index.
+            subindex: Sub-index.
+            default: Its value when the dictionary lacks it.
+        """
+        variable = self._variables.get((index, subindex))
+        if isinstance(variable, Integer):
+            return variable
+        return Integer(
+            ObjectEntry(index, subindex, 'internal', DataType.INTEGER64, default=default)
+        )
+
+    def restore(self, first: int, last: int) -> None:
+        """Give the objects from one index to another (included) their saved or default values."""
+        for address, variable in self._variables.items():
+            if first <= address[0] <= last:
+                variable.restore()
+                if address in self.saved:
+                    variable.value = self.saved[address]
+
+    def renumber(self, dictionary: ObjectDictionary) -> None:
+        """Take the defaults that the same objects have for another node id."""
+        self.dictionary = dictionary
+        for entry in dictionary:
+            self._variables[entry.address].entry = entry
+
+    def read(self, index: int, subindex: int = 0) -> bytes:
+        """Return what an SDO upload yields.
+
+        Raises:
+            SdoAbortError: No such object, write-only, or no data at present.
+        """
+        variable = self.find(index, subindex)
+        if not variable.entry.access.readable:
+            raise refusal(AbortCode.WRITE_ONLY, variable.entry)
+        if variable.before_read is not None:
+            variable.before_read()
+        shown = self.overlay.get((index, subindex))
+        return shown if shown is not None else encode(variable.entry.data_type, variable.value)
+
+    def writable(self, index: int, subindex: int = 0) -> Variable:
+        """Return a variable that an SDO may write.
+
+        Raises:
+            SdoAbortError: No such object, or it is read-only.
+        """
+        variable = self.find(index, subindex)
+        if not variable.entry.access.writable:
+            raise refusal(AbortCode.READ_ONLY, variable.entry)
+        return variable
+
+    def write(self, index: int, subindex: int, data: bytes, now: float) -> None:
+        """Do what an SDO download asks.
+
+        Args:
+            index: Object index.
+            subindex: Sub-index.
+            data: The bytes of the value.
+            now: Steady time in [s].
+
+        Raises:
+            SdoAbortError: The object, its length, range or own rules refuse it.
+        """
+        variable = self.writable(index, subindex)
+        variable.value = variable.accept(data)
+        if variable.listener is not None:
+            variable.listener(now)

@@ -1,0 +1,128 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Store and restore parameters (CiA 301, 7.5.2.13 and 7.5.2.14)."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from arm_canopen.exceptions import SdoAbortError
+from arm_canopen.standard.datatypes import encode, Value
+from arm_canopen.standard.objects import Index
+from arm_canopen.standard.sdo_abort import AbortCode
+
+from .object_store import Integer, ObjectStore, refusal, Variable
+from .parameter_memory import ParameterMemory
+
+SAVE = int.from_bytes(b'save', 'little')
+LOAD = int.from_bytes(b'load', 'little')
+
+GROUPS: dict[int, tuple[int, int]] = {
+    1: (0x1000, 0xFFFF),  # all
+    2: (0x1000, 0x1FFF),  # communication
+    3: (0x6000, 0x9FFF),  # application
+}
+"""First and last index of what a sub-index stores; those above 3 are the manufacturer's."""
+MANUFACTURER = (0x2000, 0x5FFF)
+
+AXIS_SPACING = 0x800  # between the same objects of two axes (CiA 402-1)
+PROCESS_DATA = frozenset(
+    {0x6040, 0x6042, 0x6060, 0x6071, 0x607A, 0x60B0, 0x60B1, 0x60B2, 0x60C1, 0x60FF}
+)
+"""What commands the drive is no parameter: nothing may move because it was stored."""
+NEVER_STORED = frozenset(
+    {
+        Index.PREDEFINED_ERROR_FIELD,
+        Index.STORE_PARAMETERS,
+        Index.RESTORE_PARAMETERS,
+    }
+)
+
+
+class ParameterStorage:
+    """Saves the writable objects of a device, and loads them when it starts."""
+
+    def __init__(self, store: ObjectStore, memory: ParameterMemory) -> None:
+        """Bind 0x1010 and 0x1011, and load what was saved.
+
+        Args:
+            store: Objects of the device.
+            memory: What lasts without power.
+        """
+        self._store = store
+        self._memory = memory
+        for index, signature, act in (
+            (Index.STORE_PARAMETERS, SAVE, self._save),
+            (Index.RESTORE_PARAMETERS, LOAD, self._forget),
+        ):
+            for entry in store.dictionary.subindices(index):
+                if entry.subindex:
+                    variable = store.integer(index, entry.subindex)
+                    variable.check = partial(_check, variable, signature)
+                    variable.listener = partial(self._obey, variable, act)
+
+    def load(self) -> None:
+        """Let the saved values take effect at the next restoring of the store."""
+        saved: dict[tuple[int, int], Value] = {}
+        for address, data in self._memory.values.items():
+            if address not in self._store:
+                continue  # the dictionary is another one than when it was saved
+            variable = self._store.find(*address)
+            if _is_parameter(variable):
+                try:
+                    saved[address] = variable.decoded(data)
+                except SdoAbortError:
+                    continue
+        self._store.saved = saved
+
+    def _obey(self, variable: Integer, act: object, _now: float) -> None:
+        variable.restore()  # reading tells the abilities, not the signature
+        first, last = GROUPS.get(variable.entry.subindex, MANUFACTURER)
+        if callable(act):
+            act(first, last)
+        self._memory.commit()
+        self.load()
+
+    def _save(self, first: int, last: int) -> None:
+        values = self._memory.values
+        before = dict(values)
+        for variable in self._store:
+            entry = variable.entry
+            if first <= entry.index <= last and _is_parameter(variable):
+                values[entry.address] = encode(entry.data_type, variable.value)
+        self._verify(before)
+
+    def _verify(self, before: dict[tuple[int, int], bytes]) -> None:
+        """Erase the signature 0x1020 if something else was saved than what it stands for."""
+        signature = [(int(Index.VERIFY_CONFIGURATION), sub) for sub in (1, 2)]
+        after = self._memory.values
+        changed = {key for key in after if before.get(key) != after[key]}
+        if changed and before and not changed & set(signature):
+            for address in signature:
+                if address in after:
+                    after[address] = bytes(len(after[address]))
+                    self._store.integer(*address).value = 0
+
+    def _forget(self, first: int, last: int) -> None:
+        values = self._memory.values
+        for address in [address for address in values if first <= address[0] <= last]:
+            del values[address]
+        for sub in (1, 2):
+            values.pop((Index.VERIFY_CONFIGURATION, sub), None)
+
+
+def _is_parameter(variable: Variable) -> bool:
+    entry = variable.entry
+    index = entry.index
+    if index >= 0x6000:
+        index = 0x6000 + (index - 0x6000) % AXIS_SPACING
+    return (
+        entry.access.writable
+        and entry.access.readable
+        and index not in NEVER_STORED | PROCESS_DATA
+    )
+
+
+def _check(variable: Integer, signature: int, value: Value) -> None:
+    if value != signature:  # so that nothing is stored by mistake
+        raise refusal(AbortCode.DATA_TRANSFER, variable.entry)

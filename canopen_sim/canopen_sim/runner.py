@@ -1,0 +1,170 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The thread that runs simulated devices on a real bus."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future
+import logging
+import math
+from queue import SimpleQueue
+import threading
+import time
+from typing import Any, TypeVar
+
+from arm_canopen.can.bus import Bus
+from arm_canopen.can.frame import Frame
+from arm_canopen.exceptions import BusError
+from arm_canopen.standard.cob_id import CobId, NODE_ID_MAX
+
+from .device import Device
+from .host import DeviceHost
+
+Result = TypeVar('Result')
+
+IDLE_WAIT = 1.0  # [s] longest wait when no device has a deadline
+RETRY_PAUSE = 0.1  # [s] between two looks at a bus that went away
+STALL = 0.1  # [s] that a frame has waited when devices count as having stood still
+
+logger = logging.getLogger(__name__)
+
+
+class DeviceRunner:
+    """Waits for frames and deadlines, and gives them to the devices of a host.
+
+    A bus that goes away (interface down) is waited for; the devices go on meanwhile, as real
+    ones do. A defect in one device is logged, and the others go on.
+
+    Attributes:
+        host: The devices; add them before :meth:`start`, and leave them to the thread then:
+            :meth:`call` gets at them.
+    """
+
+    def __init__(self, bus: Bus) -> None:
+        """Prepare; the thread starts with :meth:`start`.
+
+        Args:
+            bus: An open bus; it stays the caller's to close.
+        """
+        self.host = DeviceHost(self._send, _tell_defect)
+        self._bus = bus
+        self._lock = threading.Lock()
+        self._ended = False
+        self._calls: SimpleQueue[tuple[Callable[[], None], Future[Any]]] = SimpleQueue()
+        self._stopping = False
+        self._bus_failed = False
+        self._begin: Callable[[], None] = lambda: None
+        self._thread = threading.Thread(target=self.run, name='devices', daemon=True)
+
+    def start(self, begin: Callable[[], None] = lambda: None) -> None:
+        """Switch the devices on, in a thread of their own.
+
+        Args:
+            begin: Called first in the thread, which may want a priority.
+        """
+        self._begin = begin
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Fall silent, as if the power of all devices was cut, and end the thread."""
+        self._stopping = True
+        self._bus.wake()
+        if self._thread.is_alive():
+            self._thread.join()
+
+    def call(self, function: Callable[[], Result]) -> Future[Result]:
+        """Have a function run in the thread of the devices, between two of their steps.
+
+        Args:
+            function: May use :attr:`host` and its devices; it must not wait for anything.
+
+        Returns:
+            Its result or its exception; cancelled when the thread has ended or ends before.
+        """
+        future: Future[Result] = Future()
+
+        def work() -> None:
+            if not future.set_running_or_notify_cancel():
+                return
+            try:
+                future.set_result(function())
+            except Exception as error:  # noqa: BLE001  # it belongs to the caller
+                future.set_exception(error)
+
+        with self._lock:
+            if self._ended:
+                future.cancel()
+                return future
+            self._calls.put((work, future))
+        self._bus.wake()
+        return future
+
+    def run(self) -> None:
+        """Run the devices in this thread, until :meth:`stop` is called from another one."""
+        try:
+            self._begin()
+            while not self._stopping:
+                self._step()
+        finally:
+            with self._lock:
+                self._ended = True
+            while not self._calls.empty():
+                self._calls.get()[1].cancel()
+
+    def _step(self) -> None:
+        host = self.host
+        host.advance(time.monotonic())
+        while not self._calls.empty():
+            self._calls.get()[0]()
+        wait = min(host.deadline - time.monotonic(), IDLE_WAIT)
+        for frame in self._receive(max(0.0, wait)):
+            host.receive(frame, frame.timestamp or time.monotonic())
+
+    def _receive(self, timeout: float) -> list[Frame]:
+        try:
+            frames = self._bus.receive(timeout)
+        except BusError as error:
+            if not self._stopping:
+                self._tell_failure(error)
+                time.sleep(RETRY_PAUSE)
+            return []
+        self._bus_failed = self._bus_failed and not frames
+        if frames and time.monotonic() - (frames[0].timestamp or math.inf) > STALL:
+            return newest_process_data(frames)
+        return frames
+
+    def _send(self, frame: Frame) -> None:
+        try:
+            self._bus.send(frame)
+        except BusError as error:
+            self._tell_failure(error)
+
+    def _tell_failure(self, error: BusError) -> None:
+        """Log the first failure; the next one after frames have arrived again."""
+        if not self._bus_failed:
+            self._bus_failed = True
+            logger.error('%s', error)
+
+
+def newest_process_data(frames: Sequence[Frame]) -> list[Frame]:
+    """Return what the mailboxes of a CAN controller hold of frames that nobody took in time.
+
+    A device that stood still sees the newest set-point, and does not follow all those of the past.
+    Of SDO, NMT and LSS, whose clients wait for their answers, all is kept.
+    """
+    newest = {frame.can_id: frame for frame in frames}
+    return [
+        frame
+        for frame in frames
+        if not _is_process_data(frame.can_id) or newest[frame.can_id] is frame
+    ]
+
+
+def _is_process_data(can_id: int) -> bool:
+    heartbeat = 0 < can_id - CobId.HEARTBEAT <= NODE_ID_MAX
+    return CobId.SYNC <= can_id < CobId.SDO_RESPONSE or heartbeat
+
+
+def _tell_defect(device: Device, error: Exception) -> None:
+    logger.error('a defect in the simulated device %d', device.node_id, exc_info=error)

@@ -1,0 +1,170 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Errors of a device: register 0x1001, history 0x1003 and EMCY messages (CiA 301, 7.2.7)."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+
+from arm_canopen.can.frame import Frame
+from arm_canopen.standard.cob_id import CAN_ID_MASK, COB_ID_INVALID
+from arm_canopen.standard.datatypes import Value
+from arm_canopen.standard.emcy import Emergency
+from arm_canopen.standard.objects import Index
+from arm_canopen.standard.sdo_abort import AbortCode
+
+from ..objects.cob_id_rules import check_cob_id
+from ..objects.object_store import Integer, ObjectStore, refusal
+from ..timed import NEVER
+
+GENERIC_ERROR = 0x01
+REGISTER_BITS: tuple[tuple[int, int, int], ...] = (
+    (0x2000, 0x2FFF, 1 << 1),  # current
+    (0x3000, 0x3FFF, 1 << 2),  # voltage
+    (0x4000, 0x4FFF, 1 << 3),  # temperature
+    (0x8100, 0x82FF, 1 << 4),  # communication
+    (0x8300, 0x8FFF, 1 << 5),  # device profile specific
+    (0xFF00, 0xFFFF, 1 << 7),  # manufacturer specific
+)
+"""First code, last code and bit of the error register (CiA 301, tables 26 and 48)."""
+
+INHIBIT_UNIT = 0.0001  # [s] 0x1015 counts 100 us
+PENDING_MAX = 16  # messages kept while none may be sent
+
+
+def register_bits(code: int) -> int:
+    """Return the bits of the error register 0x1001 that belong to an error code."""
+    for first, last, bit in REGISTER_BITS:
+        if first <= code <= last:
+            return GENERIC_ERROR | bit
+    return GENERIC_ERROR
+
+
+class EmcyProducer:
+    """Keeps the active errors of a device and tells the network about them.
+
+    Attributes:
+        deadline: Steady time in [s] at which a message that is held back may be sent.
+    """
+
+    def __init__(self, store: ObjectStore, send: Callable[[Frame], None]) -> None:
+        """Bind 0x1001, 0x1003, 0x1014 and 0x1015."""
+        self.deadline = NEVER
+        self._send = send
+        self._register = store.integer(Index.ERROR_REGISTER)
+        self._cob_id = store.integer(Index.EMCY_COB_ID, default=COB_ID_INVALID)
+        self._cob_id.check = lambda value: check_cob_id(self._cob_id, value)
+        self._inhibit = store.integer(Index.EMCY_INHIBIT_TIME)  # [100 us]
+        self._active: set[int] = set()
+        self._pending: deque[Emergency] = deque(maxlen=PENDING_MAX)
+        self._allowed = False
+        self._next_time = 0.0
+        self._count = store.integer(Index.PREDEFINED_ERROR_FIELD)
+        self._count.check = self._check_count
+        self._count.listener = self._clear_history
+        self._history = [
+            store.integer(Index.PREDEFINED_ERROR_FIELD, entry.subindex)
+            for entry in store.dictionary.subindices(Index.PREDEFINED_ERROR_FIELD)
+            if entry.subindex > 0
+        ]
+        for number, variable in enumerate(self._history, start=1):
+            variable.before_read = _presence_check(self._count, number, variable)
+
+    @property
+    def active(self) -> frozenset[int]:
+        """Codes of the errors that are there."""
+        return frozenset(self._active)
+
+    def reset(self) -> None:
+        """Forget every error, as after switching on."""
+        self._active.clear()
+        self._pending.clear()
+        self._register.value = 0
+        self._next_time = 0.0
+        self.deadline = NEVER
+
+    def allow(self, allowed: bool, now: float) -> None:
+        """Let messages out, or hold them back (NMT Stopped)."""
+        self._allowed = allowed
+        self._flush(now)
+
+    def report(self, code: int, now: float, vendor: bytes = bytes(5)) -> None:
+        """Say that an error occurred; an error that is there already is not repeated.
+
+        Args:
+            code: Error code of CiA 301 or CiA 402.
+            now: Steady time in [s].
+            vendor: Five manufacturer-specific bytes.
+        """
+        if code in self._active:
+            return
+        self._active.add(code)
+        self._update_register()
+        self._record(code)
+        self._queue(Emergency(code, self._register.value, vendor), now)
+
+    def tell(self, code: int, present: bool, now: float) -> None:
+        """Report an error that is present at a time in [s], or clear one that is not."""
+        if present:
+            self.report(code, now)
+        else:
+            self.clear(code, now)
+
+    def clear(self, code: int, now: float) -> None:
+        """Say that an error is gone; the message tells in its register what remains."""
+        if code not in self._active:
+            return
+        self._active.discard(code)
+        self._update_register()
+        self._queue(Emergency(0, self._register.value), now)
+
+    def advance(self, now: float) -> None:
+        """Send what the inhibit time held back."""
+        if now >= self.deadline:
+            self._flush(now)
+
+    def _update_register(self) -> None:
+        value = 0
+        for code in self._active:
+            value |= register_bits(code)
+        self._register.value = value
+
+    def _record(self, code: int) -> None:
+        # the newest error stands in sub-index 1 (CiA 301, 7.5.2.4)
+        for older, newer in zip(self._history[:0:-1], self._history[-2::-1], strict=True):
+            older.value = newer.value
+        if self._history:
+            self._history[0].value = code
+            self._count.value = min(self._count.value + 1, len(self._history))
+
+    def _queue(self, emergency: Emergency, now: float) -> None:
+        self._pending.append(emergency)
+        self._flush(now)
+
+    def _flush(self, now: float) -> None:
+        self.deadline = NEVER
+        while self._pending and self._allowed:
+            if now < self._next_time:
+                self.deadline = self._next_time
+                return
+            emergency = self._pending.popleft()
+            if not self._cob_id.value & COB_ID_INVALID:
+                self._send(Frame(self._cob_id.value & CAN_ID_MASK, emergency.encode()))
+                self._next_time = now + self._inhibit.value * INHIBIT_UNIT
+
+    def _check_count(self, value: Value) -> None:
+        if value != 0:  # writing 0 erases the history, nothing else may be written
+            raise refusal(AbortCode.VALUE_RANGE, self._count.entry)
+
+    def _clear_history(self, _now: float) -> None:
+        for variable in self._history:
+            variable.value = 0
+
+
+def _presence_check(count: Integer, number: int, variable: Integer) -> Callable[[], None]:
+    def check() -> None:
+        if number > count.value:
+            raise refusal(AbortCode.NO_DATA, variable.entry)
+
+    return check

@@ -1,0 +1,112 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""NMT state machine of a device (CiA 301, 7.3.2)."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from arm_canopen.can.frame import Frame
+from arm_canopen.standard.cob_id import CobId, NODE_ID_MAX
+from arm_canopen.standard.nmt import ALL_NODES, NmtCommand, NmtState
+
+from ..timed import NEVER
+
+NMT_TARGETS: dict[NmtCommand, NmtState] = {
+    NmtCommand.START: NmtState.OPERATIONAL,
+    NmtCommand.STOP: NmtState.STOPPED,
+    NmtCommand.ENTER_PRE_OPERATIONAL: NmtState.PRE_OPERATIONAL,
+}
+"""Where a command leads from every state but Initialisation (CiA 301, figure 48)."""
+
+RESETS = frozenset({NmtCommand.RESET_NODE, NmtCommand.RESET_COMMUNICATION})
+NMT_BYTES = 2  # [byte]
+
+
+class NmtObserver(Protocol):
+    """What the rest of the device does when the NMT state changes."""
+
+    def reset(self, command: NmtCommand, now: float) -> None:
+        """Return to the defaults of the whole device or of its communication."""
+
+    def nmt_changed(self, previous: NmtState, now: float) -> None:
+        """Another state was entered, boot-up done included."""
+
+
+class NmtSlave:
+    """NMT state of one device; it obeys commands to its id and to all.
+
+    Attributes:
+        node_id: Id of the device, 255 while it has none and stays in Initialisation.
+        state: BOOT_UP stands for Initialisation.
+        deadline: When Initialisation ends, as steady time in [s].
+    """
+
+    def __init__(self, node_id: int, observer: NmtObserver, boot_time: float) -> None:
+        """Begin switched off; the first :meth:`advance` starts Initialisation.
+
+        Args:
+            node_id: Id of the device.
+            observer: Told about resets and new states.
+            boot_time: How long Initialisation takes in [s].
+        """
+        self.state = NmtState.BOOT_UP
+        self.deadline = 0.0
+        self.node_id = node_id
+        self._observer = observer
+        self._boot_time = boot_time
+        self._powered = False
+
+    def receive(self, frame: Frame, now: float) -> None:
+        """Obey a command; anything that is none is ignored."""
+        if len(frame.data) != NMT_BYTES or frame.data[1] not in (ALL_NODES, self.node_id):
+            return
+        try:
+            command = NmtCommand(frame.data[0])
+        except ValueError:
+            return
+        if command in RESETS:
+            self._initialise(command, now)
+        elif self.state is not NmtState.BOOT_UP:
+            self.enter(NMT_TARGETS[command], now)
+
+    def enter(self, state: NmtState, now: float) -> None:
+        """Go to a state; nothing happens when it is the present one."""
+        if state is self.state:
+            return
+        previous, self.state = self.state, state
+        self._observer.nmt_changed(previous, now)
+
+    def advance(self, now: float) -> None:
+        """Begin Initialisation after power-on; end it when its time is over."""
+        if not self._powered:
+            self._powered = True
+            self._initialise(NmtCommand.RESET_NODE, now)
+        if now >= self.deadline:
+            self.deadline = NEVER
+            self.enter(NmtState.PRE_OPERATIONAL, now)
+
+    def switch_off(self) -> None:
+        """Lose the power; the next :meth:`advance` starts Initialisation again."""
+        self.state = NmtState.BOOT_UP
+        self.deadline = 0.0
+        self._powered = False
+
+    def initialise(self, now: float) -> None:
+        """Reset the communication from within."""
+        self._initialise(NmtCommand.RESET_COMMUNICATION, now)
+
+    def _initialise(self, command: NmtCommand, now: float) -> None:
+        self.state = NmtState.BOOT_UP
+        self._observer.reset(command, now)
+        if self.node_id > NODE_ID_MAX:  # LSS has to give it one first
+            self.deadline = NEVER
+            return
+        self.deadline = now + self._boot_time
+        if self._boot_time <= 0.0:
+            self.advance(now)
+
+
+def boot_up_frame(node_id: int) -> Frame:
+    """Return the frame by which a device says that Initialisation is over."""
+    return Frame(CobId.HEARTBEAT + node_id, bytes((NmtState.BOOT_UP,)))

@@ -1,0 +1,186 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What RPDOs and TPDOs have in common: their parameter objects, and the rules of writing them.
+
+A PDO is changed while it does not exist (CiA 301, 7.5.2.36): set bit 31 of its COB-ID, set the
+number of mapped objects to 0, write the mapping, then the number, then the COB-ID.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from functools import partial
+
+from arm_canopen.exceptions import CodecError, SdoAbortError
+from arm_canopen.standard.cob_id import CAN_ID_MASK, COB_ID_INVALID, RTR_FORBIDDEN
+from arm_canopen.standard.datatypes import bit_length, Value
+from arm_canopen.standard.dictionary import ObjectEntry
+from arm_canopen.standard.objects import PDO_BITS_MAX
+from arm_canopen.standard.pdo import MappedObject, PdoCodec, SYNCHRONOUS_MAX
+from arm_canopen.standard.sdo_abort import AbortCode
+
+from ..objects.cob_id_rules import check_cob_id
+from ..objects.object_store import ObjectStore, refusal, Scalar, Variable
+
+TRANSMISSION_EVENT = (254, 255)
+INHIBIT_UNIT = 0.0001  # [s]
+MILLISECOND = 0.001  # [s]
+
+
+class PdoChannel(ABC):
+    """One PDO: its communication record and its mapping.
+
+    Attributes:
+        enabled: It exists (bit 31 of the COB-ID is clear) and its mapping can be used.
+        can_id: Its identifier.
+        transmission: Transmission type (CiA 301, tables 69 and 71).
+        event_time: Event timer of a TPDO, deadline of an RPDO in [s]; 0 for none.
+        codec: Packs and unpacks its payload.
+        variables: The mapped objects.
+    """
+
+    transmission_types: frozenset[int]
+
+    def __init__(
+        self,
+        store: ObjectStore,
+        communication: int,
+        mapping: int,
+        changed: Callable[[PdoChannel, float], None],
+    ) -> None:
+        """Bind the parameter objects of one PDO.
+
+        Args:
+            store: Objects of the device.
+            communication: Index of its communication record.
+            mapping: Index of its mapping record.
+            changed: Told the PDO and the time when a client changed it.
+        """
+        self._store = store
+        self._cob_id = store.integer(communication, 1, default=COB_ID_INVALID)
+        self._type = store.integer(communication, 2)
+        self._inhibit = store.integer(communication, 3)  # [100 us]
+        self._event = store.integer(communication, 5)  # [ms]
+        self._sync_start = store.integer(communication, 6)
+        self._count = store.integer(mapping)
+        self._entries = [
+            store.integer(mapping, entry.subindex)
+            for entry in store.dictionary.subindices(mapping)
+            if entry.subindex > 0
+        ]
+        self._install(changed)
+        self.configure()
+
+    def _install(self, changed: Callable[[PdoChannel, float], None]) -> None:
+        def reconfigure(now: float) -> None:
+            self.configure()
+            changed(self, now)
+
+        self._cob_id.check = partial(check_cob_id, self._cob_id)
+        self._type.check = self._check_type
+        self._inhibit.check = self._sync_start.check = self._check_disabled
+        self._count.check = self._check_count
+        for variable in self._entries:
+            variable.check = self._check_entry
+        for variable in (self._cob_id, self._type, self._inhibit, self._event, self._sync_start):
+            variable.listener = reconfigure
+
+    @property
+    def is_synchronous(self) -> bool:
+        """It goes with SYNC."""
+        return self.transmission <= SYNCHRONOUS_MAX
+
+    @property
+    def is_event_driven(self) -> bool:
+        """It goes when something happens."""
+        return self.transmission in TRANSMISSION_EVENT
+
+    @property
+    def rtr_allowed(self) -> bool:
+        """It may be asked for by a remote frame."""
+        return not self._cob_id.value & RTR_FORBIDDEN
+
+    def configure(self) -> None:
+        """Read the parameter objects; a PDO whose mapping cannot be used does not exist."""
+        self.can_id = self._cob_id.value & CAN_ID_MASK
+        self.transmission = self._type.value
+        self.inhibit_time = self._inhibit.value * INHIBIT_UNIT
+        self.event_time = self._event.value * MILLISECOND
+        self.sync_start = self._sync_start.value
+        self.variables: tuple[Scalar, ...] = ()
+        self.codec = PdoCodec(())
+        self.enabled = not self._cob_id.value & COB_ID_INVALID
+        if self.enabled:
+            try:
+                self._compile()
+            except (SdoAbortError, CodecError):  # a default of the dictionary that is no mapping
+                self.enabled = False
+
+    def _compile(self) -> None:
+        words = [variable.value for variable in self._entries[: self._count.value]]
+        self.variables = tuple(self._resolve(word) for word in words)
+        self.codec = PdoCodec(
+            [
+                MappedObject(
+                    variable.entry.index, variable.entry.subindex, variable.entry.data_type
+                )
+                for variable in self.variables
+            ]
+        )
+
+    def _resolve(self, word: int) -> Scalar:
+        """Return the object that a mapping entry names.
+
+        Raises:
+            SdoAbortError: There is none, or it cannot be mapped to this PDO.
+        """
+        variable = self._find(word >> 16, word >> 8 & 0xFF)
+        entry = variable.entry
+        if not isinstance(variable, Scalar) or not self._is_mappable(entry):
+            raise refusal(AbortCode.NOT_MAPPABLE, entry)
+        if bit_length(entry.data_type) != word & 0xFF:
+            raise refusal(AbortCode.NOT_MAPPABLE, entry)
+        return variable
+
+    @staticmethod
+    @abstractmethod
+    def _is_mappable(entry: ObjectEntry) -> bool:
+        """Tell whether an object may travel in this direction."""
+
+    def _find(self, index: int, subindex: int) -> Variable:
+        return self._store.find(index, subindex)
+
+    def _check_type(self, value: Value) -> None:
+        if value not in self.transmission_types:
+            raise refusal(AbortCode.VALUE_RANGE, self._type.entry)
+
+    def _check_disabled(self, _value: Value) -> None:
+        if self.enabled:
+            raise refusal(AbortCode.UNSUPPORTED_ACCESS, self._cob_id.entry)
+
+    def _check_count(self, value: Value) -> None:
+        self._check_disabled(value)
+        count = value if isinstance(value, int) else 0
+        if count > len(self._entries):
+            raise refusal(AbortCode.PDO_LENGTH, self._count.entry)
+        scalars = [self._resolve(variable.value) for variable in self._entries[:count]]
+        if total_bits(scalars) > PDO_BITS_MAX:
+            raise refusal(AbortCode.PDO_LENGTH, self._count.entry)
+
+    def _check_entry(self, value: Value) -> None:
+        self._check_disabled(value)
+        if self._count.value:  # the mapping is in force until its number is set to 0
+            raise refusal(AbortCode.UNSUPPORTED_ACCESS, self._count.entry)
+        if isinstance(value, int) and value:
+            self._resolve(value)
+
+
+def total_bits(variables: Sequence[Scalar]) -> int:
+    """Return how many [bit] variables take together in a PDO."""
+    return sum(bit_length(variable.entry.data_type) or 0 for variable in variables)
+
+
+def channel_numbers(store: ObjectStore, first: int, last: int) -> list[int]:
+    """Return the offsets from ``first`` of the PDO records that a dictionary has."""
+    return [index - first for index in range(first, last + 1) if store.dictionary.has_index(index)]

@@ -1,0 +1,177 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""SDO block transfers as the server sees them (CiA 301, 7.2.4.3.8 to 7.2.4.3.17)."""
+
+from __future__ import annotations
+
+import struct
+
+from arm_canopen.standard.sdo_abort import AbortCode
+from arm_canopen.standard.sdo_block import (
+    ACKNOWLEDGE_UPLOAD,
+    block_frames,
+    BLOCK_SEGMENTS_MAX,
+    checksum,
+    CRC_BIT,
+    DOWNLOAD_ACKNOWLEDGED,
+    DOWNLOAD_ENDED,
+    DOWNLOAD_INITIATED,
+    end_frame,
+    END_UPLOAD,
+    LAST,
+    SEGMENT_BYTES,
+    SIZE_BIT,
+    START_UPLOAD,
+    UPLOAD_END,
+    UPLOAD_INITIATED,
+)
+
+from ..objects.object_store import refusal, STRING_BYTES_MAX
+
+
+class BlockDownload:
+    """A block transfer by which a client writes.
+
+    Attributes:
+        index: Object index.
+        subindex: Sub-index.
+        streaming: The client sends segments, which have no command byte.
+        data: What has come, after :meth:`end` without padding.
+    """
+
+    def __init__(self, request: bytes) -> None:
+        """Begin with the client's initiation."""
+        command, self.index, self.subindex, size = struct.unpack('<BHBI', request)
+        self.size: int | None = size if command & SIZE_BIT else None
+        self.streaming = True
+        self.data = bytearray()
+        self._with_crc = bool(command & CRC_BIT)
+        self._sequence = 0
+        self._finished = False
+
+    def initiated(self) -> bytes:
+        """Return the answer to the initiation."""
+        return struct.pack(
+            '<BHBB3x',
+            DOWNLOAD_INITIATED | CRC_BIT,
+            self.index,
+            self.subindex,
+            BLOCK_SEGMENTS_MAX,
+        )
+
+    def segment(self, frame: bytes) -> bytes | None:
+        """Take a segment; after the last one of a block return how far they came in order.
+
+        Raises:
+            SdoAbortError: The sequence number is 0, or the data are longer than announced.
+        """
+        number, last = frame[0] & ~LAST, bool(frame[0] & LAST)
+        if number == 0:
+            raise refusal(AbortCode.SEQUENCE_NUMBER, 'SDO block')
+        in_order = number == self._sequence + 1
+        if in_order:
+            self._sequence = number
+            self.data += frame[1:]
+            limit = STRING_BYTES_MAX if self.size is None else self.size
+            if len(self.data) - SEGMENT_BYTES >= max(limit, 1):
+                raise refusal(AbortCode.LENGTH_HIGH, 'SDO block')
+        if not last and number < BLOCK_SEGMENTS_MAX:
+            return None
+        self._finished = last and in_order
+        self.streaming = not self._finished
+        taken, self._sequence = self._sequence, 0
+        return struct.pack('<BBB5x', DOWNLOAD_ACKNOWLEDGED, taken, BLOCK_SEGMENTS_MAX)
+
+    def end(self, request: bytes) -> bytes:
+        """Take the client's end; check length and checksum, and return the answer.
+
+        Raises:
+            SdoAbortError: A check failed, or the client has not sent everything.
+        """
+        if not self._finished:
+            raise refusal(AbortCode.COMMAND_SPECIFIER, 'SDO block')
+        command, crc = struct.unpack_from('<BH', request)
+        unused = command >> 2 & 0x07
+        del self.data[len(self.data) - unused :]
+        if self._with_crc and crc != checksum(bytes(self.data)):
+            raise refusal(AbortCode.CRC, 'SDO block')
+        if self.size is not None and len(self.data) != self.size:
+            low = len(self.data) < self.size
+            raise refusal(AbortCode.LENGTH_LOW if low else AbortCode.LENGTH_HIGH, 'SDO block')
+        return bytes((DOWNLOAD_ENDED,)) + bytes(7)
+
+
+class BlockUpload:
+    """A block transfer by which a client reads.
+
+    Attributes:
+        index: Object index.
+        subindex: Sub-index.
+        finished: The client has confirmed the end.
+    """
+
+    def __init__(self, request: bytes, data: bytes) -> None:
+        """Begin with the client's initiation.
+
+        Args:
+            request: Its frame.
+            data: The object's value.
+
+        Raises:
+            SdoAbortError: The client asks for blocks of no length.
+        """
+        command, self.index, self.subindex, segments = struct.unpack_from('<BHBB', request)
+        self.finished = False
+        self._data = data
+        self._with_crc = bool(command & CRC_BIT)
+        self._position = 0  # [byte] up to which the client has everything
+        self._sent = 0  # segments of the present block
+        self._segments = 0
+        self._ended = False
+        self._set_block(segments)
+
+    def initiated(self) -> bytes:
+        """Return the answer to the initiation."""
+        command = UPLOAD_INITIATED | SIZE_BIT | CRC_BIT
+        return struct.pack('<BHBI', command, self.index, self.subindex, len(self._data))
+
+    def proceed(self, request: bytes) -> list[bytes]:
+        """Take what the client says in the course of the transfer; return what to send.
+
+        Raises:
+            SdoAbortError: It makes no sense at this point.
+        """
+        subcommand = request[0] & 0x03
+        if subcommand == START_UPLOAD and not self._sent and not self._position:
+            return self._block()
+        if subcommand == ACKNOWLEDGE_UPLOAD and self._sent:
+            return self._acknowledged(request[1], request[2])
+        if subcommand == END_UPLOAD and self._ended:
+            self.finished = True
+            return []
+        raise refusal(AbortCode.COMMAND_SPECIFIER, 'SDO block')
+
+    def _acknowledged(self, taken: int, segments: int) -> list[bytes]:
+        if taken > self._sent:
+            raise refusal(AbortCode.SEQUENCE_NUMBER, 'SDO block')
+        self._position += taken * SEGMENT_BYTES
+        complete = taken == self._sent and self._position >= len(self._data)
+        self._sent = 0
+        if complete:
+            self._ended = True
+            return [self._end()]
+        self._set_block(segments)
+        return self._block()
+
+    def _set_block(self, segments: int) -> None:
+        if not 1 <= segments <= BLOCK_SEGMENTS_MAX:
+            raise refusal(AbortCode.BLOCK_SIZE, 'SDO block')
+        self._segments = segments
+
+    def _block(self) -> list[bytes]:
+        frames = block_frames(self._data, self._position, self._segments)
+        self._sent = len(frames)
+        return frames
+
+    def _end(self) -> bytes:
+        return end_frame(UPLOAD_END, self._data, with_crc=self._with_crc)

@@ -1,0 +1,256 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""SDO server, expedited and segmented (CiA 301, 7.2.4.3).
+
+One transfer at a time, as the standard has it for one SDO channel: a client that initiates
+another one gives the first up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+import struct
+
+from arm_canopen.can.frame import Frame
+from arm_canopen.exceptions import CodecError, SdoAbortError
+from arm_canopen.standard.sdo import (
+    Abort,
+    decode_request,
+    DownloadRequest,
+    DownloadResponse,
+    DownloadSegmentResponse,
+    EXPEDITED_MAX,
+    Segment,
+    SEGMENT_MAX,
+    UploadRequest,
+    UploadResponse,
+    UploadSegmentRequest,
+)
+from arm_canopen.standard.sdo_abort import AbortCode
+from arm_canopen.standard.sdo_block import CLIENT_DOWNLOAD, CLIENT_UPLOAD
+
+from ..objects.object_store import ObjectStore, refusal, STRING_BYTES_MAX
+from ..timed import NEVER
+from .sdo_block import BlockDownload, BlockUpload
+
+FRAME_BYTES = 8  # [byte] shorter frames are no SDO
+ABORT = 0x80  # command byte of an abort
+SILENCE_MAX = 1.0  # [s] how long a client may pause within a transfer
+
+Answer = Abort | DownloadResponse | DownloadSegmentResponse | Segment | UploadResponse
+
+
+@dataclass(slots=True)
+class Transfer:
+    """A segmented transfer under way.
+
+    Attributes:
+        index: Object index.
+        subindex: Sub-index.
+        is_download: The client writes.
+        data: What is sent, or was received so far.
+        size: Announced length of a download in [byte], None when it was not told.
+        position: Number of bytes of an upload that were sent.
+        toggle: Toggle bit of the next segment.
+    """
+
+    index: int
+    subindex: int
+    is_download: bool
+    data: bytearray = field(default_factory=bytearray)
+    size: int | None = None
+    position: int = 0
+    toggle: bool = False
+
+
+class SdoServer:
+    """Serves one SDO channel of a device.
+
+    Attributes:
+        can_id: Identifier of the requests.
+        response_id: Identifier of the answers.
+        deadline: Steady time in [s] at which a silent client's transfer is aborted.
+    """
+
+    def __init__(
+        self, can_id: int, response_id: int, store: ObjectStore, send: Callable[[Frame], None]
+    ) -> None:
+        """Serve the objects of a store under two identifiers."""
+        self.can_id = can_id
+        self.response_id = response_id
+        self.deadline = NEVER
+        self._store = store
+        self._send = send
+        self._transfer: Transfer | BlockDownload | BlockUpload | None = None
+
+    def reset(self) -> None:
+        """Forget a transfer under way."""
+        self._transfer = None
+        self.deadline = NEVER
+
+    def receive(self, frame: Frame, now: float) -> None:
+        """Answer a request."""
+        if len(frame.data) < FRAME_BYTES:
+            return
+        answers = self._answer(frame.data, now)
+        self.deadline = now + SILENCE_MAX if self._transfer else NEVER
+        for answer in answers:
+            self._send(Frame(self.response_id, answer))
+
+    def advance(self, now: float) -> None:
+        """Abort the transfer of a client that fell silent."""
+        if now < self.deadline:
+            return
+        transfer = self._transfer
+        self.reset()
+        if transfer is not None:
+            abort = Abort(transfer.index, transfer.subindex, AbortCode.TIMED_OUT)
+            self._send(Frame(self.response_id, abort.encode()))
+
+    def _answer(self, data: bytes, now: float) -> list[bytes]:
+        index, subindex = self._subject(data)
+        try:
+            if self._is_block(data):
+                return self._block(data, now)
+            answer = self._dispatch(data, now)
+        except SdoAbortError as error:
+            self._transfer = None
+            return [Abort(index, subindex, error.code).encode()]
+        return [answer.encode()] if answer is not None else []
+
+    def _subject(self, data: bytes) -> tuple[int, int]:
+        """Return the object that an abort names: that of the transfer, else of the request."""
+        transfer = self._transfer
+        streaming = isinstance(transfer, BlockDownload) and transfer.streaming
+        names_none = data[0] >> 5 in (0, 3) or (self._is_block(data) and data[0] & 0x03)
+        if streaming or names_none:
+            return (transfer.index, transfer.subindex) if transfer else (0, 0)
+        index, subindex = struct.unpack_from('<xHB', data)
+        return int(index), int(subindex)
+
+    def _is_block(self, data: bytes) -> bool:
+        """Tell whether a frame is of a block transfer; an abort is of any transfer."""
+        transfer = self._transfer
+        if isinstance(transfer, BlockDownload) and transfer.streaming:
+            return data[0] != ABORT
+        return data[0] >> 5 in (CLIENT_UPLOAD, CLIENT_DOWNLOAD)
+
+    def _block(self, data: bytes, now: float) -> list[bytes]:
+        transfer = self._transfer
+        if isinstance(transfer, BlockDownload) and transfer.streaming:
+            answer = transfer.segment(data)
+            return [answer] if answer is not None else []
+        if data[0] >> 5 == CLIENT_DOWNLOAD:
+            return [self._block_download(data, now)]
+        if not data[0] & 0x03:
+            return [self._start_block_upload(data)]
+        if not isinstance(transfer, BlockUpload):
+            raise refusal(AbortCode.COMMAND_SPECIFIER, 'SDO')
+        answers = transfer.proceed(data)
+        if transfer.finished:
+            self._transfer = None
+        return answers
+
+    def _block_download(self, data: bytes, now: float) -> bytes:
+        """Begin a block download, or end the one whose segments have all come."""
+        transfer = self._transfer
+        if not data[0] & 0x01:
+            transfer = BlockDownload(data)
+            self._transfer = None
+            variable = self._store.writable(transfer.index, transfer.subindex)
+            if transfer.size is not None:
+                variable.check_length(transfer.size)
+            self._transfer = transfer
+            return transfer.initiated()
+        if not isinstance(transfer, BlockDownload):
+            raise refusal(AbortCode.COMMAND_SPECIFIER, 'SDO')
+        answer = transfer.end(data)
+        self._transfer = None
+        self._store.write(transfer.index, transfer.subindex, bytes(transfer.data), now)
+        return answer
+
+    def _start_block_upload(self, data: bytes) -> bytes:
+        index, subindex, threshold = struct.unpack_from('<xHBxB', data)
+        self._transfer = None
+        value = self._store.read(index, subindex)
+        upload = BlockUpload(data, value)
+        if 0 < len(value) <= threshold:  # the client prefers the other protocol for so little
+            return self._start_upload(UploadRequest(index, subindex)).encode()
+        self._transfer = upload
+        return upload.initiated()
+
+    def _dispatch(self, data: bytes, now: float) -> Answer | None:
+        try:
+            request = decode_request(data)
+        except CodecError as error:
+            raise refusal(AbortCode.COMMAND_SPECIFIER, 'SDO') from error
+        match request:
+            case UploadRequest():
+                return self._start_upload(request)
+            case UploadSegmentRequest():
+                return self._send_segment(request)
+            case DownloadRequest():
+                return self._start_download(request, now)
+            case Segment():
+                return self._take_segment(request, now)
+            case Abort():
+                self._transfer = None
+        return None
+
+    def _start_upload(self, request: UploadRequest) -> UploadResponse:
+        index, subindex = request.index, request.subindex
+        self._transfer = None
+        value = self._store.read(index, subindex)
+        if 0 < len(value) <= EXPEDITED_MAX:
+            return UploadResponse(index, subindex, value, len(value))
+        self._transfer = Transfer(index, subindex, is_download=False, data=bytearray(value))
+        return UploadResponse(index, subindex, None, len(value))
+
+    def _send_segment(self, request: UploadSegmentRequest) -> Segment:
+        transfer = self._expect(request.toggle, is_download=False)
+        part = bytes(transfer.data[transfer.position : transfer.position + SEGMENT_MAX])
+        transfer.position += len(part)
+        last = transfer.position >= len(transfer.data)
+        if last:
+            self._transfer = None
+        return Segment(request.toggle, part, last)
+
+    def _start_download(self, request: DownloadRequest, now: float) -> DownloadResponse:
+        index, subindex = request.index, request.subindex
+        self._transfer = None
+        variable = self._store.writable(index, subindex)
+        if request.data is None:
+            if request.size is not None:
+                variable.check_length(request.size)
+            self._transfer = Transfer(index, subindex, is_download=True, size=request.size)
+        else:
+            data = request.data
+            if request.size is None:  # the client leaves the length to us
+                data = data[: variable.size or EXPEDITED_MAX]
+            self._store.write(index, subindex, data, now)
+        return DownloadResponse(index, subindex)
+
+    def _take_segment(self, request: Segment, now: float) -> DownloadSegmentResponse:
+        transfer = self._expect(request.toggle, is_download=True)
+        transfer.data += request.data
+        received = len(transfer.data)
+        limit = STRING_BYTES_MAX if transfer.size is None else transfer.size
+        if received > limit:
+            raise refusal(AbortCode.LENGTH_HIGH, 'SDO')
+        if request.last:
+            if transfer.size is not None and received < transfer.size:
+                raise refusal(AbortCode.LENGTH_LOW, 'SDO')
+            self._transfer = None
+            self._store.write(transfer.index, transfer.subindex, bytes(transfer.data), now)
+        return DownloadSegmentResponse(request.toggle)
+
+    def _expect(self, toggle: bool, *, is_download: bool) -> Transfer:
+        """Return the transfer that a segment belongs to, and turn its toggle bit."""
+        transfer = self._transfer
+        if not isinstance(transfer, Transfer) or transfer.is_download is not is_download:
+            raise refusal(AbortCode.COMMAND_SPECIFIER, 'SDO')
+        if toggle is not transfer.toggle:
+            raise refusal(AbortCode.TOGGLE_BIT, 'SDO')
+        transfer.toggle = not transfer.toggle
+        return transfer

@@ -1,0 +1,62 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Network time as a device takes it (CiA 301, 7.2.6 and 7.5.2.15)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import contextlib
+from datetime import datetime, timedelta
+
+from arm_canopen.can.frame import Frame
+from arm_canopen.exceptions import CodecError
+from arm_canopen.standard.cob_id import CAN_ID_MASK
+from arm_canopen.standard.datatypes import Value
+from arm_canopen.standard.objects import Index
+from arm_canopen.standard.time_of_day import decode_time_of_day
+
+from ..objects.cob_id_rules import check_can_id
+from ..objects.object_store import ObjectStore
+
+CONSUMES = 0x8000_0000  # bit 31 of 0x1012
+
+
+class TimeConsumer:
+    """Keeps the network's time of the last TIME message."""
+
+    def __init__(self, store: ObjectStore, changed: Callable[[], None]) -> None:
+        """Bind 0x1012.
+
+        Args:
+            store: Objects of the device.
+            changed: Told that TIME is wanted from now on, or under another identifier.
+        """
+        self._cob_id = store.integer(Index.TIME_COB_ID)
+        self._cob_id.check = self._check
+        self._cob_id.listener = lambda _now: changed()
+        self._received: tuple[datetime, float] | None = None
+
+    @property
+    def can_id(self) -> int | None:
+        """Identifier of the TIME message, None when the device takes none."""
+        value = self._cob_id.value
+        return value & CAN_ID_MASK if value & CONSUMES else None
+
+    def at(self, now: float) -> datetime | None:
+        """Return the network's time at steady time ``now`` in [s], None before any message."""
+        if self._received is None:
+            return None
+        time, moment = self._received
+        return time + timedelta(seconds=now - moment)
+
+    def reset(self) -> None:
+        """Forget the time, as after switching on."""
+        self._received = None
+
+    def receive(self, frame: Frame, now: float) -> None:
+        """Take a TIME message; one of another length is none."""
+        with contextlib.suppress(CodecError):
+            self._received = decode_time_of_day(frame.data), now
+
+    def _check(self, value: Value) -> None:
+        check_can_id(self._cob_id.entry, int(value) & CAN_ID_MASK if isinstance(value, int) else 0)

@@ -1,0 +1,34 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Build description of canopen_sim."""
+
+from pathlib import Path
+
+from setuptools import find_packages, setup
+
+setup(
+    name='canopen_sim',
+    version='0.1.0',
+    packages=find_packages(include=['canopen_sim', 'canopen_sim.*']),
+    package_data={'canopen_sim': ['py.typed']},
+    data_files=[
+        ('share/ament_index/resource_index/packages', ['resource/canopen_sim']),
+        ('share/canopen_sim', ['package.xml']),
+        (
+            'share/canopen_sim/scenarios',
+            sorted(str(path) for path in Path('scenarios').iterdir()),
+        ),
+    ],
+    install_requires=['setuptools'],
+    zip_safe=True,
+    maintainer='The arm and quad developers',
+    maintainer_email='developers@example.org',
+    description='Simulated CANopen devices and CiA 402 drives, with faults',
+    license='Apache-2.0',
+    entry_points={
+        'console_scripts': [
+            'fake_slave = canopen_sim.nodes.fake_slave:main',
+            'fake_slaves = canopen_sim.nodes.fake_slaves:main',
+        ],
+    },
+)

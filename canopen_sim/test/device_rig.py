@@ -1,0 +1,240 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""A simulated device on a bench: the tests are its bus, its master and its clock."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+from arm_canopen.can.frame import Frame
+from arm_canopen.config import load_eds
+from arm_canopen.standard.dictionary import ObjectDictionary
+from arm_canopen.standard.drive import drive_state, DriveState
+from arm_canopen.standard.nmt import nmt_frame, NmtCommand, NmtState
+from arm_canopen.standard.sdo import (
+    Abort,
+    decode_response,
+    DownloadRequest,
+    DownloadResponse,
+    DownloadSegmentResponse,
+    Response,
+    Segment,
+    UploadRequest,
+    UploadResponse,
+    UploadSegmentRequest,
+)
+from canopen_sim.device import Device
+from canopen_sim.drive.drive import Drive
+
+EDS = Path(__file__).parents[2] / 'arm_canopen' / 'eds' / 'cia402_drive.eds'
+NODE_ID = 5
+
+SHUTDOWN = 0x06
+SWITCH_ON = 0x07
+ENABLE = 0x0F
+QUICK_STOP = 0x02
+DISABLE_VOLTAGE = 0x00
+FAULT_RESET = 0x80
+
+
+@cache
+def drive_dictionary() -> ObjectDictionary:
+    """Read the EDS of the simulated drive, once."""
+    return load_eds(EDS).dictionary
+
+
+def with_defaults(
+    dictionary: ObjectDictionary, defaults: dict[tuple[int, int], int]
+) -> ObjectDictionary:
+    """Return a dictionary with other defaults."""
+    return ObjectDictionary(
+        replace(entry, default=defaults.get(entry.address, entry.default), node_relative=False)
+        if entry.address in defaults
+        else entry
+        for entry in dictionary
+    )
+
+
+class RefusedError(Exception):
+    """The device aborted an SDO."""
+
+    def __init__(self, code: int) -> None:
+        """Keep the abort code."""
+        super().__init__(f'0x{code:08X}')
+        self.code = code
+
+
+class Rig:
+    """One device in virtual time; every frame that it sent is kept.
+
+    Attributes:
+        now: Virtual time in [s].
+        sent: Frames of the device with the time of each.
+    """
+
+    def __init__(
+        self,
+        dictionary: ObjectDictionary | None = None,
+        *,
+        node_id: int = NODE_ID,
+        boot_time: float = 0.0,
+        power: bool = True,
+    ) -> None:
+        """Connect a device, and switch it on."""
+        self.now = 100.0
+        self.node_id = node_id
+        self.sent: list[tuple[float, Frame]] = []
+        self.device = Device(
+            node_id,
+            drive_dictionary() if dictionary is None else dictionary,
+            self._sent,
+            boot_time=boot_time,
+        )
+        if power:
+            self.device.advance(self.now)
+
+    def _sent(self, frame: Frame) -> None:
+        self.sent.append((self.now, frame))
+
+    @property
+    def drive(self) -> Drive:
+        """The axis."""
+        assert self.device.drive is not None
+        return self.device.drive
+
+    @property
+    def position(self) -> float:
+        """Where the motor is now in [inc]; the drive itself may have looked some time ago."""
+        self.drive.advance(self.now)
+        return self.drive.position
+
+    @property
+    def velocity(self) -> float:
+        """How fast the motor turns now in [inc/s]."""
+        self.drive.advance(self.now)
+        return self.drive.velocity
+
+    def send(self, can_id: int, data: bytes = b'') -> None:
+        """Let the device receive a frame."""
+        self.device.receive(Frame(can_id, data), self.now)
+
+    def run(self, duration: float) -> None:
+        """Let time pass, from deadline to deadline."""
+        end = self.now + duration
+        for _ in range(1_000_000):
+            deadline = self.device.next_deadline()
+            if deadline is None or deadline > end:
+                break
+            self.now = max(self.now, deadline)
+            self.device.advance(self.now)
+        self.now = end
+
+    def cycles(self, count: int, period: float = 0.01) -> None:
+        """Send SYNCs at a period."""
+        for _ in range(count):
+            self.run(period)
+            self.sync()
+
+    def sync(self) -> None:
+        """Send a SYNC."""
+        self.send(0x080)
+
+    def nmt(self, command: NmtCommand, node_id: int | None = None) -> None:
+        """Send an NMT command, to the device unless told otherwise."""
+        self.send(0, nmt_frame(command, self.node_id if node_id is None else node_id))
+
+    def take(self, can_id: int | None = None) -> list[bytes]:
+        """Return what the device sent since the last time, of one identifier or of all."""
+        frames = [frame for _, frame in self.sent]
+        self.sent.clear()
+        return [frame.data for frame in frames if can_id is None or frame.can_id == can_id]
+
+    def times(self, can_id: int) -> list[float]:
+        """Return when the device sent frames of an identifier, without forgetting them."""
+        return [time for time, frame in self.sent if frame.can_id == can_id]
+
+    def raw_sdo(self, request: bytes) -> bytes | None:
+        """Send an SDO frame and return the answer."""
+        before = len(self.sent)
+        self.send(0x600 + self.node_id, request)
+        answers = [f for _, f in self.sent[before:] if f.can_id == 0x580 + self.node_id]
+        self.sent = self.sent[:before] + [
+            item for item in self.sent[before:] if item[1] not in answers
+        ]
+        return answers[0].data if answers else None
+
+    def sdo(self, request: bytes) -> Response:
+        """Send an SDO frame and return the decoded answer; an abort raises RefusedError."""
+        answer = self.raw_sdo(request)
+        assert answer is not None, 'no SDO answer'
+        response = decode_response(answer)
+        if isinstance(response, Abort):
+            raise RefusedError(response.code)
+        return response
+
+    def write(self, index: int, subindex: int, data: bytes) -> None:
+        """Write an object, expedited or segmented."""
+        if 1 <= len(data) <= 4:
+            request = DownloadRequest(index, subindex, data, len(data))
+            assert isinstance(self.sdo(request.encode()), DownloadResponse)
+            return
+        self.sdo(DownloadRequest(index, subindex, None, len(data)).encode())
+        toggle = False
+        for start in range(0, max(1, len(data)), 7):
+            part = data[start : start + 7]
+            segment = Segment(toggle, part, start + 7 >= len(data))
+            assert self.sdo(segment.encode()) == DownloadSegmentResponse(toggle)
+            toggle = not toggle
+
+    def read(self, index: int, subindex: int = 0) -> bytes:
+        """Read an object, expedited or segmented."""
+        response = self.sdo(UploadRequest(index, subindex).encode())
+        assert isinstance(response, UploadResponse)
+        if response.data is not None:
+            return response.data
+        data, toggle, last = b'', False, False
+        while not last:
+            segment = self.sdo(UploadSegmentRequest(toggle).encode())
+            assert isinstance(segment, Segment)
+            data, last, toggle = data + segment.data, segment.last, not toggle
+        return data
+
+    def put(self, index: int, value: int, subindex: int = 0) -> None:
+        """Write a number in the size that the object has."""
+        variable = self.device.store.find(index, subindex)
+        size = variable.size
+        assert size is not None
+        self.write(index, subindex, (value % (1 << 8 * size)).to_bytes(size, 'little'))
+
+    def get(self, index: int, subindex: int = 0) -> int:
+        """Read a number; signed when the object is."""
+        signed = self.device.store.find(index, subindex).entry.data_type.name.startswith('INT')
+        return int.from_bytes(self.read(index, subindex), 'little', signed=signed)
+
+    @property
+    def nmt_state(self) -> NmtState:
+        """NMT state of the device."""
+        return self.device.nmt_state
+
+    @property
+    def statusword(self) -> int:
+        """Statusword, read by SDO."""
+        return self.get(0x6041)
+
+    @property
+    def state(self) -> DriveState:
+        """State that the statusword shows."""
+        return drive_state(self.statusword)
+
+    def command(self, *words: int) -> None:
+        """Write controlwords, one after another."""
+        for word in words:
+            self.put(0x6040, word)
+
+    def enable(self, mode: int = 0) -> None:
+        """Select a mode and enable operation."""
+        self.put(0x6060, mode)
+        self.command(SHUTDOWN, SWITCH_ON, ENABLE)
+        assert self.state is DriveState.OPERATION_ENABLED

@@ -1,0 +1,168 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Every homing method of the simulated drive, with its switches and its errors."""
+
+from __future__ import annotations
+
+from device_rig import ENABLE, Rig
+from hypothesis import given, settings
+from hypothesis import strategies as st
+import pytest
+
+from canopen_sim.drive.switches import Switches
+
+pytestmark = pytest.mark.slow
+
+REACHED, ATTAINED, ERROR = 0x400, 0x1000, 0x2000
+START, HALT = 0x10, 0x100
+
+SWITCHES = Switches(
+    negative_limit=-1000.0,
+    positive_limit=1500.0,
+    home=(500.0, 700.0),
+    index=130.0,
+    index_period=1000.0,
+)
+HOMES = {
+    1: -870, 2: 1130, 3: 130, 4: 1130, 5: 1130, 6: 130, 7: 130, 8: 1130, 9: 130, 10: 1130,
+    11: 1130, 12: 130, 13: 1130, 14: 130,
+    17: -1000, 18: 1500, 19: 500, 20: 500, 21: 700, 22: 700, 23: 500, 24: 500, 25: 700, 26: 700,
+    27: 700, 28: 700, 29: 500, 30: 500,
+}  # fmt: skip
+"""Mechanical position of home by method: an edge, or the index pulse behind it (0x6098)."""
+
+
+def homing_rig(method: int, start: int = 0) -> Rig:
+    """Return a drive in homing mode, its axis at a mechanical position in [inc]."""
+    rig = Rig()
+    rig.drive.set_switches(SWITCHES)
+    rig.put(0x607A, start)
+    rig.put(0x6081, 10_000)
+    rig.enable(1)
+    rig.command(ENABLE | 0x10, ENABLE)
+    rig.run(3.0)
+    rig.put(0x6098, method)
+    rig.put(0x6099, 1000, 1)
+    rig.put(0x6099, 200, 2)
+    rig.put(0x609A, 20_000)
+    rig.put(0x6060, 6)
+    return rig
+
+
+@pytest.mark.parametrize('start', [-900, 0, 600, 900])
+@pytest.mark.parametrize('method', HOMES)
+def test_method_finds_its_home(method: int, start: int) -> None:
+    """From either side of the home switch and from on it, each method finds the same place."""
+    rig = homing_rig(method, start)
+    rig.put(0x607C, 40)
+    rig.command(ENABLE | START)
+    rig.run(0.01)
+    assert not rig.statusword & (ATTAINED | ERROR)
+    rig.run(20.0)
+    assert rig.statusword & (REACHED | ATTAINED | ERROR) == REACHED | ATTAINED
+    assert rig.drive.origin == pytest.approx(40 - HOMES[method])
+
+
+@pytest.mark.parametrize('method', HOMES)
+def test_search_that_runs_over_the_switch_comes_back(method: int) -> None:
+    """A search so fast that it cannot stop on the home switch finds the same place."""
+    rig = homing_rig(method, 100)
+    rig.put(0x6099, 6000, 1)
+    rig.put(0x609A, 30_000)
+    rig.command(ENABLE | START)
+    rig.run(20.0)
+    assert rig.statusword & (REACHED | ATTAINED | ERROR) == REACHED | ATTAINED
+    assert rig.drive.origin == pytest.approx(-HOMES[method])
+
+
+@pytest.mark.parametrize(('method', 'home'), [(33, 130), (34, 1130)])
+def test_index_methods_take_the_next_pulse(method: int, home: int) -> None:
+    """Methods 33 and 34 need no switch."""
+    rig = homing_rig(method, 400)
+    rig.command(ENABLE | START)
+    rig.run(20.0)
+    assert rig.statusword & ATTAINED
+    assert rig.drive.origin == pytest.approx(-home)
+
+
+@pytest.mark.parametrize('method', [15, 16, 31, 32, 36, 38, 127, -1, -128])
+def test_method_that_is_not_there_is_an_error(method: int) -> None:
+    """Reserved methods and those of a vendor end in "homing error" and move nothing."""
+    rig = homing_rig(method)
+    rig.command(ENABLE | START)
+    rig.run(0.5)
+    assert rig.statusword & (REACHED | ATTAINED | ERROR) == REACHED | ERROR
+    assert rig.position == 0.0
+
+
+def test_without_a_home_switch_both_limits_end_the_search() -> None:
+    """A search that finds nothing turns once, then says so and stands."""
+    rig = homing_rig(19)
+    rig.drive.set_switches(Switches(-300.0, 300.0, (float('nan'), float('nan'))))
+    rig.command(ENABLE | START)
+    rig.run(10.0)
+    assert rig.statusword & (REACHED | ATTAINED | ERROR) == REACHED | ERROR
+    assert abs(rig.velocity) < 0.1
+
+
+def test_speed_of_zero_is_an_error() -> None:
+    """A search that cannot move is none."""
+    rig = homing_rig(17)
+    rig.put(0x6099, 0, 1)
+    rig.command(ENABLE | START)
+    rig.run(0.1)
+    assert rig.statusword & ERROR
+
+
+def test_start_bit_taken_back_interrupts() -> None:
+    """The axis stops, neither homed nor in error; another start begins anew."""
+    rig = homing_rig(17)
+    rig.command(ENABLE | START)
+    rig.run(0.3)
+    assert rig.velocity < 0.0
+    rig.command(ENABLE)
+    rig.run(0.5)
+    assert rig.statusword & (REACHED | ATTAINED | ERROR) == REACHED
+    assert abs(rig.velocity) < 0.1
+    rig.command(ENABLE | START)
+    rig.run(10.0)
+    assert rig.statusword & ATTAINED
+
+
+def test_halt_waits_and_goes_on() -> None:
+    """Halt stops the search, which goes on when it is over."""
+    rig = homing_rig(17)
+    rig.command(ENABLE | START)
+    rig.run(0.3)
+    rig.command(ENABLE | START | HALT)
+    rig.run(0.5)
+    assert abs(rig.velocity) < 0.1
+    assert not rig.statusword & ATTAINED
+    rig.command(ENABLE | START)
+    rig.run(10.0)
+    assert rig.statusword & ATTAINED
+
+
+@settings(max_examples=10, deadline=None)
+@given(st.sampled_from(sorted(HOMES)), st.integers(-900, 1400))
+def test_search_keeps_to_its_speeds(method: int, start: int) -> None:
+    """No search is faster than 0x6099:01 or than the ramp 0x609A allows."""
+    rig = homing_rig(method, start)
+    rig.command(ENABLE | START)
+    demand = rig.drive.velocity
+    for _ in range(400):
+        rig.run(0.01)
+        velocity = rig.velocity
+        assert abs(velocity) <= 1000.0 + 1e-6
+        assert abs(velocity - demand) <= 20_000 * 0.01 + 1e-6
+        demand = velocity
+
+
+def test_switches_show_as_digital_inputs() -> None:
+    """0x60FD has the limit switches, the home switch and the interlock."""
+    assert homing_rig(0, 600).get(0x60FD) == 0x4
+    assert homing_rig(0, -1100).get(0x60FD) == 0x1
+    rig = homing_rig(0, 1600)
+    assert rig.get(0x60FD) == 0x2
+    rig.drive.set_voltage(False, rig.now)
+    assert rig.get(0x60FD) == 0xA

@@ -1,0 +1,250 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Several simulated devices in one process, and the thread that runs them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import logging
+import threading
+import time
+
+from can_addresses import free_multicast, free_virtual
+from device_rig import drive_dictionary
+import pytest
+
+from arm_canopen.can import Bus, Frame, open_bus
+from arm_canopen.exceptions import BusError
+from arm_canopen.standard.nmt import NmtState
+from arm_canopen.standard.sdo import DownloadRequest
+from canopen_sim import DeviceHost, DeviceRunner
+
+ARRIVAL = 10.0  # [s] a deadline, no measure
+IDS = range(2, 9)
+
+
+def host_of(*node_ids: int) -> tuple[DeviceHost, list[Frame]]:
+    """Return running devices in virtual time, and the list of what they send."""
+    sent: list[Frame] = []
+    host = DeviceHost(sent.append)
+    for node_id in node_ids:
+        host.add(node_id, drive_dictionary())
+    host.advance(1.0)
+    return host, sent
+
+
+def write(host: DeviceHost, node_id: int, index: int, subindex: int, data: bytes) -> None:
+    """Write an object of one device."""
+    request = DownloadRequest(index, subindex, data, len(data)).encode()
+    host.receive(Frame(0x600 + node_id, request), 1.0)
+
+
+def test_all_boot_and_obey_a_broadcast() -> None:
+    """Each device sends its own boot-up frame, and all start at one command."""
+    host, sent = host_of(*IDS)
+    assert sent == [Frame(0x700 + node_id, b'\x00') for node_id in IDS]
+    host.receive(Frame(0, b'\x01\x00'), 1.0)
+    assert {device.nmt_state for device in host.devices} == {NmtState.OPERATIONAL}
+
+
+def test_each_gets_its_own_frames_only() -> None:
+    """A request to one device is answered by that one."""
+    host, sent = host_of(*IDS)
+    sent.clear()
+    host.receive(Frame(0x604, b'\x40\x00\x10\x00\x00\x00\x00\x00'), 1.0)
+    assert [frame.can_id for frame in sent] == [0x584]
+
+
+def test_two_devices_with_one_id_are_refused() -> None:
+    """A node id can be given once, and only within the range."""
+    host, _ = host_of(2)
+    for node_id in (2, 0, 128):
+        with pytest.raises(ValueError, match='node id'):
+            host.add(node_id, drive_dictionary())
+
+
+def test_devices_hear_each_other() -> None:
+    """A heartbeat of one device is watched by another one of the same process."""
+    host, sent = host_of(2, 3)
+    write(host, 2, 0x1017, 0, b'\x64\x00')
+    write(host, 3, 0x1016, 1, b'\xc8\x00\x02\x00')
+    now = 1.0
+    while now < 3.0:
+        now += 0.01
+        host.advance(now)
+    sent.clear()
+    write(host, 2, 0x1017, 0, b'\x00\x00')
+    for _ in range(50):
+        now += 0.01
+        host.advance(now)
+    assert Frame(0x083, b'\x30\x81\x11\x02\x00\x00\x00\x00') in sent
+
+
+def test_no_device_hears_itself() -> None:
+    """A device's own TPDO does not come back to it, but reaches the others at once."""
+    host, sent = host_of(2, 3, 4)
+    for node_id in (2, 3, 4):
+        write(host, node_id, 0x1400, 1, b'\x00\x02\x00\x80')
+        write(host, node_id, 0x1400, 1, b'\x82\x01\x00\x00')
+    sent.clear()
+    host.receive(Frame(0, b'\x01\x00'), 1.0)
+    assert Frame(0x182, b'\x50\x02') in sent  # the statusword of device 2
+    words = [device.store.integer(0x6040).value for device in host.devices]
+    assert words == [0, 0x250, 0x250]
+
+
+def test_deadline_is_the_earliest() -> None:
+    """The host wakes for the device that is due first; without devices it sleeps."""
+    host, _ = host_of(2, 3)
+    assert host.deadline == float('inf')
+    write(host, 2, 0x1017, 0, b'\xe8\x03')
+    write(host, 3, 0x1017, 0, b'\x64\x00')
+    assert 1.0 < host.deadline <= 1.1
+    assert DeviceHost(lambda _frame: None).deadline == float('inf')
+
+
+def expect(bus: Bus, wanted: Frame) -> None:
+    """Wait for a frame on a bus."""
+    deadline = time.monotonic() + ARRIVAL
+    while time.monotonic() < deadline:
+        for frame in bus.receive(0.2):
+            if (frame.can_id, frame.data) == (wanted.can_id, wanted.data):
+                return
+    pytest.fail(f'{wanted} did not come')
+
+
+@pytest.fixture(params=[free_virtual, free_multicast], ids=['virtual', 'multicast'])
+def buses(request: pytest.FixtureRequest) -> Iterator[tuple[Bus, Bus]]:
+    """Two connections to one bus."""
+    name = request.param()
+    with open_bus(name) as ours, open_bus(name) as theirs:
+        yield ours, theirs
+
+
+def test_runner_serves_a_real_bus(buses: tuple[Bus, Bus]) -> None:
+    """Frames and deadlines of real time reach the devices; stop ends the thread."""
+    bus, master = buses
+    runner = DeviceRunner(bus)
+    for node_id in IDS:
+        runner.host.add(node_id, drive_dictionary(), boot_time=0.01)
+    before = threading.active_count()
+    runner.start()
+    expect(master, Frame(0x708, b'\x00'))
+    request = DownloadRequest(0x1017, 0, b'\x32\x00', 2).encode()
+    master.send(Frame(0x605, request))
+    expect(master, Frame(0x585, b'\x60\x17\x10\x00\x00\x00\x00\x00'))
+    expect(master, Frame(0x705, b'\x7f'))
+    expect(master, Frame(0x705, b'\x7f'))
+    runner.stop()
+    runner.stop()
+    assert threading.active_count() == before
+
+
+class FlakyBus(Bus):
+    """A bus that fails for some calls, and then delivers a frame."""
+
+    def __init__(self) -> None:
+        """Begin with failures ahead."""
+        super().__init__('flaky')
+        self.failures = 3
+        self.served = threading.Event()
+        self.woken = threading.Event()
+
+    def send(self, frame: Frame) -> None:
+        """Refuse everything while failing."""
+        if self.failures > 0:
+            raise BusError('flaky is down')
+        if frame.can_id == 0x585:
+            self.served.set()
+
+    def receive(self, timeout: float) -> list[Frame]:
+        """Fail a few times, then hand out one request."""
+        if self.failures > 0:
+            self.failures -= 1
+            raise BusError('flaky is down')
+        if not self.served.is_set():
+            return [Frame(0x605, b'\x40\x00\x10\x00\x00\x00\x00\x00')]
+        self.woken.wait(timeout)
+        return []
+
+    def wake(self) -> None:
+        """Let receive return."""
+        self.woken.set()
+
+    def close(self) -> None:
+        """Nothing to release."""
+
+
+def test_bus_that_goes_away_is_waited_for(caplog: pytest.LogCaptureFixture) -> None:
+    """A failing bus is told once; the devices serve it when it is back."""
+    bus = FlakyBus()
+    runner = DeviceRunner(bus)
+    runner.host.add(5, drive_dictionary())
+    with caplog.at_level(logging.ERROR):
+        runner.start()
+        assert bus.served.wait(ARRIVAL)
+        runner.stop()
+    assert [record.getMessage() for record in caplog.records] == ['flaky is down']
+
+
+def test_defect_in_one_device_leaves_the_others_alive(
+    caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An exception in a device is logged with its traceback, and the next frame is served."""
+    name = free_virtual()
+    with open_bus(name) as bus, open_bus(name) as master:
+        runner = DeviceRunner(bus)
+        broken, _ = (runner.host.add(node_id, drive_dictionary()) for node_id in (5, 6))
+
+        def fail(frame: Frame, now: float) -> None:
+            raise ZeroDivisionError
+
+        runner.start()
+        expect(master, Frame(0x706, b'\x00'))
+        monkeypatch.setattr(broken._sdo, 'receive', fail)
+        read = b'\x40\x00\x10\x00\x00\x00\x00\x00'
+        with caplog.at_level(logging.ERROR):
+            master.send(Frame(0x605, read))
+            master.send(Frame(0x606, read))
+            expect(master, Frame(0x586, b'\x43\x00\x10\x00\x92\x01\x02\x00'))
+        runner.stop()
+    assert 'ZeroDivisionError' in caplog.text
+
+
+def test_calls_run_in_the_thread_of_the_devices() -> None:
+    """A call gets at the devices and gives its result, or its exception."""
+    with open_bus(free_virtual()) as bus:
+        runner = DeviceRunner(bus)
+        runner.host.add(5, drive_dictionary())
+        early = runner.call(threading.get_ident)
+        runner.start()
+        states = runner.call(lambda: [device.nmt_state for device in runner.host.devices])
+        assert states.result(ARRIVAL) == [NmtState.PRE_OPERATIONAL]
+        assert early.result(ARRIVAL) == runner.call(threading.get_ident).result(ARRIVAL)
+        assert early.result() != threading.get_ident()
+        with pytest.raises(KeyError):
+            runner.call(lambda: runner.host.device(6)).result(ARRIVAL)
+        runner.stop()
+        assert runner.call(threading.get_ident).cancelled()
+
+
+def test_defect_that_stays_due_does_not_stop_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A device that fails whenever it is advanced rests; the deadlines of others are kept."""
+    defects: list[int] = []
+    sent: list[Frame] = []
+    host = DeviceHost(sent.append, lambda device, _error: defects.append(device.node_id))
+    broken, _ = (host.add(node_id, drive_dictionary()) for node_id in (5, 6))
+
+    def fail(now: float) -> None:
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(broken, 'advance', fail)
+    host.advance(1.0)
+    assert sent == [Frame(0x706, b'\x00')]
+    assert defects == [5]
+    write(host, 6, 0x1017, 0, b'\x32\x00')
+    sent.clear()
+    while host.deadline < 2.0:
+        host.advance(host.deadline)
+    assert len(sent) in (19, 20, 21)
+    assert 5 < len(defects) < 15

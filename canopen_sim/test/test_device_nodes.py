@@ -1,0 +1,141 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The nodes fake_slave and fake_slaves as programs, and the helper that spins nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import os
+from pathlib import Path
+import shutil
+import signal
+import subprocess
+import sys
+import time
+
+from can_addresses import free_multicast
+from config_samples import ARTICLE_BUS
+from device_rig import EDS
+from isolation import Isolation
+import pytest
+
+from arm_canopen.can import open_bus
+
+pytestmark = pytest.mark.slow
+
+rclpy = pytest.importorskip('rclpy')
+
+PACKAGE = Path(__file__).parents[1]
+ARRIVAL = 30.0  # [s] a deadline, no measure
+
+
+@pytest.fixture(autouse=True)
+def own_domain(isolation: Isolation, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let the processes have a ROS domain of their own."""
+    for name, value in isolation.env.items():
+        monkeypatch.setenv(name, value)
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A folder with the article's bus.yml and our EDS."""
+    shutil.copy(ARTICLE_BUS, tmp_path / 'bus.yml')
+    shutil.copy(EDS, tmp_path / 'cia402_slave.eds')
+    return tmp_path
+
+
+def start(node: str, **parameters: str | int) -> subprocess.Popen[str]:
+    """Start a node with parameters."""
+    arguments = [part for k, v in parameters.items() for part in ('-p', f'{k}:={v}')]
+    environment = {
+        **os.environ,
+        'PYTHONPATH': os.pathsep.join((str(PACKAGE), os.environ.get('PYTHONPATH', ''))),
+    }
+    return subprocess.Popen(
+        [sys.executable, '-m', f'canopen_sim.nodes.{node}', '--ros-args', *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        env=environment,
+    )
+
+
+@pytest.fixture
+def processes() -> Iterator[list[subprocess.Popen[str]]]:
+    """Processes that are killed at the end, whatever happens."""
+    started: list[subprocess.Popen[str]] = []
+    yield started
+    for process in started:
+        process.kill()
+        process.communicate()
+
+
+def output(process: subprocess.Popen[str]) -> str:
+    """Wait for the end of a process and return what it wrote."""
+    return process.communicate(timeout=ARRIVAL)[0]
+
+
+@pytest.mark.scenario
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_all_slaves_of_the_article(
+    folder: Path, processes: list[subprocess.Popen[str]], number: signal.Signals
+) -> None:
+    """Seven drives boot on the bus; Ctrl-C and SIGTERM end the process cleanly."""
+    name = free_multicast()
+    with open_bus(name) as bus:
+        process = start('fake_slaves', bus_config=str(folder / 'bus.yml'), can_interface_name=name)
+        processes.append(process)
+        booted: set[int] = set()
+        deadline = time.monotonic() + ARRIVAL
+        while len(booted) < 7:
+            assert time.monotonic() < deadline
+            assert process.poll() is None, output(process)
+            booted |= {f.can_id for f in bus.receive(0.5) if f.data == b'\x00'}
+        assert booted == set(range(0x702, 0x709))
+        process.send_signal(number)
+        text = output(process)
+    assert process.returncode == 0, text
+    assert f'7 simulated drives on {name}' in text
+    assert 'Traceback' not in text
+
+
+@pytest.mark.scenario
+def test_one_slave(processes: list[subprocess.Popen[str]]) -> None:
+    """One drive with the id that was asked for, made from an EDS."""
+    name = free_multicast()
+    with open_bus(name) as bus:
+        process = start('fake_slave', node_id=17, slave_config=str(EDS), can_interface_name=name)
+        processes.append(process)
+        deadline = time.monotonic() + ARRIVAL
+        while not any(frame.can_id == 0x711 for frame in bus.receive(0.5)):
+            assert time.monotonic() < deadline
+            assert process.poll() is None, output(process)
+        process.send_signal(signal.SIGINT)
+        text = output(process)
+    assert process.returncode == 0, text
+    assert 'simulated drive 17' in text
+
+
+BAD: dict[str, tuple[str, dict[str, str | int], str]] = {
+    'no bus.yml given': ('fake_slaves', {}, 'no bus_config'),
+    'no such bus.yml': ('fake_slaves', {'bus_config': '/nowhere/bus.yml'}, '/nowhere/bus.yml'),
+    'no such EDS': ('fake_slave', {'slave_config': '/nowhere/a.eds'}, '/nowhere/a.eds'),
+    'no such scenario': ('fake_slave', {'scenario': '/nowhere/s.yaml'}, '/nowhere/s.yaml'),
+    'no such bus': ('fake_slave', {'can_interface_name': 'nothing99'}, 'nothing99'),
+    'node id out of range': ('fake_slave', {'node_id': 128}, 'node_id'),
+    'node id of another type': ('fake_slave', {'node_id': 'seven'}, 'node_id'),
+}
+
+
+@pytest.mark.scenario
+@pytest.mark.parametrize('case', BAD)
+def test_errors_are_one_message(processes: list[subprocess.Popen[str]], case: str) -> None:
+    """What cannot work is said in one message with the culprit; the exit code is 1."""
+    node, parameters, culprit = BAD[case]
+    process = start(node, **{'can_interface_name': free_multicast(), **parameters})
+    processes.append(process)
+    text = output(process)
+    assert process.returncode == 1, text
+    assert culprit in text
+    assert text.count('[FATAL]') == 1
+    assert 'Traceback' not in text

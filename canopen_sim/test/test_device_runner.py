@@ -1,0 +1,58 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Simulated devices whose computer stood still."""
+
+from __future__ import annotations
+
+import threading
+
+from can_addresses import free_virtual
+from device_rig import drive_dictionary, NODE_ID, with_defaults
+import pytest
+
+from arm_canopen.can import Frame, open_bus
+from arm_canopen.standard.cob_id import CobId, tpdo_default
+from arm_canopen.standard.nmt import nmt_frame, NmtCommand
+from canopen_sim import runner
+from canopen_sim.runner import DeviceRunner, newest_process_data
+
+PATIENCE = 10.0  # [s]
+
+
+def test_of_process_data_the_newest_is_kept_and_of_services_all() -> None:
+    """In the order of arrival."""
+    sync, old, new = Frame(0x080), Frame(0x205, b'\1'), Frame(0x205, b'\2')
+    start, read, lss = Frame(0x000, b'\1\5'), Frame(0x605, bytes(8)), Frame(0x7E5, bytes(8))
+    batch = [sync, old, start, read, Frame(0x705, b'\5'), lss, Frame(0x080), new, read, lss, start]
+    assert newest_process_data(batch) == [
+        *(start, read, Frame(0x705, b'\5'), lss),
+        *(Frame(0x080), new, read, lss, start),
+    ]
+
+
+def test_a_device_that_stood_still_does_not_live_through_what_it_missed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It answers one SYNC and not all of the past, as a burst of positions that are long over."""
+    monkeypatch.setattr(runner, 'STALL', 0.0)
+    name = free_virtual()
+    with open_bus(name) as bus, open_bus(name) as master:
+        devices = DeviceRunner(bus)
+        dictionary = with_defaults(drive_dictionary(), {(0x1800, 2): 1})  # on each SYNC
+        devices.host.add(NODE_ID, dictionary)
+        devices.start()
+        gate = threading.Event()
+        try:
+            devices.call(lambda: None).result(PATIENCE)
+            devices.call(lambda: gate.wait(PATIENCE))
+            master.send(Frame(CobId.NMT, nmt_frame(NmtCommand.START, NODE_ID)))
+            for _ in range(20):
+                master.send(Frame(CobId.SYNC))
+            gate.set()
+            devices.call(lambda: None).result(PATIENCE)
+            devices.call(lambda: None).result(PATIENCE)
+        finally:
+            gate.set()
+            devices.stop()
+        answers = [f for f in master.receive(0.0) if f.can_id == tpdo_default(1, NODE_ID)]
+    assert len(answers) == 1

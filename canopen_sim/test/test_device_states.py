@@ -1,0 +1,396 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""State machine of the simulated drive: every state and every command, and the ramps between."""
+
+from __future__ import annotations
+
+from device_rig import (
+    DISABLE_VOLTAGE,
+    drive_dictionary,
+    ENABLE,
+    FAULT_RESET,
+    QUICK_STOP,
+    Rig,
+    SHUTDOWN,
+    SWITCH_ON,
+    with_defaults,
+)
+import pytest
+
+from arm_canopen.standard.dictionary import ObjectDictionary
+from arm_canopen.standard.drive import drive_state
+from arm_canopen.standard.drive import DriveState as State
+from canopen_sim.drive.states import decode_command, DriveCommand
+
+pytestmark = pytest.mark.slow
+
+NOT_READY, SOD, READY, ON, OE, QS, REACTION, FAULT = tuple(State)[1:]
+
+TO_STATE = {
+    SOD: [],
+    READY: [SHUTDOWN],
+    ON: [SHUTDOWN, SWITCH_ON],
+    OE: [SHUTDOWN, SWITCH_ON, ENABLE],
+    QS: [SHUTDOWN, SWITCH_ON, ENABLE, QUICK_STOP],
+}
+
+TABLE = {
+    SOD: {SHUTDOWN: READY},
+    READY: {
+        SWITCH_ON: ON,
+        ENABLE: OE,
+        DISABLE_VOLTAGE: SOD,
+        QUICK_STOP: SOD,
+    },
+    ON: {SHUTDOWN: READY, ENABLE: OE, DISABLE_VOLTAGE: SOD, QUICK_STOP: SOD},
+    OE: {SHUTDOWN: READY, SWITCH_ON: ON, DISABLE_VOLTAGE: SOD, QUICK_STOP: QS},
+    QS: {ENABLE: OE, DISABLE_VOLTAGE: SOD},
+    FAULT: {FAULT_RESET: SOD},
+}
+"""Where a controlword leads (CiA 402-2, figure 4 and table 26); all others lead nowhere.
+
+In Quick stop active with an option code of 5 to 8; with the others it is left by itself.
+"""
+
+BASE_WORDS = [SHUTDOWN, SWITCH_ON, ENABLE, QUICK_STOP, DISABLE_VOLTAGE, FAULT_RESET]
+
+
+def expected(state: State, word: int) -> State:
+    """Return the next state by the mask rows of CiA 402-2, table 26."""
+    if word & FAULT_RESET:
+        return SOD if state is FAULT else state
+    if state is FAULT:
+        return FAULT
+    if not word & 0x02:
+        command = DISABLE_VOLTAGE
+    elif not word & 0x04:
+        command = QUICK_STOP
+    elif not word & 0x01:
+        command = SHUTDOWN
+    else:
+        command = ENABLE if word & 0x08 else SWITCH_ON
+    return TABLE[state].get(command, state)
+
+
+def rig_in(state: State, *, option: int = 6) -> Rig:
+    """Return a drive at rest in a state."""
+    rig = Rig()
+    rig.put(0x605A, option)
+    if state is FAULT:
+        rig.drive.raise_fault(0x2310)
+    else:
+        rig.command(*TO_STATE[state])
+    assert rig.state is state
+    return rig
+
+
+@pytest.mark.parametrize('state', [SOD, READY, ON, OE, QS, FAULT])
+def test_every_state_and_controlword(state: State) -> None:
+    """The lower byte of the controlword leads where the table says, from each state at rest."""
+    for word in range(256):
+        rig = rig_in(state)
+        if state is FAULT:  # the reset is an edge
+            rig.command(0)
+        if word == rig.get(0x6040):
+            continue  # no change, no command
+        rig.command(word)
+        assert rig.drive.state is expected(state, word), f'controlword 0x{word:02X}'
+        assert drive_state(rig.statusword) is rig.drive.state
+
+
+def test_commands_are_decoded_by_their_masks() -> None:
+    """Every word is one command, but with bit 7 it is none (CiA 402-2, table 26)."""
+    for word in range(256):
+        assert (decode_command(word) is DriveCommand.NONE) is bool(word & 0x80)
+
+
+def test_starts_by_itself() -> None:
+    """Transitions 0 and 1: after the start of the device the drive can be switched on."""
+    rig = Rig(boot_time=0.5)
+    assert rig.drive.state is NOT_READY
+    rig.run(1.0)
+    assert rig.drive.state is SOD
+
+
+def test_reset_of_the_node_starts_anew() -> None:
+    """An enabled drive is Switch on disabled after a reset of its node, and stays where it is."""
+    rig = rig_in(OE)
+    position = rig.position
+    rig.send(0, bytes((0x81, rig.node_id)))
+    assert rig.state is SOD
+    assert rig.position == position
+    rig.run(1.0)
+    assert rig.position == position
+
+
+@pytest.mark.parametrize('state', [SOD, READY, ON, OE, QS])
+def test_fault_from_every_state(state: State) -> None:
+    """Transitions 13 and 14: a fault leads to Fault from everywhere, and is told."""
+    rig = rig_in(state)
+    rig.drive.raise_fault(0x4310)
+    rig.run(0.1)
+    assert rig.state is FAULT
+    assert rig.get(0x603F) == 0x4310
+
+
+def test_fault_reset_is_an_edge() -> None:
+    """A fault reset bit that is held resets no second fault."""
+    rig = rig_in(FAULT)
+    rig.command(FAULT_RESET)
+    assert rig.state is SOD
+    rig.drive.raise_fault(0x2310)
+    rig.command(FAULT_RESET | 0x06)
+    assert rig.state is FAULT
+    rig.command(0x00, FAULT_RESET)
+    assert rig.state is SOD
+
+
+def test_held_reset_bit_is_no_command() -> None:
+    """After the reset the bit has to go before the drive obeys (CiA 402-2, table 26)."""
+    rig = rig_in(FAULT)
+    rig.command(FAULT_RESET | SHUTDOWN)
+    assert rig.state is SOD
+    rig.command(SHUTDOWN)
+    assert rig.state is READY
+
+
+@pytest.mark.parametrize(
+    ('word', 'low_bits'),
+    [
+        (None, 0x250),
+        (SHUTDOWN, 0x231),
+        (SWITCH_ON, 0x233),
+        (ENABLE, 0x237),
+        (QUICK_STOP, 0x217),
+    ],
+)
+def test_statusword(word: int | None, low_bits: int) -> None:
+    """Beside the state the word shows voltage and remote (CiA 402-2, tables 30 and 31)."""
+    rig = Rig()
+    rig.put(0x605A, 6)
+    for command in (SHUTDOWN, SWITCH_ON, ENABLE, QUICK_STOP):
+        if word is None:
+            break
+        rig.command(command)
+        if command == word:
+            break
+    assert rig.statusword & ~0x400 == low_bits
+
+
+def test_voltage_is_needed_to_switch_on() -> None:
+    """Without voltage the drive stays Ready; when it comes, the waiting command is obeyed."""
+    rig = rig_in(READY)
+    rig.drive.set_voltage(False)
+    assert rig.state is READY
+    assert not rig.statusword & 0x10
+    rig.command(SWITCH_ON)
+    assert rig.state is READY
+    rig.drive.set_voltage(True)
+    assert rig.state is ON
+
+
+@pytest.mark.parametrize('state', [ON, OE, QS])
+def test_loss_of_voltage_is_a_fault_when_switched_on(state: State) -> None:
+    """A drive that is switched on faults with under-voltage, and has no torque at once."""
+    rig = rig_in(state)
+    rig.drive.set_voltage(False)
+    assert rig.drive.state is FAULT
+    assert rig.get(0x603F) == 0x3220
+
+
+@pytest.mark.parametrize('state', [SOD, READY])
+def test_loss_of_voltage_is_none_when_off(state: State) -> None:
+    """A drive that is off does not mind."""
+    rig = rig_in(state)
+    rig.drive.set_voltage(False)
+    assert rig.state is state
+
+
+def moving(**options: int) -> Rig:
+    """Return a drive that turns at 1000 inc/s in profile velocity mode."""
+    rig = Rig()
+    for name, value in options.items():
+        rig.put(int(name.removeprefix('o'), 16), value)
+    rig.put(0x60FF, 1000)
+    rig.enable(3)
+    rig.run(1.0)
+    assert rig.get(0x606C) == 1000
+    return rig
+
+
+def ramp(rig: Rig, duration: float = 1.0) -> tuple[float, float, list[State]]:
+    """Return time to standstill, its distance, and the states on the way."""
+    start, origin = rig.now, rig.position
+    states = [rig.drive.state]
+    stopped = rig.now
+    while rig.now < start + duration:
+        rig.run(0.001)
+        if rig.drive.state is not states[-1]:
+            states.append(rig.drive.state)
+        if abs(rig.velocity) > 1.0:
+            stopped = rig.now
+    return stopped - start, rig.position - origin, states
+
+
+SLOW = 1000.0 / 10_000.0  # [s] by 0x6084
+QUICK = 1000.0 / 20_000.0  # [s] by 0x6085
+
+
+@pytest.mark.parametrize(
+    ('option', 'time', 'states'),
+    [
+        (1, SLOW, [QS, SOD]),
+        (2, QUICK, [QS, SOD]),
+        (5, SLOW, [QS]),
+        (6, QUICK, [QS]),
+    ],
+)
+def test_quick_stop(option: int, time: float, states: list[State]) -> None:
+    """0x605A chooses the ramp of a quick stop, and whether its state is left."""
+    rig = moving(o605A=option)
+    rig.command(QUICK_STOP)
+    duration, distance, seen = ramp(rig)
+    assert duration == pytest.approx(time, abs=0.03)
+    assert distance == pytest.approx(1000.0 * time / 2.0 + 2.0, rel=0.05)
+    assert seen == states
+    assert bool(rig.statusword & 0x400) is (states == [QS])
+
+
+def test_quick_stop_without_ramp() -> None:
+    """Option 0 takes the torque away; the motor runs out."""
+    rig = moving(o605A=0)
+    rig.command(QUICK_STOP)
+    _, distance, states = ramp(rig)
+    assert states == [SOD]
+    assert 0.0 < distance < 100.0
+
+
+def test_quick_stop_cannot_be_called_off() -> None:
+    """With option 2, Quick stop active is left downwards only."""
+    rig = moving(o605A=2)
+    rig.command(QUICK_STOP, ENABLE)
+    assert rig.drive.state is QS
+    _, _, states = ramp(rig)
+    assert states == [QS, SOD]
+
+
+def test_enable_after_quick_stop_with_stay() -> None:
+    """With option 6, Enable operation goes on from where the ramp is."""
+    rig = moving(o605A=6)
+    rig.command(QUICK_STOP)
+    rig.run(0.02)
+    before = rig.velocity
+    rig.command(ENABLE)
+    assert rig.drive.state is OE
+    assert rig.velocity == pytest.approx(before)
+    rig.run(1.0)
+    assert rig.get(0x606C) == 1000
+
+
+@pytest.mark.parametrize(
+    ('options', 'word', 'time', 'states'),
+    [
+        ({}, SWITCH_ON, SLOW, [OE, ON]),
+        ({'o605C': 0}, SWITCH_ON, None, [ON]),
+        ({}, SHUTDOWN, None, [READY]),
+        ({'o605B': 1}, SHUTDOWN, SLOW, [OE, READY]),
+        ({}, DISABLE_VOLTAGE, None, [SOD]),
+    ],
+)
+def test_leaving_operation_enabled(
+    options: dict[str, int], word: int, time: float | None, states: list[State]
+) -> None:
+    """0x605B and 0x605C choose between a ramp, after which the state changes, and no torque."""
+    rig = moving(**options)
+    rig.command(word)
+    duration, distance, seen = ramp(rig)
+    assert seen == states
+    if time is not None:
+        assert duration == pytest.approx(time, abs=0.03)
+        assert distance == pytest.approx(1000.0 * time / 2.0 + 2.0, rel=0.05)
+
+
+def test_ramp_out_of_operation_enabled_can_be_called_off() -> None:
+    """Enable operation during the ramp of "disable operation" makes the drive go on."""
+    rig = moving()
+    rig.command(SWITCH_ON)
+    rig.run(0.05)
+    rig.command(ENABLE)
+    _, _, states = ramp(rig)
+    assert states == [OE]
+    assert rig.get(0x606C) == 1000
+
+
+def test_command_through_two_states_after_the_ramp() -> None:
+    """Disable voltage overtakes a ramp; a repeated command does not start it anew."""
+    rig = moving()
+    rig.command(SWITCH_ON, 0x107)
+    rig.run(0.05)
+    rig.command(DISABLE_VOLTAGE)
+    assert rig.state is SOD
+
+
+@pytest.mark.parametrize(
+    ('option', 'time', 'states'),
+    [
+        (0, None, [FAULT]),
+        (1, SLOW, [REACTION, FAULT]),
+        (2, QUICK, [REACTION, FAULT]),
+    ],
+)
+def test_fault_reaction(option: int, time: float | None, states: list[State]) -> None:
+    """0x605E chooses how a moving drive is stopped by a fault."""
+    rig = moving(o605E=option)
+    rig.drive.raise_fault(0x2310, rig.now)
+    duration, distance, seen = ramp(rig)
+    assert seen == states
+    if time is not None:
+        assert duration == pytest.approx(time, abs=0.03)
+        assert distance == pytest.approx(1000.0 * time / 2.0 + 2.0, rel=0.05)
+
+
+def test_loss_of_voltage_ends_a_fault_reaction() -> None:
+    """Without voltage there is no ramp any more."""
+    rig = moving()
+    rig.drive.raise_fault(0x2310, rig.now)
+    rig.run(0.01)
+    rig.drive.set_voltage(False)
+    assert rig.drive.state is FAULT
+
+
+def test_enabling_a_motor_that_runs_out_does_not_jerk() -> None:
+    """A motor that is still coasting is caught at its velocity and stopped."""
+    rig = moving(o605C=0)
+    rig.put(0x60FF, 0)
+    rig.command(DISABLE_VOLTAGE)
+    rig.run(0.01)
+    before = rig.velocity
+    rig.put(0x6060, 1)
+    rig.command(SHUTDOWN, SWITCH_ON, ENABLE)
+    assert rig.velocity == pytest.approx(before)
+    last = before
+    for _ in range(100):
+        rig.run(0.001)
+        assert rig.velocity <= last + 1e-6
+        last = rig.velocity
+    assert last == pytest.approx(0.0, abs=1.0)
+
+
+def test_dictionary_with_an_unknown_option() -> None:
+    """An option code of the dictionary that is not simulated acts like the usual one."""
+    rig = Rig(with_defaults(drive_dictionary(), {(0x605A, 0): 9}))
+    rig.command(*TO_STATE[OE], QUICK_STOP)
+    rig.run(0.1)
+    assert rig.state is SOD
+
+
+def test_drive_of_a_poor_dictionary() -> None:
+    """Controlword, statusword and a mode are enough for a drive."""
+    kept = {0x6040, 0x6041, 0x6060, 0x6061, 0x6064, 0x607A}
+    entries = [e for e in drive_dictionary() if e.index < 0x6000 or e.index in kept]
+    rig = Rig(ObjectDictionary(entries))
+    rig.put(0x607A, 1000)
+    rig.enable(8)
+    rig.put(0x607A, 1000)
+    rig.run(1.0)
+    assert rig.get(0x6064) == 1000
