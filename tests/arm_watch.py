@@ -17,7 +17,7 @@ import time
 from arm_canopen.can import Frame
 from arm_canopen.standard.cob_id import rpdo_default, tpdo_default
 from arm_canopen.standard.drive import drive_state, DriveState
-from arm_servo import JointLimits
+from arm_model import JointLimits
 
 INCREMENTS = 1000.0
 """Of a radian, as the Panda's bus.yml has it."""

@@ -33,8 +33,8 @@ from arm_bringup.description import expand_xacro
 from arm_bringup.robots import installed_robots_folder
 from arm_canopen.can import Frame
 from arm_canopen.standard.cob_id import CobId
-from arm_servo import load_limits, MotionCore, RobotModel, SetPoint
-from arm_servo.arrays import Array
+from arm_model import Array, load_limits, RobotModel
+from arm_servo import MotionCore, SetPoint
 from arm_servo.commands import twist_command
 from arm_servo.gateway import CommandGateway, start_worker
 from arm_servo.nodes.following import FollowingLimits, FollowingWatch

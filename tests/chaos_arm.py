@@ -21,7 +21,7 @@ from simulated_arm import JOINTS
 
 from arm_bringup.description import expand_xacro
 from arm_canopen.can import open_bus
-from arm_servo import JointLimits, load_limits, RobotModel
+from arm_model import JointLimits, load_limits, RobotModel
 from arm_watch import ArmWatch
 
 if TYPE_CHECKING:

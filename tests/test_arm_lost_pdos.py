@@ -11,10 +11,10 @@ from collections.abc import Sequence
 from concurrent.futures import Future
 from itertools import pairwise
 
+from model_robots import ready, robot
 import numpy as np
 import pytest
 from servo_commands import InlineWorker, outcome
-from servo_robots import ready, robot
 from virtual_network import bus_config, drive_config, PERIOD, SCALE, VirtualNetwork
 
 from arm_canopen import MotionSource

@@ -13,7 +13,7 @@ from .findings import error, Finding, warning
 from .robots import Robot
 
 if TYPE_CHECKING:
-    from arm_servo import RobotModel
+    from arm_model import RobotModel
 
 START = 'ready'
 """Pose of the SRDF from which an arm starts."""
@@ -32,7 +32,7 @@ def check_motion(robot: Robot, urdf: str, joints: Sequence[str]) -> list[Finding
         joints: Names of the movable joints in it.
     """
     try:
-        from arm_servo import LimitsError, load_limits, ModelError, RobotModel
+        from arm_model import LimitsError, load_limits, ModelError, RobotModel
     except ImportError as problem:
         return [
             warning(

@@ -12,7 +12,7 @@ import pytest
 from arm_bringup.demos.figures import BusFigures
 from arm_bringup.demos.motion.goals import beside, duration
 from arm_bringup.demos.motion.results import Results, Square
-from arm_servo import JointLimits
+from arm_model import JointLimits
 
 
 def limits(count: int, scale: float) -> JointLimits:

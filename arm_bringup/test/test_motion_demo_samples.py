@@ -19,7 +19,7 @@ from arm_bringup.demos.motion.samples import (
     tool_speed,
     tracking_error,
 )
-from arm_servo.arrays import Array
+from arm_model import Array
 
 PERIOD = 0.01
 

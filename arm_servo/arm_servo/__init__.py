@@ -4,23 +4,24 @@
 
 from __future__ import annotations
 
+from arm_model import (
+    ArmError,
+    CommandError,
+    JointLimits,
+    LimitsError,
+    load_limits,
+    ModelError,
+    Pose,
+    RobotModel,
+    RobotState,
+)
+
 from .bounds import BrakeSettings
 from .core import MotionCore
 from .core_settings import CoreSettings
-from .exceptions import (
-    CommandError,
-    GoalCode,
-    GoalError,
-    LimitsError,
-    ModelError,
-    NotReadyError,
-    ServoError,
-)
+from .exceptions import GoalCode, GoalError, NotReadyError
 from .execution import Execution, ExecutionSettings, Feedback, Phase
 from .goal import GoalPoint, GoalRules, JointTolerance, TrajectoryGoal
-from .limits import JointLimits, load_limits
-from .model import Pose, RobotModel
-from .otg import MotionState
 from .outcome import Outcome
 from .parameter_check import check_parameters
 from .report import Cause, Limiter, MotionReport
@@ -29,6 +30,7 @@ from .set_point import SetPoint, Source
 from .velocity_ik import IkSettings
 
 __all__ = [
+    'ArmError',
     'BrakeSettings',
     'Cause',
     'CommandError',
@@ -48,13 +50,12 @@ __all__ = [
     'ModelError',
     'MotionCore',
     'MotionReport',
-    'MotionState',
     'NotReadyError',
     'Outcome',
     'Phase',
     'Pose',
     'RobotModel',
-    'ServoError',
+    'RobotState',
     'ServoSettings',
     'SetPoint',
     'Source',

@@ -15,8 +15,8 @@ import math
 
 import numpy as np
 
-from .arrays import Array
-from .limits import JointLimits
+from arm_model import Array, JointLimits
+
 from .otg import brakeable, brakeable_velocity
 from .singular import Directions, LOST, way_out, way_to_fold
 

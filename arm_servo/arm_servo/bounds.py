@@ -9,11 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .arrays import Array, frozen
-from .clearances import Proximity
-from .limits import JointLimits
-from .model import RobotModel
-from .otg import brakeable_velocity, MotionState
+from arm_model import Array, frozen, JointLimits, Proximity, RobotModel, RobotState
+
+from .otg import brakeable_velocity
 from .report import Cause, Limiter
 
 PRESSING = 1e-9
@@ -98,7 +96,7 @@ class Brakes:
             1.5 * limits.acceleration**2 / limits.jerk + 0.01 * limits.acceleration
         )
 
-    def bounds(self, state: MotionState, period: float) -> Bounds:
+    def bounds(self, state: RobotState, period: float) -> Bounds:
         """Find the bounds in a state.
 
         Args:
@@ -127,7 +125,7 @@ class Brakes:
         least = np.minimum(allowed, best)
         return Bounds(below, above, slowest, fastest, lower, upper, near, rows, least)
 
-    def _in_step(self, state: MotionState) -> JointLimits:
+    def _in_step(self, state: RobotState) -> JointLimits:
         """Return limits with which all joints brake in step: the tool keeps its direction."""
         limits, speeds = self._limits, np.abs(state.velocity)
         longest = float(np.max(speeds / limits.acceleration))
@@ -142,7 +140,7 @@ class Brakes:
             limits.jerk * share,
         )
 
-    def _lead(self, state: MotionState) -> Array:
+    def _lead(self, state: RobotState) -> Array:
         """Return the way down and up that goes by while an acceleration is taken back (2, n)."""
         acceleration = np.maximum(BOTH * state.acceleration, 0.0)
         velocity = np.maximum(BOTH * state.velocity, 0.0)

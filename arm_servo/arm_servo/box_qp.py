@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import daqp
 import numpy as np
 
-from .arrays import Array
+from arm_model import Array
 
 OPTIMAL = 1
 """Exit flag of daqp."""

@@ -8,8 +8,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from .limits import JointLimits
-from .otg import Generator, MotionState, Plan
+from arm_model import JointLimits, RobotState
+
+from .otg import Generator, Plan
 
 SOON = (4, 10, 25, 60, 150)
 """Cycles after which a meeting is tried."""
@@ -60,8 +61,8 @@ class CatchUpInterpolator:
         return self._exact
 
     def step(
-        self, state: MotionState, ahead: Callable[[float], MotionState], period: float
-    ) -> MotionState | None:
+        self, state: RobotState, ahead: Callable[[float], RobotState], period: float
+    ) -> RobotState | None:
         """Take a step.
 
         Args:
@@ -89,7 +90,7 @@ class CatchUpInterpolator:
         self._elapsed += period
         return self._plan.at(self._elapsed)
 
-    def _kept(self, state: MotionState, ahead: Callable[[float], MotionState]) -> bool:
+    def _kept(self, state: RobotState, ahead: Callable[[float], RobotState]) -> bool:
         """Whether the plan still begins and ends where it should."""
         if self._plan is None:
             return False
@@ -97,7 +98,7 @@ class CatchUpInterpolator:
         foreseen, now = self._within(ahead(left)), self._plan.at(self._elapsed)
         return _same(now, state) and _same(self._plan.at(self._plan.duration), foreseen)
 
-    def _allowed(self, state: MotionState, wanted: MotionState, period: float) -> bool:
+    def _allowed(self, state: RobotState, wanted: RobotState, period: float) -> bool:
         """Whether a jerk within the limits leads from one state to the other."""
         if not self._soft(state, wanted, period):
             return False
@@ -110,7 +111,7 @@ class CatchUpInterpolator:
         way = wanted.position - state.position - (state.velocity + bend) * period
         return bool(np.all(np.abs(way) <= shift * most * period**2))
 
-    def _soft(self, state: MotionState, wanted: MotionState, period: float) -> bool:
+    def _soft(self, state: RobotState, wanted: RobotState, period: float) -> bool:
         """Whether a state is within the limits, and its acceleration near the present one."""
         limits = self._limits
         bend = np.abs(wanted.acceleration - state.acceleration)
@@ -121,7 +122,7 @@ class CatchUpInterpolator:
         )
 
     def _meeting(
-        self, state: MotionState, ahead: Callable[[float], MotionState], period: float
+        self, state: RobotState, ahead: Callable[[float], RobotState], period: float
     ) -> Plan | None:
         """Plan to where the state will be when it is met: soon where that can be, else later."""
         for cycles in SOON:
@@ -139,27 +140,27 @@ class CatchUpInterpolator:
             time = plan.duration
         return best
 
-    def _planned(self, state: MotionState, target: MotionState, shortest: float) -> Plan | None:
+    def _planned(self, state: RobotState, target: RobotState, shortest: float) -> Plan | None:
         plan = self._generator.to_state(state, target, shortest)
         if plan is not None:
             return plan
         plan = self._generator.to_state(state, target)  # ruckig may refuse a least duration
         if plan is not None:
             return plan
-        even = MotionState(target.position, target.velocity, np.zeros(len(target.velocity)))
+        even = RobotState(target.position, target.velocity, np.zeros(len(target.velocity)))
         return self._generator.to_state(state, even)
 
-    def _within(self, target: MotionState) -> MotionState:
+    def _within(self, target: RobotState) -> RobotState:
         """Return a state that can be met: its speed and acceleration within the limits."""
         limits = self._limits
         acceleration = np.clip(target.acceleration, -limits.acceleration, limits.acceleration)
         # a speed that does not overrun its limit before the acceleration is taken back
         coasting = acceleration**2 / (2.0 * limits.jerk)
         most = np.maximum(limits.velocity - coasting, 0.0)
-        return MotionState(target.position, np.clip(target.velocity, -most, most), acceleration)
+        return RobotState(target.position, np.clip(target.velocity, -most, most), acceleration)
 
 
-def _same(one: MotionState, other: MotionState) -> bool:
+def _same(one: RobotState, other: RobotState) -> bool:
     return bool(
         np.abs(one.position - other.position).max() < NEAR
         and np.abs(one.velocity - other.velocity).max() < 100.0 * NEAR

@@ -8,13 +8,13 @@ from collections.abc import Hashable
 
 import numpy as np
 
-from .arrays import Array
+from arm_model import Array, RobotModel, RobotState
+
 from .core_settings import CoreSettings
 from .exceptions import GoalCode
 from .execution import Execution
 from .jogging import Jogging
-from .model import RobotModel
-from .otg import Generator, hard_brake, MotionState
+from .otg import Generator, hard_brake
 from .outcome import Outcome
 from .report import MotionReport
 from .servo import Command
@@ -139,14 +139,14 @@ class CommandArbiter:
 
     def step(
         self,
-        state: MotionState,
-        measured: MotionState,
+        state: RobotState,
+        measured: RobotState,
         now: float,
         period: float,
         *,
         speed_scaling: float,
         paused: bool,
-    ) -> tuple[MotionState, MotionReport]:
+    ) -> tuple[RobotState, MotionReport]:
         """Return the next state that is wanted, and what limits it.
 
         Args:
@@ -169,7 +169,7 @@ class CommandArbiter:
             wanted = self._toward(state, np.zeros(len(self._limits)), period)
         return wanted, report
 
-    def ended(self, state: MotionState, now: float, *, paused: bool) -> Source:
+    def ended(self, state: RobotState, now: float, *, paused: bool) -> Source:
         """Return what moved the arm in this cycle, and let go of what has ended.
 
         Args:
@@ -186,10 +186,10 @@ class CommandArbiter:
             self.release('')
         return source
 
-    def _toward(self, state: MotionState, velocity: Array, period: float) -> MotionState:
+    def _toward(self, state: RobotState, velocity: Array, period: float) -> RobotState:
         plan = self._generator.to_velocity(state, velocity)
         if plan is None:
             return hard_brake(state, self._limits, period)
         if period >= plan.duration and not velocity.any():
-            return MotionState.at_rest(plan.at(plan.duration).position)
+            return RobotState.at_rest(plan.at(plan.duration).position)
         return plan.at(period)

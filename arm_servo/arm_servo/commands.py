@@ -10,9 +10,8 @@ import math
 
 import numpy as np
 
-from .arrays import Array, checked, Mask
-from .exceptions import CommandError
-from .model import combined, Pose, RobotModel
+from arm_model import Array, checked, combined, CommandError, Mask, Pose, RobotModel
+
 from .requests import JogRequest
 from .servo import Command, JointCommand, PoseCommand, TwistCommand
 

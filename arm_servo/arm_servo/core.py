@@ -17,15 +17,15 @@ import math
 
 import numpy as np
 
-from .arrays import Array, checked
+from arm_model import Array, checked, CommandError, Pose, RobotModel, RobotState
+
 from .command_arbiter import CommandArbiter, Motion
 from .commands import by_joint, duration_of, in_base, pose_command, twist_command
 from .core_settings import CoreSettings
-from .exceptions import CommandError, GoalCode, NotReadyError, StateMovedError
+from .exceptions import GoalCode, NotReadyError, StateMovedError
 from .execution import Execution, Feedback
 from .goal import TrajectoryGoal
-from .model import Pose, RobotModel
-from .otg import Generator, MotionState
+from .otg import Generator
 from .outcome import Outcome
 from .preparation import CommandBasis, Preparation, Prepared
 from .report import Cause, Limiter
@@ -60,7 +60,7 @@ class MotionCore:
         self._preparation = Preparation(model, generator, self._settings)
         self._arbiter = CommandArbiter(model, generator, self._settings)
         self._filter = SafetyFilter(model, generator)
-        self._state: MotionState | None = None
+        self._state: RobotState | None = None
         self._speed = 1.0
         self._paused = False
         self._sequence = 0
@@ -73,7 +73,7 @@ class MotionCore:
         return self._model
 
     @property
-    def state(self) -> MotionState:
+    def state(self) -> RobotState:
         """The commanded state.
 
         Raises:
@@ -144,7 +144,7 @@ class MotionCore:
         where = checked(positions, len(self._model), 'positions')
         self._changed('the arm was moved by something else')
         self._arbiter.release(reason)
-        self._state = MotionState.at_rest(where)
+        self._state = RobotState.at_rest(where)
         self._filter.reset(self._state)
 
     def prepare(self, request: MotionRequest, basis: CommandBasis) -> Prepared:
@@ -372,7 +372,7 @@ class MotionCore:
             raise CommandError(f'speed override {speed}: it must be between 0 and 1')
         self._speed = speed
 
-    def step(self, now: float, period: float, measured: MotionState | None = None) -> SetPoint:
+    def step(self, now: float, period: float, measured: RobotState | None = None) -> SetPoint:
         """Return the set-point of a cycle.
 
         Args:
@@ -405,7 +405,7 @@ class MotionCore:
         """Speed override that counts, 0 to 1: none while it is paused."""
         return 0.0 if self._paused else self._speed
 
-    def _clearance(self, state: MotionState) -> float | None:
+    def _clearance(self, state: RobotState) -> float | None:
         """Return the distance that links must keep on a stop in [m].
 
         None for what is on a path that was checked: a stop stays on it.
@@ -448,7 +448,7 @@ class MotionCore:
         self._sequence += 1
         self._last_change = what
 
-    def _check_place(self, planned: MotionState, state: MotionState) -> None:
+    def _check_place(self, planned: RobotState, state: RobotState) -> None:
         """Make sure that the arm is where a trajectory was prepared; else its way is another."""
         off = np.abs(state.position - planned.position)
         joint = int(np.argmax(off))

@@ -1,16 +1,14 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Everything that arm_servo raises.
+"""Everything that arm_servo raises beside the errors of arm_model.
 
 ::
 
-    ServoError
-    ├── ModelError (ValueError)     description, SRDF and limits do not make an arm
-    │   └── LimitsError             the limits file is the matter
-    ├── CommandError (ValueError)   a command is refused before anything moves
-    │   └── GoalError               a trajectory is refused; carries the code of the action
-    │       └── StateMovedError     the arm is elsewhere than where it was planned
-    └── NotReadyError               nothing can be commanded before the arm's position is known
+    ArmError (of arm_model)
+    ├── CommandError (of arm_model)   a command is refused before anything moves
+    │   └── GoalError                 a trajectory is refused; carries the code of the action
+    │       └── StateMovedError       the arm is elsewhere than where it was planned
+    └── NotReadyError                 nothing can be commanded before the arm's position is known
 
 Arguments of the wrong kind from a *programmer* stay ``ValueError``/``TypeError``.
 """
@@ -18,6 +16,8 @@ Arguments of the wrong kind from a *programmer* stay ``ValueError``/``TypeError`
 from __future__ import annotations
 
 from enum import IntEnum
+
+from arm_model import ArmError, CommandError
 
 
 class GoalCode(IntEnum):
@@ -29,33 +29,6 @@ class GoalCode(IntEnum):
     OLD_HEADER_TIMESTAMP = -3
     PATH_TOLERANCE_VIOLATED = -4
     GOAL_TOLERANCE_VIOLATED = -5
-
-
-class ServoError(Exception):
-    """Root of all errors of this package."""
-
-
-class ModelError(ServoError, ValueError):
-    """Description, SRDF and limits do not make an arm.
-
-    Scenarios: a joint of the group has no acceleration limit, the group is unknown, the tip link
-    is misspelt, a pose of the SRDF is beyond a limit.
-    """
-
-
-class LimitsError(ModelError):
-    """The limits file cannot be read, or does not have what it must.
-
-    Scenarios: a joint without max_jerk, a speed that is wider than the description's, a number
-    that is none.
-    """
-
-
-class CommandError(ServoError, ValueError):
-    """A command is refused before anything moves.
-
-    Scenarios: a NaN, an unknown joint, a twist that is not six numbers, a speed override of 120 %.
-    """
 
 
 class GoalError(CommandError):
@@ -82,7 +55,7 @@ class StateMovedError(GoalError):
     """The arm is elsewhere than where a trajectory was planned; planned anew it may begin."""
 
 
-class NotReadyError(ServoError):
+class NotReadyError(ArmError):
     """Nothing can be commanded before the arm's position is known.
 
     Scenarios: a command before the first joint state, or after the set-point was dropped.

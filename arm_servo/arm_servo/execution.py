@@ -10,13 +10,13 @@ from enum import Enum
 
 import numpy as np
 
-from .arrays import Array
+from arm_model import Array, JointLimits, RobotState
+
 from .catch_up import CatchUpInterpolator
 from .exceptions import GoalCode
 from .goal import GoalRules, JointTolerance, TrajectoryGoal
 from .goal_path import build_path
-from .limits import JointLimits
-from .otg import Generator, MotionState
+from .otg import Generator
 from .outcome import Outcome
 from .path import Path
 from .tolerances import tolerances
@@ -73,8 +73,8 @@ class Feedback:
     """
 
     time: float
-    desired: MotionState
-    actual: MotionState
+    desired: RobotState
+    actual: RobotState
     timer: TimerState
 
     @property
@@ -101,7 +101,7 @@ class Execution:
         *,
         limits: JointLimits,
         generator: Generator,
-        state: MotionState,
+        state: RobotState,
         speed_scaling: float,
         settings: ExecutionSettings,
         wait: float = 0.0,
@@ -140,7 +140,7 @@ class Execution:
         self.on_path = False
         begin_point = self._path.at(0.0)
         timer = TimerState(0.0, self._timer.speed_scaling, 0.0, speed_scaling, wait)
-        self.feedback = Feedback(0.0, MotionState.at_rest(begin_point.position), state, timer)
+        self.feedback = Feedback(0.0, RobotState.at_rest(begin_point.position), state, timer)
 
     @property
     def outcome(self) -> Outcome | None:
@@ -157,7 +157,7 @@ class Execution:
         """How long its path lasts at full speed in [s]."""
         return self._path.duration
 
-    def foreseen(self, ahead: float, timer: TimerState | None = None) -> MotionState:
+    def foreseen(self, ahead: float, timer: TimerState | None = None) -> RobotState:
         """Return where it will be when nothing comes in between; for any thread.
 
         Args:
@@ -204,8 +204,8 @@ class Execution:
             self.phase = Phase.DONE
 
     def step(
-        self, state: MotionState, measured: MotionState, speed_scaling: float, period: float
-    ) -> MotionState | None:
+        self, state: RobotState, measured: RobotState, speed_scaling: float, period: float
+    ) -> RobotState | None:
         """Advance.
 
         Args:
@@ -251,7 +251,7 @@ class Execution:
         self._timer.begin(speed_scaling)
         return speed_scaling == 0.0 or self.phase is Phase.STOPPING
 
-    def _wait(self, state: MotionState, speed_scaling: float, period: float) -> MotionState | None:
+    def _wait(self, state: RobotState, speed_scaling: float, period: float) -> RobotState | None:
         """Come to rest where the path begins, and wait there; all is planned already."""
         self._waiting -= period
         timer = TimerState(0.0, speed_scaling, 0.0, speed_scaling, max(self._waiting, 0.0))
@@ -262,28 +262,28 @@ class Execution:
         self._rested = self._rested or not state.moving
         if not self._rested or speed_scaling == 0.0:
             return None  # the joints slow down in step; in a pause they stay where they are
-        rest = MotionState.at_rest(self._path.at(0.0).position)
+        rest = RobotState.at_rest(self._path.at(0.0).position)
         return self._catch_up.step(state, lambda _: rest, period)
 
-    def _ahead(self, period: float) -> Callable[[float], MotionState]:
+    def _ahead(self, period: float) -> Callable[[float], RobotState]:
         """Return where the path will be, by the time from now in [s]."""
         timer = self._timer
 
-        def ahead(time: float) -> MotionState:
+        def ahead(time: float) -> RobotState:
             return self._state(*timer.ahead(time - period))
 
         return ahead
 
-    def _state(self, time: float, speed_scaling: float, change: float) -> MotionState:
+    def _state(self, time: float, speed_scaling: float, change: float) -> RobotState:
         """Return the state at a time of the path that runs at a speed scaling."""
         here = self._path.at(time)
-        return MotionState(
+        return RobotState(
             here.position,
             here.velocity * speed_scaling,
             here.acceleration * speed_scaling**2 + here.velocity * change,
         )
 
-    def _check(self, state: MotionState, measured: MotionState, period: float) -> None:
+    def _check(self, state: RobotState, measured: RobotState, period: float) -> None:
         """Check the tolerances at the present place."""
         desired, limits = self.feedback.desired, self._limits
         error = limits.error(desired.position, measured.position)
@@ -307,7 +307,7 @@ class Execution:
         name = self._limits.names[joint]
         return f'{name}: the set-point is {error[joint]:+.4f} rad off the path'
 
-    def _settle(self, state: MotionState, violation: str | None, period: float) -> None:
+    def _settle(self, state: RobotState, violation: str | None, period: float) -> None:
         """Wait at the end until the arm has arrived, or the time for that is over."""
         arrived = np.allclose(state.position, self._path.end.position, atol=ARRIVED)
         if violation is None and arrived and not state.moving:
@@ -324,7 +324,7 @@ class Execution:
             )
             self.phase = Phase.DONE
 
-    def _advance(self, state: MotionState | None) -> None:
+    def _advance(self, state: RobotState | None) -> None:
         """Go on to the next phase at the end of the path, or where it stands still."""
         if self.phase is Phase.FOLLOWING and self._timer.time >= self._path.duration:
             self.phase = Phase.SETTLING

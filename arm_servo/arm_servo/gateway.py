@@ -27,14 +27,13 @@ import threading
 import time
 from typing import Any
 
-from .arrays import Array
+from arm_model import Array, RobotModel, RobotState
+
 from .command_arbiter import Motion
 from .core import MotionCore
 from .exceptions import GoalCode, NotReadyError, StateMovedError
 from .execution import Execution
 from .goal import TrajectoryGoal
-from .model import RobotModel
-from .otg import MotionState
 from .outcome import Outcome, refused
 from .preparation import CommandBasis, Prepared
 from .requests import JogRequest, MotionRequest
@@ -190,7 +189,7 @@ class CommandGateway:
             request: What is asked.
 
         Returns:
-            Nothing once it counts; the ServoError with which it was refused.
+            Nothing once it counts; the ArmError with which it was refused.
         """
         future: Future[None] = Future()
         if len(self._orders) >= MAX_QUEUED_JOGS:
@@ -321,7 +320,7 @@ class CommandGateway:
         self,
         now: float,
         period: float,
-        measured: MotionState,
+        measured: RobotState,
         blocked: str,
         ages: Array | None = None,
     ) -> SetPoint:
@@ -363,7 +362,7 @@ class CommandGateway:
         self._core.fail(reason, code)
 
     def idle(
-        self, now: float, measured: MotionState | None, blocked: str, ages: Array | None = None
+        self, now: float, measured: RobotState | None, blocked: str, ages: Array | None = None
     ) -> None:
         """Pass a cycle in which the arm does not follow; commands are refused.
 
@@ -478,7 +477,7 @@ class CommandGateway:
         needed = _preparation_time(request)
         if not at_rest and basis.source is not Source.TRAJECTORY and needed > MAX_FORESIGHT:
             # nobody can foresee a jog for so long; a goal that is refused does not stop it
-            rest = replace(basis, state=MotionState.at_rest(basis.state.position))
+            rest = replace(basis, state=RobotState.at_rest(basis.state.position))
             self._core.prepare(_aged(request, elapsed), rest)
             self._order_rest(command)
             return

@@ -10,11 +10,11 @@ import math
 
 import numpy as np
 
+from arm_model import JointLimits, RobotState
+
 from .exceptions import GoalError
 from .goal import GoalRules, TrajectoryGoal
 from .goal_points import Points, refuse, upcoming_points
-from .limits import JointLimits
-from .otg import MotionState
 from .path import cubic, linear, Path, PathPoint, quintic, Segment
 from .path_bounds import farthest_beyond
 from .path_rounding import rounded, with_run_out
@@ -72,7 +72,7 @@ class _Haste:
 
 
 def build_path(
-    goal: TrajectoryGoal, limits: JointLimits, state: MotionState, rules: GoalRules
+    goal: TrajectoryGoal, limits: JointLimits, state: RobotState, rules: GoalRules
 ) -> GoalPath:
     """Check a trajectory and make a path of it that begins at the commanded state.
 
@@ -99,7 +99,7 @@ def build_path(
     raise refuse(f'{answer.reason}; give the trajectory {factor:.2f} times the time')
 
 
-def _tried(points: Points, limits: JointLimits, state: MotionState) -> GoalPath | _Haste:
+def _tried(points: Points, limits: JointLimits, state: RobotState) -> GoalPath | _Haste:
     """Return the path through points, or why there is too little time for it."""
     answer = _walkable(points, limits, state)
     approach = float(points.times[0])
@@ -116,7 +116,7 @@ def _tried(points: Points, limits: JointLimits, state: MotionState) -> GoalPath 
     return answer
 
 
-def _walkable(points: Points, limits: JointLimits, state: MotionState) -> GoalPath | _Haste:
+def _walkable(points: Points, limits: JointLimits, state: RobotState) -> GoalPath | _Haste:
     """Return the path through points, or why there is too little time."""
     path = _given(points, limits, state)
     demand = Timing(path, limits).fastest
@@ -138,7 +138,7 @@ def _walkable(points: Points, limits: JointLimits, state: MotionState) -> GoalPa
     return GoalPath(stretched, f'{late:.2f} s later than asked, for the {cause}')
 
 
-def _sufficient(points: Points, limits: JointLimits, state: MotionState, guess: float) -> float:
+def _sufficient(points: Points, limits: JointLimits, state: RobotState, guess: float) -> float:
     """Return how many times the time suffices, in hundredths."""
     factor = _hundredths(guess)
     for _ in range(TURNS):
@@ -165,7 +165,7 @@ def _words(demand: Demand, limits: JointLimits) -> str:
     )
 
 
-def _given(points: Points, limits: JointLimits, state: MotionState) -> Path:
+def _given(points: Points, limits: JointLimits, state: RobotState) -> Path:
     """Return the path as it is given, with its corners, once it keeps within the limits."""
     joined = bool(points.times[0] > 0.0) and state.moving
     segments = [*_first(points, state), *_between(points, limits)]
@@ -191,9 +191,7 @@ def _given(points: Points, limits: JointLimits, state: MotionState) -> Path:
     )
 
 
-def _from_here(
-    points: Points, limits: JointLimits, state: MotionState, rules: GoalRules
-) -> Points:
+def _from_here(points: Points, limits: JointLimits, state: RobotState, rules: GoalRules) -> Points:
     """Give a first point without time the time to get there, where the arm is beside it."""
     off = np.abs(points.positions[0] - state.position)
     if points.times[0] > 0.0 or float(off.max()) < BESIDE:
@@ -212,7 +210,7 @@ def _from_here(
     return points if state.moving else points.delayed(float(np.max(needed)))
 
 
-def _first(points: Points, state: MotionState) -> list[Segment]:
+def _first(points: Points, state: RobotState) -> list[Segment]:
     """Return the segment from the commanded state to the first point, unless it is there."""
     if points.times[0] > 0.0:
         toward = points.at(0)

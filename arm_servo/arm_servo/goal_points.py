@@ -11,11 +11,10 @@ import math
 
 import numpy as np
 
-from .arrays import Array
+from arm_model import Array, JointLimits, RobotState
+
 from .exceptions import GoalCode, GoalError
 from .goal import GoalPoint, GoalRules, TrajectoryGoal
-from .limits import JointLimits
-from .otg import MotionState
 from .path import PathPoint
 
 MOST = 5000
@@ -72,7 +71,7 @@ class Points:
 
 
 def upcoming_points(
-    goal: TrajectoryGoal, limits: JointLimits, state: MotionState, rules: GoalRules
+    goal: TrajectoryGoal, limits: JointLimits, state: RobotState, rules: GoalRules
 ) -> Points:
     """Check a goal, and return its points from now on.
 
@@ -104,7 +103,7 @@ def refuse(reason: str, code: GoalCode = GoalCode.INVALID_GOAL) -> GoalError:
 
 
 def _ordered(
-    goal: TrajectoryGoal, limits: JointLimits, state: MotionState, rules: GoalRules
+    goal: TrajectoryGoal, limits: JointLimits, state: RobotState, rules: GoalRules
 ) -> Points:
     """Check names, lengths, numbers and times, and put the joints in the arm's order."""
     _check_joints(goal.joints, limits, rules)
@@ -217,7 +216,7 @@ def _upcoming(points: Points, age: float) -> Points:
     )
 
 
-def _by_the_short_way(points: Points, limits: JointLimits, state: MotionState) -> Points:
+def _by_the_short_way(points: Points, limits: JointLimits, state: RobotState) -> Points:
     """Move continuous joints by whole turns: the first point is at most half a turn off."""
     turn = 2 * math.pi
     turns = np.round((state.position - points.positions[0]) / turn) * turn

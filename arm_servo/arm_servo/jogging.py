@@ -8,9 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from .arrays import Array
-from .model import RobotModel
-from .otg import MotionState
+from arm_model import Array, RobotModel, RobotState
+
 from .report import MotionReport
 from .servo import Command, ServoSettings, ServoSource, TwistCommand
 
@@ -59,7 +58,7 @@ class Jogging:
         return self._command is None or now > self._fresh_until
 
     def step(
-        self, state: MotionState, now: float, period: float, *, held: bool
+        self, state: RobotState, now: float, period: float, *, held: bool
     ) -> tuple[Array | None, MotionReport]:
         """Return joint speeds in [rad/s] and what limits them; None to come to rest.
 
@@ -78,7 +77,7 @@ class Jogging:
         answer = self._servo.step(state, command, period)
         return answer.velocity, answer.report
 
-    def _slowing(self, state: MotionState, now: float) -> Command | None:
+    def _slowing(self, state: RobotState, now: float) -> Command | None:
         """Return what slows a stale jog down along its line; None for the last of it."""
         calm = np.all(np.abs(state.velocity) < CALM * self._limits.velocity)
         if calm or not isinstance(self._command, TwistCommand):

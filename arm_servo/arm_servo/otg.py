@@ -7,50 +7,16 @@ Way-points are never given to ruckig: it would send them to a service on the net
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-
 import numpy as np
 import ruckig
 
-from .arrays import Array, frozen, Native
-from .limits import JointLimits
+from arm_model import Array, frozen, JointLimits, Native, RobotState
 
 ENDLESS = 1e6
 """What counts for the way of a joint without end in [rad]."""
 
 LEAST_SHARE = 0.05
 """Least share of its acceleration that a joint keeps while others set the pace."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class MotionState:
-    """State of motion of every joint.
-
-    Attributes:
-        position: Positions in [rad].
-        velocity: Velocities in [rad/s].
-        acceleration: Accelerations in [rad/s2].
-    """
-
-    position: Array
-    velocity: Array
-    acceleration: Array
-
-    @classmethod
-    def at_rest(cls, position: Sequence[float] | Array) -> MotionState:
-        """Return the state of standing still.
-
-        Args:
-            position: Positions in [rad].
-        """
-        zero = np.zeros(len(position))
-        return cls(frozen(position), frozen(zero), frozen(zero))
-
-    @property
-    def moving(self) -> bool:
-        """Whether a joint moves, or is about to."""
-        return bool(np.any(self.velocity) or np.any(self.acceleration))
 
 
 class Plan:
@@ -77,7 +43,7 @@ class Plan:
         self._lower: Array | None = None
         self._upper: Array | None = None
 
-    def at(self, time: float) -> MotionState:
+    def at(self, time: float) -> RobotState:
         """Return the state at a time since the start; beyond the end it goes on evenly.
 
         Args:
@@ -87,7 +53,7 @@ class Plan:
         places = np.array(position)
         if self._begin is not None:
             places += self._begin
-        return MotionState(places, np.array(velocity), np.array(acceleration))
+        return RobotState(places, np.array(velocity), np.array(acceleration))
 
     @property
     def extremes(self) -> tuple[Array, Array]:
@@ -126,7 +92,7 @@ class Generator:
         self._to_standstill.target_velocity = np.zeros(count)
         self._to_standstill.current_position = np.zeros(count)
 
-    def to_velocity(self, state: MotionState, velocity: Array) -> Plan | None:
+    def to_velocity(self, state: RobotState, velocity: Array) -> Plan | None:
         """Plan to a velocity, the joints in step so that the direction is kept.
 
         Each joint gets the share of its acceleration and jerk that its change of speed has in the
@@ -151,7 +117,7 @@ class Generator:
         demand.target_velocity = velocity
         return self._plan(demand)
 
-    def brake(self, state: MotionState) -> Plan | None:
+    def brake(self, state: RobotState) -> Plan | None:
         """Plan the shortest way to a standstill, each joint for itself.
 
         It is planned from zero, since ruckig counts zero among the extremes of such a motion.
@@ -165,7 +131,7 @@ class Generator:
         return self._plan(demand, state.position)
 
     def to_state(
-        self, state: MotionState, target: MotionState, shortest: float | None = None
+        self, state: RobotState, target: RobotState, shortest: float | None = None
     ) -> Plan | None:
         """Plan to a state.
 
@@ -221,7 +187,7 @@ class Generator:
         return Plan(trajectory, begin)
 
 
-def _start(demand: Native, state: MotionState) -> None:
+def _start(demand: Native, state: RobotState) -> None:
     demand.current_position = state.position
     demand.current_velocity = state.velocity
     demand.current_acceleration = state.acceleration
@@ -234,7 +200,7 @@ def _shares(change: Array, acceleration: Array) -> Array:
     return shares
 
 
-def hard_brake(state: MotionState, limits: JointLimits, period: float) -> MotionState:
+def hard_brake(state: RobotState, limits: JointLimits, period: float) -> RobotState:
     """Slow down for a period with the greatest deceleration: for when ruckig has no answer.
 
     Args:
@@ -248,7 +214,7 @@ def hard_brake(state: MotionState, limits: JointLimits, period: float) -> Motion
     step = limits.acceleration * period
     velocity = np.sign(state.velocity) * np.maximum(np.abs(state.velocity) - step, 0.0)
     position = state.position + 0.5 * (state.velocity + velocity) * period
-    return MotionState(
+    return RobotState(
         position,
         velocity,
         np.where(velocity == 0.0, 0.0, -np.sign(velocity) * limits.acceleration),

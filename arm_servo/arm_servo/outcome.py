@@ -6,7 +6,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from .exceptions import GoalCode, GoalError, ServoError
+from arm_model import ArmError
+
+from .exceptions import GoalCode, GoalError
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,6 +33,6 @@ def refused(error: BaseException) -> Outcome:
         error: Why.
     """
     code = error.code if isinstance(error, GoalError) else GoalCode.INVALID_GOAL
-    if isinstance(error, ServoError):
+    if isinstance(error, ArmError):
         return Outcome(code, str(error))
     return Outcome(code, f'the motion could not be planned: {type(error).__name__}: {error}')

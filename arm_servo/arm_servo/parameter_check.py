@@ -7,8 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any, TYPE_CHECKING
 
-from .exceptions import ModelError
-from .model import RobotModel
+from arm_model import ModelError, RobotModel
 
 if TYPE_CHECKING:
     from rclpy.node import Node
@@ -48,10 +47,11 @@ def check_parameters(model: RobotModel, document: Mapping[str, Any]) -> list[tup
 
 def _nodes(model: RobotModel, document: Mapping[str, Any]) -> dict[str, Callable[[Node], object]]:
     """Return what declares the parameters of each node."""
+    from arm_model.ros import same_robot
     from node_runner import ParameterReader
 
+    from .nodes.controller_manager import declare_manager
     from .nodes.joint_state_broadcaster import declare_broadcaster
-    from .nodes.robot_parameters import declare_manager, same_robot
     from .nodes.servo_parameters import declare_servo, PREFIX
     from .nodes.standalone import declare_loop
     from .nodes.topic_output import ARRAY, declare_output, TRAJECTORY

@@ -15,7 +15,7 @@ import math
 
 import numpy as np
 
-from .arrays import Array, Places
+from arm_model import Array, Places
 
 # d^k/dt^k of the powers 0 to 5, as factors and exponents
 _POWERS = np.arange(6.0)

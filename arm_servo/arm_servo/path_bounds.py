@@ -9,7 +9,8 @@ import math
 
 import numpy as np
 
-from .arrays import Array
+from arm_model import Array
+
 from .path import Path
 
 # control values of a polynomial of fifth degree on 0..1, in whose hull it lies, by its

@@ -15,8 +15,7 @@ import math
 
 import numpy as np
 
-from .arrays import Array
-from .model import RobotModel
+from arm_model import Array, RobotModel
 
 STEP = 0.005
 """Greatest motion of a link against another from one look to the next in [m]."""

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .arrays import Array
-from .limits import JointLimits
+from arm_model import Array, JointLimits
+
 from .path import Path, PathPoint, quintic, Segment, shifted
 
 ROOM = 1.25

@@ -21,8 +21,8 @@ import math
 
 import numpy as np
 
-from .arrays import Array, Places
-from .limits import JointLimits
+from arm_model import Array, JointLimits, Places
+
 from .path import Path, quintics, Segment
 
 SPACING = 0.01

@@ -14,15 +14,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .arrays import Array, Mask
+from arm_model import Array, CommandError, Mask, RobotModel, RobotState
+
 from .command_arbiter import Motion
 from .commands import by_joint
 from .core_settings import CoreSettings
-from .exceptions import CommandError, GoalCode, GoalError
+from .exceptions import GoalCode, GoalError
 from .execution import Execution
 from .goal import TrajectoryGoal
-from .model import RobotModel
-from .otg import Generator, MotionState, Plan
+from .otg import Generator, Plan
 from .path_check import PathCheck
 from .requests import DisplacementRequest, MotionRequest
 from .set_point import Source
@@ -44,7 +44,7 @@ class CommandBasis:
         timer: How that runs; None for how it ran in its last step.
     """
 
-    state: MotionState
+    state: RobotState
     sequence: int
     source: Source = Source.NONE
     speed_scaling: float = 1.0
@@ -62,7 +62,7 @@ class CommandBasis:
             return replace(self, state=self.execution.foreseen(ahead, self.timer))
         state = self.state
         there = state.position + ahead * state.velocity
-        return replace(self, state=MotionState(there, state.velocity, 0.0 * state.acceleration))
+        return replace(self, state=RobotState(there, state.velocity, 0.0 * state.acceleration))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -195,8 +195,8 @@ class Preparation:
         return execution
 
     def _begin(
-        self, goal: TrajectoryGoal, state: MotionState
-    ) -> tuple[TrajectoryGoal, MotionState, float]:
+        self, goal: TrajectoryGoal, state: RobotState
+    ) -> tuple[TrajectoryGoal, RobotState, float]:
         """Return a goal that begins now or after a wait, where it begins, and the wait in [s].
 
         What begins later begins where the arm will have come to rest; where there is no time for
@@ -208,6 +208,6 @@ class Preparation:
         stop = self._generator.to_velocity(state, np.zeros(len(self._limits)))
         if stop is not None and stop.duration <= wait:
             there = stop.at(stop.duration).position
-            return replace(goal, age=0.0), MotionState.at_rest(there), wait
+            return replace(goal, age=0.0), RobotState.at_rest(there), wait
         points = [replace(point, time=point.time + wait) for point in goal.points]
         return replace(goal, points=points, age=0.0), state, 0.0

@@ -11,8 +11,9 @@ from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
 import math
 
+from arm_model import Pose
+
 from .goal import TrajectoryGoal
-from .model import Pose
 from .servo import Command, JointCommand, TwistCommand
 
 

@@ -6,10 +6,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from .arrays import Array, Mask
-from .clearances import LeastClearance
-from .model import RobotModel
-from .otg import Generator, hard_brake, MotionState, Plan
+from arm_model import Array, LeastClearance, Mask, RobotModel, RobotState
+
+from .otg import Generator, hard_brake, Plan
 from .report import Cause, Limiter
 
 TOUCH = 1e-4
@@ -50,7 +49,7 @@ class SafetyFilter:
         self._floor: float | None = None
         self._fastest: Array = model.limits.velocity * (1.0 + 1e-6)
 
-    def reset(self, state: MotionState) -> None:
+    def reset(self, state: RobotState) -> None:
         """Begin at a state.
 
         Args:
@@ -63,8 +62,8 @@ class SafetyFilter:
             self._remember(stop)
 
     def step(
-        self, state: MotionState, wanted: MotionState, period: float, clearance: float | None
-    ) -> tuple[MotionState, Limiter | None]:
+        self, state: RobotState, wanted: RobotState, period: float, clearance: float | None
+    ) -> tuple[RobotState, Limiter | None]:
         """Let a step pass, or brake instead.
 
         Args:
@@ -94,7 +93,7 @@ class SafetyFilter:
                 return eased, limiter
         return self._brake(state, period), limiter
 
-    def _beyond(self, wanted: MotionState) -> tuple[Mask, Plan | None]:
+    def _beyond(self, wanted: RobotState) -> tuple[Mask, Plan | None]:
         """Return which joints could not stop any more within their limits, and how all would."""
         coasting = wanted.acceleration * np.abs(wanted.acceleration) / (2.0 * self._limits.jerk)
         peak = np.maximum(np.abs(wanted.velocity + coasting), np.abs(wanted.velocity))
@@ -105,7 +104,7 @@ class SafetyFilter:
         lower, upper = stop.extremes
         return beyond | (lower < self._lower - EXACT) | (upper > self._upper + EXACT), stop
 
-    def _limit(self, wanted: MotionState, joint: int) -> Limiter:
+    def _limit(self, wanted: RobotState, joint: int) -> Limiter:
         """Name the limit that a joint would break."""
         name, speed = self._limits.names[joint], float(abs(wanted.velocity[joint]))
         if speed > self._fastest[joint]:
@@ -123,7 +122,7 @@ class SafetyFilter:
         self._upper = np.maximum(self._limits.upper, np.minimum(self._upper, upper))
 
     def _too_near(
-        self, stop: Plan, state: MotionState, clearance: float | None
+        self, stop: Plan, state: RobotState, clearance: float | None
     ) -> LeastClearance | None:
         """Return which links a stop would bring too near, and how near; None for none.
 
@@ -160,7 +159,7 @@ class SafetyFilter:
         places = np.array([stop.at(time).position for time in times])
         return self._model.least_clearance(places, self._clearance)
 
-    def _eased(self, state: MotionState, period: float) -> MotionState | None:
+    def _eased(self, state: RobotState, period: float) -> RobotState | None:
         """Brake with the joints in step, which keeps the direction, where that is clear too."""
         plan = self._generator.to_velocity(state, np.zeros(len(self._limits)))
         if plan is None or self._floor is None or period >= plan.duration:
@@ -172,18 +171,18 @@ class SafetyFilter:
         self._remember(stop)
         return after
 
-    def _brake(self, state: MotionState, period: float) -> MotionState:
+    def _brake(self, state: RobotState, period: float) -> RobotState:
         stop = self._generator.brake(state)
         if stop is None:
             return hard_brake(state, self._limits, period)
         if period >= stop.duration:
-            return MotionState.at_rest(stop.at(stop.duration).position)
+            return RobotState.at_rest(stop.at(stop.duration).position)
         return stop.at(period)
 
 
-def _mixed(mask: Mask, one: MotionState, other: MotionState) -> MotionState:
+def _mixed(mask: Mask, one: RobotState, other: RobotState) -> RobotState:
     """Return one state where a mask says so, and the other elsewhere."""
-    return MotionState(
+    return RobotState(
         np.where(mask, one.position, other.position),
         np.where(mask, one.velocity, other.velocity),
         np.where(mask, one.acceleration, other.acceleration),

@@ -9,9 +9,8 @@ from dataclasses import dataclass, field
 import numpy as np
 import pinocchio as pin
 
-from .arrays import Array, Mask
-from .model import Pose, RobotModel, turned_twists
-from .otg import MotionState
+from arm_model import Array, Mask, Pose, RobotModel, RobotState, turned_twists
+
 from .report import Cause, Limiter, MotionReport
 from .velocity_ik import IkAnswer, IkSettings, TwistTask, VelocityIk
 
@@ -133,7 +132,7 @@ class ServoSource:
         self._free = NO_AXES
         self._share = 1.0
 
-    def step(self, state: MotionState, command: Command, period: float) -> IkAnswer:
+    def step(self, state: RobotState, command: Command, period: float) -> IkAnswer:
         """Find the joint speeds for a command.
 
         Args:
@@ -149,7 +148,7 @@ class ServoSource:
             return self._toward(state, command, period)
         return self._jog(state, command, period)
 
-    def _jog(self, state: MotionState, command: TwistCommand, period: float) -> IkAnswer:
+    def _jog(self, state: RobotState, command: TwistCommand, period: float) -> IkAnswer:
         pose = self._model.pose(state.position)
         axes = self._axes(state, command)
         family = command.link if command.axes is None else 'axes'
@@ -177,14 +176,14 @@ class ServoSource:
             answer.velocity, MotionReport(report.factor * share, (*report.limiters, limiter))
         )
 
-    def _axes(self, state: MotionState, command: TwistCommand) -> Array:
+    def _axes(self, state: RobotState, command: TwistCommand) -> Array:
         if command.axes is not None:
             return command.axes
         if command.link is None:
             return BASE
         return self._model.pose(state.position, command.link).rotation
 
-    def _still_moving(self, state: MotionState, axes: Array) -> Mask:
+    def _still_moving(self, state: RobotState, axes: Array) -> Mask:
         twist = self._model.jacobian(state.position) @ state.velocity
         moving: Mask = np.abs(turned_twists(axes, twist)) > RELEASED
         return moving
@@ -197,7 +196,7 @@ class ServoSource:
         wanted = min(1.0, max(MIN_SHARE, 1.0 - (off - scale) / (4.0 * scale)))
         return min(max(wanted, self._share - period / SLOWED), self._share + period / HASTENED)
 
-    def _toward(self, state: MotionState, command: PoseCommand, period: float) -> IkAnswer:
+    def _toward(self, state: RobotState, command: PoseCommand, period: float) -> IkAnswer:
         """Approach a pose, slowing down so as to arrive at rest."""
         settings = self._settings
         error = _error(command.pose, self._model.pose(state.position), np.eye(3))

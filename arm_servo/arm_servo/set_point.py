@@ -7,7 +7,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
-from .otg import MotionState
+from arm_model import RobotState
+
 from .report import MotionReport
 
 
@@ -30,6 +31,6 @@ class SetPoint:
         report: What limits the motion.
     """
 
-    state: MotionState
+    state: RobotState
     source: Source
     report: MotionReport

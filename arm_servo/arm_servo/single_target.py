@@ -6,9 +6,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from .arrays import Array, frozen
+from arm_model import Array, frozen, RobotState
+
 from .exceptions import GoalCode
-from .otg import Generator, MotionState, Plan
+from .otg import Generator, Plan
 from .outcome import Outcome
 
 ARRIVED = 1e-6
@@ -39,7 +40,7 @@ class SingleTarget:
         self._max_speed, self._generator = max_speed, generator
         self._planned_for, self._planner = 0.0, generator
 
-    def plan(self, state: MotionState, speed_scaling: float) -> Plan | None:
+    def plan(self, state: RobotState, speed_scaling: float) -> Plan | None:
         """Return the way to the target as it is driven; None where there is none.
 
         Args:
@@ -50,9 +51,9 @@ class SingleTarget:
         if speed_scaling != self._planned_for:
             self._planned_for = speed_scaling
             self._planner = self._generator.slowed(speed_scaling, self._max_speed)
-        return self._planner.to_state(state, MotionState.at_rest(self.target))
+        return self._planner.to_state(state, RobotState.at_rest(self.target))
 
-    def step(self, state: MotionState, speed_scaling: float, period: float) -> MotionState | None:
+    def step(self, state: RobotState, speed_scaling: float, period: float) -> RobotState | None:
         """Return the next state; None to come to rest.
 
         Args:
@@ -67,9 +68,9 @@ class SingleTarget:
             if not state.moving:
                 self.end(Outcome(GoalCode.INVALID_GOAL, 'no motion leads to the target'))
             return None
-        return MotionState.at_rest(self.target) if plan.duration <= period else plan.at(period)
+        return RobotState.at_rest(self.target) if plan.duration <= period else plan.at(period)
 
-    def arrive(self, state: MotionState) -> None:
+    def arrive(self, state: RobotState) -> None:
         """End where a state rests at the target.
 
         Args:

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .arrays import Array, Mask
+from arm_model import Array, Mask
 
 SHARE = 0.5
 """Share of a joint's speed that a direction on its own may ask before it is damped."""

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .arrays import Array
+from arm_model import Array, RobotState
+
 from .execution import Execution
-from .otg import MotionState
 from .set_point import SetPoint, Source
 
 MAX_CYCLE_AGE = 0.25
@@ -38,7 +38,7 @@ class Snapshot:
 
     time: float
     set_point: SetPoint | None
-    measured: MotionState | None
+    measured: RobotState | None
     blocked: str
     source: Source = Source.NONE
     paused: bool = False
@@ -54,13 +54,13 @@ class Snapshot:
         return 0.0 if self.paused else self.speed
 
     @property
-    def reference(self) -> MotionState | None:
+    def reference(self) -> RobotState | None:
         """Where the arm is to be: where it stands while it does not follow; None while unknown."""
         if self.set_point is not None:
             return self.set_point.state
         if self.measured is None or not np.isfinite(self.measured.position).all():
             return None
-        return MotionState.at_rest(self.measured.position)
+        return RobotState.at_rest(self.measured.position)
 
     def stale(self, age: float) -> str:
         """Return that the cycle does not run; empty when it does.

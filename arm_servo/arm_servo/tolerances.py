@@ -10,10 +10,10 @@ import math
 
 import numpy as np
 
-from .arrays import Array
+from arm_model import Array, JointLimits
+
 from .exceptions import GoalCode, GoalError
 from .goal import JointTolerance
-from .limits import JointLimits
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -9,7 +9,8 @@ from typing import NamedTuple
 import numpy as np
 import ruckig
 
-from .limits import JointLimits
+from arm_model import JointLimits
+
 from .path import Path
 
 QUICKEST = 10.0

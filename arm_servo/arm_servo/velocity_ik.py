@@ -21,12 +21,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from .arrays import Array, frozen, Mask
+from arm_model import Array, frozen, Mask, RobotModel, RobotState, turned_twists
+
 from .border import Border
 from .bounds import Bounds, Brakes, BrakeSettings
 from .box_qp import Program
-from .model import RobotModel, turned_twists
-from .otg import MotionState
 from .report import Cause, Limiter, MotionReport
 from .singular import Directions, directions
 
@@ -120,7 +119,7 @@ class VelocityIk:
         settings = self._settings
         self._border = Border(model.limits, settings.escape, settings.brakes.braking)
 
-    def cartesian(self, state: MotionState, task: TwistTask, period: float) -> IkAnswer:
+    def cartesian(self, state: RobotState, task: TwistTask, period: float) -> IkAnswer:
         """Find joint speeds for a speed of the tool.
 
         Args:
@@ -154,7 +153,7 @@ class VelocityIk:
         return self._answer(hessian, gradient, bounds, asked, found)
 
     def joints(
-        self, state: MotionState, velocity: Array, commanded: Mask, period: float
+        self, state: RobotState, velocity: Array, commanded: Mask, period: float
     ) -> IkAnswer:
         """Find joint speeds near asked ones; joints that are not commanded are held.
 

@@ -23,8 +23,8 @@ import numpy as np
 from servo_arms import moved as moved_by
 from servo_arms import ready, robot, ROBOTS, SPEED
 
-from arm_servo import CoreSettings, GoalError, GoalPoint, MotionCore, RobotModel, TrajectoryGoal
-from arm_servo.arrays import Array
+from arm_model import Array, RobotModel
+from arm_servo import CoreSettings, GoalError, GoalPoint, MotionCore, TrajectoryGoal
 from arm_servo.path_check import PathCheck
 
 PERIOD = 0.01

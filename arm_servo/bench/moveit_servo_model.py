@@ -14,8 +14,7 @@ from collections import deque
 
 import numpy as np
 
-from arm_servo.arrays import Array
-from arm_servo.model import RobotModel
+from arm_model import Array, RobotModel
 
 LOWER, HARD_STOP, LEAVING = 17.0, 30.0, 2.0
 PROBE = 0.01

@@ -17,7 +17,7 @@ import roboplan.core as rc
 import roboplan.optimal_ik as ro
 from servo_arms import moved, ready, robot, ROBOTS, texts, TWISTS
 
-from arm_servo.arrays import Array
+from arm_model import Array
 
 PERIOD = 0.005
 

@@ -11,8 +11,7 @@ import pinocchio as pin
 
 from arm_bringup.description import expand_xacro
 from arm_bringup.robots import installed_robots_folder
-from arm_servo import load_limits, RobotModel
-from arm_servo.arrays import Array, frozen
+from arm_model import Array, frozen, load_limits, RobotModel
 
 ROBOTS = ('panda', 'prbt', 'gp110')
 

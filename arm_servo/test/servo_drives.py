@@ -8,13 +8,13 @@ from collections.abc import Sequence
 from concurrent.futures import Executor, Future
 from dataclasses import replace
 
+from model_robots import ready, robot
 import numpy as np
 from servo_commands import InlineWorker
-from servo_robots import ready, robot
 
 from arm_canopen import AxisFeedback, MotionSource, Setpoint
 from arm_canopen.standard.drive import DriveState
-from arm_servo.arrays import Array
+from arm_model import Array
 from arm_servo.core import MotionCore
 from arm_servo.gateway import CommandGateway
 from arm_servo.nodes.drive_source import DriveSource

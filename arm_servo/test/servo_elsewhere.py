@@ -7,12 +7,12 @@ from __future__ import annotations
 from collections import deque
 from concurrent.futures import Executor
 
+from model_robots import ready, robot
 import numpy as np
 from servo_commands import InlineWorker
 from servo_commands import jog as jog_joints
-from servo_robots import ready, robot
 
-from arm_servo.arrays import Array
+from arm_model import Array
 from arm_servo.core import MotionCore
 from arm_servo.gateway import CommandGateway
 from arm_servo.goal import GoalPoint, TrajectoryGoal

@@ -14,8 +14,7 @@ import math
 
 import numpy as np
 
-from arm_servo.arrays import Array
-from arm_servo.model import Pose
+from arm_model import Array, Pose
 
 PI = math.pi
 

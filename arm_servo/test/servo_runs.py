@@ -10,9 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from arm_servo.arrays import Array
-from arm_servo.model import RobotModel
-from arm_servo.otg import Generator, MotionState
+from arm_model import Array, RobotModel, RobotState
+from arm_servo.otg import Generator
 from arm_servo.report import Limiter, MotionReport
 from arm_servo.safety_filter import SafetyFilter
 from arm_servo.servo import Command, ServoSource
@@ -32,7 +31,7 @@ class Run:
         moved: Twist from the first pose to the last, in the base.
     """
 
-    states: list[MotionState]
+    states: list[RobotState]
     report: MotionReport
     held_up: list[Limiter]
     moved: Array
@@ -47,7 +46,7 @@ def twist_between(model: RobotModel, start: Array, end: Array) -> Array:
 
 def run(
     model: RobotModel,
-    start: Array | MotionState,
+    start: Array | RobotState,
     command: Command | Callable[[float], Command],
     duration: float,
     period: float = PERIOD,
@@ -55,7 +54,7 @@ def run(
     """Carry out a command, or one that changes with time, for a time [s]."""
     source, generator = ServoSource(model), Generator(model.limits)
     safety_filter = SafetyFilter(model, generator)
-    state = start if isinstance(start, MotionState) else MotionState.at_rest(start)
+    state = start if isinstance(start, RobotState) else RobotState.at_rest(start)
     safety_filter.reset(state)
     states, held_up, report = [state], [], MotionReport()
     for step in range(round(duration / period)):

@@ -8,20 +8,17 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from arm_servo.arrays import Array
+from arm_model import Array, JointLimits, RobotModel, RobotState
 from arm_servo.core import MotionCore
 from arm_servo.execution import Execution, Phase
 from arm_servo.goal import GoalPoint, TrajectoryGoal
-from arm_servo.limits import JointLimits
-from arm_servo.model import RobotModel
-from arm_servo.otg import MotionState
 from arm_servo.set_point import SetPoint
 
 PERIOD = 0.004
 """Cycle of the streams in [s]."""
 
 
-def kept(limits: JointLimits, states: list[MotionState], period: float = PERIOD) -> None:
+def kept(limits: JointLimits, states: list[RobotState], period: float = PERIOD) -> None:
     """Make sure that set-points keep every limit, also where only positions are seen."""
     position = np.array([state.position for state in states])
     velocity = np.array([state.velocity for state in states])
@@ -74,7 +71,7 @@ def stream(
 
 def follow_to_the_end(
     core: MotionCore, execution: Execution, longest: float = 20.0
-) -> list[MotionState]:
+) -> list[RobotState]:
     """Step a core until a trajectory is done, and return the states."""
     states = [core.state]
     for step in range(round(longest / PERIOD)):

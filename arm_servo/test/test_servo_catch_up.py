@@ -4,15 +4,14 @@
 
 from __future__ import annotations
 
+from model_robots import ready, robot
 import numpy as np
 import pytest
-from servo_robots import ready, robot
 
+from arm_model import RobotModel, RobotState
 from arm_servo.core import MotionCore
 from arm_servo.exceptions import GoalCode, StateMovedError
 from arm_servo.goal import GoalPoint, TrajectoryGoal
-from arm_servo.model import RobotModel
-from arm_servo.otg import MotionState
 from arm_servo.set_point import Source
 
 PERIOD = 0.01
@@ -82,7 +81,7 @@ def test_a_trajectory_is_void_where_the_arm_is_elsewhere() -> None:
     core.reset(ready('panda'))
     goal = TrajectoryGoal(core.model.joints, [GoalPoint(2.0, (ready('panda') + 0.2).tolist())])
     aside = core.basis.foreseen(0.0)
-    state = MotionState.at_rest(aside.state.position + 0.02)
+    state = RobotState.at_rest(aside.state.position + 0.02)
     prepared = core.prepare(goal, type(aside)(state, aside.sequence))
     with pytest.raises(StateMovedError) as refused:
         core.commit(prepared)

@@ -6,10 +6,10 @@ from __future__ import annotations
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from model_robots import ready, robot
 import numpy as np
 import pytest
 from servo_opw import inverse, OPW
-from servo_robots import ready, robot
 from servo_runs import run
 
 from arm_servo.servo import PoseCommand

@@ -20,11 +20,10 @@ from servo_drives import Drives, PERIOD
 from servo_elsewhere import Elsewhere
 
 from arm_canopen import Refusal, RefusalCause
-from arm_servo.arrays import Array
+from arm_model import Array, combined, Pose
 from arm_servo.commands import twist_command
 from arm_servo.gateway import CommandGateway, JOGGING, MotionCommand
 from arm_servo.goal import GoalPoint, TrajectoryGoal
-from arm_servo.model import combined, Pose
 from arm_servo.requests import JogRequest
 from arm_servo.servo import PoseCommand
 from arm_servo.set_point import Source

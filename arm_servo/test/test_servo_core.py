@@ -10,16 +10,16 @@ import math
 
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from model_robots import ready, robot, ROBOTS
 import numpy as np
 import pytest
-from servo_robots import ready, robot, ROBOTS
 from servo_runs import twist_between
 from servo_streams import kept, PERIOD, stream, wave
 
+from arm_model import CommandError, Pose
 from arm_servo.core import MotionCore
-from arm_servo.exceptions import CommandError, GoalCode, NotReadyError
+from arm_servo.exceptions import GoalCode, NotReadyError
 from arm_servo.execution import Phase
-from arm_servo.model import Pose
 from arm_servo.otg import Generator
 from arm_servo.report import Cause
 from arm_servo.set_point import SetPoint, Source

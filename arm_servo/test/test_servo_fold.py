@@ -6,9 +6,9 @@ from __future__ import annotations
 
 import math
 
+from model_robots import ready, robot, ROBOTS
 import numpy as np
 import pytest
-from servo_robots import ready, robot, ROBOTS
 
 from arm_servo.core import MotionCore
 from arm_servo.report import Cause, MotionReport

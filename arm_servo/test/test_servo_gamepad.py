@@ -9,11 +9,11 @@ import threading
 
 from input_devices import HAT, InjectedDevice, InjectedDevices, STICK
 from isolation import Isolation
+from model_robots import texts
 import pytest
 import rclpy
 from ros_client import RosClient
 from servo_listener import PATIENCE, ServoListener
-from servo_robots import texts
 
 from arm_servo.teleop.servo_gamepad import ServoGamepad, Session
 

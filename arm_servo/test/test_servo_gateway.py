@@ -17,8 +17,9 @@ from servo_commands import jog, move_by, SteppedWorker, twist
 from servo_drives import Drives, PERIOD
 
 from arm_canopen import Refusal, RefusalCause
+from arm_model import CommandError
 from arm_servo.commands import by_joint
-from arm_servo.exceptions import CommandError, GoalCode, GoalError, NotReadyError, StateMovedError
+from arm_servo.exceptions import GoalCode, GoalError, NotReadyError, StateMovedError
 from arm_servo.gateway import MAX_ATTEMPTS, MAX_QUEUED_MOTIONS, MotionCommand, start_worker
 from arm_servo.goal import GoalPoint, TrajectoryGoal
 from arm_servo.requests import JogRequest

@@ -8,14 +8,12 @@ from itertools import pairwise
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from model_robots import chain, ready, robot, ROBOTS, STRAIGHT
 import numpy as np
 import pytest
-from servo_robots import chain, ready, robot, ROBOTS, STRAIGHT
 from servo_runs import PERIOD, Run, run
 
-from arm_servo.arrays import Array
-from arm_servo.model import RobotModel
-from arm_servo.otg import MotionState
+from arm_model import Array, RobotModel, RobotState
 from arm_servo.report import Cause, Limiter
 from arm_servo.servo import JointCommand, PoseCommand, TwistCommand
 
@@ -45,7 +43,7 @@ LOST = 0.12
 """Scaled singular value below which a direction is as good as lost."""
 
 
-def holds_up(model: RobotModel, state: MotionState, limiter: Limiter) -> bool:
+def holds_up(model: RobotModel, state: RobotState, limiter: Limiter) -> bool:
     """Whether what a report names is so: measured on the arm, not read from the report."""
     limits = model.limits
     if limiter.cause is Cause.COLLISION:

@@ -8,14 +8,12 @@ from collections.abc import Sequence
 
 from control_msgs.msg import JointJog
 from geometry_msgs.msg import PoseStamped, TwistStamped
+from model_robots import ready, robot
 import numpy as np
 import pytest
-from servo_robots import ready, robot
 
-from arm_servo.arrays import Array
+from arm_model import Array, CommandError, Pose
 from arm_servo.core import MotionCore
-from arm_servo.exceptions import CommandError
-from arm_servo.model import Pose
 from arm_servo.nodes.command_converter import CommandConverter
 from arm_servo.nodes.servo_parameters import Scales, ServoParameters, Units
 from arm_servo.requests import JogRequest

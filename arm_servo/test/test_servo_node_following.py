@@ -11,8 +11,8 @@ import pytest
 from servo_commands import move_by, outcome
 from servo_elsewhere import Elsewhere, jog, PERIOD, swing
 
+from arm_model import JointLimits
 from arm_servo.exceptions import GoalCode
-from arm_servo.limits import JointLimits
 from arm_servo.nodes.following import FollowingLimits, FollowingWatch
 
 pytestmark = pytest.mark.slow

@@ -13,7 +13,7 @@ import pytest
 from servo_commands import jog, move_by, twist
 from servo_drives import Drives, PERIOD
 
-from arm_servo.exceptions import ServoError
+from arm_model import ArmError
 from arm_servo.gateway import MOTIONS
 from arm_servo.goal import GoalPoint, TrajectoryGoal
 
@@ -109,5 +109,5 @@ def test_a_refused_command_changes_nothing(numbers: list[float]) -> None:
         drives.gateway.request(goal),
     ]
     drives.run(10)
-    assert all(isinstance(command.future.exception(), ServoError) for command in refused)
+    assert all(isinstance(command.future.exception(), ArmError) for command in refused)
     assert drives.gateway.snapshot.source is source

@@ -7,10 +7,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from model_robots import ready, robot, STRAIGHT
 import pytest
 from servo_commands import InlineWorker, jog, move_by, twist
 from servo_drives import Drives, PERIOD
-from servo_robots import ready, robot, STRAIGHT
 
 from arm_canopen import Refusal, RefusalCause
 from arm_servo.bounds import BrakeSettings

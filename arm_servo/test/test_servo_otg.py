@@ -8,21 +8,21 @@ from itertools import pairwise
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from model_robots import robot, ROBOTS
 import numpy as np
 import pytest
-from servo_robots import robot, ROBOTS
 
-from arm_servo.arrays import Array
-from arm_servo.otg import brakeable_velocity, Generator, hard_brake, MotionState
+from arm_model import Array, RobotState
+from arm_servo.otg import brakeable_velocity, Generator, hard_brake
 
 PERIOD = 0.004
 
 
-def stream(name: str, seed: int) -> list[MotionState]:
+def stream(name: str, seed: int) -> list[RobotState]:
     """Follow velocities that change at random, and return the states."""
     limits, rng = robot(name).limits, np.random.default_rng(seed)
     generator = Generator(limits)
-    state = MotionState.at_rest(np.zeros(len(limits)))
+    state = RobotState.at_rest(np.zeros(len(limits)))
     states, target = [state], state.velocity
     for step in range(120):
         if step % 15 == 0:
@@ -55,7 +55,7 @@ def test_joints_start_in_step() -> None:
     limits = robot('panda').limits
     generator = Generator(limits)
     target = limits.velocity * np.array([0.3, -0.5, 0.2, 0.9, -0.1, 0.4, 0.05])
-    state = MotionState.at_rest(np.zeros(7))
+    state = RobotState.at_rest(np.zeros(7))
     for _ in range(40):
         plan = generator.to_velocity(state, target)
         assert plan is not None
@@ -71,7 +71,7 @@ def test_what_is_brakeable_can_be_braked(share: float) -> None:
     limits = robot('panda').limits
     way: Array = np.full(7, share)
     velocity = brakeable_velocity(way, limits)
-    stop = Generator(limits).brake(MotionState(np.zeros(7), velocity, np.zeros(7)))
+    stop = Generator(limits).brake(RobotState(np.zeros(7), velocity, np.zeros(7)))
     assert stop is not None
     _, upper = stop.extremes
     free = velocity < limits.velocity
@@ -84,7 +84,7 @@ def test_what_is_brakeable_can_be_braked(share: float) -> None:
 def test_the_extremes_of_a_stop_are_those_of_its_places(seed: int) -> None:
     """Wherever it begins, also far from zero, and in whatever motion."""
     limits, rng = robot('panda').limits, np.random.default_rng(seed)
-    state = MotionState(
+    state = RobotState(
         rng.uniform(limits.lower, limits.upper),
         rng.uniform(-1.0, 1.0, 7) * limits.velocity,
         rng.uniform(-1.0, 1.0, 7) * limits.acceleration,
@@ -101,8 +101,8 @@ def test_the_extremes_of_a_stop_are_those_of_its_places(seed: int) -> None:
 def test_a_plan_to_a_state_arrives() -> None:
     """Position, velocity and acceleration of the target are met at the end."""
     limits = robot('prbt').limits
-    start = MotionState(np.zeros(6), np.full(6, 0.2), np.full(6, 0.5))
-    target = MotionState(np.full(6, 0.7), np.full(6, -0.3), np.full(6, 0.1))
+    start = RobotState(np.zeros(6), np.full(6, 0.2), np.full(6, 0.5))
+    target = RobotState(np.full(6, 0.7), np.full(6, -0.3), np.full(6, 0.1))
     plan = Generator(limits).to_state(start, target)
     assert plan is not None
     end = plan.at(plan.duration)
@@ -114,14 +114,14 @@ def test_a_plan_to_a_state_arrives() -> None:
 def test_ruckig_without_an_answer_is_none() -> None:
     """A target that ruckig refuses is no exception in the loop."""
     limits = robot('prbt').limits
-    state = MotionState.at_rest(np.zeros(6))
+    state = RobotState.at_rest(np.zeros(6))
     assert Generator(limits).to_velocity(state, np.full(6, np.nan)) is None
 
 
 def test_the_hard_brake_comes_to_rest() -> None:
     """The fallback slows each joint with its greatest deceleration, and stays at rest."""
     limits = robot('prbt').limits
-    state = MotionState(np.zeros(6), np.linspace(-1.5, 1.5, 6), np.zeros(6))
+    state = RobotState(np.zeros(6), np.linspace(-1.5, 1.5, 6), np.zeros(6))
     needed = float(np.max(np.abs(state.velocity) / limits.acceleration))
     for _ in range(int(needed / PERIOD) + 2):
         after = hard_brake(state, limits, PERIOD)

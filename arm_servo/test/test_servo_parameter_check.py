@@ -6,8 +6,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from model_robots import robot
 import pytest
-from servo_robots import robot
 
 from arm_servo import check_parameters
 

@@ -9,14 +9,14 @@ import math
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from model_robots import ready, robot, ROBOTS
 import numpy as np
 import pytest
-from servo_robots import ready, robot, ROBOTS
 
-from arm_servo.arrays import Array
+from arm_model import Array, CommandError
 from arm_servo.core import MotionCore
 from arm_servo.core_settings import CoreSettings
-from arm_servo.exceptions import CommandError, GoalCode, GoalError
+from arm_servo.exceptions import GoalCode, GoalError
 from arm_servo.execution import Phase
 from arm_servo.goal import GoalPoint, TrajectoryGoal
 from arm_servo.path_check import PathCheck, STEP

@@ -10,19 +10,18 @@ import re
 
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
+from model_robots import ready, robot, ROBOTS
 import numpy as np
 import pytest
-from servo_robots import ready, robot, ROBOTS
 from servo_streams import kept, PERIOD
 
-from arm_servo.arrays import Array
+from arm_model import Array, JointLimits, RobotState
 from arm_servo.core import MotionCore
 from arm_servo.core_settings import CoreSettings
 from arm_servo.exceptions import GoalCode, GoalError
 from arm_servo.execution import Execution, ExecutionSettings, Phase
 from arm_servo.goal import GoalPoint, TrajectoryGoal
-from arm_servo.limits import JointLimits
-from arm_servo.otg import Generator, MotionState
+from arm_servo.otg import Generator
 from arm_servo.path import linear, Path
 from arm_servo.path_rounding import rounded
 from arm_servo.path_timing import Timing
@@ -87,7 +86,7 @@ def time_optimal(
     return TrajectoryGoal(limits.names, points)
 
 
-def follow(core: MotionCore, execution: Execution) -> tuple[list[MotionState], float]:
+def follow(core: MotionCore, execution: Execution) -> tuple[list[RobotState], float]:
     """Follow a trajectory to its end; return the states, and how far off its path they were."""
     states, off = [core.state], 0.0
     for step in range(round(30.0 / PERIOD)):
@@ -299,13 +298,13 @@ def test_set_points_that_leave_the_path_end_the_trajectory() -> None:
         quick('prbt', begin + 0.3, 2.0),
         limits=limits,
         generator=Generator(limits),
-        state=MotionState.at_rest(begin),
+        state=RobotState.at_rest(begin),
         speed_scaling=1.0,
         settings=ExecutionSettings(),
     )
-    state = MotionState.at_rest(begin)
+    state = RobotState.at_rest(begin)
     for step in range(300):
-        held = state if step < 150 else MotionState.at_rest(state.position)
+        held = state if step < 150 else RobotState.at_rest(state.position)
         after = execution.step(held, held, 1.0, PERIOD)
         state = after if step < 150 and after is not None else held
     assert execution.ending is not None

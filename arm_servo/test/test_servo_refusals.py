@@ -12,12 +12,12 @@ from typing import Any
 
 from input_devices import InjectedDevices
 from isolation import Isolation
+from model_robots import FOLDER, texts
 import pytest
 import rclpy
 from rclpy.node import Node
-from servo_robots import FOLDER, texts
 
-from arm_servo.exceptions import ServoError
+from arm_model import ArmError
 from arm_servo.nodes.motion_master import Motion
 from arm_servo.teleop.servo_gamepad import ServoGamepad
 from arm_servo.teleop.servo_keyboard_input import ServoKeyboardInput
@@ -70,7 +70,7 @@ def test_a_refused_node_leaves_nothing_in_the_graph(
     rclpy.init(args=parameters(tmp_path, **values), domain_id=isolation.domain_id)
     try:
         watcher = Node('watcher')
-        with pytest.raises((ParameterError, ServoError, OperatorInputError), match=reason):
+        with pytest.raises((ParameterError, ArmError, OperatorInputError), match=reason):
             make()
         assert watcher.get_node_names() == ['watcher']
         watcher.destroy_node()

@@ -7,9 +7,9 @@ from __future__ import annotations
 from collections.abc import Callable
 import contextlib
 
+from model_robots import ready, robot, ROBOTS
 import numpy as np
 import pytest
-from servo_robots import ready, robot, ROBOTS
 
 from arm_servo.core import MotionCore
 from arm_servo.exceptions import GoalError

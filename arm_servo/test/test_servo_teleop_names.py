@@ -4,10 +4,10 @@
 
 from __future__ import annotations
 
+from model_robots import chain_texts, robot, ROBOTS, texts
 import pytest
-from servo_robots import chain_texts, robot, ROBOTS, texts
 
-from arm_servo import ModelError
+from arm_model import ModelError
 from arm_servo.teleop import names_of
 
 

@@ -10,10 +10,10 @@ import re
 import shutil
 
 from isolation import Isolation
+from model_robots import texts
 import pytest
 from ros_client import RosClient
 from servo_listener import PATIENCE, ServoListener
-from servo_robots import texts
 from tmux_pane import Pane
 
 pytestmark = [

@@ -10,18 +10,17 @@ import re
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from model_robots import chain, ready, robot, ROBOTS
 import numpy as np
 import pytest
-from servo_robots import chain, ready, robot, ROBOTS
 from servo_streams import follow_to_the_end, kept, PERIOD, stream, wave
 
-from arm_servo.arrays import Array
+from arm_model import Array, RobotState
 from arm_servo.core import MotionCore
 from arm_servo.core_settings import CoreSettings
 from arm_servo.exceptions import GoalCode, GoalError
 from arm_servo.execution import ExecutionSettings, Phase
 from arm_servo.goal import GoalPoint, GoalRules, JointTolerance, TrajectoryGoal
-from arm_servo.otg import MotionState
 from arm_servo.outcome import Outcome
 from arm_servo.path import cubic, linear, Path, PathPoint, quintic
 from arm_servo.tolerances import tolerances
@@ -36,7 +35,7 @@ def core_of(name: str, execution: ExecutionSettings | None = None) -> MotionCore
     return core
 
 
-def off_the_path(states: list[MotionState], path: Path) -> float:
+def off_the_path(states: list[RobotState], path: Path) -> float:
     """Return how far positions are from the nearest place of a path, at most, in [rad]."""
     places = np.array([path.at(t).position for t in np.linspace(0, path.duration, 4000)])
     return max(float(np.abs(places - s.position).max(axis=1).min()) for s in states[::10])
@@ -333,7 +332,7 @@ def lagging(core: MotionCore, lag: Array, cycles: int) -> None:
     """Step a core whose drives are off by an amount."""
     for step in range(cycles):
         state = core.state
-        measured = MotionState(state.position - lag, state.velocity, state.acceleration)
+        measured = RobotState(state.position - lag, state.velocity, state.acceleration)
         core.step(step * PERIOD, PERIOD, measured)
 
 
@@ -476,7 +475,7 @@ def test_a_turn_of_a_continuous_joint_is_no_error() -> None:
         state = core.state
         wrapped = np.array(state.position)
         wrapped[0] = np.arctan2(np.sin(wrapped[0]), np.cos(wrapped[0]))
-        core.step(step * PERIOD, PERIOD, MotionState(wrapped, state.velocity, state.acceleration))
+        core.step(step * PERIOD, PERIOD, RobotState(wrapped, state.velocity, state.acceleration))
     assert execution.ending is not None
     assert execution.ending.code is GoalCode.SUCCESSFUL, execution.ending.reason
 

@@ -9,16 +9,16 @@ from types import SimpleNamespace
 from typing import Any
 
 from isolation import Isolation
+from model_robots import FOLDER, ready, robot, texts
 import pytest
 import rclpy
 from rclpy.node import Node
-from servo_robots import FOLDER, ready, robot, texts
 import yaml
 
+from arm_model import ModelError
 from arm_servo import check_parameters
 from arm_servo.core import MotionCore
 from arm_servo.core_settings import CoreSettings
-from arm_servo.exceptions import ModelError
 from arm_servo.nodes.motion_controller import _build as build_motion_controller
 from arm_servo.nodes.parameter_sheet import ParameterSheet
 from arm_servo.nodes.servo_node import _build as build_servo_node

@@ -9,14 +9,12 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ..arrays import Array, checked
+from arm_model import Array, checked, CommandError, Pose, RobotModel, rotation_of
+from arm_model.ros import xyz, xyzw
+
 from ..commands import by_joint, pose_command, twist_command
-from ..exceptions import CommandError
-from ..model import Pose, RobotModel
 from ..requests import DisplacementRequest, JogRequest
 from ..servo import JointCommand
-from .frame_tree import rotation_of
-from .ros_numbers import xyz, xyzw
 from .servo_parameters import (
     DEFAULT_ANGULAR_SPEED,
     DEFAULT_LINEAR_SPEED,

@@ -11,6 +11,29 @@ from controller_manager_msgs.msg import ControllerState
 from controller_manager_msgs.srv import ListControllers, SwitchController
 from rclpy.node import Node
 
+from arm_model import RobotModel
+from node_runner import ParameterReader
+
+
+def declare_manager(node: Node, model: RobotModel) -> tuple[str, bool]:
+    """Declare the trajectory controller's name, and whether joint states are published.
+
+    Args:
+        node: The node ``controller_manager``.
+        model: The arm.
+    """
+    read = ParameterReader(node)
+    return (
+        read.text(
+            'controller_name', f'{model.group}_controller', 'name of the trajectory controller'
+        ),
+        read.flag(
+            'publish_joint_states',
+            'publish /joint_states and /dynamic_joint_states; only where the drives run here',
+            default=True,
+        ),
+    )
+
 
 @dataclass(slots=True)
 class Controller:

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..arrays import frozen
+from arm_model import frozen, RobotState
+
 from ..gateway import CommandGateway
-from ..otg import MotionState
 from ..set_point import Source
 from .drive_reasons import COMMAND, what_happened, why_not
 
@@ -139,7 +139,7 @@ class DriveSource:
         self._left.clear()
 
 
-def measured_state(feedback: Sequence[AxisFeedback]) -> MotionState | None:
+def measured_state(feedback: Sequence[AxisFeedback]) -> RobotState | None:
     """Return what the drives measure; None while one of them has told nothing yet.
 
     Args:
@@ -149,4 +149,4 @@ def measured_state(feedback: Sequence[AxisFeedback]) -> MotionState | None:
     if not np.isfinite(positions).all():
         return None
     velocities = frozen([axis.velocity for axis in feedback])
-    return MotionState(positions, velocities, np.zeros(len(feedback)))
+    return RobotState(positions, velocities, np.zeros(len(feedback)))

@@ -9,8 +9,7 @@ import math
 
 import numpy as np
 
-from ..arrays import Array
-from ..limits import JointLimits
+from arm_model import Array, JointLimits
 
 MOVED = 0.002
 """How far an arm at rest may turn by itself in [rad]; more was done by others."""

@@ -9,8 +9,7 @@ import math
 
 import numpy as np
 
-from ..arrays import frozen
-from ..otg import MotionState
+from arm_model import frozen, RobotState
 
 
 class JointFeedback:
@@ -57,7 +56,7 @@ class JointFeedback:
         """Steady time since which every joint was heard in [s]."""
         return min(time for _, _, time in self._values)
 
-    def state(self, now: float) -> tuple[MotionState | None, str]:
+    def state(self, now: float) -> tuple[RobotState | None, str]:
         """Return the measured state, None before it is whole; and why it is no good.
 
         Args:
@@ -77,7 +76,7 @@ class JointFeedback:
             )
         if any(math.isnan(position) for position, _, _ in values):
             return None, blocked
-        measured = MotionState(
+        measured = RobotState(
             frozen([position for position, _, _ in values]),
             frozen([speed for _, speed, _ in values]),
             np.zeros(len(values)),

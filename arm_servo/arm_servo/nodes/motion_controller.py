@@ -10,9 +10,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 import sys
 
+from arm_model.ros import declare_robot, same_robot
+
 from ..core_settings import CoreSettings
+from .controller_manager import declare_manager
 from .motion_thread import MotionThread
-from .robot_parameters import declare_manager, declare_robot, same_robot
 from .servo import Servo
 from .servo_parameters import declare_servo
 from .standalone import declare_loop, keep_drives, make_loop, MakeNode, run_standalone

@@ -15,16 +15,16 @@ from typing import TYPE_CHECKING
 from rclpy.node import Node
 
 from arm_canopen import run_master
+from arm_model import ArmError, ModelError
+from arm_model.ros import declare_robot, same_robot
 from node_runner import destroyed_if_refused
 
 from ..core import MotionCore
 from ..core_settings import CoreSettings
-from ..exceptions import ModelError, ServoError
 from ..gateway import CommandGateway, start_worker
-from .controller_manager import ControllerManager, trajectory_entry
+from .controller_manager import ControllerManager, declare_manager, trajectory_entry
 from .drive_source import DriveSource
 from .joint_state_broadcaster import JointStateBroadcaster
-from .robot_parameters import declare_manager, declare_robot, same_robot
 from .servo import Servo
 from .servo_parameters import declare_servo
 from .trajectory_controller import TrajectoryController
@@ -132,7 +132,7 @@ def main(argv: list[str] | None = None) -> int:
     Returns:
         The exit code of the master, 1 when the arm cannot be built.
     """
-    return run_master(argv, extend=lambda master: Motion(master).nodes, errors=[ServoError])
+    return run_master(argv, extend=lambda master: Motion(master).nodes, errors=[ArmError])
 
 
 if __name__ == '__main__':

@@ -12,12 +12,12 @@ import time
 
 import numpy as np
 
+from arm_model import Array, RobotState
 from realtime_loop import CycleTimer
 
-from ..arrays import Array
 from ..exceptions import GoalCode
 from ..gateway import CommandGateway
-from ..otg import hard_brake, MotionState
+from ..otg import hard_brake
 from ..report import MotionReport
 from ..set_point import SetPoint, Source
 from .following import FollowingWatch
@@ -53,7 +53,7 @@ class MotionCycle:
             watch: Compares the two.
         """
         self._gateway, self._feedback, self._output = gateway, feedback, output
-        self._state = MotionState.at_rest(np.zeros(len(gateway.model)))
+        self._state = RobotState.at_rest(np.zeros(len(gateway.model)))
         self._watch = watch
         self.closing = ''
         self._compared = -math.inf

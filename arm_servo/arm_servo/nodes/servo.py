@@ -19,17 +19,18 @@ from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from ..exceptions import GoalCode, ModelError, NotReadyError, ServoError
+from arm_model import ArmError, ModelError
+from arm_model.ros import seconds, TfListener
+
+from ..exceptions import GoalCode, NotReadyError
 from ..gateway import CommandGateway, JOGGING
 from ..outcome import Outcome
 from ..requests import DisplacementRequest, JogRequest
 from .command_converter import CommandConverter
 from .refusals import Refusals
-from .ros_numbers import seconds
 from .servo_modes import CommandKind, ServoModes
 from .servo_parameters import PREFIX, read_scales, Scales, ServoParameters
 from .servo_status import status_of
-from .tf_listener import TfListener
 
 Convert = Callable[[Any, float], JogRequest | DisplacementRequest]
 
@@ -89,7 +90,7 @@ class Servo:
             request = convert(message, begin - age)
             if not request.is_zero and begin - self._last > FRESH:
                 self._prepare()
-        except ServoError as error:
+        except ArmError as error:
             self._refuse(str(error))
             return
         except Exception as error:  # noqa: BLE001  # a message must not end the program

@@ -11,7 +11,7 @@ from moveit_msgs.srv import ServoCommandType
 from rclpy.node import Node
 from std_srvs.srv import Empty, SetBool, Trigger
 
-from ..exceptions import CommandError
+from arm_model import CommandError
 
 
 class CommandKind(IntEnum):

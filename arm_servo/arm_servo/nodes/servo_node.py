@@ -7,11 +7,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 import sys
 
+from arm_model.ros import declare_robot
 from node_runner import ParameterReader
 
 from ..core_settings import CoreSettings
 from .motion_thread import MotionThread
-from .robot_parameters import declare_robot
 from .servo import Servo
 from .servo_parameters import declare_servo, PREFIX
 from .standalone import declare_loop, keep_drives, make_loop, MakeNode, run_standalone

@@ -10,12 +10,10 @@ from enum import Enum
 import numpy as np
 from rclpy.node import Node
 
+from arm_model import JointLimits, ModelError, RobotModel
 from node_runner import ParameterReader
 
 from ..bounds import BrakeSettings
-from ..exceptions import ModelError
-from ..limits import JointLimits
-from ..model import RobotModel
 from ..servo import ServoSettings
 from ..velocity_ik import IkSettings
 

@@ -14,6 +14,7 @@ import time
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
+from arm_model import ArmError, RobotModel
 from node_runner import (
     declare_thread_priority,
     LINGER,
@@ -26,9 +27,7 @@ from node_runner import (
 
 from ..core import MotionCore
 from ..core_settings import CoreSettings
-from ..exceptions import ServoError
 from ..gateway import CommandGateway, start_worker
-from ..model import RobotModel
 from .following import FollowingLimits, FollowingWatch
 from .joint_feedback import JointFeedback
 from .motion_thread import MotionCycle, MotionThread
@@ -150,7 +149,7 @@ def run_standalone(
         Exit code: 0, or 1 when the arm cannot be built.
     """
     sys.setswitchinterval(SWITCH_INTERVAL)
-    return run_program(name, lambda stop: _serve(build, stop), ServoError, args=args)
+    return run_program(name, lambda stop: _serve(build, stop), ArmError, args=args)
 
 
 def _serve(build: Callable[[MakeNode], MotionThread], stop: threading.Event) -> None:

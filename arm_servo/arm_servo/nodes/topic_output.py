@@ -10,9 +10,9 @@ from rclpy.node import Node
 from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
+from arm_model import ModelError
 from node_runner import ParameterReader
 
-from ..exceptions import ModelError
 from ..set_point import SetPoint
 from .trajectory_messages import duration_fields
 

@@ -14,9 +14,10 @@ from control_msgs.action import FollowJointTrajectory
 from rclpy.action.server import CancelResponse
 from rclpy.node import Node
 
+from arm_model import ArmError
 from node_runner.action_goals import serve_goals
 
-from ..exceptions import GoalCode, ServoError
+from ..exceptions import GoalCode
 from ..execution import Execution
 from ..gateway import CommandGateway, MotionCommand
 from ..goal import TrajectoryGoal
@@ -98,7 +99,7 @@ class TrajectoryAction:
         goal = self._goals[bytes(handle.goal_id.uuid)] = _Goal(handle)
         try:
             goal.command = self._follow(self._convert(handle.request))
-        except ServoError as error:
+        except ArmError as error:
             goal.outcome = refused(error)
         except Exception as error:  # noqa: BLE001  # a goal must not end the program
             goal.outcome = refused(error)

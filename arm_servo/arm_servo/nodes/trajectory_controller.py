@@ -18,12 +18,14 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from trajectory_msgs.msg import JointTrajectory
 
-from ..exceptions import NotReadyError, ServoError
+from arm_model import ArmError
+from arm_model.ros import seconds
+
+from ..exceptions import NotReadyError
 from ..execution import Execution
 from ..gateway import CommandGateway, MotionCommand
 from ..goal import TrajectoryGoal
 from ..set_point import Source
-from .ros_numbers import seconds
 from .trajectory_action import TrajectoryAction
 from .trajectory_messages import (
     difference,
@@ -114,7 +116,7 @@ class TrajectoryController:
     def _take(self, message: JointTrajectory) -> None:
         try:
             command = self._follow(goal_of_trajectory(message, self._now, self._parameters))
-        except ServoError as error:
+        except ArmError as error:
             self._news.append(f'trajectory refused: {error}')
             return
         except Exception:  # noqa: BLE001  # a message must not end the program

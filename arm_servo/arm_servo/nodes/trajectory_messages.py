@@ -9,11 +9,11 @@ from typing import Any
 
 from trajectory_msgs.msg import JointTrajectoryPoint
 
+from arm_model import JointLimits, RobotState
+from arm_model.ros import seconds
+
 from ..exceptions import GoalCode, GoalError
 from ..goal import GoalPoint, JointTolerance, TrajectoryGoal
-from ..limits import JointLimits
-from ..otg import MotionState
-from .ros_numbers import seconds
 from .trajectory_parameters import TrajectoryParameters
 
 
@@ -84,7 +84,7 @@ def goal_of_action(
     )
 
 
-def point_of(state: MotionState, time: float = 0.0) -> JointTrajectoryPoint:
+def point_of(state: RobotState, time: float = 0.0) -> JointTrajectoryPoint:
     """Return a state as a point.
 
     Args:
@@ -101,9 +101,9 @@ def point_of(state: MotionState, time: float = 0.0) -> JointTrajectoryPoint:
     return point
 
 
-def difference(limits: JointLimits, wanted: MotionState, actual: MotionState) -> MotionState:
+def difference(limits: JointLimits, wanted: RobotState, actual: RobotState) -> RobotState:
     """Return wanted less actual; accelerations are not measured, so theirs are zero."""
-    return MotionState(
+    return RobotState(
         limits.error(wanted.position, actual.position),
         wanted.velocity - actual.velocity,
         0.0 * wanted.acceleration,

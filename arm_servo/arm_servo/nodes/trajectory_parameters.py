@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 from rclpy.node import Node
 
+from arm_model import ModelError
 from node_runner import ParameterReader
 
-from ..exceptions import ModelError
 from ..execution import ExecutionSettings
 from ..goal import GoalRules, JointTolerance
 

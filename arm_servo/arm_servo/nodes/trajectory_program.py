@@ -9,11 +9,12 @@ import sys
 
 from rclpy.node import Node
 
+from arm_model.ros import declare_robot
+
 from ..core_settings import CoreSettings
 from ..gateway import CommandGateway
-from .controller_manager import ControllerManager, trajectory_entry
+from .controller_manager import ControllerManager, declare_manager, trajectory_entry
 from .motion_thread import MotionThread
-from .robot_parameters import declare_manager, declare_robot
 from .standalone import declare_loop, keep_drives, make_loop, MakeNode, run_standalone
 from .topic_output import ARRAY, declare_output
 from .trajectory_controller import TrajectoryController

@@ -4,10 +4,10 @@
 
 from __future__ import annotations
 
-from ..exceptions import ServoError
+from arm_model import ArmError
 
 
-class SettingError(ServoError, ValueError):
+class SettingError(ArmError, ValueError):
     """A parameter is misspelt, or its value makes no sense.
 
     Scenarios: a speed of 150 %, a button that no gamepad has.

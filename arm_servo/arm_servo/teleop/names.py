@@ -8,8 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from xml.etree import ElementTree as ET
 
-from ..exceptions import ModelError
-from ..srdf import parse_srdf
+from arm_model import ModelError, parse_srdf
 
 MOVABLE = frozenset({'revolute', 'continuous', 'prismatic'})
 

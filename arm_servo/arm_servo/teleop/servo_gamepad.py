@@ -10,6 +10,7 @@ import threading
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
+from arm_model import ArmError
 from node_runner import destroyed_when_refused, ParameterReader, refuse_misspelt, run_program
 from operator_input import CommandStream, OperatorInputError
 from operator_input.devices import InputDevices, KernelDevices
@@ -22,7 +23,6 @@ from operator_input.gamepad import (
     GamepadState,
 )
 
-from ..exceptions import ServoError
 from .gamepad_teleop import GamepadTeleop
 from .jog import Jog, rest_of
 from .servo_link import ServoLink
@@ -134,7 +134,7 @@ class Session(GamepadSession[Jog]):
 
 def main() -> int:
     """Run until Ctrl-C; return the exit code."""
-    return run_program('servo_gamepad', _serve, ServoError, OperatorInputError)
+    return run_program('servo_gamepad', _serve, ArmError, OperatorInputError)
 
 
 def _serve(stop: threading.Event) -> None:

@@ -10,6 +10,7 @@ import threading
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
+from arm_model import ArmError
 from node_runner import destroyed_when_refused, ParameterReader, refuse_misspelt, run_program
 from operator_input import (
     AutoRepeat,
@@ -20,7 +21,6 @@ from operator_input import (
     OperatorInputError,
 )
 
-from ..exceptions import ServoError
 from .jog import Jog, rest_of
 from .key_map import HELP
 from .keyboard_teleop import KeyboardTeleop
@@ -137,7 +137,7 @@ class Session(KeyboardSession[Jog, Request]):
 
 def main() -> int:
     """Run until Ctrl-C; return the exit code."""
-    errors = ServoError, OperatorInputError
+    errors = ArmError, OperatorInputError
     # a second Ctrl-C must not leave the terminal as the program has it
     return run_program('servo_keyboard_input', _serve, *errors, patient=True)
 

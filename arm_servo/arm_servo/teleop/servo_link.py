@@ -20,7 +20,8 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import SetBool
 
-from ..exceptions import ModelError
+from arm_model import ModelError
+
 from .jog import Frame, Jog, JointJog, Vector
 from .names import ArmNames
 from .requests import CommandType

@@ -16,7 +16,8 @@ from rclpy.client import Client
 from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
 
-from ..exceptions import ModelError
+from arm_model import ModelError
+
 from .names import ArmNames, names_of
 from .scales import Scales, UNITLESS
 

@@ -18,8 +18,7 @@ from rclpy.action.client import ActionClient
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from arm_servo import RobotModel
-from arm_servo.arrays import Array
+from arm_model import Array, RobotModel
 from process_supervisor import CallError
 
 from ..client import ArmClient

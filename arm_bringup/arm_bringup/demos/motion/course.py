@@ -11,8 +11,7 @@ import time
 from action_msgs.msg import GoalStatus
 import numpy as np
 
-from arm_servo import RobotModel
-from arm_servo.arrays import Array
+from arm_model import Array, RobotModel
 from process_supervisor import CallError
 
 from .client import GoalRun, MotionClient

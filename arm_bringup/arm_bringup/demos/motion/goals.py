@@ -6,8 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from arm_servo import JointLimits
-from arm_servo.arrays import Array
+from arm_model import Array, JointLimits
 
 # peaks of a quintic from rest to rest over unit way and unit time
 PEAK_VELOCITY, PEAK_ACCELERATION, PEAK_JERK = 1.875, 5.7735, 60.0

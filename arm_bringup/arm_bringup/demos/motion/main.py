@@ -10,7 +10,7 @@ import json
 from pathlib import Path
 import sys
 
-from arm_servo import load_limits, RobotModel, ServoError
+from arm_model import ArmError, load_limits, RobotModel
 from process_supervisor import (
     namespaced_parameters,
     parse_with_ros,
@@ -196,6 +196,6 @@ def main(argv: Sequence[str] | None = None) -> int:
             master_files=demo_files,
         ) as arm:
             return run(arm, arguments.duration)
-    except (BringupError, SupervisorError, ServoError) as error:
+    except (BringupError, SupervisorError, ArmError) as error:
         sys.stderr.write(f'{error}\n')
         return USAGE_ERROR

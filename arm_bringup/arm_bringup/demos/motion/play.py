@@ -8,7 +8,7 @@ from collections.abc import Callable
 import math
 import time
 
-from arm_servo import RobotModel
+from arm_model import RobotModel
 from process_supervisor import CallError
 from process_supervisor.play import Result
 

@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from arm_servo.arrays import Array
+from arm_model import Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 import math
 from typing import Any
 
@@ -14,32 +13,15 @@ import pinocchio as pin
 
 from .arrays import Array, frozen, Native
 from .clearances import Clearances, LeastClearance, Proximity
-from .collision import CollisionModel
 from .description import Description
 from .exceptions import CommandError, ModelError
 from .limits import JointLimits, merge_limits
+from .pose import Pose, turned_twists
+from .scene import PlanningScene
 from .srdf import Group, parse_srdf, SemanticDescription
 
 MOST_JOINTS = 8
 """Joints of the longest chain that is offered."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Pose:
-    """Position and orientation of a frame in another.
-
-    Attributes:
-        rotation: Rotation matrix (3, 3), from the frame to the other.
-        position: Origin of the frame in the other in [m].
-    """
-
-    rotation: Array
-    position: Array
-
-
-def combined(outer: Pose, inner: Pose) -> Pose:
-    """Return a pose in the frame in which the outer one is given."""
-    return Pose(outer.rotation @ inner.rotation, outer.position + outer.rotation @ inner.position)
 
 
 class RobotModel:
@@ -57,6 +39,7 @@ class RobotModel:
         limits: Limits of the joints, with their names.
         poses: Named poses of the SRDF, in the order of the joints.
         notes: What was passed over in description and SRDF, in words.
+        scene: The shapes and the pairs of them that are checked; for any thread.
         reach: Greatest distance of the tip from the first joint's axis frame in [m].
     """
 
@@ -96,8 +79,8 @@ class RobotModel:
         self._tip_frame = self._model.getFrameId(self.tip)
         self._base_frame = self._model.getFrameId(self.base)
         self._at = b''  # positions of the kinematics that are cached
-        self._shapes = CollisionModel(self._model, description.shapes, semantic.checks)
-        self._clearances = Clearances(self._shapes)
+        self.scene = PlanningScene(self._model, description.shapes, semantic.checks)
+        self._clearances = Clearances(self.scene)
         self.reach = self._reach()
 
     def __len__(self) -> int:
@@ -112,7 +95,7 @@ class RobotModel:
     @property
     def pairs(self) -> Sequence[tuple[str, str]]:
         """Links of each pair of shapes that is checked for collision."""
-        return self._shapes.pairs
+        return self.scene.pairs
 
     @property
     def frames(self) -> Sequence[str]:
@@ -194,7 +177,7 @@ class RobotModel:
 
     def clearances(self) -> Clearances:
         """Return what measures distances for another thread than the owner's."""
-        return Clearances(self._shapes)
+        return Clearances(self.scene)
 
     def check_link(self, link: str | None) -> None:
         """Make sure that a link can be asked for.
@@ -242,18 +225,6 @@ class RobotModel:
         ]
         tip = self._model.frames[self._tip_frame].placement.translation
         return float(sum(lengths) + np.linalg.norm(tip))
-
-
-def turned_twists(axes: Array, twists: Array) -> Array:
-    """Return twists along other axes.
-
-    Args:
-        axes: Rotation (3, 3) from the other axes to those of the twists.
-        twists: Twists as columns (6, n), or one twist (6).
-    """
-    parts = twists.reshape(2, 3, -1)
-    turned: Array = np.matmul(axes.T, parts).reshape(twists.shape)
-    return turned
 
 
 def _only(semantic: SemanticDescription) -> str:

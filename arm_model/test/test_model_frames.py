@@ -11,16 +11,14 @@ from typing import Any, cast, TYPE_CHECKING
 from geometry_msgs.msg import TransformStamped
 from hypothesis import given
 from hypothesis import strategies as st
+from model_robots import robot
 import numpy as np
 import pinocchio as pin
 import pytest
-from servo_robots import robot
 from tf2_msgs.msg import TFMessage
 
-from arm_servo.exceptions import CommandError
-from arm_servo.model import combined, Pose
-from arm_servo.nodes.frame_tree import FrameTree, inverse, rotation_of
-from arm_servo.nodes.tf_listener import TfListener
+from arm_model import combined, CommandError, FrameTree, inverse, Pose, rotation_of
+from arm_model.ros import TfListener
 
 if TYPE_CHECKING:
     from rclpy.node import Node

@@ -4,42 +4,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio as pin
 
-from ..arrays import Array
-from ..exceptions import CommandError
-from ..model import combined, Pose
+from .pose import combined, inverse, Pose
 
 STALE = 1.0
 """Age at which a transform of /tf counts no more in [s]."""
-
-UNIT = 1e-3
-"""How far the length of a quaternion may be off."""
-
-
-def rotation_of(quaternion: Sequence[float]) -> Array:
-    """Return the rotation matrix of a quaternion.
-
-    Args:
-        quaternion: x, y, z, w.
-
-    Raises:
-        CommandError: A number is not finite, or the length is not one.
-    """
-    length = float(np.linalg.norm(quaternion))
-    if not abs(length - 1.0) < UNIT:
-        raise CommandError(f'orientation {list(quaternion)}: its length is {length:.4g}, not 1')
-    matrix: Array = pin.Quaternion(np.array(quaternion) / length).toRotationMatrix()
-    return matrix
-
-
-def inverse(pose: Pose) -> Pose:
-    """Return the pose of the outer frame in the inner."""
-    return Pose(pose.rotation.T, -pose.rotation.T @ pose.position)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

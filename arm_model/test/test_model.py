@@ -10,15 +10,12 @@ from typing import Any
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from model_robots import chain, chain_texts, ready, robot, ROBOTS, table, texts
 import numpy as np
 import pinocchio as pin
 import pytest
-from servo_robots import chain, chain_texts, ready, robot, ROBOTS, table, texts
 
-from arm_servo.arrays import Array
-from arm_servo.exceptions import CommandError, ModelError
-from arm_servo.limits import load_limits
-from arm_servo.model import Pose, RobotModel
+from arm_model import Array, CommandError, load_limits, ModelError, Pose, RobotModel
 
 CHAINS = ('zyy', 'zyyz', 'zyyzy', 'cyyzyz', 'zpyzyzc', 'zyzyzyzy')
 

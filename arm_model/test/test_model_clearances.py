@@ -6,11 +6,11 @@ from __future__ import annotations
 
 import math
 
+from model_robots import chain, robot, ROBOTS
 import numpy as np
 import pytest
-from servo_robots import chain, robot, ROBOTS
 
-from arm_servo.model import RobotModel
+from arm_model import RobotModel
 
 ARMS = [*(robot(name) for name in ROBOTS), chain('zpyypz')]
 """The robots, and a chain with sliding joints."""

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Shapes on the links of an arm, the pairs of them that are checked, and how joints part them."""
+"""What may collide: shapes on the links, the pairs that are checked, how joints part them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .arrays import Array, Native
 from .description import Shape
 
 
-class CollisionModel:
+class PlanningScene:
     """Shapes on the links of a reduced pinocchio model, and the pairs of them that are checked.
 
     It is not changed once it is made, so any thread may read it.

@@ -10,9 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from arm_bringup.description import expand_xacro
-from arm_servo.arrays import Array, frozen
-from arm_servo.limits import load_limits
-from arm_servo.model import RobotModel
+from arm_model import Array, frozen, load_limits, RobotModel
 
 FOLDER = Path(__file__).parents[2] / 'arm_bringup' / 'robots'
 

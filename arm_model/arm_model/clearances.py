@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from .arrays import Array
-from .collision import CollisionModel
+from .scene import PlanningScene
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -19,7 +19,7 @@ class Proximity:
     """Two shapes that are near to each other.
 
     Attributes:
-        pair: Number of the pair, a place in :attr:`CollisionModel.pairs`.
+        pair: Number of the pair, a place in :attr:`PlanningScene.pairs`.
         links: Names of their links.
         distance: Between their surfaces in [m]; negative when they overlap.
         gradient: Change of the distance with each joint in [m/rad].
@@ -52,7 +52,7 @@ class Clearances:
     thread.
     """
 
-    def __init__(self, shapes: CollisionModel) -> None:
+    def __init__(self, shapes: PlanningScene) -> None:
         """Begin with nothing known.
 
         Args:

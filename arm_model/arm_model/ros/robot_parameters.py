@@ -35,26 +35,6 @@ def declare_robot(node: Node) -> RobotModel:
     return RobotModel(urdf, srdf, load_limits(Path(limits)), group or None, tip or None)
 
 
-def declare_manager(node: Node, model: RobotModel) -> tuple[str, bool]:
-    """Declare the trajectory controller's name, and whether joint states are published.
-
-    Args:
-        node: The node ``controller_manager``.
-        model: The arm.
-    """
-    read = ParameterReader(node)
-    return (
-        read.text(
-            'controller_name', f'{model.group}_controller', 'name of the trajectory controller'
-        ),
-        read.flag(
-            'publish_joint_states',
-            'publish /joint_states and /dynamic_joint_states; only where the drives run here',
-            default=True,
-        ),
-    )
-
-
 def same_robot(node: Node, model: RobotModel) -> None:
     """Declare what describes an arm on a further node, where clients ask for it too.
 

@@ -14,9 +14,10 @@ from tf2_msgs.msg import TFMessage
 
 from ..arrays import checked
 from ..exceptions import CommandError
-from ..model import Pose, RobotModel
-from .frame_tree import FrameTree, rotation_of
-from .ros_numbers import seconds, xyz, xyzw
+from ..frame_tree import FrameTree
+from ..model import RobotModel
+from ..pose import Pose, rotation_of
+from .numbers import seconds, xyz, xyzw
 
 STATIC = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 """How /tf_static is published."""

@@ -1,0 +1,43 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Everything that arm_model raises, and the root of what the packages above it raise.
+
+::
+
+    ArmError
+    ├── ModelError (ValueError)     description, SRDF and limits do not make an arm
+    │   └── LimitsError             the limits file is the matter
+    └── CommandError (ValueError)   a request is refused before anything moves
+
+Arguments of the wrong kind from a *programmer* stay ``ValueError``/``TypeError``.
+"""
+
+from __future__ import annotations
+
+
+class ArmError(Exception):
+    """Root of all errors of arm_model, arm_trajectory and arm_servo."""
+
+
+class ModelError(ArmError, ValueError):
+    """Description, SRDF and limits do not make an arm.
+
+    Scenarios: a joint of the group has no acceleration limit, the group is unknown, the tip link
+    is misspelt, a pose of the SRDF is beyond a limit.
+    """
+
+
+class LimitsError(ModelError):
+    """The limits file cannot be read, or does not have what it must.
+
+    Scenarios: a joint without max_jerk, a speed that is wider than the description's, a number
+    that is none.
+    """
+
+
+class CommandError(ArmError, ValueError):
+    """A request is refused before anything moves.
+
+    Scenarios: a NaN, an unknown joint or link, a twist that is not six numbers, a speed override
+    of 120 %.
+    """

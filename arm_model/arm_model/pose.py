@@ -1,0 +1,68 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Poses of frames in each other, and twists along other axes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from .arrays import Array
+from .exceptions import CommandError
+
+UNIT = 1e-3
+"""How far the length of a quaternion may be off."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pose:
+    """Position and orientation of a frame in another.
+
+    Attributes:
+        rotation: Rotation matrix (3, 3), from the frame to the other.
+        position: Origin of the frame in the other in [m].
+    """
+
+    rotation: Array
+    position: Array
+
+
+def combined(outer: Pose, inner: Pose) -> Pose:
+    """Return a pose in the frame in which the outer one is given."""
+    return Pose(outer.rotation @ inner.rotation, outer.position + outer.rotation @ inner.position)
+
+
+def rotation_of(quaternion: Sequence[float]) -> Array:
+    """Return the rotation matrix of a quaternion.
+
+    Args:
+        quaternion: x, y, z, w.
+
+    Raises:
+        CommandError: A number is not finite, or the length is not one.
+    """
+    length = float(np.linalg.norm(quaternion))
+    if not abs(length - 1.0) < UNIT:
+        raise CommandError(f'orientation {list(quaternion)}: its length is {length:.4g}, not 1')
+    matrix: Array = pin.Quaternion(np.array(quaternion) / length).toRotationMatrix()
+    return matrix
+
+
+def inverse(pose: Pose) -> Pose:
+    """Return the pose of the outer frame in the inner."""
+    return Pose(pose.rotation.T, -pose.rotation.T @ pose.position)
+
+
+def turned_twists(axes: Array, twists: Array) -> Array:
+    """Return twists along other axes.
+
+    Args:
+        axes: Rotation (3, 3) from the other axes to those of the twists.
+        twists: Twists as columns (6, n), or one twist (6).
+    """
+    parts = twists.reshape(2, 3, -1)
+    turned: Array = np.matmul(axes.T, parts).reshape(twists.shape)
+    return turned

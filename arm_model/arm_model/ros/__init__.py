@@ -1,0 +1,9 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The robot model in ROS: from parameters, and its frames beside those of TF."""
+
+from .numbers import seconds, xyz, xyzw
+from .robot_parameters import declare_robot, same_robot
+from .tf_listener import TfListener
+
+__all__ = ['TfListener', 'declare_robot', 'same_robot', 'seconds', 'xyz', 'xyzw']
