@@ -25,13 +25,13 @@ setup(
     entry_points={
         'can.interface': ['arm_canopen = arm_canopen.can.plugin:ArmCanopenBus'],
         'console_scripts': [
-            'candump = arm_canopen.nodes.candump:main',
-            'canopen = arm_canopen.cli.main:main',
             'canopen_joint_state_publisher = arm_canopen.nodes.joint_state_publisher:main',
-            # names of before that keep working; the programs are those of canopen_sim
+            'master = arm_canopen.nodes.master:main',
+            # names of before that keep working; the programs are those of canopen_tools and _sim
+            'candump = canopen_tools.candump:main',
+            'canopen = canopen_tools.cli.main:main',
             'fake_slave = canopen_sim.nodes.fake_slave:main',
             'fake_slaves = canopen_sim.nodes.fake_slaves:main',
-            'master = arm_canopen.nodes.master:main',
         ],
     },
 )

@@ -33,7 +33,7 @@ def check_robot(robot: Robot) -> list[Finding]:
     try:
         drives = [joint for drive in read_drives(robot) for joint in drive.joints]
     except RobotError as problem:
-        tool = 'ros2 run arm_canopen canopen check'
+        tool = 'ros2 run canopen_tools canopen check'
         findings.append(error('bus.yml', str(problem), f'{tool} {robot.bus_config} tells more'))
     try:
         urdf = expand_xacro(robot.description)

@@ -3,7 +3,8 @@
 """CANopen master and CiA 402 drives for ROS 2.
 
 The names here are the public API. Those that need ROS are loaded when they are asked for, so that
-the core can be used without it.
+the core can be used without it. Public besides, for tools and simulated devices: the modules of
+`standard`, `config` and `can`, `exceptions`, and what `master` names.
 """
 
 from __future__ import annotations

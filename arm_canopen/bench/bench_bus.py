@@ -25,12 +25,12 @@ import warnings
 import can
 
 from arm_canopen.can import Frame, open_bus
-from arm_canopen.can.candump_log import format_record, LogRecord
 from arm_canopen.can.interfaces import can_interfaces
 from arm_canopen.can.load import BusLoad
 from arm_canopen.can.multicast_format import decode, encode
 from arm_canopen.exceptions import BusError
-from arm_canopen.monitor import FrameDescriber
+from canopen_tools.candump_log import format_record, LogRecord
+from canopen_tools.monitor import FrameDescriber
 
 FRAMES = 20_000
 BATCH = 100  # frames before they are read; all buffers hold as many

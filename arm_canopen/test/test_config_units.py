@@ -27,13 +27,13 @@ from arm_canopen.cia402.motion import Setpoint
 from arm_canopen.cia402.parameters import DriveParameters
 from arm_canopen.cia402.target_limits import check_target
 from arm_canopen.cia402.units import Units
-from arm_canopen.cli.main import main
 from arm_canopen.config.checks import check_bus, check_file
 from arm_canopen.config.drive_model import DriveConfig
 from arm_canopen.config.drive_units import AxisUnits, UnitRule
 from arm_canopen.exceptions import ConfigError, DriveError
 from arm_canopen.master.events import Severity
 from arm_canopen.standard.drive import OperationMode
+from canopen_tools.cli.main import main
 
 JOINT = 'joint1'
 FACTORS = (

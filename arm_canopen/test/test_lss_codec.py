@@ -8,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from arm_canopen.monitor.lss import lss_text
 from arm_canopen.standard.lss import (
     BIT_RATES,
     COMMAND_TEXTS,
@@ -21,6 +20,7 @@ from arm_canopen.standard.lss import (
     LssCommand,
     LssMessage,
 )
+from canopen_tools.monitor.lss import lss_text
 
 
 @pytest.mark.parametrize(

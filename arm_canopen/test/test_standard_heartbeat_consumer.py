@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from arm_canopen.monitor.value_text import value_text
 from arm_canopen.standard.nmt import ConsumerHeartbeatTime
+from canopen_tools.monitor.value_text import value_text
 
 
 @given(st.integers(1, 127), st.integers(1, 0xFFFF))

@@ -1,3 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The network: boot-up, NMT, SDO queues, SYNC cycle, process image."""
+"""The network: boot-up, NMT, SDO queues, SYNC cycle, process image.
+
+The names here are for those who talk to devices without a network around them.
+"""
+
+from .scheduler import Promise, Scheduler
+from .sdo_client import SdoClient
+
+__all__ = ['Promise', 'Scheduler', 'SdoClient']

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 from arm_msgs.srv import ReadObject, WriteObject
 
+from ..config.object_text import bytes_from_text, text_from_bytes
 from ..exceptions import CanopenError
-from ..master.object_text import bytes_from_text, text_from_bytes
 from ..master.runner import NetworkThread
 from ..standard.datatypes import DataType
 from ..standard.dictionary import ObjectEntry

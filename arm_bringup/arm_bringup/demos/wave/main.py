@@ -113,7 +113,7 @@ def run(arm: Session, duration: float | None) -> int:
         f'{arm.robot.name}: {len(arm.drives)} simulated drives on {arm.bus}',
         {name: limits for name, limits in joint_limits(arm.urdf).items() if name in arm.drives},
     )
-    candump = f'ros2 run arm_canopen candump {arm.bus} --bus-config {bus_config}'
+    candump = f'ros2 run canopen_tools candump {arm.bus} --bus-config {bus_config}'
     return perform(
         arm.processes,
         view=view,

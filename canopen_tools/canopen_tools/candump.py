@@ -1,0 +1,256 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Shows the frames of any bus with their CANopen meaning; needs no ROS.
+
+::
+
+    ros2 run canopen_tools candump vcan0 --bus-config bus.yml --log bus.log
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import ExitStack, suppress
+import math
+import os
+from pathlib import Path
+import signal
+import sys
+from time import monotonic, time
+from types import FrameType
+
+from arm_canopen.can import Bus, Frame, open_bus
+from arm_canopen.config import load_bus
+from arm_canopen.config.model import BusConfig
+from arm_canopen.exceptions import CanopenError
+
+from .candump_log import CandumpLog, read_log
+from .monitor import FrameDescriber, FrameFilter
+from .monitor.line_format import LineFormat, TimeStyle
+from .ros_arguments import split_ros_arguments
+
+_NODE_WIDTH = len('all nodes')
+
+
+class Listener:
+    """Receives batches of frames until it is told to stop or its time is over."""
+
+    def __init__(self, bus: Bus, timeout: float) -> None:
+        """Listen.
+
+        Args:
+            bus: Where.
+            timeout: How long in [s]; infinity until :meth:`stop`.
+        """
+        self._bus = bus
+        self._end = monotonic() + timeout
+        self._stopped = False
+
+    def stop(self, *_: int | FrameType | None) -> None:
+        """Stop; may be called from a signal handler."""
+        self._stopped = True
+        self._bus.wake()
+
+    def batches(self) -> Iterator[list[Frame]]:
+        """Yield what arrives.
+
+        Raises:
+            BusError: The interface went away.
+        """
+        while not self._stopped and (left := self._end - monotonic()) > 0.0:
+            yield self._bus.receive(left)
+
+
+class Screen:
+    """Prints the frames that a person wants to see, up to a number of them."""
+
+    def __init__(
+        self,
+        describer: FrameDescriber,
+        chosen: FrameFilter,
+        line_format: LineFormat,
+        *,
+        count: int | None = None,
+        quiet: bool = False,
+    ) -> None:
+        """Prepare.
+
+        Args:
+            describer: Puts frames into words.
+            chosen: Which ones to show.
+            line_format: How.
+            count: After how many it is full, None for never.
+            quiet: Print nothing, but count.
+        """
+        self._describer = describer
+        self._filter = chosen
+        self._format = line_format
+        self._left = math.inf if count is None else count
+        self._quiet = quiet
+
+    def show(self, frames: Iterable[Frame]) -> bool:
+        """Print frames; return whether there is room for more.
+
+        Raises:
+            BrokenPipeError: Nobody reads any more.
+        """
+        lines = []
+        for frame in frames:
+            if self._left <= 0:
+                break
+            description = self._describer.describe(frame)
+            if self._filter.shows(frame, description):
+                self._left -= 1
+                lines.append(self._format.line(frame, description) + '\n')
+        if lines and not self._quiet:
+            sys.stdout.write(''.join(lines))
+            sys.stdout.flush()
+        return self._left > 0
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the program.
+
+    Args:
+        argv: Command line without the program; None takes the process's own.
+
+    Returns:
+        Exit code: 0, or 1 when the bus or a file cannot be read.
+    """
+    parser = _parser()
+    try:
+        arguments = split_ros_arguments(sys.argv[1:] if argv is None else argv)
+        options = parser.parse_args(arguments.own)
+        options.bus = options.bus or arguments.parameters.get('can_interface_name') or 'auto'
+        options.bus_config = options.bus_config or arguments.parameters.get('bus_config')
+        options.filter = FrameFilter(options.filter)
+    except ValueError as error:
+        parser.error(str(error))
+    try:
+        _run(options)
+    except BrokenPipeError:
+        # the interpreter flushes stdout once more when it ends
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except (CanopenError, OSError) as error:
+        _tell(str(error))
+        return 1
+    return 0
+
+
+def _run(options: argparse.Namespace) -> None:
+    config = load_bus(Path(options.bus_config)) if options.bus_config else None
+    if options.read:
+        _show_log(options, config)
+    else:
+        _show_bus(options, config)
+
+
+def _show_log(options: argparse.Namespace, config: BusConfig | None) -> None:
+    """Show a log of candump as if its frames came now; their times are of the wall clock."""
+    screen = _screen(options, config, wall_offset=0.0)
+    with Path(options.read).open(encoding='ascii', errors='replace') as file:
+        for record in read_log(file):
+            if not screen.show([record.frame._replace(timestamp=record.time)]):
+                break
+
+
+def _show_bus(options: argparse.Namespace, config: BusConfig | None) -> None:
+    offset = time() - monotonic()
+    screen = _screen(options, config, offset)
+    with ExitStack() as stack:
+        bus = stack.enter_context(open_bus(options.bus))
+        log = None
+        if options.log:
+            file = stack.enter_context(Path(options.log).open('w', encoding='ascii'))
+            log = CandumpLog(file, bus.name, offset)
+        listener = Listener(bus, options.timeout)
+        for number in (signal.SIGINT, signal.SIGTERM):
+            stack.callback(signal.signal, number, signal.signal(number, listener.stop))
+        _tell(f'listening on {bus.name}')
+        stack.callback(_tell_counters, bus)
+        for frames in listener.batches():
+            if log is not None:
+                for frame in frames:
+                    log.write(frame)
+                file.flush()
+            if not screen.show(frames):
+                break
+
+
+def _screen(options: argparse.Namespace, config: BusConfig | None, wall_offset: float) -> Screen:
+    names = [config.master.name, *(node.name for node in config.nodes)] if config else []
+    return Screen(
+        FrameDescriber(config),
+        options.filter,
+        LineFormat(
+            TimeStyle(options.time),
+            wall_offset,
+            color=sys.stdout.isatty() and not options.no_color and 'NO_COLOR' not in os.environ,
+            node_width=max([_NODE_WIDTH, *map(len, names)]),
+        ),
+        count=options.count,
+        quiet=options.quiet,
+    )
+
+
+def _tell_counters(bus: Bus) -> None:
+    counters = bus.counters
+    malformed = f', {counters.malformed} malformed' if counters.malformed else ''
+    _tell(f'{counters.received} frames, {counters.lost} lost{malformed}')
+
+
+def _tell(text: str) -> None:
+    """Write for a person, beside the frames."""
+    with suppress(BrokenPipeError):
+        sys.stderr.write(f'candump: {text}\n')
+        sys.stderr.flush()
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog='candump', description='Show the frames of a CAN bus with their CANopen meaning.'
+    )
+    add = parser.add_argument
+    add('bus', nargs='?', help='can0, vcan0, udp_multicast:239.x.y.z, ... (default: auto)')
+    add('--bus-config', metavar='FILE', help='bus.yml that names devices and objects')
+    add('--log', metavar='FILE', help="write all frames in can-utils' log format, shown or not")
+    add('--read', metavar='FILE', help='show such a log instead of a bus')
+    add('-n', '--count', type=_positive_int, help='end after so many frames shown')
+    add('--timeout', type=_positive_float, default=math.inf, metavar='S', help='end after S s')
+    add(
+        '--filter',
+        action='append',
+        default=[],
+        metavar='TERMS',
+        help='show only these: nmt, sync, emcy, time, pdo, sdo, heartbeat, lss, error, other, '
+        'node:NAME, node:ID, 181, 180:780; several with commas, ^ before one leaves it out',
+    )
+    add(
+        '-t',
+        '--time',
+        choices=[style.value for style in TimeStyle],
+        default=TimeStyle.ZERO.value,
+        help='(a)bsolute, (A)bsolute with date, (d)elta, (z)ero (default), (n)one',
+    )
+    add('-q', '--quiet', action='store_true', help='print no frames; with --log')
+    add('--no-color', action='store_true', help='no colours on a terminal either')
+    return parser
+
+
+def _positive_int(text: str) -> int:
+    number = int(text)
+    if number <= 0:
+        raise argparse.ArgumentTypeError(f'{text} is not positive')
+    return number
+
+
+def _positive_float(text: str) -> float:
+    number = float(text)
+    if not number > 0.0:
+        raise argparse.ArgumentTypeError(f'{text} is not positive')
+    return number
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,113 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Arguments that several verbs have."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, TypeAlias
+
+from arm_canopen.exceptions import CanopenError
+from arm_canopen.standard.cob_id import NODE_ID_MAX, NODE_ID_MIN
+
+if TYPE_CHECKING:
+    SubParsers: TypeAlias = argparse._SubParsersAction[argparse.ArgumentParser]  # noqa: SLF001
+else:
+    SubParsers = object
+
+
+class UsageError(CanopenError):
+    """The command line asks for something that there is not; nothing was sent yet."""
+
+
+BITRATE_MIN, BITRATE_MAX = 10_000, 1_000_000  # [bit/s] CiA 301, table 1
+
+
+def bitrate(text: str) -> int:
+    """Read a bit rate in [bit/s]; ``k`` and ``M`` behind a number are thousands and millions."""
+    factors = {'k': 1000, 'M': 1_000_000}
+    factor = factors.get(text[-1:], 1)
+    digits = text[:-1] if factor > 1 else text
+    if not digits.isdecimal():
+        raise argparse.ArgumentTypeError(f'{text!r} is no bit rate; write 500000 or 500k')
+    number = int(digits) * factor
+    if not BITRATE_MIN <= number <= BITRATE_MAX:
+        hint = f'; {text}k perhaps' if factor == 1 and 10 <= number <= 1000 else ''
+        raise argparse.ArgumentTypeError(f'{text} bit/s is not 10k to 1M{hint}')
+    return number
+
+
+def node_id(text: str) -> int:
+    """Read a node id, decimal or hexadecimal with ``0x``."""
+    number = whole_number(text)
+    if not NODE_ID_MIN <= number <= NODE_ID_MAX:
+        raise argparse.ArgumentTypeError(f'{text} is no node id; take 1 to 127')
+    return number
+
+
+def whole_number(text: str) -> int:
+    """Read a number that is not negative, decimal or hexadecimal with ``0x``."""
+    try:
+        number = int(text, 0)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f'{text!r} is no whole number') from None
+    if number < 0:
+        raise argparse.ArgumentTypeError(f'{text} is negative')
+    return number
+
+
+def seconds(text: str) -> float:
+    """Read a time in [s]."""
+    try:
+        number = float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f'{text!r} is no time in s') from None
+    if not 0.0 < number <= 3600.0:
+        raise argparse.ArgumentTypeError(f'{text} s is not above 0 and up to an hour')
+    return number
+
+
+def add_bus_argument(parser: argparse.ArgumentParser) -> None:
+    """Add what names a bus."""
+    parser.add_argument(
+        '--can',
+        metavar='BUS',
+        help='can0, vcan0, udp_multicast:239.x.y.z, ... (default: parameter can_interface_name, '
+        'else auto)',
+    )
+
+
+def add_bus_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add what names a bus and its devices."""
+    add_bus_argument(parser)
+    parser.add_argument(
+        '--bus-config',
+        metavar='BUS.yml',
+        help='names devices and objects (default: parameter bus_config)',
+    )
+
+
+def add_node_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add what names a device of a bus."""
+    parser.add_argument(
+        'node', metavar='NODE', help='node id, or name of a device of --bus-config'
+    )
+    add_bus_arguments(parser)
+    parser.add_argument(
+        '--eds', metavar='FILE', help='EDS of the device, when there is no bus.yml'
+    )
+    parser.add_argument(
+        '--timeout',
+        type=seconds,
+        metavar='S',
+        help='longest time for an answer in s (default: sdo_timeout_ms of bus.yml, else 0.5)',
+    )
+
+
+def take_parameters(options: argparse.Namespace, parameters: Mapping[str, str]) -> None:
+    """Fill options that were not given from ROS parameters of the names that the nodes have."""
+    if 'can' in options:
+        options.can = options.can or parameters.get('can_interface_name') or 'auto'
+    if 'bus_config' in options:
+        options.bus_config = options.bus_config or parameters.get('bus_config')

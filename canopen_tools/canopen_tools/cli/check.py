@@ -1,0 +1,106 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""``canopen check BUS.yml``: what is wrong with a bus, before it is switched on."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterable
+from itertools import groupby
+from pathlib import Path
+
+from arm_canopen.config.checks import check_file
+from arm_canopen.config.drive_units import AxisUnits
+from arm_canopen.config.traffic import LoadEstimate, Traffic
+
+from .arguments import bitrate, SubParsers
+from .output import counted, RED, say, say_problem, say_table, YELLOW
+
+
+def add_parser(parsers: SubParsers) -> None:
+    """Add the verb."""
+    parser = parsers.add_parser(
+        'check',
+        help='tell everything that is wrong with a bus.yml and its EDS files',
+        description='Tell everything that is wrong with a bus.yml and its EDS files, and what '
+        'the bus will carry. Exit code: 0, 1 with errors, 2 wrong usage.',
+    )
+    parser.add_argument('bus_yml', metavar='BUS.yml', type=Path)
+    parser.add_argument(
+        '--bitrate',
+        type=bitrate,
+        help='bit rate of the bus in bit/s, for its load, e.g. 500000 or 500k (default: baudrate '
+        'of the file)',
+    )
+    parser.add_argument('--strict', action='store_true', help='warnings count as errors')
+    parser.add_argument('--frames', action='store_true', help='list the load of each frame')
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Check a file; return the exit code."""
+    report = check_file(options.bus_yml, options.bitrate)
+    for problem in report.errors:
+        say_problem(problem, 'error', RED)
+    for problem in report.warnings:
+        say_problem(problem, 'warning', YELLOW)
+    if report.units:
+        _say_units(report.units)
+    if report.load is not None and report.load.traffic:
+        _say_load(report.load, each=options.frames)
+    errors, warnings = len(report.errors), len(report.warnings)
+    say(f'{options.bus_yml}: {counted(errors, "error")}, {counted(warnings, "warning")}')
+    return 1 if errors or (options.strict and warnings) else 0
+
+
+def _say_units(units: Iterable[AxisUnits]) -> None:
+    rows = [
+        (
+            axis.name,
+            f'{axis.increments:g}',
+            '?' if axis.radians is None else f'{axis.radians:.4g}',
+            f'{axis.velocity:g}',
+            axis.rule.value,
+        )
+        for axis in units
+    ]
+    head = ('1.0 of', 'increments', 'rad', 'velocity units', 'by')
+    say_table(head, rows, right='increments,rad,velocity units')
+
+
+def _say_load(load: LoadEstimate, *, each: bool) -> None:
+    if each:
+        rows = [
+            (f'{t.service} of {t.device}', f'{t.cob_id:03X}', *_figures([t], load.bitrate))
+            for t in sorted(load.traffic, key=lambda t: t.cob_id)
+        ]
+        head = ('frame', 'id', 'bytes', 'frames/s', 'load', 'when')
+        say_table(head, rows, right='bytes,frames/s,load')
+    else:
+        _say_groups(load)
+    say(
+        f'load at {load.bitrate / 1000:g} kbit/s: {load.frames_per_second:.0f} frames/s, '
+        f'{load.load:.1%} ({load.load_worst:.1%} with the most stuffing)'
+    )
+
+
+def _say_groups(load: LoadEstimate) -> None:
+    """List equal frames of several devices in one row."""
+
+    def likeness(item: Traffic) -> tuple[str, int, str]:
+        return item.service, item.size, item.reason
+
+    groups = [list(group) for _, group in groupby(sorted(load.traffic, key=likeness), likeness)]
+    groups.sort(key=lambda group: group[0].cob_id)
+    rows = [
+        (group[0].service, str(len(group)), *_figures(group, load.bitrate)) for group in groups
+    ]
+    head = ('frame', 'devices', 'bytes', 'frames/s', 'load', 'when')
+    say_table(head, rows, right='devices,bytes,frames/s,load')
+
+
+def _figures(group: Iterable[Traffic], bit_rate: int) -> tuple[str, str, str, str]:
+    items = list(group)
+    share = sum(item.bits for item in items) / bit_rate
+    rate = sum(item.rate for item in items)
+    return str(items[0].size), f'{rate:.1f}', f'{share:.1%}', items[0].reason

@@ -1,0 +1,132 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""``canopen diff NODE``: what a device holds, against what the files say."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import dataclass
+
+from arm_canopen.can import open_bus
+from arm_canopen.config.boot_plan import BootWrite
+from arm_canopen.exceptions import SdoAbortError
+from arm_canopen.standard.sdo_abort import abort_text
+
+from ..expected import expected_defaults, expected_objects
+from ..monitor.object_names import ObjectNames
+from ..monitor.value_text import data_text
+from .arguments import add_node_arguments, SubParsers, UsageError
+from .output import say, say_table
+from .session import Session
+from .target import find_target, Target, warn_of_master
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """An object that was compared.
+
+    Attributes:
+        expected: What it should hold.
+        device: What it holds, in words.
+        is_equal: It is what it should be.
+    """
+
+    expected: BootWrite
+    device: str
+    is_equal: bool
+
+
+def add_parser(parsers: SubParsers) -> None:
+    """Add the verb."""
+    parser = parsers.add_parser(
+        'diff',
+        help='compare a device with bus.yml and EDS',
+        description='Read every object of a device that bus.yml configures, and show where it '
+        'differs; without bus.yml every object that has a default in the EDS. Nothing is written. '
+        'Exit code: 0 when all is equal, 1, 2 wrong usage.',
+    )
+    add_node_arguments(parser)
+    parser.add_argument(
+        '--defaults',
+        action='store_true',
+        help='compare objects that bus.yml does not configure with their defaults in the EDS',
+    )
+    parser.add_argument('--all', action='store_true', help='show what is equal, too')
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Compare a device; return the exit code."""
+    target = find_target(options)
+    objects = _objects(target, defaults=options.defaults)
+    with open_bus(options.can) as bus:
+        session = Session(bus, target.bus)
+        warn_of_master(session, target)
+        rows = [_compare(session, target, expected) for expected in objects]
+    shown = [row for row in rows if options.all or not row.is_equal]
+    if shown:
+        names = ObjectNames(target.dictionary)
+        say_table(
+            ('', 'object', 'file', 'device', 'said by'),
+            [_cells(target, names, row) for row in shown],
+        )
+    different = sum(not row.is_equal for row in rows)
+    say(f'{target.name}: {len(rows)} objects compared, {different or "none"} different')
+    return 1 if different else 0
+
+
+def _objects(target: Target, *, defaults: bool) -> list[BootWrite]:
+    """Return what to compare.
+
+    Raises:
+        UsageError: No file says anything of the device.
+    """
+    configured: list[BootWrite] = []
+    if target.bus is not None and target.config is not None:
+        configured = expected_objects(target.bus, target.config)
+    if not configured and not target.described:
+        raise UsageError(
+            f'no file says what {target.name} should hold; give --bus-config BUS.yml with this '
+            'device in it, or --eds FILE'
+        )
+    if configured and not defaults:
+        return configured
+    known = {(item.index, item.subindex) for item in configured}
+    return configured + [
+        item
+        for item in expected_defaults(target.dictionary)
+        if (item.index, item.subindex) not in known
+    ]
+
+
+def _compare(session: Session, target: Target, expected: BootWrite) -> Row:
+    async def upload() -> bytes:
+        client = session.client(target.node_id, target.name)
+        return await client.read(expected.index, expected.subindex, target.timeout)
+
+    if session.masters:
+        session.await_quiet(target.node_id)
+    try:
+        data = session.run(upload())
+    except SdoAbortError as error:
+        return Row(expected, abort_text(error.code), is_equal=False)
+    held = data[: len(expected.data)] if len(data) == 4 else data
+    return Row(expected, _text(target, expected, held), expected.fits(data))
+
+
+def _cells(target: Target, names: ObjectNames, row: Row) -> tuple[str, ...]:
+    expected = row.expected
+    return (
+        '=' if row.is_equal else '*',
+        names.title(expected.index, expected.subindex),
+        _text(target, expected, expected.data),
+        row.device,
+        expected.key,
+    )
+
+
+def _text(target: Target, expected: BootWrite, data: bytes) -> str:
+    entry = target.dictionary.get(expected.index, expected.subindex)
+    return data_text(
+        expected.index, expected.subindex, entry.data_type if entry is not None else None, data
+    )

@@ -1,0 +1,164 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""``canopen read`` and ``canopen write``: objects of a device by name or number."""
+
+from __future__ import annotations
+
+import argparse
+
+from arm_canopen.can import open_bus
+from arm_canopen.config.object_text import bytes_from_text, text_from_bytes
+from arm_canopen.exceptions import CodecError, SdoAbortError
+from arm_canopen.standard.datatypes import byte_length, DataType
+from arm_canopen.standard.dictionary import ObjectEntry
+from arm_canopen.standard.objects import Index
+
+from ..monitor.object_names import ObjectNames
+from ..monitor.value_text import data_text
+from .arguments import add_node_arguments, SubParsers, UsageError
+from .output import remark, say
+from .session import Session
+from .target import find_target, Target, warn_of_master
+
+SHORT_TYPES: dict[str, DataType] = {
+    'bool': DataType.BOOLEAN,
+    **{f'i{bits}': DataType[f'INTEGER{bits}'] for bits in (8, 16, 24, 32, 40, 48, 56, 64)},
+    **{f'u{bits}': DataType[f'UNSIGNED{bits}'] for bits in (8, 16, 24, 32, 40, 48, 56, 64)},
+    'f32': DataType.REAL32,
+    'f64': DataType.REAL64,
+    'text': DataType.VISIBLE_STRING,
+    'bytes': DataType.DOMAIN,
+}
+"""Names of types on the command line."""
+
+LONG_TYPES = frozenset({DataType.DOMAIN, DataType.VISIBLE_STRING, DataType.OCTET_STRING})
+
+COMMANDS = frozenset({Index.STORE_PARAMETERS, Index.RESTORE_PARAMETERS})
+"""Objects that tell something else than what is written to them (CiA 301, 7.5.2.13)."""
+
+
+def add_parser(parsers: SubParsers) -> None:
+    """Add both verbs."""
+    reader = parsers.add_parser(
+        'read',
+        help='read objects of a device by name or number',
+        description='Read objects of a device by SDO. OBJECT is a number (0x6041, 0x607D:02), or '
+        'with --bus-config or --eds a name ("Statusword", "Software position limit/Max").',
+    )
+    add_node_arguments(reader)
+    reader.add_argument('objects', metavar='OBJECT', nargs='+')
+    reader.add_argument('--value', action='store_true', help='print values only, for scripts')
+    reader.set_defaults(run=read)
+    writer = parsers.add_parser(
+        'write',
+        help='write an object of a device by name or number',
+        description='Write an object of a device by SDO, and read it back. VALUE is a number, '
+        'true or false, a text, or bytes in hexadecimal, as the type of the object is.',
+    )
+    add_node_arguments(writer)
+    writer.add_argument('object', metavar='OBJECT')
+    writer.add_argument('value', metavar='VALUE')
+    writer.set_defaults(run=write)
+    for parser in (reader, writer):
+        parser.add_argument(
+            '--type', choices=SHORT_TYPES, help='type of the object, when no file says it'
+        )
+
+
+def read(options: argparse.Namespace) -> int:
+    """Read objects; return the exit code."""
+    target = find_target(options)
+    entries = [target.entry(path, _type(options)) for path in options.objects]
+    with open_bus(options.can) as bus:
+        session = Session(bus, target.bus)
+        warn_of_master(session, target)
+        for entry in entries:
+            data = _upload(session, target, entry)
+            if options.value:
+                say(_plain(entry, data))
+            else:
+                say(f'{_title(target, entry)} = {_meaning(entry, data)}')
+    return 0
+
+
+def write(options: argparse.Namespace) -> int:
+    """Write an object and read it back; return the exit code."""
+    target = find_target(options)
+    entry = target.entry(options.object, _type(options))
+    data = _data(target, entry, options)
+    with open_bus(options.can) as bus:
+        session = Session(bus, target.bus)
+        warn_of_master(session, target)
+
+        async def download() -> None:
+            await session.client(target.node_id, target.name).write(
+                *entry.address, data, target.timeout
+            )
+
+        session.run(download())
+        title = _title(target, entry)
+        if entry.index in COMMANDS or not entry.access.readable:
+            say(f'{title} was written')
+            return 0
+        try:
+            held = _upload(session, target, entry)
+        except SdoAbortError as error:  # commands, and what restarts the device
+            say(f'{title} was written')
+            remark(f'it cannot be read back: {error}')
+            return 0
+    say(f'{title} = {_meaning(entry, held)}')
+    if held != data:
+        remark(f'the device holds another value than {_meaning(entry, data)}, which was written')
+        return 1
+    return 0
+
+
+def _type(options: argparse.Namespace) -> DataType | None:
+    return SHORT_TYPES.get(options.type or '')
+
+
+def _data(target: Target, entry: ObjectEntry, options: argparse.Namespace) -> bytes:
+    """Encode the value of the command line.
+
+    Raises:
+        UsageError: The object cannot be written, or the value does not fit it.
+    """
+    if not entry.access.writable:
+        raise UsageError(
+            f'{entry} is read-only ({entry.access.value}) in {target.dictionary.source}'
+        )
+    if entry.data_type is DataType.DOMAIN and not target.described and options.type is None:
+        raise UsageError(
+            f'the type of {entry} is unknown; say it with --type, --eds or --bus-config'
+        )
+    try:
+        return bytes_from_text(entry.data_type, options.value)
+    except CodecError as error:
+        raise UsageError(f'{entry}: {error}') from error
+
+
+def _upload(session: Session, target: Target, entry: ObjectEntry) -> bytes:
+    async def upload() -> bytes:
+        client = session.client(target.node_id, target.name)
+        long = entry.data_type in LONG_TYPES
+        return await client.read(*entry.address, target.timeout, block=long)
+
+    data = session.run(upload())
+    size = byte_length(entry.data_type)
+    return data if size is None else data[:size]  # without a size an answer has 4 bytes
+
+
+def _title(target: Target, entry: ObjectEntry) -> str:
+    return ObjectNames(target.dictionary).title(*entry.address)
+
+
+def _meaning(entry: ObjectEntry, data: bytes) -> str:
+    known = None if entry.data_type is DataType.DOMAIN else entry.data_type
+    return data_text(*entry.address, known, data)
+
+
+def _plain(entry: ObjectEntry, data: bytes) -> str:
+    try:
+        return text_from_bytes(entry.data_type, data)
+    except CodecError:
+        return data.hex(' ')

@@ -1,0 +1,254 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""``canopen scan``: who is on the bus."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+
+from arm_canopen.can import Frame, open_bus
+from arm_canopen.config import load_bus
+from arm_canopen.config.identity import Identity
+from arm_canopen.config.model import BusConfig, NodeConfig
+from arm_canopen.exceptions import SdoError
+from arm_canopen.standard.cob_id import CobId, NODE_ID_MAX, NODE_ID_MIN
+from arm_canopen.standard.nmt import NmtState
+from arm_canopen.standard.objects import Index
+from arm_canopen.standard.sdo import UploadRequest
+
+from ..lss_master import LssMaster
+from .arguments import add_bus_arguments, seconds, SubParsers
+from .output import counted, remark, say, say_table
+from .session import Session
+
+LISTEN = 1.5  # [s] many devices send a heartbeat each second
+ANSWER = 0.3  # [s]
+GROUP = 8  # devices that are asked at a time, so that no transmit queue fills up
+GROUP_PAUSE = 0.01  # [s]
+
+IDENTITY: tuple[tuple[str, str, int, int], ...] = (
+    ('device_type', 'device type', Index.DEVICE_TYPE, 0),
+    ('vendor_id', 'vendor', Index.IDENTITY, 1),
+    ('product_code', 'product', Index.IDENTITY, 2),
+    ('revision_number', 'revision', Index.IDENTITY, 3),
+    ('serial_number', 'serial', Index.IDENTITY, 4),
+)
+"""Attribute of Identity, title, index and sub-index (CiA 301, 7.5.2.1 and 7.5.2.19)."""
+
+PROFILES: dict[int, str] = {
+    301: '',
+    401: 'I/O modules',
+    402: 'drive',
+    404: 'measuring device',
+    406: 'encoder',
+    408: 'hydraulics',
+    410: 'inclinometer',
+    418: 'battery',
+    419: 'charger',
+}
+"""Device profiles by their number (CiA 301, 7.5.2.1: the low word of 0x1000)."""
+
+
+@dataclass(slots=True)
+class Found:
+    """A device that was heard or has answered.
+
+    Attributes:
+        node_id: Its node id.
+        state: NMT state as it was heard, None when it sends no heartbeat.
+        numbers: What it says of itself, by attribute of Identity; None where it refuses.
+        config: What bus.yml says of it.
+        answers: It has answered an SDO.
+    """
+
+    node_id: int
+    state: NmtState | None = None
+    numbers: dict[str, int | None] = field(default_factory=dict)
+    config: NodeConfig | None = None
+    answers: bool = False
+
+    @property
+    def is_there(self) -> bool:
+        """It was heard or has answered."""
+        return self.state is not None or self.answers
+
+
+def add_parser(parsers: SubParsers) -> None:
+    """Add the verb."""
+    parser = parsers.add_parser(
+        'scan',
+        help='tell who is on a bus',
+        description='Tell who is on a bus. It listens first; when no master is heard, every node '
+        'id is asked for its identity. Exit code: 0, 1 when nobody is there, or with --bus-config '
+        'when a device is missing or another one, 2 wrong usage.',
+    )
+    add_bus_arguments(parser)
+    parser.add_argument(
+        '--listen',
+        type=seconds,
+        default=LISTEN,
+        metavar='S',
+        help=f'how long to listen first in s (default: {LISTEN})',
+    )
+    parser.add_argument(
+        '--ask', action='store_true', help='ask the devices, also beside a running master'
+    )
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Scan a bus; return the exit code."""
+    config = load_bus(options.bus_config) if options.bus_config else None
+    with open_bus(options.can) as bus:
+        session = Session(bus, config)
+        remark(f'listening on {bus.name} for {options.listen:g} s')
+        session.listen(options.listen)
+        found = _heard(session, config)
+        if _may_ask(session, ask=options.ask):
+            _find_silent(session, found)
+            for device in found.values():
+                _identify(session, device)
+            _ask_for_unnumbered(session)
+        return _show(found, config, asked=options.ask or not session.masters)
+
+
+def _heard(session: Session, config: BusConfig | None) -> dict[int, Found]:
+    nodes = {node.node_id: node for node in config.nodes} if config is not None else {}
+    return {
+        node_id: Found(node_id, session.states.get(node_id), config=nodes.get(node_id))
+        for node_id in sorted(session.states.keys() | nodes.keys())
+    }
+
+
+def _may_ask(session: Session, *, ask: bool) -> bool:
+    if not session.masters:
+        return True
+    heard = ', '.join(sorted(session.masters))
+    if ask:
+        remark(
+            f'a master is on this bus ({heard}); while devices are asked, its transfers may fail'
+        )
+        return True
+    remark(
+        f'a master is on this bus ({heard}), so devices are not asked for their identity: each '
+        "has one SDO channel, which is the master's; --ask asks all the same"
+    )
+    return False
+
+
+def _find_silent(session: Session, found: dict[int, Found]) -> None:
+    """Ask every other node id for 0x1000; devices without heartbeat are found by their answer."""
+    answered: set[int] = set()
+
+    def note(frame: Frame) -> None:
+        if frame.can_id & 0x780 == CobId.SDO_RESPONSE:
+            answered.add(frame.can_id & 0x7F)
+
+    session.listeners.append(note)
+    beside_master = bool(session.masters)
+    request = UploadRequest(Index.DEVICE_TYPE, 0).encode()
+    asked = [i for i in range(NODE_ID_MIN, NODE_ID_MAX + 1) if i not in session.states]
+    for position, node_id in enumerate(asked):
+        if beside_master:
+            session.await_quiet(node_id)
+        session.send(Frame(CobId.SDO_REQUEST + node_id, request))
+        if position % GROUP == GROUP - 1:
+            session.listen(GROUP_PAUSE)
+    session.listen(ANSWER)
+    session.listeners.remove(note)
+    for node_id in sorted(answered & set(asked)):
+        found.setdefault(node_id, Found(node_id, session.states.get(node_id))).answers = True
+
+
+def _ask_for_unnumbered(session: Session) -> None:
+    """Say it when there is a device that no node id reaches, as it has none (CiA 305)."""
+    master = LssMaster(session.scheduler, session.send)
+    session.listeners.append(master.receive)
+    if session.run(master.has_unconfigured()):
+        remark('there is a device without node id; canopen lss scan tells which')
+    session.listeners.remove(master.receive)
+
+
+def _identify(session: Session, device: Found) -> None:
+    """Read 0x1000 and 0x1018 of a device that is there."""
+    if not device.is_there:
+        return
+    client = session.client(device.node_id)
+    for attribute, _, index, subindex in IDENTITY:
+        if session.masters:
+            session.await_quiet(device.node_id)
+
+        async def read(index: int = index, subindex: int = subindex) -> bytes:
+            return await client.read(index, subindex, ANSWER)
+
+        try:
+            data = session.run(read())
+        except TimeoutError:
+            return  # it will not answer the others either
+        except SdoError:
+            device.numbers[attribute] = None  # not every device has all of them
+        else:
+            device.answers = True
+            device.numbers[attribute] = int.from_bytes(data, 'little')
+
+
+def _show(found: dict[int, Found], config: BusConfig | None, *, asked: bool) -> int:
+    devices = sorted(found.values(), key=lambda device: device.node_id)
+    present = [device for device in devices if device.is_there]
+    if not present and config is None:
+        hint = 'is the bus powered, wired and terminated, and is this its bit rate?'
+        remark(f'no device answers: {hint}' if asked else 'no device was heard')
+        return 1
+    named = config is not None
+    head = ('node', *(('name',) if named else ()), 'state', *(t for _, t, _, _ in IDENTITY))
+    remarks = {device.node_id: list(_differences(device, asked=asked)) for device in devices}
+    rows = [
+        (
+            str(device.node_id),
+            *((device.config.name if device.config else '',) if named else ()),
+            _state(device, asked=asked),
+            *_cells(device),
+            *(('; '.join(remarks[device.node_id]),) if named else ()),
+        )
+        for device in devices
+    ]
+    say_table((*head, '') if named else head, rows, right='node')
+    say(f'{counted(len(present), "device")}')
+    return 1 if not present or any(remarks.values()) else 0
+
+
+def _state(device: Found, *, asked: bool) -> str:
+    if device.state is not None:
+        return device.state.name.lower().replace('_', '-')
+    if device.answers:
+        return 'no heartbeat'
+    return 'absent' if asked else 'not heard'
+
+
+def _cells(device: Found) -> Iterable[str]:
+    for attribute, _, _, _ in IDENTITY:
+        number = device.numbers.get(attribute)
+        if attribute not in device.numbers:
+            yield ''
+        elif number is None:
+            yield '-'
+        elif attribute == 'device_type':
+            profile = PROFILES.get(number & 0xFFFF, '')
+            yield f'0x{number:08X} {profile}'.rstrip()
+        else:
+            yield f'0x{number:08X}'
+
+
+def _differences(device: Found, *, asked: bool) -> Iterator[str]:
+    """Say how a device differs from what bus.yml says of it."""
+    if device.config is None:
+        return
+    if asked and not device.is_there:
+        yield 'not on the bus'
+    expected: Identity = device.config.identity
+    for attribute, title, _, _ in IDENTITY:
+        wanted, number = getattr(expected, attribute), device.numbers.get(attribute)
+        if wanted and number is not None and number != wanted:
+            yield f'expected {title} 0x{wanted:08X}'

@@ -1,0 +1,132 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""A connection to a bus for as long as a verb runs: one loop, one thread, no background.
+
+Beside a running master it only listens, until it is told otherwise: a device has one SDO channel
+by default, which belongs to the master (CiA 301, 7.2.4.1).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Coroutine
+from time import monotonic
+from typing import Any, TypeVar
+
+from arm_canopen.can import Bus, Frame
+from arm_canopen.config.model import BusConfig
+from arm_canopen.master import Promise, Scheduler, SdoClient
+from arm_canopen.standard.cob_id import CobId, NODE_ID_MAX, NODE_ID_MIN
+from arm_canopen.standard.nmt import NmtState, parse_heartbeat
+
+T = TypeVar('T')
+
+IDLE_WAIT = 0.1  # [s] longest wait for frames when nothing else is due
+QUIET = 0.02  # [s] without SDO frames, after which a transfer of somebody else counts as ended
+QUIET_WAIT = 2.0  # [s]
+
+
+class Session:
+    """Listens to a bus and runs coroutines on it.
+
+    Attributes:
+        bus: The bus.
+        scheduler: Time.
+        states: NMT states by node id, as they were heard.
+        masters: What was heard that only a master sends.
+        listeners: Called with every frame.
+    """
+
+    def __init__(self, bus: Bus, config: BusConfig | None = None) -> None:
+        """Begin to listen.
+
+        Args:
+            bus: An open bus.
+            config: What should be on it; helps to know a master by its frames.
+        """
+        self.bus = bus
+        self.scheduler = Scheduler(monotonic())
+        self.states: dict[int, NmtState] = {}
+        self.masters: set[str] = set()
+        self.listeners: list[Callable[[Frame], None]] = []
+        self._clients: dict[int, SdoClient] = {}
+        self._sdo_times: dict[int, float] = {}
+        self._master_id = config.master.node_id if config is not None else None
+        self._rpdos = (
+            {pdo.cob_id for node in config.nodes for pdo in node.rpdos if pdo.enabled}
+            if config is not None
+            else set()
+        )
+
+    def listen(self, duration: float, until: Callable[[], bool] = lambda: False) -> None:
+        """Listen for a time in [s], or until a condition holds."""
+        end = monotonic() + duration
+        while not until() and (left := end - monotonic()) > 0.0:
+            self._step(left)
+
+    def run(self, coroutine: Coroutine[Promise[Any], None, T]) -> T:
+        """Run a coroutine to its end; returns its result or raises its error."""
+        self.scheduler.advance(monotonic())
+        task = self.scheduler.spawn(coroutine)
+        while not task.done:
+            self._step(IDLE_WAIT)
+        return task.result()
+
+    def send(self, frame: Frame) -> None:
+        """Send a frame.
+
+        Raises:
+            BusError: The interface refuses it.
+        """
+        self.bus.send(frame)
+
+    def client(self, node_id: int, name: str = '') -> SdoClient:
+        """Return the SDO client for a device."""
+        client = self._clients.get(node_id)
+        if client is None:
+            client = SdoClient(node_id, name or 'the device', self.scheduler, self.send)
+            self._clients[node_id] = client
+        return client
+
+    def await_quiet(self, node_id: int) -> None:
+        """Wait until nobody else talks to the SDO server of a device, for a while at most."""
+        self._step(0.0)
+        self.listen(QUIET_WAIT, lambda: monotonic() - self._sdo_times.get(node_id, 0.0) > QUIET)
+
+    def _step(self, wait: float) -> None:
+        deadline = self.scheduler.next_deadline()
+        if deadline is not None:
+            wait = min(wait, deadline - monotonic())
+        for frame in self.bus.receive(max(0.0, wait)):
+            self.scheduler.set_time(frame.timestamp)
+            if not frame.is_extended and not frame.is_error:
+                self._take(frame)
+        self.scheduler.advance(monotonic())
+
+    def _take(self, frame: Frame) -> None:
+        for listener in self.listeners:
+            listener(frame)
+        function, node_id = frame.can_id & 0x780, frame.can_id & 0x7F
+        self._note_master(frame, function, node_id)
+        if not NODE_ID_MIN <= node_id <= NODE_ID_MAX or frame.is_remote:
+            return
+        if function == CobId.HEARTBEAT:
+            state = parse_heartbeat(frame.data)
+            if state is not None and node_id != self._master_id:
+                self.states[node_id] = state
+        elif function == CobId.SDO_REQUEST:
+            self._sdo_times[node_id] = monotonic()
+        elif function == CobId.SDO_RESPONSE and node_id in self._clients:
+            self._clients[node_id].receive(frame)
+
+    def _note_master(self, frame: Frame, function: int, node_id: int) -> None:
+        """Note what only a master sends; own frames never arrive here."""
+        if frame.can_id == CobId.NMT:
+            self.masters.add('NMT commands')
+        elif frame.can_id == CobId.SYNC:
+            self.masters.add('SYNC')
+        elif frame.can_id in self._rpdos:
+            self.masters.add('RPDOs')
+        elif function == CobId.SDO_REQUEST and node_id:
+            self.masters.add('SDO requests')
+        elif function == CobId.HEARTBEAT and (frame.is_remote or node_id == self._master_id):
+            self.masters.add('node guarding' if frame.is_remote else 'its heartbeat')

@@ -1,0 +1,281 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The object dictionary of a master for a bus, as dcfgen lays it out, so that Lely can run it.
+
+What the devices send is mirrored: the n-th TPDO of all devices is RPDO n of the master and ends
+up in 0x2000 + n - 1, the n-th RPDO is TPDO n and comes from 0x2200 + n - 1. The objects 0x5800 to
+0x5FFF say which object of which device each is (Lely's remote PDO mapping).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+
+from arm_canopen.config.master_model import MasterConfig
+from arm_canopen.config.model import BusConfig, NodeConfig, PdoConfig
+from arm_canopen.config.pdo_direction import Direction, RPDO, TPDO
+from arm_canopen.config.shared_keys import (
+    HUNDRED_MICROSECONDS,
+    KILOBIT,
+    MICROSECONDS,
+    MILLISECONDS,
+    U16_MAX,
+)
+from arm_canopen.exceptions import CodecError
+from arm_canopen.standard.cob_id import COB_ID_INVALID, CobId, SYNC_PRODUCER
+from arm_canopen.standard.datatypes import DataType
+from arm_canopen.standard.dictionary import AccessType
+from arm_canopen.standard.nmt import ConsumerHeartbeatTime
+from arm_canopen.standard.objects import Index, PDO_COUNT_MAX
+from arm_canopen.standard.pdo import MappedObject
+
+from .network import network_objects
+from .text import dcf_text, DcfArray, DcfEntry, DcfObject, DcfRecord
+
+U8, U16, U32 = DataType.UNSIGNED8, DataType.UNSIGNED16, DataType.UNSIGNED32
+RO, RW, CONST = AccessType.READ_ONLY, AccessType.READ_WRITE, AccessType.CONSTANT
+TIME_PRODUCER = 0x4000_0000  # bit 30 of 0x1012 (CiA 301, 7.5.2.15)
+BIT_RATES = (10, 20, 50, 125, 250, 500, 800, 1000)  # [kbit/s] CiA 306-1, DeviceInfo
+DUMMY_TYPES = (*range(0x01, 0x08), 0x10, *range(0x12, 0x17), *range(0x18, 0x1C))
+"""Integer types, which a PDO may have as gaps."""
+
+
+@dataclass(frozen=True, slots=True)
+class Side:
+    """What one direction of PDOs is called in the master's dictionary.
+
+    Attributes:
+        own: The direction as the master sees it.
+        values: First object with the values.
+        remote_number: First object that says whose PDO it is.
+        remote_mapping: First object with the mapping of the device.
+        access: Access of the values.
+    """
+
+    own: Direction
+    values: int
+    remote_number: int
+    remote_mapping: int
+    access: AccessType
+
+
+SIDES: dict[str, Side] = {
+    TPDO.name: Side(RPDO, 0x2000, 0x5800, 0x5A00, AccessType.READ_WRITE_RPDO),
+    RPDO.name: Side(TPDO, 0x2200, 0x5C00, 0x5E00, AccessType.READ_WRITE_TPDO),
+}
+"""By the direction as the device sees it."""
+
+
+def master_dcf(config: BusConfig, upload_files: Mapping[int, str]) -> str:
+    """Return the DCF of the master.
+
+    Args:
+        config: The bus.
+        upload_files: Path of the concise DCF by node id, for those devices that have one.
+
+    Raises:
+        CodecError: The devices have more PDOs of one direction than the master can have.
+    """
+    objects: dict[int, DcfObject] = {
+        **dict(_communication(config)),
+        **dict(network_objects(config, upload_files)),
+    }
+    counts = {}
+    for direction in (TPDO, RPDO):
+        pdos = list(_pdos(config, direction))
+        if len(pdos) > PDO_COUNT_MAX:
+            raise CodecError(
+                f'the devices have {len(pdos)} {direction.title}s, a master takes {PDO_COUNT_MAX}'
+            )
+        counts[direction.name] = len(pdos)
+        objects |= dict(_mirrored(direction, pdos))
+    return dcf_text(_head(config.master, counts[TPDO.name], counts[RPDO.name]), objects)
+
+
+def _head(master: MasterConfig, rpdos: int, tpdos: int) -> dict[str, dict[str, str]]:
+    identity = master.identity
+    return {
+        'FileInfo': {
+            'FileName': 'master.dcf',
+            'FileVersion': '1',
+            'FileRevision': '0',
+            'EDSVersion': '4.0',
+            'Description': 'CANopen master',
+        },
+        'DeviceInfo': {
+            'VendorName': '',
+            'VendorNumber': f'0x{identity.vendor_id:08X}',
+            'ProductName': '',
+            'ProductNumber': f'0x{identity.product_code:08X}',
+            'RevisionNumber': f'0x{identity.revision_number:08X}',
+            'OrderCode': '',
+            **{f'BaudRate_{rate}': '1' for rate in BIT_RATES},
+            'SimpleBootUpMaster': '1',
+            'SimpleBootUpSlave': '0',
+            'Granularity': '1',
+            'DynamicChannelsSupported': '0',
+            'GroupMessaging': '0',
+            'NrOfRXPDO': str(rpdos),
+            'NrOfTXPDO': str(tpdos),
+            'LSS_Supported': '1',
+        },
+        'DummyUsage': {f'Dummy{number:04X}': '1' for number in DUMMY_TYPES},
+        'DeviceComissioning': {  # the standard misspells it
+            'NodeID': str(master.node_id),
+            'NodeName': '',
+            'Baudrate': f'{master.bitrate * KILOBIT:g}',
+            'NetNumber': '1',
+            'NetworkName': '',
+            'CANopenManager': '1',
+            'LSS_SerialNumber': f'0x{identity.serial_number:08X}',
+        },
+    }
+
+
+def _communication(config: BusConfig) -> Iterator[tuple[int, DcfObject]]:
+    """Yield the communication profile of the master (CiA 301, 7.5.2), without its PDOs."""
+    master = config.master
+    yield Index.DEVICE_TYPE, DcfEntry('Device type', U32, RO, '0x00000000')
+    yield Index.ERROR_REGISTER, DcfEntry('Error register', U8, RO)
+    yield Index.PREDEFINED_ERROR_FIELD, DcfArray('Pre-defined error field', U32, RO, 254)
+    sync = f'0x{SYNC_PRODUCER | CobId.SYNC:08X}'
+    yield Index.SYNC_COB_ID, DcfEntry('COB-ID SYNC', U32, RW, sync)
+    period, window = (round(t * MICROSECONDS) for t in (master.sync_period, master.sync_window))
+    yield Index.CYCLE_PERIOD, DcfEntry('Communication cycle period', U32, RW, str(period))
+    yield Index.SYNC_WINDOW, DcfEntry('Synchronous window length', U32, RW, str(window))
+    cob_id = f'0x{master.time_cob_id | TIME_PRODUCER * (master.time_period > 0):08X}'
+    yield Index.TIME_COB_ID, DcfEntry('COB-ID TIME', U32, RW, cob_id)
+    yield 0x1013, DcfEntry('High resolution time stamp', U32, RW, mappable=True)
+    yield Index.EMCY_COB_ID, DcfEntry('COB-ID EMCY', U32, RW, '$NODEID+0x80')
+    inhibit = str(round(master.emcy_inhibit_time * HUNDRED_MICROSECONDS))
+    yield Index.EMCY_INHIBIT_TIME, DcfEntry('Inhibit time EMCY', U16, RW, inhibit)
+    watched = _watched(config.nodes)
+    if watched:
+        yield (
+            Index.CONSUMER_HEARTBEAT,
+            DcfArray('Consumer heartbeat time', U32, RW, 127, dict(enumerate(watched, start=1))),
+        )
+    heartbeat = str(round(master.heartbeat_producer * MILLISECONDS))
+    yield Index.PRODUCER_HEARTBEAT, DcfEntry('Producer heartbeat time', U16, RW, heartbeat)
+    yield Index.IDENTITY, _identity(master)
+    overflow = str(master.sync_overflow)
+    yield Index.SYNC_OVERFLOW, DcfEntry('Synchronous counter overflow value', U8, RW, overflow)
+    emergencies = dict(_emergencies(config.nodes))
+    none = f'0x{COB_ID_INVALID:08X}'
+    yield 0x1028, DcfArray('Emergency consumer object', U32, RW, 127, emergencies, none)
+    behaviour = {sub: f'0x{value:02X}' for sub, value in ({1: 0} | master.error_behavior).items()}
+    yield Index.ERROR_BEHAVIOUR, DcfArray('Error behavior object', U8, RW, 254, behaviour)
+    inhibit = str(round(master.nmt_inhibit_time * HUNDRED_MICROSECONDS))
+    yield 0x102A, DcfEntry('NMT inhibit time', U16, RW, inhibit)
+
+
+def _identity(master: MasterConfig) -> DcfRecord:
+    identity = master.identity
+    return DcfRecord(
+        'Identity object',
+        [
+            DcfEntry(name, U32, RO, f'0x{value:08X}')
+            for name, value in (
+                ('Vendor-ID', identity.vendor_id),
+                ('Product code', identity.product_code),
+                ('Revision number', identity.revision_number),
+                ('Serial number', identity.serial_number),
+            )
+        ],
+    )
+
+
+def _watched(nodes: Iterable[NodeConfig]) -> list[str]:
+    """Return the entries of 0x1016: node id and consumer time in [ms]."""
+    return [
+        f'0x{ConsumerHeartbeatTime(node.node_id, _milliseconds(node.heartbeat_timeout)).word:08X}'
+        for node in nodes
+        if node.heartbeat_timeout > 0
+    ]
+
+
+def _milliseconds(time: float) -> int:
+    return min(round(time * MILLISECONDS), U16_MAX)
+
+
+def _emergencies(nodes: Iterable[NodeConfig]) -> Iterator[tuple[int, str]]:
+    for node in nodes:
+        entry = node.dictionary.get(Index.EMCY_COB_ID)
+        cob_id = entry.default if entry is not None else None
+        for write in node.sdo_writes:
+            if write.index == Index.EMCY_COB_ID:
+                cob_id = int.from_bytes(write.data, 'little')
+        if isinstance(cob_id, int) and cob_id and not cob_id & COB_ID_INVALID:
+            # an EDS without $NODEID means it
+            own = CobId.EMCY + node.node_id if cob_id == CobId.EMCY else cob_id
+            yield node.node_id, f'0x{own:08X}'
+
+
+def _pdos(config: BusConfig, direction: Direction) -> Iterator[tuple[NodeConfig, PdoConfig]]:
+    for node in config.nodes:
+        for pdo in node.tpdos if direction is TPDO else node.rpdos:
+            if pdo.enabled and pdo.mapping:
+                yield node, pdo
+
+
+def _mirrored(
+    direction: Direction, pdos: Iterable[tuple[NodeConfig, PdoConfig]]
+) -> Iterator[tuple[int, DcfObject]]:
+    """Yield what the master has for the PDOs of one direction of all devices."""
+    side = SIDES[direction.name]
+    places: dict[tuple[int, int, int], str] = {}  # node id, object -> mapping entry
+    for position, (node, pdo) in enumerate(pdos):
+        values: list[DcfEntry] = []
+        words = []
+        for mapped in pdo.mapping:
+            address = node.node_id, mapped.index, mapped.subindex
+            if address not in places:  # an object that two PDOs carry has one place
+                values.append(_value(node, mapped, side.access))
+                place = (side.values + position) << 16 | len(values) << 8 | mapped.bits
+                places[address] = f'0x{place:08X}'
+            words.append(places[address])
+        yield side.own.communication + position, _communication_parameter(side.own, pdo)
+        yield side.own.mapping + position, _mapping(f'{side.own.title} mapping parameter', words)
+        if values:
+            name = f'Mapped application objects for {side.own.title} {position + 1}'
+            yield side.values + position, DcfRecord(name, values)
+        yield from _remote(direction, position, node, pdo)
+
+
+def _value(node: NodeConfig, mapped: MappedObject, access: AccessType) -> DcfEntry:
+    entry = node.dictionary.get(mapped.index, mapped.subindex)
+    name = entry.name if entry is not None else f'0x{mapped.index:04X}:{mapped.subindex:02X}'
+    return DcfEntry(f'{node.name}: {name}', mapped.data_type, access, mappable=True)
+
+
+def _communication_parameter(own: Direction, pdo: PdoConfig) -> DcfRecord:
+    """Return the record 0x1400 or 0x1800 of the master for a PDO of a device."""
+    sends = own is TPDO
+    inhibit = round((pdo.inhibit_time or 0.0) * HUNDRED_MICROSECONDS) if sends else 0
+    parts = [
+        DcfEntry(f'COB-ID used by {own.title}', U32, RW, f'0x{pdo.cob_id:08X}'),
+        DcfEntry('Transmission type', U8, RW, f'0x{pdo.transmission:02X}'),
+        DcfEntry('Inhibit time', U16, RW, str(inhibit)),
+        DcfEntry('Reserved', U8, RW, '0'),
+        DcfEntry('Event timer', U16, RW, '0'),
+    ]
+    if sends:
+        parts.append(DcfEntry('SYNC start value', U8, RW, str(pdo.sync_start or 0)))
+    return DcfRecord(f'{own.title} communication parameter', parts)
+
+
+def _mapping(name: str, words: list[str]) -> DcfArray:
+    return DcfArray(name, U32, RW, len(words), dict(enumerate(words, start=1)))
+
+
+def _remote(
+    direction: Direction, position: int, node: NodeConfig, pdo: PdoConfig
+) -> Iterator[tuple[int, DcfObject]]:
+    """Say which PDO of which device it is, and its mapping there."""
+    side = SIDES[direction.name]
+    whose = f'0x{pdo.number << 8 | node.node_id:08X}'
+    title = f'Remote {direction.title}'
+    yield side.remote_number + position, DcfEntry(f'{title} number and node-ID', U32, RW, whose)
+    words = [f'0x{mapped.word:08X}' for mapped in pdo.mapping]
+    yield side.remote_mapping + position, _mapping(f'{title} mapping parameter', words)

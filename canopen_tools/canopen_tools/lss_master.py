@@ -1,0 +1,272 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Master of the layer setting services: finds devices, gives them node id and bit rate (CiA 305).
+
+It has no thread, clock or I/O of its own: coroutines of a scheduler send through a function and
+wait for what :meth:`LssMaster.receive` is handed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from arm_canopen.can.frame import Frame
+from arm_canopen.exceptions import LssError
+from arm_canopen.master import Scheduler
+from arm_canopen.standard.cob_id import NODE_ID_MAX, NODE_ID_MIN
+from arm_canopen.standard.lss import (
+    ADDRESS_BITS,
+    BIT_RATES,
+    decode_lss,
+    FastScan,
+    lss_bytes,
+    lss_number,
+    LSS_REQUEST,
+    LSS_RESPONSE,
+    LssAddress,
+    LssCommand,
+    LssMessage,
+    LssState,
+    STANDARD_TABLE,
+    UNCONFIGURED,
+)
+
+TIMEOUT = 0.5  # [s] for an answer; storing may take some time
+SCAN_TIMEOUT = 0.05  # [s] for an answer to a step of fast scan, whose absence means something
+SCAN_ATTEMPTS = 3
+SETTLE = 0.01  # [s] without another answer, after which all devices have answered
+PARTS = ('vendor id', 'product code', 'revision number', 'serial number')
+ERROR_TEXTS: dict[int, str] = {1: 'not supported by the device', 255: 'an error of its own'}
+"""Error codes of configuration services (CiA 305, 6.4)."""
+
+
+class LssMaster:
+    """Speaks to the LSS slaves of a bus, one service at a time.
+
+    Attributes:
+        answers: Answers since the last request.
+    """
+
+    def __init__(
+        self,
+        scheduler: Scheduler,
+        send: Callable[[Frame], None],
+        *,
+        timeout: float = TIMEOUT,
+        scan_timeout: float = SCAN_TIMEOUT,
+    ) -> None:
+        """Take the way to the bus.
+
+        Args:
+            scheduler: Time.
+            send: Hands a frame to the bus.
+            timeout: Longest time for an answer in [s].
+            scan_timeout: The same for a step of fast scan, in [s], at first.
+        """
+        self.answers: list[LssMessage] = []
+        self._scheduler = scheduler
+        self._send = send
+        self._timeout = timeout
+        self._scan_timeout = scan_timeout
+        self._expected: frozenset[int] = frozenset()
+        self._last = 0.0
+
+    def receive(self, frame: Frame) -> None:
+        """Take a frame from the bus; others than LSS answers are passed over."""
+        if frame.can_id != LSS_RESPONSE or frame.is_extended or frame.is_remote:
+            return
+        message = decode_lss(frame.data)
+        if message is not None and message.command in self._expected:
+            self.answers.append(message)
+            self._last = max(self._scheduler.now, frame.timestamp)
+
+    def switch_all(self, state: LssState) -> None:
+        """Switch every device to a state; nobody answers."""
+        self._put(lss_bytes(LssCommand.SWITCH_GLOBAL, state))
+
+    async def select(self, address: LssAddress) -> None:
+        """Switch the device of an address to the configuration state.
+
+        Raises:
+            LssError: No device has this address.
+        """
+        for part, number in enumerate(address):
+            self._put(lss_number(LssCommand.SELECT_VENDOR + part, number), LssCommand.SELECTED)
+        if not await self._answered(self._timeout):
+            raise LssError(f'no device has the LSS address {address}')
+
+    async def has_unconfigured(self) -> bool:
+        """Tell whether there is a device without a node id."""
+        self._put(lss_bytes(LssCommand.IDENTIFY_UNCONFIGURED), LssCommand.UNCONFIGURED_IDENTIFIED)
+        return await self._answered(self._scan_timeout)
+
+    async def identify(self, low: LssAddress, high: LssAddress) -> bool:
+        """Tell whether there is a device in a range of revision and serial numbers.
+
+        Args:
+            low: Vendor id, product code, and the lowest revision and serial number.
+            high: The highest revision and serial number; vendor and product are those of ``low``.
+        """
+        for command, number in (
+            (LssCommand.IDENTIFY_VENDOR, low.vendor),
+            (LssCommand.IDENTIFY_PRODUCT, low.product),
+            (LssCommand.IDENTIFY_REVISION_LOW, low.revision),
+            (LssCommand.IDENTIFY_REVISION_HIGH, high.revision),
+            (LssCommand.IDENTIFY_SERIAL_LOW, low.serial),
+            (LssCommand.IDENTIFY_SERIAL_HIGH, high.serial),
+        ):
+            self._put(lss_number(command, number), LssCommand.IDENTIFIED)
+        return await self._answered(self._timeout)
+
+    async def fast_scan(self) -> LssAddress | None:
+        """Find a device without a node id, and switch it to the configuration state.
+
+        Each bit of its address is asked for: silence means that it is set. Of several devices the
+        one with the lowest number is found; the next call finds the next one. An answer that
+        comes too late spoils the search, which is then made again with twice the time.
+
+        Returns:
+            Its address; None when no device without a node id is left in the waiting state.
+
+        Raises:
+            LssError: A device ended to answer in between, each time.
+        """
+        timeout, attempts = self._scan_timeout, 1
+        while attempts < SCAN_ATTEMPTS:
+            try:
+                return await self._search(timeout)
+            except LssError:
+                await self._scheduler.timer(timeout)  # until the last late answer has passed
+            timeout *= 2
+            attempts += 1
+        return await self._search(timeout)
+
+    async def _search(self, timeout: float) -> LssAddress | None:
+        if not await self._scan(FastScan(), self._timeout):
+            return None
+        numbers = []
+        for part in range(len(PARTS)):
+            number = 0
+            for bit in reversed(range(ADDRESS_BITS)):
+                if not await self._scan(FastScan(number, bit, part, part), timeout):
+                    number |= 1 << bit
+            following = (part + 1) % len(PARTS)
+            if not await self._scan(FastScan(number, 0, part, following), timeout):
+                raise LssError(
+                    f'the device that was being scanned no longer answers ({PARTS[part]} '
+                    f'0x{number:08X}); is it slower than {timeout * 1e3:g} ms?'
+                )
+            numbers.append(number)
+        return LssAddress(*numbers)
+
+    async def inquire_address(self) -> LssAddress:
+        """Ask the device in the configuration state for its address.
+
+        Raises:
+            LssError: None answers, or several do.
+        """
+        numbers = []
+        for part, title in enumerate(PARTS):
+            message = lss_bytes(LssCommand.INQUIRE_VENDOR + part)
+            numbers.append((await self._only_answer(message, title)).number)
+        return LssAddress(*numbers)
+
+    async def inquire_node_id(self) -> int:
+        """Ask the device in the configuration state for its node id; 255 for none.
+
+        Raises:
+            LssError: None answers, or several do.
+        """
+        message = lss_bytes(LssCommand.INQUIRE_NODE_ID)
+        return (await self._only_answer(message, 'node id')).byte
+
+    async def set_node_id(self, node_id: int) -> None:
+        """Give the device in the configuration state a node id, from its next reset on.
+
+        Args:
+            node_id: 1 to 127, or 255 for none.
+
+        Raises:
+            LssError: It refuses the id, or none answers, or several do.
+        """
+        if not NODE_ID_MIN <= node_id <= NODE_ID_MAX and node_id != UNCONFIGURED:
+            raise LssError(f'{node_id} is no node id; take 1 to 127, or 255 for none')
+        message = lss_bytes(LssCommand.CONFIGURE_NODE_ID, node_id)
+        await self._configure(message, f'node id {node_id}')
+
+    async def set_bit_rate(self, bit_rate: int) -> None:
+        """Give the device in the configuration state a bit rate.
+
+        Args:
+            bit_rate: In [bit/s]; one of the standard table.
+
+        Raises:
+            LssError: It is not in the table, or is refused, or none answers, or several do.
+        """
+        for index, rate in BIT_RATES.items():
+            if rate == bit_rate:
+                message = lss_bytes(LssCommand.CONFIGURE_BIT_TIMING, STANDARD_TABLE, index)
+                await self._configure(message, f'{rate // 1000} kbit/s')
+                return
+        known = ', '.join(str(rate // 1000) for rate in BIT_RATES.values())
+        raise LssError(f'{bit_rate / 1000:g} kbit/s is no bit rate of LSS; take {known}')
+
+    async def store(self) -> None:
+        """Have the device in the configuration state keep its settings without power.
+
+        Raises:
+            LssError: It cannot, or none answers, or several do.
+        """
+        await self._configure(lss_bytes(LssCommand.STORE), 'storing')
+
+    def activate_bit_rate(self, delay: float) -> None:
+        """Have all devices in the configuration state take their new bit rate; nobody answers.
+
+        Args:
+            delay: Time in [s] that they are silent before and again after the switch, so that
+                everybody else can switch, too.
+        """
+        milliseconds = round(delay * 1e3).to_bytes(2, 'little')
+        self._put(lss_bytes(LssCommand.ACTIVATE_BIT_TIMING, *milliseconds))
+
+    async def _scan(self, step: FastScan, timeout: float) -> bool:
+        self._put(step.message(), LssCommand.IDENTIFIED)
+        return await self._answered(timeout)
+
+    async def _configure(self, message: LssMessage, title: str) -> None:
+        code = (await self._only_answer(message, title)).byte
+        if code:
+            raise LssError(f'{title}: {ERROR_TEXTS.get(code, "error")} (LSS error {code})')
+
+    async def _only_answer(self, message: LssMessage, title: str) -> LssMessage:
+        """Ask, and make sure that it is one device that answers.
+
+        Raises:
+            LssError: None answers, or several do.
+        """
+        self._put(message, message.command)
+        if not await self._answered(self._timeout):
+            raise LssError(f'{title}: no device answers; none is in the configuration state')
+        if len(self.answers) > 1:
+            raise LssError(
+                f'{title}: {len(self.answers)} devices answer; select one of them by its address'
+            )
+        return self.answers[0]
+
+    async def _answered(self, timeout: float) -> bool:
+        """Wait for an answer, and until no more follow.
+
+        A late answer of a second device would be taken for one to the next request.
+        """
+        try:
+            await self._scheduler.until(lambda: bool(self.answers), timeout)
+        except TimeoutError:
+            return False
+        while (rest := self._last + SETTLE - self._scheduler.now) > 0.0:
+            await self._scheduler.timer(rest)
+        return True
+
+    def _put(self, message: LssMessage, *expected: int) -> None:
+        self.answers = []
+        self._expected = frozenset(expected)
+        self._send(Frame(LSS_REQUEST, message.encode()))

@@ -1,0 +1,195 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Describes the frames of a bus, by the names in its bus.yml and EDS files if there are any."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeAlias
+
+from arm_canopen.can.error_frames import error_text
+from arm_canopen.can.frame import Frame
+from arm_canopen.config.model import BusConfig, NodeConfig
+from arm_canopen.exceptions import CodecError
+from arm_canopen.standard.cob_id import CAN_ID_MASK, COB_ID_INVALID, CobId, NODE_ID_MAX
+from arm_canopen.standard.emcy import Emergency
+from arm_canopen.standard.lss import LSS_REQUEST, LSS_RESPONSE
+from arm_canopen.standard.nmt import ALL_NODES, NmtCommand, NmtState, parse_heartbeat
+from arm_canopen.standard.objects import Index
+
+from .description import Description, FrameKind
+from .lss import lss_text
+from .object_names import ObjectNames
+from .pdo_text import PdoDescriber
+from .sdo_follower import SdoFollower
+from .time_text import time_of_day_text
+
+_Handler: TypeAlias = Callable[[Frame], Description]
+_NODE_MASK = 0x7F
+_FUNCTION_MASK = 0x780
+_PDO_FUNCTIONS: dict[int, str] = {
+    CobId.TPDO1 + 0x100 * number: f'TPDO{number + 1}' for number in range(4)
+} | {CobId.RPDO1 + 0x100 * number: f'RPDO{number + 1}' for number in range(4)}
+"""Function code and name of the PDOs of the pre-defined connection set (CiA 301, table 38)."""
+
+
+class FrameDescriber:
+    """Puts frames into words, in the order in which they were on the bus.
+
+    It remembers SDO transfers, so that segments are told with their object and the value as a
+    whole. COB-IDs that bus.yml assigns count before those of the pre-defined connection set.
+    """
+
+    def __init__(self, config: BusConfig | None = None) -> None:
+        """Prepare for a bus.
+
+        Args:
+            config: What is on the bus; without it devices have numbers and PDOs no objects.
+        """
+        self._names: dict[int, str] = {}
+        self._objects: dict[int, ObjectNames] = {}
+        self._sdo: dict[int, SdoFollower] = {}
+        self._handlers: dict[int, _Handler] = {
+            CobId.NMT: self._nmt,
+            CobId.SYNC: self._sync,
+            CobId.TIME: self._time,
+            LSS_REQUEST: lambda frame: _lss('LSS >', frame),
+            LSS_RESPONSE: lambda frame: _lss('LSS <', frame),
+        }
+        self._functions: dict[int, Callable[[int, Frame], Description]] = {
+            CobId.EMCY: self._emcy,
+            CobId.SDO_REQUEST: self._sdo_request,
+            CobId.SDO_RESPONSE: self._sdo_response,
+            CobId.HEARTBEAT: self._heartbeat,
+        }
+        if config is not None:
+            self._names[config.master.node_id] = config.master.name
+            for node in config.nodes:
+                self._add(node)
+
+    def _add(self, node: NodeConfig) -> None:
+        self._names[node.node_id] = node.name
+        self._objects[node.node_id] = ObjectNames(node.dictionary)
+        if (cob_id := _cob_id(node, Index.SYNC_COB_ID)) is not None:
+            self._handlers[cob_id] = self._sync
+        if (cob_id := _cob_id(node, Index.EMCY_COB_ID)) is not None:
+            self._handlers[cob_id] = lambda frame: self._emcy(node.node_id, frame)
+        names = self._objects[node.node_id]
+        for prefix, pdos in (('TPDO', node.tpdos), ('RPDO', node.rpdos)):
+            for pdo in pdos:
+                if pdo.enabled:
+                    describer = PdoDescriber(f'{prefix}{pdo.number}', node, pdo, names)
+                    self._handlers[pdo.cob_id] = describer.describe
+
+    def describe(self, frame: Frame) -> Description:
+        """Say what a frame means; unknown ones are told as such, and none is an error."""
+        if frame.is_error:
+            return Description(FrameKind.ERROR, 'CAN error', '', error_text(frame), is_alert=True)
+        if frame.is_extended:
+            return Description(FrameKind.OTHER, 'unknown', '', '29-bit identifier')
+        if frame.is_remote:
+            return self._request(frame)
+        handler = self._handlers.get(frame.can_id)
+        return handler(frame) if handler else self._by_function(frame)
+
+    def node_name(self, node_id: int) -> str:
+        """Return the name of a device, or its number when it has none."""
+        return self._names.get(node_id) or f'node {node_id}'
+
+    def _by_function(self, frame: Frame) -> Description:
+        """Describe a frame by the pre-defined connection set."""
+        node_id, code = frame.can_id & _NODE_MASK, frame.can_id & _FUNCTION_MASK
+        if node_id:
+            if code in self._functions:
+                return self._functions[code](node_id, frame)
+            if code in _PDO_FUNCTIONS:
+                node = self.node_name(node_id)
+                return Description(FrameKind.PDO, _PDO_FUNCTIONS[code], node, node_id=node_id)
+        return Description(FrameKind.OTHER, 'unknown')
+
+    def _request(self, frame: Frame) -> Description:
+        """Describe a remote request by what an answer would be."""
+        node_id, code = frame.can_id & _NODE_MASK, frame.can_id & _FUNCTION_MASK
+        if code == CobId.HEARTBEAT and node_id:
+            node = self.node_name(node_id)
+            return Description(
+                FrameKind.HEARTBEAT, 'node guard', node, 'state requested', node_id=node_id
+            )
+        handler = self._handlers.get(frame.can_id)
+        wanted = handler(frame) if handler else self._by_function(frame)
+        return Description(
+            wanted.kind, wanted.label, wanted.node, 'requested', node_id=wanted.node_id
+        )
+
+    def _nmt(self, frame: Frame) -> Description:
+        if len(frame.data) != 2 or frame.data[1] > NODE_ID_MAX:
+            return Description(FrameKind.NMT, 'NMT', '', 'no valid command', is_alert=True)
+        command, node_id = frame.data
+        try:
+            text = NmtCommand(command).name.replace('_', ' ').lower()
+        except ValueError:
+            text = f'unknown command 0x{command:02X}'
+        node = 'all nodes' if node_id == ALL_NODES else self.node_name(node_id)
+        return Description(FrameKind.NMT, 'NMT', node, text, node_id=node_id)
+
+    @staticmethod
+    def _sync(frame: Frame) -> Description:
+        counter = f'counter {frame.data[0]}' if frame.data else ''
+        return Description(FrameKind.SYNC, 'SYNC', '', counter)
+
+    @staticmethod
+    def _time(frame: Frame) -> Description:
+        return Description(FrameKind.TIME, 'TIME', '', time_of_day_text(frame.data))
+
+    def _emcy(self, node_id: int, frame: Frame) -> Description:
+        try:
+            emergency = Emergency.decode(frame.data)
+        except CodecError as error:
+            text, is_alert = str(error), True
+        else:
+            text, is_alert = str(emergency), not emergency.is_reset
+        return Description(
+            FrameKind.EMCY, 'EMCY', self.node_name(node_id), text, is_alert, node_id
+        )
+
+    def _heartbeat(self, node_id: int, frame: Frame) -> Description:
+        state = parse_heartbeat(frame.data)
+        label = 'boot-up' if state is NmtState.BOOT_UP else 'heartbeat'
+        if state is None:
+            text = f'unknown state {frame.data.hex(" ")}'.rstrip()
+        elif state is NmtState.BOOT_UP:
+            text = ''
+        else:
+            text = state.name.replace('_', '-').lower()
+        return Description(
+            FrameKind.HEARTBEAT, label, self.node_name(node_id), text, node_id=node_id
+        )
+
+    def _sdo_request(self, node_id: int, frame: Frame) -> Description:
+        said = self._follower(node_id).request(frame.data)
+        node = self.node_name(node_id)
+        return Description(FrameKind.SDO, 'SDO >', node, said.text, said.is_abort, node_id)
+
+    def _sdo_response(self, node_id: int, frame: Frame) -> Description:
+        said = self._follower(node_id).response(frame.data)
+        node = self.node_name(node_id)
+        return Description(FrameKind.SDO, 'SDO <', node, said.text, said.is_abort, node_id)
+
+    def _follower(self, node_id: int) -> SdoFollower:
+        follower = self._sdo.get(node_id)
+        if follower is None:
+            names = self._objects.get(node_id) or ObjectNames()
+            follower = self._sdo[node_id] = SdoFollower(names)
+        return follower
+
+
+def _lss(label: str, frame: Frame) -> Description:
+    return Description(FrameKind.LSS, label, '', lss_text(frame.data))
+
+
+def _cob_id(node: NodeConfig, index: Index) -> int | None:
+    """Return the COB-ID that the EDS gives a service, None when it gives none."""
+    entry = node.dictionary.get(index)
+    if entry is None or not isinstance(entry.default, int) or entry.default & COB_ID_INVALID:
+        return None
+    return entry.default & CAN_ID_MASK or None

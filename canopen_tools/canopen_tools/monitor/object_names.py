@@ -1,0 +1,48 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Names and types of objects: by the EDS of the device, else by the standard."""
+
+from __future__ import annotations
+
+from arm_canopen.standard.datatypes import DataType
+from arm_canopen.standard.dictionary import ObjectDictionary
+from arm_canopen.standard.objects import Index, PDO_COUNT_MAX
+
+_PDO_RECORDS: tuple[tuple[Index, str], ...] = (
+    (Index.RPDO_COMMUNICATION, 'RPDO{} communication'),
+    (Index.RPDO_MAPPING, 'RPDO{} mapping'),
+    (Index.TPDO_COMMUNICATION, 'TPDO{} communication'),
+    (Index.TPDO_MAPPING, 'TPDO{} mapping'),
+)
+_STANDARD_NAMES: dict[int, str] = {
+    index: index.name.replace('_', ' ').capitalize() for index in Index
+}
+
+
+class ObjectNames:
+    """What is known of the objects of one device."""
+
+    def __init__(self, dictionary: ObjectDictionary | None = None) -> None:
+        """Read names from a dictionary, without one from the standard."""
+        self._dictionary = dictionary
+
+    def name(self, index: int, subindex: int) -> str:
+        """Return the name of an object, empty when nobody gives it one."""
+        entry = self._dictionary.get(index, subindex) if self._dictionary else None
+        return entry.name if entry else _standard_name(index)
+
+    def title(self, index: int, subindex: int) -> str:
+        """Return address and name, e.g. ``0x6041:00 Statusword``."""
+        return f'0x{index:04X}:{subindex:02X} {self.name(index, subindex)}'.rstrip()
+
+    def data_type(self, index: int, subindex: int) -> DataType | None:
+        """Return the type of an object, None when it is unknown."""
+        entry = self._dictionary.get(index, subindex) if self._dictionary else None
+        return entry.data_type if entry else None
+
+
+def _standard_name(index: int) -> str:
+    for base, name in _PDO_RECORDS:
+        if base <= index < base + PDO_COUNT_MAX:
+            return name.format(index - base + 1)
+    return _STANDARD_NAMES.get(index, '')

@@ -1,0 +1,171 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Values of objects as a person reads them: states, modes, errors and COB-IDs in words."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from arm_canopen.exceptions import CodecError
+from arm_canopen.standard.cob_id import CAN_ID_MASK, COB_ID_INVALID
+from arm_canopen.standard.datatypes import byte_length, DataType, decode, Value
+from arm_canopen.standard.drive import Controlword, drive_state, mode_title
+from arm_canopen.standard.emcy import error_code_text, error_register_text
+from arm_canopen.standard.nmt import ConsumerHeartbeatTime
+from arm_canopen.standard.objects import Index, PDO_COUNT_MAX
+
+CONTROLWORD_COMMANDS: tuple[tuple[int, int, str], ...] = (
+    (0x80, 0x80, 'Fault reset'),
+    (0x02, 0x00, 'Disable voltage'),
+    (0x06, 0x02, 'Quick stop'),
+    (0x07, 0x06, 'Shutdown'),
+    (0x0F, 0x07, 'Switch on'),
+    (0x0F, 0x0F, 'Enable operation'),
+)
+"""Mask, value and command; the first that fits counts (CiA 402-2, table 26)."""
+
+_SIGNED_TYPES = {1: DataType.INTEGER8, 2: DataType.INTEGER16, 4: DataType.INTEGER32}
+_UNSIGNED_TYPES = {1: DataType.UNSIGNED8, 2: DataType.UNSIGNED16, 4: DataType.UNSIGNED32}
+_SIGNED_OBJECTS = frozenset(
+    {
+        Index.QUICK_STOP_OPTION,
+        Index.MODE_OF_OPERATION,
+        Index.MODE_OF_OPERATION_DISPLAY,
+        Index.POSITION_DEMAND,
+        Index.POSITION_ACTUAL,
+        Index.VELOCITY_DEMAND,
+        Index.VELOCITY_ACTUAL,
+        Index.TARGET_TORQUE,
+        Index.TORQUE_ACTUAL,
+        Index.TARGET_POSITION,
+        Index.HOME_OFFSET,
+        Index.SOFTWARE_POSITION_LIMIT,
+        Index.HOMING_METHOD,
+        Index.INTERPOLATION_DATA,
+        Index.FOLLOWING_ERROR,
+        Index.TARGET_VELOCITY,
+    }
+)
+"""Objects that are signed, for when there is no EDS to say so (CiA 402-2)."""
+
+_COB_ID_SUBINDEX = 1  # of a PDO communication parameter (CiA 301, 7.5.2.35)
+
+
+def controlword_text(word: int) -> str:
+    """Say a controlword in words: its command, halt, and the bits whose meaning the mode gives."""
+    command = next(
+        (text for mask, value, text in CONTROLWORD_COMMANDS if word & mask == value), ''
+    )
+    extra = [f'bit {bit}' for bit in (4, 5, 6, 9) if word >> bit & 1]
+    if word & Controlword.HALT:
+        extra.append('halt')
+    return ', '.join([f'0x{word:04X} {command}'.rstrip(), *extra])
+
+
+def _status_text(word: int) -> str:
+    return f'0x{word:04X} {drive_state(word).title}'
+
+
+def _mode_text(number: int) -> str:
+    return f'{number} {mode_title(number)}'
+
+
+def _register_text(register: int) -> str:
+    return f'0x{register:02X} {error_register_text(register)}'
+
+
+def _cob_id_text(cob_id: int) -> str:
+    disabled = ' disabled' if cob_id & COB_ID_INVALID else ''
+    return f'0x{cob_id & CAN_ID_MASK:03X}{disabled}'
+
+
+def _mapping_text(word: int) -> str:
+    return f'0x{word >> 16:04X}:{word >> 8 & 0xFF:02X} ({word & 0xFF} bit)'
+
+
+def _hex_text(number: int) -> str:
+    return f'0x{number:08X}'
+
+
+_TEXTS: dict[int, Callable[[int], str]] = {
+    Index.CONTROLWORD: controlword_text,
+    Index.STATUSWORD: _status_text,
+    Index.MODE_OF_OPERATION: _mode_text,
+    Index.MODE_OF_OPERATION_DISPLAY: _mode_text,
+    Index.ERROR_CODE: error_code_text,
+    Index.ERROR_REGISTER: _register_text,
+    Index.DEVICE_TYPE: _hex_text,
+    Index.SYNC_COB_ID: _cob_id_text,
+    Index.EMCY_COB_ID: _cob_id_text,
+}
+_RECORD_TEXTS: dict[int, Callable[[int], str]] = {
+    Index.PREDEFINED_ERROR_FIELD: lambda code: error_code_text(code & 0xFFFF),
+    Index.IDENTITY: _hex_text,
+    Index.CONSUMER_HEARTBEAT: lambda word: _consumer_text(ConsumerHeartbeatTime.parse(word)),
+}
+"""The same for sub-indices from 1."""
+
+
+def _consumer_text(entry: ConsumerHeartbeatTime) -> str:
+    return f'node {entry.node_id}, {entry.time_ms} ms'
+
+
+def value_text(index: int, subindex: int, value: Value) -> str:
+    """Write a value as a person reads it.
+
+    Args:
+        index: Object index.
+        subindex: Sub-index.
+        value: Decoded value.
+    """
+    if isinstance(value, bytes):
+        return value.hex(' ') or 'nothing'
+    if isinstance(value, str):
+        return f'"{_printable(value.rstrip(chr(0)))}"'
+    if isinstance(value, float):
+        return f'{value:.7g}'
+    text = _text_of(index, subindex)
+    return text(value) if text else str(value)
+
+
+def _printable(text: str) -> str:
+    """Escape what would break the line or steer the terminal; devices may send anything."""
+    return ''.join(c if c.isprintable() else c.encode('unicode_escape').decode() for c in text)
+
+
+def _text_of(index: int, subindex: int) -> Callable[[int], str] | None:
+    if _is_pdo(index, Index.RPDO_COMMUNICATION, Index.TPDO_COMMUNICATION):
+        return _cob_id_text if subindex == _COB_ID_SUBINDEX else None
+    if not subindex:
+        return _TEXTS.get(index)
+    if _is_pdo(index, Index.RPDO_MAPPING, Index.TPDO_MAPPING):
+        return _mapping_text
+    return _RECORD_TEXTS.get(index)
+
+
+def _is_pdo(index: int, *bases: int) -> bool:
+    return any(base <= index < base + PDO_COUNT_MAX for base in bases)
+
+
+def data_text(index: int, subindex: int, data_type: DataType | None, data: bytes) -> str:
+    """Write the bytes of an SDO as a person reads them.
+
+    Args:
+        index: Object index.
+        subindex: Sub-index.
+        data_type: Type by the EDS, None when it is unknown.
+        data: The value as it was sent; an expedited one may be longer than its type.
+    """
+    data_type = data_type or _likely_type(index, len(data))
+    if data_type is None:
+        return data.hex(' ') or 'nothing'
+    try:
+        value = decode(data_type, data[: byte_length(data_type)])
+    except CodecError as error:
+        return f'{data.hex(" ")} ({error})'
+    return value_text(index, subindex, value)
+
+
+def _likely_type(index: int, size: int) -> DataType | None:
+    types = _SIGNED_TYPES if index in _SIGNED_OBJECTS else _UNSIGNED_TYPES
+    return types.get(size)

@@ -1,0 +1,262 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""candump as a person starts it: a process on a real bus."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+import signal
+import subprocess
+import sys
+from typing import TypeAlias
+
+from can_addresses import free_multicast, free_virtual
+from can_receiving import DEADLINE, unstamped
+from config_samples import write_bus
+import pytest
+from tool_environment import ENVIRONMENT
+
+from arm_canopen.can import Bus, Frame, open_bus
+from arm_canopen.exceptions import BusError
+from canopen_tools import candump
+from canopen_tools.candump_log import CandumpLog, read_log
+
+Start: TypeAlias = Callable[..., 'subprocess.Popen[str]']
+
+FRAMES = [
+    Frame(0x000, b'\x01\x02'),
+    Frame(0x080),
+    Frame(0x182, b'\x37\x16'),
+    Frame(0x602, bytes.fromhex('4041600000000000')),
+    Frame(0x582, bytes.fromhex('4b41600037160000')),
+    Frame(0x702, b'\x05'),
+]
+
+
+@pytest.fixture
+def name() -> str:
+    """Name a bus of one's own."""
+    return free_multicast()
+
+
+@pytest.fixture
+def bus(name: str) -> Iterator[Bus]:
+    """Open a sender on it."""
+    with open_bus(name) as opened:
+        yield opened
+
+
+@pytest.fixture
+def start() -> Iterator[Start]:
+    """Start candump and wait until it listens; it is gone when the test ends."""
+    with ExitStack() as stack:
+
+        def run(*arguments: str) -> subprocess.Popen[str]:
+            process = stack.enter_context(
+                subprocess.Popen(
+                    [sys.executable, '-m', 'canopen_tools.candump', *arguments],
+                    env=ENVIRONMENT,
+                    stdout=subprocess.PIPE,
+                    stderr=subprocess.PIPE,
+                    text=True,
+                )
+            )
+            stack.callback(process.kill)
+            assert process.stderr
+            line = process.stderr.readline()
+            assert 'listening on' in line, line + process.stderr.read()
+            return process
+
+        yield run
+
+
+def test_frames_are_shown_with_names_and_counted(
+    start: Start, bus: Bus, name: str, tmp_path: Path
+) -> None:
+    """With a bus.yml each frame has its device, its objects and their values."""
+    process = start(name, '--bus-config', str(write_bus(tmp_path)), '-n', '6', '-t', 'n')
+    for frame in FRAMES:
+        bus.send(frame)
+    output, errors = process.communicate(timeout=DEADLINE)
+    assert [line.rstrip() for line in output.splitlines()] == [
+        '     000  [2]  01 02                    NMT        joint1     start',
+        '     080  [0]                           SYNC',
+        (
+            '     182  [2]  37 16                    TPDO1      joint1     '
+            'Statusword=0x1637 Operation enabled'
+        ),
+        '     602  [8]  40 41 60 00 00 00 00 00  SDO >      joint1     read 0x6041:00 Statusword',
+        (
+            '     582  [8]  4B 41 60 00 37 16 00 00  SDO <      joint1     '
+            '0x6041:00 Statusword = 0x1637 Operation enabled'
+        ),
+        '     702  [1]  05                       heartbeat  joint1     operational',
+    ]
+    assert errors == 'candump: 6 frames, 0 lost\n'
+    assert process.returncode == 0
+
+
+def test_parameters_of_ros_name_bus_and_configuration(
+    start: Start, bus: Bus, name: str, tmp_path: Path
+) -> None:
+    """The parameters of the other nodes work here too."""
+    config = write_bus(tmp_path)
+    process = start(
+        '-n', '1', '--ros-args', '-p', f'can_interface_name:={name}', '-p', f'bus_config:={config}'
+    )
+    bus.send(Frame(0x702, b'\x00'))
+    output, _ = process.communicate(timeout=DEADLINE)
+    assert 'boot-up    joint1' in output
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_it_cleanly(
+    start: Start, bus: Bus, name: str, tmp_path: Path, number: signal.Signals
+) -> None:
+    """Ctrl-C prints the counters, leaves a whole log and no traceback."""
+    log = tmp_path / 'bus.log'
+    process = start(name, '--log', str(log), '--filter', 'sync')
+    for frame in FRAMES:
+        bus.send(frame)
+    assert process.stdout
+    assert 'SYNC' in process.stdout.readline()  # the batch is there; later ones may follow
+    process.send_signal(number)
+    _, errors = process.communicate(timeout=DEADLINE)
+    assert process.returncode == 0
+    assert errors.startswith('candump: ')
+    assert errors.endswith(' lost\n')
+    with log.open(encoding='ascii') as file:
+        records = list(read_log(file))
+    assert [record.frame for record in records] == FRAMES[: len(records)]
+    assert len(records) >= 2  # all frames, not only those shown
+
+
+def test_a_reader_that_goes_away_ends_it(start: Start, bus: Bus, name: str) -> None:
+    """As with `candump | head` there is no traceback."""
+    process = start(name)
+    assert process.stdout
+    assert process.stderr
+    process.stdout.close()
+    while process.poll() is None:
+        bus.send(Frame(0x080))
+    assert process.returncode == 0
+    errors = process.stderr.read()
+    assert errors.startswith('candump: ')
+    assert 'Traceback' not in errors
+
+
+def run_main(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
+    """Run it in this process: exit code, output and errors."""
+    code = candump.main(arguments)
+    captured = capsys.readouterr()
+    return code, captured.out, captured.err
+
+
+def test_a_log_is_shown_like_a_bus(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """--read describes what was logged, with the times of the log."""
+    path = tmp_path / 'bus.log'
+    with path.open('w', encoding='ascii') as file:
+        log = CandumpLog(file, 'can0', wall_offset=1.7e9)
+        for second, frame in enumerate(FRAMES):
+            log.write(frame, float(second))
+    code, out, _ = run_main(capsys, '--read', str(path), '-t', 'a', '--filter', '^sync', '-n', '2')
+    assert code == 0
+    assert [line[:30] for line in out.splitlines()] == [
+        '(1700000000.000000)      000  ',
+        '(1700000002.000000)      182  ',
+    ]
+
+
+def test_it_ends_after_its_time(capsys: pytest.CaptureFixture[str]) -> None:
+    """--timeout ends it on a silent bus, with success."""
+    code, out, err = run_main(capsys, free_virtual(), '--timeout', '0.01')
+    assert (code, out) == (0, '')
+    assert err.endswith('candump: 0 frames, 0 lost\n')
+
+
+def test_quiet_prints_nothing_and_still_logs(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """With --quiet the log is all there is, and -n still ends it."""
+    name, log = free_virtual(), tmp_path / 'bus.log'
+
+    with open_bus(name) as sender:
+
+        class Impatient(candump.Listener):
+            """Sends when it listens, so that the frames are not too early."""
+
+            def __init__(self, bus: Bus, timeout: float) -> None:
+                super().__init__(bus, timeout)
+                for frame in FRAMES:
+                    sender.send(frame)
+
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(candump, 'Listener', Impatient)
+            code, out, _ = run_main(capsys, name, '-q', '--log', str(log), '-n', '6')
+    assert (code, out) == (0, '')
+    with log.open(encoding='ascii') as file:
+        assert unstamped([record.frame for record in read_log(file)]) == FRAMES
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'reason'),
+    [
+        (['udp_multicast:10.0.0.1'], 'no multicast address'),
+        (['paecan:x'], 'no interface paecan'),
+        (['--bus-config', 'nowhere/bus.yml'], 'nowhere/bus.yml'),
+        (['--read', 'nowhere.log'], 'nowhere.log'),
+        (['udp_multicast:239.1.2.3', '--log', 'nowhere/bus.log'], 'nowhere/bus.log'),
+    ],
+)
+def test_what_cannot_be_opened_is_one_line(
+    capsys: pytest.CaptureFixture[str], arguments: list[str], reason: str
+) -> None:
+    """A wrong bus or file ends it with exit code 1 and a sentence."""
+    code, out, err = run_main(capsys, *arguments)
+    assert (code, out) == (1, '')
+    assert err.startswith('candump: ')
+    assert reason in err
+
+
+@pytest.mark.parametrize(
+    'arguments',
+    [
+        ['--filter', 'nonsense'],
+        ['-n', '0'],
+        ['-n', 'x'],
+        ['--timeout', '0'],
+        ['--timeout', 'nan'],
+        ['-t', 'x'],
+        ['--ros-args', '-p', 'x'],
+        ['one', 'two'],
+    ],
+)
+def test_wrong_arguments_are_refused(
+    capsys: pytest.CaptureFixture[str], arguments: list[str]
+) -> None:
+    """Mistakes on the command line end with exit code 2, as everywhere."""
+    with pytest.raises(SystemExit) as ending:
+        candump.main(arguments)
+    assert ending.value.code == 2
+    assert 'usage: candump' in capsys.readouterr().err
+
+
+def test_an_interface_that_goes_away_is_told(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """When the bus dies the counters and the reason are printed, and the exit code is 1."""
+
+    class Dying(candump.Listener):
+        """Fails as an interface does that is taken away."""
+
+        def batches(self) -> Iterator[list[Frame]]:
+            yield [Frame(0x080)]
+            raise BusError('CAN interface can0 is gone')
+
+    monkeypatch.setattr(candump, 'Listener', Dying)
+    code, out, err = run_main(capsys, free_virtual())
+    assert code == 1
+    assert 'SYNC' in out
+    assert err.endswith('candump: 0 frames, 0 lost\ncandump: CAN interface can0 is gone\n')

@@ -1,0 +1,317 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""``canopen scan``, ``read``, ``write`` and ``diff`` with simulated devices on a bus."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+import threading
+import time
+
+from can_addresses import free_virtual
+from device_rig import EDS
+import pytest
+
+from arm_canopen.can import Bus, Frame, open_bus
+from arm_canopen.config import load_eds
+from canopen_sim.faults.faults import BusFault, FaultInjection
+from canopen_sim.runner import DeviceRunner
+from canopen_tools.cli.main import main
+
+pytestmark = pytest.mark.slow
+
+BUS = """\
+master:
+  node_id: 1
+  driver: ros2_canopen::MasterDriver
+  package: canopen_master_driver
+  sync_period: 10000
+defaults:
+  dcf: cia402_drive.eds
+  driver: ros2_canopen::Cia402Driver
+  package: canopen_402_driver
+  sdo:
+    - {index: 0x6081, value: 4321}
+nodes:
+  left:
+    node_id: 2
+  right:
+    node_id: 3
+"""
+LISTEN = ('--listen', '0.3')
+DEADLINE = 10.0  # [s]
+
+
+@pytest.fixture
+def name() -> str:
+    """Name a bus of one's own."""
+    return free_virtual()
+
+
+@pytest.fixture
+def runner(name: str) -> Iterator[DeviceRunner]:
+    """Two simulated drives, 2 and 3, on the bus."""
+    with open_bus(name) as bus:
+        devices = DeviceRunner(bus)
+        for node_id in (2, 3):
+            devices.host.add(node_id, load_eds(EDS).dictionary)
+        devices.start()
+        yield devices
+        devices.stop()
+
+
+@pytest.fixture
+def bus_yml(tmp_path: Path) -> str:
+    """A bus.yml with both drives."""
+    (tmp_path / EDS.name).write_bytes(EDS.read_bytes())
+    path = tmp_path / 'bus.yml'
+    path.write_text(BUS)
+    return str(path)
+
+
+@pytest.fixture
+def master(name: str) -> Iterator[None]:
+    """Somebody who sends SYNC, as a master does."""
+    stop = threading.Event()
+
+    def sync(bus: Bus) -> None:
+        while not stop.wait(0.01):
+            bus.send(Frame(0x080))
+
+    with open_bus(name) as bus:
+        thread = threading.Thread(target=sync, args=(bus,))
+        thread.start()
+        yield
+        stop.set()
+        thread.join()
+
+
+@pytest.fixture
+def witness(name: str) -> Iterator[Bus]:
+    """Somebody who hears everything."""
+    with open_bus(name) as bus:
+        yield bus
+
+
+@pytest.mark.usefixtures('runner')
+def test_scan_finds_devices_with_and_without_heartbeat(
+    name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Each with its state and identity; one without heartbeat by its answer."""
+    assert main(['write', '3', '0x1017', '50', '--type', 'u16', '--can', name]) == 0
+    capsys.readouterr()
+    assert main(['scan', '--can', name, *LISTEN]) == 0
+    head, first, second, count = capsys.readouterr().out.splitlines()
+    assert head.split()[:2] == ['node', 'state']
+    cells = ['2', 'no heartbeat', '0x00020192 drive', '0x0000FFFF', '0x00000402', '0x00010000']
+    assert [cell.strip() for cell in first.split('  ') if cell] == [*cells, '0x00000000']
+    assert second.split()[:2] == ['3', 'pre-operational']
+    assert count == '2 devices'
+
+
+def test_scan_compares_with_bus_yml(
+    name: str, runner: DeviceRunner, bus_yml: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A device that is another one, or is not there, makes the exit code 1."""
+    assert main(['scan', '--can', name, '--bus-config', bus_yml, *LISTEN]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[:2] for line in lines[1:3]] == [['2', 'left'], ['3', 'right']]
+    left, right = runner.host.devices
+
+    def misbehave() -> None:
+        now = time.monotonic()
+        left.faults.inject(FaultInjection(BusFault.WRONG_IDENTITY, product=0x403), now)
+        right.faults.inject(FaultInjection(BusFault.DISCONNECT), now)
+
+    runner.call(misbehave).result(DEADLINE)
+    assert main(['scan', '--can', name, '--bus-config', bus_yml, *LISTEN]) == 1
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[1].split()[1] == 'left'
+    assert lines[1].endswith('expected product 0x00000402')
+    assert lines[2].split()[:3] == ['3', 'right', 'absent']
+    assert lines[2].endswith('not on the bus')
+
+
+@pytest.mark.usefixtures('runner', 'master')
+def test_scan_leaves_the_sdo_channels_to_a_master(
+    name: str, witness: Bus, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Beside a master it only listens, and says so; --ask asks, with a warning."""
+    assert main(['scan', '--can', name, *LISTEN]) == 1
+    assert 'no device was heard' in capsys.readouterr().err
+    main(['write', '3', '0x1017', '50', '--type', 'u16', '--can', name])
+    witness.receive(0.0)
+    capsys.readouterr()
+    assert main(['scan', '--can', name, *LISTEN]) == 0
+    assert {frame.can_id for frame in witness.receive(0.0)} == {0x080, 0x703}
+    captured = capsys.readouterr()
+    assert captured.out.splitlines()[1].split() == ['3', 'pre-operational']
+    assert 'a master is on this bus (SYNC), so devices are not asked' in captured.err
+    assert main(['scan', '--can', name, *LISTEN, '--ask']) == 0
+    assert 'its transfers may fail' in capsys.readouterr().err
+    assert {frame.can_id for frame in witness.receive(0.0)} >= {0x602, 0x582, 0x603, 0x583}
+
+
+def test_scan_of_an_empty_bus(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """Nobody there is exit code 1, with what to look at."""
+    assert main(['scan', '--can', name, *LISTEN]) == 1
+    assert 'powered, wired and terminated' in capsys.readouterr().err
+
+
+@pytest.mark.usefixtures('runner')
+def test_objects_by_name_and_number(
+    name: str, bus_yml: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """With a bus.yml by the names of its EDS, for devices by their names."""
+    arguments = ['--can', name, '--bus-config', bus_yml]
+    assert main(['read', 'left', 'statusw', '0x1018:01', '0x1008', *arguments]) == 0
+    assert capsys.readouterr().out.splitlines() == [
+        '0x6041:00 Statusword = 0x0250 Switch on disabled',
+        '0x1018:01 Vendor-ID = 0x0000FFFF',
+        '0x1008:00 Manufacturer device name = "Simulated CiA 402 drive"',
+    ]
+    assert main(['write', 'right', 'Profile velocity', '0x10', *arguments]) == 0
+    assert capsys.readouterr().out == '0x6081:00 Profile velocity = 16\n'
+    assert main(['read', '3', '0x6081', '--value', *arguments]) == 0
+    assert capsys.readouterr().out == '16\n'
+
+
+@pytest.mark.usefixtures('runner')
+def test_objects_without_any_file(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """What the standards describe has name and type; others have the type that is given."""
+    assert main(['read', '2', '0x60FB', '--can', name]) == 1
+    assert main(['write', '2', '0x607C', '-1', '--type', 'i32', '--can', name]) == 0
+    assert capsys.readouterr().out == '0x607C:00 Home offset = -1\n'
+    assert main(['read', '2', '0x6083', '--type', 'bytes', '--value', '--can', name]) == 0
+    assert capsys.readouterr().out == '10 27 00 00\n'
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'code', 'message'),
+    [
+        (['read', '128', '0x1000'], 2, '128 is no node id'),
+        (['read', 'middle', '0x1000'], 2, "no device is called 'middle'; known: left, right"),
+        (['read', 'left', 'Statuswort'], 2, 'similar: 0x6041:00 Statusword'),
+        (['read', 'left', '0x2FFF'], 2, 'there is no object 0x2FFF'),
+        (['read', 'left', '0x2FFF', '--type', 'u8'], 1, 'object does not exist'),
+        (['write', 'left', 'Statusword', '1'], 2, 'is read-only (ro)'),
+        (['write', 'left', '0x6041', '1', '--type', 'u16'], 1, 'write a read-only object'),
+        (['write', 'left', '0x6060', '300'], 2, 'does not fit INTEGER8'),
+        (['read', '9', '0x1000'], 1, 'did not answer the SDO for object 0x1000:00'),
+        (['diff', '9'], 2, 'no file says what the device should hold'),
+    ],
+)
+@pytest.mark.usefixtures('runner')
+def test_what_does_not_work_is_told(
+    name: str,
+    bus_yml: str,
+    *,
+    arguments: list[str],
+    code: int,
+    message: str,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """2 for what the command line or files rule out, 1 for what a device answers."""
+    assert main([*arguments, '--can', name, '--bus-config', bus_yml]) == code
+    assert message in capsys.readouterr().err
+
+
+@pytest.mark.usefixtures('runner')
+def test_an_unknown_type_is_not_guessed_in_writing(
+    name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Without a file, an object that no standard describes needs its type."""
+    assert main(['write', '2', '0x2000', '1', '--can', name]) == 2
+    assert 'say it with --type' in capsys.readouterr().err
+
+
+def test_a_device_that_holds_something_else_is_told(
+    name: str, witness: Bus, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A write is read back, as a device may round a value or ignore it."""
+
+    def serve() -> None:
+        served = 0
+        while served < 2:
+            for frame in witness.receive(DEADLINE):
+                upload = frame.data[0] == 0x40
+                answer = bytes((0x43 if upload else 0x60,)) + frame.data[1:4] + b'\5\0\0\0'
+                witness.send(Frame(0x582, answer))
+                served += 1
+
+    thread = threading.Thread(target=serve)
+    thread.start()
+    assert main(['write', '2', '0x6081', '7', '--can', name, '--type', 'u32']) == 1
+    thread.join()
+    captured = capsys.readouterr()
+    assert captured.out == '0x6081:00 Profile velocity = 5\n'
+    assert 'holds another value than 7' in captured.err
+
+
+@pytest.mark.usefixtures('runner')
+def test_a_command_is_not_read_back(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """0x1010 tells what the device can store, not what was written."""
+    assert main(['write', '2', '0x1010:1', '0x65766173', '--type', 'u32', '--can', name]) == 0
+    assert capsys.readouterr().out.endswith('was written\n')
+
+
+@pytest.mark.usefixtures('runner', 'master')
+def test_reading_beside_a_master_is_warned_of(
+    name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The value comes on stdout, the warning beside it."""
+    assert main(['read', '2', '0x6041', '--value', '--can', name]) == 0
+    captured = capsys.readouterr()
+    assert captured.out == '592\n'
+    assert 'a master is on this bus (SYNC), and shares the SDO channel' in captured.err
+
+
+@pytest.mark.usefixtures('runner')
+def test_diff_shows_what_bus_yml_has_otherwise(
+    name: str, bus_yml: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Only what differs, with the line of bus.yml; equal when it was written."""
+    arguments = ['--can', name, '--bus-config', bus_yml]
+    assert main(['diff', 'left', *arguments]) == 1
+    output = capsys.readouterr().out
+    row = next(line for line in output.splitlines() if '0x6081:00' in line)
+    cells = ['*', '0x6081:00 Profile velocity', '4321', '1000', 'defaults.sdo[0] (line 11)']
+    assert [cell.strip() for cell in row.split('  ') if cell] == cells
+    assert '0x1018:01' not in output
+    main(['write', 'left', '0x6081', '4321', *arguments])
+    main(['write', 'left', '0x1016:1', '0x010258', *arguments])  # 600 ms for node 1
+    for event_timer in ('0x1800:5', '0x1801:5'):
+        main(['write', 'left', event_timer, '100', *arguments])
+    capsys.readouterr()
+    assert main(['diff', 'left', '--all', *arguments]) == 0
+    output = capsys.readouterr().out
+    assert '0x1018:01 Vendor-ID' in output
+    assert output.splitlines()[-1].endswith('objects compared, none different')
+
+
+@pytest.mark.usefixtures('runner')
+def test_diff_with_an_eds(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """Without bus.yml the defaults of all objects that can be written count."""
+    assert main(['diff', '2', '--can', name, '--eds', str(EDS)]) == 0
+    main(['write', '2', '0x6098', '35', '--type', 'i8', '--can', name])
+    assert main(['diff', '2', '--can', name, '--eds', str(EDS)]) == 1
+    assert capsys.readouterr().out.splitlines()[-2].split() == (
+        ['*', '0x6098:00', 'Homing', 'method', '0', '35', 'EDS']
+    )
+
+
+def test_parameters_of_ros_name_bus_and_file(
+    name: str, bus_yml: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The parameters of the nodes work here too."""
+    with ExitStack() as stack:
+        bus = stack.enter_context(open_bus(name))
+        devices = DeviceRunner(bus)
+        devices.host.add(2, load_eds(EDS).dictionary)
+        devices.start()
+        stack.callback(devices.stop)
+        ros = ['--ros-args', '-p', f'can_interface_name:={name}', '-p', f'bus_config:={bus_yml}']
+        assert main(['read', 'left', 'Statusword', '--value', *ros]) == 0
+    assert capsys.readouterr().out == '592\n'

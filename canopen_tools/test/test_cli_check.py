@@ -1,0 +1,137 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""``canopen check`` as a person or a CI job starts it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+import signal
+import subprocess
+import sys
+
+from can_addresses import free_multicast
+from config_samples import eds_text, write_bus
+import pytest
+from tool_environment import ENVIRONMENT, REPOSITORY
+
+from canopen_tools.cli.main import main
+
+DEADLINE = 60.0  # [s]
+PANDA = REPOSITORY / 'arm_bringup' / 'robots' / 'panda' / 'bus.yml'
+
+
+def test_a_process_ends_with_its_exit_code(tmp_path: Path) -> None:
+    """As a program: findings on stdout, 1 for errors."""
+    (tmp_path / 'bus.yml').write_text('master:\n  node_id: 300\n')
+    process = subprocess.run(
+        [sys.executable, '-m', 'canopen_tools.cli.main', 'check', 'bus.yml'],
+        cwd=tmp_path,
+        env=ENVIRONMENT,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=DEADLINE,
+    )
+    assert process.returncode == 1
+    lines = process.stdout.splitlines()
+    assert 'bus.yml:2: error: master.node_id: 300 is out of range' in lines
+    assert lines[-1].startswith('bus.yml: 3 errors, ')
+    assert process.stderr == ''
+
+
+def test_the_article_is_checked(capsys: pytest.CaptureFixture[str]) -> None:
+    """The bus.yml of the article works, with two warnings that --strict makes errors."""
+    assert main(['check', str(PANDA)]) == 0
+    output = capsys.readouterr().out
+    assert f'{PANDA}:23: warning: defaults.sdo[5]: 0x60C2 (interpolation period) is 50' in output
+    assert f'{PANDA}:51: warning: defaults.rpdo.2: 0x607A (target position) is in RPDO' in output
+    assert 'load at 1000 kbit/s: 2912 frames/s, 26.7% (31.4% with the most stuffing)' in output
+    assert output.splitlines()[-1] == f'{PANDA}: 0 errors, 2 warnings'
+    assert main(['check', str(PANDA), '--strict']) == 1
+
+
+def test_equal_frames_of_several_devices_are_one_row(capsys: pytest.CaptureFixture[str]) -> None:
+    """The table has a row for each kind of frame; --frames lists each by its identifier."""
+    main(['check', str(PANDA), '--bitrate', '500k'])
+    output = capsys.readouterr().out
+    row = next(line for line in output.splitlines() if line.startswith('TPDO 2'))
+    # 700 frames/s of 8 bytes: 111 bits and 97 / 30 of stuffing each
+    assert row.split() == ['TPDO', '2', '7', '8', '700.0', '16.0%', 'every', 'SYNC']
+    main(['check', str(PANDA), '--bitrate', '500k', '--frames'])
+    rows = [line for line in capsys.readouterr().out.splitlines() if line.startswith('TPDO 2 of')]
+    assert [row.split()[4] for row in rows] == [f'{0x280 + node:03X}' for node in range(2, 9)]
+
+
+def test_a_full_bus_is_an_error(capsys: pytest.CaptureFixture[str]) -> None:
+    """What a bit rate cannot carry is refused, with the figures."""
+    assert main(['check', str(PANDA), '--bitrate', '250000']) == 1
+    output = capsys.readouterr().out
+    assert 'cannot carry this: 2912 frames/s at 250 kbit/s are a load of 107%' in output
+
+
+def test_a_good_file_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Nothing wrong is exit code 0, also with --strict."""
+    path = write_bus(tmp_path, eds=eds_text())
+    path.write_text(path.read_text().replace('  tpdo:', '  heartbeat_producer: 100\n  tpdo:', 1))
+    assert main(['check', '--strict', str(path)]) == 0
+    assert capsys.readouterr().out.splitlines()[-1] == f'{path}: 0 errors, 0 warnings'
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'message'),
+    [
+        ([], 'required: VERB'),
+        (['check'], 'required: BUS.yml'),
+        (['chekc', 'bus.yml'], "invalid choice: 'chekc'"),
+        (['check', 'bus.yml', '--bitrate', '500'], '500 bit/s is not 10k to 1M; 500k perhaps'),
+        (['check', 'bus.yml', '--bitrate', '2M'], '2M bit/s is not 10k to 1M'),
+        (['check', 'bus.yml', '--bitrate', 'fast'], "'fast' is no bit rate"),
+        (['check', 'bus.yml', '--ros-args', '-p'], '-p needs something behind it'),
+    ],
+)
+def test_wrong_usage_is_2(
+    arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Wrong usage is told on stderr, with exit code 2."""
+    with pytest.raises(SystemExit) as ending:
+        main(arguments)
+    assert ending.value.code == 2
+    assert message in capsys.readouterr().err
+
+
+def start(*arguments: str, prefix: Sequence[str] = ()) -> subprocess.Popen[str]:
+    """Start the program with its output in pipes."""
+    return subprocess.Popen(
+        [*prefix, sys.executable, '-m', 'canopen_tools.cli.main', *arguments],
+        env=ENVIRONMENT,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def test_a_reader_that_goes_away_is_no_error() -> None:
+    """``canopen check bus.yml | head`` ends without a traceback."""
+    process = start('check', str(PANDA), '--frames')
+    assert process.stdout
+    process.stdout.close()
+    assert process.wait(DEADLINE) == 1
+    assert process.stderr
+    assert 'Traceback' not in process.stderr.read()
+    process.stderr.close()
+
+
+@pytest.mark.parametrize('prefix', [(), ('sh', '-c', 'trap "" INT; exec "$@"', 'sh')])
+def test_ctrl_c_ends_a_verb(prefix: tuple[str, ...]) -> None:
+    """With the code of an interrupted program and no traceback, also as a script's background job.
+
+    Shells start those with SIGINT ignored, and so does the prefix.
+    """
+    process = start('scan', '--can', free_multicast(), '--listen', '60', prefix=prefix)
+    assert process.stderr
+    assert 'listening on' in process.stderr.readline()
+    process.send_signal(signal.SIGINT)
+    output, errors = process.communicate(timeout=DEADLINE)
+    assert process.returncode == 130
+    assert output == errors == ''

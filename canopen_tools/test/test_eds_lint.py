@@ -1,0 +1,288 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What ``canopen eds`` says of files that are not right, and of ours, which are."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+import random
+import re
+from typing import NamedTuple
+
+from config_mutations import mutated
+from config_samples import DRIVE_ROWS, eds_text, write_bus
+import pytest
+from tool_environment import REPOSITORY
+
+from canopen_tools.cli.main import main
+from canopen_tools.eds_lint.lint import EdsReport, lint_eds
+
+pytestmark = pytest.mark.slow
+
+OWN_FILES = sorted(
+    path
+    for folder in ('arm_canopen/eds', 'arm_canopen/arm_canopen/config', 'arm_bringup/robots')
+    for path in (REPOSITORY / folder).rglob('*')
+    if path.suffix in ('.eds', '.dcf')
+)
+GOOD = eds_text(
+    replace(row, default='5') if 0x1400 <= row.index < 0x1600 and not row.subindex else row
+    for row in DRIVE_ROWS
+)
+"""The sample, whose RPDOs have one sub-index less than they say."""
+
+
+class Case(NamedTuple):
+    """A damaged file.
+
+    Attributes:
+        section: Section in which something is replaced.
+        old: What.
+        new: By what.
+        message: Pattern of what is said.
+        line: Text of the line that is named, empty for none.
+    """
+
+    section: str
+    old: str
+    new: str
+    message: str
+    line: str
+
+
+ERRORS = {
+    'mandatory object missing': Case(
+        '1001', '[1001]', '[2FFF]', r'0x1001:00 \(error register\) is missing', ''
+    ),
+    'vendor id missing': Case(
+        '1018sub1', '[1018sub1]', '[1018sub9]', r'0x1018:01 \(vendor id\) is missing', ''
+    ),
+    'no sub-index 0': Case(
+        '1018sub0', '[1018sub0]', '[1018sub5]', '0x1018 has no sub-index 0', '[1018sub1]'
+    ),
+    'data type of a standard object': Case(
+        '6041',
+        'DataType=0x0006',
+        'DataType=0x0007',
+        'Statusword: the data type is UNSIGNED32, by the standard it is UNSIGNED16',
+        'DataType=0x0007',
+    ),
+    'default beyond its limits': Case(
+        '6081',
+        'DefaultValue=1000',
+        'DefaultValue=50001',
+        r'Profile velocity: the default 50001 is beyond its limits \(at most 50000\)',
+        'DefaultValue=50001',
+    ),
+    'text that can be mapped': Case(
+        '2001',
+        'PDOMapping=0',
+        'PDOMapping=1',
+        'VISIBLE_STRING has no fixed length',
+        'PDOMapping=1',
+    ),
+    'PDO without mapping': Case(
+        '1A00', '[1A00', '[2A00', 'TPDO 1 has no mapping: 0x1A00 is missing', ''
+    ),
+    'mapping without PDO': Case(
+        '1405', '[1405', '[2405', r'RPDO 6 has a mapping \(0x1605\), but no communication', ''
+    ),
+    'PDO without identifier': Case(
+        '1800sub1', '[1800sub1]', '[1800sub7]', r'TPDO 1 has no sub-index 1 \(COB-ID\)', ''
+    ),
+    'more mapped than there is room': Case(
+        '1A00sub0',
+        'DefaultValue=0',
+        'DefaultValue=9',
+        'TPDO 1 maps 9 objects, but has 8 entries',
+        '[1A00sub0]',
+    ),
+}
+
+WARNINGS = {
+    'wrong count': Case(
+        '1018sub0',
+        'DefaultValue=4',
+        'DefaultValue=3',
+        'sub-index 0 is 3, but the highest sub-index is 4',
+        'DefaultValue=3',
+    ),
+    'number of sub-indices': Case(
+        '1018', 'SubNumber=5', 'SubNumber=4', 'SubNumber is 4, but 5 sub-indices', 'SubNumber=4'
+    ),
+    'number of listed objects': Case(
+        'MandatoryObjects',
+        'SupportedObjects=3',
+        'SupportedObjects=2',
+        'SupportedObjects is 2, but 3 are listed',
+        'SupportedObjects=2',
+    ),
+    'in the wrong list': Case(
+        'ManufacturerObjects',
+        '1=0x2000',
+        '1=0x1008',
+        '0x1008 is listed a second time, first in .OptionalObjects.',
+        '1=0x1008',
+    ),
+    'does not belong there': Case(
+        'MandatoryObjects', '2=0x1001', '2=0x6040', '0x6040 does not belong here', '2=0x6040'
+    ),
+    'section twice': Case(
+        '2001', '[2001]', '[2000]', r'section \[2000\] was already opened', '[2000]'
+    ),
+    'key twice': Case(
+        '2001', 'PDOMapping=0', 'AccessType=ro', 'AccessType was already given', 'AccessType=ro'
+    ),
+    'value that must not be set': Case(
+        '6041', 'AccessType=ro', 'AccessType=rw', 'but the object is read-only', 'AccessType=rw'
+    ),
+    'setting that cannot be written': Case(
+        '6060', 'AccessType=rww', 'AccessType=ro', 'written by the master', 'AccessType=ro'
+    ),
+    'unknown access': Case(
+        '2000', 'AccessType=rw', 'AccessType=rx', "unknown AccessType 'rx'", 'AccessType=rx'
+    ),
+    'direction without mapping': Case(
+        '2000', 'AccessType=rw', 'AccessType=rwr', 'but PDOMapping is 0', 'PDOMapping=0'
+    ),
+    'controlword that cannot be mapped': Case(
+        '6040',
+        'PDOMapping=1',
+        'PDOMapping=0',
+        r'cannot be mapped into a RPDO \(PDOMapping 0, AccessType rww\)',
+        'PDOMapping=0',
+    ),
+    'nameless': Case(
+        '2002', 'ParameterName=Blob', 'ParameterName=', 'has no ParameterName', 'ParameterName='
+    ),
+    'identifier without node id': Case(
+        '1400sub1',
+        'DefaultValue=$NODEID+0x200',
+        'DefaultValue=0x201',
+        r'RPDO 1 does not depend on the node id \(0x201\)',
+        '[1400sub1]',
+    ),
+    'default mapping of nothing': Case(
+        '1A00sub1',
+        'DefaultValue=0',
+        'DefaultValue=0x55550010',
+        'maps 0x5555:00, which is not there',
+        '[1A00sub1]',
+    ),
+    'default mapping in the wrong direction': Case(
+        '1A00sub1',
+        'DefaultValue=0',
+        'DefaultValue=0x60400010',
+        'TPDO 1 maps 0x6040:00 Controlword by default, which cannot be mapped there',
+        '[1A00sub0]',
+    ),
+    'number of PDOs': Case(
+        'DeviceInfo',
+        'VendorName=Sample',
+        'NrOfTXPDO=4',
+        'NrOfTXPDO is 4, but there are 6',
+        'NrOfTXPDO=4',
+    ),
+    'vendor of the head': Case(
+        'DeviceInfo',
+        'VendorName=Sample',
+        'VendorNumber=0x99',
+        '0x99, but 0x1018:01 has 0x555',
+        'VendorNumber=0x99',
+    ),
+    'no bit rate': Case(
+        'DeviceInfo', 'VendorName=Sample', 'BaudRate_500=0', 'supports no bit rate', '[DeviceInfo]'
+    ),
+    'no head': Case('FileInfo', '[FileInfo]', '[Info]', r'no section \[FileInfo\]', ''),
+    'no mandatory list': Case(
+        'MandatoryObjects', '[MandatoryObjects]', '[Mandatory]', r'no section \[Mandatory', ''
+    ),
+}
+
+
+def damaged(case: Case) -> str:
+    """Return the text of a case; a head stands for its sub-sections, too."""
+    start = GOOD.index(f'[{case.section}]')
+    if case.old.endswith(']') or not case.old.startswith('['):
+        end = start + GOOD[start:].index(case.old) + len(case.old)
+        text = GOOD[: end - len(case.old)] + case.new + GOOD[end:]
+    else:
+        text = GOOD.replace(case.old, case.new)
+    if 'default mapping' in case.message or case.section == '1A00sub1':
+        head = text.index('[1A00sub0]')
+        place = text.index('DefaultValue=0', head)
+        text = text[:place] + 'DefaultValue=1' + text[place + len('DefaultValue=0') :]
+    return text
+
+
+def lint(folder: Path, text: str) -> EdsReport:
+    """Check a text."""
+    path = folder / 'drive.eds'
+    path.write_text(text, encoding='utf-8')
+    return lint_eds(path)
+
+
+@pytest.mark.parametrize('name', [*ERRORS, *WARNINGS])
+def test_damage_is_told(tmp_path: Path, name: str) -> None:
+    """Each kind of damage is an error or a warning at its line, with a remedy."""
+    case = ERRORS[name] if name in ERRORS else WARNINGS[name]
+    text = damaged(case)
+    assert text != GOOD
+    report = lint(tmp_path, text)
+    problems = report.errors if name in ERRORS else report.warnings
+    found = [problem for problem in problems if re.search(case.message, problem.message)]
+    assert found, '\n'.join(map(str, report.errors + report.warnings))
+    assert found[0].remedy
+    if case.line:
+        assert text.splitlines()[found[0].line - 1] == case.line
+
+
+def test_a_good_file_has_nothing_to_tell(tmp_path: Path) -> None:
+    """The file that every case starts from is right."""
+    report = lint(tmp_path, GOOD)
+    assert report.errors == report.warnings == ()
+
+
+@pytest.mark.parametrize('path', OWN_FILES, ids=lambda path: path.name)
+def test_our_own_files_are_right(path: Path) -> None:
+    """Every EDS and DCF that the workspace ships passes its own lint."""
+    assert OWN_FILES
+    report = lint_eds(path)
+    assert report.errors == report.warnings == ()
+
+
+def test_the_verb_tells_a_summary(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Several files, each with what it holds; exit code 1 when one has errors."""
+    good, bad = tmp_path / 'good.eds', tmp_path / 'bad.eds'
+    good.write_text(GOOD)
+    bad.write_text(damaged(ERRORS['data type of a standard object']))
+    assert main(['eds', str(good)]) == 0
+    count = len({row.index for row in DRIVE_ROWS})
+    summary = f'{count} objects, 6 RPDOs, 6 TPDOs; 0 errors, 0 warnings'
+    assert capsys.readouterr().out == f'{good}: {summary}\n'
+    assert main(['eds', str(good), str(bad), str(tmp_path / 'none.eds')]) == 1
+    lines = capsys.readouterr().out.splitlines()
+    assert re.search(r'bad.eds:\d+: error: \[6041\]: Statusword: the data type', lines[1])
+    assert lines[-1] == f'{tmp_path / "none.eds"}: 1 error, 0 warnings'
+
+
+def test_strict_takes_warnings_for_errors(tmp_path: Path) -> None:
+    """A file with a warning passes, unless it shall be strict."""
+    path = write_bus(tmp_path, eds=damaged(WARNINGS['wrong count'])).with_name('drive.eds')
+    assert main(['eds', str(path)]) == 0
+    assert main(['eds', '--strict', str(path)]) == 1
+
+
+@pytest.mark.parametrize('seed', range(4))
+def test_damaged_files_are_read_or_refused(tmp_path: Path, seed: int) -> None:
+    """Whatever a file holds, the lint ends, and every problem has words and a line of the file."""
+    generator = random.Random(seed)
+    snippets = ('[1A00', '[1018sub0]', 'DefaultValue=$NODEID', 'CompactSubObj=300', '=', 'a' * 300)
+    for _ in range(60):
+        text = mutated(GOOD, snippets, generator)
+        report = lint(tmp_path, text)
+        for problem in report.errors + report.warnings:
+            assert problem.message
+            assert problem.remedy
+            assert 0 <= problem.line <= text.count('\n') + 1

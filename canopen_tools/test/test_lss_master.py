@@ -1,0 +1,171 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The LSS master with simulated devices: finding, selecting, numbering."""
+
+from __future__ import annotations
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from lss_network import LssNetwork
+import pytest
+
+from arm_canopen.can.frame import Frame
+from arm_canopen.exceptions import LssError
+from arm_canopen.master import Scheduler
+from arm_canopen.standard.lss import (
+    BIT_RATES,
+    lss_bytes,
+    LSS_RESPONSE,
+    LssAddress,
+    LssCommand,
+    LssState,
+)
+from canopen_tools.lss_master import LssMaster
+
+FIRST = LssAddress(0x555, 0x1234, 0x10002, 0xCAFE)
+SECOND = FIRST._replace(serial=0xCAFF)
+NUMBER = st.integers(0, 0xFFFF_FFFF)
+ADDRESS = st.builds(LssAddress, NUMBER, NUMBER, NUMBER, NUMBER)
+
+
+@settings(max_examples=30)
+@given(st.sets(ADDRESS, max_size=3))
+def test_fast_scan_finds_every_device(addresses: set[LssAddress]) -> None:
+    """Whatever their numbers, one call after another finds each once, lowest first."""
+    network = LssNetwork(addresses)
+    found = [network.run(network.master.fast_scan()) for _ in range(len(addresses) + 1)]
+    assert found == [*sorted(addresses), None]
+
+
+@settings(max_examples=30)
+@given(st.data())
+def test_fast_scan_is_not_misled_by_slow_devices(data: st.DataObject) -> None:
+    """Answers of two devices may be some milliseconds apart: none counts for the next step."""
+    network = LssNetwork([FIRST, SECOND._replace(revision=0x10003)])
+    network.delays = data.draw(
+        st.lists(st.floats(0.0005, 0.009), min_size=300, max_size=300), label='delays'
+    )
+    assert network.run(network.master.fast_scan()) == FIRST
+
+
+def test_a_device_gets_its_id_and_boots() -> None:
+    """From nothing to a boot-up message: scan, set, store, let go."""
+    network = LssNetwork([FIRST])
+    master = network.master
+    assert network.run(master.has_unconfigured())
+    assert network.run(master.fast_scan()) == FIRST
+    assert network.run(master.inquire_node_id()) == 255
+    network.run(master.set_node_id(17))
+    network.run(master.set_bit_rate(500_000))
+    network.run(master.store())
+    assert network.heard == []
+    master.switch_all(LssState.WAITING)
+    assert not network.run(master.has_unconfigured())
+    assert [frame.can_id for frame in network.heard] == [0x711]
+    assert network.host.devices[0].node_id == 17
+
+
+def test_devices_are_selected_by_their_address() -> None:
+    """Of two devices with ids of their own, the one that is meant answers."""
+    network = LssNetwork([FIRST, SECOND], [5, 6])
+    network.run(network.master.select(SECOND))
+    assert network.run(network.master.inquire_node_id()) == 6
+    assert network.run(network.master.inquire_address()) == SECOND
+    with pytest.raises(LssError, match='no device has the LSS address 0x00000555 0x00001234'):
+        network.run(network.master.select(FIRST._replace(serial=1)))
+
+
+@pytest.mark.parametrize(
+    ('low', 'high', 'found'),
+    [
+        (FIRST, FIRST, True),
+        (FIRST._replace(serial=0), FIRST._replace(serial=0xFFFF), True),
+        (FIRST._replace(revision=0x10003), FIRST._replace(revision=0x20000), False),
+        (FIRST._replace(vendor=1), FIRST, False),
+    ],
+)
+def test_a_range_is_identified(low: LssAddress, high: LssAddress, found: bool) -> None:
+    """Devices with an id of their own answer to ranges of revision and serial numbers."""
+    network = LssNetwork([FIRST], [5])
+    assert network.run(network.master.identify(low, high)) is found
+
+
+def test_several_devices_in_configuration_are_noticed() -> None:
+    """One node id must not be given to two devices."""
+    network = LssNetwork([FIRST, SECOND])
+    network.master.switch_all(LssState.CONFIGURATION)
+    with pytest.raises(LssError, match='node id 17: 2 devices answer; select one'):
+        network.run(network.master.set_node_id(17))
+    with pytest.raises(LssError, match='2 devices answer'):
+        network.run(network.master.inquire_address())
+
+
+def test_refusals_are_told() -> None:
+    """What no device can take is refused before it is sent, what this one cannot by its code."""
+    network = LssNetwork([FIRST])
+    master = network.master
+    with pytest.raises(LssError, match='node id 17: no device answers; none is in the config'):
+        network.run(master.set_node_id(17))
+    master.switch_all(LssState.CONFIGURATION)
+    for node_id in (0, 128, 254):
+        with pytest.raises(LssError, match=f'{node_id} is no node id'):
+            network.run(master.set_node_id(node_id))
+    with pytest.raises(LssError, match='100 kbit/s is no bit rate of LSS; take 1000, 800, 500'):
+        network.run(master.set_bit_rate(100_000))
+    for bit_rate in BIT_RATES.values():
+        network.run(master.set_bit_rate(bit_rate))
+
+
+@pytest.mark.parametrize(
+    ('code', 'text'), [(1, 'not supported'), (255, 'an error of its own'), (7, 'LSS error 7')]
+)
+def test_error_codes_of_a_device(code: int, text: str) -> None:
+    """A device says why it does not store."""
+    scheduler = Scheduler()
+    sent: list[Frame] = []
+    master = LssMaster(scheduler, sent.append)
+    task = scheduler.spawn(master.store())
+    master.receive(Frame(LSS_RESPONSE, lss_bytes(LssCommand.STORE, code).encode()))
+    scheduler.advance(0.1)
+    with pytest.raises(LssError, match=text):
+        task.result()
+
+
+def test_slow_devices_get_more_time() -> None:
+    """Answers that come later than a step lasts spoil one search, not the next one."""
+    network = LssNetwork([FIRST])
+    network.delays = [0.08] * 1000
+    assert network.run(network.master.fast_scan()) == FIRST
+
+
+def test_a_device_that_is_too_slow_is_told() -> None:
+    """A scan that loses its device says which number it was at, and what may be the reason."""
+    network = LssNetwork([FIRST])
+    network.delays = [0.25] * 1000
+    with pytest.raises(LssError, match=r'no longer answers .vendor id .*; is it slower than 200'):
+        network.run(network.master.fast_scan())
+
+
+def test_frames_that_are_no_answer_are_passed_over() -> None:
+    """Neither other identifiers nor other commands nor late answers count."""
+    scheduler = Scheduler()
+    sent: list[Frame] = []
+    master = LssMaster(scheduler, sent.append)
+    task = scheduler.spawn(master.has_unconfigured())
+    answer = lss_bytes(LssCommand.UNCONFIGURED_IDENTIFIED).encode()
+    for frame in (
+        Frame(0x7E5, answer),
+        Frame(LSS_RESPONSE, answer[:7]),
+        Frame(LSS_RESPONSE, answer, is_extended=True),
+        Frame(LSS_RESPONSE, lss_bytes(LssCommand.IDENTIFIED).encode()),
+    ):
+        master.receive(frame)
+    scheduler.advance(1.0)
+    assert task.result() is False
+
+
+def test_the_switch_of_the_bit_rate_tells_its_delay() -> None:
+    """In milliseconds, little-endian."""
+    sent: list[Frame] = []
+    LssMaster(Scheduler(), sent.append).activate_bit_rate(0.5)
+    assert sent == [Frame(0x7E5, bytes.fromhex('15F4010000000000'))]
