@@ -6,17 +6,30 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 import contextlib
+import itertools
 import threading
 import time
+from typing import TYPE_CHECKING
 
 from process_supervisor import CallError, GivenUpError
 
-from .demos.wave.play import Client
+if TYPE_CHECKING:
+    from .service_client import ServiceClient
 
 PATIENCE = 60.0
 """Longest time for all drives to boot and to be enabled in [s]."""
 AGAIN = 1.0
 """Pause after a refusal in [s]: a drive that has not booted yet says so."""
+
+
+def enabling_services(drives: Sequence[str], mode_service: str) -> list[list[str]]:
+    """Return the services that enable drives; each group is called side by side, one by one.
+
+    Args:
+        drives: Their names.
+        mode_service: Service of each that selects the mode of streams.
+    """
+    return [[f'{drive}/{name}' for drive in drives] for name in ('init', mode_service)]
 
 
 @contextlib.contextmanager
@@ -50,14 +63,14 @@ def _enable(
     ended: threading.Event,
     namespace: str,
 ) -> None:
-    from .demos.client import ArmClient
+    from .service_client import ServiceClient
 
-    client = ArmClient(ended.is_set, namespace)
-    init, mode = ([f'{drive}/{name}' for drive in drives] for name in ('init', mode_service))
+    client = ServiceClient('bringup', ended.is_set, namespace)
+    groups = enabling_services(drives, mode_service)
     deadline = time.monotonic() + PATIENCE
     try:
-        client.prepare([*init, *mode])
-        while (refusal := _refusal(client, [init, mode])) and time.monotonic() < deadline:
+        client.prepare(itertools.chain(*groups))
+        while (refusal := _refusal(client, groups)) and time.monotonic() < deadline:
             client.wait_until(_after(AGAIN), 2 * AGAIN, 'another try')
         if refusal:
             say(f'error: the drives are not enabled: {refusal}')
@@ -69,10 +82,10 @@ def _enable(
         client.close()
 
 
-def _refusal(client: Client, calls: Sequence[list[str]]) -> str:
+def _refusal(client: ServiceClient, groups: Sequence[list[str]]) -> str:
     """Call services one group after the other; return why one refused, empty when none did."""
     try:
-        for services in calls:
+        for services in groups:
             client.call(services, PATIENCE)
     except CallError as error:
         return str(error)

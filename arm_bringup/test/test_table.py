@@ -22,7 +22,7 @@ from arm_bringup.demos.table import (
     WORDS_FROM,
 )
 from arm_bringup.description import JointLimits
-from process_supervisor.picture import Moment
+from demo_runner import DemoStatus
 
 JOINTS = [f'panda_joint{i}' for i in range(1, 8)]
 LIMITS = {name: JointLimits(name, -2.0, 2.0, 1.0) for name in JOINTS}
@@ -43,21 +43,21 @@ FIGURES = Figures(
 )
 COMMANDS = ['source env.sh', 'ros2 topic hz /joint_states', f'ros2 {"x" * 100}']
 VIEW = ArmView('panda on vcan0', LIMITS)
-MOMENT = Moment(12.34, 'waving', (), COMMANDS)
+STATUS = DemoStatus(12.34, 'waving', (), COMMANDS)
 
 
-def draw(figures: Figures, moment: Moment, width: int, height: int) -> list[str]:
+def draw(figures: Figures, status: DemoStatus, width: int, height: int) -> list[str]:
     """Draw into a terminal; return its lines."""
     file = io.StringIO()
     console = Console(file=file, width=width, height=height, color_system=None)
-    console.print(VIEW.render(figures, moment, width, height))
+    console.print(VIEW.render(figures, status, width, height))
     return file.getvalue().splitlines()
 
 
 @pytest.mark.parametrize('width', [NARROWEST, GAUGE_FROM, WORDS_FROM, 200])
 def test_every_joint_has_a_row_with_its_figures(width: int) -> None:
     """Nothing is cut, however wide the terminal is."""
-    lines = draw(FIGURES, MOMENT, width, 40)
+    lines = draw(FIGURES, STATUS, width, 40)
     rows = [line for line in lines if line.startswith('panda_joint')]
     assert [row.split()[0] for row in rows] == JOINTS
     mode = 'Cyclic position' if width >= WORDS_FROM else 'CSP'
@@ -70,7 +70,7 @@ def test_every_joint_has_a_row_with_its_figures(width: int) -> None:
 
 def test_bus_and_cycle_are_below() -> None:
     """Frames, load, losses, missed PDOs and jitter."""
-    text = '\n'.join(draw(FIGURES, MOMENT, 100, 40))
+    text = '\n'.join(draw(FIGURES, STATUS, 100, 40))
     for words in (
         '2912 frames/s',
         'load 27 %',
@@ -103,7 +103,7 @@ def test_the_picture_never_outgrows_the_terminal(
 ) -> None:
     """One line is left free and no row is broken, whatever there is to be shown."""
     figures = Figures(drives=dict(zip(JOINTS, found, strict=False)))
-    lines = draw(figures, replace(MOMENT, messages=messages), width, height)
+    lines = draw(figures, replace(STATUS, messages=messages), width, height)
     assert len(lines) < height
     assert all(len(line) <= width for line in lines)
     assert sum(line.startswith('panda_joint') for line in lines) == len(JOINTS)
@@ -111,11 +111,11 @@ def test_the_picture_never_outgrows_the_terminal(
 
 def test_messages_come_before_commands() -> None:
     """In a small terminal a warning is more important than a hint."""
-    moment = replace(MOMENT, messages=['master: [WARN] heartbeat lost'])
-    small = '\n'.join(draw(FIGURES, moment, 80, len(JOINTS) + LINES_AROUND + 2))
+    status = replace(STATUS, messages=['master: [WARN] heartbeat lost'])
+    small = '\n'.join(draw(FIGURES, status, 80, len(JOINTS) + LINES_AROUND + 2))
     assert 'heartbeat lost' in small
     assert 'second terminal' not in small
-    large = '\n'.join(draw(FIGURES, moment, 80, 40))
+    large = '\n'.join(draw(FIGURES, status, 80, 40))
     assert 'heartbeat lost' in large
     assert 'ros2 topic hz /joint_states' in large
 
@@ -126,7 +126,7 @@ def test_messages_come_before_commands() -> None:
 def test_the_gauge_shows_where_a_joint_is_between_its_limits(position: float, place: int) -> None:
     """At its ends, in the middle, and at the end when it is outside."""
     figures = replace(FIGURES, drives={JOINTS[0]: replace(DRIVE, position=position)})
-    row = next(line for line in draw(figures, MOMENT, 140, 40) if line.startswith(JOINTS[0]))
+    row = next(line for line in draw(figures, STATUS, 140, 40) if line.startswith(JOINTS[0]))
     gauge = row.rstrip()[-GAUGE_WIDTH:]
     assert gauge[place] == '●'
     assert gauge.count('─') == GAUGE_WIDTH - 1
@@ -134,7 +134,7 @@ def test_the_gauge_shows_where_a_joint_is_between_its_limits(position: float, pl
 
 def test_before_the_first_message_the_rows_are_empty() -> None:
     """And the bus says that it waits."""
-    lines = draw(Figures(), MOMENT, 100, 40)
+    lines = draw(Figures(), STATUS, 100, 40)
     assert any('waiting for the master' in line for line in lines)
 
 

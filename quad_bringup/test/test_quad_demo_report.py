@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 import pytest
 from rich.console import Console
 
-from process_supervisor.picture import Moment
+from demo_runner import DemoStatus
 from quad_bringup.demo.figures import Figures
 from quad_bringup.demo.itinerary import Stretch, Velocity
 from quad_bringup.demo.report import Measured, problems, progress_line, summary_lines
@@ -43,7 +43,7 @@ STRETCHES = [
     Measured(TURN, Velocity(0.01, 0.0, 0.84), Velocity(0.0, 0.0, 0.8)),
 ]
 VIEW = QuadView('XGO lite, simulated', LEGS)
-MOMENT = Moment(12.34, 'walk', (), ('ros2 topic hz /joint_command',))
+STATUS = DemoStatus(12.34, 'walk', (), ('ros2 topic hz /joint_command',))
 
 
 def test_a_robot_that_moves_as_told_is_no_problem() -> None:
@@ -114,17 +114,17 @@ def test_progress_says_state_speeds_tilt_and_rhythm() -> None:
     assert progress_line(Figures()) == 'waiting for the controller'
 
 
-def draw(figures: Figures, moment: Moment, width: int, height: int) -> list[str]:
+def draw(figures: Figures, status: DemoStatus, width: int, height: int) -> list[str]:
     """Draw into a terminal; return its lines."""
     file = io.StringIO()
     console = Console(file=file, width=width, height=height, color_system=None)
-    console.print(VIEW.render(figures, moment, width, height))
+    console.print(VIEW.render(figures, status, width, height))
     return file.getvalue().splitlines()
 
 
 def test_the_table_has_speeds_legs_body_and_loop() -> None:
     """In the usual 80 x 24, nothing cut."""
-    lines = draw(GOOD, MOMENT, 80, 24)
+    lines = draw(GOOD, STATUS, 80, 24)
     text = '\n'.join(lines)
     forward = next(line for line in lines if line.startswith('forward'))
     assert forward.split()[-3:] == ['+0.200', '+0.196', '+0.190']
@@ -162,7 +162,7 @@ def test_the_picture_never_outgrows_the_terminal(
     figures: Figures, width: int, height: int, messages: list[str]
 ) -> None:
     """One line is left free and no row is broken, whatever there is to be shown."""
-    lines = draw(figures, replace(MOMENT, messages=messages), width, height)
+    lines = draw(figures, replace(STATUS, messages=messages), width, height)
     assert len(lines) < height
     assert all(len(line) <= width for line in lines)
     assert sum(line.startswith(LEGS) for line in lines) == len(LEGS)

@@ -1,23 +1,18 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The demo's ROS client: calls services of many nodes side by side, and hears /diagnostics."""
+"""The ROS client of the demos: calls services of the drives, and receives /diagnostics."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-import time
-from typing import Any
+from collections.abc import Callable
 
 from diagnostic_msgs.msg import DiagnosticArray
-from std_srvs.srv import Trigger
 
-from process_supervisor import CallError
-from process_supervisor.graph_client import GraphClient
-
+from ..service_client import ServiceClient
 from .figures import Figures
 
 
-class ArmClient(GraphClient):
+class ArmClient(ServiceClient):
     """A node of its own; use it in one thread.
 
     Attributes:
@@ -34,49 +29,6 @@ class ArmClient(GraphClient):
         super().__init__('demo', given_up, namespace)
         self.figures = Figures()
         self.node.create_subscription(DiagnosticArray, 'diagnostics', self._take, 50)
-        self._clients: dict[str, Any] = {}
 
     def _take(self, message: DiagnosticArray) -> None:
         self.figures = self.figures.updated(message.status)
-
-    def prepare(self, services: Iterable[str]) -> None:
-        """Look for services that will be called, so that they are known when they are needed.
-
-        Args:
-            services: Their names, all of type std_srvs/Trigger.
-        """
-        for name in services:
-            self._clients[name] = self.node.create_client(Trigger, name)
-
-    def call(self, services: list[str], timeout: float) -> dict[str, str]:
-        """Call services side by side.
-
-        Args:
-            services: Names that were prepared.
-            timeout: Longest time in [s] for all together.
-
-        Returns:
-            What each answered.
-
-        Raises:
-            CallError: One did not answer or refused; the message says why, for each.
-            GivenUpError: It is no longer wanted.
-        """
-        clients = {name: self._clients[name] for name in services}
-        end = time.monotonic() + timeout
-        self.wait_until(
-            lambda: all(client.service_is_ready() for client in clients.values()),
-            timeout,
-            f'the services {", ".join(services)}',
-        )
-        futures = {name: client.call_async(Trigger.Request()) for name, client in clients.items()}
-        self.wait_until(
-            lambda: all(future.done() for future in futures.values()),
-            max(0.0, end - time.monotonic()),
-            f'the answers of {", ".join(services)}',
-        )
-        answers = {name: future.result() for name, future in futures.items()}
-        refused = [f'{name}: {each.message}' for name, each in answers.items() if not each.success]
-        if refused:
-            raise CallError('; '.join(refused))
-        return {name: each.message for name, each in answers.items()}

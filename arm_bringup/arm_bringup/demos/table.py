@@ -13,7 +13,7 @@ from rich.console import RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from process_supervisor.picture import compose, Moment
+from demo_runner import compose, DemoStatus
 
 from ..description import JointLimits
 from .figures import AxisFigures, BusFigures, DriveFigures, ENABLED, Figures
@@ -85,18 +85,20 @@ class ArmView:
         """
         return progress_line(figures, list(self.limits))
 
-    def render(self, figures: Figures, moment: Moment, width: int, height: int) -> RenderableType:
+    def render(
+        self, figures: Figures, status: DemoStatus, width: int, height: int
+    ) -> RenderableType:
         """Draw everything; commands and messages that there is no room for are left out.
 
         Args:
             figures: The latest.
-            moment: What else is shown.
+            status: What else is shown.
             width: Columns of the terminal.
             height: Lines of the terminal.
         """
         body: list[RenderableType] = [self.drives(figures, width), Text(''), bus_text(figures.bus)]
         room = height - len(self.limits) - LINES_AROUND
-        return compose(self.title, moment, body, (min(width, WORDS_FROM), width), room)
+        return compose(self.title, status, body, (min(width, WORDS_FROM), width), room)
 
     def drives(self, figures: Figures, width: int) -> Table:
         """Draw the table of the drives.

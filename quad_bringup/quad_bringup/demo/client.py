@@ -20,8 +20,8 @@ from quad_msgs.msg import JointCommand
 from ..mode_client import ModeClient
 from .figures import Figures, UNKNOWN
 from .itinerary import STANDSTILL, Velocity
-from .play import Milestones
 from .rhythm import Beat
+from .scenario import Milestones
 from .track import Pose, tilt_of, Track
 
 COMMAND_PERIOD = 0.1

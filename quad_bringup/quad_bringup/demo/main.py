@@ -9,16 +9,16 @@ from collections.abc import Callable, Sequence
 from functools import partial
 import sys
 
+from demo_runner import run_demo
 from process_supervisor import parse_with_ros, RosOptions, SupervisorError, USAGE_ERROR
 from process_supervisor.arguments import seconds_from
-from process_supervisor.demo import perform
 from quad_description import LEGS
 
 from ..exceptions import BringupError
 from ..session import add_arguments, Session, session
 from .figures import Figures
 from .itinerary import share_of, SHORTEST
-from .play import Client, Play
+from .scenario import Client, WalkScenario
 from .view import QuadView
 
 GROUND_TRUTH = 'fake_xgo/ground_truth'
@@ -91,12 +91,12 @@ def run(quad: Session, ros: RosOptions, mode: str, duration: float | None, share
     Returns:
         0, or 1 when something went wrong.
     """
-    return perform(
+    return run_demo(
         quad.processes,
         view=QuadView(quad.title, LEGS),
         figures=Figures(),
         commands=commands(quad.port, ros),
-        make_play=lambda display: Play(display, mode, duration, share),
+        make_scenario=lambda display: WalkScenario(display, mode, duration, share),
         make_client=partial(join_ros, quad.joints, ros.namespace),
         endless=duration is None,
     )

@@ -13,7 +13,7 @@ from rich.console import RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from process_supervisor.picture import compose, Moment
+from demo_runner import compose, DemoStatus
 
 from .figures import Figures
 from .itinerary import Velocity
@@ -58,12 +58,14 @@ class QuadView:
         """
         return progress_line(figures)
 
-    def render(self, figures: Figures, moment: Moment, width: int, height: int) -> RenderableType:
+    def render(
+        self, figures: Figures, status: DemoStatus, width: int, height: int
+    ) -> RenderableType:
         """Draw everything; commands and messages that there is no room for are left out.
 
         Args:
             figures: The latest.
-            moment: What else is shown.
+            status: What else is shown.
             width: Columns of the terminal.
             height: Lines of the terminal.
         """
@@ -76,7 +78,7 @@ class QuadView:
             _loop_line(figures),
         ]
         widths = (min(width, NARROWEST), width)
-        return compose(self.title, moment, body, widths, height - BODY_LINES)
+        return compose(self.title, status, body, widths, height - BODY_LINES)
 
     def _legs(self, figures: Figures) -> Table:
         table = _table(('leg', 9), *((f'{part} target/is', 20) for part in PARTS))

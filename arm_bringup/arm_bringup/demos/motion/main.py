@@ -11,6 +11,7 @@ from pathlib import Path
 import sys
 
 from arm_model import ArmError, load_limits, RobotModel
+from demo_runner import run_demo
 from process_supervisor import (
     namespaced_parameters,
     parse_with_ros,
@@ -19,8 +20,6 @@ from process_supervisor import (
     USAGE_ERROR,
 )
 from process_supervisor.arguments import seconds_from
-from process_supervisor.demo import perform
-from process_supervisor.display import Display
 
 from ...description import joint_limits
 from ...exceptions import BringupError, RobotError
@@ -35,12 +34,11 @@ from ...session import (
     SIMULATED_BUS,
 )
 from ...stack import MOTION_MASTER
-from ..figures import Figures
 from ..table import ArmView
 from .client import MotionClient
-from .course import START
 from .figures import MotionFigures
-from .play import MotionPlay
+from .scenario import MotionScenario
+from .sequence import START
 from .view import MotionView
 
 RATE = 100.0
@@ -138,17 +136,14 @@ def run(arm: Session, duration: float | None) -> int:
     limits = {name: each for name, each in joint_limits(arm.urdf).items() if name in arm.drives}
     title = f'{arm.robot.name}: {len(arm.drives)} simulated drives on {arm.bus}'
 
-    def make_play(display: Display[Figures]) -> MotionPlay:
-        play = MotionPlay(list(limits), arm.mode_service, display, duration)
-        play.model, play.period = model, period
-        return play
-
-    return perform(
+    return run_demo(
         arm.processes,
         view=MotionView(ArmView(title, limits)),
         figures=MotionFigures(),
         commands=commands(controller, arm.ros),
-        make_play=make_play,
+        make_scenario=lambda display: MotionScenario(
+            display, list(limits), arm.mode_service, model=model, period=period, duration=duration
+        ),
         make_client=lambda given_up: MotionClient(
             given_up, model, controller, period, arm.ros.namespace
         ),

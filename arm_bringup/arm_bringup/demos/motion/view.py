@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from rich.console import RenderableType
 from rich.text import Text
 
-from process_supervisor.picture import compose, Moment
+from demo_runner import compose, DemoStatus
 
 from ..figures import Figures
 from ..report import bus_line
@@ -49,12 +49,14 @@ class MotionView:
         """
         return f'{motion_line(figures)}; {bus_line(figures.bus)}'
 
-    def render(self, figures: Figures, moment: Moment, width: int, height: int) -> RenderableType:
+    def render(
+        self, figures: Figures, status: DemoStatus, width: int, height: int
+    ) -> RenderableType:
         """Draw everything; commands and messages that there is no room for are left out.
 
         Args:
             figures: The latest.
-            moment: What else is shown.
+            status: What else is shown.
             width: Columns of the terminal.
             height: Lines of the terminal.
         """
@@ -63,7 +65,7 @@ class MotionView:
         table = self.arm.drives(figures, width)
         body: list[RenderableType] = [table, Text(''), bus_text(figures.bus), line]
         room = height - 1 - len(self.arm.limits) - LINES_AROUND
-        return compose(self.title, moment, body, (min(width, WORDS_FROM), width), room)
+        return compose(self.title, status, body, (min(width, WORDS_FROM), width), room)
 
 
 def motion_line(figures: Figures) -> str:

@@ -10,6 +10,7 @@ from functools import partial
 import os
 import sys
 
+from demo_runner import REFRESH_PERIOD, run_demo
 from process_supervisor import (
     Executable,
     parse_with_ros,
@@ -18,15 +19,13 @@ from process_supervisor import (
     USAGE_ERROR,
 )
 from process_supervisor.arguments import seconds_from
-from process_supervisor.demo import perform
-from process_supervisor.play import REFRESH
 
 from ...description import joint_limits
 from ...exceptions import BringupError
 from ...session import add_arguments, robots_epilog, Session, session, SIMULATED_BUS
 from ..figures import Figures
 from ..table import ArmView
-from .play import Client, Play
+from .scenario import Client, WaveScenario
 
 WAVE_MASTER = Executable('arm_bringup', 'wave_master')
 """The master of the demo."""
@@ -114,12 +113,14 @@ def run(arm: Session, duration: float | None) -> int:
         {name: limits for name, limits in joint_limits(arm.urdf).items() if name in arm.drives},
     )
     candump = f'ros2 run canopen_tools candump {arm.bus} --bus-config {bus_config}'
-    return perform(
+    return run_demo(
         arm.processes,
         view=view,
         figures=Figures(),
         commands=commands(arm.drives[0], arm.mode_service, candump, arm.ros),
-        make_play=lambda display: Play(list(view.limits), arm.mode_service, display, duration),
+        make_scenario=lambda display: WaveScenario(
+            display, list(view.limits), arm.mode_service, duration
+        ),
         make_client=partial(join_ros, arm.ros.namespace),
         endless=duration is None,
     )
@@ -135,7 +136,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         0 when all went well, 1 when something did not, 2 when nothing was started.
     """
     arguments, ros = parse(sys.argv[1:] if argv is None else argv)
-    parameters = {'diagnostics_period': f'{REFRESH}'}
+    parameters = {'diagnostics_period': f'{REFRESH_PERIOD}'}
     try:
         with session(
             arguments, ros, simulate=True, master=WAVE_MASTER, master_parameters=parameters

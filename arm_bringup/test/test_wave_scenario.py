@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The course of the demo, with a ROS client and a supervisor of the test's own."""
+"""The scenario of the demo, with a ROS client and a supervisor of the test's own."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 import time
 
+from demo_doubles import FakeDisplay, FakeSupervisor
 import pytest
-from small_play import Show, Supervisor
 
 from arm_bringup.demos.figures import AxisFigures, DriveFigures, Figures
-from arm_bringup.demos.wave.play import Play
+from arm_bringup.demos.wave.scenario import WaveScenario
 from process_supervisor import CallError, GivenUpError, Outcome, Phase
 
 JOINTS = ['joint1', 'joint2']
@@ -64,21 +64,21 @@ class Client:
         self.closed = True
 
 
-def run(play: Play, supervisor: Supervisor, client: Client) -> None:
+def run(scenario: WaveScenario, supervisor: FakeSupervisor, client: Client) -> None:
     """Run the demo in this thread."""
 
     def make_client(given_up: Callable[[], bool]) -> Client:
         client.given_up = given_up
         return client
 
-    play.run(supervisor, make_client)
+    scenario.run(supervisor, make_client)
 
 
 def test_all_joints_are_enabled_before_the_wave_and_the_wave_stops_before_the_processes() -> None:
     """Services of all joints are called side by side; at the end the supervisor stops."""
-    show, supervisor, client = Show(), Supervisor(), Client()
-    play = Play(JOINTS, 'cyclic_position_mode', show, duration=0.01)
-    run(play, supervisor, client)
+    display, supervisor, client = FakeDisplay(), FakeSupervisor(), Client()
+    scenario = WaveScenario(display, JOINTS, 'cyclic_position_mode', duration=0.01)
+    run(scenario, supervisor, client)
     assert client.called == [
         'joint1/init',
         'joint2/init',
@@ -88,23 +88,23 @@ def test_all_joints_are_enabled_before_the_wave_and_the_wave_stops_before_the_pr
         'wave/stop',
     ]
     assert set(client.called) == set(client.prepared)
-    assert show.phases == ['booting', 'enabling', 'waving', 'stopping']
+    assert display.phases == ['booting', 'enabling', 'waving', 'stopping']
     assert supervisor.outcome is not None
     assert supervisor.outcome.exit_code == 0
-    assert play.result.problems == []
-    assert len(play.result.summary) == 5
-    assert not play.left
+    assert scenario.result.problems == []
+    assert len(scenario.result.summary) == 5
+    assert not scenario.left
     assert client.closed
 
 
 def test_a_drive_that_refuses_ends_the_demo_with_its_reason() -> None:
     """No wave is started, and there is no summary of one."""
-    supervisor, client = Supervisor(), Client(refuses='joint2/init')
-    play = Play(JOINTS, 'cyclic_position_mode', Show(), duration=1.0)
-    run(play, supervisor, client)
+    supervisor, client = FakeSupervisor(), Client(refuses='joint2/init')
+    scenario = WaveScenario(FakeDisplay(), JOINTS, 'cyclic_position_mode', duration=1.0)
+    run(scenario, supervisor, client)
     assert supervisor.outcome == Outcome(1, 'joint2/init: fault')
     assert 'wave/start' not in client.called
-    assert play.result.summary == []
+    assert scenario.result.summary == []
     assert client.closed
 
 
@@ -114,14 +114,14 @@ def test_ctrl_c_stops_the_wave_first() -> None:
 
     def when(what: str) -> None:
         if what in {'the processes', 'the end'}:
-            answers.append(play.leave())
+            answers.append(scenario.leave())
 
-    supervisor, client = Supervisor(), Client(when=when)
-    play = Play(JOINTS, 'cyclic_position_mode', Show(), duration=None)
-    run(play, supervisor, client)
+    supervisor, client = FakeSupervisor(), Client(when=when)
+    scenario = WaveScenario(FakeDisplay(), JOINTS, 'cyclic_position_mode', duration=None)
+    run(scenario, supervisor, client)
     assert answers == [False, True]
     assert client.called[-1] == 'wave/stop'
-    assert play.left
+    assert scenario.left
 
 
 @pytest.mark.parametrize('what', ['the processes', 'the end'])
@@ -132,8 +132,12 @@ def test_a_supervisor_that_stops_ends_the_demo(what: str) -> None:
         if waited_for == what:
             supervisor.phase = Phase.STOPPED
 
-    supervisor, client = Supervisor(Phase.RUNNING), Client(when=when)
-    run(Play(JOINTS, 'cyclic_position_mode', Show(), duration=None), supervisor, client)
+    supervisor, client = FakeSupervisor(Phase.RUNNING), Client(when=when)
+    run(
+        WaveScenario(FakeDisplay(), JOINTS, 'cyclic_position_mode', duration=None),
+        supervisor,
+        client,
+    )
     assert supervisor.outcome is None
     assert client.closed
 
@@ -145,8 +149,12 @@ def test_a_defect_in_the_demo_stops_the_processes(defect: type[BaseException]) -
     def when(what: str) -> None:
         raise defect('in the picture')
 
-    supervisor, client = Supervisor(), Client(when=when)
+    supervisor, client = FakeSupervisor(), Client(when=when)
     with pytest.raises(defect):
-        run(Play(JOINTS, 'cyclic_position_mode', Show(), duration=1.0), supervisor, client)
+        run(
+            WaveScenario(FakeDisplay(), JOINTS, 'cyclic_position_mode', duration=1.0),
+            supervisor,
+            client,
+        )
     assert supervisor.outcome == Outcome(1, f'{defect.__name__}: in the picture')
     assert client.closed

@@ -16,7 +16,7 @@ MESSAGE_ROOM = 2
 
 
 @dataclass(frozen=True, slots=True)
-class Moment:
+class DemoStatus:
     """What is shown beside the figures.
 
     Attributes:
@@ -34,7 +34,7 @@ class Moment:
 
 def compose(
     title: str,
-    moment: Moment,
+    status: DemoStatus,
     body: Sequence[RenderableType],
     widths: tuple[int, int],
     room: int,
@@ -43,15 +43,15 @@ def compose(
 
     Args:
         title: What runs, and where.
-        moment: What is shown beside the figures.
+        status: What is shown beside the figures.
         body: What the demo drew.
         widths: Columns of the title line and of the terminal.
         room: Lines that are left for messages and commands; what has no room is left out.
     """
     title_width, width = widths
-    parts: list[RenderableType] = [_title_line(title, moment, title_width), *body]
-    messages = [_message(text) for text in moment.messages[-MESSAGE_ROOM:]]
-    for lines in (messages, _commands(moment.commands, width)):
+    parts: list[RenderableType] = [_title_line(title, status, title_width), *body]
+    messages = [_message(text) for text in status.messages[-MESSAGE_ROOM:]]
+    for lines in (messages, _commands(status.commands, width)):
         if lines and room > 1:
             shown = lines[: room - 1]
             parts += [Text(''), *shown]
@@ -59,12 +59,12 @@ def compose(
     return Group(*parts)
 
 
-def _title_line(title: str, moment: Moment, width: int) -> RenderableType:
+def _title_line(title: str, status: DemoStatus, width: int) -> RenderableType:
     line = Table.grid(expand=False)
     line.width = width
     line.add_column(no_wrap=True, overflow='ellipsis', ratio=1)
     line.add_column(justify='right', no_wrap=True)
-    right = Text(f'{moment.phase}  {moment.elapsed:.1f} s', style='cyan')
+    right = Text(f'{status.phase}  {status.elapsed:.1f} s', style='cyan')
     line.add_row(Text(title, style='bold'), right)
     return line
 

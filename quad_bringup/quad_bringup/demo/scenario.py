@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The course of the demo: stand up, walk, turn, strafe, stop, lie down."""
+"""The scenario of the demo: stand up, walk, turn, strafe, stop, lie down."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import math
 import time
 from typing import Protocol
 
-from process_supervisor import CallError, play
-from process_supervisor.display import Display
+from demo_runner import DemoClient, DemoResult, DemoScenario, Display
+from process_supervisor import CallError
 
 from .figures import Figures
 from .itinerary import itinerary, STANDSTILL, Stretch, Velocity
@@ -39,7 +39,7 @@ class Milestones:
     odometry: Milestone | None
 
 
-class Client(play.Client, Protocol):
+class Client(DemoClient, Protocol):
     """What the demo needs of ROS; :class:`.client.QuadClient` is the real one."""
 
     @property
@@ -64,7 +64,7 @@ class Client(play.Client, Protocol):
         """Ask for a mode; return the answer."""
 
 
-class Play(play.Play[Client]):
+class WalkScenario(DemoScenario[Client]):
     """Lets the robot walk."""
 
     def __init__(
@@ -84,8 +84,7 @@ class Play(play.Play[Client]):
         self._duration = duration
         self._measured: list[Measured] = []
 
-    def _course(self, client: Client, ready: Callable[[], bool]) -> None:
-        self._wait(client, ready, math.inf, 'the processes')
+    def _perform(self, client: Client) -> None:
         self._find(client)
         self._reach(client, 'stand', 'standing up')
         self._moving.set()
@@ -141,20 +140,19 @@ class Play(play.Play[Client]):
     def _wait(
         self, client: Client, condition: Callable[[], bool], timeout: float, what: str
     ) -> None:
-        """Wait for something while the picture goes on; a fault of the controller ends it."""
+        """Wait for something while the figures are shown; a fault of the controller ends it."""
 
         def reached() -> bool:
-            self._show(client)
             if client.figures.fault:
                 self._conclude(client.figures)
                 raise CallError(f'the controller is in a fault: {client.figures.fault}')
             return condition()
 
-        client.wait_until(reached, timeout, what)
+        super()._wait(client, reached, timeout, what)
 
     def _conclude(self, figures: Figures) -> None:
         if self._measured:
-            self.result = play.Result(
+            self.result = DemoResult(
                 summary_lines(figures, self._measured), problems(figures, self._measured)
             )
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The course of the demo: squares, a singular pose, trajectories with override and cancel."""
+"""The motions of the demo: squares, a singular pose, trajectories with override and cancel."""
 
 from __future__ import annotations
 
@@ -49,12 +49,12 @@ START = 'ready'
 """Pose of the SRDF from which it starts."""
 
 
-class Left(Exception):  # noqa: N818  # it is no error: the user asked for the end
+class EndRequested(Exception):  # noqa: N818  # it is no error: the user asked for the end
     """The user asked for the end."""
 
 
 @dataclass(frozen=True, slots=True)
-class Course:
+class MotionSequence:
     """The parts of the demo, for a client whose drives are enabled.
 
     Attributes:
@@ -63,7 +63,7 @@ class Course:
         period: Period of the cycle in [s].
         results: Where figures go.
         enter: Told of each part.
-        look: Called often; shows how it goes, and raises Left.
+        look: Called often; shows how it goes, and raises EndRequested.
     """
 
     client: MotionClient
@@ -79,7 +79,7 @@ class Course:
         Raises:
             CallError: A trajectory was refused or failed, or somebody does not answer.
             GivenUpError: The processes have ended.
-            Left: The user asked for the end.
+            EndRequested: The user asked for the end.
         """
         self.go_to_start()
         self.square('base frame', self.model.base)

@@ -1,9 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The program around a demo: supervisor in the main thread, its play beside it, and how it went.
-
-This module is not imported by the package: it needs rich, which a mere bring-up does not.
-"""
+"""The program around a demo: supervisor in the main thread, scenario beside it, and its result."""
 
 from __future__ import annotations
 
@@ -16,13 +13,18 @@ from typing import Any
 
 from rich.console import Console
 
-from .console import explain
+from process_supervisor import (
+    explain,
+    LineWriter,
+    Outcome,
+    Painter,
+    ProcessSpec,
+    Runner,
+    wants_colour,
+)
+
 from .display import choose_display, Display, Setting, TableDisplay, View
-from .play import ClientT, MakeClient, Play
-from .runner import Runner
-from .spec import ProcessSpec
-from .supervision import Outcome
-from .terminal import LineWriter, Painter, wants_colour
+from .scenario import ClientT, DemoScenario, MakeClient
 
 
 def second_terminal(commands: Sequence[str]) -> list[str]:
@@ -36,13 +38,13 @@ def second_terminal(commands: Sequence[str]) -> list[str]:
     return [first, *commands]
 
 
-def perform(
+def run_demo(
     processes: Sequence[ProcessSpec],
     *,
     view: View[Any],
     figures: object,
     commands: Sequence[str],
-    make_play: Callable[[Display[Any]], Play[ClientT]],
+    make_scenario: Callable[[Display[Any]], DemoScenario[ClientT]],
     make_client: MakeClient[ClientT],
     endless: bool,
 ) -> int:
@@ -53,8 +55,8 @@ def perform(
         view: How its figures look.
         figures: The first ones, before there are any.
         commands: Commands to try in a second terminal.
-        make_play: Makes its course, for a display.
-        make_client: Makes its ROS client, in the thread of the course.
+        make_scenario: Makes its scenario, for a display.
+        make_client: Makes its ROS client, in the thread of the scenario.
         endless: It ends at Ctrl-C; whoever has seen the table needs no summary then.
 
     Returns:
@@ -64,18 +66,20 @@ def perform(
     painter = Painter('demo', [s.name for s in processes], wants_colour(sys.stdout, os.environ))
     setting = Setting(view, figures, second_terminal(commands), painter)
     display = choose_display(setting, Console(), write)
-    play = make_play(display)
+    scenario = make_scenario(display)
     line = without_readiness(processes, display.line)
     try:
-        with Runner(processes, line, display.notice, on_interrupt=play.leave) as runner:
-            thread = threading.Thread(target=play.run, args=[runner, make_client], name='play')
+        with Runner(processes, line, display.notice, on_interrupt=scenario.leave) as runner:
+            thread = threading.Thread(
+                target=scenario.run, args=[runner, make_client], name='scenario'
+            )
             thread.start()
             outcome = runner.run()
             thread.join()
     finally:
         display.close()
     with_summary = not (endless and isinstance(display, TableDisplay))
-    return conclude(write, play, outcome, with_summary=with_summary)
+    return conclude(write, scenario, outcome, with_summary=with_summary)
 
 
 def without_readiness(
@@ -96,24 +100,26 @@ def without_readiness(
     return line
 
 
-def conclude(write: LineWriter, play: Play[Any], outcome: Outcome, *, with_summary: bool) -> int:
+def conclude(
+    write: LineWriter, scenario: DemoScenario[Any], outcome: Outcome, *, with_summary: bool
+) -> int:
     """Say how it went.
 
     Args:
         write: Takes the lines.
-        play: The course, ended.
+        scenario: The scenario, ended.
         outcome: How the supervisor ended.
         with_summary: Write the summary.
 
     Returns:
         The exit code.
     """
-    result = play.result
+    result = scenario.result
     for line in result.summary if with_summary else []:
         write(line)
     for line in result.warnings:
         write(f'warning: {line}')
-    failures = [] if play.left else result.problems
+    failures = [] if scenario.left else result.problems
     if outcome.exit_code:
         failures = [explain(outcome), *failures]
     for line in failures:

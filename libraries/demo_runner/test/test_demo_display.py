@@ -10,14 +10,15 @@ import pytest
 from rich.console import Console, RenderableType
 from rich.text import Text
 
-from process_supervisor import LineWriter, Notice, Painter, Severity
-from process_supervisor.display import (
+from demo_runner import (
     choose_display,
+    compose,
+    DemoStatus,
     LineDisplay,
     Setting,
     TableDisplay,
 )
-from process_supervisor.picture import compose, Moment
+from process_supervisor import LineWriter, Notice, Painter, Severity
 
 FIGURES = 3
 """The figures of the demo of this test: how many widgets run."""
@@ -32,9 +33,9 @@ class Widgets:
         """Need the room of the smallest table."""
         return width >= 80 and height >= 14
 
-    def render(self, figures: int, moment: Moment, width: int, height: int) -> RenderableType:
+    def render(self, figures: int, status: DemoStatus, width: int, height: int) -> RenderableType:
         """Draw one line."""
-        return compose(self.title, moment, [Text(f'{figures} widgets')], (width, width), height)
+        return compose(self.title, status, [Text(f'{figures} widgets')], (width, width), height)
 
     def progress(self, figures: int) -> str:
         """Count them."""

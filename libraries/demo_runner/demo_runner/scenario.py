@@ -1,26 +1,27 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What a demo plays beside the supervisor of its processes: its course, its client, its result."""
+"""What a demo does beside the supervisor of its processes: its scenario, client and result."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field
+import math
 import threading
 import time
 from typing import Any, Generic, Protocol, TypeVar
 
-from .display import Display
-from .exceptions import CallError, GivenUpError
-from .supervision import Outcome, Phase
+from process_supervisor import CallError, GivenUpError, Outcome, Phase
 
-REFRESH = 0.2
+from .display import Display
+
+REFRESH_PERIOD = 0.2
 """Time between two pictures in [s]."""
 
 
 @dataclass(frozen=True, slots=True)
-class Result:
+class DemoResult:
     """How a demo went.
 
     Attributes:
@@ -34,8 +35,8 @@ class Result:
     warnings: list[str] = field(default_factory=list)
 
 
-class Client(Protocol):
-    """What every demo needs of ROS, as :class:`.graph_client.GraphClient` has it."""
+class DemoClient(Protocol):
+    """What every demo needs of ROS; ``process_supervisor.graph_client.GraphClient`` has it."""
 
     @property
     def figures(self) -> Any:  # noqa: ANN401  # each demo has its own
@@ -51,7 +52,7 @@ class Client(Protocol):
         """Leave the ROS graph."""
 
 
-ClientT = TypeVar('ClientT', bound=Client)
+ClientT = TypeVar('ClientT', bound=DemoClient)
 
 MakeClient = Callable[[Callable[[], bool]], ClientT]
 """Joins the ROS graph; the client asks the argument whether its waiting shall be given up."""
@@ -68,7 +69,7 @@ class Supervisor(Protocol):
         """Ask for an orderly end."""
 
 
-class Play(ABC, Generic[ClientT]):
+class DemoScenario(ABC, Generic[ClientT]):
     """Runs a demo in a thread of its own, beside the supervisor.
 
     Attributes:
@@ -84,7 +85,7 @@ class Play(ABC, Generic[ClientT]):
         Args:
             display: Where it is shown.
         """
-        self.result = Result()
+        self.result = DemoResult()
         self._display = display
         self._leaving = threading.Event()
         self._moving = threading.Event()
@@ -100,7 +101,7 @@ class Play(ABC, Generic[ClientT]):
         """Ask for the end, from any thread.
 
         Returns:
-            True when the robot moves: then the course brings it to rest before all is stopped.
+            True when the robot moves: then the scenario brings it to rest before all is stopped.
         """
         self._leaving.set()
         return self._moving.is_set()
@@ -117,7 +118,14 @@ class Play(ABC, Generic[ClientT]):
         client: ClientT | None = None
         try:
             client = make_client(lambda: supervisor.phase in ended)
-            self._course(client, lambda: supervisor.phase is Phase.RUNNING)
+            self._prepare(client)
+            self._wait(
+                client,
+                lambda: supervisor.phase is Phase.RUNNING,
+                math.inf,
+                'the processes',
+            )
+            self._perform(client)
             supervisor.stop(Outcome(0, 'the demo has ended'))
         except GivenUpError:
             pass  # the supervisor knows why
@@ -130,9 +138,23 @@ class Play(ABC, Generic[ClientT]):
             if client is not None:
                 self._accompany(client, lambda: supervisor.phase is Phase.STOPPED)
 
+    def _prepare(self, client: ClientT) -> None:  # a scenario may need nothing
+        """Do what can be done while the processes start."""
+
     @abstractmethod
-    def _course(self, client: ClientT, ready: Callable[[], bool]) -> None:
-        """Play it, from the start of the processes to the standstill of the robot."""
+    def _perform(self, client: ClientT) -> None:
+        """Do it all, from when the processes are ready to the standstill of the robot."""
+
+    def _wait(
+        self, client: ClientT, condition: Callable[[], bool], timeout: float, what: str
+    ) -> None:
+        """Wait for something while the figures are shown."""
+
+        def reached() -> bool:
+            self._show(client)
+            return condition()
+
+        client.wait_until(reached, timeout, what)
 
     def _enter(self, phase: str) -> None:
         if phase != self._phase:
@@ -142,7 +164,7 @@ class Play(ABC, Generic[ClientT]):
     def _show(self, client: ClientT) -> None:
         now = time.monotonic()
         if now >= self._next_picture:
-            self._next_picture = now + REFRESH
+            self._next_picture = now + REFRESH_PERIOD
             self._display.show(client.figures)
 
     def _accompany(self, client: ClientT, stopped: Callable[[], bool]) -> None:
@@ -150,7 +172,7 @@ class Play(ABC, Generic[ClientT]):
         try:
             self._enter('stopping')
             while not stopped():
-                client.listen(REFRESH / 4)
+                client.listen(REFRESH_PERIOD / 4)
                 self._show(client)
             self._display.show(client.figures)
         finally:

@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where a demo shows how it goes: a live table in a terminal, lines elsewhere.
 
-What is in the table is the demo's own: it hands in a :class:`View` of its figures. This module is
-not imported by the package: it needs rich, which a mere bring-up and the guardian do not.
+What is in the table is the demo's own: it hands in a :class:`View` of its figures.
 """
 
 from __future__ import annotations
@@ -18,9 +17,9 @@ from typing import Generic, Protocol, TypeVar
 from rich.console import Console, RenderableType
 from rich.live import Live
 
-from .picture import Moment
-from .supervision import Notice, Severity
-from .terminal import LineWriter, Painter, severity_of
+from process_supervisor import LineWriter, Notice, Painter, Severity, severity_of
+
+from .picture import DemoStatus
 
 FiguresT = TypeVar('FiguresT')
 FiguresT_contra = TypeVar('FiguresT_contra', contravariant=True)
@@ -44,7 +43,7 @@ class View(Protocol[FiguresT_contra]):
         """Say whether a terminal of so many columns and lines has room for the table."""
 
     def render(
-        self, figures: FiguresT_contra, moment: Moment, width: int, height: int
+        self, figures: FiguresT_contra, status: DemoStatus, width: int, height: int
     ) -> RenderableType:
         """Draw the table into so many columns and lines."""
 
@@ -220,11 +219,11 @@ class TableDisplay(Generic[FiguresT]):
         setting = self._setting
         now = time.monotonic()
         messages = [text for end, text in list(self._messages) if now < end]
-        moment = Moment(now - self._begun, self._phase, messages, setting.commands)
+        status = DemoStatus(now - self._begun, self._phase, messages, setting.commands)
         with self._lock:
             if self._live.is_started:
                 size = self._console.size
-                drawing = setting.view.render(self._figures, moment, size.width, size.height)
+                drawing = setting.view.render(self._figures, status, size.width, size.height)
                 self._live.update(drawing, refresh=True)
 
 

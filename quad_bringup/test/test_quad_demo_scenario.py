@@ -1,21 +1,21 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The course of the demo, with a ROS client and a supervisor of the test's own."""
+"""The scenario of the demo, with a ROS client and a supervisor of the test's own."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
 
+from demo_doubles import FakeDisplay, FakeSupervisor
 import pytest
-from small_play import Show, Supervisor
 
 from process_supervisor import CallError, GivenUpError, Outcome, Phase
-from quad_bringup.demo import play as play_module
+from quad_bringup.demo import scenario as scenario_module
 from quad_bringup.demo.figures import Figures
 from quad_bringup.demo.itinerary import STANDSTILL, Velocity
-from quad_bringup.demo.play import Milestones, Play
 from quad_bringup.demo.rhythm import Rhythm
+from quad_bringup.demo.scenario import Milestones, WalkScenario
 from quad_bringup.demo.track import Milestone
 
 STEP = 0.05
@@ -37,7 +37,7 @@ class Clock:
 def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     """Let the demo live in virtual time."""
     clock = Clock()
-    monkeypatch.setattr(play_module, 'time', clock)
+    monkeypatch.setattr(scenario_module, 'time', clock)
     return clock
 
 
@@ -103,37 +103,37 @@ class Robot:
         """Leave."""
 
 
-def run(play: Play, supervisor: Supervisor, robot: Robot) -> None:
+def run(scenario: WalkScenario, supervisor: FakeSupervisor, robot: Robot) -> None:
     """Run the demo in this thread."""
 
     def make_client(given_up: Callable[[], bool]) -> Robot:
         robot.given_up = given_up
         return robot
 
-    play.run(supervisor, make_client)
+    scenario.run(supervisor, make_client)
 
 
 def test_it_stands_up_walks_turns_strafes_stops_and_lies_down(clock: Clock) -> None:
     """With a summary of each stretch; at the end nobody commands anything any more."""
-    show, supervisor, robot = Show(), Supervisor(), Robot(clock)
-    play = Play(show, 'walk', 20.0)
-    run(play, supervisor, robot)
+    display, supervisor, robot = FakeDisplay(), FakeSupervisor(), Robot(clock)
+    scenario = WalkScenario(display, 'walk', 20.0)
+    run(scenario, supervisor, robot)
     assert robot.modes == ['stand', 'walk', 'lie']
     moves = ['walk', 'turn', 'strafe', 'stop']
-    assert show.phases == ['starting', 'standing up', *moves, 'lying down', 'stopping']
+    assert display.phases == ['starting', 'standing up', *moves, 'lying down', 'stopping']
     assert robot.commands[0] == Velocity(forward=0.2)
     assert robot.commands[-1] is None
     assert supervisor.outcome == Outcome(0, 'the demo has ended')
-    assert play.result.problems == []
-    rows = [line.split()[0] for line in play.result.summary[2:6]]
+    assert scenario.result.problems == []
+    rows = [line.split()[0] for line in scenario.result.summary[2:6]]
     assert rows == moves
 
 
 def test_a_topic_that_is_never_found_ends_it_by_name(clock: Clock) -> None:
     """Before anything moves."""
-    supervisor, robot = Supervisor(), Robot(clock)
+    supervisor, robot = FakeSupervisor(), Robot(clock)
     robot.missing = ['/odom', '/imu']
-    run(Play(Show(), 'walk', 20.0), supervisor, robot)
+    run(WalkScenario(FakeDisplay(), 'walk', 20.0), supervisor, robot)
     assert supervisor.outcome is not None
     assert supervisor.outcome.reason == 'not found in 20 s: /odom, /imu'
     assert robot.modes == []
@@ -141,94 +141,94 @@ def test_a_topic_that_is_never_found_ends_it_by_name(clock: Clock) -> None:
 
 def test_a_robot_that_walks_too_slowly_is_a_problem(clock: Clock) -> None:
     """The demo goes on to its end, and says so then."""
-    supervisor = Supervisor()
-    play = Play(Show(), 'walk', 20.0)
-    run(play, supervisor, Robot(clock, factor=0.6))
-    names = [text.split(':')[0] for text in play.result.problems]
+    supervisor = FakeSupervisor()
+    scenario = WalkScenario(FakeDisplay(), 'walk', 20.0)
+    run(scenario, supervisor, Robot(clock, factor=0.6))
+    names = [text.split(':')[0] for text in scenario.result.problems]
     assert names == ['walk', 'turn']
 
 
 def test_a_mode_that_is_refused_ends_it_with_the_reason(clock: Clock) -> None:
     """Before anything is commanded."""
-    supervisor, robot = Supervisor(), Robot(clock)
+    supervisor, robot = FakeSupervisor(), Robot(clock)
     robot.refuses = 'stand'
-    run(Play(Show(), 'walk', 20.0), supervisor, robot)
+    run(WalkScenario(FakeDisplay(), 'walk', 20.0), supervisor, robot)
     assert supervisor.outcome == Outcome(1, "the mode 'stand' was refused: battery low")
     assert set(robot.commands) == {None}
 
 
 def test_a_mode_that_is_never_reached_ends_it(clock: Clock) -> None:
     """The time-out says which."""
-    supervisor, robot = Supervisor(), Robot(clock)
+    supervisor, robot = FakeSupervisor(), Robot(clock)
 
     def fall_back(what: str) -> None:
         robot.figures = replace(robot.figures, state='lie')
 
     robot.after = fall_back
     robot.set_mode = lambda mode, timeout: mode  # type: ignore[method-assign]
-    run(Play(Show(), 'walk', 20.0), supervisor, robot)
+    run(WalkScenario(FakeDisplay(), 'walk', 20.0), supervisor, robot)
     assert supervisor.outcome == Outcome(1, 'waited in vain for mode stand')
 
 
 def test_a_fault_ends_it_at_once_with_its_words(clock: Clock) -> None:
     """In the middle of the walk."""
-    supervisor, robot = Supervisor(), Robot(clock)
+    supervisor, robot = FakeSupervisor(), Robot(clock)
 
     def fall(what: str) -> None:
         if clock.now > 105.0:
             robot.figures = replace(robot.figures, state='fault', fault='fallen: tilt 80°')
 
     robot.after = fall
-    run(Play(Show(), 'walk', 20.0), supervisor, robot)
+    run(WalkScenario(FakeDisplay(), 'walk', 20.0), supervisor, robot)
     assert supervisor.outcome == Outcome(1, 'the controller is in a fault: fallen: tilt 80°')
     assert robot.modes == ['stand', 'walk']
 
 
 def test_ctrl_c_lets_it_lie_down_first(clock: Clock) -> None:
     """Without an end it goes on and on until then; what was cut short is not measured."""
-    supervisor, robot = Supervisor(), Robot(clock)
-    play = Play(Show(), 'policy', None)
+    supervisor, robot = FakeSupervisor(), Robot(clock)
+    scenario = WalkScenario(FakeDisplay(), 'policy', None)
 
     def leave(what: str) -> None:
         if clock.now > 100.0 + 33.0:  # in the walk of the second round
-            assert play.leave()
+            assert scenario.leave()
 
     robot.after = leave
-    run(play, supervisor, robot)
+    run(scenario, supervisor, robot)
     assert robot.modes == ['stand', 'policy', 'lie']
     assert supervisor.outcome is not None
     assert supervisor.outcome.exit_code == 0
-    assert [line.split()[0] for line in play.result.summary[2:-1]].count('walk') == 2
+    assert [line.split()[0] for line in scenario.result.summary[2:-1]].count('walk') == 2
 
 
 def test_ctrl_c_before_it_stands_is_left_to_the_supervisor(clock: Clock) -> None:
     """There is nothing to lie down from."""
-    play = Play(Show(), 'walk', None)
-    assert not play.leave()
+    scenario = WalkScenario(FakeDisplay(), 'walk', None)
+    assert not scenario.leave()
 
 
 @pytest.mark.parametrize('moment', [100.2, 104.0])
 def test_a_supervisor_that_stops_ends_the_demo(clock: Clock, moment: float) -> None:
     """A process has died: nothing is waited for any more, and the outcome is the supervisor's."""
-    supervisor, robot = Supervisor(), Robot(clock)
+    supervisor, robot = FakeSupervisor(), Robot(clock)
 
     def die(what: str) -> None:
         if clock.now > moment:
             supervisor.phase = Phase.STOPPED
 
     robot.after = die
-    run(Play(Show(), 'walk', None), supervisor, robot)
+    run(WalkScenario(FakeDisplay(), 'walk', None), supervisor, robot)
     assert supervisor.outcome is None
 
 
 def test_an_error_of_our_own_stops_everything_and_is_not_hidden(clock: Clock) -> None:
     """The processes are stopped; the traceback is there."""
-    supervisor, robot = Supervisor(), Robot(clock)
+    supervisor, robot = FakeSupervisor(), Robot(clock)
 
     def fail(what: str) -> None:
         raise ZeroDivisionError('in the picture')
 
     robot.after = fail
     with pytest.raises(ZeroDivisionError):
-        run(Play(Show(), 'walk', 20.0), supervisor, robot)
+        run(WalkScenario(FakeDisplay(), 'walk', 20.0), supervisor, robot)
     assert supervisor.outcome == Outcome(1, 'ZeroDivisionError: in the picture')

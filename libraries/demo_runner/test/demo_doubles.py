@@ -1,13 +1,13 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""A display and a supervisor for tests of the course of a demo."""
+"""A display and a supervisor for tests of the scenario of a demo."""
 
 from __future__ import annotations
 
 from process_supervisor import Notice, Outcome, Phase
 
 
-class Show:
+class FakeDisplay:
     """A display that keeps the phases."""
 
     def __init__(self) -> None:
@@ -30,7 +30,7 @@ class Show:
         """Nothing is open."""
 
 
-class Supervisor:
+class FakeSupervisor:
     """A supervisor that runs until it is asked to stop."""
 
     def __init__(self, phase: Phase = Phase.RUNNING) -> None:

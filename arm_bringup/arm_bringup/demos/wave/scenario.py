@@ -1,0 +1,87 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The scenario of the demo: boot, enable, wave, watch, stop."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+import itertools
+import math
+import time
+from typing import Protocol
+
+from demo_runner import DemoClient, DemoResult, DemoScenario, Display
+
+from ...enabling import enabling_services
+from ..figures import Figures
+from ..report import problems, summary_lines, warnings
+
+ENABLE_TIMEOUT = 15.0
+"""Longest time in [s] for all drives to be enabled, and for them to be in their mode."""
+CALL_TIMEOUT = 10.0
+"""Longest time in [s] for the services of the wave, and for it to stop."""
+START, STOP = 'wave/start', 'wave/stop'
+"""Services of the wave."""
+
+
+class Client(DemoClient, Protocol):
+    """What the demo needs of ROS; :class:`..client.ArmClient` is the real one."""
+
+    figures: Figures
+
+    def prepare(self, services: Iterable[str]) -> None:
+        """Look for services that will be called."""
+
+    def call(self, services: list[str], timeout: float) -> dict[str, str]:
+        """Call services side by side."""
+
+
+class WaveScenario(DemoScenario[Client]):
+    """Lets the arm wave."""
+
+    opening = 'booting'
+
+    def __init__(
+        self,
+        display: Display[Figures],
+        joints: Sequence[str],
+        mode_service: str,
+        duration: float | None,
+    ) -> None:
+        """Prepare; nothing happens yet.
+
+        Args:
+            display: Where it is shown.
+            joints: Names of the joints with a drive.
+            mode_service: Service of a drive that selects the mode of the wave.
+            duration: How long the wave runs in [s]; None until :meth:`leave`.
+        """
+        super().__init__(display)
+        self._joints = joints
+        self._enabling = enabling_services(joints, mode_service)
+        self._duration = math.inf if duration is None else duration
+
+    def _prepare(self, client: Client) -> None:
+        client.prepare([*itertools.chain(*self._enabling), START, STOP])
+
+    def _perform(self, client: Client) -> None:
+        self._enter('enabling')
+        for services in self._enabling:
+            client.call(services, ENABLE_TIMEOUT)
+        client.call([START], CALL_TIMEOUT)
+        self._enter('waving')
+        begun = time.monotonic()
+        self._moving.set()
+        end = begun + self._duration
+        self._wait(client, lambda: self.left or time.monotonic() >= end, math.inf, 'the end')
+        self._conclude(client.figures, time.monotonic() - begun)
+        self._enter('stopping')
+        client.call([STOP], CALL_TIMEOUT)
+        self._wait(client, lambda: client.figures.wave == 'idle', CALL_TIMEOUT, 'the wave to stop')
+
+    def _conclude(self, figures: Figures, duration: float) -> None:
+        self.result = DemoResult(
+            summary_lines(figures, self._joints, duration),
+            problems(figures, self._joints),
+            warnings(figures),
+        )

@@ -1,0 +1,22 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Build description of demo_runner."""
+
+from setuptools import find_packages, setup
+
+setup(
+    name='demo_runner',
+    version='0.1.0',
+    packages=find_packages(include=['demo_runner', 'demo_runner.*']),
+    package_data={'demo_runner': ['py.typed']},
+    data_files=[
+        ('share/ament_index/resource_index/packages', ['resource/demo_runner']),
+        ('share/demo_runner', ['package.xml']),
+    ],
+    install_requires=['setuptools'],
+    zip_safe=True,
+    maintainer='The arm and quad developers',
+    maintainer_email='developers@example.org',
+    description='Runs the scenario of a demo beside its processes, and shows its figures',
+    license='Apache-2.0',
+)
