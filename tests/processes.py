@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 import os
 import re
+import select
 import signal
 import subprocess
 import threading
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
     from typing_extensions import Self
 
 from ament_index_python.packages import get_package_prefix
+
+from process_supervisor.readiness import ReadinessSocket, VARIABLE
 
 
 def executable(package: str, name: str) -> str:
@@ -37,9 +40,10 @@ class RunningProcess:
         """Start it."""
         self.lines: list[str] = []
         self._changed = threading.Condition()
+        self._readiness = ReadinessSocket()
         self._process = subprocess.Popen(
             arguments,
-            env=env,
+            env={**env, VARIABLE: self._readiness.address},
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
@@ -85,6 +89,19 @@ class RunningProcess:
                     raise AssertionError(f'no {pattern!r} ({state}) in:\n{self.output}')
                 self._changed.wait(min(left, 0.5))
 
+    def wait_until_ready(self, timeout: float = 20.0) -> None:
+        """Wait until it reports that it is ready.
+
+        Args:
+            timeout: Longest time in [s].
+        """
+        deadline = time.monotonic() + timeout
+        while not self._readiness.is_ready():
+            left = deadline - time.monotonic()
+            assert left > 0, f'not ready in:\n{self.output}'
+            assert self.is_running(), f'ended: {self._process.poll()}:\n{self.output}'
+            select.select([self._readiness], [], [], min(left, 0.5))
+
     def signal(self, number: signal.Signals) -> None:
         """Send it a signal."""
         self._process.send_signal(number)
@@ -119,6 +136,7 @@ class RunningProcess:
             os.killpg(self.pid, signal.SIGKILL)
         self._process.wait()
         self._reader.join()
+        self._readiness.close()
 
     def _read(self) -> None:
         for line in self._process.stdout or ():

@@ -21,13 +21,7 @@ from std_msgs.msg import String
 from process_supervisor import find_executable, write_parameters
 from quad_bringup.demo.itinerary import Velocity
 from quad_bringup.demo.main import GROUND_TRUTH
-from quad_bringup.stack import (
-    CONTROLLER_READY,
-    HARDWARE_READY,
-    quad_processes,
-    SIMULATOR_READY,
-    Stack,
-)
+from quad_bringup.stack import quad_processes, Stack
 from quad_description import movable_joints, robot_urdf
 from quad_msgs.srv import SetMode
 
@@ -37,12 +31,6 @@ if TYPE_CHECKING:
     from isolation import Isolation
     from typing_extensions import Self
 
-READY = {
-    'fake_xgo': SIMULATOR_READY,
-    'hardware': HARDWARE_READY,
-    'controller': CONTROLLER_READY,
-}
-"""What each process logs when it is ready."""
 AHEAD = Velocity(forward=0.2)
 """The demo's velocity."""
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -110,7 +98,7 @@ class SimulatedQuad:
         environment = {**self._isolation.env, **spec.environment}
         process = self._stack.enter_context(RunningProcess(spec.argv, environment))
         self.processes[name] = process
-        process.wait_for(READY[name], STARTING)
+        process.wait_until_ready(STARTING)
         return process
 
     def set_mode(self, mode: str) -> None:

@@ -26,14 +26,6 @@ MOTION_MASTER = Executable('arm_servo', 'motion_master')
 """The master with the motion core inside: trajectories, jogging and /joint_states."""
 MOTION_CONTROLLER = Executable('arm_servo', 'motion_controller')
 """Trajectories and jogging for drives that another process has."""
-MASTER_READY = r'all \d+ devices operational'
-"""What the master logs when every drive of the bus has booted."""
-SLAVES_READY = r'\d+ simulated drives.* on '
-"""What the simulated slaves log when they are on the bus."""
-PUBLISHER_READY = r'publishing \d+ joints'
-"""What the publisher of /joint_states logs when it has subscribed to the drives."""
-CONTROLLER_READY = 'ready for commands'
-"""What motion_controller logs."""
 
 STATE_PUBLISHERS = (
     Executable('robot_state_publisher', 'robot_state_publisher'),
@@ -103,7 +95,7 @@ def _slaves(stack: Stack, bus: Mapping[str, str], find: FindExecutable) -> Proce
         name='slaves',
         argv=node_argv(Executable('canopen_sim', 'fake_slaves'), find, bus, ros=stack.ros),
         environment=LOG_FORMAT,
-        ready=SLAVES_READY,
+        notifies_ready=True,
         ready_timeout=stack.ready_timeout,
         stop_order=SLAVES_LAST,
     )
@@ -122,7 +114,7 @@ def _master(
             stack.ros,
         ),
         environment=LOG_FORMAT,
-        ready=MASTER_READY,
+        notifies_ready=True,
         ready_timeout=stack.ready_timeout,
         stop_order=MASTER_FIRST,
     )
@@ -151,7 +143,7 @@ def controller_process(
         name='controller',
         argv=node_argv(MOTION_CONTROLLER, find, {}, (parameters, *files), ros),
         environment=LOG_FORMAT,
-        ready=CONTROLLER_READY,
+        notifies_ready=True,
         ready_timeout=ready_timeout,
         stop_order=MASTER_FIRST,
     )
@@ -168,7 +160,7 @@ def _publisher(stack: Stack, parameters: Path, find: FindExecutable) -> ProcessS
         name='joint_states',
         argv=node_argv(executable, find, {}, (parameters,), stack.ros),
         environment=LOG_FORMAT,
-        ready=PUBLISHER_READY,
+        notifies_ready=True,
         ready_timeout=stack.ready_timeout,
         stop_order=THEN_LISTENERS,
     )

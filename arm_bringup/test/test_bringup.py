@@ -19,7 +19,7 @@ pytestmark = pytest.mark.slow
 
 PANDA = Path(__file__).parents[1] / 'robots' / 'panda'
 
-READY = {
+LINES = {
     ('canopen_sim', 'fake_slaves'): '[INFO] [fake_slaves]: 7 simulated drives on '
     '{can_interface_name}',
     ('arm_canopen', 'master'): '[INFO] [master]: all 7 devices operational',
@@ -32,7 +32,7 @@ def workspace(tmp_path: Path, prefix: Path, isolation: Isolation) -> SmallWorksp
     """Install the small programs, in a ROS domain that nobody else is in."""
     libraries = ('libraries/process_supervisor', 'libraries/dds_network')
     sources = ('arm_bringup', 'arm_canopen', 'canopen_sim', *libraries)
-    workspace = SmallWorkspace(tmp_path, 'arm_bringup', READY, sources, [prefix])
+    workspace = SmallWorkspace(tmp_path, 'arm_bringup', LINES, sources, [prefix])
     workspace.environment['ROS_DOMAIN_ID'] = str(isolation.domain_id)
     return workspace
 
@@ -78,7 +78,7 @@ def test_a_master_that_dies_ends_it_with_its_last_words(workspace: SmallWorkspac
 
 def test_a_master_that_never_gets_ready_ends_it(workspace: SmallWorkspace) -> None:
     """After the time-out that was asked for; what it waited for is said."""
-    workspace.install('arm_canopen', 'master', ready='waiting for panda_joint3')
+    workspace.install('arm_canopen', 'master', line='waiting for panda_joint3', ready=False)
     code, output = workspace.run('panda', '--simulate', '--can', 'auto', '--timeout', '1')
     assert code == 1
     assert 'master did not get ready' in output
@@ -179,14 +179,14 @@ def test_the_namespace_of_bus_yml_is_that_of_all_nodes(
     text = (folder / 'bus.yml').read_text()
     text = re.sub('(?m)^(master|defaults):\n', r'\g<0>  namespace: cell\n', text)
     (folder / 'bus.yml').write_text(text)
-    for (package, name), line in READY.items():
-        workspace.install(package, name, ready=f'{line} in {{__ns}}')
+    for (package, name), line in LINES.items():
+        workspace.install(package, name, line=f'{line} in {{__ns}}')
     with workspace.bringup(f'{folder}/', '--simulate') as process:
         seen = read_until(process, 'all is ready')
         process.send_signal(signal.SIGINT)
         process.communicate(timeout=PATIENCE)
     assert 'in namespace /cell' in seen
-    assert len(re.findall(' in /cell$', seen, re.MULTILINE)) == len(READY)
+    assert len(re.findall(' in /cell$', seen, re.MULTILINE)) == len(LINES)
 
 
 def test_help_names_the_robots(workspace: SmallWorkspace) -> None:

@@ -18,15 +18,6 @@ from process_supervisor import (
     StartError,
 )
 
-SIMULATOR_READY = r'^fake_xgo: .* -> '
-"""What fake_xgo writes when its serial port is there."""
-HARDWARE_READY = r'running: '
-"""What hardware_node logs when the robot has answered and reports come in."""
-CONTROLLER_READY = r'ready: '
-"""What controller_node logs when it has heard the joints and answers /set_mode."""
-PUBLISHER_READY = r'Robot initialized|frames of robot'
-"""What the public robot_state_publisher and ours log when they have read the description."""
-
 STATE_PUBLISHERS = (
     Executable('robot_state_publisher', 'robot_state_publisher'),
     Executable('robot_viewer', 'robot_state_publisher'),
@@ -111,7 +102,7 @@ def _simulator(stack: Stack, find: FindExecutable) -> ProcessSpec:
         name='fake_xgo',
         argv=(program, *options, *ros_arguments),
         environment=LOG_FORMAT,
-        ready=SIMULATOR_READY,
+        notifies_ready=True,
         ready_timeout=stack.ready_timeout,
         stop_order=SIMULATOR_LAST,
     )
@@ -127,7 +118,7 @@ def _bridge(stack: Stack, parameters: Path, find: FindExecutable) -> ProcessSpec
         name='hardware',
         argv=node_argv(executable, find, values, files, stack.ros),
         environment=LOG_FORMAT,
-        ready=HARDWARE_READY,
+        notifies_ready=True,
         ready_timeout=stack.ready_timeout,
         stop_order=THEN_BRIDGE,
     )
@@ -142,7 +133,7 @@ def _controller(stack: Stack, parameters: Path, find: FindExecutable) -> Process
         name='controller',
         argv=node_argv(executable, find, values, (parameters,), stack.ros),
         environment=LOG_FORMAT,
-        ready=CONTROLLER_READY,
+        notifies_ready=True,
         ready_timeout=stack.ready_timeout,
         stop_order=CONTROLLER_FIRST,
     )
@@ -159,8 +150,6 @@ def _state_publisher(stack: Stack, parameters: Path, find: FindExecutable) -> Pr
         name='robot_state',
         argv=node_argv(executable, find, values, (parameters,), stack.ros),
         environment=LOG_FORMAT,
-        ready=PUBLISHER_READY,
-        ready_timeout=stack.ready_timeout,
         required=False,
         stop_order=THEN_BRIDGE,
     )

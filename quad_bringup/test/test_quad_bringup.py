@@ -16,8 +16,8 @@ from small_processes import PATIENCE
 
 pytestmark = pytest.mark.slow
 
-READY = {
-    ('quad_sim', 'fake_xgo'): 'fake_xgo: lite at {--link} -> /dev/pts/7',
+LINES = {
+    ('quad_sim', 'fake_xgo'): '[INFO] [fake_xgo]: lite at {--link} -> /dev/pts/7',
     ('quad_hardware', 'hardware_node'): '[INFO] [hardware_node]: running: {port}',
     ('quad_controller', 'controller_node'): '[INFO] [controller_node]: ready: joints known',
     ('robot_viewer', 'robot_state_publisher'): '[INFO] [publisher]: Robot initialized',
@@ -37,7 +37,7 @@ def workspace(tmp_path: Path, isolation: Isolation) -> SmallWorkspace:
     """Install the small programs, in a ROS domain that nobody else is in."""
     libraries = ('libraries/process_supervisor', 'libraries/dds_network')
     sources = ('quad_bringup', 'quad_description', *libraries)
-    workspace = SmallWorkspace(tmp_path, 'quad_bringup', READY, sources)
+    workspace = SmallWorkspace(tmp_path, 'quad_bringup', LINES, sources)
     workspace.environment['ROS_DOMAIN_ID'] = str(isolation.domain_id)
     workspace.setup = LIES
     return workspace
@@ -75,7 +75,7 @@ def test_a_process_that_dies_ends_it_with_its_last_words(
     workspace: SmallWorkspace, process: str
 ) -> None:
     """The exit code is 1, the reason is in the last lines."""
-    package, name = next(key for key in READY if key[1] == f'{process}_node')
+    package, name = next(key for key in LINES if key[1] == f'{process}_node')
     workspace.install(package, name, then="print('[FATAL] [node]: no way'); sys.exit(3)")
     code, output = workspace.run('--simulate')
     assert code == 1

@@ -26,15 +26,17 @@ def run(argv: Sequence[str] | None = None) -> int:
     try:
         simulation = build(options)
         with PseudoTerminal(options.link) as terminal:
+            description = _describe(options, terminal)
             server = Server(simulation.plant, simulation.line, terminal)
             with _stopped_by_signals(server):
                 if options.no_ros:
-                    _announce(options, terminal)
+                    sys.stdout.write(f'fake_xgo: {description}\n')
+                    sys.stdout.flush()
                     server.run()
                 else:
                     from .fake_xgo_node import serve_with_ros
 
-                    serve_with_ros(server, simulation, ros, lambda: _announce(options, terminal))
+                    serve_with_ros(server, simulation, ros, description)
             server.close()
     except SimulationError as error:
         sys.stderr.write(f'fake_xgo: {error}\n')
@@ -79,14 +81,11 @@ def _stopped_by_signals(server: Server) -> Iterator[None]:
             signal.signal(number, handler)
 
 
-def _announce(options: argparse.Namespace, terminal: PseudoTerminal) -> None:
+def _describe(options: argparse.Namespace, terminal: PseudoTerminal) -> str:
     robot = f'{options.preset}{" with arm" if options.arm else ""}'
     physics = 'in the air' if options.physics == 'none' else f'servos {options.servo}'
-    sys.stdout.write(
-        f'fake_xgo: {robot} ({physics}) at {terminal.link} -> {terminal.device}, '
-        f'protocol {options.protocol}\n'
-    )
-    sys.stdout.flush()
+    place = f'{terminal.link} -> {terminal.device}'
+    return f'{robot} ({physics}) at {place}, protocol {options.protocol}'
 
 
 if __name__ == '__main__':

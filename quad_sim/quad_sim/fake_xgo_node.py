@@ -18,7 +18,7 @@ from rclpy.node import Node
 from rclpy.utilities import ok, try_shutdown
 from std_srvs.srv import Trigger
 
-from node_runner import init_ros, make_executor
+from node_runner import init_ros, make_executor, notify_ready
 from quad_msgs.srv import InjectFault, Push
 
 from .board.board import POSE_TIME
@@ -124,7 +124,7 @@ def serve_with_ros(
     server: Server,
     simulation: Simulation,
     ros_arguments: Sequence[str],
-    announce: Callable[[], None],
+    description: str,
 ) -> None:
     """Run the robot in a thread and its node in this one, until one of them ends.
 
@@ -132,7 +132,7 @@ def serve_with_ros(
         server: The loop in which the robot lives.
         simulation: The robot.
         ros_arguments: For rclpy.
-        announce: Called when the services are there.
+        description: What is simulated, and where; logged when the services are there.
 
     Raises:
         SimulationError: What ended the robot.
@@ -147,7 +147,8 @@ def serve_with_ros(
     sys.setswitchinterval(SWITCH_INTERVAL)
     gc.freeze()  # what is there now is there to stay, and need not be looked through
     thread.start()
-    announce()
+    node.get_logger().info(description)
+    notify_ready()
     try:
         while ok() and thread.is_alive():
             executor.spin_once(timeout_sec=0.2)

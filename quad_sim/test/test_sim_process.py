@@ -29,7 +29,6 @@ from quad_sim.fake_xgo import run, split_ros_arguments
 
 PACKAGE = Path(__file__).parents[1]
 VERSION = Frame(Kind.READ, Code.VERSION)
-READY = 'fake_xgo: '
 
 
 @contextmanager
@@ -47,8 +46,9 @@ def fake_xgo(
         text=True,
     )
     try:
-        assert process.stdout is not None
-        assert process.stdout.readline().startswith(READY)
+        said = process.stdout if '--no-ros' in arguments else process.stderr
+        assert said is not None
+        assert any(f'{link} -> ' in line for line in said)
         yield process
     finally:
         if process.poll() is None:

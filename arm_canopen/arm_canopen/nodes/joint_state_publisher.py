@@ -15,7 +15,13 @@ from rclpy.time import Time
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
-from node_runner import destroyed_when_refused, ParameterReader, refuse_misspelt, run_node
+from node_runner import (
+    destroyed_when_refused,
+    notify_ready,
+    ParameterReader,
+    refuse_misspelt,
+    run_node,
+)
 
 from ..exceptions import CanopenError
 from ..joints.aggregator import JointAggregator, JointSample, JointSet
@@ -70,6 +76,7 @@ class JointStatePublisher(Node):
         self.create_timer(WATCH_PERIOD, self._watch)
         names = ', '.join(joint.name for joint in joints)
         self.get_logger().info(f'publishing {len(joints)} joints: {names}')
+        notify_ready()
 
     def _listen_to(self, joint: str) -> None:
         topic = f'{joint}/joint_states'

@@ -14,7 +14,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.node import Node
 from rclpy.time import Time
 
-from node_runner import raise_thread_priority
+from node_runner import notify_ready, raise_thread_priority
 
 from ..can.bus import Bus
 from ..can.frame import Frame
@@ -289,6 +289,7 @@ class MasterProcess:
                 count = len(self.bus.nodes)
                 text = f'all {count} devices operational'
                 self._output.post(lambda: self._node.get_logger().info(text) and None)
+                notify_ready()
 
     def _ask_diagnostics(self) -> Future[list[DiagnosticStatus]]:
         future = self._thread.call(self._collect)

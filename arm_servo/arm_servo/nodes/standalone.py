@@ -18,6 +18,7 @@ from arm_model import ArmError, RobotModel
 from node_runner import (
     declare_thread_priority,
     LINGER,
+    notify_ready,
     ParameterReader,
     raise_thread_priority,
     run_program,
@@ -169,6 +170,7 @@ def _serve(build: Callable[[MakeNode], MotionThread], stop: threading.Event) -> 
         thread.start(failed=stop.set)
         stack.callback(thread.stop)
         nodes[0].get_logger().info('ready for commands')
+        notify_ready()
         spin(nodes, stop)
         thread.end()
         spin(nodes, thread.ended, linger=LINGER)  # goals get their results

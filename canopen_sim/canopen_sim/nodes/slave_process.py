@@ -16,6 +16,7 @@ from arm_canopen.exceptions import CanopenError
 from node_runner import (
     declare_thread_priority,
     log_as,
+    notify_ready,
     ParameterReader,
     raise_thread_priority,
     refuse_misspelt,
@@ -109,6 +110,7 @@ def _run(node: Node, populate: Populate, default_bus: str, stop: threading.Event
         )
         try:
             node.get_logger().info(f'{population.what} on {bus.name}')
+            notify_ready()
             spin([node], stop)
         finally:
             runner.stop()

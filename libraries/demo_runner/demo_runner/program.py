@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 import os
-import re
 import sys
 import threading
 from typing import Any
@@ -67,9 +66,10 @@ def run_demo(
     setting = Setting(view, figures, second_terminal(commands), painter)
     display = choose_display(setting, Console(), write)
     scenario = make_scenario(display)
-    line = without_readiness(processes, display.line)
     try:
-        with Runner(processes, line, display.notice, on_interrupt=scenario.leave) as runner:
+        with Runner(
+            processes, display.line, display.notice, on_interrupt=scenario.leave
+        ) as runner:
             thread = threading.Thread(
                 target=scenario.run, args=[runner, make_client], name='scenario'
             )
@@ -80,24 +80,6 @@ def run_demo(
         display.close()
     with_summary = not (endless and isinstance(display, TableDisplay))
     return conclude(write, scenario, outcome, with_summary=with_summary)
-
-
-def without_readiness(
-    processes: Sequence[ProcessSpec], take: Callable[[str, str], None]
-) -> Callable[[str, str], None]:
-    """Leave out the lines by which processes say that they are ready: the supervisor says so.
-
-    Args:
-        processes: What runs.
-        take: Takes all other lines, with the name of the process first.
-    """
-    ready = {spec.name: re.compile(spec.ready) for spec in processes if spec.ready}
-
-    def line(name: str, text: str) -> None:
-        if name not in ready or not ready[name].search(text):
-            take(name, text)
-
-    return line
 
 
 def conclude(

@@ -73,7 +73,7 @@ def dance(scenario: type[Dance]) -> int:
     """Run a demo with one process."""
     Client.closed = False
     return run_demo(
-        [program('good', ready='^ready')],
+        [program('good', notifies_ready=True)],
         view=View(),
         figures='nothing yet',
         commands=['ros2 topic list'],
@@ -84,14 +84,13 @@ def dance(scenario: type[Dance]) -> int:
 
 
 def test_a_demo_ends_with_its_summary_and_0(capsys: pytest.CaptureFixture[str]) -> None:
-    """Phases, the end of the process, summary and warnings are told; readiness only once."""
+    """Phases, the end of the process, summary and warnings are told."""
     assert dance(Dance) == 0
     out = capsys.readouterr().out
     assert Client.closed
     places = [out.index(words) for words in ('starting', 'dancing', 'stopping', 'danced 3 s')]
     assert places == sorted(places)
     assert out.endswith('danced 3 s\nwarning: the floor is wet\n')
-    assert '| ready ' not in out
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ from .log_bridge import log_as, RosLogBridge
 from .misspelt import refuse_misspelt, refuse_similar
 from .parameter_reader import ParameterReader
 from .program import run_node, run_program
+from .readiness import notify_ready
 from .realtime import declare_thread_priority, raise_thread_priority, settle_process_memory
 from .signals import stop_on_signals
 from .spinning import LINGER, make_executor, spin, WAKE_PERIOD
@@ -25,6 +26,7 @@ __all__ = [
     'init_ros',
     'log_as',
     'make_executor',
+    'notify_ready',
     'raise_thread_priority',
     'refuse_misspelt',
     'refuse_similar',

@@ -21,6 +21,7 @@ from typing import final
 from .exceptions import StartError
 from .guardian import GuardianLink
 from .lines import LineSplitter
+from .readiness import ReadinessSocket, VARIABLE
 from .spec import ProcessSpec
 from .supervision import Notice, Outcome, Phase, Supervision
 
@@ -38,16 +39,23 @@ class _Child:
     """A running process with its pipe and the handle that tells its end."""
 
     def __init__(self, spec: ProcessSpec) -> None:
+        self.readiness = ReadinessSocket() if spec.notifies_ready else None
+        environment = {**os.environ, **spec.environment}
+        environment.pop(VARIABLE, None)  # this process may have a supervisor itself
+        if self.readiness is not None:
+            environment[VARIABLE] = self.readiness.address
         try:
             self.process = subprocess.Popen(
                 spec.argv,
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.STDOUT,
-                env={**os.environ, **spec.environment},
+                env=environment,
                 start_new_session=True,  # Ctrl-C of the terminal reaches the supervisor only
             )
         except OSError as error:
+            if self.readiness is not None:
+                self.readiness.close()
             raise StartError(f'{spec.argv[0]}: {error.strerror}') from error
         self.name = spec.name
         self.pidfd = os.pidfd_open(self.process.pid)
@@ -70,6 +78,8 @@ class _Child:
         self.send(signal.SIGKILL)
         returncode = self.process.wait()
         os.close(self.pidfd)
+        if self.readiness is not None:
+            self.readiness.close()
         if self.process.stdout is not None:
             self.process.stdout.close()
         return returncode
@@ -189,10 +199,19 @@ class Runner:
             self._guardian.watch(spec.name, child.process.pid, spec.stop_order, steps)
         self._children[spec.name] = child
         self._selector.register(child.output, selectors.EVENT_READ, lambda: self._read(child))
+        if child.readiness is not None:
+            self._selector.register(
+                child.readiness, selectors.EVENT_READ, lambda: self._check_ready(child)
+            )
         self._selector.register(child.pidfd, selectors.EVENT_READ, lambda: self._ended(child))
 
     def _send(self, name: str, number: signal.Signals) -> None:
         self._children[name].send(number)
+
+    def _check_ready(self, child: _Child) -> None:
+        if child.readiness is not None and child.readiness.is_ready():
+            self._drain(child)  # what it wrote before that comes first
+            self._supervision.ready(child.name, time.monotonic())
 
     def _read(self, child: _Child) -> bool:
         """Read once; false when there is nothing (more) to read."""
@@ -206,10 +225,16 @@ class Runner:
         self._pass_on(child.name, child.splitter.feed(data))
         return True
 
-    def _ended(self, child: _Child) -> None:
+    def _drain(self, child: _Child) -> None:
         for _ in range(LAST_CHUNKS):
             if child.output not in self._selector.get_map() or not self._read(child):
                 break
+
+    def _ended(self, child: _Child) -> None:
+        if child.readiness is not None:
+            self._check_ready(child)
+            self._selector.unregister(child.readiness)
+        self._drain(child)
         if child.output in self._selector.get_map():
             self._selector.unregister(child.output)
         self._selector.unregister(child.pidfd)
@@ -222,7 +247,7 @@ class Runner:
     def _pass_on(self, name: str, lines: Iterable[str]) -> None:
         for line in lines:
             self._write(name, line)
-            self._supervision.line(name, line, time.monotonic())
+            self._supervision.line(name, line)
 
     def _wake(self) -> None:
         numbers = self._wake_read.recv(256)

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-import re
 from signal import Signals
 
 
@@ -42,8 +41,8 @@ class ProcessSpec:
         name: Short name, unique in its bring-up; the prefix of its output.
         argv: Program and arguments.
         environment: Variables that it gets beside those of the supervisor.
-        ready: Regular expression; the process is ready when a line of its output contains it.
-            None: it is ready when it is started.
+        notifies_ready: It reports ``READY=1`` at the socket that ``NOTIFY_SOCKET`` names, as in
+            sd_notify(3), when it is ready. Otherwise it is ready when it is started.
         ready_timeout: How long it may take to be ready in [s]; infinite for no limit.
         required: The whole bring-up ends when this process ends.
         stop_order: Those with a lower number are stopped, and gone, before those with a
@@ -54,7 +53,7 @@ class ProcessSpec:
     name: str
     argv: tuple[str, ...]
     environment: Mapping[str, str] = field(default_factory=dict)
-    ready: str | None = None
+    notifies_ready: bool = False
     ready_timeout: float = 30.0
     required: bool = True
     stop_order: int = 0
@@ -64,14 +63,9 @@ class ProcessSpec:
         """Refuse what would only fail later.
 
         Raises:
-            ValueError: Empty argv or steps, or ``ready`` is no regular expression.
+            ValueError: Empty argv or steps.
         """
         if not self.argv:
             raise ValueError(f'process {self.name}: argv is empty')
         if not self.stop_steps:
             raise ValueError(f'process {self.name}: it needs at least one stop step')
-        if self.ready is not None:
-            try:
-                re.compile(self.ready)
-            except re.error as error:
-                raise ValueError(f'process {self.name}: ready {self.ready!r}: {error}') from None

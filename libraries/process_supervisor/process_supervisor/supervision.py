@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from enum import Enum
 import math
-import re
 from signal import Signals
 
 from .exceptions import StartError
@@ -154,20 +153,27 @@ class Supervision:
                 self._fail(name, f'{name} cannot be started: {error}', now)
                 return
             child.running = True
-            child.ready = child.spec.ready is None
+            child.ready = not child.spec.notifies_ready
         self._check_ready(now)
 
-    def line(self, name: str, text: str, now: float) -> None:
+    def line(self, name: str, text: str) -> None:
         """Take in a line of output.
 
         Args:
             name: The process that wrote it.
             text: The line, without its end.
+        """
+        self._children[name].lines.append(text)
+
+    def ready(self, name: str, now: float) -> None:
+        """Take in that a process is ready.
+
+        Args:
+            name: The process that reported it.
             now: Steady time in [s].
         """
         child = self._children[name]
-        child.lines.append(text)
-        if child.ready or child.spec.ready is None or not re.search(child.spec.ready, text):
+        if child.ready:
             return
         child.ready = True
         if self.phase is Phase.STARTING:
@@ -262,8 +268,8 @@ class Supervision:
         for name in self.waiting:
             child = self._children[name]
             if now >= child.deadline:
-                what = f'no line with {child.spec.ready!r} within {child.spec.ready_timeout:g} s'
-                self._fail(name, f'{name} did not get ready: {what}', now)
+                limit = f'{child.spec.ready_timeout:g} s'
+                self._fail(name, f'{name} did not get ready within {limit}', now)
                 return
 
     def _advance_stop(self, now: float) -> None:

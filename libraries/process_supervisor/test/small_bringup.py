@@ -11,27 +11,29 @@ from pathlib import Path
 import subprocess
 import sys
 
-from small_processes import PATIENCE
+from small_processes import NOTIFY, PATIENCE
 
 SOURCES = Path(__file__).parents[3]
 """The checkout."""
 
 PROGRAM = """#!{python} -IS
 import os, signal, sys
+{notify}
 def leave(number, frame):
     os.write(1, b'bye\\n')
     os._exit(0)
 signal.signal(signal.SIGTERM, leave)
 arguments = dict(word.split(':=', 1) for word in sys.argv if ':=' in word)
 arguments |= {{word: after for word, after in zip(sys.argv, sys.argv[1:])}}
-print({ready!r}.format_map(arguments), flush=True)
+print({line!r}.format_map(arguments), flush=True)
+if {ready}: notify()
 {then}
 while True: signal.pause()
 """
 
 
 class SmallWorkspace:
-    """Installed packages whose programs only say that they are ready.
+    """Installed packages whose programs only report that they are ready.
 
     Attributes:
         folder: Where they are installed; the bring-up has its temporary files there, too.
@@ -45,7 +47,7 @@ class SmallWorkspace:
         self,
         folder: Path,
         package: str,
-        ready: Mapping[tuple[str, str], str],
+        lines: Mapping[tuple[str, str], str],
         sources: Sequence[str],
         prefixes: Sequence[Path] = (),
     ) -> None:
@@ -54,14 +56,14 @@ class SmallWorkspace:
         Args:
             folder: An empty folder.
             package: Whose bring-up it is.
-            ready: For each package and program the line by which it says that it is ready, with
-                ``{port}`` for its parameter and ``{--link}`` for what follows that option.
+            lines: What each program of a package writes, with ``{port}`` for its parameter and
+                ``{--link}`` for what follows that option.
             sources: Packages whose source is used.
             prefixes: Of packages that are installed elsewhere.
         """
         self.folder = folder
-        self._package, self._ready = package, ready
-        for of, name in ready:
+        self._package, self._lines = package, lines
+        for of, name in lines:
             self.install(of, name)
         self.environment = {
             **os.environ,
@@ -70,14 +72,23 @@ class SmallWorkspace:
             'TMPDIR': str(folder),
         }
 
-    def install(self, package: str, name: str, then: str = '', ready: str | None = None) -> None:
+    def install(
+        self,
+        package: str,
+        name: str,
+        then: str = '',
+        line: str | None = None,
+        *,
+        ready: bool = True,
+    ) -> None:
         """Install a program.
 
         Args:
             package: Whose it is.
             name: What it is called.
-            then: A statement that it runs after it has said that it is ready.
-            ready: What it says; None takes the usual line.
+            then: A statement that it runs after that.
+            line: What it writes; None takes the usual line.
+            ready: It reports that it is ready.
         """
         prefix = self.folder / 'prefix'
         marker = prefix / 'share' / 'ament_index' / 'resource_index' / 'packages' / package
@@ -85,8 +96,10 @@ class SmallWorkspace:
         for path in (marker, file):
             path.parent.mkdir(parents=True, exist_ok=True)
         marker.touch()
-        line = self._ready[package, name] if ready is None else ready
-        file.write_text(PROGRAM.format(python=sys.executable, ready=line, then=then))
+        line = self._lines[package, name] if line is None else line
+        file.write_text(
+            PROGRAM.format(python=sys.executable, notify=NOTIFY, line=line, ready=ready, then=then)
+        )
         file.chmod(0o755)
 
     @contextlib.contextmanager

@@ -22,7 +22,22 @@ QUICK = tuple(
 )
 """A ladder with little patience, for processes that do not hear."""
 
+NOTIFY = """
+def notify():
+    import socket
+    if 'NOTIFY_SOCKET' not in os.environ:
+        return
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as supervisor:
+        supervisor.sendto(b'READY=1', '\\0' + os.environ['NOTIFY_SOCKET'][1:])
+"""
+"""Reports that a process is ready, as node_runner does."""
+
 PROGRAMS = {
+    # never says that it is ready
+    'silent': """
+        print('waiting', flush=True)
+        while True: signal.pause()
+    """,
     # says ready, and good-bye when it is stopped
     'good': """
         def leave(number, frame):
@@ -31,12 +46,14 @@ PROGRAMS = {
         signal.signal(signal.SIGINT, leave)
         signal.signal(signal.SIGTERM, leave)
         print('ready', os.getpid(), os.getsid(0), flush=True)
+        notify()
         while True: signal.pause()
     """,
     'deaf': """
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         signal.signal(signal.SIGTERM, signal.SIG_IGN)
         print('ready', os.getpid(), flush=True)
+        notify()
         while True: signal.pause()
     """,
     'dies': """
@@ -51,6 +68,7 @@ PROGRAMS = {
     'floods': """
         for i in range(50000): print('line', i)
         print('ready', flush=True)
+        notify()
         signal.pause()
     """,
     # leaves a child behind in its process group
@@ -67,7 +85,7 @@ PROGRAMS = {
 def program(kind: str, name: str = '', **options: object) -> ProcessSpec:
     """Describe one of the programs, named after its kind or otherwise."""
     lines = PROGRAMS[kind].strip('\n').split('\n')
-    code = 'import os, signal, sys\n' + '\n'.join(line[8:] for line in lines)
+    code = f'import os, signal, sys\n{NOTIFY}' + '\n'.join(line[8:] for line in lines)
     # isolated and without site: it starts in milliseconds
     argv = (sys.executable, '-I', '-S', '-c', code)
     values: dict[str, object] = {'stop_steps': QUICK, 'ready_timeout': PATIENCE, **options}

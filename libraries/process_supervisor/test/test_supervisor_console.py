@@ -26,7 +26,7 @@ def run_until(
     capsys: pytest.CaptureFixture[str], *kinds: str, farewell: Farewell | None
 ) -> tuple[Outcome, list[str]]:
     """Run small processes; they say good-bye by themselves when they are stopped."""
-    outcome = supervise([program(kind, ready='ready') for kind in kinds], farewell=farewell)
+    outcome = supervise([program(kind, notifies_ready=True) for kind in kinds], farewell=farewell)
     return outcome, capsys.readouterr().out.splitlines()
 
 
@@ -109,7 +109,7 @@ def test_without_readiness_there_is_no_farewell(
         say('never')
 
     CtrlC(monkeypatch, 'good is ready')
-    specs = [program('good', ready='ready'), program('good', 'slow', ready='never said')]
+    specs = [program('good', notifies_ready=True), program('silent', notifies_ready=True)]
     outcome = supervise(specs, farewell=farewell)
     assert outcome.exit_code == 0
     assert 'never\n' not in capsys.readouterr().out

@@ -57,8 +57,8 @@ def nothing(_: Runner) -> None:
 def test_ctrl_c_stops_in_order_and_exits_0() -> None:
     """The lower stop order says good-bye first, whatever the order of starting."""
     watch = Watch(
-        program('good', 'slaves', ready='ready', stop_order=2),
-        program('good', 'master', ready='ready', stop_order=0),
+        program('good', 'slaves', notifies_ready=True, stop_order=2),
+        program('good', 'master', notifies_ready=True, stop_order=0),
         when_ready=ctrl_c,
     )
     assert watch.run() == Outcome(0, 'stopped by the user')
@@ -68,7 +68,7 @@ def test_ctrl_c_stops_in_order_and_exits_0() -> None:
 
 def test_each_process_has_a_session_of_its_own() -> None:
     """So Ctrl-C in the terminal reaches the supervisor only."""
-    watch = Watch(program('good', ready='ready'), when_ready=ctrl_c)
+    watch = Watch(program('good', notifies_ready=True), when_ready=ctrl_c)
     watch.run()
     _, pid, session = watch.said('good')[0].split()
     assert pid == session != str(os.getsid(0))
@@ -77,14 +77,14 @@ def test_each_process_has_a_session_of_its_own() -> None:
 def test_signal_handlers_are_given_back() -> None:
     """After a bring-up, Ctrl-C means what it meant before."""
     before = [signal.getsignal(number) for number in LEAVE_SIGNALS]
-    Watch(program('good', ready='ready'), when_ready=ctrl_c).run()
+    Watch(program('good', notifies_ready=True), when_ready=ctrl_c).run()
     assert [signal.getsignal(number) for number in LEAVE_SIGNALS] == before
     assert signal.set_wakeup_fd(-1) == -1
 
 
 def test_a_process_that_dies_early_ends_all_and_is_quoted() -> None:
     """Standard error belongs to what it wrote last."""
-    watch = Watch(program('good'), program('dies', ready='ready'), when_ready=nothing)
+    watch = Watch(program('good'), program('dies', notifies_ready=True), when_ready=nothing)
     outcome = watch.run()
     assert outcome.exit_code == 1
     assert outcome.reason == 'dies ended with exit code 7 before it was ready'
@@ -93,23 +93,25 @@ def test_a_process_that_dies_early_ends_all_and_is_quoted() -> None:
 
 def test_a_deaf_process_is_killed_and_that_is_no_success() -> None:
     """The ladder ends with SIGKILL; the exit code says that it was needed."""
-    outcome = Watch(program('deaf', ready='ready'), when_ready=ctrl_c).run()
+    outcome = Watch(program('deaf', notifies_ready=True), when_ready=ctrl_c).run()
     assert outcome.exit_code == 1
     assert outcome.reason == 'deaf had to be killed'
 
 
 def test_not_ready_in_time_ends_all() -> None:
     """The reason names what was waited for."""
-    late = program('good', ready='never said', ready_timeout=0.2)
+    late = program('silent', notifies_ready=True, ready_timeout=0.2)
     outcome = Watch(late, when_ready=nothing).run()
     assert outcome.exit_code == 1
-    assert 'never said' in outcome.reason
+    assert outcome.reason == 'silent did not get ready within 0.2 s'
 
 
 def test_a_flood_of_output_loses_nothing_and_starves_nobody() -> None:
     """All lines arrive in order, and another process gets ready beside it."""
     watch = Watch(
-        program('floods', ready='ready'), program('good', ready='ready'), when_ready=ctrl_c
+        program('floods', notifies_ready=True),
+        program('good', notifies_ready=True),
+        when_ready=ctrl_c,
     )
     assert watch.run().exit_code == 0
     assert watch.said('floods')[:50000] == [f'line {i}' for i in range(50000)]
@@ -132,7 +134,7 @@ def test_what_a_process_leaves_behind_is_killed() -> None:
 def test_a_missing_executable_is_a_failure_with_its_name() -> None:
     """What was started before it is stopped."""
     missing = ProcessSpec('master', ('/no/such/master',))
-    watch = Watch(program('good', ready='ready'), missing, when_ready=nothing)
+    watch = Watch(program('good', notifies_ready=True), missing, when_ready=nothing)
     outcome = watch.run()
     assert outcome.exit_code == 1
     assert '/no/such/master' in outcome.reason
@@ -146,7 +148,9 @@ def test_stop_works_from_another_thread() -> None:
     def stop(runner: Runner) -> None:
         threading.Thread(target=runner.stop, args=[Outcome(3, 'enough')]).start()
 
-    assert Watch(program('good', ready='ready'), when_ready=stop).run() == Outcome(3, 'enough')
+    assert Watch(program('good', notifies_ready=True), when_ready=stop).run() == Outcome(
+        3, 'enough'
+    )
 
 
 def test_the_first_ctrl_c_can_be_taken_over() -> None:
@@ -160,7 +164,7 @@ def test_the_first_ctrl_c_can_be_taken_over() -> None:
         runner.stop(Outcome(3, 'taken over'))
         return True
 
-    specs = [program('good', ready='ready')]
+    specs = [program('good', notifies_ready=True)]
     with Runner(specs, lambda *_: None, notify, on_interrupt=take) as runner:
         assert runner.run() == Outcome(3, 'taken over')
 
@@ -174,7 +178,7 @@ def test_an_error_in_the_supervisor_stops_its_processes() -> None:
             pids.append(int(line.split()[1]))
             raise RuntimeError('broken')
 
-    runner = Runner([program('good', ready='ready')], write, lambda _: None)
+    runner = Runner([program('good', notifies_ready=True)], write, lambda _: None)
     with pytest.raises(RuntimeError, match='broken'), runner:
         runner.run()
     assert len(pids) == 1
@@ -189,7 +193,7 @@ def test_a_killed_guardian_is_no_reason_to_end() -> None:
         os.kill(runner._guardian.pid, signal.SIGKILL)
         ctrl_c(runner)
 
-    watch = Watch(program('good', ready='ready'), when_ready=kill)
+    watch = Watch(program('good', notifies_ready=True), when_ready=kill)
     assert watch.run().exit_code == 0
 
 
@@ -198,8 +202,8 @@ SUPERVISOR = textwrap.dedent("""
     from process_supervisor import Runner
     from small_processes import program
     specs = [
-        program('deaf', 'slaves', ready='ready', stop_order=2),
-        program('good', 'master', ready='ready', stop_order=0),
+        program('deaf', 'slaves', notifies_ready=True, stop_order=2),
+        program('good', 'master', notifies_ready=True, stop_order=0),
     ]
     def write(name, line):
         print(name, line, flush=True)

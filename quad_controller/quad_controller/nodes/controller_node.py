@@ -25,6 +25,7 @@ from std_srvs.srv import Trigger
 
 from node_runner import (
     destroyed_when_refused,
+    notify_ready,
     raise_thread_priority,
     run_program,
     settle_process_memory,
@@ -264,6 +265,7 @@ class ControllerNode(Node):
         if output.ready and not self._ready:
             self._ready = True
             logger.info('ready: joints and attitude are known; set_mode makes the robot move')
+            notify_ready()
         for event in output.events:
             if event.kind is EventKind.REPEATED:
                 logger.warning(event.text, throttle_duration_sec=WARN_PERIOD)

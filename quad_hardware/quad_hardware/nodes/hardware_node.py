@@ -22,6 +22,7 @@ from tf2_msgs.msg import TFMessage
 
 from node_runner import (
     destroyed_when_refused,
+    notify_ready,
     raise_thread_priority,
     run_program,
     settle_process_memory,
@@ -167,7 +168,9 @@ class HardwareNode(Node):
 
     def _link_changed(self, state: LinkState, detail: str) -> None:
         """Say how the link is; runs in the thread of the driver."""
-        if state is not LinkState.RUNNING:
+        if state is LinkState.RUNNING:
+            notify_ready()
+        else:
             self._latest = None  # the robot may be moved while nobody sees it
             self._commander.lose()
         if state in {LinkState.REFUSED, LinkState.FAILED}:

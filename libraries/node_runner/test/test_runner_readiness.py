@@ -1,0 +1,37 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What a process tells whoever started it."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+import socket
+
+import pytest
+
+from node_runner import notify_ready
+
+
+@pytest.mark.parametrize('abstract', [True, False])
+def test_readiness_is_reported_once(
+    abstract: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """To a socket with a file or without one; programs that this one starts are not asked."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK) as supervisor:
+        supervisor.bind('' if abstract else str(tmp_path / 'notify'))
+        name = supervisor.getsockname()
+        monkeypatch.setenv('NOTIFY_SOCKET', f'@{name[1:].decode()}' if abstract else name)
+        notify_ready()
+        notify_ready()
+        assert supervisor.recv(100) == b'READY=1'
+        with pytest.raises(BlockingIOError):
+            supervisor.recv(100)
+        assert 'NOTIFY_SOCKET' not in os.environ
+
+
+@pytest.mark.parametrize('address', ['', '@nobody', '/nowhere/notify'])
+def test_nobody_to_tell_is_no_error(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A node that was started by hand, and one whose supervisor has ended."""
+    monkeypatch.setenv('NOTIFY_SOCKET', address)
+    notify_ready()

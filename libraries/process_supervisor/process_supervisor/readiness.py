@@ -1,0 +1,44 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Where a process reports that it is ready: the socket of sd_notify(3)."""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+
+VARIABLE = 'NOTIFY_SOCKET'
+"""Names the socket in the environment of the process."""
+_READY = b'READY=1'
+_MAX_MESSAGE = 4096
+
+
+class ReadinessSocket:
+    """Receives what one process reports; others of systemd's messages are passed over."""
+
+    def __init__(self) -> None:
+        """Open it."""
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK)
+        self._socket.bind('')  # the kernel chooses a free name in the abstract namespace
+
+    @property
+    def address(self) -> str:
+        """What the variable names."""
+        name: bytes = self._socket.getsockname()
+        return f'@{name[1:].decode()}'
+
+    def fileno(self) -> int:
+        """Its file descriptor, for a selector."""
+        return self._socket.fileno()
+
+    def is_ready(self) -> bool:
+        """Receive what has come; true when readiness was in it."""
+        ready = False
+        with contextlib.suppress(BlockingIOError):
+            while True:
+                ready |= _READY in self._socket.recv(_MAX_MESSAGE).splitlines()
+        return ready
+
+    def close(self) -> None:
+        """Close it."""
+        self._socket.close()
