@@ -1,32 +1,32 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What the objects of a device should hold by the files: what bus.yml asks for, or defaults."""
+"""What the objects of a device should hold by the files: identity, boot plan, or defaults."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
-from arm_canopen.config.boot_plan import boot_writes, BootWrite, final_values
+from arm_canopen.config.boot_plan import BootWrite, held_after_boot
 from arm_canopen.config.model import BusConfig, NodeConfig
-from arm_canopen.config.pdo_direction import RPDO, TPDO
 from arm_canopen.exceptions import CodecError
 from arm_canopen.standard.datatypes import DataType, encode
 from arm_canopen.standard.dictionary import ObjectDictionary
-from arm_canopen.standard.objects import Index
 
-IDENTITY_SUBINDICES = (
-    ('vendor_id', 1),
-    ('product_code', 2),
-    ('revision_number', 3),
-    ('serial_number', 4),
-)
+FROM_EDS = ('device_type', 'vendor_id', 'product_code')
+"""What the EDS says of the identity; the rest is in bus.yml."""
 
 
-def expected_objects(config: BusConfig, node: NodeConfig) -> list[BootWrite]:
-    """Return everything that bus.yml decides of a device: its identity, and what boot writes."""
-    return final_values(
-        [*_identity(node), *_fixed_mappings(node), *boot_writes(config, node)],
-    )
+def expected_objects(
+    config: BusConfig, node: NodeConfig, consumers: Mapping[int, int] | None = None
+) -> list[BootWrite]:
+    """Return everything that bus.yml decides of a device: its identity, and what boot leaves.
+
+    Args:
+        config: The bus.
+        node: The device.
+        consumers: What the device has in 0x1016, by sub-index; None: what its EDS says.
+    """
+    return [*_identity(node), *held_after_boot(config, node, consumers)]
 
 
 def expected_defaults(dictionary: ObjectDictionary) -> list[BootWrite]:
@@ -46,25 +46,6 @@ def _defaults(dictionary: ObjectDictionary) -> Iterator[BootWrite]:
 
 
 def _identity(node: NodeConfig) -> Iterator[BootWrite]:
-    if node.identity.device_type:
-        yield _number(Index.DEVICE_TYPE, 0, node.identity.device_type, DataType.UNSIGNED32, 'EDS')
-    for attribute, subindex in IDENTITY_SUBINDICES:
-        value = getattr(node.identity, attribute)
-        if value:
-            key = 'EDS' if subindex <= 2 else attribute
-            yield _number(Index.IDENTITY, subindex, value, DataType.UNSIGNED32, key)
-
-
-def _fixed_mappings(node: NodeConfig) -> Iterator[BootWrite]:
-    """Return the mappings that a device has for ever, which are not written."""
-    for direction, pdos in ((RPDO, node.rpdos), (TPDO, node.tpdos)):
-        for pdo in pdos:
-            if pdo.configured and pdo.enabled and pdo.fixed_mapping:
-                index, key = direction.mapping + pdo.number - 1, f'{direction.name}.{pdo.number}'
-                yield _number(index, 0, len(pdo.mapping), DataType.UNSIGNED8, key)
-                for subindex, mapped in enumerate(pdo.mapping, start=1):
-                    yield _number(index, subindex, mapped.word, DataType.UNSIGNED32, key)
-
-
-def _number(index: int, subindex: int, value: int, data_type: DataType, key: str) -> BootWrite:
-    return BootWrite(index, subindex, encode(data_type, value), key)
+    for attribute, index, subindex, value in node.identity.objects:
+        key = 'EDS' if attribute in FROM_EDS else attribute
+        yield BootWrite(index, subindex, encode(DataType.UNSIGNED32, value), key)

@@ -138,9 +138,8 @@ class ObservedDrive:
     @property
     def homing_at_init(self) -> int:
         """Homing method that bus.yml writes to 0x6098; 0 where it asks for no homing."""
-        index = self.objects.at(Index.HOMING_METHOD)
-        written = [w.data for w in self.node.config.sdo_writes if w.index == index]
-        return int.from_bytes(written[-1], 'little', signed=True) if written else 0
+        write = self.node.config.write_of(self.objects.at(Index.HOMING_METHOD), 0)
+        return int.from_bytes(write.data, 'little', signed=True) if write is not None else 0
 
     def describe(self) -> str:
         """Say in a sentence how the drive is."""

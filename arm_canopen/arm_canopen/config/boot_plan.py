@@ -1,6 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What is written to a device at boot, once: boot downloads it, diff compares it, DCFs hold it."""
+"""What is written to a device at boot, and what it holds then: the one list of all that need it.
+
+Boot downloads :func:`boot_writes`, and a DCF holds them; take-over and ``canopen diff`` compare
+:func:`held_after_boot`.
+"""
 
 from __future__ import annotations
 
@@ -71,6 +75,12 @@ class BootWrite:
         is_timer = 0 <= number < PDO_COUNT_MAX and self.subindex == EVENT_TIMER_SUBINDEX
         return is_timer and not self.requested
 
+    def text(self, held: bytes | None = None) -> str:
+        """Write the bits that count as a hexadecimal number: its own, or those of a device."""
+        data = self.data if held is None else held
+        value = int.from_bytes(data, 'little') & (self.mask if self.mask is not None else -1)
+        return f'0x{value:0{2 * len(self.data)}X}'
+
     def over(self, present: int) -> bytes:
         """Return the data with the bits that do not count as they are in a present value."""
         if self.mask is None:
@@ -87,14 +97,32 @@ class BootWrite:
         return self.over(int.from_bytes(held, 'little')) == held
 
 
-def boot_writes(bus: BusConfig, node: NodeConfig) -> list[BootWrite]:
-    """Return everything that is written to a device at boot, in this order."""
-    return list(_Plan(bus, node).writes())
+def boot_writes(
+    bus: BusConfig, node: NodeConfig, consumers: Mapping[int, int] | None = None
+) -> list[BootWrite]:
+    """Return everything that is written to a device at boot, in this order.
+
+    Args:
+        bus: The bus.
+        node: The device.
+        consumers: What the device holds in the :func:`watch_slots` of 0x1016; None: what its EDS
+            says.
+    """
+    return list(_Plan(bus, node, consumers).writes())
 
 
-def final_values(writes: list[BootWrite]) -> list[BootWrite]:
-    """Return what the objects hold after the writes: of two writes of an object the last one."""
-    return list({write.address: write for write in writes}.values())
+def held_after_boot(
+    bus: BusConfig, node: NodeConfig, consumers: Mapping[int, int] | None = None
+) -> list[BootWrite]:
+    """Return what the device holds after its boot: what was written, and mappings that it has.
+
+    Args:
+        bus: The bus.
+        node: The device.
+        consumers: As with :func:`boot_writes`.
+    """
+    writes = [*_fixed_mappings(node), *boot_writes(bus, node, consumers)]
+    return list({write.address: write for write in writes}.values())  # the last one counts
 
 
 def is_requested(bus: BusConfig, node: NodeConfig, *keys: str) -> bool:
@@ -102,9 +130,12 @@ def is_requested(bus: BusConfig, node: NodeConfig, *keys: str) -> bool:
     return not bus.written or (node.name, *keys) in bus.written
 
 
-def watch_slots(node: NodeConfig) -> list[int]:
-    """Return the entries of 0x1016 that may be the master's: those that bus.yml does not write."""
+def watch_slots(bus: BusConfig, node: NodeConfig) -> list[int]:
+    """Return the entries of 0x1016 that may be the master's: no file has another use for them."""
     others = {w.subindex for w in node.sdo_writes if w.index == Index.CONSUMER_HEARTBEAT}
+    for subindex, word in _consumers_of_dcf(node).items():
+        if not is_free_slot(word, bus.master.node_id):
+            others.add(subindex)
     return [
         entry.subindex
         for entry in node.dictionary.subindices(Index.CONSUMER_HEARTBEAT)
@@ -112,15 +143,10 @@ def watch_slots(node: NodeConfig) -> list[int]:
     ]
 
 
-def choose_slot(entries: Mapping[int, int], master_id: int) -> tuple[int, bool]:
-    """Choose the entry of 0x1016 for the master: its own, or else the first that is not used.
-
-    Returns:
-        Its sub-index, 0 for none, and whether it names the master.
-    """
-    times = {sub: ConsumerHeartbeatTime.parse(word) for sub, word in entries.items()}
-    own = next((sub for sub, time in times.items() if time.node_id == master_id), 0)
-    return own or next((sub for sub, time in times.items() if not time.used), 0), own > 0
+def is_free_slot(word: int, master_id: int) -> bool:
+    """Tell whether an entry of 0x1016 may be the master's: it is, or it is not used."""
+    entry = ConsumerHeartbeatTime.parse(word)
+    return entry.node_id == master_id or not entry.used
 
 
 def watch_word(bus: BusConfig, node: NodeConfig) -> int:
@@ -133,9 +159,12 @@ def watch_word(bus: BusConfig, node: NodeConfig) -> int:
 class _Plan:
     """Lists the writes for one device."""
 
-    def __init__(self, bus: BusConfig, node: NodeConfig) -> None:
+    def __init__(
+        self, bus: BusConfig, node: NodeConfig, consumers: Mapping[int, int] | None
+    ) -> None:
         self._bus = bus
         self._node = node
+        self._consumers = _eds_consumers(bus, node) if consumers is None else consumers
 
     def writes(self) -> Iterator[BootWrite]:
         node = self._node
@@ -156,15 +185,13 @@ class _Plan:
         yield from map(_written, node.sdo_writes[leading:])
 
     def _watch(self) -> Iterator[BootWrite]:
-        """Have the device watch the master, or no longer, by what its EDS has in 0x1016."""
-        defaults = {
-            entry.subindex: entry.default if isinstance(entry.default, int) else 0
-            for entry in self._node.dictionary.subindices(Index.CONSUMER_HEARTBEAT)
-            if entry.subindex in watch_slots(self._node)
-        }
-        slot, is_ours = choose_slot(defaults, self._bus.master.node_id)
+        """Have the device watch the master, or no longer, in the first entry that is free."""
+        master_id = self._bus.master.node_id
+        entries = {**self._consumers, **_consumers_of_dcf(self._node)}  # which was written before
+        slots = [sub for sub in watch_slots(self._bus, self._node) if sub in entries]
+        slot = next((sub for sub in slots if is_free_slot(entries[sub], master_id)), 0)
         word = watch_word(self._bus, self._node)
-        if slot and (word or is_ours):
+        if slot and (word or ConsumerHeartbeatTime.parse(entries[slot]).node_id == master_id):
             yield _number(
                 (Index.CONSUMER_HEARTBEAT, slot),
                 word,
@@ -268,6 +295,37 @@ class _Plan:
             return entry is not None and entry.configured
         objects = direction.mapping if key == 'mapping' else direction.communication
         return is_configured(self._node.dictionary, objects + pdo.number - 1)
+
+
+def _consumers_of_dcf(node: NodeConfig) -> dict[int, int]:
+    """Return the entries of 0x1016 that are written from a DCF, before that for the master."""
+    return {
+        write.subindex: int.from_bytes(write.data, 'little')
+        for write in node.parameter_writes
+        if write.index == Index.CONSUMER_HEARTBEAT
+    }
+
+
+def _eds_consumers(bus: BusConfig, node: NodeConfig) -> dict[int, int]:
+    entries = {
+        subindex: node.dictionary.get(Index.CONSUMER_HEARTBEAT, subindex)
+        for subindex in watch_slots(bus, node)
+    }
+    return {
+        subindex: entry.default if entry is not None and isinstance(entry.default, int) else 0
+        for subindex, entry in entries.items()
+    }
+
+
+def _fixed_mappings(node: NodeConfig) -> Iterator[BootWrite]:
+    """Yield the mappings that a device has for good, which are not written."""
+    for direction, pdos in ((RPDO, node.rpdos), (TPDO, node.tpdos)):
+        for pdo in pdos:
+            if pdo.configured and pdo.enabled and pdo.fixed_mapping:
+                index, key = direction.mapping + pdo.number - 1, f'{direction.name}.{pdo.number}'
+                yield _number((index, 0), len(pdo.mapping), DataType.UNSIGNED8, key)
+                for subindex, mapped in enumerate(pdo.mapping, start=1):
+                    yield _number((index, subindex), mapped.word, DataType.UNSIGNED32, key)
 
 
 def _written(write: SdoWrite, *, unless_default: bool = False) -> BootWrite:

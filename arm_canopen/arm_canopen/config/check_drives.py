@@ -51,7 +51,7 @@ def _check_interpolation_period(subject: Subject, offset: int) -> None:
         return
     exponent = -3 if exponent is None else exponent
     period = value * 10.0**exponent if -9 <= exponent <= 3 else 0.0
-    written = subject.write_of(index, 1) or subject.write_of(index, 2)
+    written = subject.node.write_of(index, 1) or subject.node.write_of(index, 2)
     cyclic = [used for used in subject.used_modes() if used.mode in CYCLIC_MODES]
     if abs(period - wanted) < 1e-6 * wanted or not (written or cyclic):
         return

@@ -115,7 +115,9 @@ def _check_consumers(subject: Subject) -> None:
     producers[bus.master.node_id] = bus.master.heartbeat_producer
     for subindex in CONSUMER_ENTRIES:
         entry = subject.value(Index.CONSUMER_HEARTBEAT, subindex)
-        if not entry or (subindex == 1 and subject.write_of(Index.CONSUMER_HEARTBEAT, 1) is None):
+        if not entry or (
+            subindex == 1 and subject.node.write_of(Index.CONSUMER_HEARTBEAT, 1) is None
+        ):
             continue
         consumer = ConsumerHeartbeatTime.parse(entry)
         if not consumer.used:
@@ -227,7 +229,7 @@ def _services(subject: Subject) -> Iterator[tuple[int, str, Place]]:
             for part in (1, 2)
         ),
     ):
-        write = subject.write_of(index, subindex)
+        write = subject.node.write_of(index, subindex)
         value = subject.value(index, subindex)
         if write is not None and value is not None and not value & COB_ID_INVALID:
             yield value & CAN_ID_MASK, title, subject.object_place(index, subindex)
@@ -237,7 +239,7 @@ def _check_emergency(subject: Subject) -> None:
     value = subject.value(Index.EMCY_COB_ID)
     expected = CobId.EMCY + subject.node.node_id
     # EDS files often leave out $NODEID, the device adds it
-    given = subject.write_of(Index.EMCY_COB_ID, 0) is not None
+    given = subject.node.write_of(Index.EMCY_COB_ID, 0) is not None
     if value is None or value & CAN_ID_MASK == expected:
         return
     if given or value & CAN_ID_MASK not in (0, CobId.EMCY):

@@ -7,13 +7,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from ..exceptions import CodecError
-from ..standard.datatypes import decode
 from ..standard.drive import OperationMode
 from ..standard.objects import AXIS_OFFSET, Index
 from .drive_model import DriveConfig
 from .findings import Findings, Place
-from .model import BusConfig, NodeConfig, PdoConfig, SdoWrite
+from .model import BusConfig, NodeConfig, PdoConfig
 from .pdo_direction import Direction, RPDO, TPDO
 from .shared_keys import HUNDRED_MICROSECONDS, MILLISECONDS
 
@@ -62,32 +60,18 @@ class Subject:
 
     def object_place(self, index: int, subindex: int) -> Place:
         """Return the place that says what an object holds: the sdo list, or else the EDS."""
-        write = self.write_of(index, subindex)
+        write = self.node.write_of(index, subindex)
         if write is not None:
             return Place(self.bus.file, write.written.line, key=write.written.key)
         entry = self.node.dictionary.get(index, subindex)
         line = entry.line if entry is not None else 0
         return Place(self.node.eds, line, key=f'[{index:04X}sub{subindex:X}]')
 
-    def write_of(self, index: int, subindex: int) -> SdoWrite | None:
-        """Return the last write of an object that bus.yml asks for."""
-        for write in reversed(self.node.sdo_writes):
-            if (write.index, write.subindex) == (index, subindex):
-                return write
-        return None
-
     def value(self, index: int, subindex: int = 0) -> int | None:
         """Return the number that an object holds after boot, None when nobody says."""
-        entry = self.node.dictionary.get(index, subindex)
-        if entry is None:
+        if self.node.dictionary.get(index, subindex) is None:
             return None
-        write = self.write_of(index, subindex)
-        value = entry.default
-        if write is not None:
-            try:
-                value = decode(entry.data_type, write.data)
-            except CodecError:
-                return None
+        value = self.node.value_after_boot(index, subindex)
         return value if isinstance(value, int) else None
 
     def used_modes(self) -> Iterator[UsedMode]:

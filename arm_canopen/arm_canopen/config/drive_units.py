@@ -125,7 +125,7 @@ def _check_against_factors(subject: Subject, units: AxisUnits) -> None:
 
 def _check_profile_velocity(subject: Subject, axis: DriveConfig) -> None:
     index = Index.PROFILE_VELOCITY + AXIS_OFFSET * axis.channel
-    written = subject.write_of(index, 0) is not None
+    written = subject.node.write_of(index, 0) is not None
     is_used = axis.position_mode == OperationMode.PROFILE_POSITION
     if subject.value(index) == 0 and (is_used or (written and axis.position_mode is None)):
         subject.findings.warning(

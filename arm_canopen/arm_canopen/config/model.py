@@ -5,9 +5,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from ..exceptions import CodecError
+from ..standard.datatypes import DataType, decode, Value
 from ..standard.dictionary import ObjectDictionary
 from ..standard.objects import AXIS_OFFSET, COMMANDS
 from ..standard.pdo import MappedObject
@@ -151,6 +154,31 @@ class NodeConfig:
     parameter_writes: tuple[SdoWrite, ...] = ()
     axes: tuple[DriveConfig, ...] = (DriveConfig(),)
     line: int = 0
+
+    def write_of(self, index: int, subindex: int) -> SdoWrite | None:
+        """Return the last write of an object that bus.yml asks for."""
+        for write in reversed(self.sdo_writes):
+            if (write.index, write.subindex) == (index, subindex):
+                return write
+        return None
+
+    def value_after_boot(
+        self, index: int, subindex: int = 0, data_type: DataType | None = None
+    ) -> Value | None:
+        """Return what an object holds after boot by the files; None where none says it.
+
+        Args:
+            index: Object index.
+            subindex: Sub-index.
+            data_type: Its type where the EDS does not have it.
+        """
+        entry = self.dictionary.get(index, subindex)
+        write = self.write_of(index, subindex)
+        known_type = entry.data_type if entry is not None else data_type
+        if write is not None and known_type is not None:
+            with suppress(CodecError):
+                return decode(known_type, write.data)
+        return None if entry is None else entry.default
 
     @property
     def guarded(self) -> bool:

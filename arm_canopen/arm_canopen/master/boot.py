@@ -20,13 +20,14 @@ from .scheduler import Scheduler
 from .startup import Startup
 from .takeover import preset_outputs, read_outputs
 
-IDENTITY_SUBINDICES: tuple[tuple[str, int, str, BootFault], ...] = (
-    ('vendor_id', 1, 'vendor id', BootFault.VENDOR),
-    ('product_code', 2, 'product code', BootFault.PRODUCT),
-    ('revision_number', 3, 'revision number', BootFault.REVISION),
-    ('serial_number', 4, 'serial number', BootFault.SERIAL),
-)
-"""Attribute of Identity, sub-index of 0x1018, its name (CiA 301, 7.5.2.19) and its fault."""
+IDENTITY_FAULTS = {
+    'device_type': BootFault.DEVICE_TYPE,
+    'vendor_id': BootFault.VENDOR,
+    'product_code': BootFault.PRODUCT,
+    'revision_number': BootFault.REVISION,
+    'serial_number': BootFault.SERIAL,
+}
+"""The fault of each attribute of Identity that differs."""
 
 STATE_PATIENCE = 0.5  # [s] to wait for a life sign beyond the period of the heartbeat
 RESTORE_SIGNATURE = b'load'  # CiA 301, 7.5.2.14
@@ -224,24 +225,17 @@ class BootProcess:
         self._node.report(EventKind.BOOT, Severity.INFO, text)
 
     async def _check_identity(self, expected: Identity) -> None:
-        if expected.device_type:
-            self._fault = BootFault.DEVICE_TYPE
-            found = await self._configurator.read_number(Index.DEVICE_TYPE, 0)
-            self._compare('device type', expected.device_type, found, 'dcf (0x1000)')
-        for attribute, subindex, title, fault in IDENTITY_SUBINDICES:
-            wanted = getattr(expected, attribute)
-            if wanted:
-                self._fault = fault
-                found = await self._configurator.read_number(Index.IDENTITY, subindex)
-                self._compare(title, wanted, found, attribute)
-
-    def _compare(self, title: str, expected: int, found: int, key: str) -> None:
-        if expected != found:
-            raise BootError(
-                f'{self._node.name} (node {self._node.config.node_id}) is another device: {title} '
-                f'0x{found:08X}, expected 0x{expected:08X}; correct {key} in bus.yml or use the '
-                'EDS of this device'
-            )
+        for attribute, index, subindex, wanted in expected.objects:
+            self._fault = IDENTITY_FAULTS[attribute]
+            found = await self._configurator.read_number(index, subindex)
+            if found != wanted:
+                title = attribute.replace('_', ' ')
+                key = attribute if index == Index.IDENTITY else 'dcf (0x1000)'
+                raise BootError(
+                    f'{self._node.name} (node {self._node.config.node_id}) is another device: '
+                    f'{title} 0x{found:08X}, expected 0x{wanted:08X}; correct {key} in bus.yml or '
+                    'use the EDS of this device'
+                )
 
     async def _await_answer_to_guarding(self) -> None:
         """Ask before anything is written, so that a device that never answers is left in peace."""

@@ -5,15 +5,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-import struct
 
 from ..config.boot_plan import (
     boot_writes,
     BootWrite,
-    choose_slot,
     ERROR_CONTROL,
-    final_values,
-    is_requested,
+    held_after_boot,
+    is_free_slot,
     WATCH_KEY,
     watch_slots,
     watch_word,
@@ -65,7 +63,6 @@ class Configurator:
         self._bus = bus
         self._sdo_timeout = bus.master.boot_timeout
         self._on_write = on_write
-        self._plan = [w for w in boot_writes(bus, node.config) if w.key != WATCH_KEY]
 
     async def apply(self) -> None:
         """Write everything; the device must not process PDOs meanwhile.
@@ -73,8 +70,7 @@ class Configurator:
         Raises:
             SdoError: The device refused something that bus.yml asks for, or does not answer.
         """
-        await self._watch_master()
-        for write in self._plan:
+        for write in await self._writes():
             await self._bring(write)
 
     async def write_error_control(self) -> None:
@@ -83,9 +79,8 @@ class Configurator:
         Raises:
             SdoError: As with :meth:`apply`.
         """
-        await self._watch_master()
-        for write in self._plan:
-            if write.index in LIFE_SIGNS or write.is_own_timer:
+        for write in await self._writes():
+            if write.index in LIFE_SIGNS or write.key == WATCH_KEY or write.is_own_timer:
                 await self._bring(write)
 
     async def differences(self) -> list[str]:
@@ -95,14 +90,12 @@ class Configurator:
             SdoError: The device does not answer.
         """
         found = []
-        for write in final_values(self._plan):
+        for write in held_after_boot(self._bus, self._node.config):
             if write.index not in PDO_OBJECTS or write.is_own_timer:
                 continue
-            present = await self.read_number(*write.address)
-            mask = write.mask or (1 << 8 * len(write.data)) - 1
-            wanted = int.from_bytes(write.data, 'little') & mask
-            if present & mask != wanted:
-                found.append(f'{write.place} is 0x{present & mask:X} instead of 0x{wanted:X}')
+            present = await self._node.sdo.read(*write.address, self._sdo_timeout)
+            if not write.fits(present):
+                found.append(f'{write.place} is {write.text(present)} instead of {write.text()}')
         return found
 
     async def write(self, write: SdoWrite) -> None:
@@ -139,12 +132,25 @@ class Configurator:
         except SdoAbortError as error:
             if write.temporary or await self._holds(write):
                 return  # where the writes that follow need it, they are refused, too
-            refused = f'{error}; {write.key} asks for 0x{data[::-1].hex().upper()}'
-            if write.requested:
-                raise SdoError(f'{refused}: correct or remove it there') from error
-            self._warn(f'{refused} by default only, so it goes on with what it has')
-            if write.is_own_timer:
-                self._rely_on_timer(write.index, taken=False)
+            self._refused(write, error)
+        else:
+            if write.key == WATCH_KEY:
+                self._node.watch_slot = write.subindex if any(data) else 0
+
+    def _refused(self, write: BootWrite, error: SdoAbortError) -> None:
+        """Go on without what nobody asked for; raise an SdoError for what bus.yml wants."""
+        if write.key == WATCH_KEY:
+            reason = f'{error}: it does not take {write.text()}, {UNWATCHED}'
+            if write.requested and any(write.data):
+                raise SdoError(reason) from error
+            self._warn(reason)
+            return
+        reason = f'{error}; {write.key} asks for {write.text()}'
+        if write.requested:
+            raise SdoError(f'{reason}: correct or remove it there') from error
+        self._warn(f'{reason} by default only, so it goes on with what it has')
+        if write.is_own_timer:
+            self._rely_on_timer(write.index, taken=False)
 
     def _rely_on_timer(self, index: int, *, taken: bool) -> None:
         """Await a TPDO by its event timer, or no more, until the next boot."""
@@ -159,43 +165,28 @@ class Configurator:
         except SdoAbortError:
             return False
 
-    async def _watch_master(self) -> None:
-        """Have the device watch the master, in an entry of 0x1016 that watches nobody else."""
+    async def _writes(self) -> list[BootWrite]:
+        """Return the plan; the device watches the master where it watches nobody else."""
         node = self._node
-        word = watch_word(self._bus, node.config)
-        slot, is_ours = await self._find_slot()
         node.watch_slot = 0
-        if not slot:
-            if word:
-                self._warn(
-                    f'watches others in all entries of 0x1016, and not the master, {UNWATCHED}'
-                )
-            return
-        if not (word or is_ours):
-            return
-        write = SdoWrite(Index.CONSUMER_HEARTBEAT, slot, struct.pack('<I', word))
-        try:
-            await self.write(write)
-        except SdoAbortError as error:
-            refused = f'{error}: it does not take 0x{word:08X}'
-            if word and is_requested(self._bus, node.config, WATCH_KEY):
-                raise SdoError(f'{refused}, {UNWATCHED}') from error
-            self._warn(f'{refused}, {UNWATCHED}')
-        else:
-            node.watch_slot = slot if word else 0
+        writes = boot_writes(self._bus, node.config, await self._consumers())
+        if watch_word(self._bus, node.config) and all(w.key != WATCH_KEY for w in writes):
+            self._warn(f'watches others in all entries of 0x1016, and not the master, {UNWATCHED}')
+        return writes
 
-    async def _find_slot(self) -> tuple[int, bool]:
-        """Return the entry of 0x1016 for the master, 0 for none, and whether it names it."""
-        for subindex in watch_slots(self._node.config):
+    async def _consumers(self) -> dict[int, int]:
+        """Return what the device has in 0x1016, up to the first entry that is free."""
+        held: dict[int, int] = {}
+        for subindex in watch_slots(self._bus, self._node.config):
             try:
-                entry = await self.read_number(Index.CONSUMER_HEARTBEAT, subindex)
+                held[subindex] = await self.read_number(Index.CONSUMER_HEARTBEAT, subindex)
             except SdoAbortError:
-                # it cannot be read; a later one is promised by the EDS only
-                return (subindex, False) if subindex == 1 else (0, False)
-            slot, is_ours = choose_slot({subindex: entry}, self._bus.master.node_id)
-            if slot:
-                return slot, is_ours
-        return 0, False
+                if subindex == 1:  # it cannot be read; a later one is promised by the EDS only
+                    held[subindex] = 0
+                break
+            if is_free_slot(held[subindex], self._bus.master.node_id):
+                break
+        return held
 
     def _warn(self, text: str) -> None:
         self._node.report(EventKind.BOOT, Severity.WARNING, text)

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from ..config.model import NodeConfig
 from ..standard.cob_id import CAN_ID_MASK, COB_ID_INVALID, CobId
+from ..standard.datatypes import DataType
 from ..standard.objects import Index
 
 
@@ -14,13 +15,7 @@ def emergency_can_id(config: NodeConfig) -> int | None:
 
     None when the device shall send none.
     """
-    value: object = None
-    entry = config.dictionary.get(Index.EMCY_COB_ID)
-    if entry is not None:
-        value = entry.default
-    for write in config.sdo_writes:
-        if (write.index, write.subindex) == (Index.EMCY_COB_ID, 0):
-            value = int.from_bytes(write.data, 'little')
+    value = config.value_after_boot(Index.EMCY_COB_ID, data_type=DataType.UNSIGNED32)
     if not isinstance(value, int):
         return CobId.EMCY + config.node_id
     return None if value & COB_ID_INVALID else value & CAN_ID_MASK

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from ..config.model import NodeConfig
 from ..exceptions import CodecError
-from ..standard.datatypes import decode, Value
 from ..standard.pdo import MappedObject, Number, PdoCodec
 
 
@@ -23,7 +22,7 @@ def start_value(config: NodeConfig, mapped: MappedObject) -> Number:
     Returns:
         The value; 0 when neither tells one that fits the object.
     """
-    value = _configured(config, mapped)
+    value = config.value_after_boot(mapped.index, mapped.subindex, mapped.data_type)
     if isinstance(value, (int, float)):
         try:
             PdoCodec([mapped]).pack([value])
@@ -31,15 +30,3 @@ def start_value(config: NodeConfig, mapped: MappedObject) -> Number:
             return 0
         return value
     return 0
-
-
-def _configured(config: NodeConfig, mapped: MappedObject) -> Value | None:
-    address = (mapped.index, mapped.subindex)
-    for write in reversed(config.sdo_writes):
-        if (write.index, write.subindex) == address:
-            try:
-                return decode(mapped.data_type, write.data)
-            except CodecError:
-                break
-    entry = config.dictionary.get(*address)
-    return None if entry is None else entry.default

@@ -5,11 +5,14 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 
 from arm_canopen.can import open_bus
-from arm_canopen.config.boot_plan import BootWrite
+from arm_canopen.config.boot_plan import BootWrite, watch_slots
 from arm_canopen.exceptions import SdoAbortError
+from arm_canopen.standard.objects import Index
 from arm_canopen.standard.sdo_abort import abort_text
 
 from ..expected import expected_defaults, expected_objects
@@ -58,10 +61,11 @@ def add_parser(parsers: SubParsers) -> None:
 def run(options: argparse.Namespace) -> int:
     """Compare a device; return the exit code."""
     target = find_target(options)
-    objects = _objects(target, defaults=options.defaults)
+    _objects(target, {}, defaults=options.defaults)  # what cannot be is said before the bus opens
     with open_bus(options.can) as bus:
         session = Session(bus, target.bus)
         warn_of_master(session, target)
+        objects = _objects(target, _consumers(session, target), defaults=options.defaults)
         rows = [_compare(session, target, expected) for expected in objects]
     shown = [row for row in rows if options.all or not row.is_equal]
     if shown:
@@ -75,15 +79,32 @@ def run(options: argparse.Namespace) -> int:
     return 1 if different else 0
 
 
-def _objects(target: Target, *, defaults: bool) -> list[BootWrite]:
+def _consumers(session: Session, target: Target) -> dict[int, int]:
+    """Return what the device has in the entries of 0x1016 of which boot takes one."""
+    held: dict[int, int] = {}
+    if target.bus is None or target.config is None:
+        return held
+    for subindex in watch_slots(target.bus, target.config):
+        with suppress(SdoAbortError):
+            data = _read(session, target, Index.CONSUMER_HEARTBEAT, subindex)
+            held[subindex] = int.from_bytes(data, 'little')
+    return held
+
+
+def _objects(target: Target, consumers: Mapping[int, int], *, defaults: bool) -> list[BootWrite]:
     """Return what to compare.
+
+    Args:
+        target: The device.
+        consumers: What it has in 0x1016, by sub-index.
+        defaults: Compare other objects with their defaults, too.
 
     Raises:
         UsageError: No file says anything of the device.
     """
     configured: list[BootWrite] = []
     if target.bus is not None and target.config is not None:
-        configured = expected_objects(target.bus, target.config)
+        configured = expected_objects(target.bus, target.config, consumers)
     if not configured and not target.described:
         raise UsageError(
             f'no file says what {target.name} should hold; give --bus-config BUS.yml with this '
@@ -99,15 +120,25 @@ def _objects(target: Target, *, defaults: bool) -> list[BootWrite]:
     ]
 
 
-def _compare(session: Session, target: Target, expected: BootWrite) -> Row:
+def _read(session: Session, target: Target, index: int, subindex: int) -> bytes:
+    """Read an object.
+
+    Raises:
+        SdoError: The device refused, or does not answer.
+    """
+
     async def upload() -> bytes:
         client = session.client(target.node_id, target.name)
-        return await client.read(expected.index, expected.subindex, target.timeout)
+        return await client.read(index, subindex, target.timeout)
 
     if session.masters:
         session.await_quiet(target.node_id)
+    return session.run(upload())
+
+
+def _compare(session: Session, target: Target, expected: BootWrite) -> Row:
     try:
-        data = session.run(upload())
+        data = _read(session, target, expected.index, expected.subindex)
     except SdoAbortError as error:
         return Row(expected, abort_text(error.code), is_equal=False)
     held = data[: len(expected.data)] if len(data) == 4 else data

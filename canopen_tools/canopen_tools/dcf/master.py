@@ -201,11 +201,7 @@ def _milliseconds(time: float) -> int:
 
 def _emergencies(nodes: Iterable[NodeConfig]) -> Iterator[tuple[int, str]]:
     for node in nodes:
-        entry = node.dictionary.get(Index.EMCY_COB_ID)
-        cob_id = entry.default if entry is not None else None
-        for write in node.sdo_writes:
-            if write.index == Index.EMCY_COB_ID:
-                cob_id = int.from_bytes(write.data, 'little')
+        cob_id = node.value_after_boot(Index.EMCY_COB_ID, data_type=DataType.UNSIGNED32)
         if isinstance(cob_id, int) and cob_id and not cob_id & COB_ID_INVALID:
             # an EDS without $NODEID means it
             own = CobId.EMCY + node.node_id if cob_id == CobId.EMCY else cob_id
