@@ -13,6 +13,7 @@ from isolation import Isolation
 import pytest
 import rclpy
 from rclpy.node import Node
+from urdf_reader import DescriptionError
 
 from arm_bringup.exceptions import BringupError
 from arm_bringup.wave_node import WaveNode
@@ -24,7 +25,6 @@ from quad_controller.nodes.controller_node import ControllerNode
 from quad_description.display import Display
 from quad_hardware.exceptions import HardwareError
 from quad_hardware.nodes.hardware_node import HardwareNode
-from robot_viewer import ViewerError
 from robot_viewer.nodes.robot_state_publisher import RobotStatePublisher
 
 ERRORS = (
@@ -33,7 +33,7 @@ ERRORS = (
     CanopenError,
     HardwareError,
     QuadControllerError,
-    ViewerError,
+    DescriptionError,
 )
 
 
@@ -59,7 +59,7 @@ def wave() -> Node:
         (RobotStatePublisher, 'frame_prefix:=robot', 'no robot_description'),
         (RobotStatePublisher, 'robot_description:=<robot/>', 'no <link>'),
         (Display, 'rate:=1000', 'rate is 1000: it must be 1.0 to 200.0'),
-        (JointStatePublisher, 'robot_description:=none', 'not XML'),
+        (JointStatePublisher, 'robot_description:=none', 'no XML'),
         (JointStatePublisher, 'robot_descripton:=none', "did you mean 'robot_description'"),
         (wave, 'robot_description:=none', 'no XML'),
     ],

@@ -11,7 +11,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 import json
 from pathlib import Path
-from xml.etree import ElementTree as ET
+
+from urdf_reader import DescriptionError, parse_srdf
 
 from process_supervisor import (
     EVERY_NODE,
@@ -73,11 +74,11 @@ def controller_name(robot: Robot) -> str:
     """
     try:
         table = parameters_by_node(robot.controllers) if robot.controllers.is_file() else {}
-        group = ET.parse(robot.semantic).getroot().find('group')  # noqa: S314  the robot's own
-    except (StartError, ET.ParseError) as error:
+        groups = parse_srdf(robot.semantic.read_text(encoding='utf-8')).groups
+    except (StartError, DescriptionError) as error:
         raise RobotError(f'{robot.folder}: {error}') from error
     manager = table.get('controller_manager', {}).get('ros__parameters', {})
-    first = '' if group is None else group.get('name', '')
+    first = next(iter(groups), '')
     return str(manager.get('controller_name', f'{first}_controller'))
 
 

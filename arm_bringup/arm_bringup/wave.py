@@ -24,7 +24,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 import math
 
-from .description import JointLimits
+from urdf_reader import JointRange
+
 from .exceptions import WaveError
 
 STEP_SLOPE = 15 / 8
@@ -124,7 +125,7 @@ class Swing:
         return max(style.shortest_entry, by_velocity, by_acceleration)
 
 
-def plan_swing(limits: JointLimits, phase: float, style: WaveStyle) -> Swing:
+def plan_swing(limits: JointRange, phase: float, style: WaveStyle) -> Swing:
     """Choose centre and amplitude within the limits of a joint.
 
     Args:
@@ -154,7 +155,7 @@ def plan_swing(limits: JointLimits, phase: float, style: WaveStyle) -> Swing:
 
 
 def plan_wave(
-    limits: Mapping[str, JointLimits], drives: Sequence[str], style: WaveStyle
+    limits: Mapping[str, JointRange], drives: Sequence[str], style: WaveStyle
 ) -> list[Swing]:
     """Plan the wave for all drives that there is a joint for.
 

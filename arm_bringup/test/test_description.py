@@ -153,22 +153,26 @@ def test_the_limits_are_read_in_the_order_of_the_joints() -> None:
     assert limits['panda_joint5'].velocity == 2.61
 
 
+def one_joint(kind: str, limit: str = '') -> str:
+    """Return a URDF of two links and a joint."""
+    return (
+        '<robot><link name="x"/><link name="y"/>'
+        f'<joint name="a" type="{kind}"><parent link="x"/><child link="y"/>{limit}</joint></robot>'
+    )
+
+
 def test_a_continuous_joint_has_no_range() -> None:
     """Its lower and upper limits are infinite."""
-    urdf = '<robot><joint name="a" type="continuous"><limit velocity="1"/></joint></robot>'
-    assert joint_limits(urdf)['a'].lower == -math.inf
+    assert joint_limits(one_joint('continuous', '<limit velocity="1"/>'))['a'].lower == -math.inf
 
 
 @pytest.mark.parametrize(
     ('urdf', 'words'),
     [
         ('<robot>', 'no XML'),
-        ('<robot><joint name="a" type="revolute"/></robot>', 'joint a'),
-        ('<robot><joint name="a" type="revolute"><limit/></joint></robot>', 'velocity'),
-        (
-            '<robot><joint name="a" type="revolute"><limit velocity="fast"/></joint></robot>',
-            'fast',
-        ),
+        (one_joint('revolute'), 'joint a'),
+        (one_joint('revolute', '<limit/>'), 'velocity'),
+        (one_joint('revolute', '<limit velocity="fast"/>'), 'fast'),
     ],
     ids=['xml', 'no limit', 'no velocity', 'no number'],
 )

@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 from rich.console import Console
+from urdf_reader import JointRange
 
 from arm_bringup.demos.figures import AxisFigures, BusFigures, DriveFigures, Figures
 from arm_bringup.demos.table import (
@@ -21,11 +22,10 @@ from arm_bringup.demos.table import (
     NARROWEST,
     WORDS_FROM,
 )
-from arm_bringup.description import JointLimits
 from demo_runner import DemoStatus
 
 JOINTS = [f'panda_joint{i}' for i in range(1, 8)]
-LIMITS = {name: JointLimits(name, -2.0, 2.0, 1.0) for name in JOINTS}
+LIMITS = {name: JointRange(name, -2.0, 2.0, 1.0) for name in JOINTS}
 DRIVE = DriveFigures(
     online=True,
     nmt='OPERATIONAL',

@@ -11,8 +11,8 @@ import math
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
 import pytest
+from urdf_reader import JointRange
 
-from arm_bringup.description import JointLimits
 from arm_bringup.exceptions import WaveError
 from arm_bringup.wave import (
     plan_swing,
@@ -44,7 +44,7 @@ class Feedback:
 class Arm:
     """Drives that follow at once, or not at all; keeps every set-point."""
 
-    def __init__(self, limits: list[JointLimits], starts: list[float]) -> None:
+    def __init__(self, limits: list[JointRange], starts: list[float]) -> None:
         phases = [0.9 * i for i in range(len(limits))]
         pairs = zip(limits, phases, strict=True)
         self.swings = [plan_swing(each, phase, STYLE) for each, phase in pairs]
@@ -77,17 +77,17 @@ class Arm:
 
 
 limits = st.builds(
-    lambda lower, width, velocity: JointLimits('', lower, lower + width, velocity),
+    lambda lower, width, velocity: JointRange('', lower, lower + width, velocity),
     st.floats(-7, 7),
     st.floats(0.01, 12),
     st.floats(0.05, 8),
 )
 
 
-def named(plan: list[tuple[JointLimits, float]]) -> Arm:
+def named(plan: list[tuple[JointRange, float]]) -> Arm:
     """Build an arm from limits and starting points that are shares of twice the range."""
     joints = [
-        JointLimits(f'joint{i}', each.lower, each.upper, each.velocity)
+        JointRange(f'joint{i}', each.lower, each.upper, each.velocity)
         for i, (each, _) in enumerate(plan)
     ]
     starts = [
@@ -111,7 +111,7 @@ def test_the_step_has_two_continuous_derivatives_within_its_constants(x: float, 
 
 @given(plans)
 def test_the_first_setpoint_is_where_the_joint_stands(
-    plan: list[tuple[JointLimits, float]],
+    plan: list[tuple[JointRange, float]],
 ) -> None:
     """Nothing jumps: the first cycle moves less than the acceleration allows."""
     arm = named(plan)
@@ -123,7 +123,7 @@ def test_the_first_setpoint_is_where_the_joint_stands(
 
 @given(plans, st.floats(0.1, 20), st.floats(0.1, 12))
 def test_speed_and_acceleration_stay_within_the_plan(
-    plan: list[tuple[JointLimits, float]], stop_after: float, start_after: float
+    plan: list[tuple[JointRange, float]], stop_after: float, start_after: float
 ) -> None:
     """Through entry, swing, a stop at any time and a start at any time after it."""
     arm = named(plan)
@@ -137,7 +137,7 @@ def test_speed_and_acceleration_stay_within_the_plan(
 
 
 @given(plans)
-def test_positions_stay_between_start_and_swing(plan: list[tuple[JointLimits, float]]) -> None:
+def test_positions_stay_between_start_and_swing(plan: list[tuple[JointRange, float]]) -> None:
     """A joint within its limits stays there; one outside goes in and never farther out."""
     arm = named(plan)
     arm.source.start()
@@ -156,7 +156,7 @@ def test_positions_stay_between_start_and_swing(plan: list[tuple[JointLimits, fl
 
 @given(plans, st.floats(0.1, 12))
 def test_a_stop_ends_in_standstill(
-    plan: list[tuple[JointLimits, float]], stop_after: float
+    plan: list[tuple[JointRange, float]], stop_after: float
 ) -> None:
     """After its duration the wave is idle, leaves the drives where they are, and stands still."""
     arm = named(plan)
@@ -173,7 +173,7 @@ def test_a_stop_ends_in_standstill(
 def panda() -> Arm:
     """Build the seven joints of the Panda at zero, two of them outside or at their limits."""
     table = [(-2.9, 2.9), (-1.76, 1.76), (-2.9, 2.9), (-3.07, -0.07), (-2.9, 2.9), (-0.02, 3.75)]
-    joints = [JointLimits(f'joint{i}', *pair, 2.175) for i, pair in enumerate(table)]
+    joints = [JointRange(f'joint{i}', *pair, 2.175) for i, pair in enumerate(table)]
     return Arm(joints, [0.0] * len(joints))
 
 
@@ -265,13 +265,13 @@ def test_before_a_start_and_after_a_stop_nothing_is_commanded() -> None:
 
 
 @given(limits, st.sampled_from(['range', 'velocity']))
-def test_a_joint_that_cannot_swing_is_refused_by_name(each: JointLimits, what: str) -> None:
+def test_a_joint_that_cannot_swing_is_refused_by_name(each: JointRange, what: str) -> None:
     """An empty range or no speed is an error of the URDF, said with the joint's name."""
     assume(each.upper > each.lower)
     wrong = (
-        JointLimits('elbow', each.upper, each.lower, each.velocity)
+        JointRange('elbow', each.upper, each.lower, each.velocity)
         if what == 'range'
-        else JointLimits('elbow', each.lower, each.upper, 0.0)
+        else JointRange('elbow', each.lower, each.upper, 0.0)
     )
     with pytest.raises(WaveError, match='elbow'):
         plan_swing(wrong, 0.0, STYLE)
@@ -279,14 +279,14 @@ def test_a_joint_that_cannot_swing_is_refused_by_name(each: JointLimits, what: s
 
 def test_a_joint_without_a_range_swings_about_zero() -> None:
     """A continuous joint has a finite amplitude."""
-    swing = plan_swing(JointLimits('wheel', -math.inf, math.inf, 1.0), 0.0, STYLE)
+    swing = plan_swing(JointRange('wheel', -math.inf, math.inf, 1.0), 0.0, STYLE)
     assert swing.centre == 0.0
     assert 0 < swing.amplitude <= STYLE.amplitude
 
 
 def test_the_wave_has_a_swing_for_each_drive_with_a_joint() -> None:
     """In the order of the drives, spread over one wave; other drives and joints are left out."""
-    limits = {name: JointLimits(name, -1.0, 1.0, 1.0) for name in ('a', 'finger', 'b')}
+    limits = {name: JointRange(name, -1.0, 1.0, 1.0) for name in ('a', 'finger', 'b')}
     swings = plan_wave(limits, ['b', 'gripper', 'a'], STYLE)
     assert [swing.name for swing in swings] == ['b', 'a']
     assert swings[0].phase - swings[1].phase == pytest.approx(math.pi)
@@ -294,6 +294,6 @@ def test_the_wave_has_a_swing_for_each_drive_with_a_joint() -> None:
 
 def test_a_bus_without_a_joint_of_the_robot_is_refused() -> None:
     """The names on both sides are told: they differ by a prefix, usually."""
-    limits = {'panda_joint1': JointLimits('panda_joint1', -1.0, 1.0, 1.0)}
+    limits = {'panda_joint1': JointRange('panda_joint1', -1.0, 1.0, 1.0)}
     with pytest.raises(WaveError, match='drives: joint1; joints: panda_joint1'):
         plan_wave(limits, ['joint1'], STYLE)

@@ -6,9 +6,10 @@ from __future__ import annotations
 
 from hypothesis import given
 from hypothesis import strategies as st
+from urdf_reader import Mimic
 
 from arm_canopen.joints.aggregator import JointAggregator, JointSample, JointSet, STALE_AFTER
-from arm_canopen.joints.robot_joints import Mimic, RobotJoint
+from arm_canopen.joints.robot_joints import RobotJoint
 
 PERIOD_NS = 10_000_000
 NAMES = ['elbow', 'wrist', 'base']  # URDF order, which is no alphabetical one

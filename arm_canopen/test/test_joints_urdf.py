@@ -5,45 +5,43 @@
 from __future__ import annotations
 
 import pytest
+from urdf_reader import Mimic
 
 from arm_canopen.exceptions import CanopenError
-from arm_canopen.joints.robot_joints import Mimic, movable_joints, RobotJoint
+from arm_canopen.joints.robot_joints import movable_joints, RobotJoint
 
-URDF = """
-<robot name="arm">
-  <joint name="z_first" type="revolute"/>
-  <joint name="flange" type="fixed"/>
-  <joint name="a_second" type="continuous"/>
-  <joint name="floor" type="planar"/>
-  <joint name="finger" type="prismatic">
+PARTS = """
+  <joint name="z_first" type="revolute">{0}<child link="b"/></joint>
+  <joint name="flange" type="fixed">{0}<child link="c"/></joint>
+  <joint name="a_second" type="continuous">{0}<child link="d"/></joint>
+  <joint name="floor" type="planar">{0}<child link="e"/></joint>
+  <joint name="finger" type="prismatic">{0}<child link="f"/>
     <mimic joint="a_second" multiplier="-1.5" offset="0.2"/>
   </joint>
-  <joint name="other" type="prismatic"><mimic joint="finger"/></joint>
-</robot>
-"""
+  <joint name="other" type="prismatic">{0}<child link="g"/><mimic joint="finger"/></joint>
+""".format('<parent link="a"/>')
+LINKS = ''.join(f'<link name="{name}"/>' for name in 'abcdefg')
+URDF = f'<robot name="arm">{LINKS}{PARTS}</robot>'
 
 
 def test_joints_with_one_variable_in_the_order_of_the_file() -> None:
-    """Fixed, floating and planar ones have no state here; mimic keeps its numbers."""
+    """Fixed, floating and planar ones have no state here; a mimic leads to its first joint."""
     assert movable_joints(URDF) == [
         RobotJoint('z_first'),
         RobotJoint('a_second'),
         RobotJoint('finger', Mimic('a_second', -1.5, 0.2)),
-        RobotJoint('other', Mimic('finger', 1.0, 0.0)),
+        RobotJoint('other', Mimic('a_second', -1.5, 0.2)),
     ]
 
 
 @pytest.mark.parametrize(
     ('text', 'words'),
     [
-        ('', 'not XML'),
-        ('<robot>', 'not XML'),
-        ('<sdf/>', 'no URDF: its root is <sdf>'),
-        ('<robot><joint name="a" type="fixed"/></robot>', 'no revolute'),
-        (
-            '<robot><joint name="a" type="revolute"><mimic joint="b" offset="x"/></joint></robot>',
-            'odd number in <mimic>',
-        ),
+        ('', 'empty'),
+        ('<robot>', 'no XML'),
+        ('<sdf/>', 'begins with <sdf>'),
+        ('<robot><link name="a"/></robot>', 'no revolute'),
+        (URDF.replace('0.2', 'x'), "<mimic>: 'x' is no finite number"),
     ],
     ids=['empty', 'broken', 'sdf', 'fixed', 'number'],
 )

@@ -15,13 +15,14 @@ from .exceptions import ArmError, CommandError, LimitsError, ModelError
 from .frame_tree import FrameTree
 from .limits import JointLimits, load_limits
 from .model import RobotModel
+from .names import ArmNames, names_of
 from .pose import combined, inverse, Pose, rotation_of, turned_twists
 from .scene import PlanningScene
-from .srdf import parse_srdf
 from .state import RobotState
 
 __all__ = [
     'ArmError',
+    'ArmNames',
     'Array',
     'Clearances',
     'CommandError',
@@ -43,7 +44,7 @@ __all__ = [
     'frozen',
     'inverse',
     'load_limits',
-    'parse_srdf',
+    'names_of',
     'rotation_of',
     'turned_twists',
 ]

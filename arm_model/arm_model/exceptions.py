@@ -14,6 +14,11 @@ Arguments of the wrong kind from a *programmer* stay ``ValueError``/``TypeError`
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from urdf_reader import DescriptionError
+
 
 class ArmError(Exception):
     """Root of all errors of arm_model, arm_trajectory and arm_servo."""
@@ -41,3 +46,12 @@ class CommandError(ArmError, ValueError):
     Scenarios: a NaN, an unknown joint or link, a twist that is not six numbers, a speed override
     of 120 %.
     """
+
+
+@contextmanager
+def description_refused() -> Iterator[None]:
+    """Raise a ModelError where URDF or SRDF cannot be used."""
+    try:
+        yield
+    except DescriptionError as error:
+        raise ModelError(str(error)) from error

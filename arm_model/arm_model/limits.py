@@ -26,6 +26,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from urdf_reader import JointRange
 import yaml
 
 from .arrays import Array, frozen, Mask
@@ -98,15 +99,6 @@ class JointLimits:
         """Mask of the joints that turn without end."""
         mask: Mask = np.isinf(self.lower) & np.isinf(self.upper)
         return mask
-
-
-@dataclass(frozen=True, slots=True)
-class JointRange:
-    """What a description says of a joint: lower, upper in [rad], speed in [rad/s]."""
-
-    lower: float
-    upper: float
-    velocity: float
 
 
 def load_limits(path: Path | str) -> Mapping[str, Any]:

@@ -10,15 +10,15 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
+from urdf_reader import Group, parse_srdf, SemanticDescription
 
 from .arrays import Array, frozen, Native
 from .clearances import Clearances, LeastClearance, Proximity
 from .description import Description
-from .exceptions import CommandError, ModelError
+from .exceptions import CommandError, description_refused, ModelError
 from .limits import JointLimits, merge_limits
 from .pose import Pose, turned_twists
 from .scene import PlanningScene
-from .srdf import Group, parse_srdf, SemanticDescription
 
 MOST_JOINTS = 8
 """Joints of the longest chain that is offered."""
@@ -43,6 +43,7 @@ class RobotModel:
         reach: Greatest distance of the tip from the first joint's axis frame in [m].
     """
 
+    @description_refused()
     def __init__(
         self,
         urdf: str,
@@ -247,7 +248,7 @@ def _ends(
         chains += semantic.group(name).chains
     base = chains[0][0] if chains else description.joints[joints[0]].parent
     end = tip or (chains[-1][1] if chains else description.joints[joints[-1]].child)
-    on_chain = {joint.name for joint in description.chain(base, end)}
+    on_chain = {joint.name for joint in description.tree.chain(base, end)}
     if beside := [name for name in joints if name not in on_chain]:
         raise ModelError(
             f'group {group.name}: joint {beside[0]} is not between {base!r} and {end!r};'

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from .urdf import RobotModel
+from urdf_reader import KinematicTree
 
 PATIENCE = 5.0
 """Time in [s] after which a joint that was never heard of is told."""
@@ -15,7 +15,7 @@ PATIENCE = 5.0
 class JointWatch:
     """Compares the joints of a description with those of the messages; tells each once."""
 
-    def __init__(self, model: RobotModel, now: float) -> None:
+    def __init__(self, model: KinematicTree, now: float) -> None:
         """Begin to watch.
 
         Args:

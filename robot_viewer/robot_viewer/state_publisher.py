@@ -12,8 +12,16 @@ from dataclasses import dataclass
 from enum import Enum
 import math
 
-from .transforms import about, multiply, rotate, Transform
-from .urdf import Joint, JointKind, MOVABLE, RobotModel
+from urdf_reader import (
+    about,
+    Joint,
+    JointKind,
+    KinematicTree,
+    MOVABLE,
+    multiply,
+    rotate,
+    Transform,
+)
 
 HIGHEST_FREQUENCY = 1000.0
 """Greatest ``publish_frequency`` in [Hz] (robot_state_publisher 3.3.3)."""
@@ -121,7 +129,7 @@ def _sum(
 class StatePublisher:
     """Says which transforms are to be published when joint positions come in."""
 
-    def __init__(self, model: RobotModel, settings: Settings | None = None) -> None:
+    def __init__(self, model: KinematicTree, settings: Settings | None = None) -> None:
         """Take a robot.
 
         Args:
@@ -136,7 +144,7 @@ class StatePublisher:
         self._last_now = 0
 
     @property
-    def model(self) -> RobotModel:
+    def model(self) -> KinematicTree:
         """The robot."""
         return self._model
 

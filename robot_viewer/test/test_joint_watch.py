@@ -5,9 +5,10 @@
 from __future__ import annotations
 
 import pytest
-from viewer_robots import ARM, POSITIONS
+from urdf_reader import read_urdf
+from urdf_robots import ARM, POSITIONS
 
-from robot_viewer import JointWatch, read_urdf
+from robot_viewer import JointWatch
 from robot_viewer.joint_watch import PATIENCE
 
 SOON, LATE, LATER = 0.5 * PATIENCE, 1.1 * PATIENCE, 5 * PATIENCE

@@ -17,7 +17,7 @@ from ros_client import RosClient
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from tf2_msgs.msg import TFMessage
-from viewer_robots import ARM, POSITIONS
+from urdf_robots import ARM, POSITIONS
 
 if TYPE_CHECKING:
     from isolation import Isolation

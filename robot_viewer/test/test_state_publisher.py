@@ -10,9 +10,10 @@ import math
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
-from viewer_robots import ARM, POSITIONS
+from urdf_reader import read_urdf
+from urdf_robots import ARM, POSITIONS
 
-from robot_viewer import read_urdf, Remark, Settings, StatePublisher
+from robot_viewer import Remark, Settings, StatePublisher
 from robot_viewer.state_publisher import Update
 
 MS = 1_000_000

@@ -13,17 +13,15 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio
 import pytest
-from viewer_robots import random_urdfs
+from urdf_reader import about, KinematicTree, multiply, read_urdf, rotate
+from urdf_robots import random_urdfs
 
 from robot_viewer import (
     FrameTransform,
     joint_transform,
-    read_urdf,
-    RobotModel,
     Settings,
     StatePublisher,
 )
-from robot_viewer.transforms import about, multiply, rotate
 
 Matrix = npt.NDArray[np.float64]
 
@@ -38,7 +36,7 @@ def matrix_of(named: FrameTransform) -> Matrix:
     return pose
 
 
-def published(model: RobotModel, positions: Mapping[str, float]) -> dict[str, FrameTransform]:
+def published(model: KinematicTree, positions: Mapping[str, float]) -> dict[str, FrameTransform]:
     """Return what is published of a robot, by child frame."""
     core = StatePublisher(model, Settings())
     update = core.update(list(positions), list(positions.values()), 10**9, 10**9)

@@ -12,10 +12,10 @@ from rich import box
 from rich.console import RenderableType
 from rich.table import Table
 from rich.text import Text
+from urdf_reader import JointRange
 
 from demo_runner import compose, DemoStatus
 
-from ..description import JointLimits
 from .figures import AxisFigures, BusFigures, DriveFigures, ENABLED, Figures
 from .report import progress_line
 
@@ -66,7 +66,7 @@ class ArmView:
     """
 
     title: str
-    limits: Mapping[str, JointLimits]
+    limits: Mapping[str, JointRange]
 
     def fits(self, width: int, height: int) -> bool:
         """Say whether a terminal has room for the table.
@@ -144,7 +144,7 @@ def _signed(value: float) -> str:
     return f'{value:+.3f}' if math.isfinite(value) else '-'
 
 
-def _gauge(drive: DriveFigures, limits: JointLimits) -> Text:
+def _gauge(drive: DriveFigures, limits: JointRange) -> Text:
     """Show where a joint is between its limits; outside of them the mark is red, at the end."""
     span = limits.upper - limits.lower
     if not math.isfinite(span) or not math.isfinite(drive.position):

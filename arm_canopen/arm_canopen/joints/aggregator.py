@@ -119,9 +119,9 @@ class JointAggregator:
         mimic = joint.mimic
         if mimic is None or self._is_heard(joint.name, now):
             return self._samples[joint.name] if self._is_heard(joint.name, now) else None
-        if not self._is_heard(mimic.joint, now):
+        if not self._is_heard(mimic.source, now):
             return None
-        leader = self._samples[mimic.joint]
+        leader = self._samples[mimic.source]
         position = mimic.multiplier * leader.position + mimic.offset
         return JointSample(position, mimic.multiplier * leader.velocity, 0.0)
 

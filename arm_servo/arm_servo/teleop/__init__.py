@@ -4,16 +4,13 @@
 
 from .jog import CartesianJog, Frame, Jog, JointJog
 from .keyboard_teleop import KeyboardTeleop
-from .names import ArmNames, names_of
 from .scales import Scales
 
 __all__ = [
-    'ArmNames',
     'CartesianJog',
     'Frame',
     'Jog',
     'JointJog',
     'KeyboardTeleop',
     'Scales',
-    'names_of',
 ]

@@ -6,10 +6,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from arm_model import ArmNames
 from operator_input import RELEASE_WORDS, ReleaseSource, status_text, Style
 
 from .jog import CartesianJog, Frame, Jog, JointJog, Vector
-from .names import ArmNames
 from .scales import Scales
 
 AXES = ('x', 'y', 'z')

@@ -20,10 +20,9 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import SetBool
 
-from arm_model import ModelError
+from arm_model import ArmNames, ModelError
 
 from .jog import Frame, Jog, JointJog, Vector
-from .names import ArmNames
 from .requests import CommandType
 from .scales import Scales
 from .screen import ServoView

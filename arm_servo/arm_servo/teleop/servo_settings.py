@@ -16,9 +16,8 @@ from rclpy.client import Client
 from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
 
-from arm_model import ModelError
+from arm_model import ArmNames, ModelError, names_of
 
-from .names import ArmNames, names_of
 from .scales import Scales, UNITLESS
 
 PREFIX = 'moveit_servo.'

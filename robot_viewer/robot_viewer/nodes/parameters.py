@@ -9,12 +9,11 @@ from collections.abc import Iterable
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from urdf_reader import DescriptionError, read_urdf
 
 from node_runner import ParameterReader, refuse_misspelt
 
-from ..exceptions import DescriptionError
 from ..state_publisher import HIGHEST_FREQUENCY, Settings
-from ..urdf import read_urdf
 
 DESCRIPTION = 'robot_description'
 DEFAULTS = Settings()

@@ -19,13 +19,12 @@ from rclpy.utilities import remove_ros_args
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from tf2_msgs.msg import TFMessage
+from urdf_reader import DescriptionError, JointKind, read_urdf
 
 from node_runner import destroyed_when_refused, ParameterError, run_node
 
-from ..exceptions import DescriptionError, ViewerError
 from ..joint_watch import JointWatch
 from ..state_publisher import FrameTransform, Remark, StatePublisher
-from ..urdf import JointKind, read_urdf
 from .parameters import check, declare, DESCRIPTION, read_settings
 
 NAME = 'robot_state_publisher'
@@ -155,4 +154,4 @@ def main() -> int:
     Returns:
         0, or 1 when it could not begin.
     """
-    return run_node(NAME, lambda: RobotStatePublisher(_read_argument(sys.argv)), ViewerError)
+    return run_node(NAME, lambda: RobotStatePublisher(_read_argument(sys.argv)), DescriptionError)

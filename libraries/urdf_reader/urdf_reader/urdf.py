@@ -1,14 +1,16 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The kinematic tree of a URDF: links, joints, and which joints follow others.
+"""The kinematic tree of a URDF: links and their shapes, joints, and which joints follow others.
 
-Format: http://wiki.ros.org/urdf/XML. Shapes, inertias and limits are of no interest here.
+Format: http://wiki.ros.org/urdf/XML. Links, joints and their origins are checked at once, limits
+and collision shapes when they are asked for: a viewer does without.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from copy import deepcopy
+from dataclasses import dataclass, field, replace
 from enum import Enum
 import math
 from xml.etree import ElementTree as ET
@@ -32,7 +34,7 @@ class JointKind(Enum):
 
 
 MOVABLE = frozenset({JointKind.REVOLUTE, JointKind.CONTINUOUS, JointKind.PRISMATIC})
-"""Joints with one degree of freedom, which a JointState can tell of."""
+"""Joints with one degree of freedom, which have a position in a JointState."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +53,23 @@ class Mimic:
 
 
 @dataclass(frozen=True, slots=True)
+class JointRange:
+    """How far and how fast a joint moves; radians or metres.
+
+    Attributes:
+        name: Name of the joint.
+        lower: Least position in [rad]; minus infinity for a continuous joint.
+        upper: Greatest position in [rad]; infinity for a continuous joint.
+        velocity: Greatest speed in [rad/s].
+    """
+
+    name: str
+    lower: float
+    upper: float
+    velocity: float
+
+
+@dataclass(frozen=True, slots=True)
 class Joint:
     """A joint.
 
@@ -62,6 +81,7 @@ class Joint:
         origin: Pose of the child in the parent at position zero.
         axis: Unit vector in the child's frame.
         mimic: What it follows, if it does.
+        limit: Attributes of ``<limit>`` as they are written, if there is one.
     """
 
     name: str
@@ -71,11 +91,67 @@ class Joint:
     origin: Transform
     axis: Vector
     mimic: Mimic | None = None
+    limit: Mapping[str, str] | None = None
+
+    @property
+    def independent(self) -> bool:
+        """Whether it has a degree of freedom of its own."""
+        return self.kind in MOVABLE and self.mimic is None
+
+    @property
+    def range(self) -> JointRange:
+        """How far and how fast it moves.
+
+        Raises:
+            DescriptionError: It has no ``<limit>``, or that has no usable numbers.
+        """
+        if self.limit is None:
+            raise DescriptionError(
+                f'joint {self.name}: a {self.kind.value} joint needs <limit .../>'
+            )
+        try:
+            velocity = float(self.limit['velocity'])
+            if self.kind is JointKind.CONTINUOUS:
+                return JointRange(self.name, -math.inf, math.inf, velocity)
+            lower, upper = (float(self.limit.get(key, 0)) for key in ('lower', 'upper'))
+        except (KeyError, ValueError) as error:
+            raise DescriptionError(f'joint {self.name}: <limit> is not usable: {error}') from error
+        return JointRange(self.name, lower, upper, velocity)
 
 
 @dataclass(frozen=True, slots=True)
-class RobotModel:
-    """A kinematic tree.
+class Collision:
+    """A collision shape of a link.
+
+    Attributes:
+        link: Name of the link.
+        shape: What it is: box, cylinder, sphere, mesh, or empty where nothing is said.
+        attributes: Its attributes as they are written.
+        origin: Where it is in the link's frame.
+    """
+
+    link: str
+    shape: str
+    attributes: Mapping[str, str]
+    origin: Transform
+
+    def lengths(self, *names: str) -> tuple[float, ...]:
+        """Return the numbers of some of its attributes in [m].
+
+        Raises:
+            DescriptionError: One is missing, or no number.
+        """
+        try:
+            return tuple(float(word) for name in names for word in self.attributes[name].split())
+        except (KeyError, ValueError) as error:
+            raise DescriptionError(
+                f'link {self.link}: <{self.shape}> is not usable: {error}'
+            ) from error
+
+
+@dataclass(frozen=True, slots=True)
+class KinematicTree:
+    """What a URDF says.
 
     Attributes:
         name: Name of the robot.
@@ -88,20 +164,89 @@ class RobotModel:
     root: str
     links: tuple[str, ...]
     joints: tuple[Joint, ...]
+    _robot: ET.Element = field(repr=False, compare=False)
 
     def movable(self) -> Iterator[Joint]:
-        """Go through the joints that a JointState can tell of."""
+        """Go through the joints that have a position in a JointState."""
         return (joint for joint in self.joints if joint.kind in MOVABLE)
 
+    def ranges(self) -> dict[str, JointRange]:
+        """Return how far and how fast the joints with a freedom of their own move, by name.
 
-def read_urdf(text: str) -> RobotModel:
+        Raises:
+            DescriptionError: One has no usable ``<limit>``.
+        """
+        return {joint.name: joint.range for joint in self.joints if joint.independent}
+
+    def chain(self, base: str, tip: str) -> list[Joint]:
+        """Return the joints from one link out to another.
+
+        Args:
+            base: Link where the chain begins.
+            tip: Link where it ends.
+
+        Raises:
+            DescriptionError: A link is unknown, or the tip does not hang on the base.
+        """
+        for link in (base, tip):
+            if link not in self.links:
+                known = ', '.join(sorted(self.links))
+                raise DescriptionError(
+                    f'there is no link {link!r} in the description; links: {known}'
+                )
+        above = {joint.child: joint for joint in self.joints}
+        joints: list[Joint] = []
+        link = tip
+        while link != base:
+            if link not in above:
+                raise DescriptionError(
+                    f'link {tip!r} does not hang on link {base!r} in the description'
+                )
+            joints.append(above[link])
+            link = above[link].parent
+        return joints[::-1]
+
+    def collisions(self) -> Iterator[Collision]:
+        """Go through the collision shapes of all links.
+
+        Raises:
+            DescriptionError: The origin of one is not usable.
+        """
+        for link in self._robot.findall('link'):
+            name = _name(link, 'link')
+            for element in link.findall('collision'):
+                shape = next(iter(element.find('geometry') or ()), None)
+                yield Collision(
+                    name,
+                    '' if shape is None else shape.tag,
+                    {} if shape is None else dict(shape.attrib),
+                    _origin(element, f'link {name}, <collision>'),
+                )
+
+    def without_continuous_joints(self, bound: float) -> str:
+        """Return the URDF with continuous joints as revolute ones, whose position is one number.
+
+        Args:
+            bound: Where they end to either side in [rad].
+        """
+        robot = deepcopy(self._robot)
+        for joint in robot.findall('joint'):
+            limit = joint.find('limit')
+            if joint.get('type') == JointKind.CONTINUOUS.value and limit is not None:
+                joint.set('type', JointKind.REVOLUTE.value)
+                limit.set('lower', str(-bound))
+                limit.set('upper', str(bound))
+        return ET.tostring(robot, encoding='unicode')
+
+
+def read_urdf(text: str) -> KinematicTree:
     """Read a URDF.
 
     Args:
         text: The URDF as XML text.
 
     Returns:
-        Its tree.
+        What it says.
 
     Raises:
         DescriptionError: The text is empty or no URDF, or its joints make no tree; the message
@@ -115,7 +260,7 @@ def read_urdf(text: str) -> RobotModel:
     root = _root(links, joints)
     sources = {joint.name: joint for joint in joints}
     resolved = (_with_first_source(joint, sources) for joint in joints)
-    return RobotModel(robot.get('name', ''), root, links, tuple(resolved))
+    return KinematicTree(robot.get('name', ''), root, links, tuple(resolved), robot)
 
 
 def _parse(text: str) -> ET.Element:
@@ -148,7 +293,9 @@ def _joint(element: ET.Element) -> Joint:
         ) from None
     parent, child = (_link_of(element, end, name) for end in ('parent', 'child'))
     axis = _axis(element, name) if kind in MOVABLE else (1.0, 0.0, 0.0)
-    return Joint(name, kind, parent, child, _origin(element, name), axis, _mimic(element, name))
+    origin, limit = _origin(element, f'joint {name}'), element.find('limit')
+    limits = None if limit is None else dict(limit.attrib)
+    return Joint(name, kind, parent, child, origin, axis, _mimic(element, name), limits)
 
 
 def _link_of(element: ET.Element, end: str, joint: str) -> str:
@@ -159,11 +306,11 @@ def _link_of(element: ET.Element, end: str, joint: str) -> str:
     return link
 
 
-def _origin(element: ET.Element, joint: str) -> Transform:
+def _origin(element: ET.Element, what: str) -> Transform:
     origin = element.find('origin')
     if origin is None:
         return Transform()
-    place = f'joint {joint}: <origin>'
+    place = f'{what}: <origin>'
     translation = _vector(origin.get('xyz', '0 0 0'), place)
     return Transform(translation, from_rpy(*_vector(origin.get('rpy', '0 0 0'), place)))
 
@@ -266,5 +413,4 @@ def _with_first_source(joint: Joint, joints: Mapping[str, Joint]) -> Joint:
         above = source.mimic
         offset = mimic.multiplier * above.offset + mimic.offset
         mimic = Mimic(above.source, mimic.multiplier * above.multiplier, offset)
-    fields = (joint.kind, joint.parent, joint.child, joint.origin, joint.axis)
-    return Joint(joint.name, *fields, mimic)
+    return replace(joint, mimic=mimic)

@@ -5,9 +5,8 @@
 from __future__ import annotations
 
 import pytest
-from viewer_robots import ARM
-
-from robot_viewer import DescriptionError, JointKind, Mimic, read_urdf
+from urdf_reader import DescriptionError, JointKind, Mimic, read_urdf
+from urdf_robots import ARM
 
 TWO = '<robot name="r"><link name="a"/><link name="b"/>{}</robot>'
 JOINT = '<joint name="j" type="{}"><parent link="{}"/><child link="{}"/>{}</joint>'

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from xml.etree import ElementTree as ET
 
-from .exceptions import ModelError
+from .exceptions import DescriptionError
 
 Pair = frozenset[str]
 """Two links, in no order."""
@@ -63,11 +63,11 @@ class SemanticDescription:
             name: Its name.
 
         Raises:
-            ModelError: There is none of this name; lists those that there are.
+            DescriptionError: There is none of this name; lists those that there are.
         """
         if name not in self.groups:
             known = ', '.join(self.groups) or 'none'
-            raise ModelError(f'there is no group {name!r} in the SRDF; groups: {known}')
+            raise DescriptionError(f'there is no group {name!r} in the SRDF; groups: {known}')
         return self.groups[name]
 
 
@@ -78,12 +78,12 @@ def parse_srdf(text: str) -> SemanticDescription:
         text: The SRDF as XML text.
 
     Raises:
-        ModelError: The text is no SRDF.
+        DescriptionError: The text is no SRDF.
     """
     try:
         root = ET.fromstring(text)  # noqa: S314  a robot's own description, not from the network
     except ET.ParseError as error:
-        raise ModelError(f'the SRDF is no XML: {error}') from error
+        raise DescriptionError(f'the SRDF is no XML: {error}') from error
     groups = {group.name: group for group in map(_group, root.findall('group'))}
     poses: dict[str, dict[str, Mapping[str, float]]] = {name: {} for name in groups}
     for state in root.findall('group_state'):
@@ -120,4 +120,4 @@ def _pose(state: ET.Element) -> Mapping[str, float]:
             for joint in state.findall('joint')
         }
     except ValueError as error:
-        raise ModelError(f'pose {state.get("name")!r} of the SRDF: {error}') from error
+        raise DescriptionError(f'pose {state.get("name")!r} of the SRDF: {error}') from error

@@ -1,0 +1,13 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What urdf_reader raises."""
+
+from __future__ import annotations
+
+
+class DescriptionError(ValueError):
+    """A robot description cannot be used; the message names the element.
+
+    Scenarios: it is empty or no XML, a joint names a link that does not exist, two links have the
+    same name, the joints make a loop, a number is no number, a group is unknown.
+    """
