@@ -30,7 +30,7 @@ setup(
     zip_safe=False,
     maintainer='The arm and quad developers',
     maintainer_email='developers@example.org',
-    description='The XGO quadruped as a URDF made from its numbers, with presets and arm',
+    description='The model of the XGO quadruped: URDF, legs, limits, poses, kinematics',
     license='Apache-2.0',
     entry_points={
         'console_scripts': [

@@ -14,8 +14,7 @@ import pytest
 from simulated_quad import SimulatedQuad
 
 from quad_bringup.demo.track import tilt_of
-from quad_description import Pose, pose_positions, raised_feet, robot_urdf
-from quad_hardware.estimation.feet import Feet
+from quad_description import Pose, pose_positions, quadruped, raised_feet, robot_urdf
 from quad_msgs.msg import JointCommand
 
 pytestmark = pytest.mark.scenario
@@ -55,7 +54,7 @@ def tilt(quad: SimulatedQuad) -> float:
 def freeze_in_mid_trot(quad: SimulatedQuad) -> None:
     """Stop the controller (SIGSTOP) while its last targets have a foot in the air."""
     commands = quad.client.listen(JointCommand, '/joint_command')
-    feet = Feet(robot_urdf(), quad.names)
+    robot = quadruped(robot_urdf())
     controller = quad.processes['controller']
     for _ in range(TRIES):
         if quad.state != 'walk':
@@ -65,7 +64,7 @@ def freeze_in_mid_trot(quad: SimulatedQuad) -> None:
         quad.walk(1.0)
         controller.signal(signal.SIGSTOP)
         quad.spin(0.1)  # what it sent before arrives
-        if raised_feet([foot.position for foot in feet.poses(commands[-1].position)]):
+        if raised_feet(robot.feet(commands[-1].position)):
             return
         controller.signal(signal.SIGCONT)
     raise AssertionError(f'all feet stood, {TRIES} times')

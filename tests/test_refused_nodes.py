@@ -54,7 +54,7 @@ def wave() -> Node:
         (controller, 'swing_hight:=0.03', "did you mean 'swing_height'"),
         (controller, 'arm_pose:=[0.5, 1.0]', 'arm_pose has 2 positions'),
         (HardwareNode, 'protokoll:=old', "did you mean 'protocol'"),
-        (HardwareNode, 'robot_description:=none', 'no XML'),
+        (HardwareNode, 'robot_description:=none', 'not XML'),
         (RobotStatePublisher, 'publish_frequncy:=9.0', "did you mean 'publish_frequency'"),
         (RobotStatePublisher, 'frame_prefix:=robot', 'no robot_description'),
         (RobotStatePublisher, 'robot_description:=<robot/>', 'no <link>'),

@@ -25,8 +25,7 @@ from quad_controller.gait.generator import GaitGenerator
 from quad_controller.gait.parameters import GaitParameters
 from quad_controller.gait.schedule import Gait
 from quad_controller.gait.velocity import Velocity as GaitVelocity
-from quad_controller.model.quadruped import quadruped
-from quad_description import robot_urdf
+from quad_description import quadruped, robot_urdf
 
 
 @given(st.floats(SHORTEST, 1000.0))

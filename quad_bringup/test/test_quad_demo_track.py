@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 import pytest
 
 from quad_bringup.demo.itinerary import Velocity
-from quad_bringup.demo.track import mean_velocity, Milestone, Pose, tilt_of, Track
+from quad_bringup.demo.track import mean_velocity, Milestone, Pose, Track
+from quad_description.rotations import tilt_of
 
 PERIOD = 0.02
 """Time between two poses in [s]."""

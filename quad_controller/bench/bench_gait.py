@@ -19,13 +19,12 @@ from quad_controller.gait.generator import GaitGenerator
 from quad_controller.gait.parameters import GaitParameters
 from quad_controller.gait.servo_compensation import ServoModel
 from quad_controller.gait.velocity import Velocity
-from quad_controller.model.quadruped import quadruped
 from quad_controller.policy.load import load_policy
 from quad_controller.policy.options import PolicyOptions
 from quad_controller.states.controller import Controller
 from quad_controller.states.measurement import ImuSample, JointSample, Measurement
 from quad_controller.states.parameters import StateParameters
-from quad_description import robot_urdf
+from quad_description import quadruped, robot_urdf
 
 STEPS = 5000
 PERIOD = 0.02  # [s]

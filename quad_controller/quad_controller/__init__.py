@@ -8,10 +8,10 @@ The pure core, without ROS::
         Controller,
         GaitParameters,
         Measurement,
-        quadruped,
         StateParameters,
         Velocity,
     )
+    from quad_description import quadruped
 
     controller = Controller(quadruped(urdf), GaitParameters(), StateParameters())
     output = controller.step(Measurement(joints, imu), 0.02)
@@ -19,14 +19,13 @@ The pure core, without ROS::
     controller.set_velocity(Velocity(0.2))
 """
 
-from .exceptions import DescriptionError, ParameterError, PolicyError, QuadControllerError
+from .exceptions import ParameterError, PolicyError, QuadControllerError
 from .gait.body import BodyPose
 from .gait.generator import GaitGenerator
 from .gait.parameters import GaitParameters
 from .gait.schedule import Gait
 from .gait.servo_compensation import ServoModel
 from .gait.velocity import Velocity
-from .model.quadruped import Quadruped, quadruped
 from .policy.load import load_policy
 from .policy.options import PolicyOptions
 from .policy.shipped import find_policy
@@ -43,7 +42,6 @@ __all__ = [
     'Answer',
     'BodyPose',
     'Controller',
-    'DescriptionError',
     'Gait',
     'GaitGenerator',
     'GaitParameters',
@@ -55,7 +53,6 @@ __all__ = [
     'PolicyError',
     'PolicyOptions',
     'QuadControllerError',
-    'Quadruped',
     'ServoModel',
     'State',
     'StateParameters',
@@ -63,5 +60,4 @@ __all__ = [
     'Velocity',
     'find_policy',
     'load_policy',
-    'quadruped',
 ]

@@ -5,10 +5,10 @@
 ::
 
     QuadControllerError
-    ├── DescriptionError (ValueError)   a URDF is no quadruped that this package can walk with
     ├── ParameterError (ValueError)     a parameter is outside of what makes sense
     └── PolicyError (ValueError)        an ONNX policy does not fit this robot; names what differs
 
+A robot description that is no quadruped's raises :class:`quad_description.DescriptionError`.
 Requests that can be refused while the robot runs (a mode, a velocity) raise nothing: they are
 answered with a reason. Arguments of the wrong kind from a *programmer* stay ``ValueError``.
 """
@@ -18,13 +18,6 @@ from __future__ import annotations
 
 class QuadControllerError(Exception):
     """Root of all errors of this package."""
-
-
-class DescriptionError(QuadControllerError, ValueError):
-    """A robot description does not describe a quadruped that this package can walk with.
-
-    Scenarios: it is no XML, a leg's joint is missing, a hip does not turn about the x axis.
-    """
 
 
 class ParameterError(QuadControllerError, ValueError):

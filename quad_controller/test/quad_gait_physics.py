@@ -10,13 +10,12 @@ import math
 
 from quad_controller.gait.parameters import GaitParameters
 from quad_controller.gait.velocity import REST, Velocity
-from quad_controller.model.quadruped import Quadruped, quadruped
 from quad_controller.policy.interface import Policy
 from quad_controller.states.controller import Controller
 from quad_controller.states.measurement import ImuSample, JointSample, Measurement
 from quad_controller.states.modes import State
 from quad_controller.states.parameters import StateParameters
-from quad_description import robot_urdf
+from quad_description import Quadruped, quadruped, robot_urdf
 from quad_sim.physics import Robot
 
 PERIOD = 0.02  # [s]

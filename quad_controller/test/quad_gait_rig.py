@@ -7,15 +7,15 @@ from __future__ import annotations
 from dataclasses import replace
 import math
 
+from quad_builds import Build, urdf
 from quad_controller.gait.parameters import GaitParameters
 from quad_controller.gait.velocity import Velocity
-from quad_controller.model.quadruped import quadruped, Targets
 from quad_controller.policy.interface import PolicyStep
 from quad_controller.states.controller import Controller
 from quad_controller.states.measurement import ImuSample, JointSample, Measurement
 from quad_controller.states.modes import State
 from quad_controller.states.parameters import StateParameters
-from quad_gait_urdf import Build, urdf
+from quad_description import quadruped, Targets
 
 PERIOD = 0.02  # [s]
 UPRIGHT = ImuSample((0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0), (0.0, 0.0, 9.81))

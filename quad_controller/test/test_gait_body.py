@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 import numpy as np
 import pytest
 
+from quad_builds import urdf
 from quad_controller.exceptions import ParameterError
 from quad_controller.gait.body import BodyLimits, BodyPose, feet_in_body, Leveller, UPRIGHT
 from quad_controller.gait.generator import GaitGenerator
@@ -21,9 +22,8 @@ from quad_controller.gait.schedule import Gait
 from quad_controller.gait.servo_compensation import ServoCompensation, ServoModel
 from quad_controller.gait.stepping import Stepper
 from quad_controller.gait.velocity import REST, Velocity
-from quad_controller.model.quadruped import quadruped
-from quad_controller.model.urdf import Vector
-from quad_gait_urdf import urdf
+from quad_description import quadruped
+from quad_description.rotations import Vector
 
 ROBOT = quadruped(urdf())
 CENTRE = ROBOT.hip_centre

@@ -20,7 +20,6 @@ from sensor_msgs.msg import BatteryState, Imu, JointState
 
 from node_runner.wire import Reader
 from quad_controller.gait.parameters import GaitParameters
-from quad_controller.model.quadruped import Targets
 from quad_controller.nodes.control_loop import ControlLoop
 from quad_controller.nodes.diagnostics import state_diagnostic
 from quad_controller.nodes.joint_reader import CommandScope, JointReader
@@ -31,6 +30,7 @@ from quad_controller.states.controller import Controller
 from quad_controller.states.measurement import ImuSample, JointSample
 from quad_controller.states.parameters import StateParameters
 from quad_controller.states.status import Output
+from quad_description import Targets
 from quad_gait_rig import ARM_ROBOT, FOLDED, Rig, ROBOT, tilted, UPRIGHT
 
 PATIENCE = 10.0  # [s]

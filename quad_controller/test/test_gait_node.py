@@ -27,9 +27,8 @@ from std_msgs.msg import String
 
 from node_runner import ParameterError
 from quad_controller.exceptions import QuadControllerError
-from quad_controller.model.quadruped import quadruped
 from quad_controller.nodes.controller_node import ControllerNode, LATCHED_QOS
-from quad_description import robot_urdf
+from quad_description import DescriptionError, quadruped, robot_urdf
 from quad_gait_policies import metadata, write_policy
 from quad_msgs.msg import JointCommand
 from quad_msgs.srv import SetMode
@@ -243,7 +242,9 @@ def test_odd_parameters_are_refused_at_the_start(parameter: str, reason: str) ->
     """A parameter that makes no sense is told, and nothing runs."""
     rclpy.init(args=['--ros-args', '-p', parameter])
     try:
-        with pytest.raises((ParameterError, QuadControllerError), match=re.escape(reason)):
+        with pytest.raises(
+            (ParameterError, QuadControllerError, DescriptionError), match=re.escape(reason)
+        ):
             ControllerNode(threading.Event())
     finally:
         rclpy.shutdown()

@@ -14,13 +14,12 @@ from quad_controller.gait.body import BodyPose
 from quad_controller.gait.parameters import GaitParameters
 from quad_controller.gait.servo_compensation import ServoModel
 from quad_controller.gait.velocity import Velocity
-from quad_controller.model.quadruped import quadruped
 from quad_controller.states.measurement import Measurement
-from quad_description import robot_urdf
+from quad_description import quadruped, robot_urdf
+from quad_description.rotations import about_z, multiply, roll_pitch_yaw
 from quad_gait_physics import measure, PhysicsRig
 from quad_hardware.estimation import ImuMounting
 from quad_hardware.estimation.imu_mounting import UNCHECKED_DEVIATION
-from quad_hardware.estimation.rotation import about_z, multiply, yaw_of
 from quad_sim import ServoParameters, Terrain
 from quad_sim.physics import Robot
 
@@ -180,12 +179,12 @@ def yawed_imu(mounting: ImuMounting, robot: Robot) -> Measurement:
     """What a controller gets of an IMU that is turned by 180 degrees about the vertical."""
     measured = measure(robot)
     assert measured.imu is not None
-    x, y, z, w = multiply(measured.imu.orientation, about_z(math.pi))
-    roll = math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
-    pitch = math.asin(2 * (w * y - z * x))
-    reported = math.degrees(roll), math.degrees(pitch), math.degrees(yaw_of((x, y, z, w)))
+    turned = multiply(measured.imu.orientation, about_z(math.pi))
+    roll, pitch, yaw = map(math.degrees, roll_pitch_yaw(turned))
     deviation = 0.02 if mounting.checked else UNCHECKED_DEVIATION
-    imu = replace(measured.imu, orientation=mounting.attitude(reported), deviation=deviation)
+    imu = replace(
+        measured.imu, orientation=mounting.attitude((roll, pitch, yaw)), deviation=deviation
+    )
     return replace(measured, imu=imu)
 
 

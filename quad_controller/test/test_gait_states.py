@@ -11,18 +11,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 import pytest
 
-from quad_controller.exceptions import DescriptionError, ParameterError
+from quad_controller.exceptions import ParameterError
 from quad_controller.gait.body import BodyPose
 from quad_controller.gait.generator import GaitGenerator
 from quad_controller.gait.parameters import GaitParameters
 from quad_controller.gait.velocity import Velocity
-from quad_controller.model.urdf import Vector
 from quad_controller.states.controller import Controller
 from quad_controller.states.faults import Fault
 from quad_controller.states.measurement import ImuSample, JointSample, Measurement
 from quad_controller.states.modes import MODES, State
 from quad_controller.states.parameters import StateParameters
-from quad_description import raised_feet
+from quad_description import DescriptionError, raised_feet
+from quad_description.rotations import Vector
 from quad_gait_rig import ARM_ROBOT, FOLDED, PERIOD, Rig, ROBOT, StillPolicy, tilted, UPRIGHT
 
 pytestmark = pytest.mark.slow

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 import numpy as np
 import pytest
 
+from quad_builds import urdf
 from quad_controller.gait.body import UPRIGHT
 from quad_controller.gait.generator import GaitGenerator
 from quad_controller.gait.lift import hermite
@@ -18,8 +19,7 @@ from quad_controller.gait.parameters import GaitParameters
 from quad_controller.gait.schedule import Gait, SCHEDULES
 from quad_controller.gait.stepping import Stepper
 from quad_controller.gait.velocity import REST, Velocity
-from quad_controller.model.quadruped import quadruped
-from quad_gait_urdf import urdf
+from quad_description import quadruped
 
 pytestmark = pytest.mark.slow
 

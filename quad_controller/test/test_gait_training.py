@@ -14,13 +14,13 @@ from train_imitation import Trainer
 from quad_controller.gait.generator import GaitGenerator
 from quad_controller.gait.parameters import GaitParameters
 from quad_controller.gait.velocity import Velocity
-from quad_controller.model.quadruped import Targets
 from quad_controller.policy.check import check_contract
 from quad_controller.policy.interface import PolicyStep
 from quad_controller.policy.metadata import read_metadata
 from quad_controller.policy.network import OnnxNetwork
 from quad_controller.policy.options import PolicyOptions
 from quad_controller.states.measurement import ImuSample, JointSample
+from quad_description import Targets
 from quad_gait_physics import MODEL, PhysicsRig
 
 pytestmark = pytest.mark.slow
@@ -46,7 +46,7 @@ class Lesson:
         """Answer for what was measured, and go on in the cycle while there is a velocity."""
         self._phase = (self._phase + dt / self._teacher.schedule.period) % 1.0
         phase = 0.0 if velocity.at_rest else self._phase
-        return PolicyStep(self._teacher.targets(velocity, phase, imu.roll_pitch), '')
+        return PolicyStep(self._teacher.targets(velocity, phase, imu.roll_pitch_yaw[:2]), '')
 
 
 @pytest.mark.parametrize('velocity', [Velocity(0.2), Velocity(0.1, 0.05), Velocity(yaw=0.6)])

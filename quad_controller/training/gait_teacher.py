@@ -11,8 +11,8 @@ from quad_controller.gait.lift import arc, hermite, SwingLift
 from quad_controller.gait.parameters import GaitParameters
 from quad_controller.gait.schedule import Gait
 from quad_controller.gait.velocity import Velocity
-from quad_controller.model.quadruped import Quadruped, Targets
-from quad_controller.model.urdf import Vector
+from quad_description import Quadruped, Targets
+from quad_description.rotations import Vector
 
 
 class GaitTeacher:

@@ -24,11 +24,10 @@ from policy_mlp import fit, Floats, Mlp
 
 from quad_controller.gait.parameters import GaitParameters
 from quad_controller.gait.velocity import Velocity
-from quad_controller.model.quadruped import quadruped
 from quad_controller.policy.observation import ObservationBuilder, TERMS, width
 from quad_controller.policy.options import GravitySource
 from quad_controller.states.measurement import ImuSample
-from quad_description import robot_urdf
+from quad_description import quadruped, robot_urdf
 from quad_sim import ServoModel, Terrain
 from quad_sim.physics import Robot
 

@@ -1,26 +1,49 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The XGO quadruped as a URDF, made from its numbers; nothing here imports rclpy."""
+"""The XGO quadruped: URDF from its numbers, legs, limits, poses, kinematics; without rclpy.
+
+Where the feet are, and the joints for where they shall be::
+
+    from quad_description import Pose, pose_positions, quadruped, robot_urdf
+
+    robot = quadruped(robot_urdf('lite'))
+    feet = robot.feet(list(pose_positions(Pose.STAND).values()))
+    solutions = robot.solve(feet)
+
+Public, besides the names below: the modules :mod:`.rotations` and :mod:`.urdf`.
+"""
 
 from .exceptions import DescriptionError, PresetError
-from .feet import foot_position, raised_feet, standing_height
 from .joint_commands import STREAM_TIMEOUT
-from .joints import Joint, LEGS, movable_joints
+from .kinematics.leg import LegGeometry, LEGS
+from .kinematics.leg_kinematics import foot_position, jacobian, LegSolution, solve
+from .kinematics.quadruped import Feet, FootPose, Quadruped, quadruped, Targets
+from .kinematics.support import raised_feet
 from .poses import Pose, pose_positions
-from .urdf import PRESETS, robot_urdf
+from .presets import PRESETS, robot_urdf
+from .urdf import Joint, JointLimits, movable_joints
 
 __all__ = [
     'LEGS',
     'PRESETS',
     'STREAM_TIMEOUT',
     'DescriptionError',
+    'Feet',
+    'FootPose',
     'Joint',
+    'JointLimits',
+    'LegGeometry',
+    'LegSolution',
     'Pose',
     'PresetError',
+    'Quadruped',
+    'Targets',
     'foot_position',
+    'jacobian',
     'movable_joints',
     'pose_positions',
+    'quadruped',
     'raised_feet',
     'robot_urdf',
-    'standing_height',
+    'solve',
 ]

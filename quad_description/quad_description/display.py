@@ -16,11 +16,11 @@ from tf2_msgs.msg import TFMessage
 from node_runner import destroyed_when_refused, ParameterReader, refuse_misspelt, run_node
 
 from .exceptions import DescriptionError
-from .feet import standing_height
-from .joints import movable_joints
-from .motion import sweep
+from .kinematics.quadruped import quadruped
 from .poses import Pose, pose_positions
-from .urdf import PRESETS, robot_urdf
+from .presets import PRESETS, robot_urdf
+from .sweep import sweep
+from .urdf import movable_joints
 
 SWEEP = 'sweep'
 MOTIONS = (SWEEP, *(pose.value for pose in Pose))
@@ -48,14 +48,14 @@ class Display(Node):
         self._prefix = read.text('frame_prefix', '', 'before each frame')
         refuse_misspelt(self)
         urdf = robot_urdf(preset, arm)
-        self._joints = movable_joints(urdf)
+        self._robot, self._joints = quadruped(urdf), movable_joints(urdf)
         self._moves = motion == SWEEP
         self._rest = pose_positions(Pose.STAND if self._moves else Pose(motion), arm)
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self._description = self.create_publisher(String, 'robot_description', latched)
         self._description.publish(String(data=urdf))
         self._states = self.create_publisher(JointState, 'joint_states', 10)
-        self._footprint = self.create_publisher(TFMessage, '/tf', 10)
+        self._tf = self.create_publisher(TFMessage, '/tf', 10)
         self._start = self.get_clock().now()
         self.create_timer(1.0 / rate, self._publish)
         self.get_logger().info(f'{preset}: {len(self._joints)} joints, motion {motion}')
@@ -68,17 +68,15 @@ class Display(Node):
         message = JointState(name=list(positions), position=list(positions.values()))
         message.header.stamp = now.to_msg()
         self._states.publish(message)
-        self._footprint.publish(TFMessage(transforms=[_footprint(message, self._prefix)]))
+        self._tf.publish(TFMessage(transforms=[self._to_footprint(message)]))
 
-
-def _footprint(states: JointState, prefix: str) -> TransformStamped:
-    """Return where the ground is below a body that is level and stands on its lowest foot."""
-    transform = TransformStamped(child_frame_id=f'{prefix}base_footprint')
-    transform.header.stamp = states.header.stamp
-    transform.header.frame_id = f'{prefix}base_link'
-    positions = dict(zip(states.name, states.position, strict=True))
-    transform.transform.translation.z = -standing_height(positions)
-    return transform
+    def _to_footprint(self, states: JointState) -> TransformStamped:
+        """Return where the ground is below a body that is level and stands on its lowest foot."""
+        transform = TransformStamped(child_frame_id=f'{self._prefix}base_footprint')
+        transform.header.stamp = states.header.stamp
+        transform.header.frame_id = f'{self._prefix}base_link'
+        transform.transform.translation.z = -self._robot.standing_height(states.position)
+        return transform
 
 
 def run(args: list[str] | None = None) -> int:

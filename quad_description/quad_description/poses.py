@@ -8,7 +8,7 @@ from enum import Enum
 from typing import Any
 
 from .figures import robot_numbers
-from .joints import LEGS
+from .kinematics.leg import LEGS
 
 _LEG_JOINTS = ('hip', 'thigh', 'calf')
 _ARM_JOINTS = ('yaw', 'thigh', 'calf')

@@ -1,65 +1,242 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The URDF of a preset, expanded from the xacro files of this package."""
+"""The URDF of a quadruped, read once: links, joints, limits, masses."""
 
 from __future__ import annotations
 
-from functools import lru_cache
+from dataclasses import dataclass
+from enum import Enum
 import math
-from typing import Final
 from xml.etree import ElementTree as ET
 
-from .exceptions import DescriptionError, PresetError
-from .figures import MODEL, robot_numbers
-
-PRESETS: Final[tuple[str, ...]] = tuple(sorted(robot_numbers()['presets']))
-"""Names of the robots that there are."""
-
-TRUNK_MASS_RANGE: Final = (0.05, 5.0)  # [kg] what the legs could carry, with room to spare
+from .exceptions import DescriptionError
+from .rotations import from_roll_pitch_yaw, Quaternion, Vector
 
 
-@lru_cache(maxsize=16)
-def robot_urdf(preset: str = 'lite', arm: bool = False, trunk_mass: float | None = None) -> str:
-    """Make the URDF of a robot.
+class JointKind(Enum):
+    """Joint types of the URDF specification."""
+
+    REVOLUTE = 'revolute'
+    CONTINUOUS = 'continuous'
+    PRISMATIC = 'prismatic'
+    FIXED = 'fixed'
+    FLOATING = 'floating'
+    PLANAR = 'planar'
+
+
+MOVABLE = frozenset({JointKind.REVOLUTE, JointKind.CONTINUOUS, JointKind.PRISMATIC})
+"""Joints with exactly one variable."""
+
+
+@dataclass(frozen=True, slots=True)
+class JointLimits:
+    """Range of a joint.
+
+    Attributes:
+        lower: Smallest position in [rad] or [m].
+        upper: Largest position in [rad] or [m].
+        velocity: Largest speed in [rad/s] or [m/s].
+        effort: Largest torque in [N m] or force in [N].
+    """
+
+    lower: float = -math.inf
+    upper: float = math.inf
+    velocity: float = math.inf
+    effort: float = math.inf
+
+    def clamp(self, position: float) -> float:
+        """Return the nearest position within the range."""
+        return min(max(position, self.lower), self.upper)
+
+
+@dataclass(frozen=True, slots=True)
+class Joint:
+    """A joint; the child's frame sits in the parent's at ``position``, turned by ``rotation``.
+
+    Attributes:
+        name: Name in the URDF.
+        kind: Its type.
+        parent: Link that it is fixed to.
+        child: Link that it moves.
+        position: Origin in the parent's frame in [m].
+        rotation: From the child's frame at zero to the parent's.
+        axis: Unit vector of the motion in the child's frame.
+        limits: Its range; unlimited where the joint takes no commands and the URDF has none.
+        mimics: Whether it follows another joint.
+    """
+
+    name: str
+    kind: JointKind
+    parent: str
+    child: str
+    position: Vector
+    rotation: Quaternion
+    axis: Vector
+    limits: JointLimits
+    mimics: bool
+
+    @property
+    def commanded(self) -> bool:
+        """Whether it takes commands of its own."""
+        return self.kind in MOVABLE and not self.mimics
+
+
+@dataclass(frozen=True, slots=True)
+class PointMass:
+    """A link's mass in [kg] and its centre in the link's frame in [m]."""
+
+    mass: float
+    centre: Vector
+
+
+@dataclass(frozen=True, slots=True)
+class Description:
+    """A robot.
+
+    Attributes:
+        links: Names of all links in the order of the URDF.
+        joints: All joints in the order of the URDF.
+        masses: Mass and centre of the links that have one, by name.
+        spheres: Radius of the first sphere of the links that have one, by name, in [m].
+    """
+
+    links: tuple[str, ...]
+    joints: tuple[Joint, ...]
+    masses: dict[str, PointMass]
+    spheres: dict[str, float]
+
+    @property
+    def commanded(self) -> tuple[Joint, ...]:
+        """Joints that take commands, in the order of the URDF."""
+        return tuple(joint for joint in self.joints if joint.commanded)
+
+
+def parse(urdf: str) -> Description:
+    """Read a URDF.
 
     Args:
-        preset: One of :data:`PRESETS`.
-        arm: With the arm and gripper on its back.
-        trunk_mass: Mass of the trunk in [kg] when the robot carries more than the bare one, whose
-            figure is the preset's.
-
-    Returns:
-        The URDF as XML text.
+        urdf: URDF as XML text.
 
     Raises:
-        PresetError: There is no such preset.
-        DescriptionError: The mass of the trunk is none.
+        DescriptionError: It is no URDF, a number in it is none, or a joint that takes commands
+            has no limits.
     """
-    if preset not in PRESETS:
-        raise PresetError(f'there is no preset {preset!r}; choose one of {", ".join(PRESETS)}')
-    lowest, highest = TRUNK_MASS_RANGE
-    if trunk_mass is not None and not (
-        math.isfinite(trunk_mass) and lowest <= trunk_mass <= highest
-    ):
+    try:
+        # a robot description is the user's own file, and expat resolves no external entities
+        robot = ET.fromstring(urdf)  # noqa: S314
+    except ET.ParseError as error:
         raise DescriptionError(
-            f'trunk_mass {trunk_mass} kg is not {lowest} to {highest} kg; '
-            "leave it out for the preset's own"
-        )
-    return _expand(
-        {
-            'preset': preset,
-            'arm': str(bool(arm)).lower(),
-            'trunk_mass': repr(float(trunk_mass or 0.0)),
-        }
+            f'the robot description is not XML: {error}; give its text: "$(xacro robot.xacro)"'
+        ) from error
+    if robot.tag != 'robot':
+        raise DescriptionError(f'the robot description is no URDF: its root is <{robot.tag}>')
+    links = {link.get('name', ''): link for link in robot.findall('link')}
+    spheres = {name: link.find('.//sphere') for name, link in links.items()}
+    return Description(
+        links=tuple(links),
+        joints=tuple(_joint(element) for element in robot.findall('joint')),
+        masses={
+            name: _point_mass(link)
+            for name, link in links.items()
+            if link.find('inertial/mass') is not None
+        },
+        spheres={
+            name: _number(sphere, 'radius', name)
+            for name, sphere in spheres.items()
+            if sphere is not None
+        },
     )
 
 
-def _expand(arguments: dict[str, str]) -> str:
-    import xacro
+def movable_joints(urdf: str) -> tuple[Joint, ...]:
+    """Return the joints that have a motor, in the order of the URDF; those that mimic do not.
 
-    path = MODEL / 'quadruped.urdf.xacro'
-    document = xacro.process_file(str(path), mappings=arguments).toxml()
-    # parsing drops the comments, and with them the path on this machine
-    root = ET.fromstring(document)  # noqa: S314  made a line above, from our own files
-    ET.indent(root)
-    return ET.tostring(root, encoding='unicode')
+    Raises:
+        DescriptionError: As :func:`parse`.
+    """
+    return parse(urdf).commanded
+
+
+def _joint(element: ET.Element) -> Joint:
+    name = element.get('name', '')
+    try:
+        kind = JointKind(element.get('type'))
+    except ValueError:
+        raise DescriptionError(f'joint {name}: {element.get("type")!r} is no joint type') from None
+    origin = element.find('origin')
+    mimics = element.find('mimic') is not None
+    return Joint(
+        name=name,
+        kind=kind,
+        parent=_link(element, 'parent'),
+        child=_link(element, 'child'),
+        position=_vector(origin, 'xyz', name),
+        rotation=from_roll_pitch_yaw(*_vector(origin, 'rpy', name)),
+        axis=_unit(_vector(element.find('axis'), 'xyz', name, '1 0 0'), name),
+        limits=_limits(element, name, kind, needed=kind in MOVABLE and not mimics),
+        mimics=mimics,
+    )
+
+
+def _link(element: ET.Element, tag: str) -> str:
+    link = element.find(tag)
+    name = link.get('link') if link is not None else None
+    if not name:
+        raise DescriptionError(f'joint {element.get("name")}: <{tag} link="..."/> is missing')
+    return name
+
+
+def _limits(joint: ET.Element, name: str, kind: JointKind, *, needed: bool) -> JointLimits:
+    element = joint.find('limit')
+    given = {} if element is None else element.attrib
+    lacking = [key for key in ('velocity', 'effort') if key not in given]
+    if needed and lacking:
+        raise DescriptionError(
+            f'joint {name}: a {kind.value} joint needs <limit .../> with {" and ".join(lacking)}'
+        )
+    if element is None:
+        return JointLimits()
+    velocity, effort = (
+        math.inf if key in lacking else _number(element, key, name)
+        for key in ('velocity', 'effort')
+    )
+    if kind is JointKind.CONTINUOUS:
+        return JointLimits(velocity=velocity, effort=effort)
+    lower, upper = (_number(element, key, name) for key in ('lower', 'upper'))
+    return JointLimits(lower, upper, velocity, effort)
+
+
+def _point_mass(link: ET.Element) -> PointMass:
+    name = link.get('name', '')
+    mass = link.find('inertial/mass')
+    value = _number(mass, 'value', name) if mass is not None else 0.0
+    return PointMass(value, _vector(link.find('inertial/origin'), 'xyz', name))
+
+
+def _number(element: ET.Element, attribute: str, name: str) -> float:
+    return _numbers(element.get(attribute, '0'), 1, name)[0]
+
+
+def _vector(
+    element: ET.Element | None, attribute: str, name: str, default: str = '0 0 0'
+) -> Vector:
+    text = element.get(attribute, default) if element is not None else default
+    x, y, z = _numbers(text, 3, name)
+    return x, y, z
+
+
+def _numbers(text: str, count: int, name: str) -> list[float]:
+    try:
+        numbers = [float(word) for word in text.split()]
+    except ValueError:
+        numbers = []
+    if len(numbers) != count or not all(map(math.isfinite, numbers)):
+        raise DescriptionError(f'{name}: {text!r} is not {count} finite number(s)')
+    return numbers
+
+
+def _unit(vector: Vector, name: str) -> Vector:
+    length = math.hypot(*vector)
+    if length == 0.0:
+        raise DescriptionError(f'joint {name}: its axis has no direction')
+    return vector[0] / length, vector[1] / length, vector[2] / length

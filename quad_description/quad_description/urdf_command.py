@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import sys
 
 from .exceptions import DescriptionError
-from .urdf import PRESETS, robot_urdf
+from .presets import PRESETS, robot_urdf
 
 
 def run(argv: Sequence[str] | None = None) -> int:

@@ -24,13 +24,14 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from tf2_msgs.msg import TFMessage
 
-from quad_description import movable_joints, Pose, pose_positions, robot_urdf, standing_height
-from quad_description.motion import sweep, SWEEP_DURATION
+from quad_description import movable_joints, Pose, pose_positions, quadruped, robot_urdf
+from quad_description.sweep import sweep, SWEEP_DURATION
 
 pytestmark = pytest.mark.slow
 
 PACKAGE = Path(__file__).parents[1]
 JOINTS = movable_joints(robot_urdf('lite'))
+ROBOT = quadruped(robot_urdf('lite'))
 REST = pose_positions(Pose.STAND)
 
 
@@ -40,7 +41,7 @@ def test_a_sweep_moves_one_joint_within_its_limits(elapsed: float) -> None:
     positions = sweep(JOINTS, REST, elapsed)
     assert sum(positions[name] != REST[name] for name in REST) <= 1
     for joint in JOINTS:
-        assert joint.lower - 1e-9 <= positions[joint.name] <= joint.upper + 1e-9
+        assert joint.limits.lower - 1e-9 <= positions[joint.name] <= joint.limits.upper + 1e-9
 
 
 def test_a_sweep_reaches_both_ends_of_every_joint() -> None:
@@ -48,8 +49,8 @@ def test_a_sweep_reaches_both_ends_of_every_joint() -> None:
     for index, joint in enumerate(JOINTS):
         up = sweep(JOINTS, REST, (index + 0.25) * SWEEP_DURATION)
         down = sweep(JOINTS, REST, (index + 0.75) * SWEEP_DURATION)
-        assert up[joint.name] == pytest.approx(joint.upper)
-        assert down[joint.name] == pytest.approx(joint.lower)
+        assert up[joint.name] == pytest.approx(joint.limits.upper)
+        assert down[joint.name] == pytest.approx(joint.limits.lower)
 
 
 class Listener:
@@ -107,7 +108,7 @@ def test_the_display_publishes_what_viewers_need(listener: Listener, isolation: 
         assert description.data == robot_urdf('mini', arm=True)
         tree = listener.wait_for(TFMessage, '/tf', 10).transforms[0]
         assert (tree.header.frame_id, tree.child_frame_id) == ('base_link', 'base_footprint')
-        lying = standing_height(pose_positions(Pose.LIE))
+        lying = ROBOT.standing_height(list(pose_positions(Pose.LIE).values()))
         assert tree.transform.translation.z == pytest.approx(-lying)
         assert dict(zip(states.name, states.position, strict=True)) == pose_positions(
             Pose.LIE, arm=True

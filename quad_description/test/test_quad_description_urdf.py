@@ -15,15 +15,14 @@ import pytest
 
 from quad_description import (
     DescriptionError,
-    foot_position,
     LEGS,
     movable_joints,
     Pose,
     pose_positions,
     PresetError,
     PRESETS,
+    quadruped,
     robot_urdf,
-    standing_height,
 )
 from quad_description.urdf_command import run
 from quad_kinematics import centre_of_mass, inertia, link_pose, mass, parse, rotation
@@ -37,6 +36,9 @@ builds = pytest.mark.parametrize(('preset', 'arm'), BUILDS)
 # roll axis, knee and pad of a left leg at zero [m], as the vendor's model has them
 HIP_X = {'f': 0.04946, 'b': -0.10059}
 ANGLE = st.floats(-1.0, 1.0)
+BROKEN = (
+    '<robot><joint name="a" type="revolute"><parent link="b"/><child link="c"/>{}</joint></robot>'
+)
 
 
 @builds
@@ -120,7 +122,9 @@ def test_foot_positions_are_those_of_the_urdf(
     names = (f'{leg}_{joint}_joint' for joint in ('hip', 'thigh', 'calf'))
     at = dict(zip(names, (hip, thigh, calf), strict=True))
     expected, _ = link_pose(parse(robot_urdf('mini')), f'{leg}_foot', at)
-    assert foot_position(leg, at) == pytest.approx(expected, abs=1e-9)
+    robot = quadruped(robot_urdf('mini'))
+    feet = robot.feet([at.get(name, 0.0) for name in robot.names])
+    assert feet[LEGS.index(leg)] == pytest.approx(expected, abs=1e-9)
 
 
 def test_a_positive_hip_moves_each_foot_inward() -> None:
@@ -152,16 +156,19 @@ def test_poses_keep_the_limits(preset: str, arm: bool) -> None:
         positions = pose_positions(pose, arm)
         assert list(positions) == [joint.name for joint in joints]
         for joint in joints:
-            assert joint.lower <= positions[joint.name] <= joint.upper
-            assert joint.velocity > 0
-            assert joint.effort > 0
+            assert joint.limits.lower <= positions[joint.name] <= joint.limits.upper
+            assert joint.limits.velocity > 0
+            assert joint.limits.effort > 0
 
 
 def test_standing_height_is_that_of_the_vendors_default_pose() -> None:
     """The base stands 125 to 130 mm above the ground."""
     foot, _ = link_pose(parse(robot_urdf('mini')), 'fl_foot', pose_positions(Pose.STAND))
     assert 0.125 <= 0.010 - foot[2] <= 0.130
-    assert standing_height(pose_positions(Pose.STAND)) == pytest.approx(0.010 - foot[2])
+    standing = list(pose_positions(Pose.STAND).values())
+    assert quadruped(robot_urdf('mini')).standing_height(standing) == pytest.approx(
+        0.010 - foot[2]
+    )
 
 
 def test_the_lite_keeps_what_its_servos_reach() -> None:
@@ -172,8 +179,12 @@ def test_the_lite_keeps_what_its_servos_reach() -> None:
     )
     for lite, mini in pairs:
         lowest, highest = reach[lite.name.split('_')[1]]
-        assert max(mini.lower, math.radians(lowest)) == pytest.approx(lite.lower, abs=2e-3)
-        assert min(mini.upper, math.radians(highest)) == pytest.approx(lite.upper, abs=1e-3)
+        assert max(mini.limits.lower, math.radians(lowest)) == pytest.approx(
+            lite.limits.lower, abs=2e-3
+        )
+        assert min(mini.limits.upper, math.radians(highest)) == pytest.approx(
+            lite.limits.upper, abs=1e-3
+        )
 
 
 @settings(max_examples=10)
@@ -208,9 +219,13 @@ def test_an_unknown_preset_is_answered_with_the_list() -> None:
 @pytest.mark.parametrize(
     ('urdf', 'message'),
     [
-        ('<robot', 'no XML'),
-        ('<robot><joint name="a" type="revolute"/></robot>', 'joint a: a revolute joint needs'),
-        ('<robot><joint name="a" type="revolute"><limit lower="x"/></joint></robot>', 'joint a'),
+        ('<robot', 'not XML'),
+        (
+            BROKEN.format(''),
+            'joint a: a revolute joint needs <limit .../> with velocity and effort',
+        ),
+        (BROKEN.format('<limit velocity="1" effort="1" lower="x"/>'), "a: 'x' is not 1 finite"),
+        (BROKEN.format('<axis xyz="0 0 0"/>'), 'joint a: its axis has no direction'),
     ],
 )
 def test_a_broken_description_is_refused(urdf: str, message: str) -> None:

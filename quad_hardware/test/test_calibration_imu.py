@@ -17,15 +17,9 @@ import pytest
 
 from quad_calibration_script import Script
 from quad_description import movable_joints, robot_urdf
-from quad_hardware.calibration.imu import find_mounting, Readings, Stance
-from quad_hardware.calibration.main import run_calibrate
-from quad_hardware.calibration.parameter_file import imu_parameters, read_parameters
-from quad_hardware.calibration.robot import ImuReading
-from quad_hardware.estimation.estimator import Estimator, EstimatorSettings
-from quad_hardware.estimation.gravity import gravity_from_attitude, STANDARD_GRAVITY
-from quad_hardware.estimation.imu_mounting import ImuMounting
-from quad_hardware.estimation.rotation import (
+from quad_description.rotations import (
     conjugate,
+    down_in_body,
     from_roll_pitch_yaw,
     multiply,
     Quaternion,
@@ -34,6 +28,13 @@ from quad_hardware.estimation.rotation import (
     Vector,
     yaw_of,
 )
+from quad_hardware.calibration.imu import find_mounting, Readings, Stance
+from quad_hardware.calibration.main import run_calibrate
+from quad_hardware.calibration.parameter_file import imu_parameters, read_parameters
+from quad_hardware.calibration.robot import ImuReading
+from quad_hardware.estimation.estimator import Estimator, EstimatorSettings
+from quad_hardware.estimation.gravity import STANDARD_GRAVITY
+from quad_hardware.estimation.imu_mounting import ImuMounting
 from quad_hardware.exceptions import CommandError
 from quad_hardware.joints import JointMap, servo_of
 from quad_hardware.link import RobotState
@@ -72,7 +73,7 @@ def signed(signs: Vector, values: Vector) -> Vector:
 def report(mounting: ImuMounting, body: Quaternion) -> ImuReading:
     """What an IMU with a mounting reports of a body at rest."""
     unsigned = angles_of(multiply(body, mounting.rotation))
-    x, y, z = gravity_from_attitude(body)
+    x, y, z = down_in_body(body)
     force = (-STANDARD_GRAVITY * x, -STANDARD_GRAVITY * y, -STANDARD_GRAVITY * z)
     felt = rotate(conjugate(mounting.rotation), force)
     return ImuReading(
@@ -106,9 +107,7 @@ def test_what_is_found_turns_reports_into_the_attitude_of_the_body(
         body = from_roll_pitch_yaw(roll, pitch, turn)
         seen = report(mounting, body)
         attitude = found.attitude(seen.attitude)
-        assert gravity_from_attitude(attitude) == pytest.approx(
-            gravity_from_attitude(body), abs=1e-6
-        )
+        assert down_in_body(attitude) == pytest.approx(down_in_body(body), abs=1e-6)
         if accelerometer:
             assert seen.acceleration is not None
             down = rotate(conjugate(body), (0.0, 0.0, -STANDARD_GRAVITY))
@@ -146,9 +145,7 @@ def test_reports_are_published_for_the_body(mounting: ImuMounting) -> None:
     estimate = estimator.update(state)
     assert estimate is not None
     assert estimate.attitude is not None
-    assert gravity_from_attitude(estimate.attitude) == pytest.approx(
-        gravity_from_attitude(body), abs=1e-6
-    )
+    assert down_in_body(estimate.attitude) == pytest.approx(down_in_body(body), abs=1e-6)
     up = rotate(conjugate(body), (0.0, 0.0, STANDARD_GRAVITY))
     assert estimate.acceleration == pytest.approx(up, abs=1e-6)
     assert estimate.angular_velocity == pytest.approx(turning, abs=1e-9)

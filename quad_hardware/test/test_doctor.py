@@ -61,7 +61,7 @@ def test_a_robot_that_is_well_gets_no_remedy() -> None:
         ({'joints': NAMES[1:]}, 'joints', Severity.ERROR, 'fl_hip_joint'),
         ({'joints': (*NAMES, 'tail')}, 'joints', Severity.ERROR, 'tail'),
         ({'urdf': ''}, 'robot_description', Severity.WARNING, 'robot_state_publisher'),
-        ({'urdf': '<robot'}, 'robot_description', Severity.ERROR, 'no XML'),
+        ({'urdf': '<robot'}, 'robot_description', Severity.ERROR, 'not XML'),
         ({'parents': {'base_link': 'odom'}}, 'tf', Severity.ERROR, 'fl_foot'),
         (
             {'publishers': {'joint_command': ['controller_node', 'other']}},
@@ -83,8 +83,7 @@ def test_what_is_wrong_with_the_graph_is_found(
 
 def test_a_tree_with_a_loop_or_a_gap_reaches_nothing() -> None:
     """Only a way up to odom counts."""
-    urdf = '<robot name="r"><link name="a"/><link name="b"/><link name="c"/></robot>'
-    assert links_without_place(urdf, {'a': 'b', 'b': 'a', 'c': 'odom'}) == ['a', 'b']
+    assert links_without_place(('a', 'b', 'c'), {'a': 'b', 'b': 'a', 'c': 'odom'}) == ['a', 'b']
 
 
 @pytest.mark.parametrize(

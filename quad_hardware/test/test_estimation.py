@@ -12,27 +12,25 @@ from hypothesis import strategies as st
 import pytest
 
 from quad_description import movable_joints, robot_urdf
-from quad_hardware.estimation import Estimator, EstimatorSettings, ImuMounting, RateSource
-from quad_hardware.estimation.battery import Battery, BatteryFilter, REPORTS
-from quad_hardware.estimation.filters import AttitudeRate, JointRate
-from quad_hardware.estimation.gravity import (
-    gravity_from_acceleration,
-    gravity_from_attitude,
-    GravityCheck,
-)
-from quad_hardware.estimation.plausibility import PATIENCE, Plausibility
-from quad_hardware.estimation.rotation import (
+from quad_description.rotations import (
     about_z,
     conjugate,
+    down_in_body,
     from_roll_pitch_yaw,
     IDENTITY,
     multiply,
     Quaternion,
     rotate,
-    rotation_vector,
     Vector,
-    yaw_of,
 )
+from quad_hardware.estimation import Estimator, EstimatorSettings, ImuMounting, RateSource
+from quad_hardware.estimation.battery import Battery, BatteryFilter, REPORTS
+from quad_hardware.estimation.filters import AttitudeRate, JointRate
+from quad_hardware.estimation.gravity import (
+    gravity_from_acceleration,
+    GravityCheck,
+)
+from quad_hardware.estimation.plausibility import PATIENCE, Plausibility
 from quad_hardware.estimation.sample_clock import SampleClock
 from quad_hardware.joints import JointMap, servo_of
 from quad_hardware.link.state import DEVICE_TIME_WRAP, RobotState
@@ -83,29 +81,6 @@ def test_signs_are_checked_when_those_of_the_gyro_are(
     assert estimate.signs_checked is checked
 
 
-@given(ROTATIONS, ROTATIONS, VECTORS)
-def test_rotations_are_a_group_that_acts(a: Quaternion, b: Quaternion, v: Vector) -> None:
-    """One after the other is their product; the inverse undoes."""
-    assert rotate(multiply(a, b), v) == pytest.approx(rotate(a, rotate(b, v)), abs=1e-9)
-    assert rotate(conjugate(a), rotate(a, v)) == pytest.approx(v, abs=1e-9)
-
-
-@given(ANGLES, st.floats(-1.5, 1.5), ANGLES, VECTORS)
-def test_angles_turn_about_fixed_axes(roll: float, pitch: float, yaw: float, v: Vector) -> None:
-    """First x, then y, then z (REP 103); the yaw comes back."""
-    rotation = from_roll_pitch_yaw(roll, pitch, yaw)
-    step = rotate(from_roll_pitch_yaw(roll, 0, 0), v)
-    step = rotate(from_roll_pitch_yaw(0, pitch, 0), step)
-    assert rotate(rotation, v) == pytest.approx(rotate(about_z(yaw), step), abs=1e-9)
-    assert math.remainder(yaw_of(rotation) - yaw, math.tau) == pytest.approx(0, abs=1e-9)
-
-
-@given(st.tuples(*[st.floats(-1, 1)] * 3))
-def test_a_rotation_vector_is_axis_times_angle(vector: Vector) -> None:
-    """Also for a rotation by nothing."""
-    assert rotation_vector(spun(vector, 1.0)) == pytest.approx(vector, abs=1e-6)
-
-
 @given(ROTATIONS, st.tuples(*[st.floats(-4, 4)] * 3))
 def test_a_constant_rate_is_found_from_any_attitude(start: Quaternion, rate: Vector) -> None:
     """In the frame of the body, through every wrap of yaw, once the filter has settled."""
@@ -133,14 +108,14 @@ def test_after_a_gap_the_rate_begins_at_rest() -> None:
 def test_both_directions_of_gravity_agree_at_rest(attitude: Quaternion) -> None:
     """An accelerometer at rest reads upwards, so gravity is its opposite."""
     felt = rotate(conjugate(attitude), (0.0, 0.0, 9.8))
-    assert gravity_from_acceleration(felt) == pytest.approx(gravity_from_attitude(attitude))
+    assert gravity_from_acceleration(felt) == pytest.approx(down_in_body(attitude))
     assert check([(attitude, felt)] * 50) == pytest.approx(0.0, abs=1e-6)
 
 
 def test_gravity_is_not_read_while_accelerating() -> None:
     """A push is no tilt; upright, gravity is (0, 0, -1); axes that are swapped are seen."""
     assert gravity_from_acceleration((9.0, 0.0, 9.8)) is None
-    assert gravity_from_attitude(IDENTITY) == (0.0, 0.0, -1.0)
+    assert down_in_body(IDENTITY) == (0.0, 0.0, -1.0)
     assert check([(IDENTITY, (9.8, 0.0, 0.0))] * 50) == pytest.approx(math.pi / 2)
 
 

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from functools import cache
 import math
 import random
 import threading
@@ -14,11 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 import pytest
 
-from quad_description import movable_joints, robot_urdf
+from quad_description import FootPose, movable_joints, quadruped, robot_urdf
+from quad_description.rotations import from_roll_pitch_yaw, IDENTITY, yaw_of
 from quad_hardware.estimation import Estimator, EstimatorSettings
-from quad_hardware.estimation.feet import Feet, FootPose
 from quad_hardware.estimation.odometry import LegOdometry, OdometrySettings
-from quad_hardware.estimation.rotation import from_roll_pitch_yaw, IDENTITY, yaw_of
 from quad_hardware.exceptions import CommandError
 from quad_hardware.joints import JointMap, servo_of
 from quad_hardware.link import RobotState
@@ -27,23 +25,16 @@ from quad_hardware.protocol import LEG_MOTORS
 Array = NDArray[np.float64]
 
 URDF = robot_urdf('lite')
-NAMES = [joint.name for joint in movable_joints(URDF)]
+ROBOT = quadruped(URDF)
 PERIOD = 0.02  # [s]
-
-
-@cache
-def feet_of(urdf: str) -> Feet:
-    """The legs of a robot, read once."""
-    return Feet(urdf, NAMES)
 
 
 def test_standing_goes_nowhere() -> None:
     """Noise on the joints does not add up to a way worth the name."""
     odometry, rng = LegOdometry(OdometrySettings(), 0.01), random.Random(1)
-    feet = feet_of(URDF)
     for tick in range(500):
-        angles = [rng.gauss(0.0, math.radians(0.1)) for _ in NAMES]
-        state = odometry.update(tick * PERIOD, feet.poses(angles), IDENTITY)
+        angles = [rng.gauss(0.0, math.radians(0.1)) for _ in ROBOT.names]
+        state = odometry.update(tick * PERIOD, ROBOT.foot_poses(angles), IDENTITY)
     assert math.hypot(state.x, state.y) < 0.01
 
 
@@ -63,14 +54,15 @@ def test_a_rolling_foot_counts(yaw: float) -> None:
 
 def test_commands_may_come_from_another_thread() -> None:
     """Any number of them while a measurement is taken."""
-    odometry, feet = LegOdometry(OdometrySettings(), 0.01), feet_of(URDF).poses([0.0] * 12)
+    odometry, feet = LegOdometry(OdometrySettings(), 0.01), ROBOT.foot_poses([0.0] * 12)
+    centres = [foot.position for foot in feet]
     stop = threading.Event()
 
     def send() -> None:
         time = 0.0
         while not stop.is_set():
             time += 1e-4
-            odometry.command(time, feet)
+            odometry.command(time, centres)
 
     sender = threading.Thread(target=send)
     sender.start()
@@ -85,9 +77,8 @@ def test_commands_may_come_from_another_thread() -> None:
 def test_a_gap_is_no_way() -> None:
     """A robot that was carried to another stance while it was silent has not walked."""
     odometry = LegOdometry(OdometrySettings(), 0.01)
-    feet = feet_of(URDF)
-    odometry.update(0.0, feet.poses([0.0] * 12), IDENTITY)
-    state = odometry.update(2.0, feet.poses([0.2] * 12), IDENTITY)
+    odometry.update(0.0, ROBOT.foot_poses([0.0] * 12), IDENTITY)
+    state = odometry.update(2.0, ROBOT.foot_poses([0.2] * 12), IDENTITY)
     assert (state.x, state.y, state.velocity_x) == (0.0, 0.0, 0.0)
 
 
@@ -126,5 +117,7 @@ def test_a_robot_that_was_turned_while_its_cable_was_out_is_turned() -> None:
 
 def test_a_leg_that_is_missing_is_named() -> None:
     """A URDF whose foot hangs on nothing."""
+    joints = JointMap(servo_of(joint) for joint in movable_joints(URDF))
+    urdf = URDF.replace('<child link="fl_foot"', '<child link="other"')
     with pytest.raises(CommandError, match='no chain from base_link to fl_foot'):
-        Feet(URDF.replace('<child link="fl_foot"', '<child link="other"'), NAMES)
+        Estimator(urdf, joints, EstimatorSettings())

@@ -21,9 +21,7 @@ from sensor_msgs.msg import Imu
 
 from node_runner.wire import Form, Template
 from quad_description import movable_joints, robot_urdf
-from quad_hardware.estimation import Battery, Estimate, Health, OdometryState
-from quad_hardware.estimation.estimator import Estimator, EstimatorSettings
-from quad_hardware.estimation.rotation import (
+from quad_description.rotations import (
     from_roll_pitch_yaw,
     IDENTITY,
     multiply,
@@ -31,7 +29,9 @@ from quad_hardware.estimation.rotation import (
     Vector,
     yaw_of,
 )
-from quad_hardware.estimation.rotation import Quaternion as Rotation
+from quad_description.rotations import Quaternion as Rotation
+from quad_hardware.estimation import Battery, Estimate, Health, OdometryState
+from quad_hardware.estimation.estimator import Estimator, EstimatorSettings
 from quad_hardware.joints import CommandCounters, JointMap, servo_of
 from quad_hardware.link import DialectCounters, LinkState, LinkStatus, RobotState
 from quad_hardware.nodes import messages

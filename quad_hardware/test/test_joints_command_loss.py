@@ -13,14 +13,20 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from quad_description import movable_joints, Pose, pose_positions, raised_feet, robot_urdf
-from quad_hardware.estimation.feet import Feet
+from quad_description import (
+    movable_joints,
+    Pose,
+    pose_positions,
+    quadruped,
+    raised_feet,
+    robot_urdf,
+)
 from quad_hardware.joints import JointCommander, JointMap, LimiterSettings, servo_of
 from quad_hardware.joints.command_loss import CommandLoss, LossReaction, SPEED
 
 JOINTS = JointMap(servo_of(joint) for joint in movable_joints(robot_urdf('lite')))
 NAMES = JOINTS.names
-FEET = Feet(robot_urdf('lite'), NAMES)
+ROBOT = quadruped(robot_urdf('lite'))
 PERIOD = 0.02  # [s]
 STAND = pose_positions(Pose.STAND)
 STANDING = [STAND[name] for name in NAMES]
@@ -29,7 +35,7 @@ LYING = [pose_positions(Pose.LIE)[name] for name in NAMES]
 
 def raised(targets: Sequence[float]) -> Sequence[str]:
     """Feet that are in the air [names]."""
-    return raised_feet([foot.position for foot in FEET.poses(targets)])
+    return raised_feet(ROBOT.feet(targets))
 
 
 def command_loss(

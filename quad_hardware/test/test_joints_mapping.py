@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from quad_description import Joint, movable_joints, robot_urdf
+from quad_description import movable_joints, robot_urdf
 from quad_hardware.exceptions import CommandError
 from quad_hardware.joints import JointMap, JointServo, servo_of
 from quad_hardware.link.new_dialect import NewDialect
@@ -68,11 +68,11 @@ def test_a_missing_leg_joint_is_named() -> None:
 
 def test_a_joint_without_motor_is_named() -> None:
     """A renamed joint needs its motor; two joints on one motor are one too many."""
-    renamed = Joint('front_left_knee', -1.0, 1.0, 10.0, 0.4)
+    renamed = replace(LEGS[2], name='front_left_knee')
     with pytest.raises(CommandError, match=r'front_left_knee.*joints\.front_left_knee\.motor'):
         servo_of(renamed)
     servos = [servo_of(joint) for joint in LEGS]
-    assert servo_of(renamed, 11).lower == -1.0
+    assert servo_of(renamed, 11).lower == LEGS[2].limits.lower
     with pytest.raises(CommandError, match='motor 11 moves two joints'):
         JointMap([*servos, servo_of(renamed, 11)])
 
@@ -83,7 +83,7 @@ def test_the_legs_come_first() -> None:
     with pytest.raises(CommandError, match='has arm_yaw_joint before joints of the legs'):
         JointMap([servos[12], *servos[:12], *servos[13:]])
     assert JointMap([*reversed(servos[:12]), *servos[12:]]).leg_count == 12
-    tail = Joint('tail_joint', -1.0, 1.0, 10.0, 0.4)
+    tail = replace(LEGS[2], name='tail_joint')
     with pytest.raises(CommandError, match='tail_joint: there is no motor 61'):
         JointMap([*servos, servo_of(tail, 61)])
 

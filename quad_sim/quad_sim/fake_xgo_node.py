@@ -19,6 +19,7 @@ from rclpy.utilities import ok, try_shutdown
 from std_srvs.srv import Trigger
 
 from node_runner import init_ros, make_executor, notify_ready
+from quad_description.rotations import Vector
 from quad_msgs.srv import InjectFault, Push
 
 from .board.board import POSE_TIME
@@ -26,7 +27,6 @@ from .exceptions import SetupError
 from .line.faults import FOREVER, make_fault
 from .line.server import Server
 from .options import Simulation
-from .plant.state import Vector
 
 TRUTH_PERIOD = 0.05  # [s]
 PATIENCE = 1.0  # [s] the loop answers within milliseconds

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from functools import cache
 import math
 import random
 
@@ -12,51 +11,19 @@ import numpy as np
 from numpy.typing import NDArray
 import pytest
 
-from quad_description import movable_joints, Pose, pose_positions, raised_feet, robot_urdf
-from quad_hardware.estimation.feet import Feet, FootPoses
+from quad_description import Pose, pose_positions, quadruped, raised_feet, robot_urdf
+from quad_description.rotations import from_roll_pitch_yaw, rotate
 from quad_hardware.estimation.odometry import LegOdometry, OdometrySettings, OdometryState
-from quad_hardware.estimation.rotation import from_roll_pitch_yaw, rotate
 from quad_sim.physics import Robot
 
 Array = NDArray[np.float64]
 
 URDF = robot_urdf('lite')
-NAMES = [joint.name for joint in movable_joints(URDF)]
+ROBOT = quadruped(URDF)
+NAMES = ROBOT.names
 STAND = pose_positions(Pose.STAND)
 PERIOD = 0.02  # [s]
 GAIT_PERIOD, DUTY, LIFT, HEIGHT = 0.28, 0.55, 0.02, 0.085  # a trot that is known to walk
-
-
-@cache
-def feet_of(urdf: str) -> Feet:
-    """The legs of a robot, read once."""
-    return Feet(urdf, NAMES)
-
-
-def places(feet: FootPoses) -> Array:
-    """Centres of the feet [m], (4, 3)."""
-    return np.array([foot.position for foot in feet], dtype=np.float64)
-
-
-def feet_at(angles: Array) -> FootPoses:
-    """Where the feet are for joint angles [rad]."""
-    return feet_of(URDF).poses(angles.tolist())
-
-
-def solve(wanted: Array, angles: Array) -> Array:
-    """Joint angles that put the feet somewhere, by Newton's method."""
-    for _ in range(12):
-        error = wanted - places(feet_at(angles))
-        if np.abs(error).max() < 1e-7:
-            break
-        columns = []
-        for joint in range(3):
-            moved = angles.copy()
-            moved[joint::3] += 1e-6
-            columns.append((places(feet_at(moved)) - places(feet_at(angles))) / 1e-6)
-        jacobian = np.stack(columns, axis=2)
-        angles = angles + np.linalg.solve(jacobian, error[..., None])[..., 0].ravel()
-    return angles
 
 
 def trot(phase: float, velocity: tuple[float, float], neutral: Array) -> Array:
@@ -76,27 +43,26 @@ def trot(phase: float, velocity: tuple[float, float], neutral: Array) -> Array:
 
 def walk(velocity: tuple[float, float], duration: float) -> tuple[Array, OdometryState, float]:
     """Trot in physics; return the true way in the first heading, the estimate, the height."""
-    robot, legs, rng = Robot(URDF), feet_of(URDF), random.Random(1)
-    odometry = LegOdometry(OdometrySettings(), legs.radius)
-    angles = np.array([STAND[name] for name in NAMES])
-    neutral = places(feet_at(angles))
+    robot, rng = Robot(URDF), random.Random(1)
+    odometry = LegOdometry(OdometrySettings(), ROBOT.foot_radius)
+    standing = [STAND[name] for name in NAMES]
+    neutral = np.array(ROBOT.feet(standing))
     neutral[:, 0] = [0.025, 0.025, -0.125, -0.125]
     neutral[:, 2] = -0.022 - HEIGHT
-    angles = solve(neutral, angles)
-    robot.set_targets(list(angles))
+    robot.set_targets(ROBOT.place(ROBOT.solve(neutral.tolist()), standing))
     robot.step(1.0)
     start, yaw = np.array(robot.base_pose.position), robot.imu.roll_pitch_yaw[2]
     state = None
     for tick in range(round(duration / PERIOD)):
         time = tick * PERIOD
-        measured = robot.joint_positions + [rng.gauss(0, math.radians(0.1)) for _ in NAMES]
+        measured = [q + rng.gauss(0, math.radians(0.1)) for q in robot.joint_positions.tolist()]
         attitude = [angle + rng.gauss(0, math.radians(0.1)) for angle in robot.imu.roll_pitch_yaw]
-        state = odometry.update(time, feet_at(measured), from_roll_pitch_yaw(*attitude))
+        state = odometry.update(time, ROBOT.foot_poses(measured), from_roll_pitch_yaw(*attitude))
         ramp = min(time / 0.5, 1.0)
         speed = velocity[0] * ramp, velocity[1] * ramp
-        angles = solve(trot(time / GAIT_PERIOD, speed, neutral), angles)
-        robot.set_targets(list(angles))
-        odometry.command(time, feet_at(angles))
+        feet = trot(time / GAIT_PERIOD, speed, neutral).tolist()
+        robot.set_targets(ROBOT.place(ROBOT.solve(feet), standing))
+        odometry.command(time, feet)
         robot.step(PERIOD)
     assert state is not None
     x, y, _ = np.array(robot.base_pose.position) - start
@@ -122,9 +88,9 @@ def test_feet_are_where_physics_has_them() -> None:
     pose = {name: 0.1 * math.sin(3 * index) for index, name in enumerate(NAMES)}
     robot = Robot(URDF, pose=pose)
     (x, y, z), rotation = robot.base_pose.position, robot.base_pose.orientation
-    found = places(feet_of(URDF).poses([pose[name] for name in NAMES]))
-    for leg, foot in enumerate(robot.feet):
-        place = rotate(rotation, (found[leg, 0], found[leg, 1], found[leg, 2]))
+    found = ROBOT.feet([pose[name] for name in NAMES])
+    for centre, foot in zip(found, robot.feet, strict=True):
+        place = rotate(rotation, centre)
         wanted = np.array(robot.link_position(foot)) - (x, y, z)
         assert place == pytest.approx(wanted, abs=1e-6)
 
@@ -137,6 +103,5 @@ def test_physics_agrees_about_feet_in_the_air(legs: tuple[str, ...]) -> None:
     for pose in (STAND, held):
         robot.set_targets(pose)
         robot.step(1.0)
-    assert bool(
-        raised_feet(places(feet_at(np.array([held[name] for name in NAMES]))).tolist())
-    ) is not all(robot.foot_contacts)
+    raised = raised_feet(ROBOT.feet([held[name] for name in NAMES]))
+    assert bool(raised) is not all(robot.foot_contacts)

@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 
 from quad_description import movable_joints, Pose, pose_positions, robot_urdf
+from quad_description.rotations import rotate, yaw_of
 from quad_sim import ServoModel, ServoParameters, SetupError, SimulationError, TargetError, Terrain
 from quad_sim.physics import Robot
 from quad_sim.plant.noise import BOARD, ENCODER_STEP
-from quad_sim.plant.state import roll_pitch_yaw
 
 URDF = robot_urdf('mini')
 GRAVITY = 9.81  # [m/s2]
@@ -77,10 +77,9 @@ def test_a_falling_robot_weighs_nothing() -> None:
 def test_ground_turns_the_vertical_onto_its_normal(angle: float, direction: float) -> None:
     """Orientation and normal of a slope say the same, and the yaw stays small."""
     terrain = Terrain.slope(angle, direction)
-    w, x, y, z = terrain.orientation
-    up = (2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y))
+    up = rotate(terrain.orientation, (0.0, 0.0, 1.0))
     assert up == pytest.approx(terrain.normal, abs=1e-9)
-    assert abs(roll_pitch_yaw((x, y, z, w))[2]) <= angle * angle / 2 + 1e-9
+    assert abs(yaw_of(terrain.orientation)) <= angle * angle / 2 + 1e-9
 
 
 def test_pose_and_velocity_agree() -> None:
@@ -183,7 +182,7 @@ def test_targets_are_kept_within_the_limits() -> None:
     robot = Robot(URDF)
     robot.set_targets([10.0] * 12)
     robot.step(0.5)
-    assert robot.joint_targets == pytest.approx([j.upper for j in movable_joints(URDF)])
+    assert robot.joint_targets == pytest.approx([j.limits.upper for j in movable_joints(URDF)])
 
 
 @pytest.mark.parametrize(
@@ -249,7 +248,7 @@ def test_servos_differ_in_how_they_sag() -> None:
 def test_servos_are_as_strong_and_fast_as_the_urdf_and_the_motor_line_allow() -> None:
     """No torque above the stall torque, and a free leg stays below the no-load speed."""
     lifted = Robot(URDF, ServoParameters(stiffness=100.0))
-    efforts = np.array([joint.effort for joint in movable_joints(URDF)])
+    efforts = np.array([joint.limits.effort for joint in movable_joints(URDF)])
     lifted.push((0, 0, 1.02 * lifted.mass * GRAVITY), 2.0)
     lifted.step(0.5)
     fastest = 0.0

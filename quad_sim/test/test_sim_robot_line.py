@@ -84,7 +84,7 @@ def test_any_frame_is_survived(
     targets = robot.simulation.plant.joint_targets
     for joint, target in zip(LIMITS, targets, strict=True):
         assert math.isfinite(target)
-        assert joint.lower - 1e-9 <= target <= joint.upper + 1e-9
+        assert joint.limits.lower - 1e-9 <= target <= joint.limits.upper + 1e-9
     assert answers(robot)
 
 

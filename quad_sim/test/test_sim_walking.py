@@ -89,7 +89,7 @@ def test_no_servo_is_asked_for_more_than_it_can() -> None:
             robot.run(0.01)
             fastest = np.maximum(fastest, np.abs(robot.simulation.plant.measure().velocities))
     assert fastest.max() > 1.0
-    assert all(fastest < 1.2 * np.array([joint.velocity for joint in JOINTS]))
+    assert all(fastest < 1.2 * np.array([joint.limits.velocity for joint in JOINTS]))
 
 
 @pytest.mark.parametrize('degrees', [-90, 200])

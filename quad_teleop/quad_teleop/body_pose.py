@@ -5,7 +5,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-import math
+
+from quad_description.rotations import from_roll_pitch_yaw, Quaternion
 
 from .exceptions import SettingError
 
@@ -26,21 +27,12 @@ class BodyPose:
     pitch: float = 0.0
     yaw: float = 0.0
 
-    def quaternion(self) -> tuple[float, float, float, float]:
+    def quaternion(self) -> Quaternion:
         """Return the attitude as a unit quaternion (x, y, z, w).
 
         Roll, pitch, yaw about fixed axes, as in REP 103.
         """
-        (sr, cr), (sp, cp), (sy, cy) = (
-            (math.sin(angle / 2), math.cos(angle / 2))
-            for angle in (self.roll, self.pitch, self.yaw)
-        )
-        return (
-            sr * cp * cy - cr * sp * sy,
-            cr * sp * cy + sr * cp * sy,
-            cr * cp * sy - sr * sp * cy,
-            cr * cp * cy + sr * sp * sy,
-        )
+        return from_roll_pitch_yaw(self.roll, self.pitch, self.yaw)
 
 
 NEUTRAL = BodyPose()

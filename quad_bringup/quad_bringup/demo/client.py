@@ -15,6 +15,7 @@ from nav_msgs.msg import Odometry
 from rclpy.qos import qos_profile_sensor_data, QoSProfile
 from sensor_msgs.msg import BatteryState, Imu, JointState
 
+from quad_description.rotations import tilt_of
 from quad_msgs.msg import JointCommand
 
 from ..mode_client import ModeClient
@@ -22,7 +23,7 @@ from .figures import Figures, UNKNOWN
 from .itinerary import STANDSTILL, Velocity
 from .rhythm import Beat
 from .scenario import Milestones
-from .track import Pose, tilt_of, Track
+from .track import Pose, Track
 
 COMMAND_PERIOD = 0.1
 """Time in [s] between two velocity commands; the controller's time-out is 0.5 s."""

@@ -8,6 +8,8 @@ from collections import deque
 from dataclasses import dataclass
 import math
 
+from quad_description.rotations import Quaternion, tilt_of, yaw_of
+
 from .itinerary import Velocity
 
 WINDOW = 1.0
@@ -30,28 +32,17 @@ class Pose:
     x: float
     y: float
     z: float
-    rotation: tuple[float, float, float, float]
+    rotation: Quaternion
 
     @property
     def yaw(self) -> float:
         """Heading in [rad], from minus pi to pi."""
-        x, y, z, w = self.rotation
-        return math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+        return yaw_of(self.rotation)
 
     @property
     def tilt(self) -> float:
         """Angle between the body's z axis and the vertical in [rad]."""
         return tilt_of(self.rotation)
-
-
-def tilt_of(rotation: tuple[float, float, float, float]) -> float:
-    """Return the angle between the body's z axis and the vertical in [rad].
-
-    Args:
-        rotation: Unit quaternion (x, y, z, w), body to a frame with z up.
-    """
-    x, y, _, _ = rotation
-    return math.acos(min(1.0, max(-1.0, 1 - 2 * (x * x + y * y))))
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 import math
 
-from ..model.urdf import Vector
+from quad_description.rotations import conjugate, from_roll_pitch_yaw, rotate, Vector
+
 from .velocity import approach
 
 
@@ -98,25 +99,16 @@ def feet_in_body(feet: Sequence[Vector], pose: BodyPose, centre: Vector) -> list
         pose: Where the body is instead.
         centre: Point that the body turns about in [m].
     """
-    sr, cr = math.sin(pose.roll), math.cos(pose.roll)
-    sp, cp = math.sin(pose.pitch), math.cos(pose.pitch)
-    sy, cy = math.sin(pose.yaw), math.cos(pose.yaw)
-    # columns of Rz(yaw) Ry(pitch) Rx(roll); its transpose takes a vector into the body
-    xx, xy, xz = cy * cp, sy * cp, -sp
-    yx, yy, yz = cy * sp * sr - sy * cr, sy * sp * sr + cy * cr, cp * sr
-    zx, zy, zz = cy * sp * cr + sy * sr, sy * sp * cr - cy * sr, cp * cr
+    to_body = conjugate(from_roll_pitch_yaw(pose.roll, pose.pitch, pose.yaw))
     moved = []
     for foot in feet:
-        x = foot[0] - centre[0] - pose.x
-        y = foot[1] - centre[1] - pose.y
-        z = foot[2] - centre[2] - pose.z
-        moved.append(
-            (
-                centre[0] + xx * x + xy * y + xz * z,
-                centre[1] + yx * x + yy * y + yz * z,
-                centre[2] + zx * x + zy * y + zz * z,
-            )
+        way = (
+            foot[0] - centre[0] - pose.x,
+            foot[1] - centre[1] - pose.y,
+            foot[2] - centre[2] - pose.z,
         )
+        x, y, z = rotate(to_body, way)
+        moved.append((centre[0] + x, centre[1] + y, centre[2] + z))
     return moved
 
 

@@ -8,8 +8,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 import math
 
-from ..model.quadruped import Feet, Quadruped, Targets
-from ..model.urdf import Vector
+from quad_description import Feet, Quadruped, Targets
+from quad_description.rotations import Vector
+
 from .body import BodyPose, feet_in_body, Leveller, UPRIGHT
 from .heading import HeadingHold
 from .lift import SwingLift
@@ -29,7 +30,7 @@ class GaitStep:
 
     Attributes:
         targets: Positions of all joints in [rad].
-        contacts: Which legs stand, in the order of :class:`..model.leg.Leg`.
+        contacts: Which legs stand, in the order of :data:`quad_description.LEGS`.
         reachable: Whether the feet are where they should be; else limits cut them off.
     """
 

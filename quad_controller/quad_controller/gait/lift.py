@@ -15,7 +15,8 @@ from collections.abc import Iterator
 import itertools
 import math
 
-from ..model.quadruped import Feet, Quadruped
+from quad_description import Feet, Quadruped
+
 from .schedule import Schedule
 
 SPEED_SHARE = 0.97  # of the joints' speed; levelling and turning take their part, too

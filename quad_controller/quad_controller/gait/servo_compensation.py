@@ -14,8 +14,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ..model.leg_kinematics import jacobian
-from ..model.quadruped import Quadruped, Targets
+from quad_description import jacobian, Quadruped, Targets
 
 GRAVITY = 9.81  # [m/s^2]
 

@@ -14,8 +14,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 import math
 
-from ..model.quadruped import Feet
-from ..model.urdf import Vector
+from quad_description import Feet
+from quad_description.rotations import Vector
+
 from .lift import arc, hermite
 from .schedule import Schedule
 from .velocity import Velocity

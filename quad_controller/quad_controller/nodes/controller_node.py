@@ -32,6 +32,7 @@ from node_runner import (
     spin,
 )
 from node_runner.wire import Reader, Stream
+from quad_description import DescriptionError
 from quad_msgs.msg import JointCommand
 from quad_msgs.srv import SetMode
 
@@ -238,7 +239,7 @@ class ControllerNode(Node):
                 return SetParametersResult(successful=True)
             with self._loop.lock:
                 answer = self._controller.retune(gait)
-        except QuadControllerError as error:
+        except (QuadControllerError, DescriptionError) as error:
             return SetParametersResult(successful=False, reason=str(error))
         if answer.accepted:
             self._gait = gait
@@ -299,7 +300,7 @@ class ControllerNode(Node):
 
 def main() -> int:
     """Run until Ctrl-C; return the exit code."""
-    return run_program('controller_node', _serve, QuadControllerError)
+    return run_program('controller_node', _serve, QuadControllerError, DescriptionError)
 
 
 def _serve(stop: threading.Event) -> int:

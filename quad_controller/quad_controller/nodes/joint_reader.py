@@ -13,7 +13,8 @@ from collections.abc import Sequence
 
 from sensor_msgs.msg import JointState
 
-from ..model.quadruped import Quadruped, Targets
+from quad_description import Quadruped, Targets
+
 from ..states.measurement import JointSample
 
 STILL_TITLES = frozenset({'relax', 'to relax', 'lie', 'to lie'})

@@ -13,6 +13,7 @@ from geometry_msgs.msg import Pose, Twist
 from sensor_msgs.msg import BatteryState, Imu
 from std_msgs.msg import Header
 
+from quad_description.rotations import normalized, roll_pitch_yaw
 from quad_msgs.msg import JointCommand
 
 from ..gait.body import BodyPose
@@ -84,19 +85,10 @@ def velocity(message: Twist) -> Velocity:
 def body_pose(message: Pose) -> BodyPose:
     """Return the pose of the body relative to its normal one; all zeros are no rotation."""
     place, turn = message.position, message.orientation
-    x, y, z, w = turn.x, turn.y, turn.z, turn.w
-    norm = math.sqrt(x * x + y * y + z * z + w * w)
-    if norm == 0.0:
+    rotation = turn.x, turn.y, turn.z, turn.w
+    if not any(rotation):
         return BodyPose(place.x, place.y, place.z)
-    x, y, z, w = x / norm, y / norm, z / norm, w / norm
-    return BodyPose(
-        place.x,
-        place.y,
-        place.z,
-        math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)),
-        math.asin(min(max(2 * (w * y - z * x), -1.0), 1.0)),
-        math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)),
-    )
+    return BodyPose(place.x, place.y, place.z, *roll_pitch_yaw(normalized(rotation)))
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,13 +11,12 @@ from typing import Any
 from rclpy.node import Node
 
 from node_runner import declare_thread_priority, ParameterReader, refuse_misspelt
-from quad_description import PRESETS, robot_urdf
+from quad_description import PRESETS, Quadruped, quadruped, robot_urdf
 
 from ..gait.body import BodyLimits
 from ..gait.parameters import GaitParameters, RANGES
 from ..gait.schedule import Gait
 from ..gait.servo_compensation import ServoModel
-from ..model.quadruped import Quadruped, quadruped
 from ..policy.options import GravitySource, ImuFrame, OPTION_RANGES, PolicyOptions
 from ..states.parameters import STATE_RANGES, StateParameters
 

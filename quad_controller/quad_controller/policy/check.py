@@ -10,7 +10,8 @@ from enum import Enum
 
 import numpy as np
 
-from ..model.quadruped import Quadruped, Targets
+from quad_description import Quadruped, Targets
+
 from .metadata import PolicyMetadata
 from .network import FLOAT, Floats, Network
 from .observation import ALIASES, TERMS, width

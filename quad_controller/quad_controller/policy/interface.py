@@ -7,8 +7,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
+from quad_description import Targets
+
 from ..gait.velocity import Velocity
-from ..model.quadruped import Targets
 from ..states.measurement import ImuSample, JointSample
 
 

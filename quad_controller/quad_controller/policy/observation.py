@@ -12,8 +12,9 @@ import math
 
 import numpy as np
 
+from quad_description.rotations import Vector
+
 from ..gait.velocity import Velocity
-from ..model.urdf import Vector
 from ..states.measurement import ImuSample
 from .network import Floats
 from .options import GravitySource

@@ -9,8 +9,9 @@ import math
 
 import numpy as np
 
+from quad_description import Quadruped, Targets
+
 from ..gait.velocity import Velocity
-from ..model.quadruped import Quadruped, Targets
 from ..states.measurement import ImuSample, JointSample
 from .interface import lacking, PolicyStep
 from .metadata import PolicyMetadata

@@ -10,13 +10,12 @@ import math
 import signal
 import sys
 
-from quad_description import PRESETS, robot_urdf
+from quad_description import PRESETS, quadruped, robot_urdf
 
 from ..exceptions import QuadControllerError
 from ..gait.generator import GaitGenerator
 from ..gait.parameters import GaitParameters
 from ..gait.velocity import Velocity
-from ..model.quadruped import quadruped
 from ..policy.load import load_policy
 from ..policy.options import GravitySource, ImuFrame, PolicyOptions
 from ..policy.shipped import find_policy

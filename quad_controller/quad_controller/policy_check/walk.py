@@ -7,10 +7,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 import math
 
+from quad_description import quadruped
+
 from ..exceptions import QuadControllerError
 from ..gait.parameters import GaitParameters
 from ..gait.velocity import REST, Velocity
-from ..model.quadruped import quadruped
 from ..policy.interface import Policy
 from ..states.controller import Controller
 from ..states.measurement import ImuSample, JointSample, Measurement

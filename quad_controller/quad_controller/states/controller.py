@@ -7,14 +7,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 import math
 
-from quad_description import raised_feet, STREAM_TIMEOUT
+from quad_description import DescriptionError, Quadruped, raised_feet, STREAM_TIMEOUT, Targets
 
 from ..gait.body import BodyPose
 from ..gait.generator import GaitGenerator
 from ..gait.parameters import GaitParameters
 from ..gait.schedule import Gait
 from ..gait.velocity import Velocity
-from ..model.quadruped import Quadruped, Targets
 from ..policy.interface import lacking, Policy
 from .commands import Commands
 from .faults import Fault, FaultLatch
@@ -76,9 +75,13 @@ class Controller:
             first_gait: Gait to begin with.
 
         Raises:
-            DescriptionError: The legs do not reach the heights of the parameters.
+            DescriptionError: The legs do not reach the heights of the parameters, or a joint has
+                no speed.
             ParameterError: ``arm_pose`` does not fit the robot.
         """
+        for name, limits in zip(robot.names, robot.limits, strict=True):
+            if not limits.velocity > 0.0:
+                raise DescriptionError(f'{name} has no velocity limit (limit velocity="...")')
         poses = Poses(robot, states.lie_height, arm_pose)
         self._typical = poses.typical
         self._generator = GaitGenerator(robot, gait, poses.typical)

@@ -94,7 +94,7 @@ class Health:
         """Roll and pitch in [rad], None when they are not known any more."""
         if self.imu is None or self.imu_age > self._parameters.hold_age:
             return None
-        return self.imu.roll_pitch
+        return self.imu.roll_pitch_yaw[:2]
 
     @property
     def complete(self) -> bool:

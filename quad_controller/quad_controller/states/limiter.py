@@ -11,8 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 import math
 
-from ..model.quadruped import Targets
-from ..model.urdf import Limits
+from quad_description import JointLimits, Targets
 
 LONGEST_STEP = 1.5  # periods; a step that comes late may not be a leap
 
@@ -24,7 +23,7 @@ class StepLimiter:
         limited: How many targets of single joints were too fast so far, and were cut.
     """
 
-    def __init__(self, limits: Sequence[Limits], period: float, speed: float = 1.0) -> None:
+    def __init__(self, limits: Sequence[JointLimits], period: float, speed: float = 1.0) -> None:
         """Start at no target.
 
         Args:

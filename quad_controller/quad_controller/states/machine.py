@@ -16,9 +16,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from quad_description import Quadruped, Targets
+
 from ..exceptions import ParameterError
 from ..gait.generator import GaitGenerator
-from ..model.quadruped import Quadruped, Targets
 from ..policy.interface import Policy
 from ..policy.motion import PolicyMotion
 from .faults import Reaction

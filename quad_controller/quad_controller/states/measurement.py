@@ -7,7 +7,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 import math
 
-from ..model.urdf import Vector
+from quad_description.rotations import (
+    down_in_body,
+    normalized,
+    Quaternion,
+    roll_pitch_yaw,
+    tilt_of,
+    Vector,
+)
 
 NORM_TOLERANCE = 0.1  # of a quaternion's length; beyond it the message is no orientation
 MAX_DEVIATION = 0.35  # [rad] of an orientation that may be acted upon
@@ -15,7 +22,7 @@ MAX_DEVIATION = 0.35  # [rad] of an orientation that may be acted upon
 
 @dataclass(frozen=True, slots=True)
 class JointSample:
-    """Joints as they were measured, in the order of :attr:`..model.quadruped.Quadruped.names`.
+    """Joints as they were measured, in the order of :attr:`quad_description.Quadruped.names`.
 
     Attributes:
         positions: In [rad] or [m].
@@ -53,7 +60,7 @@ class ImuSample:
             said. A heading is only held against itself, so that of yaw does not matter.
     """
 
-    orientation: tuple[float, float, float, float]
+    orientation: Quaternion
     angular_velocity: Vector | None
     acceleration: Vector
     deviation: float = 0.0
@@ -75,32 +82,17 @@ class ImuSample:
     @property
     def down(self) -> Vector:
         """Direction of gravity in the body's frame; (0, 0, -1) upright."""
-        x, y, z, w = self.orientation
-        norm = x * x + y * y + z * z + w * w
-        return (
-            -2.0 * (x * z - w * y) / norm,
-            -2.0 * (y * z + w * x) / norm,
-            2.0 * (x * x + y * y) / norm - 1.0,
-        )
-
-    @property
-    def roll_pitch(self) -> tuple[float, float]:
-        """Rotations about x and then y of the level body, in [rad]."""
-        x, y, z = self.down
-        return math.atan2(-y, -z), math.asin(min(max(x, -1.0), 1.0))
+        return down_in_body(normalized(self.orientation))
 
     @property
     def roll_pitch_yaw(self) -> Vector:
         """Rotations about fixed axes x, y, z in [rad]."""
-        x, y, z, w = self.orientation
-        roll, pitch = self.roll_pitch
-        yaw = math.atan2(2.0 * (w * z + x * y), w * w + x * x - y * y - z * z)
-        return roll, pitch, yaw
+        return roll_pitch_yaw(normalized(self.orientation))
 
     @property
     def tilt(self) -> float:
         """Angle between the body's z axis and up in [rad]."""
-        return math.acos(min(max(-self.down[2], -1.0), 1.0))
+        return tilt_of(normalized(self.orientation))
 
 
 @dataclass(frozen=True, slots=True)

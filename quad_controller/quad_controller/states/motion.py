@@ -8,10 +8,11 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 import math
 
+from quad_description import Targets
+
 from ..gait.body import BodyPose
 from ..gait.generator import GaitGenerator
 from ..gait.velocity import Velocity
-from ..model.quadruped import Targets
 from .measurement import ImuSample, JointSample
 
 

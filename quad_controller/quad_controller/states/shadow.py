@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from ..model.quadruped import Targets
+from quad_description import Targets
+
 from ..policy.interface import Policy
 from .motion import Situation
 

@@ -7,9 +7,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
+from quad_description import Targets
+
 from ..gait.schedule import Gait
 from ..gait.velocity import Velocity
-from ..model.quadruped import Targets
 from .modes import State
 
 

@@ -13,9 +13,7 @@ from enum import Enum
 import itertools
 import math
 
-from ..estimation.gravity import STANDARD_GRAVITY
-from ..estimation.imu_mounting import ImuMounting
-from ..estimation.rotation import (
+from quad_description.rotations import (
     conjugate,
     from_roll_pitch_yaw,
     multiply,
@@ -24,6 +22,9 @@ from ..estimation.rotation import (
     Vector,
     yaw_of,
 )
+
+from ..estimation.gravity import STANDARD_GRAVITY
+from ..estimation.imu_mounting import ImuMounting
 from ..exceptions import CommandError
 from ..link import RobotState
 from .console import Console

@@ -11,8 +11,9 @@ from typing import cast
 
 import yaml
 
+from quad_description.rotations import roll_pitch_yaw
+
 from ..estimation import ImuMounting
-from ..estimation.rotation import yaw_of
 from ..exceptions import CommandError
 from ..joints import JointServo
 
@@ -64,9 +65,6 @@ def servo_parameters(servos: Iterable[JointServo]) -> Tree:
 
 def imu_parameters(mounting: ImuMounting) -> Tree:
     """Return the parameters of the mounting of the IMU."""
-    x, y, z, w = mounting.rotation
-    roll = math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
-    pitch = math.asin(min(max(2 * (w * y - z * x), -1.0), 1.0))
     gyro: Tree = (
         {'rate_signs': list(mounting.rate_signs), 'rates_checked': True}
         if mounting.rates_checked
@@ -74,7 +72,7 @@ def imu_parameters(mounting: ImuMounting) -> Tree:
     )
     return {
         'imu': {
-            'mounting': [round(angle, 5) for angle in (roll, pitch, yaw_of(mounting.rotation))],
+            'mounting': [round(angle, 5) for angle in roll_pitch_yaw(mounting.rotation)],
             'attitude_signs': list(mounting.attitude_signs),
             'acceleration_signs': list(mounting.acceleration_signs),
             'mounting_checked': mounting.checked,

@@ -13,7 +13,8 @@ from statistics import fmean, median
 import threading
 from typing import TYPE_CHECKING
 
-from ..estimation.rotation import Vector
+from quad_description.rotations import Vector
+
 from ..exceptions import NoAnswerError
 from ..link import Driver, LinkOptions, LinkState, RobotState
 

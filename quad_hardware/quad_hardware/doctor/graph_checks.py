@@ -6,9 +6,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from xml.etree.ElementTree import ParseError
 
-from quad_description import DescriptionError, movable_joints
+from quad_description import DescriptionError
+from quad_description.urdf import parse
 
 from .finding import error, Finding, good, note, warning
 from .tree import links_without_place
@@ -105,7 +105,7 @@ def _check_joints(seen: Observation) -> Iterator[Finding]:
         yield warning('robot_description', 'nobody publishes it', remedy)
         return
     try:
-        wanted = [joint.name for joint in movable_joints(seen.urdf)]
+        wanted = [joint.name for joint in parse(seen.urdf).commanded]
     except DescriptionError as problem:
         yield error('robot_description', str(problem), 'mend the URDF')
         return
@@ -126,8 +126,8 @@ def _check_transforms(seen: Observation) -> Iterator[Finding]:
     if not seen.urdf:
         return
     try:
-        lost = links_without_place(seen.urdf, seen.parents)
-    except ParseError:
+        lost = links_without_place(parse(seen.urdf).links, seen.parents)
+    except DescriptionError:
         return  # said above
     if lost:
         remedy = 'robot_state_publisher and hardware_node publish them; compare joint names above'

@@ -1,24 +1,21 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Which links of a URDF the transforms reach."""
+"""Which links of a robot the transforms reach."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from xml.etree import ElementTree as ET
+from collections.abc import Iterable, Mapping
 
 ROOT = 'odom'
 
 
-def links_without_place(urdf: str, parents: Mapping[str, str]) -> list[str]:
+def links_without_place(links: Iterable[str], parents: Mapping[str, str]) -> list[str]:
     """Return the links that have no chain of transforms from odom.
 
     Args:
-        urdf: The robot.
+        links: Of the robot.
         parents: Parent by child of all transforms.
     """
-    root = ET.fromstring(urdf)  # noqa: S314  # what robot_state_publisher has read already
-    links = [link.get('name', '') for link in root.iter('link')]
     return [link for link in links if not _reaches(link, parents)]
 
 

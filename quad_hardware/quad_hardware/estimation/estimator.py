@@ -4,23 +4,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 
-from quad_description import raised_feet
+from quad_description import DescriptionError, quadruped, raised_feet
+from quad_description.rotations import Quaternion, Vector
 
+from ..exceptions import CommandError
 from ..joints import JointMap
 from ..link.state import RobotState
 from .battery import Battery, BatteryFilter
 from .board_watch import BoardWatch
-from .feet import Feet
 from .filters import AttitudeRate, JointRate
 from .gravity import GravityCheck
 from .imu_mounting import ImuMounting
 from .odometry import LegOdometry, OdometrySettings, OdometryState
 from .plausibility import Plausibility
-from .rotation import Quaternion, Vector
 from .sample_clock import SampleClock
 
 
@@ -117,7 +117,10 @@ class Estimator:
         self.refusal = ''
         self._joints = joints
         self._settings = settings
-        self._feet = Feet(urdf, joints.names)
+        try:
+            self._robot = quadruped(urdf)
+        except DescriptionError as error:
+            raise CommandError(f'robot_description: {error}') from error
         self._clock = SampleClock()
         self._boards = BoardWatch()
         self._plausibility = Plausibility([servo.motor for servo in joints.servos])
@@ -125,7 +128,7 @@ class Estimator:
         self._joint_rate = JointRate(settings.joint_cutoff)
         self._battery = BatteryFilter()
         self._gravity = GravityCheck()
-        self._odometry = LegOdometry(settings.odometry, self._feet.radius)
+        self._odometry = LegOdometry(settings.odometry, self._robot.foot_radius)
 
     def command(self, time: float, targets: Sequence[float]) -> None:
         """Note what was sent to the legs, which tells the feet that stand from those that swing.
@@ -134,11 +137,11 @@ class Estimator:
             time: When, on the monotonic clock [s].
             targets: Positions of the first joints, in their order [rad].
         """
-        self._odometry.command(time, self._feet.poses(self._padded(targets)))
+        self._odometry.command(time, self._feet(targets))
 
     def raised_feet(self, targets: Sequence[float]) -> tuple[str, ...]:
         """Return the feet that are in the air at targets of the first joints [rad]."""
-        return raised_feet([foot.position for foot in self._feet.poses(self._padded(targets))])
+        return raised_feet(self._feet(targets))
 
     def update(self, state: RobotState) -> Estimate | None:
         """Take a report; return None when it cannot be. :meth:`walk` comes next."""
@@ -184,9 +187,7 @@ class Estimator:
         """
         if estimate.attitude is None:
             return None
-        positions = estimate.positions
-        placed = [positions.get(name, 0.0) for name in self._joints.names]
-        feet = self._feet.poses(placed)
+        feet = self._robot.foot_poses(self._ordered(estimate.positions))
         return self._odometry.update(estimate.joints_time, feet, estimate.attitude)
 
     def health(self) -> Health:
@@ -206,5 +207,9 @@ class Estimator:
             return self._settings.mounting.rate(state.rates), True
         return differentiated, False
 
-    def _padded(self, positions: Sequence[float]) -> list[float]:
-        return [*positions, *([0.0] * (len(self._joints.names) - len(positions)))]
+    def _feet(self, targets: Sequence[float]) -> Sequence[Vector]:
+        named = dict(zip(self._joints.names, targets, strict=False))  # without those of an arm
+        return self._robot.feet(self._ordered(named))
+
+    def _ordered(self, positions: Mapping[str, float]) -> list[float]:
+        return [positions.get(name, 0.0) for name in self._robot.names]

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 import math
 
-from .rotation import conjugate, multiply, Quaternion, rotation_vector, Vector
+from quad_description.rotations import conjugate, multiply, Quaternion, rotation_vector, Vector
 
 LONGEST_GAP = 0.2  # [s] a difference over more says nothing about now
 ZERO: Vector = (0.0, 0.0, 0.0)

@@ -8,21 +8,11 @@ from collections import deque
 from collections.abc import Sequence
 import math
 
-from .rotation import conjugate, Quaternion, rotate, Vector
+from quad_description.rotations import down_in_body, Quaternion, Vector
 
 STANDARD_GRAVITY = 9.80665  # [m/s²]
 TOLERANCE = 2.0  # [m/s²] beyond which the body is accelerating
 REPORTS = 50  # that are looked at together: a second, in which the pushes of a gait cancel out
-
-
-def gravity_from_attitude(attitude: Quaternion) -> Vector:
-    """Return the unit vector that points down, in the body."""
-    return rotate(conjugate(attitude), (0.0, 0.0, -1.0))
-
-
-def tilt_of(attitude: Quaternion) -> float:
-    """Return the angle between the body's z axis and up [rad]."""
-    return math.acos(min(max(-gravity_from_attitude(attitude)[2], -1.0), 1.0))
 
 
 def gravity_from_acceleration(acceleration: Vector) -> Vector | None:
@@ -63,7 +53,7 @@ class GravityCheck:
         reports = list(self._reports)  # another thread may take the next one
         if len(reports) < REPORTS:
             return None
-        down = _mean([gravity_from_attitude(attitude) for attitude, _ in reports])
+        down = _mean([down_in_body(attitude) for attitude, _ in reports])
         felt = gravity_from_acceleration(_mean([felt for _, felt in reports]))
         length = math.hypot(*down)
         if felt is None or length == 0.0:

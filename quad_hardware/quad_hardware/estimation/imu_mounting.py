@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 import math
 
-from .rotation import (
+from quad_description.rotations import (
     conjugate,
     from_roll_pitch_yaw,
     IDENTITY,

@@ -11,12 +11,22 @@ along, which is more than a tenth of the way (radius over height of the hip).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 import math
 
-from .feet import FootPose, FootPoses
+from quad_description import FootPose
+from quad_description.rotations import (
+    about_z,
+    conjugate,
+    multiply,
+    Quaternion,
+    rotate,
+    Vector,
+    yaw_of,
+)
+
 from .filters import low_pass_share
-from .rotation import about_z, conjugate, multiply, Quaternion, rotate, Vector, yaw_of
 
 Flags = tuple[bool, ...]
 
@@ -92,29 +102,28 @@ class LegOdometry:
         self._settings = settings
         self._radius = foot_radius
         # replaced as a whole: commands come from another thread than measurements
-        self._commands: tuple[tuple[float, list[Vector]], ...] = ()
-        self._last: tuple[float, FootPoses, Flags] | None = None
+        self._commands: tuple[tuple[float, Sequence[Vector]], ...] = ()
+        self._last: tuple[float, Sequence[FootPose], Flags] | None = None
         self._yaw0: float | None = None
         self._heading = 0.0  # [rad] of the last update
         self._keeps_heading = False
         self._place = self._held = self._smooth = REST  # the velocities in the body turned level
         self._distance = 0.0
 
-    def command(self, time: float, feet: FootPoses) -> None:
+    def command(self, time: float, feet: Sequence[Vector]) -> None:
         """Note where the feet were sent.
 
         Args:
             time: When [s].
-            feet: Where.
+            feet: Their centres in base_link [m].
         """
-        places = [foot.position for foot in feet]
-        self._commands = (*self._commands, (time, places))[-KEPT_COMMANDS:]
+        self._commands = (*self._commands, (time, feet))[-KEPT_COMMANDS:]
 
     def keep_heading(self) -> None:
         """Go on with the last heading: the next attitude counts its yaw from elsewhere."""
         self._keeps_heading = True
 
-    def update(self, time: float, feet: FootPoses, attitude: Quaternion) -> OdometryState:
+    def update(self, time: float, feet: Sequence[FootPose], attitude: Quaternion) -> OdometryState:
         """Take a measurement.
 
         Args:
@@ -144,7 +153,7 @@ class LegOdometry:
             standing,
         )
 
-    def _standing(self, time: float, feet: FootPoses, rotation: Quaternion) -> Flags:
+    def _standing(self, time: float, feet: Sequence[FootPose], rotation: Quaternion) -> Flags:
         settings, commands = self._settings, self._commands
         at = time - settings.delay
         recent = [places for t, places in commands if abs(t - at) <= settings.margin]
@@ -162,7 +171,9 @@ class LegOdometry:
             )
         return standing
 
-    def _integrate(self, time: float, feet: FootPoses, standing: Flags, heading: float) -> None:
+    def _integrate(
+        self, time: float, feet: Sequence[FootPose], standing: Flags, heading: float
+    ) -> None:
         if self._last is None:
             return
         last_time, last_feet, stood = self._last
@@ -199,7 +210,7 @@ class LegOdometry:
             -rolled * x - after.position[1] + before.position[1],
         )
 
-    def _height(self, feet: FootPoses, standing: Flags) -> float:
+    def _height(self, feet: Sequence[FootPose], standing: Flags) -> float:
         heights = [foot.position[2] for foot, stands in zip(feet, standing, strict=True) if stands]
         heights = heights or [foot.position[2] for foot in feet]
         return self._radius - sum(heights) / len(heights)

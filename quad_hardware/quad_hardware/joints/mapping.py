@@ -84,11 +84,11 @@ def servo_of(joint: Joint, motor: int | None = None) -> JointServo:
             f'or set joints.{joint.name}.motor'
         )
     if number != GRIPPER_MOTOR:
-        return JointServo(joint.name, number, lower=joint.lower, upper=joint.upper)
+        return JointServo(joint.name, number, lower=joint.limits.lower, upper=joint.limits.upper)
     span = ANGLE_SPANS[Model.LITE][GRIPPER_MOTOR]
-    gain = (joint.upper - joint.lower) / (span.high - span.low)
-    offset = joint.lower - gain * span.low
-    return JointServo(joint.name, number, 1, offset, joint.lower, joint.upper, gain)
+    gain = (joint.limits.upper - joint.limits.lower) / (span.high - span.low)
+    offset = joint.limits.lower - gain * span.low
+    return JointServo(joint.name, number, 1, offset, joint.limits.lower, joint.limits.upper, gain)
 
 
 def _within_reach(servo: JointServo) -> JointServo:

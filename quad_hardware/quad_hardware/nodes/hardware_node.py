@@ -29,10 +29,10 @@ from node_runner import (
     spin,
 )
 from node_runner.wire import Reader, Stream
+from quad_description.rotations import tilt_of
 from quad_msgs.msg import JointCommand
 
 from ..estimation import Estimate, Estimator, OdometryState
-from ..estimation.gravity import tilt_of
 from ..exceptions import CommandError, HardwareError
 from ..joints import JointCommander
 from ..joints.command import NOMINAL_PERIOD

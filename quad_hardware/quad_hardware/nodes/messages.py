@@ -20,10 +20,11 @@ from sensor_msgs.msg import BatteryState, Imu, JointState
 from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
+from quad_description.rotations import about_z, conjugate, multiply, rotate, yaw_of
+from quad_description.rotations import Quaternion as Rotation
+
 from ..estimation import Battery, Estimate, OdometryState
 from ..estimation.imu_mounting import UNCHECKED_DEVIATION
-from ..estimation.rotation import about_z, conjugate, multiply, rotate, yaw_of
-from ..estimation.rotation import Quaternion as Rotation
 from .parameters import Deviations, Frames
 
 NOT_THERE = [-1.0, *([0.0] * 8)]  # covariance of what is not measured (REP 145)

@@ -11,9 +11,9 @@ from rclpy.node import Node
 
 from node_runner import declare_thread_priority, ParameterReader, refuse_misspelt
 from quad_description import DescriptionError, Joint, movable_joints, PRESETS, robot_urdf
+from quad_description.rotations import from_roll_pitch_yaw, Vector
 
 from ..estimation import EstimatorSettings, ImuMounting, OdometrySettings, RateSource, SCALES
-from ..estimation.rotation import from_roll_pitch_yaw, Vector
 from ..exceptions import CommandError
 from ..joints import JointMap, JointServo, LimiterSettings, LossReaction, servo_of
 from ..link import LinkOptions

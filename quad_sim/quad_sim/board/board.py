@@ -9,10 +9,11 @@ from enum import IntEnum
 import math
 
 from quad_description import movable_joints, Pose, pose_positions
+from quad_description.rotations import Vector
 from quad_hardware.protocol import Fault, Model, MOTOR_ORDER
 
 from ..plant.plant import Plant
-from ..plant.state import Measurement, Vector
+from ..plant.state import Measurement
 from .power import Battery, HOT, LOW_BATTERY, Overload, Warmth
 from .servos import Mount, Servos
 from .turning import Turn
@@ -85,7 +86,7 @@ class Board:
         self.lost_time = 0.0
         self.imu_failed = False
         self._plant = plant
-        self._efforts = [joint.effort for joint in joints]
+        self._efforts = [joint.limits.effort for joint in joints]
         self._with_arm = len(joints) > len(pose_positions(Pose.STAND))
         self._warmth = Warmth(len(joints))
         self._overload = Overload(len(joints))

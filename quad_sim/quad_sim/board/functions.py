@@ -7,10 +7,11 @@ from __future__ import annotations
 from collections.abc import Callable
 import math
 
+from quad_description.rotations import Vector
 from quad_hardware.exceptions import CodecError
 from quad_hardware.protocol import Access, Code, Feedback, Frame, Kind, NEW, Refusal
 
-from ..plant.state import Measurement, Vector
+from ..plant.state import Measurement
 from .board import Board
 
 ALL_MOTORS = 0xFF

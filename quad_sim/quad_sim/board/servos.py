@@ -70,8 +70,8 @@ def _scale(joint: Joint, motor: int, model: Model, mount: Mount) -> _Scale:
     gain, offset = math.pi / 180.0, 0.0
     if motor == GRIPPER:
         span = ANGLE_SPANS[model][motor]
-        gain = (joint.upper - joint.lower) / (span.high - span.low)
-        offset = joint.lower - gain * span.low
+        gain = (joint.limits.upper - joint.limits.lower) / (span.high - span.low)
+        offset = joint.limits.lower - gain * span.low
     gain *= mount.sign
     return _Scale(gain, offset - gain * mount.offset)
 

@@ -2,10 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The board's own trot, which the registers VX, VY and VYAW ask for.
 
-The vendor's firmware has one; this is a plain trot of ours with legs measured from the URDF, so
+The vendor's firmware has one; this is a plain trot of ours with the legs of the URDF, so
 that clients of the register protocol see the robot walk. It is not that of quad_controller.
 
-Leg frame: origin in the roll axis of the hip, axes as base_link's.
 """
 
 from __future__ import annotations
@@ -13,11 +12,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 import math
-from xml.etree import ElementTree as ET
 
-from quad_description import LEGS
-
-from ..plant.state import Vector
+from quad_description import LegGeometry, LEGS, quadruped
+from quad_description.rotations import conjugate, from_roll_pitch_yaw, rotate, Vector
 
 PERIOD = 0.28  # [s] of a stride; longer ones lose speed and roll
 DUTY = 0.55  # share of a stride that a foot is on the ground
@@ -46,79 +43,6 @@ class Stance:
     feet: dict[str, Vector] = field(default_factory=dict)
 
 
-@dataclass(frozen=True, slots=True)
-class Leg:
-    """Lengths of a leg [m].
-
-    Attributes:
-        name: fl, fr, bl or br.
-        side: 1 left, -1 right.
-        hip: Roll axis in base_link.
-        ahead: Thigh joint ahead of the hip.
-        beside: Plane of the foot beside the roll axis, outward.
-        thigh: Length.
-        calf: Length.
-        zero: Angle of the calf, forward from straight down, at position 0 [rad].
-    """
-
-    name: str
-    side: int
-    hip: Vector
-    ahead: float
-    beside: float
-    thigh: float
-    calf: float
-    zero: float
-
-    def solve(self, foot: Vector) -> dict[str, float]:
-        """Return joint positions [rad] that bring the foot there [m]; too far is stretched."""
-        x, y, z = foot
-        lateral = self.side * self.beside
-        depth = -math.sqrt(max(y * y + z * z - lateral * lateral, 1e-9))
-        roll = math.remainder(math.atan2(z, y) - math.atan2(depth, lateral), 2 * math.pi)
-        x -= self.ahead
-        cosine = (x * x + depth * depth - self.thigh**2 - self.calf**2) / (
-            2 * self.thigh * self.calf
-        )
-        knee = -math.acos(min(max(cosine, -1.0), 1.0))
-        pitch = math.atan2(-x, -depth) - math.atan2(
-            self.calf * math.sin(knee), self.thigh + self.calf * math.cos(knee)
-        )
-        positions = (-self.side * roll, pitch, knee + self.zero)
-        names = (f'{self.name}_{joint}_joint' for joint in ('hip', 'thigh', 'calf'))
-        return dict(zip(names, positions, strict=True))
-
-
-def measure_legs(urdf: str) -> tuple[Leg, ...]:
-    """Measure the legs of a URDF in the order of its legs."""
-    root = ET.fromstring(urdf)  # noqa: S314  a robot's own description, not from the network
-    return tuple(_measure_leg(root, name) for name in LEGS)
-
-
-def _measure_leg(root: ET.Element, name: str) -> Leg:
-    hip, thigh, calf, foot = (
-        _origin(root, f'{name}_{part}_joint') for part in ('hip', 'thigh', 'calf', 'foot')
-    )
-    side = 1 if hip[1] > 0 else -1
-    return Leg(
-        name=name,
-        side=side,
-        hip=hip,
-        ahead=thigh[0],
-        beside=side * (thigh[1] + calf[1] + foot[1]),
-        thigh=math.hypot(calf[0], calf[2]),
-        calf=math.hypot(foot[0], foot[2]),
-        zero=math.atan2(foot[0], -foot[2]),
-    )
-
-
-def _origin(root: ET.Element, joint: str) -> Vector:
-    element = root.find(f"joint[@name='{joint}']/origin")
-    words = ('0', '0', '0') if element is None else element.get('xyz', '0 0 0').split()
-    x, y, z = map(float, words)
-    return x, y, z
-
-
 class Walker:
     """Stands or trots; one call of :meth:`step` for every set of targets.
 
@@ -130,13 +54,12 @@ class Walker:
     """
 
     def __init__(self, urdf: str) -> None:
-        """Measure the legs.
+        """Stand, as after switching on.
 
         Args:
             urdf: The robot.
         """
-        self._legs = measure_legs(urdf)
-        self._middle = sum(leg.hip[0] for leg in self._legs) / len(self._legs)
+        self._robot = quadruped(urdf)
         self.reset()
 
     def reset(self) -> None:
@@ -168,29 +91,33 @@ class Walker:
             self._phase = (self._phase + duration / PERIOD) % 1.0
         else:
             self._phase = self._stride = 0.0
-        positions: dict[str, float] = {}
-        for leg in self._legs:
-            positions |= leg.solve(self._foot(leg))
-        return positions
+        robot = self._robot
+        feet = [self._foot(name, leg) for name, leg in zip(LEGS, robot.legs, strict=True)]
+        return {
+            joint: angle
+            for leg, solution in zip(robot.legs, robot.solve(feet), strict=True)
+            for joint, angle in zip(leg.joints, solution.angles, strict=True)
+        }
 
-    def _foot(self, leg: Leg) -> Vector:
-        """Where the foot is to be, in the leg frame."""
-        stance = self.stance
-        dx, dy, dz = stance.feet.get(leg.name, (0.0, 0.0, 0.0))
-        ahead, aside = FOOT_AHEAD + dx, leg.side * leg.beside + dy
+    def _foot(self, name: str, leg: LegGeometry) -> Vector:
+        """Where the foot is to be, in base_link."""
+        stance, (middle, _, hip_height) = self.stance, self._robot.hip_centre
+        dx, dy, dz = stance.feet.get(name, (0.0, 0.0, 0.0))
         # the place under the hip, seen from the middle between the legs
-        x, y = leg.hip[0] - self._middle + ahead, leg.hip[1] + aside
+        x = leg.hip[0] - middle + FOOT_AHEAD + dx
+        y = leg.hip[1] + leg.offset_y + dy
         vx, vy, turn = self._speed
         forward, left, up = _stride(
-            (self._phase + DIAGONAL[leg.name]) % 1.0, vx - turn * y, vy + turn * x
+            (self._phase + DIAGONAL[name]) % 1.0, vx - turn * y, vy + turn * x
         )
         ground = (
             x + forward - stance.shift[0],
             y + left - stance.shift[1],
             -stance.height + dz + up * self.lift * self._stride,
         )
-        bx, by, bz = _turned_back(ground, stance.attitude)
-        return bx - leg.hip[0] + self._middle, by - leg.hip[1], bz
+        to_body = conjugate(from_roll_pitch_yaw(*stance.attitude))
+        x, y, z = rotate(to_body, ground)
+        return middle + x, y, hip_height + z
 
 
 def _stride(phase: float, vx: float, vy: float) -> Vector:
@@ -204,15 +131,3 @@ def _stride(phase: float, vx: float, vy: float) -> Vector:
     slope = -(1.0 - DUTY) * PERIOD
     time = half * (-4 * k**3 + 6 * k**2 - 1) + slope * (2 * k**3 - 3 * k**2 + k)
     return time * vx, time * vy, 0.5 * (1.0 - math.cos(2.0 * math.pi * k))
-
-
-def _turned_back(point: Vector, attitude: Vector) -> Vector:
-    """Return a point of the ground as the body sees it that is turned by roll, pitch and yaw."""
-    x, y, z = point
-    roll, pitch, yaw = attitude
-    cos, sin = math.cos(yaw), math.sin(yaw)
-    x, y = cos * x + sin * y, -sin * x + cos * y
-    cos, sin = math.cos(pitch), math.sin(pitch)
-    x, z = cos * x - sin * z, sin * x + cos * z
-    cos, sin = math.cos(roll), math.sin(roll)
-    return x, cos * y + sin * z, -sin * y + cos * z

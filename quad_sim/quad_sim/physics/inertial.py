@@ -10,7 +10,9 @@ from typing import Final
 import mujoco
 import numpy as np
 
-from ..plant.state import Array, Imu, roll_pitch_yaw, Vector
+from quad_description.rotations import roll_pitch_yaw, Vector
+
+from ..plant.state import Array, Imu
 from .model import ACCELEROMETER, GYRO, IMU
 
 BANDWIDTH: Final = 20.0  # [Hz] of the accelerometer's low-pass, as IMU chips have one

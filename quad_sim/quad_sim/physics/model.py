@@ -104,7 +104,7 @@ def _add_floor(spec: mujoco.MjSpec, terrain: Terrain) -> None:
         name=FLOOR,
         type=mujoco.mjtGeom.mjGEOM_PLANE,
         size=[0, 0, 1],
-        quat=np.array(terrain.orientation),
+        quat=np.roll(terrain.orientation, 1),  # MuJoCo has w first
         friction=[terrain.friction, 0.005, 0.0001],  # sliding, MuJoCo's own torsion and rolling
         priority=1,  # the friction is the floor's, whatever touches it
         contype=1,
@@ -129,7 +129,7 @@ def _add_servo(spec: mujoco.MjSpec, joint: Joint, servo: ServoParameters) -> Non
         gainprm=_padded(servo.stiffness),
         biasprm=_padded(0.0, -servo.stiffness, -servo.velocity_gain),
         forcelimited=True,
-        forcerange=[-joint.effort, joint.effort],
+        forcerange=[-joint.limits.effort, joint.limits.effort],
     )
 
 

@@ -45,7 +45,7 @@ def place(model: mujoco.MjModel, data: mujoco.MjData, terrain: Terrain) -> None:
     _follow_mimics(model, data)
     normal = np.array(terrain.normal)
     data.qpos[:3] = normal
-    data.qpos[3:7] = terrain.orientation
+    data.qpos[3:7] = np.roll(terrain.orientation, 1)  # MuJoCo has w first
     mujoco.mj_kinematics(model, data)
     floor, points = model.geom(FLOOR).id, np.empty(6)
     gap = min(

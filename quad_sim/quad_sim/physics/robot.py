@@ -12,11 +12,12 @@ import mujoco
 import numpy as np
 
 from quad_description import movable_joints
+from quad_description.rotations import Vector
 
 from ..exceptions import SetupError, SimulationError
 from ..plant.noise import disturb, Noise, NONE
 from ..plant.servo import ServoModel, ServoParameters
-from ..plant.state import Array, BasePose, BaseVelocity, Imu, Measurement, Vector
+from ..plant.state import Array, BasePose, BaseVelocity, Imu, Measurement
 from ..plant.targets import TargetRamp, Targets
 from ..plant.terrain import FLAT, Terrain
 from .inertial import base_rotation, InertialUnit, vector

@@ -9,7 +9,9 @@ import math
 
 import numpy as np
 
-from .state import Array, Imu, Measurement, Vector
+from quad_description.rotations import Vector
+
+from .state import Array, Imu, Measurement
 
 ENCODER_STEP = 2 * math.pi / 4096  # [rad] the servos' magnetic encoder has 12 bits
 

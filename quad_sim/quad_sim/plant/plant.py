@@ -10,10 +10,11 @@ from typing import Protocol
 import numpy as np
 
 from quad_description import movable_joints
+from quad_description.rotations import Vector
 
 from ..exceptions import SetupError, TargetError
 from .noise import disturb, Noise, NONE
-from .state import Array, BasePose, BaseVelocity, Imu, Measurement, Vector
+from .state import Array, BasePose, BaseVelocity, Imu, Measurement
 from .targets import TargetRamp, Targets
 
 TIMESTEP = 0.002  # [s]

@@ -5,24 +5,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-import math
 
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_description.rotations import Quaternion, roll_pitch_yaw, tilt_of, Vector
+
 Array = NDArray[np.float64]
-Vector = tuple[float, float, float]
-Quaternion = tuple[float, float, float, float]
-
-
-def roll_pitch_yaw(orientation: Quaternion) -> Vector:
-    """Return roll, pitch and yaw [rad] (fixed axes x, y, z) of a unit quaternion (x, y, z, w)."""
-    x, y, z, w = orientation
-    roll = math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
-    # rounding may lead just beyond the range of asin
-    pitch = math.asin(min(max(2 * (w * y - z * x), -1.0), 1.0))
-    yaw = math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
-    return roll, pitch, yaw
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,8 +34,7 @@ class BasePose:
     @property
     def tilt(self) -> float:
         """Angle between the body's z axis and the vertical [rad]."""
-        x, y, _, _ = self.orientation
-        return math.acos(min(max(1 - 2 * (x * x + y * y), -1.0), 1.0))
+        return tilt_of(self.orientation)
 
 
 @dataclass(frozen=True, slots=True)

@@ -33,8 +33,8 @@ class TargetRamp:
             values: The first set-points [rad]; the array itself is changed from now on.
         """
         self._index = {joint.name: index for index, joint in enumerate(joints)}
-        self._lower = np.array([joint.lower for joint in joints])
-        self._upper = np.array([joint.upper for joint in joints])
+        self._lower = np.array([joint.limits.lower for joint in joints])
+        self._upper = np.array([joint.limits.upper for joint in joints])
         self._timestep = timestep
         self.values: Array = values
         self._goal: Array = values.copy()

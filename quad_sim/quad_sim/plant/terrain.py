@@ -7,12 +7,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 import math
 
+from quad_description.rotations import about, Quaternion, Vector
+
 from ..exceptions import SetupError
 
 STEEPEST = math.radians(45.0)  # [rad] steeper than any foot holds
-
-Quaternion = tuple[float, float, float, float]
-Vector = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,17 +53,12 @@ class Terrain:
 
     @property
     def orientation(self) -> Quaternion:
-        """Rotation (w, x, y, z) of a robot that stands on it and faces along the world's x axis.
+        """Rotation of a robot that stands on it and faces along the world's x axis.
 
         It turns by the slope about the horizontal axis across the direction of the slope.
         """
-        half = 0.5 * self.angle
-        return (
-            math.cos(half),
-            math.sin(half) * math.sin(self.direction),
-            -math.sin(half) * math.cos(self.direction),
-            0.0,
-        )
+        across = math.sin(self.direction), -math.cos(self.direction), 0.0
+        return about(across, self.angle)
 
 
 FLAT = Terrain()

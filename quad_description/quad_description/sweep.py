@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import math
 from typing import Final
 
-from .joints import Joint
+from .urdf import Joint
 
 SWEEP_DURATION: Final = 2.5  # [s] for one joint, there and back
 
@@ -32,6 +32,6 @@ def sweep(joints: Sequence[Joint], rest: Mapping[str, float], elapsed: float) ->
     moving = joints[int(turn) % len(joints)]
     wave = math.sin(2.0 * math.pi * phase)
     here = rest[moving.name]
-    amplitude = moving.upper - here if wave > 0.0 else here - moving.lower
+    amplitude = moving.limits.upper - here if wave > 0.0 else here - moving.limits.lower
     positions[moving.name] = here + amplitude * wave
     return positions

@@ -6,21 +6,34 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-import math
+from typing import NamedTuple
 
 from ..exceptions import DescriptionError
-from .leg import Leg, leg_geometry, LegGeometry
-from .leg_kinematics import foot_position, LegSolution, solve
+from ..rotations import Quaternion, Vector
+from ..urdf import Description, JointLimits, parse
+from .leg import leg_geometry, LegGeometry, LEGS
+from .leg_kinematics import calf_rotation, foot_position, LegSolution, solve
 from .tree import centre_of_mass
-from .urdf import Description, Limits, parse, Vector
 
 Targets = tuple[float, ...]
 """One position in [rad] or [m] for each commanded joint, in the order of the URDF."""
 
 Feet = tuple[Vector, Vector, Vector, Vector]
-"""Centres of the feet in the body's frame in [m], in the order of :class:`Leg`."""
+"""Centres of the feet in the body's frame in [m], in the order of :data:`LEGS`."""
 
 BALANCE_PASSES = 3  # the centre of mass moves with the legs; this many passes settle to 0.1 mm
+
+
+class FootPose(NamedTuple):
+    """Where a foot is.
+
+    Attributes:
+        position: Of its centre in [m].
+        rotation: How it is turned against the zero pose, in what the position is given in.
+    """
+
+    position: Vector
+    rotation: Quaternion
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,17 +44,19 @@ class Quadruped:
         description: What the URDF says.
         names: Commanded joints in the order of the URDF.
         limits: Their ranges, in the same order.
-        legs: The four legs in the order of :class:`Leg`.
+        legs: The four legs in the order of :data:`LEGS`.
         leg_indices: For each leg the places of hip, thigh and calf in ``names``.
         mass: Weight of all links in [kg].
+        foot_radius: Of the ball that a foot is in [m]; 0 where the URDF has none.
     """
 
     description: Description
     names: tuple[str, ...]
-    limits: tuple[Limits, ...]
+    limits: tuple[JointLimits, ...]
     legs: tuple[LegGeometry, ...]
     leg_indices: tuple[tuple[int, int, int], ...]
     mass: float
+    foot_radius: float
 
     @property
     def hip_centre(self) -> Vector:
@@ -65,12 +80,27 @@ class Quadruped:
         return [(positions[a], positions[b], positions[c]) for a, b, c in self.leg_indices]
 
     def feet(self, positions: Sequence[float]) -> Feet:
-        """Return where the feet are for the positions of all joints [rad]."""
+        """Return where the feet are for the positions of the joints [rad].
+
+        Args:
+            positions: In the order of ``names``; what comes behind the legs may be left out.
+        """
         one, two, three, four = (
             foot_position(leg, angles)
             for leg, angles in zip(self.legs, self.leg_angles(positions), strict=True)
         )
         return one, two, three, four
+
+    def foot_poses(self, positions: Sequence[float]) -> list[FootPose]:
+        """Return where the feet are and how they are turned, as :meth:`feet`."""
+        return [
+            FootPose(foot_position(leg, angles), calf_rotation(leg, angles))
+            for leg, angles in zip(self.legs, self.leg_angles(positions), strict=True)
+        ]
+
+    def standing_height(self, positions: Sequence[float]) -> float:
+        """Return how high a level base_link is above ground that its lowest foot touches [m]."""
+        return self.foot_radius - min(z for _, _, z in self.feet(positions))
 
     def solve(self, feet: Sequence[Vector]) -> list[LegSolution]:
         """Return the joint positions of each leg for where the feet shall be."""
@@ -116,8 +146,8 @@ class Quadruped:
                     'folded and stretched legs'
                 )
             placed = self.place(solutions, placed)
-            centre = centre_of_mass(self.description, self._named(placed), 'base_link')
-            shift = float(centre[0]) - self.hip_centre[0]
+            centre = centre_of_mass(self.description, self._named(placed))
+            shift = centre[0] - self.hip_centre[0]
         return self._feet_below(shift, height)
 
     def _feet_below(self, shift: float, height: float) -> Feet:
@@ -131,36 +161,30 @@ class Quadruped:
         return dict(zip(self.names, positions, strict=True))
 
 
-def quadruped(robot_description: str) -> Quadruped:
+def quadruped(urdf: str) -> Quadruped:
     """Make the model of a robot from its URDF.
 
     Args:
-        robot_description: URDF as XML text.
+        urdf: URDF as XML text.
 
     Raises:
-        DescriptionError: It is no URDF of a quadruped with the joints that this stack knows.
+        DescriptionError: It is no URDF of a quadruped whose legs turn about x, y and y.
     """
-    description = parse(robot_description)
+    description = parse(urdf)
     commanded = description.commanded
     names = tuple(joint.name for joint in commanded)
-    legs = tuple(leg_geometry(description, leg) for leg in Leg)
-    for leg in Leg:
-        for name in leg.joint_names:
-            if name not in names:
-                raise DescriptionError(f'{name} takes no commands: it is fixed or a mimic joint')
-    for joint in commanded:
-        if not joint.limits.velocity < math.inf:
-            raise DescriptionError(f'{joint.name} has no velocity limit (limit velocity="...")')
+    legs = tuple(leg_geometry(description, leg) for leg in LEGS)
     return Quadruped(
         description=description,
         names=names,
         limits=tuple(joint.limits for joint in commanded),
         legs=legs,
-        leg_indices=tuple(_indices(names, leg) for leg in Leg),
+        leg_indices=tuple(_indices(names, leg) for leg in legs),
         mass=sum(point.mass for point in description.masses.values()),
+        foot_radius=description.spheres.get(f'{LEGS[0]}_foot', 0.0),
     )
 
 
-def _indices(names: Sequence[str], leg: Leg) -> tuple[int, int, int]:
-    hip, thigh, calf = (names.index(name) for name in leg.joint_names)
+def _indices(names: Sequence[str], leg: LegGeometry) -> tuple[int, int, int]:
+    hip, thigh, calf = (names.index(name) for name in leg.joints)
     return hip, thigh, calf

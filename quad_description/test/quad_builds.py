@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from quad_controller.model.leg import Leg
+from quad_description import LEGS
 
 
 @dataclass(frozen=True)
@@ -36,12 +36,11 @@ def joint(
     )
 
 
-def leg(which: Leg, build: Build) -> str:
+def leg(name: str, build: Build) -> str:
     """Return the three joints of a leg and its foot."""
-    name = which.value
     front, side = (1 if name[0] == 'f' else -1), (1 if name[1] == 'l' else -1)
     x, y, z = build.offset
-    hip, thigh, calf = which.joint_names
+    hip, thigh, calf = (f'{name}_{part}_joint' for part in ('hip', 'thigh', 'calf'))
     return (
         joint(
             hip, ('base_link', f'{name}_hip'),
@@ -70,7 +69,7 @@ def urdf(build: Build | None = None) -> str:
     return (
         '<robot name="test"><link name="base_link"><inertial><mass value="0.4"/>'
         '<origin xyz="-0.05 0 -0.02"/></inertial></link>'
-        + ''.join(leg(which, build) for which in Leg)
+        + ''.join(leg(name, build) for name in LEGS)
         + (arm if build.arm else '')
         + '</robot>'
     )

@@ -11,12 +11,21 @@ from hypothesis import strategies as st
 import numpy as np
 import pytest
 
-from quad_controller.exceptions import DescriptionError
-from quad_controller.model.leg import Leg
-from quad_controller.model.leg_kinematics import foot_position, jacobian, solve
-from quad_controller.model.quadruped import quadruped
-from quad_controller.model.tree import link_poses
-from quad_gait_urdf import Build, urdf
+from quad_builds import Build, urdf
+from quad_description import (
+    DescriptionError,
+    foot_position,
+    jacobian,
+    LEGS,
+    Pose,
+    pose_positions,
+    quadruped,
+    robot_urdf,
+    solve,
+)
+from quad_description.kinematics.leg_kinematics import calf_rotation
+from quad_description.kinematics.tree import link_poses
+from quad_description.rotations import conjugate, multiply, rotation_vector
 
 pytestmark = pytest.mark.slow
 
@@ -52,11 +61,14 @@ def test_closed_form_agrees_with_the_tree(
     """The foot is where walking through the URDF finds it."""
     robot = ROBOTS[name]
     angles = pose(name, index, fraction)
-    leg = list(Leg)[index]
-    named = dict(zip(leg.joint_names, angles, strict=True))
-    poses = link_poses(robot.description, named, 'base_link')
-    expected = poses[leg.foot_link][:3, 3]
-    assert foot_position(robot.legs[index], angles) == pytest.approx(expected, abs=1e-12)
+    named = dict(zip(robot.legs[index].joints, angles, strict=True))
+    link = f'{LEGS[index]}_foot'
+    expected = link_poses(robot.description, named)[link]
+    assert foot_position(robot.legs[index], angles) == pytest.approx(expected.position, abs=1e-12)
+    zero = link_poses(robot.description, {})[link].rotation
+    turned = calf_rotation(robot.legs[index], angles)
+    off = rotation_vector(multiply(conjugate(expected.rotation), multiply(turned, zero)))
+    assert off == pytest.approx((0.0, 0.0, 0.0), abs=1e-9)
 
 
 @robots
@@ -145,10 +157,11 @@ def test_a_height_out_of_reach_is_refused() -> None:
 @pytest.mark.parametrize(
     ('text', 'replacement', 'reason'),
     [
-        ('fl_calf_joint', 'fl_knee_joint', "no joint 'fl_calf_joint'"),
+        ('link="fl_foot"', 'link="fl_toe"', 'no chain from base_link to fl_foot'),
         ('axis xyz="-1 0 0"', 'axis xyz="0 0 1"', 'turns about'),
         ('axis xyz="-1 0 0"', 'axis xyz="0 0 0"', 'no direction'),
-        ('velocity="10"', '', 'no velocity limit'),
+        ('velocity="10"', '', 'needs <limit .../> with velocity'),
+        ('parent link="base_link"', 'parent link="fl_calf"', 'no chain'),
         ('lower="-0.6"', 'lower="nan"', 'finite'),
         ('<robot', '<model', 'not XML'),
         ('type="revolute"', 'type="turning"', 'no joint type'),
@@ -164,5 +177,20 @@ def test_unsuited_descriptions_are_refused(text: str, replacement: str, reason: 
 def test_order_of_joints_is_that_of_the_description() -> None:
     """An arm's joint stays in its place among the commanded joints and is in no leg."""
     robot = quadruped(urdf(Build(arm=True)))
-    assert robot.names[:3] == Leg.FRONT_LEFT.joint_names
+    assert robot.names[:3] == robot.legs[0].joints
     assert robot.others == (12,)
+
+
+def test_joints_may_have_any_names() -> None:
+    """A leg is what leads from the body to its foot."""
+    robot = quadruped(urdf().replace('fl_calf_joint', 'left_front_knee'))
+    assert robot.legs[0].joints[2] == 'left_front_knee'
+
+
+def test_a_standing_robot_is_as_high_as_its_lowest_foot_says() -> None:
+    """The feet are balls: their centres are a radius above the ground."""
+    robot = quadruped(robot_urdf('mini'))
+    positions = list(pose_positions(Pose.STAND).values())
+    lowest = min(z for _, _, z in robot.feet(positions))
+    assert robot.foot_radius == pytest.approx(0.010)
+    assert robot.standing_height(positions) == pytest.approx(0.010 - lowest)

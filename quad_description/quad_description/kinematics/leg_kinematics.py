@@ -13,8 +13,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 import math
 
+from ..rotations import Quaternion, Vector
 from .leg import LegGeometry
-from .urdf import Vector
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,6 +81,19 @@ def foot_position(leg: LegGeometry, angles: Vector) -> Vector:
     z = leg.thigh_z - leg.thigh_length * math.cos(upper) - leg.calf_length * math.cos(lower)
     y, sine, cosine = leg.offset_y, math.sin(roll), math.cos(roll)
     return (leg.hip[0] + x, leg.hip[1] + y * cosine - z * sine, leg.hip[2] + y * sine + z * cosine)
+
+
+def calf_rotation(leg: LegGeometry, angles: Vector) -> Quaternion:
+    """Return how calf and foot are turned against the zero pose, in the body's frame.
+
+    Args:
+        leg: The leg.
+        angles: Hip, thigh, calf in [rad].
+    """
+    roll = leg.signs[0] * angles[0] / 2
+    pitch = (leg.signs[1] * angles[1] + leg.signs[2] * angles[2]) / 2
+    sr, cr, sp, cp = math.sin(roll), math.cos(roll), math.sin(pitch), math.cos(pitch)
+    return sr * cp, cr * sp, sr * sp, cr * cp
 
 
 def jacobian(leg: LegGeometry, angles: Vector) -> tuple[Vector, Vector, Vector]:

@@ -1,0 +1,65 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The URDF of a preset, expanded from the xacro files of this package."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+import math
+from typing import Final
+from xml.etree import ElementTree as ET
+
+from .exceptions import DescriptionError, PresetError
+from .figures import MODEL, robot_numbers
+
+PRESETS: Final[tuple[str, ...]] = tuple(sorted(robot_numbers()['presets']))
+"""Names of the robots that there are."""
+
+TRUNK_MASS_RANGE: Final = (0.05, 5.0)  # [kg] what the legs could carry, with room to spare
+
+
+@lru_cache(maxsize=16)
+def robot_urdf(preset: str = 'lite', arm: bool = False, trunk_mass: float | None = None) -> str:
+    """Make the URDF of a robot.
+
+    Args:
+        preset: One of :data:`PRESETS`.
+        arm: With the arm and gripper on its back.
+        trunk_mass: Mass of the trunk in [kg] when the robot carries more than the bare one, whose
+            figure is the preset's.
+
+    Returns:
+        The URDF as XML text.
+
+    Raises:
+        PresetError: There is no such preset.
+        DescriptionError: The mass of the trunk is none.
+    """
+    if preset not in PRESETS:
+        raise PresetError(f'there is no preset {preset!r}; choose one of {", ".join(PRESETS)}')
+    lowest, highest = TRUNK_MASS_RANGE
+    if trunk_mass is not None and not (
+        math.isfinite(trunk_mass) and lowest <= trunk_mass <= highest
+    ):
+        raise DescriptionError(
+            f'trunk_mass {trunk_mass} kg is not {lowest} to {highest} kg; '
+            "leave it out for the preset's own"
+        )
+    return _expand(
+        {
+            'preset': preset,
+            'arm': str(bool(arm)).lower(),
+            'trunk_mass': repr(float(trunk_mass or 0.0)),
+        }
+    )
+
+
+def _expand(arguments: dict[str, str]) -> str:
+    import xacro
+
+    path = MODEL / 'quadruped.urdf.xacro'
+    document = xacro.process_file(str(path), mappings=arguments).toxml()
+    # parsing drops the comments, and with them the path on this machine
+    root = ET.fromstring(document)  # noqa: S314  made a line above, from our own files
+    ET.indent(root)
+    return ET.tostring(root, encoding='unicode')
