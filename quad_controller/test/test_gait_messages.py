@@ -18,7 +18,7 @@ import pytest
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import BatteryState, Imu, JointState
 
-from node_runner.wire import Reader
+from message_templates import FastReader
 from quad_controller.gait.parameters import GaitParameters
 from quad_controller.nodes.control_loop import ControlLoop
 from quad_controller.nodes.diagnostics import state_diagnostic
@@ -39,13 +39,15 @@ angles = st.floats(-1.2, 1.2)
 
 def joints(reader: JointReader, message: JointState, sent: Targets) -> JointSample:
     """Read a message as it comes from a raw subscription."""
-    known, numbers = Reader(JointState, 'position', 'velocity').read(serialize_message(message))
+    known, numbers = FastReader(JointState, 'position', 'velocity').read(
+        serialize_message(message)
+    )
     return reader.read(known, numbers, sent)
 
 
 def sample(message: Imu) -> ImuSample:
     """Read a message as it comes from a raw subscription."""
-    return imu_sample(*Reader(Imu, *IMU_NUMBERS).read(serialize_message(message)))
+    return imu_sample(*FastReader(Imu, *IMU_NUMBERS).read(serialize_message(message)))
 
 
 @given(st.permutations(range(14)))

@@ -19,7 +19,7 @@ import pytest
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import Imu
 
-from node_runner.wire import Form, Template
+from message_templates import MessageTemplate, SerializedTemplate
 from quad_description import movable_joints, robot_urdf
 from quad_description.rotations import (
     from_roll_pitch_yaw,
@@ -173,7 +173,7 @@ def test_odometry_is_less_sure_the_farther_it_went() -> None:
     assert (level.child_frame_id, level.pose.pose.position.z) == ('base_footprint', 0.0)
 
 
-FORMS: list[Form] = [
+FORMS: list[MessageTemplate] = [
     messages.JointStates(('a',)),
     messages.JointStates(tuple('abcdefghijkl')),
     messages.ImuForm('imu_link', 0.02, 0.3, 0.15),
@@ -186,12 +186,16 @@ FORMS: list[Form] = [
 
 
 @given(st.sampled_from(FORMS), st.integers(0, 2**31 * 10**9 - 1), st.data())
-def test_every_form_takes_its_numbers(form: Form, time: int, data: st.DataObject) -> None:
+def test_every_form_takes_its_numbers(
+    form: MessageTemplate, time: int, data: st.DataObject
+) -> None:
     """Whatever its numbers, and whenever it is stamped."""
     floats = st.floats(allow_nan=False)
     numbers = data.draw(st.lists(floats, min_size=form.count, max_size=form.count))
     message = form.message(Time(sec=time // 10**9, nanosec=time % 10**9), numbers)
-    assert deserialize_message(Template(form).fill(time, numbers), type(message)) == message
+    assert (
+        deserialize_message(SerializedTemplate(form).fill(time, numbers), type(message)) == message
+    )
 
 
 def test_an_unknown_charge_is_nan() -> None:

@@ -23,6 +23,7 @@ from sensor_msgs.msg import BatteryState, Imu, JointState
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
+from message_templates import FastPublisher, FastReader
 from node_runner import (
     destroyed_when_refused,
     notify_ready,
@@ -31,7 +32,6 @@ from node_runner import (
     settle_process_memory,
     spin,
 )
-from node_runner.wire import Reader, Stream
 from quad_description import DescriptionError
 from quad_msgs.msg import JointCommand
 from quad_msgs.srv import SetMode
@@ -95,8 +95,8 @@ class ControllerNode(Node):
         self._loop = ControlLoop(
             self._controller, settings.states.period, self._publish, self._give_up
         )
-        self._joint_states = Reader(JointState, 'position', 'velocity')
-        self._imu = Reader(Imu, *messages.IMU_NUMBERS)
+        self._joint_states = FastReader(JointState, 'position', 'velocity')
+        self._imu = FastReader(Imu, *messages.IMU_NUMBERS)
         self._joints = JointReader(settings.robot)
         self._scope = CommandScope(
             settings.robot, others_move=bool(settings.arm_pose) or policy is not None
@@ -107,7 +107,7 @@ class ControllerNode(Node):
         self._ready = False
         self._stop, self.failure = stop, ''
         self._commands, self._shadow = (
-            Stream(self.create_publisher(JointCommand, topic, COMMAND_QOS))
+            FastPublisher(self.create_publisher(JointCommand, topic, COMMAND_QOS))
             for topic in ('joint_command', 'joint_command_shadow')
         )
         self._state = self.create_publisher(String, '~/state', LATCHED_QOS)

@@ -20,6 +20,7 @@ from sensor_msgs.msg import BatteryState, Imu, JointState
 from std_srvs.srv import SetBool
 from tf2_msgs.msg import TFMessage
 
+from message_templates import FastPublisher, FastReader
 from node_runner import (
     destroyed_when_refused,
     notify_ready,
@@ -28,7 +29,6 @@ from node_runner import (
     settle_process_memory,
     spin,
 )
-from node_runner.wire import Reader, Stream
 from quad_description.rotations import tilt_of
 from quad_msgs.msg import JointCommand
 
@@ -79,16 +79,16 @@ class HardwareNode(Node):
         )
         self._driver = Driver(settings.link, self._report, self._link_changed)
         self._latest: tuple[RobotState, Estimate] | None = None  # while the link is running
-        self._joint_states = Stream(
+        self._joint_states = FastPublisher(
             self.create_publisher(JointState, 'joint_states', SENSOR_DEPTH)
         )
-        self._imu = Stream(self.create_publisher(Imu, 'imu', SENSOR_DEPTH))
-        self._odom = Stream(self.create_publisher(Odometry, 'odom', SENSOR_DEPTH))
+        self._imu = FastPublisher(self.create_publisher(Imu, 'imu', SENSOR_DEPTH))
+        self._odom = FastPublisher(self.create_publisher(Odometry, 'odom', SENSOR_DEPTH))
         self._battery = self.create_publisher(BatteryState, 'battery_state', SENSOR_DEPTH)
-        self._tf = Stream(self.create_publisher(TFMessage, '/tf', 100))
+        self._tf = FastPublisher(self.create_publisher(TFMessage, '/tf', 100))
         self._link = LinkDiagnostic()
         self._diagnostics = self.create_publisher(DiagnosticArray, 'diagnostics', SENSOR_DEPTH)
-        self._reader = Reader(JointCommand, 'position', 'velocity', 'effort')
+        self._reader = FastReader(JointCommand, 'position', 'velocity', 'effort')
         self.create_subscription(JointCommand, 'joint_command', self._take, COMMAND_QOS, raw=True)
         self.create_service(SetBool, '~/torque', self._set_torque)
         self.create_timer(settings.diagnostics_period, self._diagnose)

@@ -28,7 +28,7 @@ _SECONDS_MARK, _NANOSECONDS_MARK = 0x5EC0ABCD, 0xA0ABCDEF
 _ENCAPSULATION, _LITTLE_ENDIAN = 1, 1  # byte of a serialized message that tells its order [B]
 
 
-class Form(Hashable, Protocol):
+class MessageTemplate(Hashable, Protocol):
     """What messages that differ by their numbers have in common."""
 
     @property
@@ -107,10 +107,10 @@ def _places(data: bytes, mark: bytes) -> Iterator[int]:
         at = data.find(mark, at + len(mark))
 
 
-class Template:
+class SerializedTemplate:
     """The bytes of a message, with gaps for its stamp and numbers."""
 
-    def __init__(self, form: Form) -> None:
+    def __init__(self, form: MessageTemplate) -> None:
         """Make the first message and find its numbers.
 
         Raises:
@@ -134,15 +134,15 @@ class Template:
         return self._pack(*self._arrange(values))
 
 
-class Stream:
+class FastPublisher:
     """A topic on which messages of few forms are published often."""
 
     def __init__(self, publisher: Publisher) -> None:
         """Publish there."""
         self._publisher = publisher
-        self._templates: dict[Form, Template] = {}
+        self._templates: dict[MessageTemplate, SerializedTemplate] = {}
 
-    def publish(self, form: Form, time: int, numbers: Sequence[float]) -> None:
+    def publish(self, form: MessageTemplate, time: int, numbers: Sequence[float]) -> None:
         """Publish a message of a form, with a time [ns] and numbers.
 
         Raises:
@@ -150,11 +150,11 @@ class Stream:
         """
         template = self._templates.get(form)
         if template is None:
-            template = self._templates[form] = Template(form)
+            template = self._templates[form] = SerializedTemplate(form)
         self._publisher.publish(template.fill(time, numbers))
 
 
-class Reader:
+class FastReader:
     """Reads serialized messages, of a subscription with ``raw=True``, with a header.
 
     As long as nothing but stamp and numbers changes, only these are looked at; everything else

@@ -15,8 +15,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import Imu, JointState, LaserScan
 from std_msgs.msg import Header
 
-from node_runner import wire
-from node_runner.wire import Reader, Template
+from message_templates import FastReader, serialized, SerializedTemplate
 
 NUMBERS = st.lists(st.floats(allow_nan=False), min_size=3, max_size=3)
 STAMPS = st.builds(Time, sec=st.integers(0, 2**31 - 1), nanosec=st.integers(0, 10**9 - 1))
@@ -42,7 +41,7 @@ def test_a_template_is_heard_as_its_message(
     frame: str, stamp: Time, one: float, two: float
 ) -> None:
     """Whatever its numbers and stamp; a number may stand in several places."""
-    data = Template(Pair(frame)).fill(10**9 * stamp.sec + stamp.nanosec, (one, two))
+    data = SerializedTemplate(Pair(frame)).fill(10**9 * stamp.sec + stamp.nanosec, (one, two))
     assert deserialize_message(data, JointState) == Pair(frame).message(stamp, (one, two))
 
 
@@ -63,7 +62,7 @@ SHORT = st.lists(st.floats(width=32, allow_nan=False), min_size=3, max_size=3)
 @given(SHORT, SHORT, STAMPS)
 def test_float32_goes_both_ways(one: list[float], two: list[float], stamp: Time) -> None:
     """Written by a template, and read."""
-    reader, template = Reader(LaserScan, 'range_max', 'ranges'), Template(Scan())
+    reader, template = FastReader(LaserScan, 'range_max', 'ranges'), SerializedTemplate(Scan())
     for numbers in (one, two):
         message, found = reader.read(template.fill(10**9 * stamp.sec + stamp.nanosec, numbers))
         assert list(found) == numbers
@@ -73,7 +72,7 @@ def test_float32_goes_both_ways(one: list[float], two: list[float], stamp: Time)
 def test_a_form_that_loses_a_number_is_refused() -> None:
     """Before anything is published; the message says which number."""
     with pytest.raises(ValueError, match='number 1 of 2'):
-        Template(Pair('', loses=True))
+        SerializedTemplate(Pair('', loses=True))
 
 
 def joints(names: Sequence[str], numbers: Sequence[float], stamp: Time) -> JointState:
@@ -92,7 +91,7 @@ def test_a_reader_reads_what_was_written(
     messages: list[tuple[Sequence[str], list[float], Time]],
 ) -> None:
     """In any order of forms, learnt or not: names and numbers are those of the message."""
-    reader = Reader(JointState, 'position', 'velocity')
+    reader = FastReader(JointState, 'position', 'velocity')
     for names, numbers, stamp in messages:
         message, found = reader.read(serialize_message(joints(names, numbers, stamp)))
         assert (list(message.name), list(found)) == (list(names), numbers)
@@ -101,7 +100,7 @@ def test_a_reader_reads_what_was_written(
 @given(NUMBERS, NUMBERS, STAMPS)
 def test_nested_numbers_are_read(one: list[float], two: list[float], stamp: Time) -> None:
     """Path by path, in the order in which the paths were given."""
-    reader = Reader(Imu, 'linear_acceleration.z', 'angular_velocity.x', 'orientation.w')
+    reader = FastReader(Imu, 'linear_acceleration.z', 'angular_velocity.x', 'orientation.w')
     for values in (one, two):
         message = Imu(header=Header(stamp=stamp, frame_id='imu'))
         message.linear_acceleration.z, message.angular_velocity.x = values[:2]
@@ -119,8 +118,8 @@ def test_messages_of_one_form_are_read_in_full_once(monkeypatch: pytest.MonkeyPa
         full.append(data)
         return deserialize_message(data, kind)
 
-    monkeypatch.setattr(wire, 'deserialize_message', deserialize)
-    reader = Reader(JointState, 'position', 'velocity')
+    monkeypatch.setattr(serialized, 'deserialize_message', deserialize)
+    reader = FastReader(JointState, 'position', 'velocity')
     for form in (('a', 'b'), ('c', 'd')):
         data = bytearray(serialize_message(joints(form, [1.0, 2.0, 3.0], Time(sec=1))))
         for second in range(5):
@@ -131,7 +130,7 @@ def test_messages_of_one_form_are_read_in_full_once(monkeypatch: pytest.MonkeyPa
 
 def test_a_message_without_numbers_is_read() -> None:
     """Empty joint states are no reason to fail."""
-    reader = Reader(JointState, 'position', 'velocity')
+    reader = FastReader(JointState, 'position', 'velocity')
     for _ in range(3):
         message, numbers = reader.read(serialize_message(JointState(name=['a'])))
         assert (message.name, list(numbers)) == (['a'], [])

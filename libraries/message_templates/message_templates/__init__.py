@@ -1,0 +1,9 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Messages that come and go often, as bytes in which only stamp and numbers change."""
+
+from .serialized import FastPublisher, FastReader, MessageTemplate, SerializedTemplate
+
+__version__ = '0.1.0'
+
+__all__ = ['FastPublisher', 'FastReader', 'MessageTemplate', 'SerializedTemplate']
