@@ -139,6 +139,7 @@ def every_mode(config: NodeConfig) -> NodeConfig:
 def bus_config(*nodes: NodeConfig, **master: Any) -> BusConfig:
     """Return a bus with devices and, as keywords, other values for fields of MasterConfig."""
     settings: dict[str, Any] = {'node_id': 1, 'sync_period': PERIOD, 'cycle_period': PERIOD}
+    settings['heartbeat_producer'] = 0.0
     return BusConfig(Path('bus.yml'), MasterConfig(**settings | master), nodes)
 
 

@@ -115,9 +115,9 @@ TEXTS: dict[str, str] = {
     'offset_pos_from_dev': 'added to a position in user units',
     'switching_state': 'state in which the mode is switched: 2 to 5 of CiA 402',
     'homing_timeout_seconds': 'longest time for homing [s]',
-    'position_mode': 'mode for position commands: 1, 7 or 8',
-    'velocity_mode': 'mode for velocity commands: 2, 3 or 9',
-    'effort_mode': 'mode for effort commands: 4 or 10',
+    'position_mode': 'mode for positions: 1, 7 or 8; its objects are checked, services select it',
+    'velocity_mode': 'as position_mode, for velocities: 2, 3 or 9',
+    'effort_mode': 'as position_mode, for efforts: 4 or 10',
     'target_timeout_ms': 'pause that ends a stream on `~/target` (our own key)',
     'recovery': '`manual` or `auto`: after a loss (our own key)',
     'quirks': 'where the drive deviates from CiA 402 (our own key)',
@@ -170,7 +170,7 @@ def _defaults(model: type) -> dict[str, Any]:
 
 
 def _default(key: Key, defaults: Mapping[str, Any]) -> str:
-    value = key.default
+    value = key.neutral if key.default is None else key.default
     if value is None and key.use is Use.READ and key.field in defaults:
         value = defaults[key.field]
         if isinstance(value, (int, float)) and not isinstance(value, bool) and key.per_unit:

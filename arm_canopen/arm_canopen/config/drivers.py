@@ -19,13 +19,11 @@ class DriverClass:
         name: As bus.yml writes it.
         package: ROS package that has it upstream.
         for_master: It drives the master, not a device.
-        lifecycle: It is a managed node upstream.
     """
 
     name: str
     package: str
     for_master: bool = False
-    lifecycle: bool = False
 
 
 DRIVER_CLASSES: tuple[DriverClass, ...] = (
@@ -34,12 +32,11 @@ DRIVER_CLASSES: tuple[DriverClass, ...] = (
         'ros2_canopen::LifecycleMasterDriver',
         'canopen_master_driver',
         for_master=True,
-        lifecycle=True,
     ),
     DriverClass('ros2_canopen::ProxyDriver', 'canopen_proxy_driver'),
-    DriverClass('ros2_canopen::LifecycleProxyDriver', 'canopen_proxy_driver', lifecycle=True),
+    DriverClass('ros2_canopen::LifecycleProxyDriver', 'canopen_proxy_driver'),
     DriverClass('ros2_canopen::Cia402Driver', 'canopen_402_driver'),
-    DriverClass('ros2_canopen::LifecycleCia402Driver', 'canopen_402_driver', lifecycle=True),
+    DriverClass('ros2_canopen::LifecycleCia402Driver', 'canopen_402_driver'),
 )
 
 

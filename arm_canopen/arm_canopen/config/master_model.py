@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 
 from .identity import ANY_DEVICE, Identity
 
+HEARTBEAT_PERIOD = 0.2  # [s] not 0: by it alone devices notice that the master died
+
 
 @dataclass(frozen=True, slots=True)
 class MasterConfig:
@@ -56,7 +58,7 @@ class MasterConfig:
     time_cob_id: int = 0x100
     time_period: float = 0.0
     cycle_period: float = 0.01
-    heartbeat_producer: float = 0.0
+    heartbeat_producer: float = HEARTBEAT_PERIOD
     heartbeat_timeout: float = 0.0
     start: bool = True
     start_nodes: bool = True

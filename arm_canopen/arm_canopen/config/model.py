@@ -110,8 +110,6 @@ class NodeConfig:
         reset_communication: The device may be reset at boot; false keeps a running one alive.
         restore_configuration: Sub-index of 0x1011 by which defaults are restored at boot, 0 for
             none.
-        software_file: Program that is loaded when the device has another version, None for none.
-        software_version: Version in 0x1F56:1 that the device shall have, 0 for any.
         sdo_timeout: How long an SDO answer may take in [s].
         boot_timeout: How long one boot attempt waits for the device in [s].
         poll_period: How often objects that no PDO carries are read in [s] (``period`` of bus.yml).
@@ -143,8 +141,6 @@ class NodeConfig:
     mandatory: bool = False
     reset_communication: bool = True
     restore_configuration: int = 0
-    software_file: Path | None = None
-    software_version: int = 0
     sdo_timeout: float = SDO_TIMEOUT
     boot_timeout: float = BOOT_TIMEOUT
     poll_period: float = POLL_PERIOD

@@ -54,7 +54,8 @@ class Key:
         high: Largest value, in units of the file.
         zero: True allows 0 beside the range, False refuses it within the range.
         choices: The only values allowed, with their meaning.
-        default: Value of an absent key in units of the file; without it the model's own counts.
+        default: Value of an absent key in units of the file, where no record of settings has it.
+        neutral: Value with which a key that is not used, or refused, asks for nothing.
         use: What is made of it.
         why: Reason for the default, the range or the use, as the user reads it.
     """
@@ -68,6 +69,7 @@ class Key:
     zero: bool | None = None
     choices: Mapping[int, str] | None = None
     default: Any = None
+    neutral: Any = None
     use: Use = Use.READ
     why: str = ''
 

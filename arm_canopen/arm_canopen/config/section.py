@@ -59,14 +59,14 @@ def _read_key(key: Key, item: Item, values: dict[str, Any], findings: Findings) 
     except RefusedError as reason:
         findings.refuse(item.place, reason)
         return
-    is_default = value is not None and value == key.default
+    is_neutral = value is not None and value == key.neutral
     if key.field:
         values[key.field] = key.to_model(value)
-    if key.use is Use.REFUSED and not is_default:
+    if key.use is Use.REFUSED and not is_neutral:
         findings.error(
             item.place, f'{describe(item)} is not supported: {key.why}', 'remove the key'
         )
-    elif key.use is Use.LATER and not is_default:
+    elif key.use is Use.LATER and not is_neutral:
         findings.warning(item.place, f'known, not used yet: {key.why}', 'it may stay')
 
 

@@ -1,22 +1,33 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Sections of bus.yml as records, before the EDS files are consulted."""
+"""Sections of bus.yml as records, before the EDS files are consulted.
+
+A record has a value for each key that is absent: the default of the model where that has the
+field, and None where other sections or the EDS decide.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 import re
 
+from ..standard.dictionary import ObjectDictionary
 from .device_keys import DEVICE_KEYS, DRIVE_KEYS
 from .document import Mapping
 from .drive_axes import check_node_name, read_axes, read_drive
 from .drive_model import DriveConfig
 from .drivers import check_driver
 from .findings import Findings
+from .identity import ANY_DEVICE
 from .master_keys import MASTER_KEYS, OPTION_KEYS
-from .model import BOOT_TIMEOUT, POLL_PERIOD, RETRY_FACTOR, SDO_TIMEOUT
+from .master_model import MasterConfig
+from .model import NodeConfig
 from .section import read_section, texts
 
+MASTER = MasterConfig(node_id=0)
+DEVICE = NodeConfig('', 0, '', eds=Path(), dictionary=ObjectDictionary(()))
+"""Master and device of which no key says anything."""
 NAMESPACE = re.compile(r'/?([A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*)?')
 
 
@@ -32,7 +43,7 @@ class Options:
 
     dcf_path: str = ''
     heartbeat_multiplier: float = 3.0
-    retry_factor: int = RETRY_FACTOR
+    retry_factor: int = DEVICE.retry_factor
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,28 +60,28 @@ class MasterSettings:
     node_id: int | None = None
     driver: str = ''
     namespace: str = ''
-    bitrate: int = 1_000_000
+    bitrate: int = MASTER.bitrate
     watch_devices: bool = True
-    heartbeat_producer: float = 0.0
+    heartbeat_producer: float = MASTER.heartbeat_producer
     heartbeat_multiplier: float | None = None
-    sync_period: float = 0.0
-    sync_window: float = 0.0
-    sync_overflow: int = 0
-    time_cob_id: int = 0x100
+    sync_period: float = MASTER.sync_period
+    sync_window: float = MASTER.sync_window
+    sync_overflow: int = MASTER.sync_overflow
+    time_cob_id: int = MASTER.time_cob_id
     time_period: float | None = None
-    start: bool = True
-    start_nodes: bool = True
-    start_all_nodes: bool = False
-    reset_all_nodes: bool = False
-    stop_all_nodes: bool = False
-    nmt_inhibit_time: float = 0.0
-    emcy_inhibit_time: float = 0.0
-    vendor_id: int = 0
-    product_code: int = 0
-    revision_number: int = 0
-    serial_number: int = 0
-    boot_time: float = 0.0
-    boot_timeout: float = 2.0
+    start: bool = MASTER.start
+    start_nodes: bool = MASTER.start_nodes
+    start_all_nodes: bool = MASTER.start_all_nodes
+    reset_all_nodes: bool = MASTER.reset_all_nodes
+    stop_all_nodes: bool = MASTER.stop_all_nodes
+    nmt_inhibit_time: float = MASTER.nmt_inhibit_time
+    emcy_inhibit_time: float = MASTER.emcy_inhibit_time
+    vendor_id: int = ANY_DEVICE.vendor_id
+    product_code: int = ANY_DEVICE.product_code
+    revision_number: int = ANY_DEVICE.revision_number
+    serial_number: int = ANY_DEVICE.serial_number
+    boot_time: float = MASTER.boot_time
+    boot_timeout: float = MASTER.boot_timeout
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,22 +100,22 @@ class DeviceSettings:
     namespace: str = ''
     dcf: str = ''
     dcf_path: str | None = None
-    poll_period: float = POLL_PERIOD
-    sdo_timeout: float = SDO_TIMEOUT
-    boot_timeout: float = BOOT_TIMEOUT
-    revision_number: int = 0
-    serial_number: int = 0
+    poll_period: float = DEVICE.poll_period
+    sdo_timeout: float = DEVICE.sdo_timeout
+    boot_timeout: float = DEVICE.boot_timeout
+    revision_number: int = ANY_DEVICE.revision_number
+    serial_number: int = ANY_DEVICE.serial_number
     heartbeat_producer: float | None = None
     heartbeat_consumer: bool | None = None
     heartbeat_multiplier: float | None = None
     guard_time: float | None = None
     life_time_factor: int | None = None
     retry_factor: int | None = None
-    boot: bool = True
-    mandatory: bool = False
-    reset_communication: bool = True
-    restore_configuration: int = 0
-    num_channels: int = 1
+    boot: bool = DEVICE.boot
+    mandatory: bool = DEVICE.mandatory
+    reset_communication: bool = DEVICE.reset_communication
+    restore_configuration: int = DEVICE.restore_configuration
+    num_channels: int = len(DEVICE.axes)
 
 
 def read_options(section: Mapping, findings: Findings) -> Options:

@@ -27,8 +27,7 @@ IS_MASTER, START_ALL, NO_OWN_START, NO_START, RESET_ALL, STOP_ALL = (
     0x40,
 )
 """Bits of 0x1F80, NMT start-up (CiA 302-2, 7.2)."""
-IS_SLAVE, BOOT, MANDATORY, KEEP_ALIVE = 0x01, 0x04, 0x08, 0x10
-CHECK_SOFTWARE, UPDATE_SOFTWARE, RESTORE = 0x20, 0x40, 0x80
+IS_SLAVE, BOOT, MANDATORY, KEEP_ALIVE, RESTORE = 0x01, 0x04, 0x08, 0x10, 0x80
 """Bits of 0x1F81, slave assignment (CiA 302-2, 7.3); bits 8 to 15 are the retry factor, 16 to 31
 the guard time."""
 
@@ -46,11 +45,7 @@ def network_objects(
     if upload_files:
         yield 0x1F22, _files('Concise DCF', upload_files)
     yield 0x1F25, DcfArray('Configuration request', U8, WO, NODES)
-    versions = {n.node_id: f'0x{n.software_version:08X}' for n in nodes if n.software_version}
-    yield 0x1F55, DcfArray('Expected software identification', U32, RW, NODES, versions)
-    programs = {n.node_id: str(n.software_file) for n in nodes if n.software_file is not None}
-    if programs:
-        yield 0x1F58, _files('Program data', programs)
+    yield 0x1F55, DcfArray('Expected software identification', U32, RW, NODES)
     yield 0x1F80, DcfEntry('NMT start-up', U32, RW, f'0x{_start_up(config.master):08X}')
     assignment = {node.node_id: f'0x{_assignment(node):08X}' for node in nodes}
     yield 0x1F81, DcfArray('NMT slave assignment', U32, RW, NODES, assignment)
@@ -101,8 +96,6 @@ def _assignment(node: NodeConfig) -> int:
         | BOOT * node.boot
         | MANDATORY * node.mandatory
         | KEEP_ALIVE * (not node.reset_communication)
-        | CHECK_SOFTWARE * bool(node.software_version)
-        | UPDATE_SOFTWARE * (node.software_file is not None)
         | RESTORE * bool(node.restore_configuration)
         | node.retry_factor << 8
         | round(node.guard_time * MILLISECONDS) << 16
