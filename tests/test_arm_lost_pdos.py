@@ -21,8 +21,8 @@ from arm_canopen import MotionSource
 from arm_canopen.standard.drive import DriveState, OperationMode
 from arm_servo.core import MotionCore
 from arm_servo.gateway import CommandGateway
-from arm_servo.goal import GoalPoint, TrajectoryGoal
 from arm_servo.nodes.drive_source import DriveSource
+from arm_trajectory import GoalPoint, TrajectoryGoal
 
 LOST = 'panda_joint3'
 TPDOS, RPDOS = (0x180, 0x280), (0x200, 0x300, 0x400)

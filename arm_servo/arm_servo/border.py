@@ -16,8 +16,8 @@ import math
 import numpy as np
 
 from arm_model import Array, JointLimits
+from arm_trajectory import brakeable, brakeable_velocity
 
-from .otg import brakeable, brakeable_velocity
 from .singular import Directions, LOST, way_out, way_to_fold
 
 FULL = 0.05

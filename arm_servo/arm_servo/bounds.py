@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from arm_model import Array, frozen, JointLimits, Proximity, RobotModel, RobotState
+from arm_trajectory import brakeable_velocity
 
-from .otg import brakeable_velocity
 from .report import Cause, Limiter
 
 PRESSING = 1e-9

@@ -9,12 +9,11 @@ from collections.abc import Hashable
 import numpy as np
 
 from arm_model import Array, RobotModel, RobotState
+from arm_trajectory import GoalCode, hard_brake, OnlineTrajectoryGenerator
 
 from .core_settings import CoreSettings
-from .exceptions import GoalCode
 from .execution import Execution
 from .jogging import Jogging
-from .otg import Generator, hard_brake
 from .outcome import Outcome
 from .report import MotionReport
 from .servo import Command
@@ -35,7 +34,9 @@ class CommandArbiter:
         jogger: Who has jogged last.
     """
 
-    def __init__(self, model: RobotModel, generator: Generator, settings: CoreSettings) -> None:
+    def __init__(
+        self, model: RobotModel, generator: OnlineTrajectoryGenerator, settings: CoreSettings
+    ) -> None:
         """Let nothing move the arm yet.
 
         Args:

@@ -18,14 +18,13 @@ import math
 import numpy as np
 
 from arm_model import Array, checked, CommandError, Pose, RobotModel, RobotState
+from arm_trajectory import GoalCode, OnlineTrajectoryGenerator, StateMovedError, TrajectoryGoal
 
 from .command_arbiter import CommandArbiter, Motion
 from .commands import by_joint, duration_of, in_base, pose_command, twist_command
 from .core_settings import CoreSettings
-from .exceptions import GoalCode, NotReadyError, StateMovedError
+from .exceptions import NotReadyError
 from .execution import Execution, Feedback
-from .goal import TrajectoryGoal
-from .otg import Generator
 from .outcome import Outcome
 from .preparation import CommandBasis, Preparation, Prepared
 from .report import Cause, Limiter
@@ -56,7 +55,7 @@ class MotionCore:
         """
         self._model = model
         self._settings = settings or CoreSettings()
-        generator = Generator(model.limits)
+        generator = OnlineTrajectoryGenerator(model.limits)
         self._preparation = Preparation(model, generator, self._settings)
         self._arbiter = CommandArbiter(model, generator, self._settings)
         self._filter = SafetyFilter(model, generator)

@@ -11,16 +11,21 @@ from enum import Enum
 import numpy as np
 
 from arm_model import Array, JointLimits, RobotState
+from arm_trajectory import (
+    build_path,
+    CatchUpInterpolator,
+    GoalCode,
+    GoalRules,
+    JointTolerance,
+    merge_tolerances,
+    OnlineTrajectoryGenerator,
+    Path,
+    TimerState,
+    TrajectoryGoal,
+    TrajectoryTimer,
+)
 
-from .catch_up import CatchUpInterpolator
-from .exceptions import GoalCode
-from .goal import GoalRules, JointTolerance, TrajectoryGoal
-from .goal_path import build_path
-from .otg import Generator
 from .outcome import Outcome
-from .path import Path
-from .tolerances import tolerances
-from .trajectory_timer import TimerState, TrajectoryTimer
 
 ARRIVED = 1e-6
 """How near to the end the set-points must be to have arrived in [rad]."""
@@ -100,7 +105,7 @@ class Execution:
         goal: TrajectoryGoal,
         *,
         limits: JointLimits,
-        generator: Generator,
+        generator: OnlineTrajectoryGenerator,
         state: RobotState,
         speed_scaling: float,
         settings: ExecutionSettings,
@@ -128,8 +133,8 @@ class Execution:
         self._begins_at_rest = not state.moving
         self._begun = False
         self._catch_up = CatchUpInterpolator(limits, generator)
-        self._path_tolerance = tolerances(limits, goal.path_tolerance, settings.path)
-        self._goal_tolerance = tolerances(limits, goal.goal_tolerance, settings.goal)
+        self._path_tolerance = merge_tolerances(limits, goal.path_tolerance, settings.path)
+        self._goal_tolerance = merge_tolerances(limits, goal.goal_tolerance, settings.goal)
         self._goal_time = goal.goal_time or settings.goal_time
         self._settling = 0.0
         self._off = 0.0

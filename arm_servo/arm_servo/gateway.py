@@ -28,12 +28,12 @@ import time
 from typing import Any
 
 from arm_model import Array, RobotModel, RobotState
+from arm_trajectory import GoalCode, StateMovedError, TrajectoryGoal
 
 from .command_arbiter import Motion
 from .core import MotionCore
-from .exceptions import GoalCode, NotReadyError, StateMovedError
+from .exceptions import NotReadyError
 from .execution import Execution
-from .goal import TrajectoryGoal
 from .outcome import Outcome, refused
 from .preparation import CommandBasis, Prepared
 from .requests import JogRequest, MotionRequest

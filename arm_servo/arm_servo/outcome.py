@@ -7,8 +7,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from arm_model import ArmError
-
-from .exceptions import GoalCode, GoalError
+from arm_trajectory import GoalCode, GoalError
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,19 +15,23 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from arm_model import Array, CommandError, Mask, RobotModel, RobotState
+from arm_trajectory import (
+    GoalCode,
+    GoalError,
+    OnlineTrajectoryGenerator,
+    PathCheck,
+    Plan,
+    TimerState,
+    TrajectoryGoal,
+)
 
 from .command_arbiter import Motion
 from .commands import by_joint
 from .core_settings import CoreSettings
-from .exceptions import GoalCode, GoalError
 from .execution import Execution
-from .goal import TrajectoryGoal
-from .otg import Generator, Plan
-from .path_check import PathCheck
 from .requests import DisplacementRequest, MotionRequest
 from .set_point import Source
 from .single_target import SingleTarget
-from .trajectory_timer import TimerState
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,7 +88,9 @@ class Preparation:
     A trajectory takes 2 ms, 0.2 ms a point, and about 3 ms for each second of its path.
     """
 
-    def __init__(self, model: RobotModel, catch_up: Generator, settings: CoreSettings) -> None:
+    def __init__(
+        self, model: RobotModel, catch_up: OnlineTrajectoryGenerator, settings: CoreSettings
+    ) -> None:
         """Prepare.
 
         Args:
@@ -96,7 +102,9 @@ class Preparation:
         self._limits = model.limits
         self._catch_up = catch_up
         self._settings = settings
-        self._generator = Generator(model.limits)  # that of the cycle is for the cycle
+        self._generator = OnlineTrajectoryGenerator(
+            model.limits
+        )  # that of the cycle is for the cycle
         self._check = PathCheck(model) if settings.check_self_collision else None
 
     def prepare(self, request: MotionRequest, basis: CommandBasis) -> Prepared:

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import math
 
 from arm_model import Pose
+from arm_trajectory import TrajectoryGoal
 
-from .goal import TrajectoryGoal
 from .servo import Command, JointCommand, TwistCommand
 
 

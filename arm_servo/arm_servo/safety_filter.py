@@ -7,8 +7,8 @@ from __future__ import annotations
 import numpy as np
 
 from arm_model import Array, LeastClearance, Mask, RobotModel, RobotState
+from arm_trajectory import hard_brake, OnlineTrajectoryGenerator, Plan
 
-from .otg import Generator, hard_brake, Plan
 from .report import Cause, Limiter
 
 TOUCH = 1e-4
@@ -32,7 +32,7 @@ class SafetyFilter:
     beyond a limit, or in contact, may go back and may not go further.
     """
 
-    def __init__(self, model: RobotModel, generator: Generator) -> None:
+    def __init__(self, model: RobotModel, generator: OnlineTrajectoryGenerator) -> None:
         """Prepare.
 
         Args:

@@ -7,9 +7,8 @@ from __future__ import annotations
 import numpy as np
 
 from arm_model import Array, frozen, RobotState
+from arm_trajectory import GoalCode, OnlineTrajectoryGenerator, Plan
 
-from .exceptions import GoalCode
-from .otg import Generator, Plan
 from .outcome import Outcome
 
 ARRIVED = 1e-6
@@ -27,7 +26,9 @@ class SingleTarget:
         outcome: How it ended; None while it goes on.
     """
 
-    def __init__(self, target: Array, max_speed: float, generator: Generator) -> None:
+    def __init__(
+        self, target: Array, max_speed: float, generator: OnlineTrajectoryGenerator
+    ) -> None:
         """Aim.
 
         Args:

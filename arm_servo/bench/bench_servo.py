@@ -24,8 +24,8 @@ from servo_arms import moved as moved_by
 from servo_arms import ready, robot, ROBOTS, SPEED
 
 from arm_model import Array, RobotModel
-from arm_servo import CoreSettings, GoalError, GoalPoint, MotionCore, TrajectoryGoal
-from arm_servo.path_check import PathCheck
+from arm_servo import CoreSettings, MotionCore
+from arm_trajectory import GoalError, GoalPoint, PathCheck, TrajectoryGoal
 
 PERIOD = 0.01
 STUCK = 0.05

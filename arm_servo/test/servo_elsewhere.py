@@ -15,11 +15,11 @@ from servo_commands import jog as jog_joints
 from arm_model import Array
 from arm_servo.core import MotionCore
 from arm_servo.gateway import CommandGateway
-from arm_servo.goal import GoalPoint, TrajectoryGoal
 from arm_servo.nodes.following import FollowingLimits, FollowingWatch
 from arm_servo.nodes.joint_feedback import JointFeedback
 from arm_servo.nodes.motion_thread import MotionCycle
 from arm_servo.set_point import SetPoint
+from arm_trajectory import GoalPoint, TrajectoryGoal
 
 PERIOD = 0.01
 

@@ -11,10 +11,10 @@ import numpy as np
 import pinocchio as pin
 
 from arm_model import Array, RobotModel, RobotState
-from arm_servo.otg import Generator
 from arm_servo.report import Limiter, MotionReport
 from arm_servo.safety_filter import SafetyFilter
 from arm_servo.servo import Command, ServoSource
+from arm_trajectory import OnlineTrajectoryGenerator
 
 PERIOD = 0.01
 """Cycle of the tests in [s]: slower than in use, so that they are quick."""
@@ -52,7 +52,7 @@ def run(
     period: float = PERIOD,
 ) -> Run:
     """Carry out a command, or one that changes with time, for a time [s]."""
-    source, generator = ServoSource(model), Generator(model.limits)
+    source, generator = ServoSource(model), OnlineTrajectoryGenerator(model.limits)
     safety_filter = SafetyFilter(model, generator)
     state = start if isinstance(start, RobotState) else RobotState.at_rest(start)
     safety_filter.reset(state)

@@ -11,8 +11,8 @@ import numpy as np
 from arm_model import Array, JointLimits, RobotModel, RobotState
 from arm_servo.core import MotionCore
 from arm_servo.execution import Execution, Phase
-from arm_servo.goal import GoalPoint, TrajectoryGoal
 from arm_servo.set_point import SetPoint
+from arm_trajectory import GoalPoint, TrajectoryGoal
 
 PERIOD = 0.004
 """Cycle of the streams in [s]."""

@@ -10,9 +10,8 @@ import pytest
 
 from arm_model import RobotModel, RobotState
 from arm_servo.core import MotionCore
-from arm_servo.exceptions import GoalCode, StateMovedError
-from arm_servo.goal import GoalPoint, TrajectoryGoal
 from arm_servo.set_point import Source
+from arm_trajectory import GoalCode, GoalPoint, StateMovedError, TrajectoryGoal
 
 PERIOD = 0.01
 

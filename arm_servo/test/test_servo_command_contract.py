@@ -23,10 +23,10 @@ from arm_canopen import Refusal, RefusalCause
 from arm_model import Array, combined, Pose
 from arm_servo.commands import twist_command
 from arm_servo.gateway import CommandGateway, JOGGING, MotionCommand
-from arm_servo.goal import GoalPoint, TrajectoryGoal
 from arm_servo.requests import JogRequest
 from arm_servo.servo import PoseCommand
 from arm_servo.set_point import Source
+from arm_trajectory import GoalPoint, TrajectoryGoal
 
 pytestmark = pytest.mark.slow
 

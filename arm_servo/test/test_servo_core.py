@@ -18,11 +18,11 @@ from servo_streams import kept, PERIOD, stream, wave
 
 from arm_model import CommandError, Pose
 from arm_servo.core import MotionCore
-from arm_servo.exceptions import GoalCode, NotReadyError
+from arm_servo.exceptions import NotReadyError
 from arm_servo.execution import Phase
-from arm_servo.otg import Generator
 from arm_servo.report import Cause
 from arm_servo.set_point import SetPoint, Source
+from arm_trajectory import GoalCode, OnlineTrajectoryGenerator
 
 pytestmark = pytest.mark.slow
 
@@ -181,7 +181,7 @@ def test_without_an_answer_of_the_generator_the_arm_brakes(
     core = core_of('prbt')
     core.jog({'prbt_joint_1': 0.8, 'prbt_joint_4': -0.5}, 0.0, duration=1.0)
     stream(core, 0.6)
-    monkeypatch.setattr(Generator, '_plan', lambda *_: None)
+    monkeypatch.setattr(OnlineTrajectoryGenerator, '_plan', lambda *_: None)
     before = core.state
     states = [point.state for point in stream(core, 0.4)]
     assert not states[-1].moving

@@ -19,14 +19,14 @@ from servo_drives import Drives, PERIOD
 from arm_canopen import Refusal, RefusalCause
 from arm_model import CommandError
 from arm_servo.commands import by_joint
-from arm_servo.exceptions import GoalCode, GoalError, NotReadyError, StateMovedError
+from arm_servo.exceptions import NotReadyError
 from arm_servo.gateway import MAX_ATTEMPTS, MAX_QUEUED_MOTIONS, MotionCommand, start_worker
-from arm_servo.goal import GoalPoint, TrajectoryGoal
 from arm_servo.requests import JogRequest
 from arm_servo.safety_filter import SafetyFilter
 from arm_servo.servo import JointCommand
 from arm_servo.set_point import Source
 from arm_servo.single_target import SingleTarget
+from arm_trajectory import GoalCode, GoalError, GoalPoint, StateMovedError, TrajectoryGoal
 
 JOINT = 'panda_joint1'
 

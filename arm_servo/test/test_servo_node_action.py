@@ -11,10 +11,9 @@ import pytest
 from servo_commands import SteppedWorker
 from servo_drives import Drives
 
-from arm_servo.exceptions import GoalCode
 from arm_servo.gateway import MotionCommand
-from arm_servo.goal import GoalPoint, TrajectoryGoal
 from arm_servo.nodes.trajectory_action import TrajectoryAction
+from arm_trajectory import GoalCode, GoalPoint, TrajectoryGoal
 
 
 class Server:

@@ -14,13 +14,13 @@ from servo_drives import Drives, PERIOD
 
 from arm_canopen import CanopenError, Refusal, RefusalCause
 from arm_servo.core import MotionCore
-from arm_servo.exceptions import GoalCode, NotReadyError
+from arm_servo.exceptions import NotReadyError
 from arm_servo.execution import Phase
 from arm_servo.gateway import MotionCommand
-from arm_servo.goal import GoalPoint, TrajectoryGoal
 from arm_servo.nodes.drive_reasons import why_not
 from arm_servo.nodes.drive_source import NOT_ATTACHED
 from arm_servo.set_point import Source
+from arm_trajectory import GoalCode, GoalPoint, TrajectoryGoal
 
 
 def swing(drives: Drives, far: float = 0.4, time: float = 2.0) -> MotionCommand:

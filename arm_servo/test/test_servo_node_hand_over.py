@@ -15,7 +15,7 @@ from servo_drives import Drives, PERIOD
 
 from arm_model import ArmError
 from arm_servo.gateway import MOTIONS
-from arm_servo.goal import GoalPoint, TrajectoryGoal
+from arm_trajectory import GoalPoint, TrajectoryGoal
 
 pytestmark = pytest.mark.slow
 

@@ -7,8 +7,6 @@ from __future__ import annotations
 from functools import cache
 import math
 
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from model_robots import ready, robot, ROBOTS
 import numpy as np
 import pytest
@@ -16,12 +14,10 @@ import pytest
 from arm_model import Array, CommandError
 from arm_servo.core import MotionCore
 from arm_servo.core_settings import CoreSettings
-from arm_servo.exceptions import GoalCode, GoalError
 from arm_servo.execution import Phase
-from arm_servo.goal import GoalPoint, TrajectoryGoal
-from arm_servo.path_check import PathCheck, STEP
 from arm_servo.requests import DisplacementRequest
 from arm_servo.set_point import Source
+from arm_trajectory import GoalCode, GoalError, GoalPoint, TrajectoryGoal
 
 pytestmark = pytest.mark.slow
 
@@ -85,27 +81,6 @@ def test_a_trajectory_through_contact_is_refused_with_pair_and_time(name: str) -
     assert time == pytest.approx(times[first], abs=0.05)
     links = core.model.nearest(places[first], math.inf, 1)[0].links
     assert all(link in str(caught.value) for link in links)
-
-
-@pytest.mark.parametrize('name', ROBOTS)
-@settings(max_examples=12, deadline=None)
-@given(seed=st.integers(0, 10**6))
-def test_what_is_refused_collides_and_what_is_accepted_does_not(name: str, seed: int) -> None:
-    """Against looking at every millisecond; what is passed over is shallower than a step."""
-    model, rng = robot(name), np.random.default_rng(seed)
-    lower = np.maximum(model.limits.lower, -2.5)
-    upper = np.minimum(model.limits.upper, 2.5)
-    begin, end = rng.uniform(lower, upper, (2, len(model)))
-    shares = np.linspace(0.0, 1.0, 2001)
-    least = min(model.clearance(begin + share * (end - begin)) for share in shares)
-
-    def positions(times: Array) -> Array:
-        places: Array = begin + np.outer(times / 4.0, end - begin)
-        return places
-
-    if model.clearance(begin) > 0.0:
-        found = PathCheck(model).contact(positions, 4.0)
-        assert least < 0.0 if found else least > -STEP
 
 
 @pytest.mark.parametrize('name', ROBOTS)

@@ -18,13 +18,14 @@ from servo_streams import kept, PERIOD
 from arm_model import Array, JointLimits, RobotState
 from arm_servo.core import MotionCore
 from arm_servo.core_settings import CoreSettings
-from arm_servo.exceptions import GoalCode, GoalError
 from arm_servo.execution import Execution, ExecutionSettings, Phase
-from arm_servo.goal import GoalPoint, TrajectoryGoal
-from arm_servo.otg import Generator
-from arm_servo.path import linear, Path
-from arm_servo.path_rounding import rounded
-from arm_servo.path_timing import Timing
+from arm_trajectory import (
+    GoalCode,
+    GoalError,
+    GoalPoint,
+    OnlineTrajectoryGenerator,
+    TrajectoryGoal,
+)
 
 pytestmark = pytest.mark.slow
 
@@ -257,47 +258,13 @@ def test_goals_replace_each_other_on_their_paths(name: str, seed: int) -> None:
     kept(limits, states + more[1:])
 
 
-@settings(max_examples=20, deadline=None)
-@given(seed=st.integers(0, 10**6), step=st.sampled_from([0.01, 0.1, 1.0]))
-def test_rounded_paths_are_smooth(seed: int, step: float) -> None:
-    """Positions, speeds and accelerations are continuous, however dense the corners are."""
-    limits = robot('prbt').limits
-    rows = np.cumsum(np.random.default_rng(seed).normal(size=(12, 6)), axis=0) * 0.1 * step
-    lines = [linear(n * step, step, rows[n], rows[n + 1]) for n in range(len(rows) - 1)]
-    path = rounded(Path(lines), limits)
-    for before, after in zip(path.segments, path.segments[1:], strict=False):
-        one, other = before.at(after.start), after.at(after.start)
-        assert other.position == pytest.approx(one.position, abs=1e-9)
-        assert other.velocity == pytest.approx(one.velocity, abs=1e-8)
-        assert other.acceleration == pytest.approx(one.acceleration, abs=1e-6)
-    assert path.at(0.0).position == pytest.approx(rows[0])
-    assert path.end.position == pytest.approx(rows[-1])
-
-
-@settings(max_examples=20, deadline=None)
-@given(seed=st.integers(0, 10**6))
-def test_stretched_paths_lead_through_the_same_places(seed: int) -> None:
-    """A path that is walked slower is the same path, within the limits."""
-    limits = robot('gp110').limits
-    rows = np.random.default_rng(seed).uniform(-0.3, 0.3, (5, 6))
-    lines = [linear(0.25 * n, 0.25, rows[n], rows[n + 1]) for n in range(4)]
-    given_path = rounded(Path(lines), limits)
-    stretched = Timing(given_path, limits).stretched()
-    assume(stretched is not None and stretched is not given_path)
-    assert stretched is not None
-    assert Timing(stretched, limits).demand.share <= 1.0
-    there = given_path.positions(np.linspace(0.0, given_path.duration, 3000))
-    for place in stretched.positions(np.linspace(0.0, stretched.duration, 60)):
-        assert np.abs(there - place).max(axis=1).min() < 2e-3  # as dense as the places are
-
-
 def test_set_points_that_leave_the_path_end_the_trajectory() -> None:
     """Whatever takes the set-points off the path that they had met, it does not go on."""
     limits, begin = robot('prbt').limits, ready('prbt')
     execution = Execution(
         quick('prbt', begin + 0.3, 2.0),
         limits=limits,
-        generator=Generator(limits),
+        generator=OnlineTrajectoryGenerator(limits),
         state=RobotState.at_rest(begin),
         speed_scaling=1.0,
         settings=ExecutionSettings(),

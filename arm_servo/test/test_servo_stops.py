@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 
 from arm_servo.core import MotionCore
-from arm_servo.exceptions import GoalError
-from arm_servo.goal import GoalPoint, TrajectoryGoal
+from arm_trajectory import GoalError, GoalPoint, TrajectoryGoal
 
 pytestmark = pytest.mark.slow
 

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 import math
-import re
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -18,12 +17,17 @@ from servo_streams import follow_to_the_end, kept, PERIOD, stream, wave
 from arm_model import Array, RobotState
 from arm_servo.core import MotionCore
 from arm_servo.core_settings import CoreSettings
-from arm_servo.exceptions import GoalCode, GoalError
 from arm_servo.execution import ExecutionSettings, Phase
-from arm_servo.goal import GoalPoint, GoalRules, JointTolerance, TrajectoryGoal
 from arm_servo.outcome import Outcome
-from arm_servo.path import cubic, linear, Path, PathPoint, quintic
-from arm_servo.tolerances import tolerances
+from arm_trajectory import (
+    GoalCode,
+    GoalError,
+    GoalPoint,
+    GoalRules,
+    JointTolerance,
+    Path,
+    TrajectoryGoal,
+)
 
 pytestmark = pytest.mark.slow
 
@@ -45,40 +49,6 @@ def path_of(core: MotionCore) -> Path:
     """Return the path that a core follows."""
     assert core.execution is not None
     return core.execution._path
-
-
-@settings(max_examples=30, deadline=None)
-@given(seed=st.integers(0, 10**6), duration=st.floats(0.1, 5.0))
-def test_segments_meet_their_ends(seed: int, duration: float) -> None:
-    """A line meets positions, a cubic velocities too, a quintic accelerations too."""
-    rng = np.random.default_rng(seed)
-    begin, end = (PathPoint(*rng.normal(size=(3, 4))) for _ in range(2))
-    straight = linear(1.0, duration, begin.position, end.position)
-    third, fifth = cubic(1.0, duration, begin, end), quintic(1.0, duration, begin, end)
-    for segment in (straight, third, fifth):
-        assert segment.at(1.0).position == pytest.approx(begin.position)
-        assert segment.at(1.0 + duration).position == pytest.approx(end.position, abs=1e-9)
-    for segment in (third, fifth):
-        assert segment.at(1.0).velocity == pytest.approx(begin.velocity)
-        assert segment.at(1.0 + duration).velocity == pytest.approx(end.velocity, abs=1e-8)
-    assert fifth.at(1.0).acceleration == pytest.approx(begin.acceleration)
-    assert fifth.at(1.0 + duration).acceleration == pytest.approx(end.acceleration, abs=1e-6)
-
-
-@settings(max_examples=30, deadline=None)
-@given(seed=st.integers(0, 10**6), share=st.floats(0.1, 0.9))
-def test_derivatives_of_segments_are_differences(seed: int, share: float) -> None:
-    """Velocity and acceleration are the difference quotients of what they derive."""
-    rng, step = np.random.default_rng(seed), 1e-6
-    begin, end = (PathPoint(*rng.normal(size=(3, 4))) for _ in range(2))
-    segment = quintic(0.0, 1.0, begin, end)
-    before, here, after = (segment.at(share + shift) for shift in (-step, 0.0, step))
-    assert here.velocity == pytest.approx(
-        (after.position - before.position) / (2 * step), abs=1e-5
-    )
-    assert here.acceleration == pytest.approx(
-        (after.velocity - before.velocity) / (2 * step), abs=1e-4
-    )
 
 
 @pytest.mark.parametrize('name', ROBOTS)
@@ -349,19 +319,6 @@ def test_a_path_violation_names_joint_amount_and_time() -> None:
         assert word in execution.ending.reason
     assert execution.phase is Phase.DONE
     assert not core.state.moving
-
-
-@settings(max_examples=30, deadline=None)
-@given(tolerance=st.floats(1e-6, 1.0), share=st.floats(1.0001, 2.0))
-def test_the_words_of_a_violation_show_it(tolerance: float, share: float) -> None:
-    """The amount reads greater than its tolerance, however small both are."""
-    limits = robot('prbt').limits
-    bound = tolerances(limits, None, JointTolerance(tolerance))
-    words = bound.violation(limits, np.full(6, -tolerance * share), np.zeros(6))
-    assert words is not None
-    found = re.search(r'off by -(\S+) rad, tolerance (\S+)$', words)
-    assert found is not None, words
-    assert float(found[1]) > float(found[2]) > 0.0
 
 
 def test_a_goals_own_tolerance_counts() -> None:

@@ -8,8 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import math
 
 from arm_canopen import AxisFeedback, Refusal, RefusalCause
-
-from ..exceptions import GoalCode
+from arm_trajectory import GoalCode
 
 POWER = 'look after its power and its cable'
 MODE = 'call its ~/cyclic_position_mode or ~/interpolated_position_mode'

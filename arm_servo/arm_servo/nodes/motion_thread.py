@@ -13,11 +13,10 @@ import time
 import numpy as np
 
 from arm_model import Array, RobotState
+from arm_trajectory import GoalCode, hard_brake
 from realtime_loop import CycleTimer
 
-from ..exceptions import GoalCode
 from ..gateway import CommandGateway
-from ..otg import hard_brake
 from ..report import MotionReport
 from ..set_point import SetPoint, Source
 from .following import FollowingWatch

@@ -21,8 +21,9 @@ from rclpy.parameter import Parameter
 
 from arm_model import ArmError, ModelError
 from arm_model.ros import seconds, TfListener
+from arm_trajectory import GoalCode
 
-from ..exceptions import GoalCode, NotReadyError
+from ..exceptions import NotReadyError
 from ..gateway import CommandGateway, JOGGING
 from ..outcome import Outcome
 from ..requests import DisplacementRequest, JogRequest

@@ -15,12 +15,11 @@ from rclpy.action.server import CancelResponse
 from rclpy.node import Node
 
 from arm_model import ArmError
+from arm_trajectory import GoalCode, TrajectoryGoal
 from node_runner.action_goals import serve_goals
 
-from ..exceptions import GoalCode
 from ..execution import Execution
 from ..gateway import CommandGateway, MotionCommand
-from ..goal import TrajectoryGoal
 from ..outcome import Outcome, refused
 from .trajectory_messages import difference, point_of
 

@@ -20,11 +20,11 @@ from trajectory_msgs.msg import JointTrajectory
 
 from arm_model import ArmError
 from arm_model.ros import seconds
+from arm_trajectory import TrajectoryGoal
 
 from ..exceptions import NotReadyError
 from ..execution import Execution
 from ..gateway import CommandGateway, MotionCommand
-from ..goal import TrajectoryGoal
 from ..set_point import Source
 from .trajectory_action import TrajectoryAction
 from .trajectory_messages import (

@@ -11,9 +11,8 @@ from trajectory_msgs.msg import JointTrajectoryPoint
 
 from arm_model import JointLimits, RobotState
 from arm_model.ros import seconds
+from arm_trajectory import GoalCode, GoalError, GoalPoint, JointTolerance, TrajectoryGoal
 
-from ..exceptions import GoalCode, GoalError
-from ..goal import GoalPoint, JointTolerance, TrajectoryGoal
 from .trajectory_parameters import TrajectoryParameters
 
 

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from rclpy.node import Node
 
 from arm_model import ModelError
+from arm_trajectory import GoalRules, JointTolerance
 from node_runner import ParameterReader
 
 from ..execution import ExecutionSettings
-from ..goal import GoalRules, JointTolerance
 
 RATES = (0.1, 1000.0)
 """Span of rates in [Hz]."""

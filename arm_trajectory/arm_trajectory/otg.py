@@ -67,7 +67,7 @@ class Plan:
         return self._lower, self._upper
 
 
-class Generator:
+class OnlineTrajectoryGenerator:
     """Plans jerk-limited motions of one arm.
 
     It is ruckig with the arm's limits; None where ruckig has no answer, which its callers meet
@@ -148,7 +148,7 @@ class Generator:
         demand.minimum_duration = shortest
         return self._plan(demand)
 
-    def slowed(self, share: float, fastest: float = np.inf) -> Generator:
+    def slowed(self, share: float, fastest: float = np.inf) -> OnlineTrajectoryGenerator:
         """Return a generator with a share of the velocities.
 
         Args:
@@ -156,7 +156,7 @@ class Generator:
             fastest: Greatest speed of any joint in [rad/s], before the share is taken.
         """
         limits = self._limits
-        return Generator(
+        return OnlineTrajectoryGenerator(
             JointLimits(
                 limits.names,
                 limits.lower,

@@ -57,7 +57,7 @@ def _distinct(error: float, tolerance: float) -> tuple[str, str]:
     return off, most
 
 
-def tolerances(
+def merge_tolerances(
     limits: JointLimits,
     given: Mapping[str, JointTolerance] | None,
     default: JointTolerance,

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from arm_model import Array, RobotState
-from arm_servo.otg import brakeable_velocity, Generator, hard_brake
+from arm_trajectory import brakeable_velocity, hard_brake, OnlineTrajectoryGenerator
 
 PERIOD = 0.004
 
@@ -21,7 +21,7 @@ PERIOD = 0.004
 def stream(name: str, seed: int) -> list[RobotState]:
     """Follow velocities that change at random, and return the states."""
     limits, rng = robot(name).limits, np.random.default_rng(seed)
-    generator = Generator(limits)
+    generator = OnlineTrajectoryGenerator(limits)
     state = RobotState.at_rest(np.zeros(len(limits)))
     states, target = [state], state.velocity
     for step in range(120):
@@ -53,7 +53,7 @@ def test_limits_hold_while_the_target_changes(name: str, seed: int) -> None:
 def test_joints_start_in_step() -> None:
     """From rest all joints keep the direction of the asked velocity, cycle by cycle."""
     limits = robot('panda').limits
-    generator = Generator(limits)
+    generator = OnlineTrajectoryGenerator(limits)
     target = limits.velocity * np.array([0.3, -0.5, 0.2, 0.9, -0.1, 0.4, 0.05])
     state = RobotState.at_rest(np.zeros(7))
     for _ in range(40):
@@ -71,7 +71,7 @@ def test_what_is_brakeable_can_be_braked(share: float) -> None:
     limits = robot('panda').limits
     way: Array = np.full(7, share)
     velocity = brakeable_velocity(way, limits)
-    stop = Generator(limits).brake(RobotState(np.zeros(7), velocity, np.zeros(7)))
+    stop = OnlineTrajectoryGenerator(limits).brake(RobotState(np.zeros(7), velocity, np.zeros(7)))
     assert stop is not None
     _, upper = stop.extremes
     free = velocity < limits.velocity
@@ -89,7 +89,7 @@ def test_the_extremes_of_a_stop_are_those_of_its_places(seed: int) -> None:
         rng.uniform(-1.0, 1.0, 7) * limits.velocity,
         rng.uniform(-1.0, 1.0, 7) * limits.acceleration,
     )
-    stop = Generator(limits).brake(state)
+    stop = OnlineTrajectoryGenerator(limits).brake(state)
     assert stop is not None
     places = np.array([stop.at(time).position for time in np.linspace(0, stop.duration, 400)])
     assert places[0] == pytest.approx(state.position, abs=1e-12)
@@ -103,7 +103,7 @@ def test_a_plan_to_a_state_arrives() -> None:
     limits = robot('prbt').limits
     start = RobotState(np.zeros(6), np.full(6, 0.2), np.full(6, 0.5))
     target = RobotState(np.full(6, 0.7), np.full(6, -0.3), np.full(6, 0.1))
-    plan = Generator(limits).to_state(start, target)
+    plan = OnlineTrajectoryGenerator(limits).to_state(start, target)
     assert plan is not None
     end = plan.at(plan.duration)
     assert end.position == pytest.approx(target.position, abs=1e-9)
@@ -115,7 +115,7 @@ def test_ruckig_without_an_answer_is_none() -> None:
     """A target that ruckig refuses is no exception in the loop."""
     limits = robot('prbt').limits
     state = RobotState.at_rest(np.zeros(6))
-    assert Generator(limits).to_velocity(state, np.full(6, np.nan)) is None
+    assert OnlineTrajectoryGenerator(limits).to_velocity(state, np.full(6, np.nan)) is None
 
 
 def test_the_hard_brake_comes_to_rest() -> None:

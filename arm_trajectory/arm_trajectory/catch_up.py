@@ -10,7 +10,7 @@ import numpy as np
 
 from arm_model import JointLimits, RobotState
 
-from .otg import Generator, Plan
+from .otg import OnlineTrajectoryGenerator, Plan
 
 SOON = (4, 10, 25, 60, 150)
 """Cycles after which a meeting is tried."""
@@ -42,7 +42,7 @@ class CatchUpInterpolator:
     every cycle, the meeting would be put off again and again.
     """
 
-    def __init__(self, limits: JointLimits, generator: Generator) -> None:
+    def __init__(self, limits: JointLimits, generator: OnlineTrajectoryGenerator) -> None:
         """Prepare.
 
         Args:

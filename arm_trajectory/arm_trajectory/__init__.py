@@ -1,0 +1,46 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Trajectories of an arm before and while they are executed; pure.
+
+A :class:`TrajectoryGoal` becomes a :class:`Path` (:func:`build_path`): segments between its
+points, corners rounded, time scaled to the limits of the joints. :class:`PathCheck` finds where
+links meet on it. A :class:`TrajectoryTimer` scales the speed of its execution, a
+:class:`CatchUpInterpolator` leads to it, an :class:`OnlineTrajectoryGenerator` from state to
+state.
+"""
+
+from __future__ import annotations
+
+from .catch_up import CatchUpInterpolator
+from .exceptions import GoalCode, GoalError, StateMovedError
+from .goal import GoalPoint, GoalRules, JointTolerance, TrajectoryGoal
+from .goal_path import build_path
+from .otg import brakeable, brakeable_velocity, hard_brake, OnlineTrajectoryGenerator, Plan
+from .path import Path
+from .path_check import Contact, PathCheck
+from .tolerances import merge_tolerances, Tolerances
+from .trajectory_timer import TimerState, TrajectoryTimer
+
+__all__ = [
+    'CatchUpInterpolator',
+    'Contact',
+    'GoalCode',
+    'GoalError',
+    'GoalPoint',
+    'GoalRules',
+    'JointTolerance',
+    'OnlineTrajectoryGenerator',
+    'Path',
+    'PathCheck',
+    'Plan',
+    'StateMovedError',
+    'TimerState',
+    'Tolerances',
+    'TrajectoryGoal',
+    'TrajectoryTimer',
+    'brakeable',
+    'brakeable_velocity',
+    'build_path',
+    'hard_brake',
+    'merge_tolerances',
+]

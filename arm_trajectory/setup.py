@@ -1,0 +1,22 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Build description of arm_trajectory."""
+
+from setuptools import find_packages, setup
+
+setup(
+    name='arm_trajectory',
+    version='0.1.0',
+    packages=find_packages(include=['arm_trajectory', 'arm_trajectory.*']),
+    package_data={'arm_trajectory': ['py.typed']},
+    data_files=[
+        ('share/ament_index/resource_index/packages', ['resource/arm_trajectory']),
+        ('share/arm_trajectory', ['package.xml']),
+    ],
+    install_requires=['setuptools'],
+    zip_safe=True,
+    maintainer='The arm and quad developers',
+    maintainer_email='developers@example.org',
+    description='Jerk-limited trajectories of an arm, planned and checked before anything moves',
+    license='Apache-2.0',
+)

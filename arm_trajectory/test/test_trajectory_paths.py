@@ -1,0 +1,101 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Segments, rounded corners, time scaling, and the words of a tolerance that is violated."""
+
+from __future__ import annotations
+
+import re
+
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from model_robots import robot
+import numpy as np
+import pytest
+
+from arm_trajectory import JointTolerance, merge_tolerances, Path
+from arm_trajectory.path import cubic, linear, PathPoint, quintic
+from arm_trajectory.path_rounding import rounded
+from arm_trajectory.path_timing import Timing
+
+pytestmark = pytest.mark.slow
+
+
+@settings(max_examples=30, deadline=None)
+@given(seed=st.integers(0, 10**6), duration=st.floats(0.1, 5.0))
+def test_segments_meet_their_ends(seed: int, duration: float) -> None:
+    """A line meets positions, a cubic velocities too, a quintic accelerations too."""
+    rng = np.random.default_rng(seed)
+    begin, end = (PathPoint(*rng.normal(size=(3, 4))) for _ in range(2))
+    straight = linear(1.0, duration, begin.position, end.position)
+    third, fifth = cubic(1.0, duration, begin, end), quintic(1.0, duration, begin, end)
+    for segment in (straight, third, fifth):
+        assert segment.at(1.0).position == pytest.approx(begin.position)
+        assert segment.at(1.0 + duration).position == pytest.approx(end.position, abs=1e-9)
+    for segment in (third, fifth):
+        assert segment.at(1.0).velocity == pytest.approx(begin.velocity)
+        assert segment.at(1.0 + duration).velocity == pytest.approx(end.velocity, abs=1e-8)
+    assert fifth.at(1.0).acceleration == pytest.approx(begin.acceleration)
+    assert fifth.at(1.0 + duration).acceleration == pytest.approx(end.acceleration, abs=1e-6)
+
+
+@settings(max_examples=30, deadline=None)
+@given(seed=st.integers(0, 10**6), share=st.floats(0.1, 0.9))
+def test_derivatives_of_segments_are_differences(seed: int, share: float) -> None:
+    """Velocity and acceleration are the difference quotients of what they derive."""
+    rng, step = np.random.default_rng(seed), 1e-6
+    begin, end = (PathPoint(*rng.normal(size=(3, 4))) for _ in range(2))
+    segment = quintic(0.0, 1.0, begin, end)
+    before, here, after = (segment.at(share + shift) for shift in (-step, 0.0, step))
+    assert here.velocity == pytest.approx(
+        (after.position - before.position) / (2 * step), abs=1e-5
+    )
+    assert here.acceleration == pytest.approx(
+        (after.velocity - before.velocity) / (2 * step), abs=1e-4
+    )
+
+
+@settings(max_examples=30, deadline=None)
+@given(tolerance=st.floats(1e-6, 1.0), share=st.floats(1.0001, 2.0))
+def test_the_words_of_a_violation_show_it(tolerance: float, share: float) -> None:
+    """The amount reads greater than its tolerance, however small both are."""
+    limits = robot('prbt').limits
+    bound = merge_tolerances(limits, None, JointTolerance(tolerance))
+    words = bound.violation(limits, np.full(6, -tolerance * share), np.zeros(6))
+    assert words is not None
+    found = re.search(r'off by -(\S+) rad, tolerance (\S+)$', words)
+    assert found is not None, words
+    assert float(found[1]) > float(found[2]) > 0.0
+
+
+@settings(max_examples=20, deadline=None)
+@given(seed=st.integers(0, 10**6), step=st.sampled_from([0.01, 0.1, 1.0]))
+def test_rounded_paths_are_smooth(seed: int, step: float) -> None:
+    """Positions, speeds and accelerations are continuous, however dense the corners are."""
+    limits = robot('prbt').limits
+    rows = np.cumsum(np.random.default_rng(seed).normal(size=(12, 6)), axis=0) * 0.1 * step
+    lines = [linear(n * step, step, rows[n], rows[n + 1]) for n in range(len(rows) - 1)]
+    path = rounded(Path(lines), limits)
+    for before, after in zip(path.segments, path.segments[1:], strict=False):
+        one, other = before.at(after.start), after.at(after.start)
+        assert other.position == pytest.approx(one.position, abs=1e-9)
+        assert other.velocity == pytest.approx(one.velocity, abs=1e-8)
+        assert other.acceleration == pytest.approx(one.acceleration, abs=1e-6)
+    assert path.at(0.0).position == pytest.approx(rows[0])
+    assert path.end.position == pytest.approx(rows[-1])
+
+
+@settings(max_examples=20, deadline=None)
+@given(seed=st.integers(0, 10**6))
+def test_stretched_paths_lead_through_the_same_places(seed: int) -> None:
+    """A path that is walked slower is the same path, within the limits."""
+    limits = robot('gp110').limits
+    rows = np.random.default_rng(seed).uniform(-0.3, 0.3, (5, 6))
+    lines = [linear(0.25 * n, 0.25, rows[n], rows[n + 1]) for n in range(4)]
+    given_path = rounded(Path(lines), limits)
+    stretched = Timing(given_path, limits).stretched()
+    assume(stretched is not None and stretched is not given_path)
+    assert stretched is not None
+    assert Timing(stretched, limits).demand.share <= 1.0
+    there = given_path.positions(np.linspace(0.0, given_path.duration, 3000))
+    for place in stretched.positions(np.linspace(0.0, stretched.duration, 60)):
+        assert np.abs(there - place).max(axis=1).min() < 2e-3  # as dense as the places are
