@@ -22,9 +22,8 @@ from quad_controller.gait.velocity import Velocity
 from quad_controller.policy.load import load_policy
 from quad_controller.policy.options import PolicyOptions
 from quad_controller.states.controller import Controller
-from quad_controller.states.measurement import ImuSample, JointSample, Measurement
 from quad_controller.states.parameters import StateParameters
-from quad_description import quadruped, robot_urdf
+from quad_description import ImuSample, JointSample, quadruped, robot_urdf, RobotState
 
 STEPS = 5000
 PERIOD = 0.02  # [s]
@@ -61,7 +60,7 @@ def main() -> None:
     policy.reset(stand)
     report('policy, 47-128-64-12', lambda: policy.step(joints, IMU, VELOCITY, PERIOD))
     controller = Controller(robot, GaitParameters(), StateParameters())
-    measurement = Measurement(joints, IMU, 0.8)
+    measurement = RobotState(joints, IMU, 0.8)
     controller.step(measurement, PERIOD)
     controller.set_mode('walk')
     for _ in range(100):

@@ -4,19 +4,18 @@
 
 The pure core, without ROS::
 
-    from quad_controller import (
-        Controller,
-        GaitParameters,
-        Measurement,
-        StateParameters,
-        Velocity,
-    )
-    from quad_description import quadruped
+    from quad_controller import Controller, GaitParameters, StateParameters, Velocity
+    from quad_description import quadruped, robot_urdf
+    from quad_sim.physics import PhysicsBackend, Robot
 
+    urdf = robot_urdf()
     controller = Controller(quadruped(urdf), GaitParameters(), StateParameters())
-    output = controller.step(Measurement(joints, imu), 0.02)
-    controller.set_mode('walk')
-    controller.set_velocity(Velocity(0.2))
+    with PhysicsBackend(Robot(urdf)) as backend:  # or another quad_description.Backend
+        state = backend.reset()
+        for _ in range(500):
+            state = backend.step(controller.step(state, backend.period).targets)
+            controller.set_mode('walk')
+            controller.set_velocity(Velocity(0.2))
 """
 
 from .exceptions import ParameterError, PolicyError, QuadControllerError
@@ -30,7 +29,6 @@ from .policy.load import load_policy
 from .policy.options import PolicyOptions
 from .policy.shipped import find_policy
 from .states.controller import Controller
-from .states.measurement import ImuSample, JointSample, Measurement
 from .states.modes import Answer, MODES, State
 from .states.parameters import StateParameters
 from .states.status import Output, Status
@@ -45,9 +43,6 @@ __all__ = [
     'Gait',
     'GaitGenerator',
     'GaitParameters',
-    'ImuSample',
-    'JointSample',
-    'Measurement',
     'Output',
     'ParameterError',
     'PolicyError',

@@ -12,11 +12,10 @@ from quad_controller.gait.parameters import GaitParameters
 from quad_controller.gait.velocity import REST, Velocity
 from quad_controller.policy.interface import Policy
 from quad_controller.states.controller import Controller
-from quad_controller.states.measurement import ImuSample, JointSample, Measurement
 from quad_controller.states.modes import State
 from quad_controller.states.parameters import StateParameters
-from quad_description import Quadruped, quadruped, robot_urdf
-from quad_sim.physics import Robot
+from quad_description import Quadruped, quadruped, robot_urdf, RobotState
+from quad_sim.physics import PhysicsBackend, Robot
 
 PERIOD = 0.02  # [s]
 MODEL = quadruped(robot_urdf())
@@ -39,16 +38,6 @@ class Travel:
     tilt: float
 
 
-def measure(robot: Robot) -> Measurement:
-    """Return what ideal sensors of the robot say."""
-    angular = robot.base_velocity.angular
-    return Measurement(
-        JointSample(tuple(robot.joint_positions.tolist()), tuple(robot.joint_velocities.tolist())),
-        ImuSample(robot.base_pose.orientation, angular, robot.imu.specific_force),
-        0.8,
-    )
-
-
 class PhysicsRig:
     """Lets a controller walk a robot."""
 
@@ -58,11 +47,12 @@ class PhysicsRig:
         gait: GaitParameters | None = None,
         policy: Policy | None = None,
         model: Quadruped = MODEL,
-        sense: Callable[[Robot], Measurement] = measure,
+        sense: Callable[[RobotState], RobotState] = lambda state: state,
     ) -> None:
         """Stand up, by what the robot's sensors say."""
         self._sense = sense
         self.robot, self.model = robot or Robot(robot_urdf()), model
+        self._backend = PhysicsBackend(self.robot, PERIOD)
         self.controller = Controller(
             model, gait or GaitParameters(), StateParameters(), policy=policy
         )
@@ -79,10 +69,8 @@ class PhysicsRig:
     def step(self, velocity: Velocity) -> None:
         """Pass one period."""
         self.controller.set_velocity(velocity)
-        output = self.controller.step(self._sense(self.robot), PERIOD)
-        if output.targets is not None:
-            self.robot.set_targets(dict(zip(self.model.names, output.targets, strict=True)))
-        self.robot.step(PERIOD)
+        state = self._sense(self._backend.observe())
+        self._backend.step(self.controller.step(state, PERIOD).targets)
         self.tilt = max(self.tilt, self.robot.base_pose.tilt)
 
     def run(self, duration: float, velocity: Velocity = REST) -> None:

@@ -12,10 +12,9 @@ from quad_controller.gait.parameters import GaitParameters
 from quad_controller.gait.velocity import Velocity
 from quad_controller.policy.interface import PolicyStep
 from quad_controller.states.controller import Controller
-from quad_controller.states.measurement import ImuSample, JointSample, Measurement
 from quad_controller.states.modes import State
 from quad_controller.states.parameters import StateParameters
-from quad_description import quadruped, Targets
+from quad_description import ImuSample, JointSample, quadruped, RobotState, Targets
 
 PERIOD = 0.02  # [s]
 UPRIGHT = ImuSample((0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0), (0.0, 0.0, 9.81))
@@ -74,7 +73,7 @@ class Rig:
         if velocity is not None:
             self.controller.set_velocity(velocity)
         still = (0.0,) * len(self.positions)
-        measured = Measurement(
+        measured = RobotState(
             joints=JointSample(self.positions, still) if self.joints else None,
             imu=self.imu,
             battery=self.battery,

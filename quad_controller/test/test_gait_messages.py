@@ -27,10 +27,9 @@ from quad_controller.nodes.messages import body_pose, charge, IMU_NUMBERS, imu_s
 from quad_controller.policy.observation import gravity
 from quad_controller.policy.options import GravitySource
 from quad_controller.states.controller import Controller
-from quad_controller.states.measurement import ImuSample, JointSample
 from quad_controller.states.parameters import StateParameters
 from quad_controller.states.status import Output
-from quad_description import Targets
+from quad_description import ImuSample, JointSample, Targets
 from quad_gait_rig import ARM_ROBOT, FOLDED, Rig, ROBOT, tilted, UPRIGHT
 
 PATIENCE = 10.0  # [s]

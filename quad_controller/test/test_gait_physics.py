@@ -14,14 +14,15 @@ from quad_controller.gait.body import BodyPose
 from quad_controller.gait.parameters import GaitParameters
 from quad_controller.gait.servo_compensation import ServoModel
 from quad_controller.gait.velocity import Velocity
-from quad_controller.states.measurement import Measurement
-from quad_description import quadruped, robot_urdf
+from quad_controller.states.controller import Controller
+from quad_controller.states.parameters import StateParameters
+from quad_description import Backend, quadruped, RecordedBackend, robot_urdf, RobotState, Targets
 from quad_description.rotations import about_z, multiply, roll_pitch_yaw
-from quad_gait_physics import measure, PhysicsRig
+from quad_gait_physics import MODEL, PhysicsRig
 from quad_hardware.estimation import ImuMounting
 from quad_hardware.estimation.imu_mounting import UNCHECKED_DEVIATION
 from quad_sim import ServoParameters, Terrain
-from quad_sim.physics import Robot
+from quad_sim.physics import PhysicsBackend, Robot
 
 pytestmark = pytest.mark.slow
 
@@ -175,17 +176,14 @@ def test_compensation_makes_soft_servos_keep_their_speed() -> None:
     assert errors[1] < 0.03
 
 
-def yawed_imu(mounting: ImuMounting, robot: Robot) -> Measurement:
+def yawed_imu(mounting: ImuMounting, state: RobotState) -> RobotState:
     """What a controller gets of an IMU that is turned by 180 degrees about the vertical."""
-    measured = measure(robot)
-    assert measured.imu is not None
-    turned = multiply(measured.imu.orientation, about_z(math.pi))
+    assert state.imu is not None
+    turned = multiply(state.imu.orientation, about_z(math.pi))
     roll, pitch, yaw = map(math.degrees, roll_pitch_yaw(turned))
+    orientation = mounting.attitude((roll, pitch, yaw))
     deviation = 0.02 if mounting.checked else UNCHECKED_DEVIATION
-    imu = replace(
-        measured.imu, orientation=mounting.attitude((roll, pitch, yaw)), deviation=deviation
-    )
-    return replace(measured, imu=imu)
+    return replace(state, imu=replace(state.imu, orientation=orientation, deviation=deviation))
 
 
 @pytest.mark.parametrize(
@@ -205,3 +203,26 @@ def test_an_imu_that_sits_otherwise_tilts_nobody(
     rig.run(3.0)
     assert rig.state == 'stand'
     assert least < math.degrees(rig.robot.base_pose.tilt) < most
+
+
+def test_a_recorded_walk_is_commanded_alike() -> None:
+    """The controller is a function of states and time: a replay asks for the same targets."""
+
+    def walk(backend: Backend) -> tuple[list[RobotState], list[Targets | None]]:
+        controller = Controller(MODEL, GaitParameters(), StateParameters())
+        states, targets = [backend.reset()], []
+        for tick in range(300):
+            targets.append(controller.step(states[-1], backend.period).targets)
+            states.append(backend.step(targets[-1]))
+            if tick == 0:
+                controller.set_mode('walk')
+            controller.set_velocity(Velocity(0.2))
+        return states, targets
+
+    with PhysicsBackend(Robot(robot_urdf())) as physics:
+        states, targets = walk(physics)
+    assert states[-1].position is not None
+    assert states[-1].position[0] > 0.2
+    with RecordedBackend(physics.names, states) as recording:
+        assert walk(recording) == (states, targets)
+        assert recording.finished

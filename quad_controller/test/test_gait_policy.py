@@ -23,7 +23,7 @@ from quad_controller.policy.load import admit, load_policy, LoadedPolicy
 from quad_controller.policy.network import OnnxNetwork
 from quad_controller.policy.observation import gravity
 from quad_controller.policy.options import GravitySource, ImuFrame, PolicyOptions
-from quad_controller.states.measurement import ImuSample, JointSample
+from quad_description import ImuSample, JointSample
 from quad_gait_physics import MODEL, PhysicsRig
 from quad_gait_policies import FakeNetwork, metadata, STAND, write_policy
 from quad_gait_rig import ARM_ROBOT, ROBOT, tilted, UPRIGHT

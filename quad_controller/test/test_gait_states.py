@@ -18,10 +18,9 @@ from quad_controller.gait.parameters import GaitParameters
 from quad_controller.gait.velocity import Velocity
 from quad_controller.states.controller import Controller
 from quad_controller.states.faults import Fault
-from quad_controller.states.measurement import ImuSample, JointSample, Measurement
 from quad_controller.states.modes import MODES, State
 from quad_controller.states.parameters import StateParameters
-from quad_description import DescriptionError, raised_feet
+from quad_description import DescriptionError, ImuSample, JointSample, raised_feet, RobotState
 from quad_description.rotations import Vector
 from quad_gait_rig import ARM_ROBOT, FOLDED, PERIOD, Rig, ROBOT, StillPolicy, tilted, UPRIGHT
 
@@ -73,7 +72,7 @@ def test_a_joint_found_outside_its_limits_stays_until_something_is_asked() -> No
     rig.run(1.0)
     assert rig.positions == outside
     further = (outside[0] + 0.5, *outside[1:])
-    measured = Measurement(JointSample(further, (0.0,) * 12), UPRIGHT)
+    measured = RobotState(JointSample(further, (0.0,) * 12), UPRIGHT)
     for _ in range(10):
         assert rig.controller.step(measured, PERIOD).targets == outside
     standing(rig)
@@ -86,7 +85,7 @@ def test_a_joint_moved_by_hand_is_not_pulled_back() -> None:
     rig = Rig()
     rig.step()
     moved = (*FOLDED[:1], FOLDED[1] - 1.0, *FOLDED[2:])
-    measured = Measurement(JointSample(moved, (0.0,) * 12), UPRIGHT)
+    measured = RobotState(JointSample(moved, (0.0,) * 12), UPRIGHT)
     for _ in range(100):
         targets = rig.controller.step(measured, PERIOD).targets
     assert targets is not None
@@ -240,7 +239,7 @@ def test_a_short_pause_of_the_controller_itself_is_no_silence_of_the_robot() -> 
     rig.ask('walk')
     rig.run(1.0, FORWARD)
     before = rig.positions
-    targets = rig.controller.step(Measurement(), 0.4).targets
+    targets = rig.controller.step(RobotState(), 0.4).targets
     assert targets is not None
     steps = [abs(a - b) for a, b in zip(targets, before, strict=True)]
     assert max(steps) <= 10.0 * 1.5 * PERIOD + 1e-9
@@ -257,7 +256,7 @@ def test_a_controller_that_wakes_from_a_pause_in_motion_lies_down_from_where_it_
     rig = standing(policy_rig()[0])
     rig.ask(goal)
     rig.run(0.8, FORWARD)
-    stale = Measurement(JointSample(rig.positions, (0.0,) * 12), UPRIGHT)
+    stale = RobotState(JointSample(rig.positions, (0.0,) * 12), UPRIGHT)
     assert rig.controller.step(stale, 2.0).targets is None
     assert any('pause' in text for text in rig.controller.status.faults)
     rig.positions = found = tuple([0.05, 1.1, -0.7] * 4)
@@ -292,7 +291,7 @@ def test_after_a_pause_with_a_foot_in_the_air_nothing_is_lifted_again(case: str)
     if case == 'cleared':
         assert rig.controller.clear_fault().accepted
         rig.run(0.1)
-    stale = Measurement(JointSample(rig.positions, (0.0,) * 12), UPRIGHT)
+    stale = RobotState(JointSample(rig.positions, (0.0,) * 12), UPRIGHT)
     assert rig.controller.step(stale, 3.0).targets is None
     assert any('_foot in the air' in text for text in rig.controller.status.faults)
     rig.positions = found = tuple([0.05, 1.1, -0.7] * 4)
@@ -310,7 +309,7 @@ def test_a_pause_of_a_robot_that_stands_in_a_fault_leaves_it_so() -> None:
     rig.run(1.0)
     assert rig.is_in(State.FAULT)
     before = rig.positions
-    assert rig.controller.step(Measurement(), 3.0).targets == pytest.approx(before)
+    assert rig.controller.step(RobotState(), 3.0).targets == pytest.approx(before)
     assert not any('pause' in text for text in rig.controller.status.faults)
 
 
@@ -337,7 +336,7 @@ def test_a_pause_at_rest_is_no_fault() -> None:
     rig = standing()
     rig.ask('walk')
     rig.run(1.0)
-    assert rig.controller.step(Measurement(), 2.0).targets is not None
+    assert rig.controller.step(RobotState(), 2.0).targets is not None
     rig.run(1.0)
     assert rig.is_in(State.WALK)
 
@@ -351,7 +350,7 @@ def test_a_slow_loop_watches_as_well(dts: tuple[float, ...]) -> None:
     passed = 0.0
     while not rig.is_in(State.FAULT):
         for dt in dts:
-            rig.controller.step(Measurement(), dt)
+            rig.controller.step(RobotState(), dt)
         passed += sum(dts)
         assert passed <= 0.5 + 2 * sum(dts)
 
@@ -361,8 +360,8 @@ def test_one_odd_sample_after_a_pause_is_no_fault() -> None:
     rig = standing()
     still = JointSample(rig.positions, (0.0,) * 12)
     for _ in range(2):
-        rig.controller.step(Measurement(still, tilted(1.2), 0.01), 4.0)
-        rig.controller.step(Measurement(still, UPRIGHT, 0.9), PERIOD)
+        rig.controller.step(RobotState(still, tilted(1.2), 0.01), 4.0)
+        rig.controller.step(RobotState(still, UPRIGHT, 0.9), PERIOD)
     assert rig.is_in(State.STAND)
     rig.imu = tilted(1.2)
     rig.run(0.2)
@@ -383,7 +382,7 @@ def test_a_frozen_sensor_is_told(frozen: tuple[int, ...]) -> None:
             stuck[index] if index in frozen else angle for index, angle in enumerate(rig.positions)
         )
         output = rig.controller.step(
-            Measurement(JointSample(positions, (0.0,) * 12), UPRIGHT), PERIOD
+            RobotState(JointSample(positions, (0.0,) * 12), UPRIGHT), PERIOD
         )
         rig.log += [event.text for event in output.events]
         rig.positions = output.targets or rig.positions
@@ -587,7 +586,7 @@ def test_the_stronger_reaction_prevails() -> None:
 def test_measurements_that_are_no_numbers_count_as_missing() -> None:
     """NaN joints hold and fault like silence, and are named."""
     rig = standing()
-    bad = Measurement(JointSample((math.nan,) * 12, (0.0,) * 12), UPRIGHT)
+    bad = RobotState(JointSample((math.nan,) * 12, (0.0,) * 12), UPRIGHT)
     for _ in range(40):
         output = rig.controller.step(bad, PERIOD)
         assert output.targets == rig.positions
@@ -642,7 +641,7 @@ def test_a_dry_run_watches_the_policy_only() -> None:
         ROBOT, GaitParameters(), StateParameters(), policy=policy, dry_run=True
     )
     rig = standing(Rig(controller))
-    output = controller.step(Measurement(JointSample(rig.positions, (0.0,) * 12), UPRIGHT), PERIOD)
+    output = controller.step(RobotState(JointSample(rig.positions, (0.0,) * 12), UPRIGHT), PERIOD)
     assert output.shadow == STAND
     assert 'dry run' in controller.set_mode('policy').message
 
@@ -656,7 +655,7 @@ def test_a_policy_is_told_nothing_that_is_not_measured(
 ) -> None:
     """Without joint velocities or turning its mode is refused; the gait walks without them."""
     rig = standing(policy_rig()[0])
-    measured = Measurement(
+    measured = RobotState(
         JointSample(rig.positions, velocities), replace(UPRIGHT, angular_velocity=turning)
     )
     rig.controller.step(measured, PERIOD)
@@ -748,7 +747,7 @@ def test_no_sequence_of_events_makes_a_target_jump(script: list[dict[str, object
                 'follow': previous, 'blocked': positions, 'nan': (math.nan,) * 12, 'none': None,
             }[str(moment['joints'])]  # fmt: skip
             joints = JointSample(measured, (0.0,) * 12) if measured is not None else None
-            measurement = Measurement(joints, moment['imu'], moment['battery'])  # type: ignore[arg-type]
+            measurement = RobotState(joints, moment['imu'], moment['battery'])  # type: ignore[arg-type]
             targets = controller.step(measurement, dt).targets
             if targets is None:
                 assert begins_anew or dt > 0.5

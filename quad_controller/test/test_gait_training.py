@@ -19,8 +19,7 @@ from quad_controller.policy.interface import PolicyStep
 from quad_controller.policy.metadata import read_metadata
 from quad_controller.policy.network import OnnxNetwork
 from quad_controller.policy.options import PolicyOptions
-from quad_controller.states.measurement import ImuSample, JointSample
-from quad_description import Targets
+from quad_description import ImuSample, JointSample, Targets
 from quad_gait_physics import MODEL, PhysicsRig
 
 pytestmark = pytest.mark.slow

@@ -18,7 +18,6 @@ import time
 
 from gait_teacher import GaitTeacher
 import numpy as np
-import numpy.typing as npt
 from policy_export import export, joined
 from policy_mlp import fit, Floats, Mlp
 
@@ -26,10 +25,10 @@ from quad_controller.gait.parameters import GaitParameters
 from quad_controller.gait.velocity import Velocity
 from quad_controller.policy.observation import ObservationBuilder, TERMS, width
 from quad_controller.policy.options import GravitySource
-from quad_controller.states.measurement import ImuSample
-from quad_description import quadruped, robot_urdf
+from quad_description import ImuSample, quadruped, robot_urdf, RobotState
+from quad_description.rotations import multiply, normalized
 from quad_sim import ServoModel, Terrain
-from quad_sim.physics import Robot
+from quad_sim.physics import PhysicsBackend, Robot
 
 PERIOD = 0.02  # [s]
 SCALE = 0.25  # [rad] for an action of one, as in the vendor's training
@@ -117,6 +116,8 @@ class Trainer:
             terrain=Terrain(friction=float(random.uniform(0.4, 1.3))),
             pose=dict(zip(self._model.names, self._teacher.stand, strict=True)),
         )
+        backend = PhysicsBackend(robot, PERIOD)
+        state = backend.observe()
         period = round(self._teacher.schedule.period, 3)
         builder = ObservationBuilder(
             self._defaults, period, PHASE_THRESHOLD, yawed=False, source=GravitySource.EULER
@@ -131,18 +132,18 @@ class Trainer:
                 velocity = self._command()
             if random.random() < 0.01:
                 robot.kick((*random.uniform(-0.4, 0.4, 2), 0.0))
+                state = backend.observe()
             builder.advance(PERIOD)
             phase = (phase + PERIOD / period) % 1.0
-            joints, imu = self._sense(robot)
+            joints, imu = self._sense(state)
             row = builder.build(*joints, imu, velocity, previous)
             moves = np.linalg.norm(row[0, 6:9]) >= PHASE_THRESHOLD
-            right = self._teacher.targets(velocity if moves else Velocity(), phase, _tilt(robot))
+            right = self._teacher.targets(velocity if moves else Velocity(), phase, _tilt(state))
             wanted: Floats = ((np.array(right) - self._defaults) / SCALE).astype(np.float32)
             self._inputs.append(row[0].copy())
             self._wanted.append(wanted)
             previous = wanted if taught else self.network(row)[0]
-            robot.set_targets(self._defaults + SCALE * previous)
-            robot.step(PERIOD)
+            state = backend.step((self._defaults + SCALE * previous).tolist())
             if robot.base_pose.tilt > MAX_TILT:
                 return step * PERIOD
         return EPISODE
@@ -158,37 +159,23 @@ class Trainer:
         x, y, yaw = parts.tolist()
         return Velocity(x, y, yaw)
 
-    def _sense(self, robot: Robot) -> tuple[tuple[Floats, Floats], ImuSample]:
+    def _sense(self, state: RobotState) -> tuple[tuple[Floats, Floats], ImuSample]:
+        if state.joints is None or state.imu is None:
+            raise ValueError('a policy needs joints and attitude')
         noise = {name: self._random.uniform(-size, size, 12) for name, size in NOISE.items()}
-        rate = np.array(robot.base_velocity.angular) + noise['rate'][:3]
+        rate = np.array(state.imu.angular_velocity) + noise['rate'][:3]
         # a small turn of the attitude is a small error of the direction of gravity
-        tilt = 0.5 * np.array([*noise['gravity'][:2], 0.0])
-        orientation = _turned(robot.base_pose.orientation, tilt)
-        positions = (robot.joint_positions + noise['position']).astype(np.float32)
-        velocities = (robot.joint_velocities + noise['velocity']).astype(np.float32)
+        a, b = (0.5 * noise['gravity'][:2]).tolist()
+        orientation = normalized(multiply(state.imu.orientation, (a, b, 0.0, 1.0)))
+        positions = (np.array(state.joints.positions) + noise['position']).astype(np.float32)
+        velocities = (np.array(state.joints.velocities) + noise['velocity']).astype(np.float32)
         x, y, z = rate.tolist()
         return (positions, velocities), ImuSample(orientation, (x, y, z), (0.0, 0.0, 9.81))
 
 
-def _tilt(robot: Robot) -> tuple[float, float]:
-    roll, pitch, _ = robot.base_pose.roll_pitch_yaw
+def _tilt(state: RobotState) -> tuple[float, float]:
+    roll, pitch, _ = state.imu.roll_pitch_yaw if state.imu is not None else (0.0, 0.0, 0.0)
     return roll, pitch
-
-
-def _turned(
-    orientation: tuple[float, float, float, float], half: npt.NDArray[np.float64]
-) -> tuple[float, float, float, float]:
-    """Return an orientation after a small rotation about the body's axes; half its angles."""
-    x, y, z, w = orientation
-    a, b, c = half.tolist()
-    turned = (
-        x + w * a + y * c - z * b,
-        y + w * b + z * a - x * c,
-        z + w * c + x * b - y * a,
-        w - x * a - y * b - z * c,
-    )
-    norm = float(np.linalg.norm(turned))
-    return turned[0] / norm, turned[1] / norm, turned[2] / norm, turned[3] / norm
 
 
 def main() -> None:

@@ -13,6 +13,7 @@ Where the feet are, and the joints for where they shall be::
 Public, besides the names below: the modules :mod:`.rotations` and :mod:`.urdf`.
 """
 
+from .backend import Backend, RecordedBackend
 from .exceptions import DescriptionError, PresetError
 from .joint_commands import STREAM_TIMEOUT
 from .kinematics.leg import LegGeometry, LEGS
@@ -21,22 +22,28 @@ from .kinematics.quadruped import Feet, FootPose, Quadruped, quadruped, Targets
 from .kinematics.support import raised_feet
 from .poses import Pose, pose_positions
 from .presets import PRESETS, robot_urdf
+from .state import ImuSample, JointSample, RobotState
 from .urdf import Joint, JointLimits, movable_joints
 
 __all__ = [
     'LEGS',
     'PRESETS',
     'STREAM_TIMEOUT',
+    'Backend',
     'DescriptionError',
     'Feet',
     'FootPose',
+    'ImuSample',
     'Joint',
     'JointLimits',
+    'JointSample',
     'LegGeometry',
     'LegSolution',
     'Pose',
     'PresetError',
     'Quadruped',
+    'RecordedBackend',
+    'RobotState',
     'Targets',
     'foot_position',
     'jacobian',

@@ -8,8 +8,9 @@ from collections.abc import Callable
 import threading
 import time
 
+from quad_description import ImuSample, JointSample, RobotState
+
 from ..states.controller import Controller
-from ..states.measurement import ImuSample, JointSample, Measurement
 from ..states.status import Output
 from ..timing.pacer import Pacer
 from ..timing.statistics import LoopFigures, LoopStatistics
@@ -112,7 +113,7 @@ class ControlLoop:
                     return
                 now = time.monotonic()
                 arrival = self._arrival
-                measurement = Measurement(self._joints, self._imu, self._battery)
+                measurement = RobotState(self._joints, self._imu, self._battery)
                 self._joints = self._imu = self._battery = self._arrival = None
                 self._pacer.stepped(now, arrival)
             with self.lock:

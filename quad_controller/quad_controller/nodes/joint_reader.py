@@ -13,9 +13,7 @@ from collections.abc import Sequence
 
 from sensor_msgs.msg import JointState
 
-from quad_description import Quadruped, Targets
-
-from ..states.measurement import JointSample
+from quad_description import JointSample, Quadruped, Targets
 
 STILL_TITLES = frozenset({'relax', 'to relax', 'lie', 'to lie'})
 """States of the controller in which no joint but those of the legs moves."""

@@ -13,12 +13,12 @@ from geometry_msgs.msg import Pose, Twist
 from sensor_msgs.msg import BatteryState, Imu
 from std_msgs.msg import Header
 
+from quad_description import ImuSample
 from quad_description.rotations import normalized, roll_pitch_yaw
 from quad_msgs.msg import JointCommand
 
 from ..gait.body import BodyPose
 from ..gait.velocity import Velocity
-from ..states.measurement import ImuSample
 
 UNMEASURED = -1.0  # first covariance of what an IMU does not measure (sensor_msgs/Imu, REP 145)
 

@@ -7,10 +7,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
-from quad_description import Targets
+from quad_description import ImuSample, JointSample, Targets
 
 from ..gait.velocity import Velocity
-from ..states.measurement import ImuSample, JointSample
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,11 +11,10 @@ import time
 
 import numpy as np
 
-from quad_description import Quadruped, Targets
+from quad_description import ImuSample, JointSample, Quadruped, Targets
 
 from ..exceptions import PolicyError
 from ..gait.velocity import REST
-from ..states.measurement import ImuSample, JointSample
 from .check import check_answers, check_contract, Report
 from .metadata import read_metadata
 from .network import Network, OnnxNetwork

@@ -12,10 +12,10 @@ import math
 
 import numpy as np
 
+from quad_description import ImuSample
 from quad_description.rotations import Vector
 
 from ..gait.velocity import Velocity
-from ..states.measurement import ImuSample
 from .network import Floats
 from .options import GravitySource
 

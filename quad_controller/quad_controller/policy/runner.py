@@ -9,10 +9,9 @@ import math
 
 import numpy as np
 
-from quad_description import Quadruped, Targets
+from quad_description import ImuSample, JointSample, Quadruped, Targets
 
 from ..gait.velocity import Velocity
-from ..states.measurement import ImuSample, JointSample
 from .interface import lacking, PolicyStep
 from .metadata import PolicyMetadata
 from .network import Floats, Network

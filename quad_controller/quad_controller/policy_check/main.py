@@ -10,7 +10,7 @@ import math
 import signal
 import sys
 
-from quad_description import PRESETS, quadruped, robot_urdf
+from quad_description import Backend, PRESETS, quadruped, robot_urdf
 
 from ..exceptions import QuadControllerError
 from ..gait.generator import GaitGenerator
@@ -20,7 +20,10 @@ from ..policy.load import load_policy
 from ..policy.options import GravitySource, ImuFrame, PolicyOptions
 from ..policy.shipped import find_policy
 from ..states.parameters import StateParameters
-from .walk import SERVOS, walk
+from .walk import walk
+
+SERVOS = ('firm', 'vendor_rl')
+"""Servo models of the simulation; policies of the vendor's training expect ``vendor_rl``."""
 
 SHORTEST, LONGEST = 0.5, 600.0
 """Times of a walk in [s]."""
@@ -52,7 +55,8 @@ def run(arguments: Sequence[str]) -> int:
         if options.walk is None:
             return 0
         velocity = Velocity(*options.walk)
-        walked = walk(urdf, loaded.runner, velocity, options.duration, options.servo)
+        with _physics(urdf, options.servo) as backend:
+            walked = walk(backend, robot, loaded.runner, velocity, options.duration)
     except QuadControllerError as error:
         _print(str(error))
         return 1
@@ -74,6 +78,15 @@ def main() -> None:
     # a script's shell starts background jobs with SIGINT ignored
     signal.signal(signal.SIGINT, signal.default_int_handler)
     sys.exit(run(sys.argv[1:]))
+
+
+def _physics(urdf: str, servo: str) -> Backend:
+    try:
+        from quad_sim import ServoModel
+        from quad_sim.physics import PhysicsBackend, Robot
+    except ImportError as error:
+        raise QuadControllerError(f'a walk needs quad_sim and MuJoCo: {error}') from error
+    return PhysicsBackend(Robot(urdf, ServoModel(servo)))
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -7,7 +7,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 import math
 
-from quad_description import DescriptionError, Quadruped, raised_feet, STREAM_TIMEOUT, Targets
+from quad_description import (
+    DescriptionError,
+    Quadruped,
+    raised_feet,
+    RobotState,
+    STREAM_TIMEOUT,
+    Targets,
+)
 
 from ..gait.body import BodyPose
 from ..gait.generator import GaitGenerator
@@ -17,17 +24,16 @@ from ..gait.velocity import Velocity
 from ..policy.interface import lacking, Policy
 from .commands import Commands
 from .faults import Fault, FaultLatch
-from .following import Following
 from .health import Health
 from .limiter import StepLimiter
 from .machine import Poses, StateMachine
-from .measurement import Measurement
 from .modes import Answer, GAIT_STATES, ModeRequest, MODES, MOVING_STATES, parse_mode, State
 from .motion import Situation
 from .notices import Notices
 from .parameters import StateParameters
 from .shadow import Shadow
 from .status import Event, EventKind, Output, Status
+from .tracking import TrackingMonitor
 
 MAX_STEP = 0.05  # [s] after a longer pause the gait goes on where it was instead of leaping
 
@@ -93,7 +99,7 @@ class Controller:
         self._commands = Commands(states.command_timeout)
         self._health = Health(len(robot.names), states)
         self._limiter = StepLimiter(robot.limits, states.period, states.target_speed)
-        self._following = Following(robot.names)
+        self._tracking = TrackingMonitor(robot.names)
         self._latch = FaultLatch()
         self._notices = Notices()
         self._unreachable = 0
@@ -167,7 +173,7 @@ class Controller:
     def status(self) -> Status:
         """What can be told of it."""
         health, machine = self._health, self._machine
-        more = (self._commands.warning(machine.state), self._following.text)
+        more = (self._commands.warning(machine.state), self._tracking.text)
         return Status(
             state=machine.state,
             title=machine.title,
@@ -193,39 +199,60 @@ class Controller:
         """
         self._health.refuse(what, reason)
 
-    def step(self, measurement: Measurement, dt: float) -> Output:
+    def step(self, state: RobotState, dt: float) -> Output:
         """Advance.
 
         Args:
-            measurement: What arrived since the last step.
+            state: What arrived since the last step.
             dt: Time since the last step in [s].
 
         Returns:
             The targets to send, and what happened.
         """
-        events = [Event(EventKind.REPEATED, text) for text in self._health.take(measurement, dt)]
-        self._commands.pass_time(dt)
-        if dt > STREAM_TIMEOUT and self._limiter.last:
-            events += self._wake(dt, self._limiter.last)
-        last = self._limiter.last or self._start()
+        events: list[Event] = []
+        self._take(state, dt, events)
+        last = self._last_targets(dt, events)
         if last is None:
             return Output(None, None, self._machine.title, False, tuple(events))
+        self._latch_faults(last, events)
+        self._advance_state(last, events)
+        self._report_conditions(events)
+        situation, dt_motion = self._situation(), min(dt, MAX_STEP)
+        wanted = self._move(situation, dt_motion, last, events)
+        shadow = self._shadow.step(situation, dt_motion, last) if self._shadow else None
+        targets = self._limiter.step(wanted, dt)
+        self._track(targets, dt)
+        return Output(targets, shadow, self._machine.title, self._health.complete, tuple(events))
+
+    def _take(self, state: RobotState, dt: float, events: list[Event]) -> None:
+        """Take in what arrived, and the time that passed."""
+        events += [Event(EventKind.REPEATED, text) for text in self._health.take(state, dt)]
+        self._commands.pass_time(dt)
+
+    def _last_targets(self, dt: float, events: list[Event]) -> Targets | None:
+        """Return what was sent last; where the joints are, at the start and after a pause."""
+        if dt > STREAM_TIMEOUT and self._limiter.last:
+            events += self._wake(dt, self._limiter.last)
+        return self._limiter.last or self._start()
+
+    def _advance_state(self, last: Targets, events: list[Event]) -> None:
+        """Change the state when it is time."""
         before = self._machine.state
-        events += self._watch(last)
         if failure := self._machine.advance(last):
             events.append(Event(EventKind.TROUBLE, f'the policy was given up: {failure}'))
         state = self._machine.state
         if state is not before and state is not State.FAULT:
             events.append(Event(EventKind.NEWS, f'{before.value} -> {state.value}'))
-        events += self._notices.step(self._matters(state), self._over(state))
-        situation, dt_motion = self._situation(), min(dt, MAX_STEP)
-        wanted = last if self._held else self._move(situation, dt_motion, last, events)
-        shadow = self._shadow.step(situation, dt_motion, last) if self._shadow else None
-        targets = self._limiter.step(wanted, dt)
+
+    def _report_conditions(self, events: list[Event]) -> None:
+        """Tell what stops the robot without being a fault, and when it is over."""
+        state = self._machine.state
+        events += self._notices.step(self._conditions(state), self._ended_conditions(state))
+
+    def _track(self, targets: Targets, dt: float) -> None:
+        """Compare what is sent with where the joints are."""
         if self._health.joints is not None:
-            self._following.step(targets, self._health.joints.positions, dt)
-        ready = self._health.complete
-        return Output(targets, shadow, self._machine.title, ready, tuple(events))
+            self._tracking.step(targets, self._health.joints.positions, dt)
 
     @property
     def _held(self) -> bool:
@@ -258,39 +285,36 @@ class Controller:
         self._limiter.reset()
         return events
 
-    def _watch(self, last: Targets) -> list[Event]:
+    def _latch_faults(self, last: Targets, events: list[Event]) -> None:
         """Latch faults of a robot that is on its legs, or on its way down."""
         machine = self._machine
         upright, goes_down = machine.state in UPRIGHT_STATES, machine.goal in WAYS_DOWN
         if not upright and machine.motion.finished:
-            return []
+            return
         watched = LYING_FAULTS - self._tolerated if goes_down or not upright else frozenset(Fault)
-        return [
-            event
-            for fault, reason in self._health.faults()
-            if fault in watched
-            for event in self._latch_fault(fault, reason, last)
-        ]
+        for fault, reason in self._health.faults():
+            if fault in watched:
+                events += self._latch_fault(fault, reason, last)
 
-    def _matters(self, state: State) -> dict[str, str]:
+    def _conditions(self, state: State) -> dict[str, str]:
         """Return what stops the robot without being a fault, by a name for each."""
-        matters = {}
+        conditions = {}
         if stale := self._commands.warning(state):
-            matters['command'] = stale
+            conditions['command'] = stale
         if self._held and (state in UPRIGHT_STATES or not self._machine.motion.finished):
             age = self._health.joints_age * 1e3
-            matters['held'] = f'joint states are {age:.0f} ms old; holding the last targets'
-        if self._following.text:
-            matters['following'] = self._following.text
+            conditions['held'] = f'joint states are {age:.0f} ms old; holding the last targets'
+        if self._tracking.text:
+            conditions['following'] = self._tracking.text
         if self._health.uncertainty and state in UPRIGHT_STATES:
-            matters['uncertain'] = self._health.uncertainty
+            conditions['uncertain'] = self._health.uncertainty
         gait = self._generator
         if state in GAIT_STATES and gait.clamped:
             asked, walked = self._commands.velocity(state), gait.goal
-            matters['clamped'] = f'{asked} is more than a {gait.gait.value} can: it is {walked}'
-        return matters
+            conditions['clamped'] = f'{asked} is more than a {gait.gait.value} can: it is {walked}'
+        return conditions
 
-    def _over(self, state: State) -> dict[str, str]:
+    def _ended_conditions(self, state: State) -> dict[str, str]:
         """Return what to say when one of these is over, where that lets the robot move again."""
         over = {}
         if state in MOVING_STATES:
@@ -311,6 +335,9 @@ class Controller:
     def _move(
         self, situation: Situation, dt: float, last: Targets, events: list[Event]
     ) -> Targets:
+        """Return where the motion of the state leads; the last targets while nothing is known."""
+        if self._held:
+            return last
         wanted = self._machine.motion.step(situation, dt)
         self._unreachable += not self._machine.reachable
         if all(map(math.isfinite, wanted)):

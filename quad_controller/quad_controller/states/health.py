@@ -7,8 +7,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 import math
 
+from quad_description import ImuSample, JointSample, RobotState
+
 from .faults import Fault
-from .measurement import ImuSample, JointSample, Measurement
 from .parameters import StateParameters
 
 REFUSAL_LIFE = 0.2
@@ -47,7 +48,7 @@ class Health:
         self._falling_for: float | None = None
         self._low_for: float | None = None
 
-    def take(self, measurement: Measurement, dt: float) -> list[str]:
+    def take(self, measurement: RobotState, dt: float) -> list[str]:
         """Take what is new.
 
         Args:

@@ -21,11 +21,11 @@ from quad_description import Quadruped, Targets
 from ..exceptions import ParameterError
 from ..gait.generator import GaitGenerator
 from ..policy.interface import Policy
-from ..policy.motion import PolicyMotion
 from .faults import Reaction
 from .modes import GAIT_STATES, State
 from .motion import Blend, Hold, Motion, Walk
 from .parameters import StateParameters
+from .policy_motion import PolicyMotion
 
 EASE_TIME = 0.7  # [s] over which a policy takes over
 

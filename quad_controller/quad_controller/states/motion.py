@@ -8,12 +8,11 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 import math
 
-from quad_description import Targets
+from quad_description import ImuSample, JointSample, Targets
 
 from ..gait.body import BodyPose
 from ..gait.generator import GaitGenerator
 from ..gait.velocity import Velocity
-from .measurement import ImuSample, JointSample
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The robot in MuJoCo; the only part of the simulation that needs it."""
 
+from .backend import PhysicsBackend
 from .robot import Robot
 
-__all__ = ['Robot']
+__all__ = ['PhysicsBackend', 'Robot']

@@ -14,7 +14,7 @@ LEAST_TRAVEL = 0.15  # [rad] that a target must have gone to be of interest
 LEAST_SHARE = 0.1  # of that way, that its joint must have gone; soft servos go a third
 
 
-class Following:
+class TrackingMonitor:
     """Compares how far targets and joints went.
 
     Attributes:

@@ -6,8 +6,8 @@ from __future__ import annotations
 
 from quad_description import Targets
 
-from ..states.motion import Motion, Situation
-from .interface import Policy
+from ..policy.interface import Policy
+from .motion import Motion, Situation
 
 MAX_BAD_STEPS = 3  # in a row; one may be a glitch, the robot stands on its last targets meanwhile
 WIND_DOWN = 0.5  # [s] without velocity before the gait takes over

@@ -1,13 +1,13 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What the controller is told in one step: only what is new since the last one."""
+"""What the sensors of a quadruped say, in SI units and the frames of REP 103 and 145."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 import math
 
-from quad_description.rotations import (
+from .rotations import (
     down_in_body,
     normalized,
     Quaternion,
@@ -22,7 +22,7 @@ MAX_DEVIATION = 0.35  # [rad] of an orientation that may be acted upon
 
 @dataclass(frozen=True, slots=True)
 class JointSample:
-    """Joints as they were measured, in the order of :attr:`quad_description.Quadruped.names`.
+    """Joints as they were measured, in the order of :attr:`.Quadruped.names`.
 
     Attributes:
         positions: In [rad] or [m].
@@ -96,15 +96,19 @@ class ImuSample:
 
 
 @dataclass(frozen=True, slots=True)
-class Measurement:
-    """What arrived since the last step.
+class RobotState:
+    """State of a robot, as far as it is new; what every back end observes.
 
     Attributes:
         joints: The newest joint states, None when there were none.
         imu: The newest attitude, None when there was none.
         battery: Charge 0 to 1, None when nothing was said of it.
+        position: Of base_link in the world in [m]; None where the back end does not know it.
+        time: When the joints were measured, on the clock of the back end in [s].
     """
 
     joints: JointSample | None = None
     imu: ImuSample | None = None
     battery: float | None = None
+    position: Vector | None = None
+    time: float = 0.0
