@@ -37,8 +37,8 @@ from quad_hardware.estimation.gravity import STANDARD_GRAVITY
 from quad_hardware.estimation.imu_mounting import ImuMounting
 from quad_hardware.exceptions import CommandError
 from quad_hardware.joints import JointMap, servo_of
-from quad_hardware.link import RobotState
 from quad_hardware.protocol import LEG_MOTORS, OLD
+from quad_hardware.report import Report
 from quad_pty_peer import PtyPeer
 
 SIGNS: list[Vector] = [(x, y, z) for x, y, z in itertools.product((1.0, -1.0), repeat=3)]
@@ -133,7 +133,7 @@ def test_reports_are_published_for_the_body(mounting: ImuMounting) -> None:
     body, turning = from_roll_pitch_yaw(0.2, -0.3, 1.0), (0.5, -1.0, 2.0)
     seen = report(mounting, body)
     rates = signed(mounting.rate_signs, rotate(conjugate(mounting.rotation), turning))
-    state = RobotState(
+    state = Report(
         arrival=0.0,
         wire_time=0.001,
         attitude=seen.attitude,
@@ -222,7 +222,7 @@ def turned(
                 for share, angle in zip(gyro, felt, strict=True)
             )
             r, p, q = (angle + noise() for angle in report(mounting, body).attitude)
-            state = RobotState(tick * 0.02, 0.0, (r, p, q), None, {}, {}, rates=(x, y, z))
+            state = Report(tick * 0.02, 0.0, (r, p, q), None, {}, {}, rates=(x, y, z))
             states.append(state)
             before = body
         readings[stance] = replace(readings[stance], on_the_way=tuple(states))

@@ -6,6 +6,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 import math
+import subprocess
+import sys
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -33,13 +35,13 @@ from quad_hardware.estimation.gravity import (
 from quad_hardware.estimation.plausibility import PATIENCE, Plausibility
 from quad_hardware.estimation.sample_clock import SampleClock
 from quad_hardware.joints import JointMap, servo_of
-from quad_hardware.link.state import DEVICE_TIME_WRAP, RobotState
 from quad_hardware.protocol import LEG_MOTORS
+from quad_hardware.report import DEVICE_TIME_WRAP, Report
 
 ANGLES = st.floats(-3.1, 3.1)
 ROTATIONS = st.builds(from_roll_pitch_yaw, ANGLES, st.floats(-1.5, 1.5), ANGLES)
 VECTORS = st.tuples(*[st.floats(-10, 10)] * 3)
-STATE = RobotState(
+STATE = Report(
     arrival=0.0,
     wire_time=0.00127,
     attitude=(0.0, 0.0, 0.0),
@@ -269,3 +271,14 @@ def test_a_jump_is_believed_when_it_stays() -> None:
     assert plausibility.check(later) == ''
     wrapped = replace(turned, arrival=1.02, attitude=(0.0, 0.0, -179.0))
     assert plausibility.check(wrapped) == ''
+
+
+def test_estimation_needs_no_serial_port() -> None:
+    """Recorded reports can be read where pyserial is not installed."""
+    program = (
+        'import sys; sys.modules["serial"] = None\n'
+        'from quad_hardware.estimation import Estimator, EstimatorSettings\n'
+        'from quad_hardware.joints import JointMap, servo_of\n'
+        'from quad_hardware.report import Report'
+    )
+    subprocess.run([sys.executable, '-c', program], check=True)

@@ -19,8 +19,8 @@ from quad_hardware.estimation import Estimator, EstimatorSettings
 from quad_hardware.estimation.odometry import LegOdometry, OdometrySettings
 from quad_hardware.exceptions import CommandError
 from quad_hardware.joints import JointMap, servo_of
-from quad_hardware.link import RobotState
 from quad_hardware.protocol import LEG_MOTORS
+from quad_hardware.report import Report
 
 Array = NDArray[np.float64]
 
@@ -88,7 +88,7 @@ def yaws(reports: Iterable[tuple[float, float | None, float]]) -> list[float]:
     estimator = Estimator(URDF, joints, EstimatorSettings())
     headings = []
     for arrival, device_time, yaw in reports:
-        state = RobotState(
+        state = Report(
             arrival=arrival, wire_time=0.001, attitude=(0.0, 0.0, yaw), acceleration=None,
             positions=dict.fromkeys(LEG_MOTORS, 0.0), velocities={}, device_time=device_time,
         )  # fmt: skip

@@ -33,7 +33,7 @@ from quad_description.rotations import Quaternion as Rotation
 from quad_hardware.estimation import Battery, Estimate, Health, OdometryState
 from quad_hardware.estimation.estimator import Estimator, EstimatorSettings
 from quad_hardware.joints import CommandCounters, JointMap, servo_of
-from quad_hardware.link import DialectCounters, LinkState, LinkStatus, RobotState
+from quad_hardware.link import DialectCounters, LinkState, LinkStatus
 from quad_hardware.nodes import messages
 from quad_hardware.nodes.diagnostics import (
     command_diagnostic,
@@ -43,6 +43,7 @@ from quad_hardware.nodes.diagnostics import (
 from quad_hardware.nodes.hardware_node import HardwareNode
 from quad_hardware.nodes.parameters import Deviations, Frames
 from quad_hardware.protocol import Fault, LEG_MOTORS, ParserCounters
+from quad_hardware.report import Report
 
 STAMP = Time(sec=1)
 FRAMES = Frames('odom', 'base_link', 'base_footprint', 'imu_link', False, True)
@@ -121,7 +122,7 @@ def test_joints_are_stamped_when_they_were_measured() -> None:
     urdf = robot_urdf('lite')
     joints = JointMap(servo_of(joint) for joint in movable_joints(urdf))
     angles = dict.fromkeys(LEG_MOTORS, 0.0)
-    state = RobotState(5.0, 0.0, (0.0, 0.0, 0.0), None, angles, {}, joints_age=0.008)
+    state = Report(5.0, 0.0, (0.0, 0.0, 0.0), None, angles, {}, joints_age=0.008)
     stamps: dict[str, int] = {}
 
     def stream(name: str) -> Any:
@@ -278,7 +279,7 @@ def test_the_level_of_the_robot(
 ) -> None:
     """Battery, heat, an IMU that is mounted otherwise, and faults that the robot reports."""
     state = replace(
-        RobotState(0.0, 0.0, (0, 0, 0), (0, 0, 9.8), {}, {}),
+        Report(0.0, 0.0, (0, 0, 0), (0, 0, 9.8), {}, {}),
         **change,  # type: ignore[arg-type]
     )
     health = Health(Battery(charge), error, refused=0, refusal='')
@@ -295,7 +296,7 @@ def test_an_orientation_whose_signs_nobody_checked_is_uncertain(checked: bool) -
     odometry = messages.odometry_form(estimate, DEVIATIONS, FRAMES)
     expected = DEVIATIONS.orientation if checked else pytest.approx(math.pi / 2)
     assert imu.orientation == odometry.tilt == expected
-    state = RobotState(0.0, 0.0, (0, 0, 0), (0, 0, 9.8), {}, {})
+    state = Report(0.0, 0.0, (0, 0, 0), (0, 0, 9.8), {}, {})
     health = Health(Battery(80.0), 0.0, refused=0, refusal='')
     status = robot_diagnostic('hardware_node', '/dev/x', state, health, signs_checked=checked)
     assert ('calibrate imu' in status.message) is not checked

@@ -15,7 +15,6 @@ import pytest
 from quad_hardware.link.dialect import Dialect
 from quad_hardware.link.new_dialect import ASK_AGAIN, NewDialect
 from quad_hardware.link.old_dialect import HOST_GAP, OldDialect
-from quad_hardware.link.state import RobotState
 from quad_hardware.link.unseen_servo import LOWEST_RATE, UnseenServo
 from quad_hardware.protocol import (
     ANGLE_SPANS,
@@ -33,6 +32,7 @@ from quad_hardware.protocol import (
     Register,
     StreamParser,
 )
+from quad_hardware.report import Report
 
 LEGS = dict.fromkeys(LEG_MOTORS, 10.0)
 IMU = OLD.functions[Register.IMU]
@@ -53,12 +53,12 @@ class OldRig:
     def __init__(self, latency: float = 0.002) -> None:
         """Begin at time zero."""
         self.now = 0.0
-        self.dialect: Dialect = OldDialect(self.now)
+        self.dialect: Dialect[Frame] = OldDialect(self.now)
         self.latency = latency
         self.lose_each = 0
         self._asked = 0
         self.sent: list[tuple[float, Frame]] = []
-        self.states: list[RobotState] = []
+        self.states: list[Report] = []
         self.angles_at: list[float] = []  # [s] when half an answer about the motors was there
         self._answers: list[tuple[float, Frame]] = []
         self._parser = StreamParser(OLD, HOST_KINDS)
@@ -84,7 +84,7 @@ class OldRig:
                 self.now, reply = self._answers.pop(0)
                 if reply.address == Register.MOTORS:
                     self.angles_at.append(self.now - OLD.wire_time(len(reply.encode(OLD))) / 2)
-                state = self.dialect.hear(reply, self.now)
+                state = self.dialect.handle_frame(reply, self.now)
                 self.states += [state] if state else []
             else:
                 assert step.wake > self.now or step.send, 'it would spin'
@@ -157,7 +157,7 @@ def test_an_arm_joint_is_sent_again_for_a_frame_may_be_lost() -> None:
         rig.run(0.02)
     assert arm_writes(rig) == 4
     for count, forget in (
-        (5, rig.dialect.withdraw),
+        (5, rig.dialect.cancel_pending),
         (6, partial(rig.dialect.torque, on=False)),
     ):
         forget()
@@ -188,7 +188,7 @@ def test_a_servo_that_is_not_reported_goes_slowly_until_it_must_be_there() -> No
     rig.dialect.command({**LEGS, 54: 90.0})
     rig.run(0.05)
     assert (0x5C, 1) not in writes_to(rig, 0x5C)
-    rig.dialect.withdraw()
+    rig.dialect.cancel_pending()
     rig.sent.clear()
     rig.dialect.command({**LEGS, 54: 90.0})
     rig.run(0.05)
@@ -247,10 +247,10 @@ def test_half_a_report_is_no_report() -> None:
     dialect = OldDialect(0.0)
     motors = dialect.step(0.0)
     (request,) = StreamParser(OLD, HOST_KINDS).feed(motors.send)
-    assert dialect.hear(Frame(Kind.REPLY, Register.IMU, bytes(24)), 0.001) is None
+    assert dialect.handle_frame(Frame(Kind.REPLY, Register.IMU, bytes(24)), 0.001) is None
     assert dialect.counters.unusable == 1
-    assert dialect.hear(answer(request), 0.002) is None
-    assert dialect.hear(answer(request), 0.002) is None  # asked once, answered twice
+    assert dialect.handle_frame(answer(request), 0.002) is None
+    assert dialect.handle_frame(answer(request), 0.002) is None  # asked once, answered twice
     assert dialect.counters.unusable == 2
 
 
@@ -260,7 +260,7 @@ def test_a_command_withdrawn_is_not_sent() -> None:
         dialect.step(0.0)
         dialect.command(LEGS)
         dialect.torque(on=False)
-        dialect.withdraw()
+        dialect.cancel_pending()
         steps = [dialect.step(0.05 + tick * 0.01).send for tick in range(5)]
         frames = StreamParser(dialect.protocol, HOST_KINDS).feed(b''.join(steps))
         assert Kind.WRITE not in [frame.kind for frame in frames]
@@ -272,7 +272,7 @@ def test_the_new_protocol_asks_until_states_come() -> None:
     asked = [f.address for f in StreamParser(NEW, HOST_KINDS).feed(dialect.step(0.0).send)]
     assert asked == [Code.FEEDBACK_RATE, Code.FEEDBACK]
     assert dialect.step(ASK_AGAIN / 2).send == b''
-    assert dialect.hear(Feedback().frame(), ASK_AGAIN / 2) is not None
+    assert dialect.handle_frame(Feedback().frame(), ASK_AGAIN / 2) is not None
     assert dialect.step(ASK_AGAIN).send == b''
     assert dialect.step(ASK_AGAIN * 1.5).send != b''
 
@@ -293,11 +293,11 @@ def test_lost_states_are_counted_by_their_sequence() -> None:
     """Across the wrap; a robot that restarted lost nothing; frames cut short do not count."""
     dialect = NewDialect(0.0)
     for sequence in (65533, 65535, 0, 3):
-        dialect.hear(Feedback(sequence=sequence).frame(), 0.0)
+        dialect.handle_frame(Feedback(sequence=sequence).frame(), 0.0)
     assert dialect.counters.lost == 3
-    dialect.hear(Feedback(sequence=1).frame(), 0.0)
+    dialect.handle_frame(Feedback(sequence=1).frame(), 0.0)
     assert dialect.counters.lost == 3
     state = Feedback().frame()
     bad = replace(state, payload=state.payload[:-1])
-    assert dialect.hear(bad, 0.0) is None
+    assert dialect.handle_frame(bad, 0.0) is None
     assert (dialect.counters.states, dialect.counters.unusable) == (5, 1)

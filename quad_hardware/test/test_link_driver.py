@@ -8,16 +8,18 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 import termios
 import time
+from typing import Any
 
 import pytest
 import serial
 
 from quad_hardware.exceptions import LinkError
-from quad_hardware.link import Driver, LinkOptions, LinkState, RobotState, SerialPort
+from quad_hardware.link import Driver, LinkOptions, LinkState, SerialPort
 from quad_hardware.link.dialect import Dialect
 from quad_hardware.link.new_dialect import NewDialect
 from quad_hardware.link.old_dialect import OldDialect
 from quad_hardware.protocol import LEG_MOTORS, NEW, OLD
+from quad_hardware.report import Report
 from quad_pty_peer import PtyPeer
 
 pytestmark = pytest.mark.slow
@@ -32,13 +34,13 @@ class Rig:
     def __init__(self, peer: PtyPeer) -> None:
         """Prepare both."""
         self.peer = peer
-        self.states: list[RobotState] = []
+        self.states: list[Report] = []
         self.changes: list[tuple[LinkState, str]] = []
         self.refusal = ''
         options = LinkOptions(str(peer.link))
         self.driver = Driver(options, self._take, lambda *change: self.changes.append(change))
 
-    def _take(self, state: RobotState) -> str:
+    def _take(self, state: Report) -> str:
         if not self.refusal:
             self.states.append(state)
         return self.refusal
@@ -153,11 +155,11 @@ def test_no_command_slips_through_when_the_robot_falls_silent(
     """While the pending one is being withdrawn, another is refused already."""
     answers: list[tuple[bool, bool]] = []
 
-    def command_meanwhile(_: Dialect) -> None:
+    def command_meanwhile(_: Dialect[Any]) -> None:
         answers.append((rig.driver.command(LEGS), rig.driver.torque(on=False)))
 
     for dialect in (NewDialect, OldDialect):
-        monkeypatch.setattr(dialect, 'withdraw', command_meanwhile)
+        monkeypatch.setattr(dialect, 'cancel_pending', command_meanwhile)
     rig.reports(1)
     rig.peer.behaviour.silent = True
     rig.reach(LinkState.STALE)
@@ -254,9 +256,9 @@ def test_a_failure_is_told_and_got_over(tmp_path: Path, caplog: pytest.LogCaptur
     """What goes wrong with a report ends the conversation, not the link: it begins anew."""
     failures = [ZeroDivisionError(), KeyError(54)]
     changes: list[tuple[LinkState, str]] = []
-    states: list[RobotState] = []
+    states: list[Report] = []
 
-    def fail_twice(state: RobotState) -> str:
+    def fail_twice(state: Report) -> str:
         if failures:
             raise failures.pop(0)
         states.append(state)
@@ -279,10 +281,10 @@ def test_a_failure_is_told_and_got_over(tmp_path: Path, caplog: pytest.LogCaptur
 
 def test_an_order_does_not_outlive_its_connection(tmp_path: Path) -> None:
     """Given in the moment in which the robot is lost, it is not carried out on the next one."""
-    states: list[RobotState] = []
+    states: list[Report] = []
     given: list[bool] = []
 
-    def order_and_fail(state: RobotState) -> str:
+    def order_and_fail(state: Report) -> str:
         states.append(state)
         if len(states) == 5:
             given.extend((driver.torque(on=False), driver.command(LEGS)))
@@ -301,7 +303,7 @@ def test_an_order_does_not_outlive_its_connection(tmp_path: Path) -> None:
 
 def test_a_failure_that_cannot_be_told_ends_nothing(tmp_path: Path) -> None:
     """Nor when the callback that hears of it fails as well."""
-    states: list[RobotState] = []
+    states: list[Report] = []
     failing = [LinkState.WAITING, LinkState.FAILED]
 
     def hear(state: LinkState, _detail: str) -> None:

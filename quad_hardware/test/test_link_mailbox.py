@@ -15,8 +15,9 @@ import pytest
 
 from quad_description import movable_joints, robot_urdf
 from quad_hardware.joints import CommandLimiter, JointMap, servo_of
-from quad_hardware.link import Driver, LinkOptions, LinkState, RobotState
+from quad_hardware.link import Driver, LinkOptions, LinkState
 from quad_hardware.link.mailbox import Mailbox
+from quad_hardware.report import Report
 from quad_pty_peer import PtyPeer
 
 ROUNDS, ORDERS = 20, 100
@@ -81,7 +82,7 @@ def test_a_change_of_torque_that_is_not_sent_is_told(tmp_path: Path) -> None:
     changes: list[tuple[LinkState, str]] = []
     accepted: list[bool] = []
 
-    def fail_once(_: RobotState) -> str:
+    def fail_once(_: Report) -> str:
         if not accepted and driver.status().state is LinkState.RUNNING:
             accepted.append(driver.torque(on=False))
             raise RuntimeError

@@ -16,10 +16,11 @@ from rclpy.node import Node
 from xgo_lib2 import feedback
 
 from quad_hardware.exceptions import CommandError, LinkError
-from quad_hardware.link import Driver, LinkOptions, LinkState, RobotState
+from quad_hardware.link import Driver, LinkOptions, LinkState
 from quad_hardware.link.session import open_session
 from quad_hardware.nodes import parameters
 from quad_hardware.protocol import LEG_MOTORS, NEW
+from quad_hardware.report import Report
 from quad_pty_peer import PtyPeer
 
 TIMEOUT = 15.0  # [s]
@@ -49,10 +50,10 @@ def test_the_library_does_the_talking(
     peer.behaviour.attitude = (1.0, 2.0, 3.0)
     peer.angles.update({motor: float(motor) for motor in peer.angles})
     before = dict(peer.angles)
-    states: list[RobotState] = []
+    states: list[Report] = []
     commanded = threading.Event()
 
-    def take(state: RobotState) -> str:
+    def take(state: Report) -> str:
         states.append(state)
         if state.positions[43] == pytest.approx(12.5):
             commanded.set()

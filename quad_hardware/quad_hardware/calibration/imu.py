@@ -26,7 +26,7 @@ from quad_description.rotations import (
 from ..estimation.gravity import STANDARD_GRAVITY
 from ..estimation.imu_mounting import ImuMounting
 from ..exceptions import CommandError
-from ..link import RobotState
+from ..report import Report
 from .console import Console
 from .robot import HandheldRobot, ImuReading
 
@@ -116,7 +116,7 @@ def with_gyro(mounting: ImuMounting, readings: Readings) -> ImuMounting:
     return replace(mounting, rate_signs=(x, y, z), rates_checked=True)
 
 
-def _turns(mounting: ImuMounting, states: Sequence[RobotState]) -> Iterator[tuple[Vector, Vector]]:
+def _turns(mounting: ImuMounting, states: Sequence[Report]) -> Iterator[tuple[Vector, Vector]]:
     """Return how far gyro and attitude turned in windows of time, about the IMU's axes [rad]."""
     for begin in range(0, len(states) - TURN_WINDOW, TURN_WINDOW):
         window = states[begin : begin + TURN_WINDOW + 1]

@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING
 from quad_description.rotations import Vector
 
 from ..exceptions import NoAnswerError
-from ..link import Driver, LinkOptions, LinkState, RobotState
+from ..link import Driver, LinkOptions, LinkState
+from ..report import Report
 
 if TYPE_CHECKING:
     from types import TracebackType
@@ -40,7 +41,7 @@ class ImuReading:
 
     attitude: Vector
     acceleration: Vector | None
-    on_the_way: Sequence[RobotState] = ()
+    on_the_way: Sequence[Report] = ()
 
 
 class HandheldRobot:
@@ -55,7 +56,7 @@ class HandheldRobot:
         """
         self._motors = frozenset(motors)
         self._recent: deque[Mapping[int, float]] = deque(maxlen=SAMPLES)
-        self._imu: deque[RobotState] = deque(maxlen=LONGEST_WAY)
+        self._imu: deque[Report] = deque(maxlen=LONGEST_WAY)
         self._changed = threading.Condition()
         self._driver = Driver(options, self._take, self._forget)
 
@@ -110,7 +111,7 @@ class HandheldRobot:
             self._driver.torque(on=True)
             self.angles()
 
-    def _take(self, state: RobotState) -> str:
+    def _take(self, state: Report) -> str:
         with self._changed:
             self._imu.append(state)
             self._recent.append(

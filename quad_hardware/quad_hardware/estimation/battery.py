@@ -8,7 +8,7 @@ from collections import deque
 from dataclasses import dataclass
 from statistics import median
 
-from ..link.state import RobotState
+from ..report import Report
 
 REPORTS = 25  # that the median is taken of: half a second
 EMPTY, FULL = 0.0, 100.0  # [%]
@@ -36,7 +36,7 @@ class BatteryFilter:
         self._charges: deque[float] = deque(maxlen=REPORTS)
         self._voltages: deque[float] = deque(maxlen=REPORTS)
 
-    def take(self, state: RobotState) -> None:
+    def take(self, state: Report) -> None:
         """Take a report; charges that cannot be do not count."""
         if state.battery is not None and EMPTY <= state.battery <= FULL:
             self._charges.append(state.battery)

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 
-from ..link.state import DEVICE_TIME_WRAP, RobotState
+from ..report import DEVICE_TIME_WRAP, Report
 
 LARGEST_LAG = 1.0  # [s] by which reports of one life of the board come late, or after each other
 BOOT_TIME = 0.5  # [s] without a report is no shorter while the board boots
@@ -21,9 +21,9 @@ class BoardWatch:
 
     def __init__(self) -> None:
         """Begin without a report."""
-        self._last: RobotState | None = None
+        self._last: Report | None = None
 
-    def restarted(self, state: RobotState) -> bool:
+    def restarted(self, state: Report) -> bool:
         """Take a report; return whether the board has, or may have, begun anew before it."""
         last, self._last = self._last, state
         if last is None:

@@ -13,7 +13,7 @@ from quad_description.rotations import Quaternion, Vector
 
 from ..exceptions import CommandError
 from ..joints import JointMap
-from ..link.state import RobotState
+from ..report import Report
 from .battery import Battery, BatteryFilter
 from .board_watch import BoardWatch
 from .filters import AttitudeRate, JointRate
@@ -143,7 +143,7 @@ class Estimator:
         """Return the feet that are in the air at targets of the first joints [rad]."""
         return raised_feet(self._feet(targets))
 
-    def update(self, state: RobotState) -> Estimate | None:
+    def update(self, state: Report) -> Estimate | None:
         """Take a report; return None when it cannot be. :meth:`walk` comes next."""
         reason = self._plausibility.check(state)
         if reason:
@@ -197,7 +197,7 @@ class Estimator:
         return Health(self._battery.state, error, self._refused, self.refusal, imu_problem)
 
     def _angular_velocity(
-        self, time: float, attitude: Quaternion, state: RobotState
+        self, time: float, attitude: Quaternion, state: Report
     ) -> tuple[Vector | None, bool]:
         source = self._settings.rate_source
         differentiated = self._rate.update(time, attitude)

@@ -8,7 +8,7 @@ from collections.abc import Collection
 import math
 
 from ..joints.mapping import SERVO_REACH
-from ..link.state import DEVICE_TIME_WRAP, RobotState
+from ..report import DEVICE_TIME_WRAP, Report
 
 LARGEST_SPEED = 3000.0  # [deg/s] of a servo
 LARGEST_ACCELERATION = 200.0  # [m/s²]
@@ -37,11 +37,11 @@ class Plausibility:
             motors: Ids of those that a joint uses; what the others report is nothing.
         """
         self._motors = tuple(motors)
-        self._last: RobotState | None = None
+        self._last: Report | None = None
         self._refused = 0
         self.imu_problem = ''
 
-    def check(self, state: RobotState) -> str:
+    def check(self, state: Report) -> str:
         """Return why a report cannot be; empty when it can."""
         if reason := self._joint_problem(state):
             return reason
@@ -56,7 +56,7 @@ class Plausibility:
         self._last, self.imu_problem = state, imu
         return ''
 
-    def _joint_problem(self, state: RobotState) -> str:
+    def _joint_problem(self, state: Report) -> str:
         for name, values, most in (
             ('deg', state.positions, SERVO_REACH),
             ('deg/s', state.velocities, LARGEST_SPEED),
@@ -68,7 +68,7 @@ class Plausibility:
                     return f'motor {motor} at {value:.4g} {name}' if finite else NOT_FINITE
         return ''
 
-    def _jump(self, last: RobotState, state: RobotState, *, attitude: bool) -> str:
+    def _jump(self, last: Report, state: Report, *, attitude: bool) -> str:
         for motor in self._motors:
             angle = state.positions.get(motor)
             if angle is None:
@@ -85,7 +85,7 @@ class Plausibility:
         return ''
 
 
-def _imu_problem(state: RobotState) -> str:
+def _imu_problem(state: Report) -> str:
     felt = state.acceleration or (0.0, 0.0, 0.0)
     if not all(map(math.isfinite, (*state.attitude, *felt, *(state.rates or ())))):
         return f'imu: {NOT_FINITE}'

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 
-from ..link.state import DEVICE_TIME_WRAP, RobotState
+from ..report import DEVICE_TIME_WRAP, Report
 
 DRIFT = 1e-4  # share by which the robot's clock may be off
 RESTART = 1.0  # [s] a difference beyond that is a robot that began anew
@@ -30,7 +30,7 @@ class SampleClock:
         self._wraps = 0
         self._late_since = math.inf
 
-    def time(self, state: RobotState) -> float:
+    def time(self, state: Report) -> float:
         """Return when a report was made [s], on the clock of its arrival."""
         begun = state.arrival - state.wire_time
         if state.device_time is None:

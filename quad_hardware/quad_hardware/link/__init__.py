@@ -8,7 +8,6 @@ from .latency import latency_problem, latency_timer
 from .port import SerialPort
 from .probe import ask, ask_battery, ask_firmware, connect, Connection
 from .session import LinkOptions
-from .state import RobotState
 from .status import LinkState, LinkStatus
 
 __all__ = [
@@ -19,7 +18,6 @@ __all__ = [
     'LinkOptions',
     'LinkState',
     'LinkStatus',
-    'RobotState',
     'SerialPort',
     'ask',
     'ask_battery',

@@ -10,9 +10,13 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Generic, TypeVar
 
-from ..protocol import Frame, Protocol
-from .state import RobotState
+from ..protocol import Protocol
+from ..report import Report
+
+Received = TypeVar('Received')
+"""What the parser of a session finds: frames, or states of the vendor's library."""
 
 
 @dataclass(slots=True)
@@ -47,7 +51,7 @@ class Step:
     wake: float
 
 
-class Dialect(ABC):
+class Dialect(ABC, Generic[Received]):
     """Conversation with one robot.
 
     Attributes:
@@ -55,7 +59,7 @@ class Dialect(ABC):
         can_release: Its servos can be told to let go.
 
     The caller does :meth:`step` again when its ``wake`` has come, after :meth:`command` and after
-    frames; and :meth:`hear` for each frame.
+    frames; and :meth:`handle_frame` for each frame.
     """
 
     def __init__(self, protocol: Protocol, now: float) -> None:
@@ -98,7 +102,7 @@ class Dialect(ABC):
         """Have all servos hold their place, or let go, at the next possible moment."""
 
     @abstractmethod
-    def withdraw(self) -> None:
+    def cancel_pending(self) -> None:
         """Forget a command and a change of torque that have not been sent yet."""
 
     @abstractmethod
@@ -106,5 +110,5 @@ class Dialect(ABC):
         """Return what is to be sent now."""
 
     @abstractmethod
-    def hear(self, frame: Frame, now: float) -> RobotState | None:
+    def handle_frame(self, frame: Received, now: float) -> Report | None:
         """Take a frame of the robot; return the report that it completes, if any."""

@@ -11,14 +11,15 @@ import os
 import select
 import threading
 import time
+from typing import Any
 
 from ..exceptions import LinkError
 from ..protocol import ParserCounters
+from ..report import Report
 from .dialect import Dialect, DialectCounters
 from .latency import latency_problem, latency_timer
 from .mailbox import Mailbox
 from .session import LinkOptions, open_session, Session
-from .state import RobotState
 from .status import LinkState, LinkStatus
 
 STALE_TIME = 0.5  # [s] without a report, after which nothing is sent any more
@@ -44,7 +45,7 @@ class Driver:
     def __init__(
         self,
         options: LinkOptions,
-        on_state: Callable[[RobotState], str],
+        on_state: Callable[[Report], str],
         on_change: Callable[[LinkState, str], None],
     ) -> None:
         """Prepare; :meth:`start` begins."""
@@ -222,18 +223,18 @@ class Driver:
         ends = (self._reported_at + STALE_TIME, self._heard_at + STALE_TIME)
         return min((end for end in ends if end >= now), default=self._heard_at + PROBE_AGAIN)
 
-    def _fall_silent(self, dialect: Dialect, now: float) -> None:
+    def _fall_silent(self, dialect: Dialect[Any], now: float) -> None:
         refused = now - self._heard_at <= STALE_TIME
         state = LinkState.REFUSED if refused else LinkState.STALE
         if state is not self._state:
             self._enter(state, self._silence(refused=refused))
-        dialect.withdraw()  # only now: from here on no order is accepted
+        dialect.cancel_pending()  # only now: from here on no order is accepted
 
     def _silence(self, *, refused: bool) -> str:
         what = f'every report is refused, {self._refusal}' if refused else 'no report'
         return f'{what} for {STALE_TIME} s: the servos hold their last target, nothing is sent'
 
-    def _post(self, dialect: Dialect) -> None:
+    def _post(self, dialect: Dialect[Any]) -> None:
         orders = self._mailbox.take()
         if orders.angles is not None:
             dialect.command(orders.angles)
@@ -255,12 +256,12 @@ class Driver:
         if not data and parser.pending and now - bytes_at > QUIET_TIME:
             frames = parser.expire()
         for frame in frames:
-            report = session.dialect.hear(frame, now)
+            report = session.dialect.handle_frame(frame, now)
             if report is not None:
                 self._take(report, now)
         return now if data else bytes_at
 
-    def _take(self, report: RobotState, now: float) -> None:
+    def _take(self, report: Report, now: float) -> None:
         self._heard_at = now
         reason = self._on_state(report)
         if reason:

@@ -18,16 +18,16 @@ from ..protocol import (
     NEW,
     STATE,
 )
+from ..report import Report
 from .dialect import Dialect, Step
-from .state import RobotState
 
 ASK_AGAIN = 0.3  # [s] of silence after which the robot is asked to push its state
 _SERVOS = NEW.functions[Code.SERVOS]
-_STATE_LENGTH = NEW.overhead + STATE.length
+STATE_WIRE_TIME = NEW.wire_time(NEW.overhead + STATE.length)  # [s]
 _SEQUENCE = 1 << 16
 
 
-class NewDialect(Dialect):
+class NewDialect(Dialect[Frame]):
     """Asks for 50 states a second, and again whenever they stop coming."""
 
     def __init__(self, now: float, rate: int = 50) -> None:
@@ -67,7 +67,7 @@ class NewDialect(Dialect):
         payload = NEW.functions[Code.TORQUE].pack(motor=(ALL_MOTORS,), on=(on,))
         self._torque = Frame(Kind.WRITE, Code.TORQUE, payload).encode(NEW)
 
-    def withdraw(self) -> None:
+    def cancel_pending(self) -> None:
         """Forget what has not been sent yet."""
         self._pending = self._torque = b''
 
@@ -79,7 +79,7 @@ class NewDialect(Dialect):
             send = self._ask + send
         return Step(send, self._ask_at)
 
-    def hear(self, frame: Frame, now: float) -> RobotState | None:
+    def handle_frame(self, frame: Frame, now: float) -> Report | None:
         """Take a frame of the robot; every state frame is a report."""
         if frame.kind is Kind.NACK:
             self._counters.refused += 1
@@ -103,10 +103,10 @@ class NewDialect(Dialect):
         self._sequence = sequence
 
 
-def _report(feedback: Feedback, now: float) -> RobotState:
-    return RobotState(
+def _report(feedback: Feedback, now: float) -> Report:
+    return Report(
         arrival=now,
-        wire_time=NEW.wire_time(_STATE_LENGTH),
+        wire_time=STATE_WIRE_TIME,
         attitude=feedback.attitude,
         acceleration=feedback.acceleration,
         positions=dict(zip(MOTOR_ORDER, feedback.position, strict=True)),

@@ -14,6 +14,8 @@ from dataclasses import dataclass
 import math
 from statistics import median_high
 
+from quad_description.rotations import Vector
+
 from ..protocol import (
     ANGLE_SPANS,
     BULK_READ_ORDER,
@@ -26,8 +28,8 @@ from ..protocol import (
     REGISTER_OF_MOTOR,
     Torque,
 )
+from ..report import Report
 from .dialect import Dialect, Step
-from .state import RobotState, Vector
 from .unseen_servo import FULL_SPEED, LOWEST_SPEED, UnseenServo
 
 HOST_GAP = 0.001  # [s] the board drops some commands that follow each other faster
@@ -60,7 +62,7 @@ _READ_IMU = _Request(Register.IMU, _IMU.length)
 _READ_BATTERY = _Request(Register.BATTERY, 1)
 
 
-class OldDialect(Dialect):
+class OldDialect(Dialect[Frame]):
     """Polls a robot; a command goes out as soon as the line is free.
 
     A board that is slower than the period makes the reports fewer. How long an answer is waited
@@ -119,7 +121,7 @@ class OldDialect(Dialect):
         self._forget_arm()
         self._torque = bytes((Torque.LOAD_ALL if on else Torque.UNLOAD_ALL,))
 
-    def withdraw(self) -> None:
+    def cancel_pending(self) -> None:
         """Forget what has not been sent yet."""
         self._legs = self._torque = b''
         self._arm.clear()
@@ -136,7 +138,7 @@ class OldDialect(Dialect):
             self._free_at = now + OLD.wire_time(len(send)) + HOST_GAP
         return Step(send, self._wake())
 
-    def hear(self, frame: Frame, now: float) -> RobotState | None:
+    def handle_frame(self, frame: Frame, now: float) -> Report | None:
         """Take an answer; with the one of the IMU a report is complete."""
         waiting = self._waiting
         if (
@@ -231,13 +233,13 @@ class OldDialect(Dialect):
         if self._speed != _BOARDS_OWN:
             self._speed = _FORGOTTEN
 
-    def _report(self, imu: bytes, now: float) -> RobotState:
+    def _report(self, imu: bytes, now: float) -> Report:
         angles, self._angles = self._angles or b'', None
         values = _IMU.unpack(imu)
         self._counters.states += 1
         pairs = zip(BULK_READ_ORDER, angles, strict=True)
         wire_time = _on_the_line(imu)
-        return RobotState(
+        return Report(
             arrival=now,
             wire_time=wire_time,
             attitude=_vector(values['attitude']),

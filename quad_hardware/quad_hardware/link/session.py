@@ -4,8 +4,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 import time
+from typing import Any, TypeVar
 from typing import Protocol as Interface
 
 from ..exceptions import LinkError
@@ -51,7 +53,10 @@ class LinkOptions:
     vendor_method: str = ''
 
 
-class FrameParser(Interface):
+Found_co = TypeVar('Found_co', covariant=True)
+
+
+class FrameParser(Interface[Found_co]):
     """What finds frames in bytes.
 
     Attributes:
@@ -67,10 +72,10 @@ class FrameParser(Interface):
     def counters(self) -> ParserCounters:
         """A copy of the counters."""
 
-    def feed(self, data: bytes) -> list[Frame]:
+    def feed(self, data: bytes) -> Sequence[Found_co]:
         """Take bytes and return the frames that they complete."""
 
-    def expire(self) -> list[Frame]:
+    def expire(self) -> Sequence[Found_co]:
         """Give up waiting for the rest of a frame."""
 
 
@@ -87,8 +92,8 @@ class Session:
 
     port: Port
     firmware: str
-    parser: FrameParser
-    dialect: Dialect
+    parser: FrameParser[Any]
+    dialect: Dialect[Any]
 
 
 def open_session(options: LinkOptions) -> Session:
@@ -120,7 +125,7 @@ def _open_vendor(options: LinkOptions) -> Session:
         raise
 
 
-def _make_dialect(connection: Connection, options: LinkOptions) -> Dialect:
+def _make_dialect(connection: Connection, options: LinkOptions) -> Dialect[Frame]:
     now = time.monotonic()
     if connection.protocol is NEW:
         return NewDialect(now, options.rate)

@@ -16,12 +16,14 @@ from dataclasses import replace
 import importlib
 import os
 
+from quad_description.rotations import Vector
+
 from ..exceptions import LinkError
-from ..protocol import Feedback, Frame, MOTOR_ORDER, NEW, ParserCounters, Protocol
-from .dialect import Step
-from .new_dialect import ASK_AGAIN, NewDialect
+from ..protocol import MOTOR_ORDER, NEW, ParserCounters, Protocol
+from ..report import Report
+from .dialect import Dialect, Step
+from .new_dialect import ASK_AGAIN, STATE_WIRE_TIME
 from .port import CHUNK
-from .state import RobotState, Vector
 from .vendor_library import Dog, find_serial, find_write_method, StateParser
 
 VENDOR = Protocol(
@@ -112,14 +114,12 @@ class VendorPort:
 
 
 class VendorParser:
-    """The vendor's parser, its states as frames of ours."""
+    """The vendor's parser."""
 
     def __init__(self) -> None:
         """Begin with an empty buffer."""
         feedback = importlib.import_module('xgo_lib2.feedback')
-        registry = importlib.import_module('xgo_lib2.registry')
         self._parser: StateParser = feedback.SendStateParser()
-        self._slots = [int(registry.feedback_slot_of(motor)) for motor in MOTOR_ORDER]
         self._counters = ParserCounters()
         self.pending = 0
 
@@ -128,45 +128,23 @@ class VendorParser:
         """A copy of the counters: bytes and states; the others are the vendor's affair."""
         return replace(self._counters)
 
-    def feed(self, data: bytes) -> list[Frame]:
+    def feed(self, data: bytes) -> list[object]:
         """Take bytes and return the states that they complete."""
         self._counters.bytes += len(data)
-        frames = []
-        for state in self._feed(data):
-            self._counters.frames += 1
-            frames.append(self._feedback(state).frame())
-        return frames
+        try:
+            states = list(self._parser.feed_bytes(data))
+        except Exception as error:  # whatever the vendor's library raises
+            raise LinkError(f'xgo_lib2 cannot read what came: {error}') from error
+        self._counters.frames += len(states)
+        return states
 
-    def expire(self) -> list[Frame]:
+    def expire(self) -> list[object]:
         """Return nothing: what waits is known to the vendor's parser only."""
         return []
 
-    def _feed(self, data: bytes) -> list[object]:
-        try:
-            return list(self._parser.feed_bytes(data))
-        except Exception as error:  # whatever the vendor's library raises
-            raise LinkError(f'xgo_lib2 cannot read what came: {error}') from error
 
-    def _feedback(self, state: object) -> Feedback:
-        try:
-            return Feedback(
-                battery=min(max(int(_number(state, 'battery')), 0), 100),
-                attitude=_vector(_number(state, name) for name in ('roll', 'pitch', 'yaw')),
-                acceleration=_acceleration(state),
-                position=self._by_motor(state, 'joint_pos_deg'),
-                velocity=self._by_motor(state, 'joint_vel_deg_s'),
-                sequence=self._counters.frames % 65536,
-            )
-        except (AttributeError, IndexError, TypeError, ValueError) as error:
-            raise LinkError(f'a state of xgo_lib2 is not as expected: {error}') from error
-
-    def _by_motor(self, state: object, name: str) -> tuple[float, ...]:
-        values = list(getattr(state, name))
-        return tuple(float(values[slot]) for slot in self._slots)
-
-
-class VendorDialect(NewDialect):
-    """States as in the new protocol; commands by the vendor's methods."""
+class VendorDialect(Dialect[object]):
+    """States of the vendor's parser; commands by the vendor's methods."""
 
     def __init__(self, dog: Dog, now: float, method: str) -> None:
         """Begin a conversation.
@@ -179,18 +157,28 @@ class VendorDialect(NewDialect):
         Raises:
             LinkError: There is no such method.
         """
-        super().__init__(now)
-        self.protocol = VENDOR
+        super().__init__(VENDOR, now)
         self.can_release = False
+        self._ask_at = now
         self._dog = dog
         self._write = find_write_method(dog, method)
+        registry = importlib.import_module('xgo_lib2.registry')
+        self._slots = {motor: int(registry.feedback_slot_of(motor)) for motor in MOTOR_ORDER}
         self._angles: dict[int, float] = {}
+
+    @property
+    def motors(self) -> tuple[int, ...]:
+        """Ids of the motors whose angles the robot reports."""
+        return MOTOR_ORDER
 
     def command(self, angles: Mapping[int, float]) -> None:
         """Set the angles that are written at the next step."""
         self._angles = dict(angles)
 
-    def withdraw(self) -> None:
+    def torque(self, *, on: bool) -> None:
+        """Do nothing: no public method of the vendor's library does it."""
+
+    def cancel_pending(self) -> None:
         """Forget a command that has not been sent yet."""
         self._angles = {}
 
@@ -211,32 +199,42 @@ class VendorDialect(NewDialect):
             raise LinkError(f'xgo_lib2 failed: {error}') from error
         return Step(b'', self._ask_at)
 
-    def hear(self, frame: Frame, now: float) -> RobotState | None:
-        """Take a state; what the vendor's parser does not tell is not made up."""
-        report = super().hear(frame, now)
-        if report is None:
-            return None
-        blind = report.acceleration == NO_ACCELERATION
-        return replace(
-            report,
-            acceleration=None if blind else report.acceleration,
-            device_time=None,
-            temperatures=None,
-        )
+    def handle_frame(self, frame: object, now: float) -> Report | None:
+        """Take a state of the vendor's parser; what it does not tell is not made up.
 
+        Raises:
+            LinkError: The state has not what is public of it.
+        """
+        self._ask_at = now + ASK_AGAIN
+        self._counters.states += 1
+        try:
+            return Report(
+                arrival=now,
+                wire_time=STATE_WIRE_TIME,
+                attitude=_vector(_number(frame, name) for name in ('roll', 'pitch', 'yaw')),
+                acceleration=_acceleration(frame),
+                positions=self._by_motor(frame, 'joint_pos_deg'),
+                velocities=self._by_motor(frame, 'joint_vel_deg_s'),
+                battery=min(max(int(_number(frame, 'battery')), 0), 100),
+            )
+        except (AttributeError, IndexError, TypeError, ValueError) as error:
+            raise LinkError(f'a state of xgo_lib2 is not as expected: {error}') from error
 
-NO_ACCELERATION: Vector = (0.0, 0.0, 0.0)  # no accelerometer on earth reads that for long
+    def _by_motor(self, state: object, name: str) -> dict[int, float]:
+        values = list(getattr(state, name))
+        return {motor: float(values[slot]) for motor, slot in self._slots.items()}
 
 
 def _number(state: object, name: str) -> float:
     return float(getattr(state, name))
 
 
-def _acceleration(state: object) -> Vector:
+def _acceleration(state: object) -> Vector | None:
     name = next((name for name in _ACCELERATIONS if hasattr(state, name)), None)
     if name is None:
-        return NO_ACCELERATION
-    return _vector(float(number) for number in getattr(state, name))
+        return None
+    acceleration = _vector(float(number) for number in getattr(state, name))
+    return acceleration if any(acceleration) else None  # no accelerometer on earth reads zero
 
 
 def _vector(values: Iterable[float]) -> Vector:

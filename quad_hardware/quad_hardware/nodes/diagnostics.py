@@ -12,8 +12,9 @@ from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from ..estimation import Health
 from ..estimation.battery import EMPTY_BATTERY, LOW_BATTERY
 from ..joints import CommandCounters
-from ..link import latency_problem, LinkState, LinkStatus, RobotState
+from ..link import latency_problem, LinkState, LinkStatus
 from ..protocol import Fault, ParserCounters
+from ..report import Report
 
 HOT_SERVO = 65.0  # [°C]
 GRAVITY_ERROR = math.radians(15.0)  # [rad] between accelerometer and attitude
@@ -93,7 +94,7 @@ class LinkDiagnostic:
 
 
 def robot_diagnostic(
-    node: str, port: str, state: RobotState, health: Health, *, signs_checked: bool
+    node: str, port: str, state: Report, health: Health, *, signs_checked: bool
 ) -> DiagnosticStatus:
     """Describe battery, servos and IMU.
 

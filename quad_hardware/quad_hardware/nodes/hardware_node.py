@@ -36,7 +36,8 @@ from ..estimation import Estimate, Estimator, OdometryState
 from ..exceptions import CommandError, HardwareError
 from ..joints import JointCommander
 from ..joints.command import NOMINAL_PERIOD
-from ..link import Driver, LinkState, RobotState, STALE_TIME
+from ..link import Driver, LinkState, STALE_TIME
+from ..report import Report
 from . import messages
 from .diagnostics import command_diagnostic, LinkDiagnostic, robot_diagnostic
 from .parameters import declare_parameters
@@ -78,7 +79,7 @@ class HardwareNode(Node):
             warn=self._warn,
         )
         self._driver = Driver(settings.link, self._report, self._link_changed)
-        self._latest: tuple[RobotState, Estimate] | None = None  # while the link is running
+        self._latest: tuple[Report, Estimate] | None = None  # while the link is running
         self._joint_states = FastPublisher(
             self.create_publisher(JointState, 'joint_states', SENSOR_DEPTH)
         )
@@ -115,7 +116,7 @@ class HardwareNode(Node):
             time.sleep(NOMINAL_PERIOD)
         self._driver.stop()
 
-    def _report(self, state: RobotState) -> str:
+    def _report(self, state: Report) -> str:
         """Publish a report; return why it cannot be. Runs in the thread of the driver."""
         estimate = self._estimator.update(state)
         if estimate is None:

@@ -1,19 +1,19 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What a robot reports, whichever protocol it speaks."""
+"""What a robot reports, whichever protocol it speaks; in the units of the wire."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-DEVICE_TIME_WRAP = 2**32 / 1000.0  # [s]
+from quad_description.rotations import Vector
 
-Vector = tuple[float, float, float]
+DEVICE_TIME_WRAP = 2**32 / 1000.0  # [s]
 
 
 @dataclass(frozen=True, slots=True)
-class RobotState:
+class Report:
     """One report, with angles by motor id in the units of the wire.
 
     Attributes:
