@@ -52,8 +52,6 @@ TABLE = {
 In Quick stop active with an option code of 5 to 8; with the others it is left by itself.
 """
 
-BASE_WORDS = [SHUTDOWN, SWITCH_ON, ENABLE, QUICK_STOP, DISABLE_VOLTAGE, FAULT_RESET]
-
 
 def expected(state: State, word: int) -> State:
     """Return the next state by the mask rows of CiA 402-2, table 26."""

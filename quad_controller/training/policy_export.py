@@ -59,10 +59,6 @@ def export(network: Mlp, path: Path, metadata: Mapping[str, str]) -> None:
     onnx.save(model, str(path))
 
 
-def _port(name: str, width: int) -> onnx.ValueInfoProto:
-    return helper.make_tensor_value_info(name, TensorProto.FLOAT, [1, width])
-
-
 def joined(values: object) -> str:
     """Return a list as the exporters write it: by commas, numbers with three decimals."""
     if isinstance(values, str):

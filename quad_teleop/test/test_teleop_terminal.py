@@ -21,7 +21,6 @@ pytestmark = [
     pytest.mark.skipif(shutil.which('setsid') is None, reason='needs setsid of util-linux'),
 ]
 FORWARD = (0.15, 0.0, 0.0)
-HANG_UP_OR_GONE = {1, -signal.SIGHUP}
 
 
 @contextmanager

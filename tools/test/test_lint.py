@@ -6,10 +6,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from grimp import ImportGraph
+from importlinter.api import read_configuration
 import pytest
 
-from workspace.layout import Layout
+from workspace.layout import Layout, this_checkout
 from workspace.lint import lint
+from workspace.packages import find_packages
+from workspace.public_api import PublicApiContract
 
 # each run of it waits until the other one has begun, and gives up after a while
 WAITS_FOR_THE_OTHER = """#!/bin/sh
@@ -27,10 +31,15 @@ echo "seen by $1"
 def install(root: Path, script: str) -> Layout:
     """Make a checkout without packages, with a ruff that is a script."""
     layout = Layout(root)
-    ruff = layout.venv / 'bin' / 'ruff'
-    ruff.parent.mkdir(parents=True)
-    ruff.write_text(script, encoding='ascii')
-    ruff.chmod(0o755)
+    folder = layout.venv / 'bin'
+    folder.mkdir(parents=True)
+    programs = {
+        'ruff': script,
+        **dict.fromkeys(('lint-imports', 'vulture', 'codespell'), '#!/bin/sh\n'),
+    }
+    for name, source in programs.items():
+        (folder / name).write_text(source, encoding='ascii')
+        (folder / name).chmod(0o755)
     return layout
 
 
@@ -50,3 +59,36 @@ def test_a_check_that_fails_is_told_and_the_others_run(
     shown = capsys.readouterr().out
     assert 'ran check' in shown
     assert 'ran format' in shown
+
+
+def test_every_package_is_in_the_contracts() -> None:
+    """import-linter looks only at packages that it is told of."""
+    root = this_checkout().root
+    options = read_configuration(str(root / 'pyproject.toml'))['session_options']
+    named = options['root_packages']
+    packages = find_packages(root).values()
+    python = [package.name for package in packages if package.build_type == 'ament_python']
+    assert sorted(named) == sorted(python)
+
+
+@pytest.mark.parametrize(
+    ('imported', 'problems'),
+    [
+        ('arm', []),
+        ('arm.rooms', []),
+        ('arm.tables.units', []),
+        ('arm.inner', ['leg imports arm.inner']),
+        ('arm.rooms.one', ['leg imports arm.rooms.one']),
+    ],
+)
+def test_packages_meet_through_what_they_name(imported: str, problems: list[str]) -> None:
+    """A package itself, the families that it offers, and nothing below."""
+    graph = ImportGraph()
+    for module in ('arm', 'arm.inner', 'arm.rooms', 'arm.rooms.one', 'arm.tables', 'leg'):
+        graph.add_module(module)
+    graph.add_import(importer='leg', imported=imported)
+    graph.add_import(importer='arm', imported='arm.inner')
+    families = {'families': ['arm.rooms', 'arm.tables.*']}
+    check = PublicApiContract('borders', {}, families).check(graph, verbose=False)
+    assert check.metadata['problems'] == problems
+    assert check.kept == (not problems)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Runs every check that reads the code: ruff, its formatter, mypy."""
+"""Runs every check that reads the code: style, types, layers, dead code, spelling."""
 
 from __future__ import annotations
 
@@ -48,14 +48,24 @@ def lint(layout: Layout, environ: Mapping[str, str]) -> int:
         0 when all passed, else 1.
     """
     bin_folder = layout.venv / 'bin'
+    packages = [
+        package.folder
+        for package in find_packages(layout.root).values()
+        if package.build_type == 'ament_python'
+    ]
+    tools, tests = layout.root / 'tools', layout.root / 'tests'
     commands: list[list[str | Path]] = [
         [bin_folder / 'ruff', 'check', '.'],
         [bin_folder / 'ruff', 'format', '--check', '.'],
+        [bin_folder / 'lint-imports', '--no-cache'],
+        [bin_folder / 'vulture', *packages, tools, tests, layout.root / 'conftest.py'],
+        [bin_folder / 'codespell'],
     ]
     for name, folders in type_check_units(layout.root).items():
         cache = layout.root / '.mypy_cache' / name
         commands.append([bin_folder / 'mypy', '--cache-dir', cache, *folders])
     environment = clean_environment(environ)
+    environment['PYTHONPATH'] = os.pathsep.join(map(str, [*packages, tools]))  # for lint-imports
 
     def run(command: list[str | Path]) -> subprocess.CompletedProcess[str]:
         return subprocess.run(

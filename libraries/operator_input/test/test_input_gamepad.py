@@ -35,7 +35,7 @@ from operator_input.gamepad.presets import (
 )
 from operator_input.gamepad.reading import position
 
-BTN_SOUTH, BTN_EAST, BTN_NORTH, BTN_WEST, BTN_TL, BTN_TR = 0x130, 0x131, 0x133, 0x134, 0x136, 0x137
+BTN_SOUTH, BTN_NORTH, BTN_TL = 0x130, 0x133, 0x136
 STANDARD_KEYS = range(0x130, 0x13F)
 STANDARD_AXES = {
     ABS_X: STICK,

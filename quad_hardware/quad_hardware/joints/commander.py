@@ -20,7 +20,6 @@ class CommandCounters:
     Attributes:
         received: All of them.
         refused: Of wrong length or not finite.
-        unsent: Came while the link was not running.
         clamped: Went beyond limits and were taken to them.
         slowed: Asked for more speed than allowed, and were approached.
         reason: Why the last one was refused, or which joints were clamped.
@@ -31,7 +30,6 @@ class CommandCounters:
 
     received: int = 0
     refused: int = 0
-    unsent: int = 0
     clamped: int = 0
     slowed: int = 0
     reason: str = ''
@@ -175,7 +173,6 @@ class JointCommander:
 
     def _drop(self) -> None:
         self.forget()
-        self.counters.unsent += 1
         self._trouble(f'joint command not sent: {self._obstacle()}')
 
     def _count(self, command: Command) -> None:

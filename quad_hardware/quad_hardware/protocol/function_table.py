@@ -19,7 +19,6 @@ from .schema import Access, Field, Function, Kind, Protocol, Scalar, table
 
 SLOTS = len(MOTOR_ORDER)
 ALL_MOTORS = 0xFF
-PUSH_RATE = 50.0  # [Hz] default rate of the states
 
 
 class Code(IntEnum):

@@ -21,7 +21,6 @@ class ParserCounters:
         bytes: Bytes fed.
         frames: Valid frames.
         skipped: Bytes that belong to no valid frame.
-        bad_length: Headers followed by a length that no frame has.
         bad_kind: Headers followed by a kind of frame that is not expected from this side.
         bad_tail: Candidates without the tail where their length says it is.
         bad_checksum: Candidates with header, length and tail, and a wrong checksum.
@@ -30,7 +29,6 @@ class ParserCounters:
     bytes: int = 0
     frames: int = 0
     skipped: int = 0
-    bad_length: int = 0
     bad_kind: int = 0
     bad_tail: int = 0
     bad_checksum: int = 0
@@ -122,7 +120,6 @@ class StreamParser:
             return _Verdict.INCOMPLETE, 0
         length = buffer[start + LENGTH_AT]
         if not self._protocol.overhead <= length <= self._protocol.max_length:
-            counters.bad_length += 1
             return _Verdict.WRONG, 0
         if available > KIND_AT and buffer[start + KIND_AT] not in self._kinds:
             counters.bad_kind += 1

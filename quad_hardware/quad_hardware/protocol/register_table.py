@@ -49,7 +49,6 @@ class Torque(IntEnum):
 
 
 ACTION_RESET = 255  # of register 0x3E: stop and stand in the default pose
-BULK_READ_SIZE = 15  # [B] at 0x50: 12 legs, then 51, 52 and 53
 
 ARM_REGISTERS: Mapping[int, int] = {51: 0x71, 52: 0x5D, 53: 0x5E, 54: 0x70}
 MOTOR_OF_REGISTER: Mapping[int, int] = {

@@ -32,7 +32,6 @@ from .walking import DUTY, HEIGHT, LIFT, PERIOD
 
 NEUTRAL = (127, 128)  # the vendor's library encodes zero as 127, its documents as 128
 LIE_DOWN, STAND_UP = 1, 2  # actions, of register 0x3E
-ARM_LEG = 5
 LEG_NAMES = {1: 'fl', 2: 'fr', 3: 'br', 4: 'bl'}
 INT16 = 32767
 LONGEST_ANSWER = OLD.max_length - OLD.overhead  # [B]

@@ -28,13 +28,11 @@ class LineStatistics:
         frames: Valid frames.
         hurried: Frames that followed the one before too closely, and were not carried out.
         garbled: Bytes at a baud rate at which the robot does not listen.
-        pushed: States sent unasked.
     """
 
     frames: int = 0
     hurried: int = 0
     garbled: int = 0
-    pushed: int = 0
 
 
 class RobotLine:
@@ -140,7 +138,6 @@ class RobotLine:
         self._board.advance(now)
         frame = self._functions.push(now)
         if self._board.awake:
-            self.statistics.pushed += 1
             self._say(frame, NEW, now)
 
     def _hear(self, arrived: Arrival) -> None:
