@@ -7,7 +7,7 @@
     CanopenError
     ├── ConfigError (ValueError)     a bus.yml or EDS is wrong; lists every problem
     ├── BusError (OSError)           a CAN interface cannot be opened, or refuses a frame
-    ├── RivalError                   another master leads this bus already
+    ├── OtherMasterError                   another master leads this bus already
     ├── CodecError (ValueError)      a value does not fit its type, or bytes are no message
     ├── ObjectError (LookupError)    a device has no object of that name or number
     ├── SdoError                     a device did not do what an SDO asked
@@ -56,7 +56,7 @@ class BusError(CanopenError, OSError):
     """
 
 
-class RivalError(CanopenError):
+class OtherMasterError(CanopenError):
     """Another master leads this bus already; the message says by which frames it is known."""
 
 

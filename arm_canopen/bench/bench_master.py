@@ -91,7 +91,7 @@ def microseconds(work: Callable[[int], object]) -> float:
 def decode_cost() -> Row:
     """Take a TPDO and read its two values."""
     entries, node = image(), remote_node()
-    source = entries.inputs[0]
+    source = entries.tpdos[0]
     readers = [reader for index, _ in FEEDBACK if (reader := entries.reader(index)) is not None]
     frames = [Frame(TPDO, struct.pack('<ii', value, 3 * value)) for value in range(256)]
     payloads = [bytearray(frame.data) for frame in frames]
@@ -115,7 +115,7 @@ def decode_cost() -> Row:
 def encode_cost() -> Row:
     """Write two values and make the frame of their RPDO."""
     entries, node = image(), remote_node()
-    output = entries.outputs[0]
+    output = entries.rpdos[0]
     writers = [writer for index, _ in COMMAND if (writer := entries.writer(index)) is not None]
 
     def ours(number: int) -> bytes:

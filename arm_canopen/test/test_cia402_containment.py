@@ -117,7 +117,7 @@ def break_rpdo(number: int) -> Callable[[Arm, str, pytest.MonkeyPatch], None]:
     """Return what lets the packing of an RPDO fail."""
 
     def inject(arm: Arm, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-        outputs = arm.net.network.nodes[name].image.outputs
+        outputs = arm.net.network.nodes[name].image.rpdos
         output = next(entry for entry in outputs if entry.config.number == number)
         monkeypatch.setattr(output, '_pack', unpackable)
 
@@ -246,5 +246,5 @@ def test_a_value_that_cannot_be_packed_keeps_nothing_else_from_being_sent() -> N
     for bad in (2**31, -(2**31) - 1, float('nan'), float('inf')):
         with pytest.raises(CodecError, match='0x607A'):
             target.write(bad)
-    output = next(entry for entry in image.outputs if entry.config.number == 2)
+    output = next(entry for entry in image.rpdos if entry.config.number == 2)
     assert struct.unpack_from('<i', output.frame().data) == (7,)

@@ -109,7 +109,7 @@ class Failing:
 def owner_of(failing: Failing, place: str) -> tuple[object, str]:
     """Return the object and its attribute that a failure is injected into."""
     drive = failing.net.drives[JOINT]
-    rpdo = failing.net.network.nodes[JOINT].image.outputs[-1]
+    rpdo = failing.net.network.nodes[JOINT].image.rpdos[-1]
     return {
         'mode': (drive.mode, 'step'),
         'write': (drive, 'write'),

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 import pytest
 
 from arm_canopen.config import load_bus, NodeConfig, Problem
-from arm_canopen.config.document import Item, Mapping, Scalar, ScalarKind
+from arm_canopen.config.document import Item, Scalar, ScalarKind, YamlMap
 from arm_canopen.config.findings import Place
 from arm_canopen.config.merge import merge_device
 
@@ -167,7 +167,7 @@ PLACE = Place(Path('x.yml'))
 def item(tree: object) -> Item:
     """Turn nested dicts into a document."""
     if isinstance(tree, dict):
-        return Mapping(PLACE, {str(key): item(value) for key, value in tree.items()})
+        return YamlMap(PLACE, {str(key): item(value) for key, value in tree.items()})
     return Scalar(PLACE, str(tree), ScalarKind.INTEGER)
 
 
@@ -188,8 +188,8 @@ def test_merging_is_deep_and_the_upper_wins(
 ) -> None:
     """Merging two sections is merging nested dicts; nothing given is changed."""
     lower, upper = item(below), item(above)
-    assert isinstance(lower, Mapping)
-    assert isinstance(upper, Mapping)
+    assert isinstance(lower, YamlMap)
+    assert isinstance(upper, YamlMap)
     assert merge_device(lower, upper) == item(merged(below, above))
     assert (lower, upper) == (item(below), item(above))
 

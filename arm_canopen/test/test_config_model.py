@@ -45,7 +45,7 @@ from arm_canopen.standard.drive import DriveState
         ('restore_configuration: 1', 'restore_configuration', 1),
         ('retry_factor: 5', 'retry_factor', 5),
         ('life_time_factor: 4', 'life_time_factor', 4),
-        ('heartbeat_producer: 50', 'guarded', False),
+        ('heartbeat_producer: 50', 'uses_node_guarding', False),
         ('reset_communication: false', 'reset_communication', False),
         ('sdo_timeout_ms: 50', 'sdo_timeout', 0.05),
         ('boot_timeout_ms: 2500', 'boot_timeout', 2.5),
@@ -350,7 +350,7 @@ def test_tables_and_records_fit(keys: tuple[Key, ...], record: type, elsewhere: 
 @pytest.mark.parametrize('key', MASTER_KEYS + DEVICE_KEYS + DRIVE_KEYS, ids=lambda key: key.name)
 def test_every_key_that_is_not_read_says_why(key: Key) -> None:
     """A key is read, has no effect, or says why it is not used; defaults lie within ranges."""
-    if key.use in (Use.LATER, Use.REFUSED):
+    if key.use in (Use.UNUSED, Use.REFUSED):
         assert key.why
         assert not (key.use is Use.REFUSED and key.field)
     elif key.kind is not Kind.BLOCK and key.use is Use.READ:
@@ -372,10 +372,10 @@ def test_a_device_without_heartbeat_is_guarded(tmp_path: Path) -> None:
     rows = [*DRIVE_ROWS, Row(0x100C, 0, 'Guard time', 6, 'rw', '50')]
     text = added('joint1', 'heartbeat_producer: 0\nguard_time: 150')
     (node,) = load_text(tmp_path, text, eds=eds_text(rows)).nodes
-    assert (node.guard_time, node.guarded) == (0.15, True)
+    assert (node.guard_time, node.uses_node_guarding) == (0.15, True)
     text = added('joint1', 'heartbeat_producer: 0')
     (node,) = load_text(tmp_path, text, eds=eds_text(rows)).nodes
-    assert (node.guard_time, node.guarded) == (0.05, True)
+    assert (node.guard_time, node.uses_node_guarding) == (0.05, True)
     with pytest.raises(ConfigError, match='no writable 0x100C'):
         load_text(
             tmp_path, added('joint1', 'heartbeat_producer: 0\nguard_time: 150'), eds=eds_text()
@@ -385,7 +385,7 @@ def test_a_device_without_heartbeat_is_guarded(tmp_path: Path) -> None:
 def test_a_heartbeat_replaces_guarding(tmp_path: Path) -> None:
     """Both at a time are forbidden by CiA 301; the heartbeat wins, and it is told."""
     config = load_text(tmp_path, added('joint1', 'heartbeat_producer: 100\nguard_time: 150'))
-    assert (config.nodes[0].guard_time, config.nodes[0].guarded) == (0.0, False)
+    assert (config.nodes[0].guard_time, config.nodes[0].uses_node_guarding) == (0.0, False)
     assert any('sends a heartbeat every 100 ms' in str(warning) for warning in config.warnings)
 
 

@@ -12,7 +12,7 @@ from scripted_device import ScriptedDevice, START
 from test_master_boot import DEVICE_VALUES, io_config, NODE, NODE_ID
 from virtual_network import bus_config, VirtualNetwork
 
-from arm_canopen.config.model import NodeConfig, Written
+from arm_canopen.config.model import NodeConfig, SourceLocation
 from arm_canopen.master.events import Severity
 from arm_canopen.standard.nmt import NmtState
 
@@ -35,8 +35,8 @@ class Refusing:
         self, config: NodeConfig, *keys: str, refuses: dict[tuple[int, int], int]
     ) -> None:
         """Switch the device on."""
-        written = {(NODE, *key.split('.')): Written(7, key) for key in ('node_id', *keys)}
-        bus = replace(bus_config(config, **WATCHING), written=written)
+        locations = {(NODE, *key.split('.')): SourceLocation(7, key) for key in ('node_id', *keys)}
+        bus = replace(bus_config(config, **WATCHING), locations=locations)
         self.net = VirtualNetwork(bus, absent=[NODE])
         self.device = ScriptedDevice(
             NODE_ID,

@@ -357,7 +357,7 @@ def test_a_device_that_babbles_while_it_is_lost_is_not_waited_for() -> None:
     net.power_on('a')
     net.wire.loses = lambda sender, frame: False
     net.run_until(lambda: node.online)
-    assert node.image.inputs[0].values is None
+    assert node.image.tpdos[0].values is None
 
 
 def test_the_masters_heartbeat_comes_from_the_cycle() -> None:
@@ -452,7 +452,7 @@ def test_strange_frames_are_counted_and_passed_over() -> None:
     net = network()
     net.boot()
     node = net.network.nodes['a']
-    count, unknown = node.image.inputs[0].count, net.network.unknown_frames
+    count, unknown = node.image.tpdos[0].count, net.network.unknown_frames
     for frame in (
         Frame(0x7FF, b'\0'),
         Frame(0x182, bytes(3), is_extended=True),
@@ -460,7 +460,7 @@ def test_strange_frames_are_counted_and_passed_over() -> None:
         Frame(0x182, bytes(8), is_error=True),
     ):
         net.network.receive(frame)
-    assert node.image.inputs[0].count == count
+    assert node.image.tpdos[0].count == count
     assert net.network.unknown_frames == unknown + 3
     assert net.network.controller.error_frames == 1
 
@@ -518,7 +518,7 @@ def test_a_time_out_that_begins_with_a_frame_counts_from_it() -> None:
     net.run(0.1)  # until nothing else waits
     node = net.network.nodes['a']
     begin = net.network.scheduler.now
-    node.image.inputs[0].listener = lambda entry: promises.append(
+    node.image.tpdos[0].listener = lambda entry: promises.append(
         node.sdo.write(0x2000, 0, b'', 0.02)
     )
     promises: list[object] = []

@@ -15,7 +15,7 @@ from virtual_network import drive_config, pdo, sdo_write
 
 from arm_canopen.can.frame import Frame
 from arm_canopen.config.model import PdoConfig
-from arm_canopen.master.process_image import Input, ProcessImage, SyncRound
+from arm_canopen.master.process_image import ProcessImage, ReceivedTpdo, SyncRound
 from arm_canopen.master.start_values import start_value
 from arm_canopen.standard.datatypes import DataType
 from arm_canopen.standard.objects import is_controlword
@@ -47,7 +47,7 @@ def test_values_stand_where_the_mapping_says(
 ) -> None:
     """Each object is found in the frame of its TPDO, signed as its type is."""
     entries = image()
-    for entry in entries.inputs:
+    for entry in entries.tpdos:
         data = (
             struct.pack('<Hb', word, mode)
             if entry.config.number == 1
@@ -74,7 +74,7 @@ def test_what_is_written_leaves_with_the_next_frame(
         writer = entries.writer(index, subindex)
         assert writer is not None
         writer.write(value)
-    frames = {output.frame().can_id: output.frame().data for output in entries.outputs}
+    frames = {output.frame().can_id: output.frame().data for output in entries.rpdos}
     assert frames == {
         0x202: struct.pack('<Hb', word, 0),
         0x302: struct.pack('<ii', target, velocity),
@@ -90,7 +90,7 @@ def test_an_object_in_several_rpdos_is_written_to_all_of_them() -> None:
         writer = entries.writer(index)
         assert writer is not None
         writer.write(value)
-    frames = {output.frame().can_id: output.frame().data for output in entries.outputs}
+    frames = {output.frame().can_id: output.frame().data for output in entries.rpdos}
     assert frames == {
         0x202: struct.pack('<Hb', 0x0F, 0),
         0x302: struct.pack('<ii', -5, 0),
@@ -100,14 +100,14 @@ def test_an_object_in_several_rpdos_is_written_to_all_of_them() -> None:
 
 def test_the_controlword_leaves_last() -> None:
     """A command never overtakes its data; the others keep their order."""
-    assert [output.config.cob_id for output in image().outputs] == [0x302, 0x402, 0x202]
+    assert [output.config.cob_id for output in image().rpdos] == [0x302, 0x402, 0x202]
 
 
 def test_what_no_pdo_carries_has_no_place() -> None:
     """Objects that are not mapped, or only the other way, or in a disabled PDO, are not found."""
     disabled = (replace(TPDOS[0], enabled=False), replace(TPDOS[1], mapping=()))
     entries = image(disabled)
-    assert entries.inputs == []
+    assert entries.tpdos == []
     assert entries.reader(0x6041) is None
     assert entries.reader(CONTROLWORD) is None
     assert entries.writer(0x6041) is None
@@ -121,7 +121,7 @@ def test_values_are_unknown_until_they_come_and_after_a_restart() -> None:
     reader = entries.reader(0x6041)
     assert reader is not None
     assert reader.value is None
-    entries.inputs[0].receive(Frame(0x182, bytes(3)))
+    entries.tpdos[0].receive(Frame(0x182, bytes(3)))
     assert reader.value == 0
     entries.clear()
     assert reader.value is None
@@ -130,7 +130,7 @@ def test_values_are_unknown_until_they_come_and_after_a_restart() -> None:
 @pytest.mark.parametrize(('length', 'taken'), [(0, False), (2, False), (3, True), (8, True)])
 def test_short_pdos_are_counted_and_long_ones_read(length: int, taken: bool) -> None:
     """A PDO of the wrong length does not change values by half (CiA 301, 7.2.2.5)."""
-    entry = image().inputs[0]
+    entry = image().tpdos[0]
     entry.receive(Frame(0x182, b'\x37\x06\x01' + bytes(5)))
     entry.receive(Frame(0x182, (b'\x40\x02\x08' + bytes(5))[:length]))
     assert entry.values == ((0x240, 8) if taken else (0x637, 1))
@@ -138,7 +138,7 @@ def test_short_pdos_are_counted_and_long_ones_read(length: int, taken: bool) -> 
     assert entry.length_errors == 1 - taken
 
 
-def answered(entry: Input) -> None:
+def answered(entry: ReceivedTpdo) -> None:
     """Let a TPDO come."""
     entry.receive(Frame(entry.config.cob_id, bytes(8)))
 
@@ -157,7 +157,7 @@ def test_a_round_is_complete_when_its_last_answer_comes(
     """
     complete: list[int] = []
     sync = SyncRound(lambda: complete.append(1))
-    entries = [Input(replace(TPDOS[0], number=n), sync) for n in range(1, 5)]
+    entries = [ReceivedTpdo(replace(TPDOS[0], number=n), sync) for n in range(1, 5)]
     known: set[int] = set()
     for third_asked, arrivals in rounds:
         complete.clear()
@@ -198,17 +198,17 @@ def test_start_values_leave_with_the_first_frame() -> None:
         SyncRound(lambda: None),
         start=lambda mapped: start_value(config, mapped),
     )
-    assert entries.outputs[0].frame().data == struct.pack('<iI', 0, 1234)
+    assert entries.rpdos[0].frame().data == struct.pack('<iI', 0, 1234)
 
 
 def test_a_listener_that_is_cleared_by_another_thread_harms_no_frame() -> None:
     """Between the look whether there is one and the call of it."""
 
-    class Cleared(Input):
+    class Cleared(ReceivedTpdo):
         """An input whose listener goes away as soon as it was looked at."""
 
         @property
-        def listener(self) -> Callable[[Input], None] | None:
+        def listener(self) -> Callable[[ReceivedTpdo], None] | None:
             self.looks += 1
             return heard.append if self.looks == 1 else None
 
@@ -216,7 +216,7 @@ def test_a_listener_that_is_cleared_by_another_thread_harms_no_frame() -> None:
         def listener(self, value: object) -> None:
             self.looks = 0
 
-    heard: list[Input] = []
+    heard: list[ReceivedTpdo] = []
     entry = Cleared(TPDOS[0], SyncRound(lambda: None))
     entry.receive(Frame(TPDOS[0].cob_id, bytes(8)))
     assert heard == [entry]

@@ -23,10 +23,10 @@ from arm_canopen import RefusalCause
 from arm_canopen.config import load_bus
 from arm_canopen.config.boot_plan import boot_writes
 from arm_canopen.config.checks import check_bus
-from arm_canopen.config.model import BusConfig, NodeConfig, Written
+from arm_canopen.config.model import BusConfig, NodeConfig, SourceLocation
 from arm_canopen.config.tpdo_freshness import with_event_timer
 from arm_canopen.master.events import Severity
-from arm_canopen.master.process_image import Input, SyncRound
+from arm_canopen.master.process_image import ReceivedTpdo, SyncRound
 from arm_canopen.standard.dictionary import ObjectDictionary
 from arm_canopen.standard.drive import DriveState, OperationMode
 from canopen_sim.drive.drive import Drive as SimulatedDrive
@@ -124,7 +124,7 @@ def test_an_axis_is_not_held_at_a_position_of_unknown_age(
 def test_a_device_that_refuses_its_event_timer_is_named() -> None:
     """It boots, and is not taken for silent when it only rests."""
     without = on_change(timer=False).dictionary
-    config = replace(bus_config(on_change()), written={(JOINT,): Written()})
+    config = replace(bus_config(on_change()), locations={(JOINT,): SourceLocation()})
     net = VirtualNetwork(config, dictionaries={JOINT: without})
     net.boot()
     net.run(2.0)
@@ -140,7 +140,7 @@ def test_a_device_that_refuses_its_event_timer_is_named() -> None:
 
 def test_a_timer_that_is_taken_at_the_next_boot_counts_again() -> None:
     """The loss is noticed from then on, and a device that refuses it once more is named again."""
-    net = VirtualNetwork(replace(bus_config(on_change()), written={(JOINT,): Written()}))
+    net = VirtualNetwork(replace(bus_config(on_change()), locations={(JOINT,): SourceLocation()}))
     refused = FaultInjection(BusFault.SDO_ABORT, object=(0x1800, 5), abort=0x06090030)
     net.start()
     for refuses in (True, False, True):
@@ -182,7 +182,7 @@ def test_a_drive_in_operation_is_taken_over_and_gets_its_event_timer() -> None:
     net = VirtualNetwork(bus_config(replace(timed, tpdos=untimed)))
     net.boot()
     net.do(JOINT, 'init')
-    net._config = replace(bus_config(timed), written={(JOINT,): Written()})
+    net._config = replace(bus_config(timed), locations={(JOINT,): SourceLocation()})
     net.replace_master()
     net.start()
     net.run(2.0)
@@ -257,4 +257,4 @@ def test_check_and_boot_name_what_may_get_lost(
     expected = lossy if sync_period else lossy_without_sync
     assert any('when TPDO 1 gets lost' in text for text in found) is expected
     sync = SyncRound(lambda: None, period=bus.master.sync_period)
-    assert Input(bus.nodes[0].tpdos[0], sync).loss_unnoticed is expected
+    assert ReceivedTpdo(bus.nodes[0].tpdos[0], sync).loss_unnoticed is expected

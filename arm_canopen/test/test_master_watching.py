@@ -158,7 +158,7 @@ def test_a_pdo_with_an_event_time_that_stops_is_told() -> None:
     net.run(0.2)
     assert not net.drives['a'].fresh
     assert any('TPDO 3 (0x382) has stopped: none for 60 ms' in text for text in net.told())
-    node.image.inputs[-1].receive(Frame(0x382, bytes(2), net.now))
+    node.image.tpdos[-1].receive(Frame(0x382, bytes(2), net.now))
     net.run(0.01)
     assert net.drives['a'].fresh
 

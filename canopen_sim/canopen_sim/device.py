@@ -24,7 +24,7 @@ from .objects.object_store import ObjectStore
 from .objects.parameter_memory import ParameterMemory
 from .objects.parameter_storage import ParameterStorage
 from .services.emcy_producer import EmcyProducer
-from .services.error_control import Contact
+from .services.error_control import ErrorControl
 from .services.heartbeat import HeartbeatProducer
 from .services.lss_slave import LssSlave
 from .services.nmt_slave import boot_up_frame, NmtSlave
@@ -117,7 +117,7 @@ class Device:
         node_id, store, send, nmt = self.node_id, self.store, self._send, self._nmt
         self._sdo = SdoServers(node_id, store, send, self._subscribe)
         self._producer = HeartbeatProducer(node_id, store, lambda: nmt.state, send)
-        self._contact = Contact(
+        self._error_control = ErrorControl(
             store, nmt, self._errors, self.drives, send=send, subscribe=self._subscribe
         )
         self._storage = ParameterStorage(store, self._memory)
@@ -134,7 +134,7 @@ class Device:
             self._sdo,
             self._sync,
             self.clock,
-            self._contact,
+            self._error_control,
             self._rpdos,
             self._tpdos,
         )
@@ -145,9 +145,9 @@ class Device:
             self._nmt,
             self._sdo,
             self._errors,
-            self._contact.consumer,
+            self._error_control.consumer,
             self._producer,
-            self._contact.guarding,
+            self._error_control.guarding,
             self._rpdos,
             self._tpdos,
             *self.drives,
@@ -212,7 +212,7 @@ class Device:
         self._tpdos.stop()
         for drive in self.drives:
             drive.reset(now)
-        self._contact.guarding.reset()
+        self._error_control.guarding.reset()
         self._lss.pending_id = self._memory.node_id or self.first_id
         self._nmt.switch_off()
         self._parts = [self.faults]
@@ -263,7 +263,7 @@ class Device:
                 drive.connection_lost(now)
                 for code in sorted(drive.faults):
                     self._errors.report(code, now)
-        self._contact.reset()
+        self._error_control.reset()
         self._subscribe()
 
     def nmt_changed(self, previous: NmtState, now: float) -> None:
@@ -291,8 +291,8 @@ class Device:
         """Offer the services of the present NMT state."""
         handlers = self._services.handlers(self._on_sdo) if self.powered else {}
         if self._line.faults:
-            guarded = self._line.guarded
-            handlers = {can_id: guarded(handler) for can_id, handler in handlers.items()}
+            filtered = self._line.filtered
+            handlers = {can_id: filtered(handler) for can_id, handler in handlers.items()}
         self.handlers = handlers
         if self._handlers_changed is not None:
             self._handlers_changed()
@@ -301,7 +301,7 @@ class Device:
         """Take another node id; all that follows from it is read again by the reset."""
         self.node_id = node_id
         self.store.renumber(self._dictionary.for_node(node_id))
-        guarding = self._contact.guarding
+        guarding = self._error_control.guarding
         for part in (self._nmt, self._sdo, self._producer, guarding, self._lss):
             part.node_id = node_id
 
@@ -312,7 +312,7 @@ class Device:
 
     def _on_remote(self, frame: Frame, now: float) -> None:
         if frame.can_id == CobId.HEARTBEAT + self.node_id:
-            self._contact.guarding.request(now)
+            self._error_control.guarding.request(now)
             return
         self._tpdos.request(frame.can_id, now)
 

@@ -57,7 +57,7 @@ def loss_text(name: str, granted: int) -> str:
     return f'{text}; `sysctl -w net.core.rmem_max={RECEIVE_BUFFER}` allows a larger buffer'
 
 
-class StampReader:
+class TimestampReader:
     """Turns ancillary data of received datagrams into steady time and a count of losses.
 
     The kernel stamps with the wall clock. Stamps never go back, also when somebody sets it.
@@ -111,7 +111,7 @@ class SocketBus(Bus):
         """Take over a prepared, non-blocking socket."""
         super().__init__(name)
         self._receiver = receiver
-        self._stamps = StampReader()
+        self._stamps = TimestampReader()
         self._wake_fd = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
         self._closed = False
 

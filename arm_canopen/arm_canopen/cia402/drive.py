@@ -9,7 +9,7 @@ from collections.abc import Callable
 from ..config.drive_model import DriveConfig
 from ..exceptions import CanopenError, SdoError
 from ..master.events import Severity
-from ..master.process_image import Output
+from ..master.process_image import SentRpdo
 from ..master.remote_node import RemoteNode
 from ..master.scheduler import Promise, Scheduler, Task
 from ..standard.drive import DriveState, mode_title, OperationMode, Statusword
@@ -120,7 +120,7 @@ class Drive(ModedDrive):
         """Take the state from the process image."""
         if self.node.operational and not self._begun:
             self._begun = True
-            self._upkeep.begin()
+            self._cache.begin()
             if self.config is self.node.config.drive:  # one axis polls for all
                 poll = self.node.poll(self.node.config.poll_period)
                 self._polling = self._scheduler.background(poll)
@@ -159,7 +159,7 @@ class Drive(ModedDrive):
             raise CanopenError('the RPDO with its controlword is kept back, with another axis')
         self._send(command, bits)
 
-    def fail(self, error: Exception, output: Output | None = None) -> None:
+    def fail(self, error: Exception, output: SentRpdo | None = None) -> None:
         """Stop and disable the drive, because its cycle failed; never raises.
 
         The other drives of the bus go on.
@@ -352,11 +352,11 @@ class Drive(ModedDrive):
             self.released(Refusal(RefusalCause.NOT_ENABLED, self.state.title))
 
     async def _report_fault(self) -> None:
-        await self.know_error()
+        await self.read_error_code()
         self.report(Severity.ERROR, f'FAULT: {self.describe()}; call ~/recover')
 
     def _on_lost(self, reason: str) -> None:
-        self._upkeep.forget(reason)
+        self._cache.forget(reason)
         if self._polling is not None:
             self._polling.cancel(SdoError(reason))
         enabled = self.state is DriveState.OPERATION_ENABLED and self.goal is self.state

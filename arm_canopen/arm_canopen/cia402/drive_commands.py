@@ -297,10 +297,12 @@ class DriveCommands(StopCommands):
 
     def _missing_mode(self, number: OperationMode) -> str:
         drive = self.drive
-        told = drive.parameters
-        offered = ', '.join(mode.title for mode in drive.modes if mode and told.supports(mode))
-        if not told.supports(number):
-            why = f'the drive does not have it (0x6502 is 0x{told.supported_modes:X})'
+        parameters = drive.parameters
+        offered = ', '.join(
+            mode.title for mode in drive.modes if mode and parameters.supports(mode)
+        )
+        if not parameters.supports(number):
+            why = f'the drive does not have it (0x6502 is 0x{parameters.supported_modes:X})'
         else:
             target = TARGET_OBJECTS.get(number)
             place = f'0x{drive.objects.at(target[0]):04X}' if target is not None else 'its target'

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from ..master.process_image import Output, Writer
+from ..master.process_image import SentRpdo, Writer
 from ..master.remote_node import RemoteNode
 from ..standard.drive import drive_state, DriveState, OperationMode
 from ..standard.objects import AXIS_OFFSET, Index
@@ -39,7 +39,7 @@ class DriveObjects:
         self.mode = node.writer(self.at(Index.MODE_OF_OPERATION))
         self._controlling = [
             output
-            for output in node.image.outputs
+            for output in node.image.rpdos
             if any(mapped.index == self.at(Index.CONTROLWORD) for mapped in output.config.mapping)
         ]
 
@@ -57,7 +57,7 @@ class DriveObjects:
             return None
         return int(word), position
 
-    def is_controlled_by(self, output: Output) -> bool:
+    def is_controlled_by(self, output: SentRpdo) -> bool:
         """Tell whether an RPDO carries the controlword of this axis."""
         return output in self._controlling
 

@@ -18,7 +18,9 @@ from .refusal import Refusal, RefusalCause
 
 HAND_OVER_MARGIN = 2.0  # cycles of profile velocity from the set-point that a stream may start
 SPEED_MARGIN = 1.5  # share of the greatest speed (0x607F) above which a step is a jump
-UNTOLD_MARGIN = 10.0  # the same of the profile velocity, for drives that tell no greatest speed
+DEFAULT_SPEED_MARGIN = (
+    10.0  # the same of the profile velocity, for drives that tell no greatest speed
+)
 
 
 @dataclass(slots=True)
@@ -183,7 +185,7 @@ def _feedback(drive: Drive) -> AxisFeedback:
 
 def _greatest_speed(drive: Drive) -> float:
     """Return the speed in user units per second above which a stream is no motion any more."""
-    told = drive.parameters
-    if told.speed_limit is not None:
-        return SPEED_MARGIN * told.speed_limit
-    return UNTOLD_MARGIN * told.profile.velocity
+    parameters = drive.parameters
+    if parameters.speed_limit is not None:
+        return SPEED_MARGIN * parameters.speed_limit
+    return DEFAULT_SPEED_MARGIN * parameters.profile.velocity

@@ -17,7 +17,7 @@ from ..standard.objects import Index
 from .drive_objects import DriveObjects
 from .halt import Halt
 from .modes import Actual
-from .parameter_upkeep import ParameterUpkeep
+from .parameter_cache import ParameterCache
 from .parameters import DriveParameters
 from .units import clamp, INT16_MAX, INT32_MAX, Units
 from .velocity_estimate import VelocityEstimate
@@ -65,14 +65,14 @@ class ObservedDrive:
         self.failure = ''
         self._position = math.nan
         self._scheduler = scheduler
-        self._upkeep = ParameterUpkeep(node, config, self.units, scheduler, self.warn)
+        self._cache = ParameterCache(node, config, self.units, scheduler, self.warn)
         polled = self.objects.position_is_polled
         self._estimate = VelocityEstimate(node.config.poll_period if polled else 0.0)
 
     @property
     def parameters(self) -> DriveParameters:
         """What it told about itself."""
-        return self._upkeep.told
+        return self._cache.parameters
 
     @property
     def age(self) -> float:
@@ -116,8 +116,8 @@ class ObservedDrive:
 
     def ramp_time(self, longest: float) -> float:
         """Return how long it brakes on its way out in [s], by the slower of its ramps."""
-        told = self.parameters
-        ramp = min(told.quick_stop_deceleration, told.profile.deceleration)
+        parameters = self.parameters
+        ramp = min(parameters.quick_stop_deceleration, parameters.profile.deceleration)
         return min(longest, self.speed / ramp)
 
     @property
@@ -133,7 +133,7 @@ class ObservedDrive:
     @property
     def ready(self) -> bool:
         """Whether its state and its parameters are known."""
-        return self.state is not DriveState.UNKNOWN and self._upkeep.known and self.fresh
+        return self.state is not DriveState.UNKNOWN and self._cache.known and self.fresh
 
     @property
     def homing_at_init(self) -> int:
@@ -168,7 +168,7 @@ class ObservedDrive:
             parts.append(f'NMT state {self.node.nmt_state.name}: call ~/nmt_start_node')
         return '; '.join(parts)
 
-    async def know_error(self) -> None:
+    async def read_error_code(self) -> None:
         """Read 0x603F, so that the answer can say what is wrong."""
         index = self.objects.at(Index.ERROR_CODE)
         if self.state not in FAULTY or (index, 0) not in self.node.config.dictionary:

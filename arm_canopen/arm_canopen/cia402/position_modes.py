@@ -64,7 +64,7 @@ class Handshake(Enum):
     OFFERED = 'bit 4 is set, the drive has not acknowledged yet'
     RELEASED = 'acknowledged, bit 4 is cleared, the drive still shows bit 12'
     WITHDRAWN = 'bit 4 is cleared without an acknowledge, until the drive has seen that'
-    IMPOSED = 'bit 4 is set though the buffer is full (bit 12): an immediate move empties it'
+    FORCED = 'bit 4 is set though the buffer is full (bit 12): an immediate move empties it'
     AWAITED = 'bit 4 is cleared after that; bit 12 goes when the set-point was taken'
 
 
@@ -230,7 +230,7 @@ class ProfilePosition(Mode):
             self._watch_acknowledge(now, acknowledged=acknowledged)
         elif self.handshake is Handshake.WRITTEN:
             self._watch_delivery(now, acknowledged=acknowledged)
-        elif self.handshake in (Handshake.WITHDRAWN, Handshake.IMPOSED):
+        elif self.handshake in (Handshake.WITHDRAWN, Handshake.FORCED):
             self._show_edge(now)
         elif self.handshake is Handshake.AWAITED:
             patience = max(FULL_AFTER, EDGE_CYCLES * period)
@@ -240,7 +240,7 @@ class ProfilePosition(Mode):
         elif self._follows_at_once or statusword & TARGET_REACHED:
             self._full_since = self._imposed = None
             self._hand_over(now, acknowledged=False)
-        if self.handshake in (Handshake.OFFERED, Handshake.IMPOSED):
+        if self.handshake in (Handshake.OFFERED, Handshake.FORCED):
             return self._bits | NEW_SET_POINT
         return self._bits
 
@@ -254,7 +254,7 @@ class ProfilePosition(Mode):
         self._drop_waiting('it was stopped before the drive had it')
         self._imposed = None
         self._taken = False
-        if self.handshake in (Handshake.OFFERED, Handshake.IMPOSED):
+        if self.handshake in (Handshake.OFFERED, Handshake.FORCED):
             self.handshake = Handshake.WITHDRAWN
             self._cycles_left = EDGE_CYCLES
         elif self.handshake is not Handshake.WITHDRAWN:
@@ -305,14 +305,14 @@ class ProfilePosition(Mode):
         self._offered_at = now
         self._cycles_left = EDGE_CYCLES
         self._taken |= self._acknowledges is False
-        self.handshake = Handshake.IMPOSED if acknowledged else Handshake.OFFERED
+        self.handshake = Handshake.FORCED if acknowledged else Handshake.OFFERED
 
     def _show_edge(self, now: float) -> None:
         self._cycles_left -= 1
         if self._cycles_left > 0:
             return
         self._offered_at = now
-        imposed = self.handshake is Handshake.IMPOSED
+        imposed = self.handshake is Handshake.FORCED
         self.handshake = Handshake.AWAITED if imposed else Handshake.IDLE
 
     def _watch_full(self, now: float) -> None:

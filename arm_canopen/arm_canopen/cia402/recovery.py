@@ -46,7 +46,7 @@ class Recovery:
     async def _recover(self, mode: OperationMode) -> None:
         drive = self._drive
         if drive.state in FAULTY:
-            await drive.know_error()
+            await drive.read_error_code()
             drive.report(
                 Severity.WARNING, f'not enabled again: {drive.describe()}; call ~/recover'
             )

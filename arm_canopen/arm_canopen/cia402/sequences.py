@@ -251,7 +251,7 @@ class DriveSequences:
         except TimeoutError:
             raise self.refused(f'did not reach {what} within {timeout:g} s{self._why()}') from None
         if not condition():
-            await drive.know_error()
+            await drive.read_error_code()
             raise self.refused(f'did not reach {what}')
 
     def require_no_fault(self) -> None:

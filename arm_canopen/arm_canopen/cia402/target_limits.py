@@ -26,14 +26,14 @@ TORQUE_MODES = (OperationMode.PROFILE_TORQUE, OperationMode.CYCLIC_TORQUE)
 
 
 def check_target(
-    name: str, mode: Mode, told: DriveParameters, units: Units, target: float
+    name: str, mode: Mode, parameters: DriveParameters, units: Units, target: float
 ) -> None:
     """Refuse a target that the drive would not go to: beyond its limits, or without any effect.
 
     Args:
         name: Name of the drive.
         mode: The mode.
-        told: What the drive told about itself.
+        parameters: Its parameters.
         units: Its units.
         target: The target in user units.
 
@@ -41,31 +41,31 @@ def check_target(
         DriveError: It is such a target; the message says why.
     """
     if mode.setpoint is not None:
-        _check_position(name, told.position_limits, target)
+        _check_position(name, parameters.position_limits, target)
         _check_rounding(name, units, target)
-        if mode.number is OperationMode.PROFILE_POSITION and told.profile_velocity_inc == 0:
+        if mode.number is OperationMode.PROFILE_POSITION and parameters.profile_velocity_inc == 0:
             raise DriveError(
                 f'{name}: its profile velocity (0x6081) is 0, so it would not move; write it, for '
                 'good in the sdo list of bus.yml'
             )
     elif mode.number in VELOCITY_MODES:
-        _check_size(name, told.speed_limit, target, 'velocity {:g} (0x607F)')
+        _check_size(name, parameters.speed_limit, target, 'velocity {:g} (0x607F)')
         _check_effect(name, units.velocity_raw(target), target, 'scale_vel_to_dev')
     elif mode.number in TORQUE_MODES:
-        _check_size(name, told.effort_limit, target, 'torque {:g} (0x6072)')
+        _check_size(name, parameters.effort_limit, target, 'torque {:g} (0x6072)')
         _check_effect(name, units.effort_raw(target), target, 'scale_eff_to_dev')
 
 
-def check_setpoint(name: str, mode: Mode, told: DriveParameters, setpoint: Setpoint) -> None:
+def check_setpoint(name: str, mode: Mode, parameters: DriveParameters, setpoint: Setpoint) -> None:
     """Refuse a set-point of a motion source beyond limits; errors as for targets.
 
     A path leads between increments everywhere, and is off by half of one at most.
     """
-    _check_position(name, told.position_limits, setpoint.position)
+    _check_position(name, parameters.position_limits, setpoint.position)
     if mode.number is not OperationMode.CYCLIC_POSITION:
         return  # which has no feed-forward
-    _check_size(name, told.speed_limit, setpoint.velocity, 'velocity {:g} (0x607F)')
-    _check_size(name, told.effort_limit, setpoint.effort, 'torque {:g} (0x6072)')
+    _check_size(name, parameters.speed_limit, setpoint.velocity, 'velocity {:g} (0x607F)')
+    _check_size(name, parameters.effort_limit, setpoint.effort, 'torque {:g} (0x6072)')
 
 
 def _check_position(name: str, limits: tuple[float, float] | None, target: float) -> None:

@@ -15,7 +15,7 @@ from ..standard.cob_id import CAN_ID_MASK, COB_ID_EXTENDED, COB_ID_INVALID
 from ..standard.datatypes import DataType, encode
 from ..standard.nmt import ConsumerHeartbeatTime
 from ..standard.objects import Index, PDO_COUNT_MAX
-from .model import BusConfig, NodeConfig, PdoConfig, SdoWrite, Written
+from .model import BusConfig, NodeConfig, PdoConfig, SdoWrite, SourceLocation
 from .parameter_values import is_configured
 from .pdo_direction import Direction, RPDO, TPDO
 from .shared_keys import HUNDRED_MICROSECONDS, MILLISECONDS
@@ -127,7 +127,7 @@ def held_after_boot(
 
 def is_requested(bus: BusConfig, node: NodeConfig, *keys: str) -> bool:
     """Tell whether bus.yml has a key of a device; a bus that was built by a program has all."""
-    return not bus.written or (node.name, *keys) in bus.written
+    return not bus.locations or (node.name, *keys) in bus.locations
 
 
 def watch_slots(bus: BusConfig, node: NodeConfig) -> list[int]:
@@ -213,7 +213,7 @@ class _Plan:
             if entry is None or not entry.access.writable:
                 continue
             heartbeat = index is Index.PRODUCER_HEARTBEAT
-            if heartbeat or node.guarded or values[index] != (entry.default or 0):
+            if heartbeat or node.uses_node_guarding or values[index] != (entry.default or 0):
                 yield _number(
                     (index, 0),
                     values[index],
@@ -329,12 +329,12 @@ def _fixed_mappings(node: NodeConfig) -> Iterator[BootWrite]:
 
 
 def _written(write: SdoWrite, *, unless_default: bool = False) -> BootWrite:
-    key = _key(write.written)
+    key = _key(write.location)
     return BootWrite(write.index, write.subindex, write.data, key, unless_default=unless_default)
 
 
-def _key(written: Written) -> str:
-    return f'{written.key} (line {written.line})' if written.line else written.key or 'bus.yml'
+def _key(location: SourceLocation) -> str:
+    return f'{location.key} (line {location.line})' if location.line else location.key or 'bus.yml'
 
 
 def _units(time: float | None, per_second: float = HUNDRED_MICROSECONDS) -> int | None:

@@ -46,10 +46,10 @@ def check_heartbeats(subject: Subject) -> None:
     """Check who watches a device, and whom it watches."""
     node = subject.node
     producer = node.heartbeat_producer
-    if not producer and not node.guarded:
+    if not producer and not node.uses_node_guarding:
         subject.findings.warning(
             subject.place('heartbeat_producer'),
-            'the device sends no heartbeat and is not guarded: nobody notices when it is gone',
+            'no heartbeat and no node guarding: nobody notices when the device is gone',
             'write heartbeat_producer: 100',
         )
     elif producer and not node.heartbeat_timeout:
@@ -188,11 +188,11 @@ def check_writes(subject: Subject) -> None:
     last = {(w.index, w.subindex): w for w in subject.node.sdo_writes}
     for write in subject.node.sdo_writes:
         kept = last[write.index, write.subindex]
-        if write.data != kept.data and write.written.line:
+        if write.data != kept.data and write.location.line:
             subject.findings.warning(
-                Place(subject.bus.file, write.written.line, key=write.written.key),
+                Place(subject.bus.file, write.location.line, key=write.location.key),
                 f'0x{write.index:04X}:{write.subindex:02X} is written again in line '
-                f'{kept.written.line} with another value',
+                f'{kept.location.line} with another value',
                 'keep one of them, unless the device needs both in this order',
             )
 
@@ -266,5 +266,5 @@ def _check_sdo_server(subject: Subject) -> None:
 
 
 def _master_place(config: BusConfig, key: str) -> Place:
-    written = config.place_of('master', key)
-    return Place(config.file, written.line, key=written.key)
+    location = config.place_of('master', key)
+    return Place(config.file, location.line, key=location.key)

@@ -51,8 +51,8 @@ class Subject:
 
     def place(self, *names: str) -> Place:
         """Return the place of a key of the device, or of the nearest thing around it."""
-        written = self.bus.place_of(self.node.name, *names)
-        return Place(self.bus.file, written.line or self.node.line, key=written.key)
+        location = self.bus.place_of(self.node.name, *names)
+        return Place(self.bus.file, location.line or self.node.line, key=location.key)
 
     def pdo_place(self, direction: Direction, pdo: PdoConfig, key: str = '') -> Place:
         """Return the place of a PDO, or of one of its keys."""
@@ -62,7 +62,7 @@ class Subject:
         """Return the place that says what an object holds: the sdo list, or else the EDS."""
         write = self.node.write_of(index, subindex)
         if write is not None:
-            return Place(self.bus.file, write.written.line, key=write.written.key)
+            return Place(self.bus.file, write.location.line, key=write.location.key)
         entry = self.node.dictionary.get(index, subindex)
         line = entry.line if entry is not None else 0
         return Place(self.node.eds, line, key=f'[{index:04X}sub{subindex:X}]')

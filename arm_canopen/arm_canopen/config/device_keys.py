@@ -58,9 +58,9 @@ DEVICE_KEYS: tuple[Key, ...] = (
     REMAPPINGS,
     Key('dcf', Kind.TEXT, 'dcf'),
     Key('dcf_path', Kind.TEXT, 'dcf_path'),
-    Key('polling', Kind.BOOLEAN, use=Use.NEEDLESS),
+    Key('polling', Kind.BOOLEAN, use=Use.IGNORED),
     Key('period', Kind.NUMBER, 'poll_period', per_unit=MILLISECONDS, low=1, high=60_000),
-    Key('non_transmit_timeout', Kind.NUMBER, use=Use.NEEDLESS),
+    Key('non_transmit_timeout', Kind.NUMBER, use=Use.IGNORED),
     Key(
         'sdo_timeout_ms',
         Kind.NUMBER,
@@ -72,12 +72,12 @@ DEVICE_KEYS: tuple[Key, ...] = (
     Key(
         'boot_timeout_ms', Kind.NUMBER, 'boot_timeout', per_unit=MILLISECONDS, low=1, high=600_000
     ),
-    Key('diagnostics', Kind.BLOCK, use=Use.NEEDLESS),
-    Key('enable_lazy_load', Kind.BOOLEAN, use=Use.NEEDLESS),
+    Key('diagnostics', Kind.BLOCK, use=Use.IGNORED),
+    Key('enable_lazy_load', Kind.BOOLEAN, use=Use.IGNORED),
     Key('num_channels', Kind.INTEGER, 'num_channels', low=1, high=8, why='CiA 402 has 8 axes'),
     Key('channel_names', Kind.BLOCK),
     Key('channels', Kind.BLOCK),
-    Key('channel', Kind.INTEGER, use=Use.NEEDLESS),
+    Key('channel', Kind.INTEGER, use=Use.IGNORED),
     Key('revision_number', Kind.INTEGER, 'revision_number', low=0, high=U32_MAX),
     Key('serial_number', Kind.INTEGER, 'serial_number', low=0, high=U32_MAX),
     Key(

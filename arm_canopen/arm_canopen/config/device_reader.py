@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 from ..standard.dictionary import ObjectDictionary
 from ..standard.objects import AXIS_OFFSET, Index
-from .document import Mapping
+from .document import YamlMap
 from .eds import Eds
 from .eds_files import EdsFiles
 from .findings import Findings, Place
@@ -36,7 +36,7 @@ class DeviceDraft:
     """
 
     config: NodeConfig | None
-    section: Mapping
+    section: YamlMap
     settings: DeviceSettings
     pdos: list[PdoDraft] = field(default_factory=list)
 
@@ -47,7 +47,7 @@ class DeviceDraft:
 
 
 def read_device(
-    name: str, section: Mapping, options: Options, eds_files: EdsFiles, findings: Findings
+    name: str, section: YamlMap, options: Options, eds_files: EdsFiles, findings: Findings
 ) -> DeviceDraft:
     """Read everything about a device that does not depend on master and other devices.
 
@@ -97,7 +97,7 @@ def read_device(
 
 
 def _find_eds(
-    section: Mapping,
+    section: YamlMap,
     settings: DeviceSettings,
     options: Options,
     eds_files: EdsFiles,
@@ -135,7 +135,7 @@ def _default(dictionary: ObjectDictionary, index: int, subindex: int) -> int:
     return entry.default if entry is not None and isinstance(entry.default, int) else 0
 
 
-def _check_profile(config: NodeConfig, section: Mapping, findings: Findings) -> None:
+def _check_profile(config: NodeConfig, section: YamlMap, findings: Findings) -> None:
     """Refuse the drive profile's driver for a device that is no drive."""
     missing = [index for index in DRIVE_OBJECTS if not config.dictionary.has_index(index)]
     if config.is_drive and missing:
@@ -147,7 +147,7 @@ def _check_profile(config: NodeConfig, section: Mapping, findings: Findings) -> 
         )
 
 
-def _check_axes(config: NodeConfig, section: Mapping, findings: Findings) -> None:
+def _check_axes(config: NodeConfig, section: YamlMap, findings: Findings) -> None:
     """Refuse more axes than the EDS has."""
     for axis in config.axes[1:]:
         index = Index.CONTROLWORD + AXIS_OFFSET * axis.channel

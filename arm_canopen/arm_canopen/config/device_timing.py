@@ -27,7 +27,7 @@ CYCLIC_OBJECTS = ((RPDO, Index.CONTROLWORD, 'enabled'), (TPDO, Index.STATUSWORD,
 
 
 @dataclass(frozen=True, slots=True)
-class Surroundings:
+class BusContext:
     """What a device meets on its bus.
 
     Attributes:
@@ -42,28 +42,28 @@ class Surroundings:
 
 
 def finish_device(
-    draft: DeviceDraft, config: NodeConfig, around: Surroundings, findings: Findings
+    draft: DeviceDraft, config: NodeConfig, context: BusContext, findings: Findings
 ) -> NodeConfig:
     """Complete a device.
 
     Args:
         draft: The device; its PDOs have their final COB-IDs.
         config: Its configuration so far.
-        around: Its surroundings.
+        context: What the whole bus says.
         findings: Gets what does not fit together.
     """
-    master = around.master
+    master = context.master
     _check_period(draft, master, findings)
     _check_sync(draft.pdos, master, findings)
     if config.is_drive:
         _check_drive_pdos(draft, config, findings)
         check_drive_types(draft.pdos, findings)
     producer = _heartbeat_producer(draft, config.dictionary, findings)
-    multiplier = draft.settings.heartbeat_multiplier or around.options.heartbeat_multiplier
+    multiplier = draft.settings.heartbeat_multiplier or context.options.heartbeat_multiplier
     return replace(
         config,
         heartbeat_producer=producer,
-        heartbeat_timeout=producer * multiplier if around.settings.watch_devices else 0.0,
+        heartbeat_timeout=producer * multiplier if context.settings.watch_devices else 0.0,
         guard_time=_guard_time(draft, config.dictionary, producer, findings),
         life_time_factor=_life_time_factor(draft, config.dictionary),
         heartbeat_consumer=_heartbeat_consumer(draft, config.dictionary, master, findings),

@@ -24,7 +24,7 @@ TAG_PREFIX = 'tag:yaml.org,2002:'
 MERGE_TAG = TAG_PREFIX + 'merge'
 INTEGER_TAG = TAG_PREFIX + 'int'
 TEXT_TAGS = (TAG_PREFIX + 'timestamp', TAG_PREFIX + 'value', MERGE_TAG)  # dates, '=' and '<<'
-SLIPPED_TAG = 'slipped'  # of a mapping that was put together by `indented_again`
+SLIPPED_TAG = 'slipped'  # of a mapping that was put together by `reindent`
 NUMBERED = ('tpdo', 'rpdo')  # whose keys are numbers
 SIZE_MAX = 4 * 1024 * 1024  # [byte]
 
@@ -57,7 +57,7 @@ class Scalar:
 
 
 @dataclass(frozen=True, slots=True)
-class Listing:
+class YamlList:
     """A sequence."""
 
     place: Place
@@ -65,7 +65,7 @@ class Listing:
 
 
 @dataclass(frozen=True, slots=True)
-class Mapping:
+class YamlMap:
     """A mapping, merge keys resolved.
 
     Attributes:
@@ -77,7 +77,7 @@ class Mapping:
     entries: dict[str, Item] = field(default_factory=dict)
 
 
-Item: TypeAlias = Scalar | Listing | Mapping
+Item: TypeAlias = Scalar | YamlList | YamlMap
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +104,7 @@ BUS_YML = DocumentKind(
 
 def read_document(
     path: str | os.PathLike[str], findings: Findings, kind: DocumentKind = BUS_YML
-) -> Mapping:
+) -> YamlMap:
     """Read a YAML file whose top level is a mapping.
 
     Args:
@@ -117,7 +117,7 @@ def read_document(
     """
     file = Path(path)
     item = _read(file, findings, kind)
-    if isinstance(item, Mapping):
+    if isinstance(item, YamlMap):
         return item
     findings.error(
         Place(file),
@@ -125,7 +125,7 @@ def read_document(
         kind.beginning,
     )
     findings.raise_errors()
-    return Mapping(Place(file))
+    return YamlMap(Place(file))
 
 
 def _read(file: Path, findings: Findings, kind: DocumentKind) -> Item | None:
@@ -197,12 +197,12 @@ class _Converter:
             return self._scalar(node, place)
         raise TypeError(f'unknown kind of YAML node {node!r}')
 
-    def _listing(self, node: yaml.SequenceNode, place: Place) -> Listing:
+    def _listing(self, node: yaml.SequenceNode, place: Place) -> YamlList:
         items = (
             self.convert(child, self._place(child, f'{place.key}[{number}]'))
             for number, child in enumerate(node.value)
         )
-        return Listing(place, tuple(items))
+        return YamlList(place, tuple(items))
 
     def _scalar(self, node: yaml.ScalarNode, place: Place) -> Scalar:
         known = {TAG_PREFIX + kind.value: kind for kind in ScalarKind}
@@ -211,19 +211,19 @@ class _Converter:
         kind = known.get(node.tag, ScalarKind.TEXT)
         return Scalar(place, str(node.value), kind, quoted=node.style is not None)
 
-    def _mapping(self, node: yaml.MappingNode, place: Place) -> Mapping:
+    def _mapping(self, node: yaml.MappingNode, place: Place) -> YamlMap:
         own: dict[str, Item] = {}
         merged: dict[str, Item] = {}
         pairs = node.value
         if place.key.rpartition('.')[2] in NUMBERED:
-            pairs = indented_again(pairs, lambda key: self._tell_slip(key, place))
+            pairs = reindent(pairs, lambda key: self._tell_slip(key, place))
             self._kept.append(pairs)
         for key, value in pairs:
             if key.tag == MERGE_TAG:
                 self._merge(value, place, merged)
             else:
                 self._entry(key, value, place, own)
-        return Mapping(place, merged | own)
+        return YamlMap(place, merged | own)
 
     def _tell_slip(self, key: yaml.Node, place: Place) -> None:
         self._findings.warning(
@@ -254,7 +254,7 @@ class _Converter:
         for source in sources:
             where = self._place(source, f'{place.key}.<<')
             item = self.convert(source, where)
-            if not isinstance(item, Mapping):
+            if not isinstance(item, YamlMap):
                 self._findings.error(
                     where, "'<<' takes a mapping", "write '<<: *name' for an anchor '&name'"
                 )
@@ -267,7 +267,7 @@ class _Converter:
         return Place(self._file, mark.line + 1, mark.column + 1, key)
 
 
-def indented_again(
+def reindent(
     pairs: list[tuple[yaml.Node, yaml.Node]], tell: Callable[[yaml.Node], None]
 ) -> list[tuple[yaml.Node, yaml.Node]]:
     """Put keys below the number that they follow, where a listing has lost their indentation.

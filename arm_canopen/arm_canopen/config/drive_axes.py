@@ -11,7 +11,7 @@ from typing import Any
 from ..standard.drive import DriveState
 from . import scalars
 from .device_keys import CHANNEL_KEYS, SCALE_KEYS
-from .document import Item, Mapping
+from .document import Item, YamlMap
 from .drive_model import DriveConfig, RecoveryPolicy
 from .findings import Findings, Place, RefusedError
 from .section import listing, read_section
@@ -21,7 +21,7 @@ SCALE_TOLERANCE = 0.01  # by which the product of the scales of both directions 
 POLICIES = {policy.value: policy for policy in RecoveryPolicy}
 
 
-def read_drive(section: Mapping, values: dict[str, Any], findings: Findings) -> DriveConfig:
+def read_drive(section: YamlMap, values: dict[str, Any], findings: Findings) -> DriveConfig:
     """Build the settings that count for all axes of a drive.
 
     Args:
@@ -47,7 +47,7 @@ def check_node_name(name: str, place: Place, findings: Findings) -> None:
 
 
 def read_axes(
-    name: str, section: Mapping, count: int, drive: DriveConfig, findings: Findings
+    name: str, section: YamlMap, count: int, drive: DriveConfig, findings: Findings
 ) -> tuple[DriveConfig, ...]:
     """Return one record for each axis.
 
@@ -84,7 +84,7 @@ def read_axes(
 def _axis(drive: DriveConfig, part: Item | None, findings: Findings) -> DriveConfig:
     if part is None:
         return drive
-    if not isinstance(part, Mapping):
+    if not isinstance(part, YamlMap):
         findings.error(
             part.place,
             f'expected the keys of a channel, got {scalars.describe(part)}',
@@ -98,7 +98,7 @@ def _axis(drive: DriveConfig, part: Item | None, findings: Findings) -> DriveCon
 
 
 def _with_scales(
-    drive: DriveConfig, section: Mapping, values: dict[str, Any], findings: Findings
+    drive: DriveConfig, section: YamlMap, values: dict[str, Any], findings: Findings
 ) -> DriveConfig:
     """Return an axis with the values of a section, be it of its device or of its channel."""
     _check_one_rule(section, values, findings)
@@ -117,7 +117,7 @@ def _with_scales(
     return axis
 
 
-def _switching_state(section: Mapping, values: dict[str, Any], findings: Findings) -> DriveState:
+def _switching_state(section: YamlMap, values: dict[str, Any], findings: Findings) -> DriveState:
     state = DriveState(values['switching_state'])
     if state is not DriveState.FAULT:
         return state
@@ -129,7 +129,7 @@ def _switching_state(section: Mapping, values: dict[str, Any], findings: Finding
     return DriveState.OPERATION_ENABLED
 
 
-def _check_one_rule(section: Mapping, values: dict[str, Any], findings: Findings) -> None:
+def _check_one_rule(section: YamlMap, values: dict[str, Any], findings: Findings) -> None:
     """Refuse scales beside those of the factor group."""
     given = [key for key in SCALE_KEYS if key in section.entries]
     if given and values.get('scale_from_factor_group'):

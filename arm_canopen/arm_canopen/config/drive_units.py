@@ -60,7 +60,7 @@ def axis_units(subject: Subject, axis: DriveConfig) -> AxisUnits:
         rule = UnitRule.FACTOR_GROUP
         increments, velocity = factors.position_scale, factors.velocity_scale
     elif increments == DriveConfig().scale_pos_to_dev and not (
-        subject.bus.written and is_requested(subject.bus, subject.node, POSITION_KEY)
+        subject.bus.locations and is_requested(subject.bus, subject.node, POSITION_KEY)
     ):
         rule = UnitRule.UPSTREAM
     per_radian = factors.position_scale

@@ -7,7 +7,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 import difflib
 
-from .document import Mapping
+from .document import YamlMap
 from .findings import Findings
 
 
@@ -54,7 +54,7 @@ BASE_CLASSES = {
 """Classes that no bus.yml can name, and what is meant."""
 
 
-def check_driver(section: Mapping, name: str, findings: Findings, *, for_master: bool) -> None:
+def check_driver(section: YamlMap, name: str, findings: Findings, *, for_master: bool) -> None:
     """Check the driver class of the master or of a device, and its package.
 
     Args:
@@ -86,7 +86,7 @@ def _remedy(name: str, names: list[str], for_master: bool) -> str:
     return f'did you mean {close[0]!r}?' if close else f'take one of {", ".join(names)}'
 
 
-def _check_variant(section: Mapping, driver: DriverClass, findings: Findings) -> None:
+def _check_variant(section: YamlMap, driver: DriverClass, findings: Findings) -> None:
     package = section.entries.get('package')
     text = getattr(package, 'text', driver.package)
     if package is not None and text != driver.package:

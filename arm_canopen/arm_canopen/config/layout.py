@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 import difflib
 
-from .document import Item, Listing, Mapping
+from .document import Item, YamlList, YamlMap
 from .findings import Findings
 from .merge import merge_device
 from .scalars import describe
@@ -31,19 +31,19 @@ class Layout:
         devices: Each device with the ``defaults`` below its own values, in the order of the file.
     """
 
-    options: Mapping
-    master: Mapping
-    devices: dict[str, Mapping] = field(default_factory=dict)
+    options: YamlMap
+    master: YamlMap
+    devices: dict[str, YamlMap] = field(default_factory=dict)
 
 
-def lay_out(root: Mapping, findings: Findings) -> Layout:
+def lay_out(root: YamlMap, findings: Findings) -> Layout:
     """Find the sections of either format."""
     root = _lifted(root, findings)
     new = 'nodes' in root.entries or 'defaults' in root.entries
     devices = _new_devices(root, findings) if new else _old_devices(root, findings)
     if 'master' not in root.entries:
         findings.error(root.place, "no section 'master'", "write 'master:' and its node_id below")
-    empty = Mapping(root.place)
+    empty = YamlMap(root.place)
     return Layout(
         block(root, 'options', findings) or empty,
         block(root, 'master', findings) or empty,
@@ -51,10 +51,10 @@ def lay_out(root: Mapping, findings: Findings) -> Layout:
     )
 
 
-def _lifted(root: Mapping, findings: Findings) -> Mapping:
+def _lifted(root: YamlMap, findings: Findings) -> YamlMap:
     """Take sections that are indented below ``options`` as sections of their own."""
     options = root.entries.get('options')
-    if not isinstance(options, Mapping):
+    if not isinstance(options, YamlMap):
         return root
     sections = {
         name: item
@@ -70,28 +70,28 @@ def _lifted(root: Mapping, findings: Findings) -> Mapping:
             'indent it less',
         )
     rest = {name: item for name, item in options.entries.items() if name not in sections}
-    entries = root.entries | {'options': Mapping(options.place, rest)} | sections
-    return Mapping(root.place, entries)
+    entries = root.entries | {'options': YamlMap(options.place, rest)} | sections
+    return YamlMap(root.place, entries)
 
 
-def _new_devices(root: Mapping, findings: Findings) -> dict[str, Mapping]:
+def _new_devices(root: YamlMap, findings: Findings) -> dict[str, YamlMap]:
     for name, item in root.entries.items():
         if name not in TOP_LEVEL and not name.startswith('.'):
             findings.error(item.place, f'unknown section {name!r}', _section_remedy(name, item))
-    defaults = _with_dcf(block(root, 'defaults', findings) or Mapping(root.place), findings)
+    defaults = _with_dcf(block(root, 'defaults', findings) or YamlMap(root.place), findings)
     nodes = root.entries.get('nodes')
     if nodes is None:
         findings.error(root.place, "there are 'defaults' but no 'nodes'", NODES_REMEDY)
-    elif isinstance(nodes, Listing):
+    elif isinstance(nodes, YamlList):
         findings.error(nodes.place, "'nodes' is a list", NODES_REMEDY)
-    elif not isinstance(nodes, Mapping) or not nodes.entries:
+    elif not isinstance(nodes, YamlMap) or not nodes.entries:
         findings.error(nodes.place, 'there are no devices', NODES_REMEDY)
     else:
         return _devices(nodes, defaults, findings)
     return {}
 
 
-def _old_devices(root: Mapping, findings: Findings) -> dict[str, Mapping]:
+def _old_devices(root: YamlMap, findings: Findings) -> dict[str, YamlMap]:
     sections: dict[str, Item] = {}
     for name, item in root.entries.items():
         if _is_misspelt(name, item):
@@ -100,12 +100,12 @@ def _old_devices(root: Mapping, findings: Findings) -> dict[str, Mapping]:
             sections[name] = item
     if not any(not name.startswith('.') for name in sections):
         findings.error(root.place, 'there are no devices', NODES_REMEDY)
-    return _devices(Mapping(root.place, sections), Mapping(root.place), findings)
+    return _devices(YamlMap(root.place, sections), YamlMap(root.place), findings)
 
 
 def _is_misspelt(name: str, item: Item) -> bool:
     """Tell a section with a typing error from a device, which has an EDS in this format."""
-    is_device = isinstance(item, Mapping) and bool({'dcf', 'eds'} & item.entries.keys())
+    is_device = isinstance(item, YamlMap) and bool({'dcf', 'eds'} & item.entries.keys())
     return name not in TOP_LEVEL and not is_device and bool(_close_section(name))
 
 
@@ -113,12 +113,12 @@ def _close_section(name: str) -> list[str]:
     return difflib.get_close_matches(name, TOP_LEVEL, n=1, cutoff=0.75)
 
 
-def _devices(nodes: Mapping, defaults: Mapping, findings: Findings) -> dict[str, Mapping]:
-    result: dict[str, Mapping] = {}
+def _devices(nodes: YamlMap, defaults: YamlMap, findings: Findings) -> dict[str, YamlMap]:
+    result: dict[str, YamlMap] = {}
     for name, item in nodes.entries.items():
         if name.startswith('.'):
             continue
-        if isinstance(item, Mapping):
+        if isinstance(item, YamlMap):
             result[name] = merge_device(defaults, _with_dcf(item, findings))
         else:
             findings.error(
@@ -129,7 +129,7 @@ def _devices(nodes: Mapping, defaults: Mapping, findings: Findings) -> dict[str,
     return result
 
 
-def _with_dcf(section: Mapping, findings: Findings) -> Mapping:
+def _with_dcf(section: YamlMap, findings: Findings) -> YamlMap:
     """Take ``eds`` for ``dcf``, as many people write it; ros2_canopen knows the latter only."""
     item = section.entries.get('eds')
     if item is None:
@@ -143,12 +143,12 @@ def _with_dcf(section: Mapping, findings: Findings) -> Mapping:
     entries = {
         ('dcf' if name == 'eds' else name): value for name, value in section.entries.items()
     }
-    return Mapping(section.place, entries)
+    return YamlMap(section.place, entries)
 
 
 def _section_remedy(name: str, item: Item) -> str:
     if close := _close_section(name):
         return f'did you mean {close[0]!r}?'
-    if isinstance(item, Mapping) and 'node_id' in item.entries:
+    if isinstance(item, YamlMap) and 'node_id' in item.entries:
         return "move the device below 'nodes:'"
     return "a device needs at least 'node_id:' below its name; begin a template's name with a dot"

@@ -11,14 +11,14 @@ from pathlib import Path
 
 from .cob_ids import assign_cob_ids
 from .device_reader import DeviceDraft, read_device
-from .device_timing import finish_device, Surroundings
-from .document import Item, Mapping, read_document
+from .device_timing import BusContext, finish_device
+from .document import Item, read_document, YamlMap
 from .eds_files import EdsFiles
 from .findings import Findings, Place
 from .layout import lay_out, Layout
 from .master import build_master
 from .master_model import MasterConfig
-from .model import BusConfig, Written
+from .model import BusConfig, SourceLocation
 from .pdo_direction import RPDO, TPDO
 from .settings import read_master_settings, read_options
 
@@ -75,20 +75,20 @@ def read_bus(
     unique = _check_node_ids(layout.master, settings.node_id, drafts, findings)
     _check_axis_names(unique, findings)
     _check_lifecycle(master, drafts, findings)
-    around = Surroundings(options, settings, master)
+    context = BusContext(options, settings, master)
     nodes = tuple(
-        finish_device(draft, draft.config, around, findings)
+        finish_device(draft, draft.config, context, findings)
         for draft in _with_cob_ids(unique, findings)
         if draft.config is not None
     )
-    return BusConfig(file, master, nodes, findings.warnings, _written(layout)), findings
+    return BusConfig(file, master, nodes, findings.warnings, _locations(layout)), findings
 
 
-def _written(layout: Layout) -> dict[tuple[str, ...], Written]:
+def _locations(layout: Layout) -> dict[tuple[str, ...], SourceLocation]:
     """Say where each key stands, by the names that lead to it."""
     sections = {'master': layout.master, **layout.devices}
     return {
-        names: Written(item.place.line, item.place.key)
+        names: SourceLocation(item.place.line, item.place.key)
         for name, section in sections.items()
         for names, item in _walk((name,), section)
     }
@@ -96,7 +96,7 @@ def _written(layout: Layout) -> dict[tuple[str, ...], Written]:
 
 def _walk(names: tuple[str, ...], item: Item) -> Iterator[tuple[tuple[str, ...], Item]]:
     yield names, item
-    if not isinstance(item, Mapping) or len(names) > DEPTH_MAX:
+    if not isinstance(item, YamlMap) or len(names) > DEPTH_MAX:
         return
     for name, child in item.entries.items():
         if len(names) == 1 or names[1] in PDO_SECTIONS:
@@ -120,7 +120,7 @@ def _check_lifecycle(
 
 
 def _check_node_ids(
-    master: Mapping, master_id: int | None, drafts: Sequence[DeviceDraft], findings: Findings
+    master: YamlMap, master_id: int | None, drafts: Sequence[DeviceDraft], findings: Findings
 ) -> list[DeviceDraft]:
     """Refuse doubled node ids; returns the devices that have one of their own."""
     owners: dict[int, tuple[str, Place]] = {}

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from .document import Mapping
+from .document import YamlMap
 from .findings import Findings, RefusedError
 from .identity import Identity
 from .master_model import MasterConfig
@@ -38,7 +38,7 @@ HEARTBEAT_TIME_MAX = U16_MAX / MILLISECONDS  # [s] 0x1016 holds 16 bits
 
 
 def build_master(
-    section: Mapping,
+    section: YamlMap,
     settings: MasterSettings,
     options: Options,
     device_periods: list[float],
@@ -76,7 +76,7 @@ def build_master(
 
 
 def _heartbeat_timeout(
-    section: Mapping, settings: MasterSettings, options: Options, findings: Findings
+    section: YamlMap, settings: MasterSettings, options: Options, findings: Findings
 ) -> float:
     """Return how long devices wait for the heartbeat of the master in [s]."""
     multiplier = settings.heartbeat_multiplier or options.heartbeat_multiplier
@@ -99,7 +99,7 @@ def _time_period(settings: MasterSettings) -> float:
     return TIME_PERIOD if settings.time_cob_id & TIME_PRODUCER else 0.0
 
 
-def _error_behaviour(section: Mapping, findings: Findings) -> dict[int, int]:
+def _error_behaviour(section: YamlMap, findings: Findings) -> dict[int, int]:
     """Read 0x1029 of the master: what it does by kind of error (CiA 301, 7.5.2.28)."""
     given = block(section, 'error_behavior', findings)
     result: dict[int, int] = {}

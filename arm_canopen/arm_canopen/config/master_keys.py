@@ -50,7 +50,7 @@ MASTER_KEYS: tuple[Key, ...] = (
         low=0,
         high=U32_MAX,
         neutral=0,
-        use=Use.LATER,
+        use=Use.UNUSED,
         why=NO_DICTIONARY,
     ),
     Key(
@@ -60,7 +60,7 @@ MASTER_KEYS: tuple[Key, ...] = (
         low=0,
         high=U32_MAX,
         neutral=0,
-        use=Use.LATER,
+        use=Use.UNUSED,
         why=NO_DICTIONARY,
     ),
     Key(
@@ -70,7 +70,7 @@ MASTER_KEYS: tuple[Key, ...] = (
         low=0,
         high=U32_MAX,
         neutral=0,
-        use=Use.LATER,
+        use=Use.UNUSED,
         why=NO_DICTIONARY,
     ),
     Key(
@@ -80,7 +80,7 @@ MASTER_KEYS: tuple[Key, ...] = (
         low=0,
         high=U32_MAX,
         neutral=0,
-        use=Use.LATER,
+        use=Use.UNUSED,
         why=NO_DICTIONARY,
     ),
     Key('heartbeat_consumer', Kind.BOOLEAN, 'watch_devices'),
@@ -131,7 +131,7 @@ MASTER_KEYS: tuple[Key, ...] = (
         low=0,
         high=U16_MAX,
         neutral=0,
-        use=Use.LATER,
+        use=Use.UNUSED,
         why='the master sends no EMCY',
     ),
     Key(
@@ -142,7 +142,7 @@ MASTER_KEYS: tuple[Key, ...] = (
         low=0,
         high=U16_MAX,
     ),
-    Key('error_behavior', Kind.BLOCK, use=Use.LATER, why='the master has no NMT state'),
+    Key('error_behavior', Kind.BLOCK, use=Use.UNUSED, why='the master has no NMT state'),
     Key('start', Kind.BOOLEAN, 'start'),
     Key('start_nodes', Kind.BOOLEAN, 'start_nodes'),
     Key('start_all_nodes', Kind.BOOLEAN, 'start_all_nodes'),

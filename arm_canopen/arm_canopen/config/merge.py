@@ -11,42 +11,42 @@
 
 from __future__ import annotations
 
-from .document import Item, Listing, Mapping
+from .document import Item, YamlList, YamlMap
 from .findings import RefusedError
 from .scalars import integer
 
 SDO_LIST = 'sdo'
 
 
-def merge_device(defaults: Mapping, own: Mapping) -> Mapping:
+def merge_device(defaults: YamlMap, own: YamlMap) -> YamlMap:
     """Return a device's section with the defaults below it; it keeps its own place."""
     merged = _merge_mappings(defaults, own)
     common, special = defaults.entries.get(SDO_LIST), own.entries.get(SDO_LIST)
-    if isinstance(common, Listing) and isinstance(special, Listing) and special.items:
+    if isinstance(common, YamlList) and isinstance(special, YamlList) and special.items:
         merged.entries[SDO_LIST] = _merge_sdo(common, special)
     return merged
 
 
-def _merge_mappings(below: Mapping, above: Mapping) -> Mapping:
+def _merge_mappings(below: YamlMap, above: YamlMap) -> YamlMap:
     entries: dict[str, Item] = dict(below.entries)
     for name, item in above.entries.items():
         base = below.entries.get(name)
-        if isinstance(base, Mapping) and isinstance(item, Mapping):
+        if isinstance(base, YamlMap) and isinstance(item, YamlMap):
             entries[name] = _merge_mappings(base, item)
         else:
             entries[name] = item
-    return Mapping(above.place, entries)
+    return YamlMap(above.place, entries)
 
 
-def _merge_sdo(common: Listing, special: Listing) -> Listing:
+def _merge_sdo(common: YamlList, special: YamlList) -> YamlList:
     replaced = {_address(item) for item in special.items} - {None}
     kept = tuple(item for item in common.items if _address(item) not in replaced)
-    return Listing(special.place, kept + special.items)
+    return YamlList(special.place, kept + special.items)
 
 
 def _address(item: Item) -> tuple[int, int] | None:
     """Return which object an entry writes; None when that cannot be read (told elsewhere)."""
-    if not isinstance(item, Mapping) or 'index' not in item.entries:
+    if not isinstance(item, YamlMap) or 'index' not in item.entries:
         return None
     subindex = item.entries.get('sub_index')
     try:

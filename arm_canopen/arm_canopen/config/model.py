@@ -25,7 +25,7 @@ RETRY_FACTOR = 3
 
 
 @dataclass(frozen=True, slots=True)
-class Written:
+class SourceLocation:
     """Where something stands in bus.yml.
 
     Attributes:
@@ -74,13 +74,13 @@ class SdoWrite:
         index: Object index.
         subindex: Sub-index.
         data: The value as it is sent.
-        written: Where bus.yml asks for it.
+        location: Where bus.yml asks for it.
     """
 
     index: int
     subindex: int
     data: bytes
-    written: Written = field(default=Written(), compare=False)
+    location: SourceLocation = field(default=SourceLocation(), compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,7 +177,7 @@ class NodeConfig:
         return None if entry is None else entry.default
 
     @property
-    def guarded(self) -> bool:
+    def uses_node_guarding(self) -> bool:
         """The master asks for its NMT state; never together with a heartbeat (CiA 301)."""
         return self.guard_time > 0.0 and not self.heartbeat_producer
 
@@ -246,7 +246,7 @@ class BusConfig:
         master: The master.
         nodes: The devices in the order of the file.
         warnings: What was odd but could be understood.
-        written: Where each key stands, by the names that lead to it: ``('master', 'node_id')``,
+        locations: Where each key stands, by the names that lead to it: ``('master', 'node_id')``,
             ``('joint1', 'tpdo', '1', 'mapping')``; defaults belong to every device.
     """
 
@@ -254,19 +254,21 @@ class BusConfig:
     master: MasterConfig
     nodes: tuple[NodeConfig, ...]
     warnings: tuple[Problem, ...] = ()
-    written: Mapping[tuple[str, ...], Written] = field(default_factory=dict, compare=False)
+    locations: Mapping[tuple[str, ...], SourceLocation] = field(
+        default_factory=dict, compare=False
+    )
 
     @property
     def joints(self) -> tuple[str, ...]:
         """Names of all joints that its drives have, in the order of the file."""
         return tuple(joint for node in self.nodes for joint in node.joints)
 
-    def place_of(self, *names: str) -> Written:
+    def place_of(self, *names: str) -> SourceLocation:
         """Return where a key stands, or else the nearest thing around it that does."""
         for length in range(len(names), 0, -1):
-            if (written := self.written.get(names[:length])) is not None:
-                return written
-        return Written()
+            if (location := self.locations.get(names[:length])) is not None:
+                return location
+        return SourceLocation()
 
     def node(self, name: str) -> NodeConfig:
         """Return a device by name.

@@ -15,7 +15,7 @@ from ..standard.dictionary import ObjectDictionary, ObjectEntry
 from ..standard.objects import AXIS_OFFSET, COMMANDS, Index
 from .eds import Eds
 from .findings import Findings, Place
-from .model import SdoWrite, Written
+from .model import SdoWrite, SourceLocation
 
 ACTIONS = frozenset({Index.STORE_PARAMETERS, Index.RESTORE_PARAMETERS})
 """Objects that do something when they are written."""
@@ -34,7 +34,9 @@ def parameter_writes(eds: Eds, findings: Findings) -> tuple[SdoWrite, ...]:
         findings: Gets values that are not written, and why.
     """
     return tuple(
-        SdoWrite(*entry.address, data, written=Written(key=f'ParameterValue of {eds.path.name}'))
+        SdoWrite(
+            *entry.address, data, location=SourceLocation(key=f'ParameterValue of {eds.path.name}')
+        )
         for entry in eds.dictionary
         if entry.configured
         and _is_setting(entry)

@@ -11,7 +11,7 @@ from ..standard.dictionary import ObjectDictionary, ObjectEntry
 from ..standard.objects import Index, is_signed, PDO_BITS_MAX
 from ..standard.pdo import MappedObject
 from .device_keys import MAPPING_KEYS
-from .document import Listing
+from .document import YamlList
 from .eds import DUMMY_TYPES, Eds
 from .findings import Findings, Place, RefusedError
 from .pdo_direction import Direction, RPDO
@@ -100,7 +100,7 @@ def _from_word(
 
 
 def read_mapping(
-    direction: Direction, number: int, entries: Listing, eds: Eds, findings: Findings
+    direction: Direction, number: int, entries: YamlList, eds: Eds, findings: Findings
 ) -> tuple[MappedObject, ...]:
     """Read the mapping that bus.yml gives a PDO.
 
@@ -131,7 +131,7 @@ def read_mapping(
 
 
 def _mapped_objects(
-    direction: Direction, entries: Listing, eds: Eds, findings: Findings
+    direction: Direction, entries: YamlList, eds: Eds, findings: Findings
 ) -> Iterator[MappedObject]:
     for item in entries.items:
         address = read_address(item, MAPPING_KEYS, findings)

@@ -11,7 +11,7 @@ from typing import Any
 from ..standard.cob_id import CAN_ID_MASK, COB_ID_EXTENDED, COB_ID_INVALID
 from ..standard.objects import PDO_COUNT_MAX
 from ..standard.pdo import SYNCHRONOUS_MAX
-from .document import Item, Listing, Mapping, Scalar
+from .document import Item, Scalar, YamlList, YamlMap
 from .eds import Eds
 from .findings import Findings, Place, RefusedError
 from .model import PdoConfig
@@ -57,7 +57,7 @@ class PdoReader:
     """Reads the PDOs of one device."""
 
     def __init__(
-        self, name: str, device: Mapping, eds: Eds, node_id: int, *, findings: Findings
+        self, name: str, device: YamlMap, eds: Eds, node_id: int, *, findings: Findings
     ) -> None:
         """Keep what the device is.
 
@@ -89,13 +89,13 @@ class PdoReader:
             drafts.append(draft)
         return drafts
 
-    def _wanted(self, direction: Direction, numbers: list[int]) -> Iterator[tuple[int, Mapping]]:
+    def _wanted(self, direction: Direction, numbers: list[int]) -> Iterator[tuple[int, YamlMap]]:
         section = block(self._device, direction.name, self._findings)
         for name, item in section.entries.items() if section else ():
             number = key_number(name, PDO_COUNT_MAX)
             if number not in numbers:
                 self._findings.refuse(item.place, _no_such_pdo(direction, name, number, numbers))
-            elif isinstance(item, Mapping):
+            elif isinstance(item, YamlMap):
                 yield number, item
             else:
                 self._findings.error(
@@ -139,7 +139,7 @@ class PdoReader:
         entry = self._eds.dictionary.get(direction.communication + number - 1, subindex)
         return entry.default if entry is not None and isinstance(entry.default, int) else None
 
-    def _configured(self, draft: PdoDraft, section: Mapping) -> PdoDraft:
+    def _configured(self, draft: PdoDraft, section: YamlMap) -> PdoDraft:
         """Lay what bus.yml says over a PDO of the EDS."""
         values = read_section(section, draft.direction.keys, self._findings)
         self._check_parameters(draft, section, values)
@@ -156,7 +156,7 @@ class PdoReader:
             )
         return self._with_cob_id(draft, section.entries.get('cob_id'))
 
-    def _with_mapping(self, draft: PdoDraft, entries: Listing) -> PdoDraft:
+    def _with_mapping(self, draft: PdoDraft, entries: YamlList) -> PdoDraft:
         config = draft.config
         mapping = read_mapping(draft.direction, config.number, entries, self._eds, self._findings)
         if config.fixed_mapping and mapping != config.mapping:
@@ -168,7 +168,7 @@ class PdoReader:
         return replace(draft, config=replace(config, mapping=mapping))
 
     def _check_parameters(
-        self, draft: PdoDraft, section: Mapping, values: dict[str, object]
+        self, draft: PdoDraft, section: YamlMap, values: dict[str, object]
     ) -> None:
         """Refuse what the device has no sub-index for, and transmission types without use."""
         communication = draft.direction.communication + draft.config.number - 1

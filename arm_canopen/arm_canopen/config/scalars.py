@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 import re
 
-from .document import Item, Listing, Scalar, ScalarKind
+from .document import Item, Scalar, ScalarKind, YamlList
 from .findings import RefusedError
 
 TRUE_WORDS = frozenset({'true', 'yes', 'on', 'y', '1'})
@@ -23,7 +23,7 @@ NUMBER_LENGTH_MAX = 80  # longer than any 64-bit number in any notation
 
 def describe(item: Item) -> str:
     """Say what a value is, for messages."""
-    if isinstance(item, Listing):
+    if isinstance(item, YamlList):
         return 'a list'
     if not isinstance(item, Scalar):
         return 'a mapping'

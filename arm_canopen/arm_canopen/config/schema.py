@@ -28,8 +28,8 @@ class Use(Enum):
     """What is made of a key."""
 
     READ = auto()  # fills a field of the model
-    NEEDLESS = auto()  # accepted: what it asks for is so anyway
-    LATER = auto()  # told in a warning: known, not used yet; a field is for other tools' files
+    IGNORED = auto()  # accepted: what it asks for is so anyway
+    UNUSED = auto()  # told in a warning: known, not used yet; a field is for other tools' files
     REFUSED = auto()  # ignoring it would change motion or safety, so only its default is accepted
 
 

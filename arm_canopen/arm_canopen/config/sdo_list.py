@@ -20,9 +20,9 @@ from ..standard.dictionary import ObjectDictionary, ObjectEntry
 from ..standard.objects import Index, PDO_COUNT_MAX
 from . import scalars
 from .device_keys import SDO_KEYS
-from .document import Item, Mapping, Scalar, ScalarKind
+from .document import Item, Scalar, ScalarKind, YamlMap
 from .findings import Findings, Place, RefusedError
-from .model import SdoWrite, Written
+from .model import SdoWrite, SourceLocation
 from .schema import Key
 from .section import block, listing, read_section
 from .shared_keys import U8_MAX
@@ -54,7 +54,7 @@ class SdoReader:
         self._dictionary = dictionary
         self._findings = findings
 
-    def read(self, device: Mapping) -> tuple[SdoWrite, ...]:
+    def read(self, device: YamlMap) -> tuple[SdoWrite, ...]:
         """Return the writes of a section (defaults merged) in their order."""
         writes = [
             *self._time_cob_id(device),
@@ -63,12 +63,12 @@ class SdoReader:
         ]
         return tuple(write for write in writes if write is not None)
 
-    def _time_cob_id(self, device: Mapping) -> Iterator[SdoWrite | None]:
+    def _time_cob_id(self, device: YamlMap) -> Iterator[SdoWrite | None]:
         item = device.entries.get('time_cob_id')
         if item is not None:
             yield self._write((Index.TIME_COB_ID, 0), item, item.place)
 
-    def _error_behaviour(self, device: Mapping) -> Iterator[SdoWrite | None]:
+    def _error_behaviour(self, device: YamlMap) -> Iterator[SdoWrite | None]:
         section = block(device, 'error_behavior', self._findings)
         for name, item in section.entries.items() if section else ():
             subindex = scalars.key_number(name, U8_MAX)
@@ -79,11 +79,11 @@ class SdoReader:
             else:
                 yield self._write((Index.ERROR_BEHAVIOUR, subindex), item, item.place)
 
-    def _sdo_list(self, device: Mapping) -> Iterator[SdoWrite | None]:
+    def _sdo_list(self, device: YamlMap) -> Iterator[SdoWrite | None]:
         entries = listing(device, 'sdo', self._findings)
         for item in entries.items if entries else ():
             address = read_address(item, SDO_KEYS, self._findings)
-            if address is not None and isinstance(item, Mapping):
+            if address is not None and isinstance(item, YamlMap):
                 zero = Scalar(item.place, '0', ScalarKind.INTEGER)
                 yield self._write(address, item.entries.get('value', zero), item.place)
 
@@ -98,7 +98,7 @@ class SdoReader:
         except RefusedError as reason:
             self._findings.refuse(value.place, reason)
             return None
-        return SdoWrite(*address, data, Written(place.line, place.key))
+        return SdoWrite(*address, data, SourceLocation(place.line, place.key))
 
 
 def read_address(item: Item, keys: tuple[Key, ...], findings: Findings) -> tuple[int, int] | None:
@@ -108,7 +108,7 @@ def read_address(item: Item, keys: tuple[Key, ...], findings: Findings) -> tuple
         Index and sub-index, None when the findings say what is wrong.
     """
     example = '{index: 0x6081, sub_index: 0}'
-    if not isinstance(item, Mapping):
+    if not isinstance(item, YamlMap):
         findings.error(
             item.place, f'expected an object, got {scalars.describe(item)}', f'write {example}'
         )

@@ -9,7 +9,7 @@ import difflib
 from typing import Any
 
 from .device_keys import DEVICE_KEYS, DRIVE_KEYS, RPDO_KEYS, SDO_KEYS, TPDO_KEYS
-from .document import Item, Listing, Mapping, Scalar, ScalarKind
+from .document import Item, Scalar, ScalarKind, YamlList, YamlMap
 from .findings import Findings, RefusedError
 from .master_keys import MASTER_KEYS, OPTION_KEYS
 from .scalars import describe
@@ -28,7 +28,7 @@ SECTIONS: dict[str, tuple[Key, ...]] = {
 """Where each key belongs, for remedies."""
 
 
-def read_section(mapping: Mapping, keys: Sequence[Key], findings: Findings) -> dict[str, Any]:
+def read_section(mapping: YamlMap, keys: Sequence[Key], findings: Findings) -> dict[str, Any]:
     """Check the keys of a section and read those that fill the model.
 
     Blocks (lists and mappings) are left to their own readers.
@@ -66,11 +66,11 @@ def _read_key(key: Key, item: Item, values: dict[str, Any], findings: Findings) 
         findings.error(
             item.place, f'{describe(item)} is not supported: {key.why}', 'remove the key'
         )
-    elif key.use is Use.LATER and not is_neutral:
+    elif key.use is Use.UNUSED and not is_neutral:
         findings.warning(item.place, f'known, not used yet: {key.why}', 'it may stay')
 
 
-def check_keys(mapping: Mapping, keys: Iterable[Key], findings: Findings) -> None:
+def check_keys(mapping: YamlMap, keys: Iterable[Key], findings: Findings) -> None:
     """Refuse keys that are not in a table, with a guess at what was meant."""
     names = [key.name for key in keys]
     for name, item in mapping.entries.items():
@@ -93,10 +93,10 @@ def remedy_for(name: str, names: Sequence[str]) -> str:
     return f'remove it; known here: {", ".join(names)}'
 
 
-def block(mapping: Mapping, name: str, findings: Findings) -> Mapping | None:
+def block(mapping: YamlMap, name: str, findings: Findings) -> YamlMap | None:
     """Return a section within a section, None when it is absent or of the wrong kind."""
     item = mapping.entries.get(name)
-    if item is None or isinstance(item, Mapping):
+    if item is None or isinstance(item, YamlMap):
         return item
     findings.error(
         item.place,
@@ -106,10 +106,10 @@ def block(mapping: Mapping, name: str, findings: Findings) -> Mapping | None:
     return None
 
 
-def listing(mapping: Mapping, name: str, findings: Findings) -> Listing | None:
+def listing(mapping: YamlMap, name: str, findings: Findings) -> YamlList | None:
     """Return a list within a section, None when it is absent or of the wrong kind."""
     item = mapping.entries.get(name)
-    if item is None or isinstance(item, Listing):
+    if item is None or isinstance(item, YamlList):
         return item
     findings.error(
         item.place,
@@ -119,7 +119,7 @@ def listing(mapping: Mapping, name: str, findings: Findings) -> Listing | None:
     return None
 
 
-def texts(mapping: Mapping, name: str, findings: Findings) -> dict[str, str]:
+def texts(mapping: YamlMap, name: str, findings: Findings) -> dict[str, str]:
     """Read a mapping from text to text, such as ``remappings``."""
     section = block(mapping, name, findings)
     result: dict[str, str] = {}

@@ -14,7 +14,7 @@ import re
 
 from ..standard.dictionary import ObjectDictionary
 from .device_keys import DEVICE_KEYS, DRIVE_KEYS
-from .document import Mapping
+from .document import YamlMap
 from .drive_axes import check_node_name, read_axes, read_drive
 from .drive_model import DriveConfig
 from .drivers import check_driver
@@ -118,12 +118,12 @@ class DeviceSettings:
     num_channels: int = len(DEVICE.axes)
 
 
-def read_options(section: Mapping, findings: Findings) -> Options:
+def read_options(section: YamlMap, findings: Findings) -> Options:
     """Read the section ``options``."""
     return Options(**read_section(section, OPTION_KEYS, findings))
 
 
-def read_master_settings(section: Mapping, findings: Findings) -> MasterSettings:
+def read_master_settings(section: YamlMap, findings: Findings) -> MasterSettings:
     """Read the section ``master``."""
     settings = MasterSettings(**read_section(section, MASTER_KEYS, findings))
     _check_names(section, settings.namespace, findings)
@@ -134,7 +134,7 @@ def read_master_settings(section: Mapping, findings: Findings) -> MasterSettings
 
 
 def read_device_settings(
-    name: str, section: Mapping, findings: Findings
+    name: str, section: YamlMap, findings: Findings
 ) -> tuple[DeviceSettings, tuple[DriveConfig, ...]]:
     """Read the section of a device, apart from its PDOs and objects; return its axes, too."""
     values = read_section(section, DEVICE_KEYS + DRIVE_KEYS, findings)
@@ -147,12 +147,12 @@ def read_device_settings(
     return settings, read_axes(name, section, settings.num_channels, drive, findings)
 
 
-def remappings(section: Mapping, findings: Findings) -> dict[str, str]:
+def remappings(section: YamlMap, findings: Findings) -> dict[str, str]:
     """Read the ROS remappings of the master or a device."""
     return texts(section, 'remappings', findings)
 
 
-def _check_names(section: Mapping, namespace: str, findings: Findings) -> None:
+def _check_names(section: YamlMap, namespace: str, findings: Findings) -> None:
     if not NAMESPACE.fullmatch(namespace):
         findings.error(
             section.entries['namespace'].place,

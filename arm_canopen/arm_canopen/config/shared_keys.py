@@ -25,7 +25,7 @@ NODE_ID = Key(
     why='CANopen node ids are 1 to 127',
 )
 DRIVER = Key('driver', Kind.TEXT, 'driver')
-PACKAGE = Key('package', Kind.TEXT, use=Use.NEEDLESS)
+PACKAGE = Key('package', Kind.TEXT, use=Use.IGNORED)
 NAMESPACE = Key('namespace', Kind.TEXT, 'namespace')
 REMAPPINGS = Key('remappings', Kind.BLOCK)
 MULTIPLIER = Key(

@@ -117,7 +117,7 @@ def _master_traffic(config: BusConfig) -> Iterator[Traffic]:
 
 def _guarding(node: NodeConfig) -> Iterator[Traffic]:
     """Yield question and answer of node guarding (CiA 301, 7.2.8.2.2)."""
-    if node.guarded:
+    if node.uses_node_guarding:
         cob_id, reason = CobId.HEARTBEAT + node.node_id, f'every {node.guard_time * 1e3:g} ms'
         yield Traffic(node.name, 'guarding', cob_id, 0, 1 / node.guard_time, reason)
         yield Traffic(node.name, 'guarding', cob_id, 1, 1 / node.guard_time, reason)

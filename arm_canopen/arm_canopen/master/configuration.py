@@ -154,7 +154,7 @@ class Configurator:
 
     def _rely_on_timer(self, index: int, *, taken: bool) -> None:
         """Await a TPDO by its event timer, or no more, until the next boot."""
-        for entry in self._node.image.inputs:
+        for entry in self._node.image.tpdos:
             if entry.config.number == index - Index.TPDO_COMMUNICATION + 1:
                 entry.rely_on_timer(taken=taken)
 

@@ -35,7 +35,7 @@ class LifeSigns:
         self._since = 0.0
         self._patience = math.inf
         self._guarding: Guarding | None = None
-        if config.guarded:
+        if config.uses_node_guarding:
             timing = (config.guard_time, config.retry_factor)
             self._guarding = Guarding(config.node_id, *timing, send)
 

@@ -19,16 +19,16 @@ from ..exceptions import CanopenError
 from ..standard.cob_id import CAN_ID_MASK, CobId
 from ..standard.nmt import ALL_NODES, COMMANDED_STATES, NmtCommand, NmtState, parse_nmt
 from ..standard.pdo import Number
-from .boots import Boots
+from .boot_manager import BootManager
 from .bus_sender import BusSender
 from .controller_watch import ControllerWatch
 from .emergency_id import emergency_can_id
 from .events import Event, EventKind, Report, Severity
 from .nmt_sender import NmtSender
+from .other_master import OtherMasterWatch
 from .process_image import SyncRound
 from .producers import HeartbeatProducer, SyncCounter, TimeProducer, utc_now, WallClock
 from .remote_node import RemoteNode
-from .rivals import RivalWatch
 from .scheduler import completed, Promise, Scheduler
 from .sdo_client import SdoClient
 from .startup import Startup
@@ -111,11 +111,13 @@ class Network:
         }
         nodes = list(self.nodes.values())
         self._startup = Startup(master, nodes, self.scheduler, self.send_nmt, report)
-        self._boots = Boots(
+        self._boots = BootManager(
             config, nodes, self.scheduler, self._startup, send=self.send, send_nmt=self.send_nmt
         )
-        self._strangers: dict[int, SdoClient] = {}
-        self._handlers = dict(self._connect(RivalWatch(config, report, expected=beside_master)))
+        self._unconfigured_clients: dict[int, SdoClient] = {}
+        self._handlers = dict(
+            self._connect(OtherMasterWatch(config, report, expected=beside_master))
+        )
 
     def start(self, now: float) -> None:
         """Reset the devices and begin to boot them, all at the same time."""
@@ -217,7 +219,7 @@ class Network:
         self.missed_pdos += node.count_missed()
 
     def _send_outputs(self, node: RemoteNode, now: float) -> None:
-        for output in node.image.outputs:
+        for output in node.image.rpdos:
             try:
                 if output.leaves(now):
                     self.send(output.frame())
@@ -298,10 +300,10 @@ class Network:
         for node in self.nodes.values():
             if node.config.node_id == node_id:
                 return node.sdo
-        client = self._strangers.get(node_id)
+        client = self._unconfigured_clients.get(node_id)
         if client is None:
             client = SdoClient(node_id, f'node {node_id}', self.scheduler, self.send)
-            self._strangers[node_id] = client
+            self._unconfigured_clients[node_id] = client
             self._handlers[CobId.SDO_RESPONSE + node_id] = client.receive
         return client
 
@@ -319,11 +321,13 @@ class Network:
         text = f'a defect in the CANopen master: {type(error).__name__}: {error}'
         self._report(Event(EventKind.BUS, Severity.ERROR, '', text))
 
-    def _connect(self, rivals: RivalWatch) -> Iterator[tuple[int, Callable[[Frame], None]]]:
+    def _connect(
+        self, other_master: OtherMasterWatch
+    ) -> Iterator[tuple[int, Callable[[Frame], None]]]:
         """Say who takes the frames of which identifier."""
         yield CobId.NMT, self._hear_nmt
-        yield CobId.HEARTBEAT + self.config.master.node_id, rivals.receive
-        yield CobId.SYNC, rivals.receive
+        yield CobId.HEARTBEAT + self.config.master.node_id, other_master.receive
+        yield CobId.SYNC, other_master.receive
         for node in self.nodes.values():
             node_id = node.config.node_id
             yield CobId.HEARTBEAT + node_id, node.receive_heartbeat
@@ -331,7 +335,7 @@ class Network:
             if emergency_id is not None:
                 yield emergency_id, node.emergencies.receive
             yield CobId.SDO_RESPONSE + node_id, node.sdo.receive
-            for entry in node.image.inputs:
+            for entry in node.image.tpdos:
                 yield entry.config.cob_id, entry.receive
 
     def _hear_nmt(self, frame: Frame) -> None:

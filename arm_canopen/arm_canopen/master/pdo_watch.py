@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from .events import EventKind, Severity
-from .process_image import Input
+from .process_image import ReceivedTpdo
 
 
 class PdoWatch:
@@ -19,7 +19,7 @@ class PdoWatch:
 
     def __init__(
         self,
-        inputs: Sequence[Input],
+        inputs: Sequence[ReceivedTpdo],
         report: Callable[[EventKind, Severity, str], None],
     ) -> None:
         """Begin with nothing awaited.
@@ -89,7 +89,7 @@ class PdoWatch:
                     'again'
                 )
 
-    def _tell_short(self, entry: Input, length: int) -> None:
+    def _tell_short(self, entry: ReceivedTpdo, length: int) -> None:
         if entry.length_errors == 1:
             self._warn(
                 f'TPDO {entry.config.number} (0x{entry.config.cob_id:03X}) has {length} bytes, '

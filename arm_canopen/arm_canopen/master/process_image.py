@@ -61,7 +61,7 @@ class SyncRound:
         self._sync_time = 0.0
 
     def start(self, now: float) -> None:
-        """A SYNC is about to be sent; each :class:`Input` says whether it is expected.
+        """A SYNC is about to be sent; each :class:`ReceivedTpdo` says whether it is expected.
 
         Args:
             now: Steady time in [s].
@@ -77,7 +77,7 @@ class SyncRound:
             self.complete()
 
 
-class Input:
+class ReceivedTpdo:
     """One TPDO of the device.
 
     Attributes:
@@ -101,8 +101,8 @@ class Input:
         self.timestamp = 0.0
         self.count = 0
         self.length_errors = 0
-        self.listener: Callable[[Input], None] | None = None
-        self.on_short: Callable[[Input, int], None] = lambda entry, length: None
+        self.listener: Callable[[ReceivedTpdo], None] | None = None
+        self.on_short: Callable[[ReceivedTpdo, int], None] = lambda entry, length: None
         self.awaited = False
         self.stale_after = longest_silence(config, sync.period)
         self._sync = sync
@@ -160,7 +160,7 @@ class Input:
             self._sync.answer(frame.timestamp)
 
 
-class Output:
+class SentRpdo:
     """One RPDO of the device.
 
     Attributes:
@@ -274,7 +274,7 @@ class Writer(Protocol):
 class InputReader:
     """Reads an object from a TPDO."""
 
-    def __init__(self, source: Input, position: int) -> None:
+    def __init__(self, source: ReceivedTpdo, position: int) -> None:
         """Point to one object of the PDO."""
         self._source = source
         self._position = position
@@ -304,7 +304,7 @@ class OutputWriter:
 
     by_sdo = False
 
-    def __init__(self, places: Sequence[tuple[Output, int]]) -> None:
+    def __init__(self, places: Sequence[tuple[SentRpdo, int]]) -> None:
         """Point to the object: RPDOs, and its position in each."""
         self._places = [(output.values, position) for output, position in places]
         output, position = places[0]
@@ -337,8 +337,8 @@ class ProcessImage:
     """All PDOs of one device that are in use.
 
     Attributes:
-        inputs: Its TPDOs.
-        outputs: Its RPDOs, in the order in which they are sent.
+        tpdos: Those that it sends.
+        rpdos: Those that it gets, in the order in which they are sent.
     """
 
     def __init__(
@@ -362,22 +362,22 @@ class ProcessImage:
             send_last: Tells of an index whether RPDOs with that object leave after the others:
                 commands, which must not overtake their data.
         """
-        self.inputs = [Input(pdo, sync) for pdo in tpdos if pdo.enabled and pdo.mapping]
-        outputs = [
-            Output(pdo, start, cyclic=cyclic) for pdo in rpdos if pdo.enabled and pdo.mapping
+        self.tpdos = [ReceivedTpdo(pdo, sync) for pdo in tpdos if pdo.enabled and pdo.mapping]
+        used = [
+            SentRpdo(pdo, start, cyclic=cyclic) for pdo in rpdos if pdo.enabled and pdo.mapping
         ]
-        self.outputs = sorted(
-            outputs, key=lambda output: any(send_last(o.index) for o in output.config.mapping)
+        self.rpdos = sorted(
+            used, key=lambda output: any(send_last(o.index) for o in output.config.mapping)
         )
 
     def clear(self) -> None:
         """Forget what the device sent."""
-        for entry in self.inputs:
+        for entry in self.tpdos:
             entry.clear()
-        for output in self.outputs:
+        for output in self.rpdos:
             output.reset()
 
-    def store(self, index: int, subindex: int, value: Number) -> list[Output]:
+    def store(self, index: int, subindex: int, value: Number) -> list[SentRpdo]:
         """Let the RPDOs carry a value of an object; return those that do."""
         places = list(self._mapped_outputs(index, subindex))
         for output, position in places:
@@ -386,7 +386,7 @@ class ProcessImage:
 
     def reader(self, index: int, subindex: int = 0) -> InputReader | None:
         """Return a reader for an object, None when no TPDO carries it."""
-        for entry in self.inputs:
+        for entry in self.tpdos:
             for position, mapped in enumerate(entry.config.mapping):
                 if (mapped.index, mapped.subindex) == (index, subindex):
                     return InputReader(entry, position)
@@ -412,7 +412,7 @@ class ProcessImage:
         commands = [entry for entry, _ in self._mapped_outputs(command, 0)]
         if len(commands) != 1:
             return False
-        before = self.outputs[: self.outputs.index(commands[0])]
+        before = self.rpdos[: self.rpdos.index(commands[0])]
         return all(
             entry is commands[0] or (entry in before and not entry.synchronous)
             for entry, _ in self._mapped_outputs(index, subindex)
@@ -430,8 +430,8 @@ class ProcessImage:
             return entry.config.mapping[position]
         return None
 
-    def _mapped_outputs(self, index: int, subindex: int) -> Iterator[tuple[Output, int]]:
-        for entry in self.outputs:
+    def _mapped_outputs(self, index: int, subindex: int) -> Iterator[tuple[SentRpdo, int]]:
+        for entry in self.rpdos:
             for position, mapped in enumerate(entry.config.mapping):
                 if (mapped.index, mapped.subindex) == (index, subindex):
                     yield entry, position

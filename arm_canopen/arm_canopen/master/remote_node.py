@@ -17,7 +17,7 @@ from .emergency_log import EmergencyLog
 from .events import EventKind, Report, Severity
 from .life_signs import LifeSigns
 from .pdo_watch import PdoWatch
-from .process_image import Output, SyncRound
+from .process_image import SentRpdo, SyncRound
 from .remote_objects import RemoteObjects
 from .scheduler import Scheduler
 
@@ -84,10 +84,10 @@ class RemoteNode(RemoteObjects):
         self.loss = ''
         self.life = LifeSigns(config, send)
         self.emergencies = EmergencyLog(self.report)
-        self.pdos = PdoWatch(self.image.inputs, self.report)
+        self.pdos = PdoWatch(self.image.tpdos, self.report)
         self.on_boot_up: Callable[[], None] = lambda: None
         self.on_lost: list[Callable[[str], None]] = []
-        self.on_failed: list[Callable[[Exception, Output | None], None]] = []
+        self.on_failed: list[Callable[[Exception, SentRpdo | None], None]] = []
         self._failed = False
         self.on_dropped_out: Callable[[float], None] = lambda pause: None
         self._backoff = DropBackoff()
@@ -170,7 +170,7 @@ class RemoteNode(RemoteObjects):
             self.pdos.look(now)
         return False
 
-    def fail(self, error: Exception, output: Output | None = None) -> None:
+    def fail(self, error: Exception, output: SentRpdo | None = None) -> None:
         """Stop its drivers, because a step of the cycle failed; other devices go on.
 
         Args:
@@ -227,7 +227,7 @@ class RemoteNode(RemoteObjects):
     @property
     def _is_mute(self) -> bool:
         """Whether it never tells its NMT state, so that it is taken to be in the commanded one."""
-        return not self.config.heartbeat_producer and not self.config.guarded
+        return not self.config.heartbeat_producer and not self.config.uses_node_guarding
 
     def _why_dropped(self) -> str:
         emergency = self.emergencies.last

@@ -31,7 +31,7 @@ Match: TypeAlias = Callable[[bytes], T | None]
 REPEAT_AFTER = 0.25  # [s] before a question that may be repeated is asked again
 MARKERS: tuple[Address, ...] = ((0x1000, 0), (0x1001, 0), *((0x1018, sub) for sub in range(5)))
 """Objects that a device has or refuses (CiA 301, table 65); the answer shows where others end."""
-OWED_MAX = 16  # answers to remember that never came
+PENDING_MAX = 16  # answers to remember that never came
 _FRAME_SIZE = 8  # [byte]
 _ABORT = 0x80
 
@@ -79,7 +79,7 @@ class SdoChannel:
         self._answered: Promise[Any] | None = None
         self._match: Match[Any] = lambda data: None
         self._strays = 0  # frames since the open question that do not answer it
-        self._owed: list[Address] = []
+        self._pending_replies: list[Address] = []
 
     async def begin(
         self, index: int, subindex: int, timeout: float, *, settle: bool = True
@@ -95,7 +95,7 @@ class SdoChannel:
         Raises:
             SdoTimeoutError: The device does not answer at all.
         """
-        if settle and (index, subindex) in self._owed:
+        if settle and (index, subindex) in self._pending_replies:
             await self._settle(index, subindex, timeout)
         self.address = (index, subindex)
 
@@ -124,7 +124,7 @@ class SdoChannel:
 
     def restarted(self) -> None:
         """The device has restarted, so it owes no answer any more."""
-        self._owed = []
+        self._pending_replies = []
 
     def send(self, data: bytes) -> None:
         """Send a frame that is not answered."""
@@ -172,7 +172,7 @@ class SdoChannel:
             except TimeoutError:
                 continue
             self.counters.repeated += asked - 1
-            self._owed = [self.address] * (asked - 1)
+            self._pending_replies = [self.address] * (asked - 1)
             return answer
         self._answered = None
         self._owe(asked)
@@ -192,7 +192,9 @@ class SdoChannel:
 
     async def _settle(self, index: int, subindex: int, timeout: float) -> None:
         """Let the answers that are owed pass, by reading an object that none of them is of."""
-        marker = next((place for place in MARKERS if place not in self._owed), MARKERS[0])
+        marker = next(
+            (place for place in MARKERS if place not in self._pending_replies), MARKERS[0]
+        )
         self.address = marker
         question = UploadRequest(*marker).encode()
         try:
@@ -202,7 +204,7 @@ class SdoChannel:
             raise SdoTimeoutError(self._silence((index, subindex), timeout)) from None
 
     def _owe(self, asked: int) -> None:
-        self._owed = [*self._owed, *[self.address] * asked][-OWED_MAX:]
+        self._pending_replies = [*self._pending_replies, *[self.address] * asked][-PENDING_MAX:]
 
     def _abort_of(self, data: bytes) -> Abort | None:
         if len(data) != _FRAME_SIZE or data[0] != _ABORT:

@@ -13,7 +13,7 @@ from ..standard.drive import OperationMode
 from ..standard.objects import AXIS_OFFSET, Index, OFFSETS
 from ..standard.pdo import MappedObject, Number
 from ..standard.target_objects import TARGET_OBJECTS
-from .process_image import Output
+from .process_image import SentRpdo
 from .remote_node import RemoteNode
 from .start_values import start_value
 
@@ -83,10 +83,10 @@ def _source(node: RemoteNode, mapped: MappedObject) -> MappedObject | None:
     return None if offset or index in node.config.commanded_indices else mapped
 
 
-def _mapped(node: RemoteNode) -> list[tuple[Output, int, MappedObject]]:
+def _mapped(node: RemoteNode) -> list[tuple[SentRpdo, int, MappedObject]]:
     return [
         (output, position, mapped)
-        for output in node.image.outputs
+        for output in node.image.rpdos
         for position, mapped in enumerate(output.config.mapping)
         if mapped.index > DUMMY_MAX
     ]

@@ -21,7 +21,7 @@ from node_runner import destroyed_when_refused
 
 from ..exceptions import CanopenError, SdoError
 from ..master.object_access import bytes_from_raw, number_from_raw, raw_from_bytes, raw_from_number
-from ..master.process_image import Input
+from ..master.process_image import ReceivedTpdo
 from ..master.remote_node import RemoteNode
 from ..master.runner import NetworkThread
 from ..master.scheduler import Promise
@@ -107,7 +107,7 @@ class DeviceNode(Node):
             respond: Fills the response in.
         """
 
-        def guarded(request: Any) -> Future[Any]:  # noqa: ANN401
+        def admitted(request: Any) -> Future[Any]:  # noqa: ANN401
             try:
                 self.admit()
             except CanopenError as error:
@@ -116,7 +116,7 @@ class DeviceNode(Node):
                 return refused
             return handler(request)
 
-        self._deferred.create(self, service_type, name, guarded, respond)
+        self._deferred.create(self, service_type, name, admitted, respond)
 
     def offer_trigger(self, name: str, handler: Callable[[], Future[str]]) -> None:
         """Offer a std_srvs/Trigger whose message is what the future returns, or why it failed."""
@@ -139,7 +139,7 @@ class DeviceNode(Node):
         """Publish each received object on ~/rpdo while somebody listens, and only then."""
         listened = self._rpdo.get_subscription_count() > 0
         listener = self._received if listened else None
-        for entry in self.device.image.inputs:
+        for entry in self.device.image.tpdos:
             entry.listener = listener
 
     def owns_object(self, index: int) -> bool:
@@ -158,11 +158,11 @@ class DeviceNode(Node):
                 'use the services of the drive'
             )
 
-    def _received(self, entry: Input) -> None:
+    def _received(self, entry: ReceivedTpdo) -> None:
         values = entry.values or ()
         self.output.post_stream(entry, partial(self._publish_objects, entry, values))
 
-    def _publish_objects(self, entry: Input, values: tuple[float, ...]) -> None:
+    def _publish_objects(self, entry: ReceivedTpdo, values: tuple[float, ...]) -> None:
         for mapped, value in zip(entry.config.mapping, values, strict=True):
             data = raw_from_number(mapped, value)
             self._rpdo.publish(COData(index=mapped.index, subindex=mapped.subindex, data=data))

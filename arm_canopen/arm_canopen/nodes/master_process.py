@@ -29,8 +29,8 @@ from ..config.model import BusConfig
 from ..exceptions import CanopenError
 from ..master.events import Event, EventKind, Severity
 from ..master.network import Network
+from ..master.other_master import describe, listen, refuse_other_master
 from ..master.remote_node import RemoteNode
-from ..master.rivals import describe, listen, refuse_rival
 from ..master.runner import NetworkThread
 from ..master.scheduler import Scheduler
 from ..master.status import node_status
@@ -130,10 +130,10 @@ class MasterProcess:
         """Listen for another master before the first word; call it right before :meth:`start`.
 
         Raises:
-            RivalError: There is one, and nobody said to go on beside it.
+            OtherMasterError: There is one, and nobody said to go on beside it.
         """
         if not self._beside_master:
-            refuse_rival(self._can, self.bus)
+            refuse_other_master(self._can, self.bus)
         elif heard := listen(self._can, self.bus):
             self._node.get_logger().warning(
                 f'going on beside another master, as beside_master says: {describe(heard)}'

@@ -169,7 +169,7 @@ class FaultLine:
         elif delay is not None:
             self._postpone(delay, lambda later: deliver(frame, later))
 
-    def guarded(self, deliver: Deliver) -> Deliver:
+    def filtered(self, deliver: Deliver) -> Deliver:
         """Return a handler that passes through this line."""
 
         def handle(frame: Frame, now: float) -> None:

@@ -25,13 +25,19 @@ Every error names file, line, key and remedy; nothing begins when there is one.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from collections.abc import Mapping as Dictionary
+from collections.abc import Callable, Iterable, Mapping
 import difflib
 import os
 from typing import TypeVar
 
-from arm_canopen.config.document import DocumentKind, Item, Listing, Mapping, read_document, Scalar
+from arm_canopen.config.document import (
+    DocumentKind,
+    Item,
+    read_document,
+    Scalar,
+    YamlList,
+    YamlMap,
+)
 from arm_canopen.config.findings import Findings, RefusedError
 from arm_canopen.config.scalars import describe, integer, number, scalar
 from arm_canopen.standard.drive import DriveState
@@ -57,7 +63,7 @@ Value = TypeVar('Value')
 
 
 def load_scenario(
-    path: str | os.PathLike[str], devices: Dictionary[str, int], drives: frozenset[int]
+    path: str | os.PathLike[str], devices: Mapping[str, int], drives: frozenset[int]
 ) -> tuple[Step, ...]:
     """Read a scenario file.
 
@@ -80,19 +86,19 @@ class _Reader:
     """Reads one file."""
 
     def __init__(
-        self, devices: Dictionary[str, int], drives: frozenset[int], findings: Findings
+        self, devices: Mapping[str, int], drives: frozenset[int], findings: Findings
     ) -> None:
         self._devices = devices
         self._drives = drives
         self._findings = findings
         self._seed = 0
 
-    def read(self, document: Mapping) -> tuple[Step, ...]:
+    def read(self, document: YamlMap) -> tuple[Step, ...]:
         """Read all steps."""
         self._check_keys(document, TOP_KEYS)
         self._seed = self._read(document.entries.get('seed'), integer) or 0
         steps = document.entries.get('steps')
-        if not isinstance(steps, Listing):
+        if not isinstance(steps, YamlList):
             place = steps.place if steps is not None else document.place
             self._findings.error(place, "there is no list 'steps'", KIND.beginning)
             return ()
@@ -100,7 +106,7 @@ class _Reader:
         return tuple(step for step in read if step is not None)
 
     def _step(self, item: Item) -> Step | None:
-        if not isinstance(item, Mapping):
+        if not isinstance(item, YamlMap):
             remedy = "write '- after: 1.0' and the other keys below it"
             self._findings.error(item.place, f'expected a step, got {describe(item)}', remedy)
             return None
@@ -120,14 +126,14 @@ class _Reader:
             self._check_drives(item, node_ids)
         return Step(node_ids, injection, after=after, event=event) if injection else None
 
-    def _check_drives(self, step: Mapping, node_ids: tuple[int, ...]) -> None:
+    def _check_drives(self, step: YamlMap, node_ids: tuple[int, ...]) -> None:
         others = [str(node_id) for node_id in node_ids if node_id not in self._drives]
         if others:
             place = step.entries['fault'].place
             message = f'device {", ".join(others)} is no drive and cannot have this fault'
             self._findings.error(place, message, 'name drives')
 
-    def _injection(self, step: Mapping) -> FaultInjection | None:
+    def _injection(self, step: YamlMap) -> FaultInjection | None:
         allowed = _settings_of(step)
         settings = {'seed': str(self._seed)} if 'seed' in allowed else {}
         for name in allowed:
@@ -136,7 +142,7 @@ class _Reader:
         return self._read(step.entries['fault'], lambda item: _fault(item, settings))
 
     def _event(self, item: Item) -> Event | None:
-        if not isinstance(item, Mapping):
+        if not isinstance(item, YamlMap):
             remedy = 'write when: {device: joint1, nmt: operational}'
             self._findings.error(item.place, f'expected an event, got {describe(item)}', remedy)
             return None
@@ -158,14 +164,14 @@ class _Reader:
             self._read(entries.get('position_below'), number),
         )
 
-    def _concerned(self, mapping: Mapping) -> tuple[int, ...]:
+    def _concerned(self, mapping: YamlMap) -> tuple[int, ...]:
         """Return the node ids of the devices that a step or an event names."""
         item = mapping.entries.get('device')
         if item is None:
             remedy = f'add device: one of {", ".join(self._devices)}, or all'
             self._findings.error(mapping.place, 'no device is named', remedy)
             return ()
-        items = item.items if isinstance(item, Listing) else (item,)
+        items = item.items if isinstance(item, YamlList) else (item,)
         found = [self._read(each, self._device) for each in items]
         return tuple(dict.fromkeys(node_id for ids in found for node_id in ids or ()))
 
@@ -180,7 +186,7 @@ class _Reader:
             return (numbers[name],)
         raise RefusedError(f'there is no device {name!r}', _advice(name, self._devices))
 
-    def _check_keys(self, mapping: Mapping, known: tuple[str, ...]) -> None:
+    def _check_keys(self, mapping: YamlMap, known: tuple[str, ...]) -> None:
         for name, item in mapping.entries.items():
             if name not in known:
                 self._findings.error(item.place, f'unknown key {name!r}', _advice(name, known))
@@ -196,7 +202,7 @@ class _Reader:
         return None
 
 
-def _settings_of(step: Mapping) -> tuple[str, ...]:
+def _settings_of(step: YamlMap) -> tuple[str, ...]:
     item = step.entries.get('fault')
     fault = FAULTS.get(item.text) if isinstance(item, Scalar) else None
     return ('duration', *SETTINGS[fault]) if fault else ('duration',)
@@ -219,7 +225,7 @@ def _ended(item: Item) -> Fault | None:
     return _member(item, FAULTS)
 
 
-def _member(item: Item, members: Dictionary[str, Value]) -> Value:
+def _member(item: Item, members: Mapping[str, Value]) -> Value:
     name = scalar(item, 'a name').text.lower().replace('-', '_').replace(' ', '_')
     if name not in members:
         raise RefusedError(f'{name!r} is none of the names here', _advice(name, members))

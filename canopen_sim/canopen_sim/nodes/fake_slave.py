@@ -18,7 +18,7 @@ from arm_canopen.standard.lss import UNCONFIGURED
 from node_runner import ParameterReader
 
 from ..host import DeviceHost
-from .slave_process import memories, Population, run_slaves
+from .slave_process import memories, run_slaves, SimulatedDevices
 
 DEFAULT_NODE_ID = 2
 
@@ -38,7 +38,7 @@ def default_eds() -> Path:
     return Path(get_package_share_directory('arm_canopen')) / 'eds' / 'cia402_drive.eds'
 
 
-def _populate(node: Node, host: DeviceHost) -> Population:
+def _populate(node: Node, host: DeviceHost) -> SimulatedDevices:
     read = ParameterReader(node)
     node_id = read.whole(
         'node_id',
@@ -57,7 +57,7 @@ def _populate(node: Node, host: DeviceHost) -> Population:
         node.get_logger().warning(str(warning))
     device = host.add(node_id, eds.dictionary, memory=memories(node)(node_id))
     kind = 'drive' if device.drive is not None else 'device'
-    return Population(f'simulated {kind} {node_id} of {eds.path}', {'slave': node_id})
+    return SimulatedDevices(f'simulated {kind} {node_id} of {eds.path}', {'slave': node_id})
 
 
 if __name__ == '__main__':

@@ -14,7 +14,7 @@ from arm_canopen.exceptions import CanopenError
 from node_runner import ParameterReader
 
 from ..host import DeviceHost
-from .slave_process import memories, Population, run_slaves
+from .slave_process import memories, run_slaves, SimulatedDevices
 
 
 def run_fake_slaves(args: Sequence[str] | None = None) -> int:
@@ -27,7 +27,7 @@ def main() -> None:
     sys.exit(run_fake_slaves())
 
 
-def _populate(node: Node, host: DeviceHost) -> Population:
+def _populate(node: Node, host: DeviceHost) -> SimulatedDevices:
     path = ParameterReader(node).text('bus_config', '', 'bus.yml whose devices are simulated')
     if not path:
         raise CanopenError(
@@ -42,7 +42,7 @@ def _populate(node: Node, host: DeviceHost) -> Population:
     drives = sum(device.drive is not None for device in host.devices)
     others = len(host.devices) - drives
     what = f'{drives} simulated drives' + (f' and {others} other devices' if others else '')
-    return Population(what, {config.name: config.node_id for config in bus.nodes})
+    return SimulatedDevices(what, {config.name: config.node_id for config in bus.nodes})
 
 
 if __name__ == '__main__':

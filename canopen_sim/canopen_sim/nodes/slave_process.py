@@ -42,7 +42,7 @@ SCENARIO = 'YAML file with faults and their times; empty for none'
 
 
 @dataclass(frozen=True, slots=True)
-class Population:
+class SimulatedDevices:
     """The devices of a process.
 
     Attributes:
@@ -54,7 +54,7 @@ class Population:
     names: Mapping[str, int]
 
 
-Populate = Callable[[Node, DeviceHost], Population]
+Populate = Callable[[Node, DeviceHost], SimulatedDevices]
 
 
 def memories(node: Node) -> Callable[[int], ParameterMemory]:
@@ -116,7 +116,7 @@ def _run(node: Node, populate: Populate, default_bus: str, stop: threading.Event
             runner.stop()
 
 
-def _play_scenario(node: Node, host: DeviceHost, population: Population) -> None:
+def _play_scenario(node: Node, host: DeviceHost, population: SimulatedDevices) -> None:
     path = ParameterReader(node).text('scenario', '', SCENARIO)
     if not path:
         return

@@ -13,16 +13,16 @@ from arm_canopen.standard.objects import Index
 from ..drive.drive import Drive
 from ..objects.object_store import ObjectStore
 from .emcy_producer import EmcyProducer
-from .guarding import GuardedNode
 from .heartbeat import HeartbeatConsumer
 from .nmt_slave import NmtSlave
+from .node_guarding import GuardedNode
 
 HEARTBEAT_ERROR = 0x8130  # EMCY: life guard error or heartbeat error
 ERROR_STATES: dict[int, NmtState] = {0: NmtState.PRE_OPERATIONAL, 2: NmtState.STOPPED}
 """Where a communication error leads from Operational, by 0x1029:01; 1 leads nowhere."""
 
 
-class Contact:
+class ErrorControl:
     """Heartbeat consumer and life guarding of one device, with what follows from a loss.
 
     Attributes:

@@ -12,7 +12,7 @@ from arm_canopen.standard.lss import LSS_REQUEST
 from arm_canopen.standard.nmt import NmtState
 
 from ..faults.line import Service, Traffic
-from .error_control import Contact
+from .error_control import ErrorControl
 from .lss_slave import LssSlave
 from .nmt_slave import NmtSlave
 from .rpdo import Handler, RpdoEngine
@@ -31,7 +31,7 @@ class Services:
     sdo: SdoServers
     sync: SyncConsumer
     clock: TimeConsumer
-    contact: Contact
+    error_control: ErrorControl
     rpdos: RpdoEngine
     tpdos: TpdoEngine
 
@@ -44,7 +44,7 @@ class Services:
         state = self.nmt.state
         handlers: dict[int, Handler] = {CobId.NMT: self.nmt.receive, LSS_REQUEST: self.lss.receive}
         if state is not NmtState.BOOT_UP:
-            watched = self.contact.consumer
+            watched = self.error_control.consumer
             handlers.update(dict.fromkeys(watched.can_ids, watched.receive))
         if state in (NmtState.PRE_OPERATIONAL, NmtState.OPERATIONAL):
             handlers.update((can_id, on_sdo) for can_id in self.sdo.can_ids)

@@ -15,7 +15,7 @@ from ..dcf.master import master_dcf
 from ..monitor.object_names import ObjectNames
 from ..monitor.value_text import data_text
 from .arguments import SubParsers
-from .output import counted, remark, say
+from .output import counted, say, warn
 
 
 def add_parser(parsers: SubParsers) -> None:
@@ -50,7 +50,7 @@ def run(options: argparse.Namespace) -> int:
     """Write the files; return the exit code."""
     config = load_bus(options.bus_yml)
     for warning in config.warnings:
-        remark(str(warning))
+        warn(str(warning))
     out: Path = options.out
     out.mkdir(parents=True, exist_ok=True)
     folder = Path(options.path) if options.path else out.absolute()

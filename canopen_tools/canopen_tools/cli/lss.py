@@ -25,7 +25,7 @@ from .arguments import (
     UsageError,
     whole_number,
 )
-from .output import counted, remark, say, say_table
+from .output import counted, say, say_table, warn
 from .session import Session
 
 BOOT_WAIT = 2.0  # [s] for the boot-up message of a device that has got its first node id
@@ -140,7 +140,7 @@ def run_set(options: argparse.Namespace) -> int:
         if options.activate is not None:
             master.activate_bit_rate(options.activate)
             rate = options.bitrate
-            remark(f'now switch the interface: ip link set can0 type can bitrate {rate}')
+            warn(f'now switch the interface: ip link set can0 type can bitrate {rate}')
             return 0
         boots = options.node_id is not None and before == UNCONFIGURED
         return _let_go(session, master, options.node_id if boots else None, before)
@@ -155,7 +155,7 @@ def _lss(options: argparse.Namespace) -> Iterator[tuple[Session, LssMaster]]:
         session.listeners.append(master.receive)
         session.listen(MASTER_WAIT)
         if session.masters:
-            remark(
+            warn(
                 f'a master is on this bus ({", ".join(sorted(session.masters))}); a device that '
                 'gets another node id is lost to it'
             )
@@ -198,7 +198,7 @@ def _configure(session: Session, master: LssMaster, options: argparse.Namespace)
         session.run(master.store())
         say('stored')
     else:
-        remark('not stored: the device forgets it without power (--store)')
+        warn('not stored: the device forgets it without power (--store)')
 
 
 def _let_go(session: Session, master: LssMaster, new_id: int | None, before: int) -> int:
@@ -214,13 +214,13 @@ def _let_go(session: Session, master: LssMaster, new_id: int | None, before: int
     master.switch_all(LssState.WAITING)
     if new_id is None:
         if before != UNCONFIGURED:
-            remark('it takes effect with the next reset of the device, or its next power-on')
+            warn('it takes effect with the next reset of the device, or its next power-on')
         return 0
     session.listen(BOOT_WAIT, lambda: new_id in booted)
     if new_id in booted:
         say(f'node {new_id} has booted')
         return 0
-    remark(f'no boot-up message of node {new_id} came within {BOOT_WAIT:g} s')
+    warn(f'no boot-up message of node {new_id} came within {BOOT_WAIT:g} s')
     return 1
 
 

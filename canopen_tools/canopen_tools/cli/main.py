@@ -20,7 +20,7 @@ from arm_canopen.exceptions import CanopenError
 from ..ros_arguments import split_ros_arguments
 from . import check, dcf, diff, eds, lss, objects, scan
 from .arguments import take_parameters, UsageError
-from .output import remark
+from .output import warn
 
 VERBS = (check, eds, scan, objects, diff, dcf, lss)
 INTERRUPTED = 130  # exit code of a program that Ctrl-C ended
@@ -55,7 +55,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         return INTERRUPTED
     except (CanopenError, OSError) as error:
-        remark(str(error))
+        warn(str(error))
         return 2 if isinstance(error, UsageError) else 1
     return code
 

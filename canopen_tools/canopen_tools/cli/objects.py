@@ -16,7 +16,7 @@ from arm_canopen.standard.objects import Index
 from ..monitor.object_names import ObjectNames
 from ..monitor.value_text import data_text
 from .arguments import add_node_arguments, SubParsers, UsageError
-from .output import remark, say
+from .output import say, warn
 from .session import Session
 from .target import find_target, Target, warn_of_master
 
@@ -104,11 +104,11 @@ def write(options: argparse.Namespace) -> int:
             held = _upload(session, target, entry)
         except SdoAbortError as error:  # commands, and what restarts the device
             say(f'{title} was written')
-            remark(f'it cannot be read back: {error}')
+            warn(f'it cannot be read back: {error}')
             return 0
     say(f'{title} = {_meaning(entry, held)}')
     if held != data:
-        remark(f'the device holds another value than {_meaning(entry, data)}, which was written')
+        warn(f'the device holds another value than {_meaning(entry, data)}, which was written')
         return 1
     return 0
 

@@ -23,7 +23,7 @@ def say(text: str = '') -> None:
     sys.stdout.write(f'{text}\n')
 
 
-def remark(text: str) -> None:
+def warn(text: str) -> None:
     """Write a line for a person, beside the result."""
     with suppress(BrokenPipeError):
         sys.stdout.flush()

@@ -20,7 +20,7 @@ from arm_canopen.standard.sdo import UploadRequest
 
 from ..lss_master import LssMaster
 from .arguments import add_bus_arguments, seconds, SubParsers
-from .output import counted, remark, say, say_table
+from .output import counted, say, say_table, warn
 from .session import Session
 
 LISTEN = 1.5  # [s] many devices send a heartbeat each second
@@ -103,7 +103,7 @@ def run(options: argparse.Namespace) -> int:
     config = load_bus(options.bus_config) if options.bus_config else None
     with open_bus(options.can) as bus:
         session = Session(bus, config)
-        remark(f'listening on {bus.name} for {options.listen:g} s')
+        warn(f'listening on {bus.name} for {options.listen:g} s')
         session.listen(options.listen)
         found = _heard(session, config)
         if _may_ask(session, ask=options.ask):
@@ -127,11 +127,9 @@ def _may_ask(session: Session, *, ask: bool) -> bool:
         return True
     heard = ', '.join(sorted(session.masters))
     if ask:
-        remark(
-            f'a master is on this bus ({heard}); while devices are asked, its transfers may fail'
-        )
+        warn(f'a master is on this bus ({heard}); while devices are asked, its transfers may fail')
         return True
-    remark(
+    warn(
         f'a master is on this bus ({heard}), so devices are not asked for their identity: each '
         "has one SDO channel, which is the master's; --ask asks all the same"
     )
@@ -167,7 +165,7 @@ def _ask_for_unnumbered(session: Session) -> None:
     master = LssMaster(session.scheduler, session.send)
     session.listeners.append(master.receive)
     if session.run(master.has_unconfigured()):
-        remark('there is a device without node id; canopen lss scan tells which')
+        warn('there is a device without node id; canopen lss scan tells which')
     session.listeners.remove(master.receive)
 
 
@@ -199,7 +197,7 @@ def _show(found: dict[int, Found], config: BusConfig | None, *, asked: bool) -> 
     present = [device for device in devices if device.is_there]
     if not present and config is None:
         hint = 'is the bus powered, wired and terminated, and is this its bit rate?'
-        remark(f'no device answers: {hint}' if asked else 'no device was heard')
+        warn(f'no device answers: {hint}' if asked else 'no device was heard')
         return 1
     named = config is not None
     head = ('node', *(('name',) if named else ()), 'state', *(t for _, t, _, _ in IDENTITY))

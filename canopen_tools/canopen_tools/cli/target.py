@@ -19,7 +19,7 @@ from arm_canopen.standard.object_path import find_object, NUMBER
 
 from ..monitor.object_names import ObjectNames
 from .arguments import UsageError
-from .output import remark
+from .output import warn
 from .session import Session
 
 TIMEOUT = 0.5  # [s]
@@ -131,7 +131,7 @@ def warn_of_master(session: Session, target: Target) -> None:
     session.listen(LISTEN)
     if session.masters:
         heard = ', '.join(sorted(session.masters))
-        remark(
+        warn(
             f'a master is on this bus ({heard}), and shares the SDO channel of {target.name}: one '
             "of its transfers may fail; the master's services ~/read_object and ~/write_object "
             'take turns'

@@ -17,17 +17,17 @@ import time
 from ..can.bus import Bus
 from ..can.frame import Frame
 from ..config.model import BusConfig
-from ..exceptions import BusError, RivalError
+from ..exceptions import BusError, OtherMasterError
 from ..standard.cob_id import CobId
 from ..standard.nmt import ALL_NODES, parse_nmt
 from .events import Event, EventKind, Report, Severity
 
 LISTENING_TIME = 0.2  # [s] a start takes longer by it; a master that runs may be held up as long
-SIGNS_TOLD = 3
+FRAMES_REPORTED = 3
 
 
-class Telling(IntEnum):
-    """How much a frame says about who sends it, the clearest first."""
+class Evidence(IntEnum):
+    """How clearly a frame says who sends it, the clearest first."""
 
     COMMAND = 0
     HEARTBEAT = 1
@@ -36,19 +36,19 @@ class Telling(IntEnum):
 
 
 @dataclass(frozen=True, slots=True, order=True)
-class Sign:
+class MasterFrame:
     """A kind of frame that only the master of a bus sends.
 
     Attributes:
-        telling: How much it says.
+        evidence: How clearly it says who sends it.
         text: What it is, in words.
     """
 
-    telling: Telling
+    evidence: Evidence
     text: str
 
 
-class RivalSigns:
+class MasterFrames:
     """Reads from frames of others what only the master of this bus would send."""
 
     def __init__(self, config: BusConfig) -> None:
@@ -60,29 +60,29 @@ class RivalSigns:
         master = config.master
         heartbeat = CobId.HEARTBEAT + master.node_id
         from_devices = {pdo.cob_id for node in config.nodes for pdo in node.tpdos}
-        self._signs = {
-            pdo.cob_id: Sign(
-                Telling.RPDO, f'RPDO {pdo.number} (0x{pdo.cob_id:03X}) of {node.name}'
+        self._frames = {
+            pdo.cob_id: MasterFrame(
+                Evidence.RPDO, f'RPDO {pdo.number} (0x{pdo.cob_id:03X}) of {node.name}'
             )
             for node in config.nodes
             for pdo in node.rpdos
             if pdo.enabled and pdo.cob_id not in from_devices  # devices may command each other
         }
         text = f'the heartbeat 0x{heartbeat:03X} of node id {master.node_id}, which is our own'
-        self._signs[heartbeat] = Sign(Telling.HEARTBEAT, text)
+        self._frames[heartbeat] = MasterFrame(Evidence.HEARTBEAT, text)
         if master.sync_period > 0:
-            self._signs[CobId.SYNC] = Sign(Telling.SYNC, f'SYNC (0x{CobId.SYNC:03X})')
+            self._frames[CobId.SYNC] = MasterFrame(Evidence.SYNC, f'SYNC (0x{CobId.SYNC:03X})')
 
-    def read(self, frame: Frame) -> Sign | None:
+    def read(self, frame: Frame) -> MasterFrame | None:
         """Return what a frame of somebody else says, None when any device may send it."""
         if frame.is_extended or frame.is_remote or frame.is_error:
             return None
         if frame.can_id == CobId.NMT:
             return _command(frame)
-        return self._signs.get(frame.can_id)
+        return self._frames.get(frame.can_id)
 
 
-class RivalWatch:
+class OtherMasterWatch:
     """Says once of each kind of frame that somebody else sends what only the master sends."""
 
     def __init__(self, config: BusConfig, report: Report, *, expected: bool) -> None:
@@ -93,18 +93,18 @@ class RivalWatch:
             report: Takes events.
             expected: The other master is meant to be there.
         """
-        self._signs = RivalSigns(config)
+        self._frames = MasterFrames(config)
         self._report = report
         self._severity = Severity.WARNING if expected else Severity.ERROR
-        self._told: set[Sign] = set()
+        self._reported: set[MasterFrame] = set()
 
     def receive(self, frame: Frame) -> None:
         """Take a frame of somebody else."""
-        sign = self._signs.read(frame)
-        if sign is not None and sign not in self._told:
-            self._told.add(sign)
+        kind = self._frames.read(frame)
+        if kind is not None and kind not in self._reported:
+            self._reported.add(kind)
             text = (
-                f'another master is on this bus: somebody else sends {sign.text}; two masters '
+                f'another master is on this bus: somebody else sends {kind.text}; two masters '
                 'command the same drives, so end one of them'
             )
             self._report(Event(EventKind.BUS, self._severity, '', text))
@@ -112,7 +112,7 @@ class RivalWatch:
 
 def listen(
     bus: Bus, config: BusConfig, clock: Callable[[], float] = time.monotonic
-) -> Counter[Sign]:
+) -> Counter[MasterFrame]:
     """Listen for another master, without a word.
 
     Args:
@@ -123,7 +123,7 @@ def listen(
     Returns:
         What was heard of it, and how often; empty when nobody is there.
     """
-    signs, heard = RivalSigns(config), Counter[Sign]()
+    known, heard = MasterFrames(config), Counter[MasterFrame]()
     begin = clock()
     end = begin + LISTENING_TIME
     while (left := end - clock()) > 0.0:
@@ -132,25 +132,27 @@ def listen(
         except BusError:  # nobody can be heard on it now; it says so itself when it is used
             break
         # what came before may be the last words of a master that has ended since
-        fresh = (signs.read(frame) for frame in frames if frame.timestamp >= begin)
-        heard.update(sign for sign in fresh if sign is not None)
+        fresh = (known.read(frame) for frame in frames if frame.timestamp >= begin)
+        heard.update(kind for kind in fresh if kind is not None)
     return heard
 
 
-def describe(heard: Counter[Sign]) -> str:
+def describe(heard: Counter[MasterFrame]) -> str:
     """Name what was heard of another master, the clearest first."""
-    return ', '.join(f'{sign.text} {heard[sign]} times' for sign in sorted(heard)[:SIGNS_TOLD])
+    return ', '.join(
+        f'{kind.text} {heard[kind]} times' for kind in sorted(heard)[:FRAMES_REPORTED]
+    )
 
 
-def refuse_rival(bus: Bus, config: BusConfig) -> None:
+def refuse_other_master(bus: Bus, config: BusConfig) -> None:
     """Listen, and refuse a bus on which another master is heard.
 
     Raises:
-        RivalError: There is one; the message says by which frames it is known.
+        OtherMasterError: There is one; the message says by which frames it is known.
     """
     heard = listen(bus, config)
     if heard:
-        raise RivalError(
+        raise OtherMasterError(
             f'another master is on {bus.name}: it sent {describe(heard)} in '
             f'{LISTENING_TIME:g} s. Nothing was sent, as a start resets the '
             'devices that it leads. End it, choose another can_interface_name, or, if it has '
@@ -158,10 +160,10 @@ def refuse_rival(bus: Bus, config: BusConfig) -> None:
         )
 
 
-def _command(frame: Frame) -> Sign | None:
+def _command(frame: Frame) -> MasterFrame | None:
     parsed = parse_nmt(frame.data)
     if parsed is None:
         return None
     command, node_id = parsed
     whom = 'all nodes' if node_id == ALL_NODES else f'node {node_id}'
-    return Sign(Telling.COMMAND, f'the NMT command {command.name} to {whom}')
+    return MasterFrame(Evidence.COMMAND, f'the NMT command {command.name} to {whom}')

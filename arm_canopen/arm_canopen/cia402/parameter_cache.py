@@ -19,12 +19,12 @@ from .units import Units
 ASK_AGAIN = 1.0  # [s] after which a drive is asked again for what it did not answer
 
 
-class ParameterUpkeep:
+class ParameterCache:
     """The parameters of one axis.
 
     Attributes:
-        told: What the drive told last.
-        known: It has told them since its device was booted.
+        parameters: What the drive reported last.
+        known: They were read since its device was booted.
     """
 
     def __init__(
@@ -44,7 +44,7 @@ class ParameterUpkeep:
             scheduler: Time.
             warn: Takes a warning in words.
         """
-        self.told = DriveParameters()
+        self.parameters = DriveParameters()
         self.known = False
         self._offset = AXIS_OFFSET * config.channel
         self._config = config
@@ -96,7 +96,7 @@ class ParameterUpkeep:
         """Read the parameters; return why that could not be done, or nothing."""
         self._outdated = False
         try:
-            self.told = await self._reader.read()
+            self.parameters = await self._reader.read()
         except SdoError as error:
             return str(error)
         if not self.known:
@@ -107,7 +107,7 @@ class ParameterUpkeep:
     def _warn_of_silence(self) -> None:
         """Warn, after a boot, of parameters with which targets would move nothing."""
         used = self._config.position_mode in (None, OperationMode.PROFILE_POSITION)
-        if used and self.told.profile_velocity_inc == 0:
+        if used and self.parameters.profile_velocity_inc == 0:
             self._warn('its profile velocity (0x6081) is 0: targets of mode 1 are refused')
         scale = self._units.position_scale
         if self._config.scale_from_factor_group and is_coarse(scale):

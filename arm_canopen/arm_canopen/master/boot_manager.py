@@ -18,7 +18,7 @@ from .scheduler import Scheduler, Task
 from .startup import Startup
 
 
-class Boots:
+class BootManager:
     """Begins the boot of a device when it appears, restarts or drops out."""
 
     def __init__(

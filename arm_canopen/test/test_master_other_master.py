@@ -11,14 +11,14 @@ from virtual_network import bus_config, drive_config, VirtualNetwork
 
 from arm_canopen.can.frame import Frame
 from arm_canopen.can.virtual import VirtualBus, VirtualWire
-from arm_canopen.exceptions import RivalError
+from arm_canopen.exceptions import OtherMasterError
 from arm_canopen.master.events import Severity
-from arm_canopen.master.rivals import (
+from arm_canopen.master.other_master import (
     describe,
     listen,
     LISTENING_TIME,
-    refuse_rival,
-    RivalSigns,
+    MasterFrames,
+    refuse_other_master,
 )
 
 BUS = bus_config(drive_config('a', 2), drive_config('b', 3))
@@ -54,8 +54,8 @@ class SharedBus(VirtualBus):
 def test_a_master_that_runs_is_refused_by_name(frame: Frame, words: str) -> None:
     """The refusal names frame, sender and remedies, and nothing was sent."""
     with SharedBus(frame) as bus:
-        with pytest.raises(RivalError, match='another master is on here') as refusal:
-            refuse_rival(bus, BUS)
+        with pytest.raises(OtherMasterError, match='another master is on here') as refusal:
+            refuse_other_master(bus, BUS)
         assert bus.counters.sent == 0
     assert words in str(refusal.value)
     assert 'beside_master:=true' in str(refusal.value)
@@ -76,7 +76,7 @@ def test_a_master_that_runs_is_refused_by_name(frame: Frame, words: str) -> None
 def test_devices_and_tools_are_no_master(frame: Frame) -> None:
     """What a device or somebody who only asks may send does not hold up the start."""
     with SharedBus(frame) as bus:
-        refuse_rival(bus, BUS)
+        refuse_other_master(bus, BUS)
         assert bus.counters.received > 0
 
 
@@ -92,8 +92,8 @@ def test_the_last_words_of_a_master_that_ended_do_not_count() -> None:
 def test_a_sync_of_somebody_else_is_no_sign_where_the_master_sends_none() -> None:
     """With sync_period 0 a device may be the SYNC producer."""
     silent = bus_config(drive_config('a', 2), sync_period=0.0)
-    assert RivalSigns(silent).read(Frame(0x080)) is None
-    assert RivalSigns(BUS).read(Frame(0x080))
+    assert MasterFrames(silent).read(Frame(0x080)) is None
+    assert MasterFrames(BUS).read(Frame(0x080))
 
 
 def test_the_virtual_master_shows_itself_within_the_listening_time() -> None:
@@ -101,7 +101,7 @@ def test_the_virtual_master_shows_itself_within_the_listening_time() -> None:
     net = VirtualNetwork(BUS)
     net.boot()
     net.run(1.0)
-    signs = RivalSigns(BUS)
+    signs = MasterFrames(BUS)
     for number in range(20):
         begin = net.now + number * 0.0013
         net.run(LISTENING_TIME + 0.03)
@@ -129,7 +129,7 @@ def test_beside_another_master_no_command_is_for_all() -> None:
 
 def test_the_clearest_sign_is_told_first() -> None:
     """Many RPDOs do not hide the SYNC, nor that an NMT command."""
-    signs = RivalSigns(BUS)
+    signs = MasterFrames(BUS)
     frames = [*[Frame(0x202, bytes(3))] * 9, *[Frame(0x080)] * 3, Frame(0x000, b'\x01\x00')]
     heard = Counter(sign for frame in frames if (sign := signs.read(frame)) is not None)
     assert describe(heard) == (
