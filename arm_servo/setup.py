@@ -21,10 +21,10 @@ setup(
     license='Apache-2.0',
     entry_points={
         'console_scripts': [
-            'motion_controller = arm_servo.nodes.motion_controller:main',
-            'motion_master = arm_servo.nodes.motion_master:main',
-            'servo_node = arm_servo.nodes.servo_node:main',
-            'trajectory_controller = arm_servo.nodes.trajectory_program:main',
+            'motion_controller = arm_servo.ros.motion_controller:main',
+            'motion_master = arm_servo.ros.motion_master:main',
+            'servo_node = arm_servo.ros.servo_node:main',
+            'trajectory_controller = arm_servo.ros.trajectory_program:main',
             'servo_gamepad = arm_servo.teleop.servo_gamepad:main',
             'servo_keyboard_input = arm_servo.teleop.servo_keyboard_input:main',
         ],

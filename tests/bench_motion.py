@@ -35,12 +35,12 @@ from arm_canopen.can import Frame
 from arm_canopen.standard.cob_id import CobId
 from arm_model import Array, load_limits, RobotModel
 from arm_servo import MotionCore, SetPoint
-from arm_servo.commands import twist_command
-from arm_servo.gateway import CommandGateway, start_worker
-from arm_servo.nodes.following import FollowingLimits, FollowingWatch
-from arm_servo.nodes.joint_feedback import JointFeedback
-from arm_servo.nodes.motion_thread import MotionCycle, MotionThread
-from arm_servo.requests import JogRequest
+from arm_servo.core.commands import twist_command
+from arm_servo.core.gateway import CommandGateway, start_worker
+from arm_servo.core.requests import JogRequest
+from arm_servo.io.following import FollowingLimits, FollowingWatch
+from arm_servo.io.joint_feedback import JointFeedback
+from arm_servo.io.motion_thread import MotionCycle, MotionThread
 from realtime_loop import raise_priority
 
 if TYPE_CHECKING:

@@ -19,9 +19,9 @@ from virtual_network import bus_config, drive_config, PERIOD, SCALE, VirtualNetw
 
 from arm_canopen import MotionSource
 from arm_canopen.standard.drive import DriveState, OperationMode
-from arm_servo.core import MotionCore
-from arm_servo.gateway import CommandGateway
-from arm_servo.nodes.drive_source import DriveSource
+from arm_servo import MotionCore
+from arm_servo.core.gateway import CommandGateway
+from arm_servo.io.drive_source import DriveSource
 from arm_trajectory import GoalPoint, TrajectoryGoal
 
 LOST = 'panda_joint3'

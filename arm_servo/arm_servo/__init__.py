@@ -4,20 +4,19 @@
 
 from __future__ import annotations
 
-from .bounds import BrakeSettings
-from .core import MotionCore
-from .core_settings import CoreSettings
+from .core.execution import Execution, ExecutionSettings, Feedback, Phase
+from .core.motion_core import MotionCore
+from .core.outcome import Outcome
+from .core.set_point import SetPoint, Source
+from .core.settings import CoreSettings
 from .exceptions import NotReadyError
-from .execution import Execution, ExecutionSettings, Feedback, Phase
-from .outcome import Outcome
-from .parameter_check import check_parameters
+from .jog.servo_source import ServoSettings
+from .jog.velocity_bounds import VelocityBoundsSettings
+from .jog.velocity_ik import IkSettings
 from .report import Cause, Limiter, MotionReport
-from .servo import ServoSettings
-from .set_point import SetPoint, Source
-from .velocity_ik import IkSettings
+from .ros.parameter_check import check_parameters
 
 __all__ = [
-    'BrakeSettings',
     'Cause',
     'CoreSettings',
     'Execution',
@@ -33,5 +32,6 @@ __all__ = [
     'ServoSettings',
     'SetPoint',
     'Source',
+    'VelocityBoundsSettings',
     'check_parameters',
 ]

@@ -9,11 +9,11 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor, Future
 from typing import Any
 
-from arm_servo.commands import by_joint, twist_command
-from arm_servo.gateway import CommandGateway, MotionCommand
-from arm_servo.outcome import Outcome
-from arm_servo.requests import DisplacementRequest, JogRequest
-from arm_servo.servo import JointCommand
+from arm_servo import Outcome
+from arm_servo.core.commands import by_joint, twist_command
+from arm_servo.core.gateway import CommandGateway, MotionCommand
+from arm_servo.core.requests import DisplacementRequest, JogRequest
+from arm_servo.jog.servo_source import JointCommand
 
 
 class InlineWorker(Executor):

@@ -15,9 +15,9 @@ from servo_commands import InlineWorker
 from arm_canopen import AxisFeedback, MotionSource, Setpoint
 from arm_canopen.standard.drive import DriveState
 from arm_model import Array
-from arm_servo.core import MotionCore
-from arm_servo.gateway import CommandGateway
-from arm_servo.nodes.drive_source import DriveSource
+from arm_servo import MotionCore
+from arm_servo.core.gateway import CommandGateway
+from arm_servo.io.drive_source import DriveSource
 
 PERIOD = 0.01
 

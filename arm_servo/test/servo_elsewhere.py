@@ -13,12 +13,11 @@ from servo_commands import InlineWorker
 from servo_commands import jog as jog_joints
 
 from arm_model import Array
-from arm_servo.core import MotionCore
-from arm_servo.gateway import CommandGateway
-from arm_servo.nodes.following import FollowingLimits, FollowingWatch
-from arm_servo.nodes.joint_feedback import JointFeedback
-from arm_servo.nodes.motion_thread import MotionCycle
-from arm_servo.set_point import SetPoint
+from arm_servo import MotionCore, SetPoint
+from arm_servo.core.gateway import CommandGateway
+from arm_servo.io.following import FollowingLimits, FollowingWatch
+from arm_servo.io.joint_feedback import JointFeedback
+from arm_servo.io.motion_thread import MotionCycle
 from arm_trajectory import GoalPoint, TrajectoryGoal
 
 PERIOD = 0.01

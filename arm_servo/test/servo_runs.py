@@ -11,9 +11,9 @@ import numpy as np
 import pinocchio as pin
 
 from arm_model import Array, RobotModel, RobotState
-from arm_servo.report import Limiter, MotionReport
-from arm_servo.safety_filter import SafetyFilter
-from arm_servo.servo import Command, ServoSource
+from arm_servo import Limiter, MotionReport
+from arm_servo.core.safety_filter import SafetyFilter
+from arm_servo.jog.servo_source import Command, ServoSource
 from arm_trajectory import OnlineTrajectoryGenerator
 
 PERIOD = 0.01

@@ -9,9 +9,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from arm_model import Array, JointLimits, RobotModel, RobotState
-from arm_servo.core import MotionCore
-from arm_servo.execution import Execution, Phase
-from arm_servo.set_point import SetPoint
+from arm_servo import Execution, MotionCore, Phase, SetPoint
 from arm_trajectory import GoalPoint, TrajectoryGoal
 
 PERIOD = 0.004

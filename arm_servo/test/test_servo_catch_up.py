@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from arm_model import RobotModel, RobotState
-from arm_servo.core import MotionCore
-from arm_servo.set_point import Source
+from arm_servo import MotionCore, Source
 from arm_trajectory import GoalCode, GoalPoint, StateMovedError, TrajectoryGoal
 
 PERIOD = 0.01

@@ -21,11 +21,11 @@ from servo_elsewhere import Elsewhere
 
 from arm_canopen import Refusal, RefusalCause
 from arm_model import Array, combined, Pose
-from arm_servo.commands import twist_command
-from arm_servo.gateway import CommandGateway, JOGGING, MotionCommand
-from arm_servo.requests import JogRequest
-from arm_servo.servo import PoseCommand
-from arm_servo.set_point import Source
+from arm_servo import Source
+from arm_servo.core.commands import twist_command
+from arm_servo.core.gateway import CommandGateway, JOGGING, MotionCommand
+from arm_servo.core.requests import JogRequest
+from arm_servo.jog.servo_source import PoseCommand
 from arm_trajectory import GoalPoint, TrajectoryGoal
 
 pytestmark = pytest.mark.slow

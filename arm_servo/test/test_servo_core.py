@@ -17,11 +17,7 @@ from servo_runs import twist_between
 from servo_streams import kept, PERIOD, stream, wave
 
 from arm_model import CommandError, Pose
-from arm_servo.core import MotionCore
-from arm_servo.exceptions import NotReadyError
-from arm_servo.execution import Phase
-from arm_servo.report import Cause
-from arm_servo.set_point import SetPoint, Source
+from arm_servo import Cause, MotionCore, NotReadyError, Phase, SetPoint, Source
 from arm_trajectory import GoalCode, OnlineTrajectoryGenerator
 
 pytestmark = pytest.mark.slow

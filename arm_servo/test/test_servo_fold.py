@@ -10,8 +10,7 @@ from model_robots import ready, robot, ROBOTS
 import numpy as np
 import pytest
 
-from arm_servo.core import MotionCore
-from arm_servo.report import Cause, MotionReport
+from arm_servo import Cause, MotionCore, MotionReport
 
 pytestmark = pytest.mark.slow
 

@@ -18,14 +18,13 @@ from servo_drives import Drives, PERIOD
 
 from arm_canopen import Refusal, RefusalCause
 from arm_model import CommandError
-from arm_servo.commands import by_joint
-from arm_servo.exceptions import NotReadyError
-from arm_servo.gateway import MAX_ATTEMPTS, MAX_QUEUED_MOTIONS, MotionCommand, start_worker
-from arm_servo.requests import JogRequest
-from arm_servo.safety_filter import SafetyFilter
-from arm_servo.servo import JointCommand
-from arm_servo.set_point import Source
-from arm_servo.single_target import SingleTarget
+from arm_servo import NotReadyError, Source
+from arm_servo.core.commands import by_joint
+from arm_servo.core.gateway import MAX_ATTEMPTS, MAX_QUEUED_MOTIONS, MotionCommand, start_worker
+from arm_servo.core.requests import JogRequest
+from arm_servo.core.safety_filter import SafetyFilter
+from arm_servo.core.single_target import SingleTarget
+from arm_servo.jog.servo_source import JointCommand
 from arm_trajectory import GoalCode, GoalError, GoalPoint, StateMovedError, TrajectoryGoal
 
 JOINT = 'panda_joint1'

@@ -11,8 +11,8 @@ import pytest
 from servo_commands import SteppedWorker
 from servo_drives import Drives
 
-from arm_servo.gateway import MotionCommand
-from arm_servo.nodes.trajectory_action import TrajectoryAction
+from arm_servo.core.gateway import MotionCommand
+from arm_servo.ros.trajectory.action import TrajectoryAction
 from arm_trajectory import GoalCode, GoalPoint, TrajectoryGoal
 
 

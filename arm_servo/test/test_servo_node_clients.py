@@ -10,12 +10,12 @@ from typing import Any
 from geometry_msgs.msg import TwistStamped
 from servo_drives import Drives
 
-from arm_servo.commands import twist_command
-from arm_servo.nodes.refusals import Refusals
-from arm_servo.nodes.servo import FRESH, Servo
-from arm_servo.nodes.servo_modes import CommandKind
-from arm_servo.requests import JogRequest
-from arm_servo.set_point import Source
+from arm_servo import Source
+from arm_servo.core.commands import twist_command
+from arm_servo.core.requests import JogRequest
+from arm_servo.ros.refusals import Refusals
+from arm_servo.ros.servo.modes import CommandKind
+from arm_servo.ros.servo.node import FRESH, Servo
 
 
 class Commands:

@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 
 from arm_model import Array, CommandError, Pose
-from arm_servo.core import MotionCore
-from arm_servo.nodes.command_converter import CommandConverter
-from arm_servo.nodes.servo_parameters import Scales, ServoParameters, Units
-from arm_servo.requests import JogRequest
-from arm_servo.servo import PoseCommand, ServoSettings
+from arm_servo import MotionCore, ServoSettings
+from arm_servo.core.requests import JogRequest
+from arm_servo.jog.servo_source import PoseCommand
+from arm_servo.ros.servo.command_converter import CommandConverter
+from arm_servo.ros.servo.parameters import Scales, ServoParameters, Units
 
 PERIOD = 0.01
 SPEED = Scales(Units.SPEED, 0.2, 0.5, 0.5, 1.0)

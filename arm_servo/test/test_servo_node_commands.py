@@ -20,10 +20,10 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from servo_drives import Drives
 
-from arm_servo.nodes.servo import Servo
-from arm_servo.nodes.servo_parameters import declare_servo, PREFIX
-from arm_servo.requests import JogRequest
-from arm_servo.servo import PoseCommand
+from arm_servo.core.requests import JogRequest
+from arm_servo.jog.servo_source import PoseCommand
+from arm_servo.ros.servo.node import Servo
+from arm_servo.ros.servo.parameters import declare_servo, PREFIX
 
 TWIST, JOG, POSE = 'delta_twist_cmds', 'delta_joint_cmds', 'pose_target_cmds'
 TIMEOUT = 0.5

@@ -13,13 +13,10 @@ from servo_commands import outcome
 from servo_drives import Drives, PERIOD
 
 from arm_canopen import CanopenError, Refusal, RefusalCause
-from arm_servo.core import MotionCore
-from arm_servo.exceptions import NotReadyError
-from arm_servo.execution import Phase
-from arm_servo.gateway import MotionCommand
-from arm_servo.nodes.drive_reasons import why_not
-from arm_servo.nodes.drive_source import NOT_ATTACHED
-from arm_servo.set_point import Source
+from arm_servo import MotionCore, NotReadyError, Phase, Source
+from arm_servo.core.gateway import MotionCommand
+from arm_servo.io.drive_reasons import why_not
+from arm_servo.io.drive_source import NOT_ATTACHED
 from arm_trajectory import GoalCode, GoalPoint, TrajectoryGoal
 
 

@@ -12,7 +12,7 @@ from servo_commands import move_by, outcome
 from servo_elsewhere import Elsewhere, jog, PERIOD, swing
 
 from arm_model import JointLimits
-from arm_servo.nodes.following import FollowingLimits, FollowingWatch
+from arm_servo.io.following import FollowingLimits, FollowingWatch
 from arm_trajectory import GoalCode
 
 pytestmark = pytest.mark.slow

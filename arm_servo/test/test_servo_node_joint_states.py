@@ -16,7 +16,7 @@ from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from servo_drives import Drives, PERIOD
 
-from arm_servo.nodes.joint_state_broadcaster import (
+from arm_servo.ros.joint_state_broadcaster import (
     JointSample,
     JointSamples,
     JointStateBroadcaster,

@@ -15,9 +15,9 @@ from servo_commands import jog as jog_joints
 from servo_commands import outcome
 from servo_elsewhere import Elsewhere, jog, PERIOD, swing
 
-from arm_servo.exceptions import NotReadyError
-from arm_servo.nodes.joint_feedback import JointFeedback
-from arm_servo.nodes.motion_thread import MotionThread
+from arm_servo import NotReadyError
+from arm_servo.io.joint_feedback import JointFeedback
+from arm_servo.io.motion_thread import MotionThread
 from arm_trajectory import GoalCode
 
 

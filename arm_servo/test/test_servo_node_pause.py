@@ -9,9 +9,9 @@ from dataclasses import replace
 import pytest
 from servo_drives import Drives
 
-from arm_servo.nodes.trajectory_pause import words_of_pause, words_of_resume
-from arm_servo.set_point import Source
-from arm_servo.snapshot import Snapshot
+from arm_servo import Source
+from arm_servo.core.snapshot import Snapshot
+from arm_servo.ros.trajectory.pause import words_of_pause, words_of_resume
 
 IDLE = Snapshot(1.0, None, None, '')
 

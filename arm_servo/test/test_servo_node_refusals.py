@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from arm_servo.nodes.refusals import FORGOTTEN, Refusals, REMEMBERED
+from arm_servo.ros.refusals import FORGOTTEN, Refusals, REMEMBERED
 
 
 def test_a_stream_with_old_stamps_is_one_line_of_the_log() -> None:

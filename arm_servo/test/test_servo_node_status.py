@@ -13,15 +13,19 @@ from servo_commands import InlineWorker, jog, move_by, twist
 from servo_drives import Drives, PERIOD
 
 from arm_canopen import Refusal, RefusalCause
-from arm_servo.bounds import BrakeSettings
-from arm_servo.core import MotionCore
-from arm_servo.core_settings import CoreSettings
-from arm_servo.gateway import CommandGateway
-from arm_servo.nodes.servo_status import code_of, status_of, StatusCode
-from arm_servo.report import Cause, Limiter, MotionReport
-from arm_servo.servo import ServoSettings
-from arm_servo.set_point import Source
-from arm_servo.velocity_ik import IkSettings
+from arm_servo import (
+    Cause,
+    CoreSettings,
+    IkSettings,
+    Limiter,
+    MotionCore,
+    MotionReport,
+    ServoSettings,
+    Source,
+    VelocityBoundsSettings,
+)
+from arm_servo.core.gateway import CommandGateway
+from arm_servo.ros.servo.status import code_of, status_of, StatusCode
 
 
 def attached(name: str = 'panda', at: Sequence[float] = ()) -> Drives:
@@ -86,7 +90,7 @@ def test_a_stop_of_the_safety_filter_is_no_free_motion() -> None:
     """Where nothing else brakes in front of contact, it does, with code and links."""
     core = MotionCore(
         robot('panda'),
-        CoreSettings(servo=ServoSettings(ik=IkSettings(brakes=BrakeSettings(pairs=0)))),
+        CoreSettings(servo=ServoSettings(ik=IkSettings(brakes=VelocityBoundsSettings(pairs=0)))),
     )
     gateway = CommandGateway(core, InlineWorker(), lambda: 100.0)
     core.reset(ready('panda'))

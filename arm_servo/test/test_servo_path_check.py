@@ -12,11 +12,8 @@ import numpy as np
 import pytest
 
 from arm_model import Array, CommandError
-from arm_servo.core import MotionCore
-from arm_servo.core_settings import CoreSettings
-from arm_servo.execution import Phase
-from arm_servo.requests import DisplacementRequest
-from arm_servo.set_point import Source
+from arm_servo import CoreSettings, MotionCore, Phase, Source
+from arm_servo.core.requests import DisplacementRequest
 from arm_trajectory import GoalCode, GoalError, GoalPoint, TrajectoryGoal
 
 pytestmark = pytest.mark.slow

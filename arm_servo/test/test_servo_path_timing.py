@@ -16,9 +16,7 @@ import pytest
 from servo_streams import kept, PERIOD
 
 from arm_model import Array, JointLimits, RobotState
-from arm_servo.core import MotionCore
-from arm_servo.core_settings import CoreSettings
-from arm_servo.execution import Execution, ExecutionSettings, Phase
+from arm_servo import CoreSettings, Execution, ExecutionSettings, MotionCore, Phase
 from arm_trajectory import (
     GoalCode,
     GoalError,

@@ -18,7 +18,7 @@ import rclpy
 from rclpy.node import Node
 
 from arm_model import ArmError
-from arm_servo.nodes.motion_master import Motion
+from arm_servo.ros.motion_master import Motion
 from arm_servo.teleop.servo_gamepad import ServoGamepad
 from arm_servo.teleop.servo_keyboard_input import ServoKeyboardInput
 from node_runner import ParameterError

@@ -11,7 +11,7 @@ from model_robots import ready, robot, ROBOTS
 import numpy as np
 import pytest
 
-from arm_servo.core import MotionCore
+from arm_servo import MotionCore
 from arm_trajectory import GoalError, GoalPoint, TrajectoryGoal
 
 pytestmark = pytest.mark.slow

@@ -15,10 +15,7 @@ import pytest
 from servo_streams import follow_to_the_end, kept, PERIOD, stream, wave
 
 from arm_model import Array, RobotState
-from arm_servo.core import MotionCore
-from arm_servo.core_settings import CoreSettings
-from arm_servo.execution import ExecutionSettings, Phase
-from arm_servo.outcome import Outcome
+from arm_servo import CoreSettings, ExecutionSettings, MotionCore, Outcome, Phase
 from arm_trajectory import (
     GoalCode,
     GoalError,
@@ -244,7 +241,7 @@ def test_a_later_begin_is_planned_before_it(name: str, seed: int, ahead: float) 
     goal = replace(wave(robot(name), ready(name), 'q'), age=-ahead)
     execution = core.follow(goal)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr('arm_servo.execution.build_path', None)
+        patch.setattr('arm_servo.core.execution.build_path', None)
         followed = follow_to_the_end(core, execution)
     assert execution.ending is not None
     assert execution.ending.code is GoalCode.SUCCESSFUL, execution.ending

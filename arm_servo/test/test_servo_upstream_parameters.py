@@ -16,14 +16,12 @@ from rclpy.node import Node
 import yaml
 
 from arm_model import ModelError
-from arm_servo import check_parameters
-from arm_servo.core import MotionCore
-from arm_servo.core_settings import CoreSettings
-from arm_servo.nodes.motion_controller import _build as build_motion_controller
-from arm_servo.nodes.parameter_sheet import ParameterSheet
-from arm_servo.nodes.servo_node import _build as build_servo_node
-from arm_servo.nodes.servo_parameters import declare_servo, ServoParameters
-from arm_servo.nodes.upstream_parameters import check_names
+from arm_servo import check_parameters, CoreSettings, MotionCore
+from arm_servo.ros.motion_controller import _build as build_motion_controller
+from arm_servo.ros.parameter_sheet import ParameterSheet
+from arm_servo.ros.servo.parameters import declare_servo, ServoParameters
+from arm_servo.ros.servo_node import _build as build_servo_node
+from arm_servo.ros.upstream_parameters import check_names
 
 JOINTS = list(robot('panda').joints)
 GROUP = 'panda_arm'

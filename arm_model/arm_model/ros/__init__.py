@@ -2,8 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """The robot model in ROS: from parameters, and its frames beside those of TF."""
 
-from .numbers import seconds, xyz, xyzw
+from .numbers import duration_fields, seconds, xyz, xyzw
 from .robot_parameters import declare_robot, same_robot
 from .tf_listener import TfListener
 
-__all__ = ['TfListener', 'declare_robot', 'same_robot', 'seconds', 'xyz', 'xyzw']
+__all__ = [
+    'TfListener',
+    'declare_robot',
+    'duration_fields',
+    'same_robot',
+    'seconds',
+    'xyz',
+    'xyzw',
+]

@@ -24,3 +24,13 @@ def xyzw(quaternion: Any) -> list[float]:  # noqa: ANN401
 def seconds(stamp: Any) -> float:  # noqa: ANN401  # Time and Duration
     """Return a stamp or a duration in [s]."""
     return float(stamp.sec) + 1e-9 * float(stamp.nanosec)
+
+
+def duration_fields(time: float) -> dict[str, int]:
+    """Return the fields of a duration.
+
+    Args:
+        time: In [s].
+    """
+    total = round(time * 1e9)
+    return {'sec': total // 1_000_000_000, 'nanosec': total % 1_000_000_000}

@@ -1,0 +1,196 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Jogging, a trajectory and a single target: one of them moves the arm, and hands it over."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+
+import numpy as np
+
+from arm_model import Array, RobotModel, RobotState
+from arm_trajectory import GoalCode, hard_brake, OnlineTrajectoryGenerator
+
+from ..jog.jogging import Jogging
+from ..jog.servo_source import Command
+from ..report import MotionReport
+from .execution import Execution
+from .outcome import Outcome
+from .set_point import Source
+from .settings import CoreSettings
+from .single_target import SingleTarget
+
+Motion = Execution | SingleTarget
+"""What has a goal, and an outcome once it ended."""
+
+
+class CommandArbiter:
+    """What may move an arm, and what does.
+
+    Attributes:
+        active: What moves the arm.
+        execution: The trajectory that was followed last; None before the first.
+        target: The single target that was aimed at last; None before the first.
+        jogger: Who has jogged last.
+    """
+
+    def __init__(
+        self, model: RobotModel, generator: OnlineTrajectoryGenerator, settings: CoreSettings
+    ) -> None:
+        """Let nothing move the arm yet.
+
+        Args:
+            model: The arm.
+            generator: Plans its motion.
+            settings: How the core behaves.
+        """
+        self._limits = model.limits
+        self._generator = generator
+        self._jogging = Jogging(model, settings.servo)
+        self.active = Source.NONE
+        self.execution: Execution | None = None
+        self.target: SingleTarget | None = None
+        self.jogger: Hashable = None
+
+    @property
+    def motion(self) -> Motion | None:
+        """The trajectory or the single target that moves the arm; None without one."""
+        if self.active is Source.TRAJECTORY:
+            return self.execution
+        return self.target if self.active is Source.TARGET else None
+
+    def jog(self, command: Command, fresh_until: float, client: Hashable) -> None:
+        """Let a jog command move the arm.
+
+        Args:
+            command: The command.
+            fresh_until: Steady time until which it counts in [s].
+            client: Who asks.
+        """
+        if self.active is not Source.JOG:
+            self.release('jogging took over')
+            self._jogging.begin()
+        self.active, self.jogger = Source.JOG, client
+        self._jogging.take(command, fresh_until)
+
+    @property
+    def brakes(self) -> bool:
+        """Whether what was ordered may still bring the arm to rest out of another motion."""
+        if self.active is Source.TRAJECTORY:
+            return self.execution is not None and self.execution.waits
+        return self.active is Source.TARGET
+
+    @property
+    def on_path(self) -> bool:
+        """Whether the step that was taken last is on a path that was checked for collisions."""
+        if self.active is not Source.TRAJECTORY or self.execution is None:
+            return False
+        return self.execution.on_path
+
+    def follow(self, execution: Execution) -> None:
+        """Let a trajectory move the arm.
+
+        Args:
+            execution: Its execution.
+        """
+        self.release('a new trajectory took over')
+        self.active, self.execution = Source.TRAJECTORY, execution
+
+    def aim(self, target: SingleTarget) -> None:
+        """Let a single target move the arm.
+
+        Args:
+            target: The target.
+        """
+        if self.active is Source.TARGET:  # displacements add up: what was asked before is in it
+            self.end(Outcome(GoalCode.SUCCESSFUL, 'a further target goes on from it'))
+        self.release('a single target took over')
+        self.active, self.target = Source.TARGET, target
+
+    def stop(self, outcome: Outcome) -> None:
+        """Come to rest: a trajectory on its path, anything else in the shortest time.
+
+        Args:
+            outcome: How the motion ends.
+        """
+        if self.active is Source.TRAJECTORY and self.execution is not None:
+            self.execution.stop(outcome)
+            return
+        self.end(outcome)
+        self.release(outcome.reason)
+
+    def release(self, reason: str) -> None:
+        """Take the arm from what moves it; it comes to rest unless something else takes over.
+
+        Args:
+            reason: Why, for the motion that this ends.
+        """
+        self.end(Outcome(GoalCode.INVALID_GOAL, reason))
+        self._jogging.end()
+        self.active = Source.NONE
+
+    def end(self, outcome: Outcome) -> None:
+        """End the trajectory or the single target that moves the arm.
+
+        Args:
+            outcome: How.
+        """
+        if self.motion is not None:
+            self.motion.end(outcome)
+
+    def step(
+        self,
+        state: RobotState,
+        measured: RobotState,
+        now: float,
+        period: float,
+        *,
+        speed_scaling: float,
+        paused: bool,
+    ) -> tuple[RobotState, MotionReport]:
+        """Return the next state that is wanted, and what limits it.
+
+        Args:
+            state: Commanded state now.
+            measured: Measured state now.
+            now: Steady time in [s].
+            period: Time to the next step in [s].
+            speed_scaling: Share of the speed of trajectories and targets, 0 to 1.
+            paused: Whether jogging comes to rest in spite of a command.
+        """
+        report, wanted = MotionReport(), None
+        if self.active is Source.JOG:
+            velocity, report = self._jogging.step(state, now, period, held=paused)
+            wanted = None if velocity is None else self._toward(state, velocity, period)
+        elif self.active is Source.TRAJECTORY and self.execution is not None:
+            wanted = self.execution.step(state, measured, speed_scaling, period)
+        elif self.active is Source.TARGET and self.target is not None:
+            wanted = self.target.step(state, speed_scaling, period)
+        if wanted is None:
+            wanted = self._toward(state, np.zeros(len(self._limits)), period)
+        return wanted, report
+
+    def ended(self, state: RobotState, now: float, *, paused: bool) -> Source:
+        """Return what moved the arm in this cycle, and let go of what has ended.
+
+        Args:
+            state: Commanded state at the end of the cycle.
+            now: Steady time in [s].
+            paused: Whether jogging comes to rest in spite of a command.
+        """
+        source, motion = self.active, self.motion
+        if isinstance(motion, SingleTarget):
+            motion.arrive(state)
+        done = motion is not None and motion.outcome is not None
+        stale = paused or self._jogging.stale(now)
+        if done or (source is Source.JOG and stale and not state.moving):
+            self.release('')
+        return source
+
+    def _toward(self, state: RobotState, velocity: Array, period: float) -> RobotState:
+        plan = self._generator.to_velocity(state, velocity)
+        if plan is None:
+            return hard_brake(state, self._limits, period)
+        if period >= plan.duration and not velocity.any():
+            return RobotState.at_rest(plan.at(plan.duration).position)
+        return plan.at(period)

@@ -1,0 +1,221 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What is found out about a motion before it begins, beside the cycle.
+
+``prepare(request, basis) -> Prepared`` plans and checks a request from a state of the arm; it
+moves nothing, and takes as long as it needs. ``MotionCore.commit(prepared)`` begins the motion in
+the cycle, and refuses what was prepared for another state or before another command.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from arm_model import Array, CommandError, Mask, RobotModel, RobotState
+from arm_trajectory import (
+    GoalCode,
+    GoalError,
+    OnlineTrajectoryGenerator,
+    PathCheck,
+    Plan,
+    TimerState,
+    TrajectoryGoal,
+)
+
+from .arbiter import Motion
+from .commands import by_joint
+from .execution import Execution
+from .requests import DisplacementRequest, MotionRequest
+from .set_point import Source
+from .settings import CoreSettings
+from .single_target import SingleTarget
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CommandBasis:
+    """What the cycle knows when a command is prepared.
+
+    Attributes:
+        state: Commanded state where the motion begins.
+        sequence: Number of commands and stops so far.
+        source: What moves the arm.
+        speed_scaling: Share of the speed of trajectories and targets, 0 to 1.
+        target: Where a single target takes the arm in [rad]; None without one.
+        execution: The trajectory that was followed last; None before the first.
+        timer: How that runs; None for how it ran in its last step.
+    """
+
+    state: RobotState
+    sequence: int
+    source: Source = Source.NONE
+    speed_scaling: float = 1.0
+    target: Array | None = None
+    execution: Execution | None = None
+    timer: TimerState | None = None
+
+    def foreseen(self, ahead: float) -> CommandBasis:
+        """Return the basis some time later, when nothing comes in between.
+
+        Args:
+            ahead: Time from now in [s].
+        """
+        if self.source is Source.TRAJECTORY and self.execution is not None:
+            return replace(self, state=self.execution.foreseen(ahead, self.timer))
+        state = self.state
+        there = state.position + ahead * state.velocity
+        return replace(self, state=RobotState(there, state.velocity, 0.0 * state.acceleration))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Prepared:
+    """A motion whose path is clear.
+
+    Attributes:
+        motion: What begins; None for a displacement by nothing, which is no command.
+        basis: From what it was planned; it does not begin from anything else.
+    """
+
+    motion: Motion | None
+    basis: CommandBasis
+
+
+class Preparation:
+    """Plans motions, and looks for collisions on their paths; for one thread.
+
+    A trajectory takes 2 ms, 0.2 ms a point, and about 3 ms for each second of its path.
+    """
+
+    def __init__(
+        self, model: RobotModel, catch_up: OnlineTrajectoryGenerator, settings: CoreSettings
+    ) -> None:
+        """Prepare.
+
+        Args:
+            model: The arm.
+            catch_up: Plans how executions catch up; used in the cycle only.
+            settings: How the core behaves.
+        """
+        self._model = model
+        self._limits = model.limits
+        self._catch_up = catch_up
+        self._settings = settings
+        self._generator = OnlineTrajectoryGenerator(
+            model.limits
+        )  # that of the cycle is for the cycle
+        self._check = PathCheck(model) if settings.check_self_collision else None
+
+    def prepare(self, request: MotionRequest, basis: CommandBasis) -> Prepared:
+        """Plan a request and check its path.
+
+        Args:
+            request: What is asked.
+            basis: The arm where the motion begins.
+
+        Raises:
+            CommandError: The request is refused.
+        """
+        if isinstance(request, TrajectoryGoal):
+            return Prepared(self.trajectory(request, basis), basis)
+        if isinstance(request, DisplacementRequest):
+            target = self._displaced(request.displacements, basis)
+            if request.is_zero:
+                return Prepared(None, basis)
+        else:
+            target = self._aimed(*self._by_joint(request.positions, 'positions'), basis)
+        return Prepared(self._single_target(target, request.max_speed, basis), basis)
+
+    def _by_joint(self, values: Mapping[str, float], what: str) -> tuple[Array, Mask]:
+        return by_joint(self._model, values, what)
+
+    def _displaced(self, displacements: Mapping[str, float], basis: CommandBasis) -> Array:
+        """Return where displacements lead, beyond where the arm is going already."""
+        values, moved = self._by_joint(displacements, 'displacements')
+        if basis.target is not None:
+            ends: Array = basis.target + values
+            return ends
+        return self._aimed(basis.state.position + values, moved, basis)
+
+    def _aimed(self, positions: Array, moved: Mask, basis: CommandBasis) -> Array:
+        """Return positions of the joints that are moved, and where the others come to rest."""
+        rest, limits = self._generator.brake(basis.state), self._limits
+        stay = basis.state.position if rest is None else rest.at(rest.duration).position
+        # where a joint comes to rest was not asked for: it need not be refused
+        target: Array = np.where(moved, positions, np.clip(stay, limits.lower, limits.upper))
+        return target
+
+    def _single_target(self, target: Array, max_speed: float, basis: CommandBasis) -> SingleTarget:
+        if not max_speed > 0.0:
+            raise CommandError(f'greatest speed of a joint {max_speed} rad/s: it must be above 0')
+        limits = self._limits
+        beyond = (target < limits.lower) | (target > limits.upper)
+        if beyond.any():
+            joint = int(np.argmax(beyond))
+            raise CommandError(
+                f'{limits.names[joint]}: {target[joint]:.4f} is beyond its limits'
+                f' {limits.lower[joint]:.4f}..{limits.upper[joint]:.4f}'
+            )
+        motion = SingleTarget(target, max_speed, self._generator)
+        self._check_single_target(motion.plan(basis.state, basis.speed_scaling))
+        return motion
+
+    def _check_single_target(self, plan: Plan | None) -> None:
+        """Make sure that no links meet on the way to a single target, as it is driven."""
+        if self._check is None or plan is None:
+            return
+
+        def positions(times: Array) -> Array:
+            return np.array([plan.at(time).position for time in times.tolist()])
+
+        found = self._check.contact(positions, plan.duration)
+        if found:
+            raise CommandError(
+                f'{" and ".join(found.links)} would collide after {found.time:.2f} s on the way'
+                ' to the target; go around that (check_self_collision switches this off)'
+            )
+
+    def trajectory(self, goal: TrajectoryGoal, basis: CommandBasis) -> Execution:
+        """Plan a trajectory and check its path.
+
+        Raises:
+            GoalError: It is refused.
+        """
+        goal, begin, wait = self._begin(goal, basis.state)
+        execution = Execution(
+            goal,
+            limits=self._limits,
+            generator=self._catch_up,
+            state=begin,
+            speed_scaling=basis.speed_scaling,
+            settings=self._settings.execution,
+            wait=wait,
+        )
+        path = execution.path
+        found = self._check and self._check.contact(path.positions, path.duration)
+        if found:
+            raise GoalError(
+                GoalCode.INVALID_GOAL,
+                f'{" and ".join(found.links)} would collide at {found.time:.2f} s of the'
+                ' trajectory; lead it around that (check_self_collision switches this off)',
+            )
+        return execution
+
+    def _begin(
+        self, goal: TrajectoryGoal, state: RobotState
+    ) -> tuple[TrajectoryGoal, RobotState, float]:
+        """Return a goal that begins now or after a wait, where it begins, and the wait in [s].
+
+        What begins later begins where the arm will have come to rest; where there is no time for
+        that, the motion goes over into it, so that its points are met at their times.
+        """
+        wait = max(-goal.age, 0.0)
+        if wait == 0.0 or not state.moving:
+            return replace(goal, age=max(goal.age, 0.0)), state, wait
+        stop = self._generator.to_velocity(state, np.zeros(len(self._limits)))
+        if stop is not None and stop.duration <= wait:
+            there = stop.at(stop.duration).position
+            return replace(goal, age=0.0), RobotState.at_rest(there), wait
+        points = [replace(point, time=point.time + wait) for point in goal.points]
+        return replace(goal, points=points, age=0.0), state, 0.0

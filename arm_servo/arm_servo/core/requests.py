@@ -1,0 +1,77 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What a client asks of the arm, as values; nothing in them moves anything.
+
+A trajectory is asked for by a :class:`~.goal.TrajectoryGoal`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping
+from dataclasses import dataclass
+import math
+
+from arm_model import Pose
+from arm_trajectory import TrajectoryGoal
+
+from ..jog.servo_source import Command, JointCommand, TwistCommand
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JogRequest:
+    """Move the tool or joints at a speed, or track a pose, until the request expires.
+
+    Attributes:
+        command: What the arm does.
+        expires: Steady time at which the request expires in [s].
+        frame: Link, or pose in the base, about whose origin a twist turns and along whose axes it
+            is given, and in which a pose is given; None for the tip, and for the base.
+        client: Who asks: standing still is a command only for whoever is jogging.
+    """
+
+    command: Command
+    expires: float
+    frame: str | Pose | None = None
+    client: Hashable = None
+
+    @property
+    def is_zero(self) -> bool:
+        """Whether it asks for standing still."""
+        if isinstance(self.command, TwistCommand):
+            return not self.command.twist.any()
+        return isinstance(self.command, JointCommand) and not self.command.velocity.any()
+
+
+@dataclass(frozen=True, slots=True)
+class DisplacementRequest:
+    """Move joints on by amounts; displacements add up while they are carried out.
+
+    Attributes:
+        displacements: How far in [rad] by joint.
+        max_speed: Greatest speed of a joint in [rad/s].
+    """
+
+    displacements: Mapping[str, float]
+    max_speed: float = math.inf
+
+    @property
+    def is_zero(self) -> bool:
+        """Whether it asks for standing still."""
+        return not any(self.displacements.values())
+
+
+@dataclass(frozen=True, slots=True)
+class TargetRequest:
+    """Move joints to positions; the others come to rest.
+
+    Attributes:
+        positions: Targets in [rad] by joint.
+        max_speed: Greatest speed of a joint in [rad/s].
+    """
+
+    positions: Mapping[str, float]
+    max_speed: float = math.inf
+
+
+MotionRequest = DisplacementRequest | TargetRequest | TrajectoryGoal
+"""What is planned and checked for collisions before it may begin."""

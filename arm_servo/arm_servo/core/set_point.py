@@ -1,0 +1,36 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What leaves the motion core in a cycle."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+from arm_model import RobotState
+
+from ..report import MotionReport
+
+
+class Source(Enum):
+    """What moves the arm."""
+
+    NONE = 'none'
+    JOG = 'jog'
+    TRAJECTORY = 'trajectory'
+    TARGET = 'target'
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SetPoint:
+    """What to command in a cycle.
+
+    Attributes:
+        state: Positions, velocities and accelerations.
+        source: What moves the arm.
+        report: What limits the motion.
+    """
+
+    state: RobotState
+    source: Source
+    report: MotionReport

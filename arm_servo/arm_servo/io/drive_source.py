@@ -1,0 +1,152 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The motion core as a motion source of arm_canopen: stepped in the CANopen cycle."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from arm_model import frozen, RobotState
+
+from ..core.gateway import CommandGateway
+from ..core.set_point import Source
+from .drive_reasons import COMMAND, what_happened, why_not
+
+if TYPE_CHECKING:
+    from arm_canopen import AxisFeedback, MotionSource, Refusal, Setpoint
+
+
+NOT_ATTACHED = f'was not attached yet; {COMMAND}'
+
+
+class DriveSource:
+    """Commands the drives of an arm; a :class:`arm_canopen.MotionSource`.
+
+    It follows while every drive can. When one drops out, the others stop on the path, and a
+    trajectory ends with the drive named. Afterwards it takes the arm over where the drives'
+    set-points are: at once when nobody took a drive away, else when it is attached again.
+    """
+
+    def __init__(self, gateway: CommandGateway) -> None:
+        """Wait for the drives.
+
+        Args:
+            gateway: Commands to the core; it is stepped here only.
+        """
+        from arm_canopen import Setpoint
+
+        self._make: type[Setpoint] = Setpoint
+        self._gateway = gateway
+        self._axes = list(gateway.model.joints)
+        self._released: dict[str, Refusal | str] = dict.fromkeys(self._axes, NOT_ATTACHED)
+        self._following = False
+        self._left: set[str] = set()  # drives that dropped out since all of them followed
+        self._lost = ''
+
+    @property
+    def axes(self) -> Sequence[str]:
+        """Names of the drives, which are those of the joints."""
+        return self._axes
+
+    @property
+    def detached(self) -> bool:
+        """Whether a drive was taken away, so that it has to be attached again; any thread."""
+        return bool(self._released)
+
+    def attach(self, attach: Callable[[MotionSource], Future[None]]) -> None:
+        """Get back the drives that were taken away; any thread, and it waits for nothing.
+
+        Args:
+            attach: What attaches a source to the bus before the next cycle. When that fails, the
+                drives are away as before, and the next command tries again.
+        """
+        before = self._released
+        self._released = {}  # before, so that a drive which is taken away right after is known
+
+        def finish(future: Future[None]) -> None:
+            if future.cancelled() or future.exception() is not None:
+                self._released = {**before, **self._released}
+
+        attach(self).add_done_callback(finish)
+
+    def released(self, axis: str, refusal: Refusal) -> None:
+        """Come to rest, and leave the drives alone until attached again.
+
+        Args:
+            axis: Name of the drive.
+            refusal: Why it was taken away.
+        """
+        self._released = {**self._released, axis: refusal}
+
+    def update(
+        self, now: float, period: float, feedback: Sequence[AxisFeedback]
+    ) -> Sequence[Setpoint | None]:
+        """Answer the set-points of a cycle.
+
+        Args:
+            now: Steady time in [s].
+            period: Time to the next cycle in [s].
+            feedback: State of each drive.
+
+        Returns:
+            Position in [rad] and velocity in [rad/s] of each drive that follows.
+        """
+        try:
+            return self._update(now, period, feedback)
+        except Exception as error:  # the bus detaches it then
+            what = f'{type(error).__name__}: {error}'
+            reason = f'was let go, because the motion core raised {what}; {COMMAND}'
+            self._released = dict.fromkeys(self._axes, reason)
+            self._following, self._lost = False, ''
+            self._gateway.abandon(now, reason)
+            raise
+
+    def _update(
+        self, now: float, period: float, feedback: Sequence[AxisFeedback]
+    ) -> Sequence[Setpoint | None]:
+        measured, ages = measured_state(feedback), frozen([axis.age for axis in feedback])
+        blocked = why_not(feedback, self._released)
+        if not self._following and not blocked:
+            self._take_over(feedback)
+        if not self._following or measured is None:
+            self._gateway.idle(now, measured, self._lost or blocked, ages)
+            return [None] * len(feedback)
+        if blocked and not self._lost:
+            self._lost, code = what_happened(feedback, self._released)
+            self._gateway.fail(self._lost, code)
+        self._left.update(axis.name for axis in feedback if not axis.followable)
+        if len(self._left) == len(feedback):  # nothing is left to be brought to rest
+            self._gateway.idle(now, measured, self._lost, ages)
+            self._following, self._lost = False, ''
+            return [None] * len(feedback)
+        point = self._gateway.step(now, period, measured, self._lost, ages)
+        if self._lost and point.source is Source.NONE and not point.state.moving:
+            self._following, self._lost = False, ''
+        rows = zip(point.state.position, point.state.velocity, feedback, strict=True)
+        return [
+            None if axis.name in self._left else self._make(float(position), float(velocity))
+            for position, velocity, axis in rows
+        ]
+
+    def _take_over(self, feedback: Sequence[AxisFeedback]) -> None:
+        """Begin at rest at the set-points of the drives."""
+        self._gateway.begin(frozen([axis.setpoint for axis in feedback]))
+        self._following, self._lost = True, ''
+        self._left.clear()
+
+
+def measured_state(feedback: Sequence[AxisFeedback]) -> RobotState | None:
+    """Return what the drives measure; None while one of them has told nothing yet.
+
+    Args:
+        feedback: State of each drive.
+    """
+    positions = frozen([axis.position for axis in feedback])
+    if not np.isfinite(positions).all():
+        return None
+    velocities = frozen([axis.velocity for axis in feedback])
+    return RobotState(positions, velocities, np.zeros(len(feedback)))

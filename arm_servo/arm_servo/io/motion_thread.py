@@ -1,0 +1,218 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The motion core in a thread of its own, for drives that are commanded over topics."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+import math
+import threading
+import time
+
+import numpy as np
+
+from arm_model import Array, RobotState
+from arm_trajectory import GoalCode, hard_brake
+from realtime_loop import CycleTimer
+
+from ..core.gateway import CommandGateway
+from ..core.set_point import SetPoint, Source
+from ..report import MotionReport
+from .following import FollowingWatch
+from .joint_feedback import JointFeedback
+
+SILENCE = 0.3
+"""How long nobody must command an arm that did not follow, before it takes commands, in [s]."""
+
+LAST_STOP = 3.0
+"""Longest time for the arm to come to rest at the end of the program in [s]."""
+
+
+class MotionCycle:
+    """What is done in a cycle; reads no clock.
+
+    Attributes:
+        closing: Why the arm comes to rest for good; empty before the end.
+    """
+
+    def __init__(
+        self,
+        gateway: CommandGateway,
+        feedback: JointFeedback,
+        output: Callable[[SetPoint], None],
+        watch: FollowingWatch,
+    ) -> None:
+        """Wait for the arm.
+
+        Args:
+            gateway: Commands to the core.
+            feedback: The arm's measured state.
+            output: Takes the set-points while something moves, and the last at rest.
+            watch: Compares the two.
+        """
+        self._gateway, self._feedback, self._output = gateway, feedback, output
+        self._state = RobotState.at_rest(np.zeros(len(gateway.model)))
+        self._watch = watch
+        self.closing = ''
+        self._compared = -math.inf
+        self._failure, self._failed = '', -math.inf
+        self._following = False
+        self._lost = ''
+        self._quiet = True
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether nothing moves."""
+        return not self._following or self._quiet
+
+    def step(self, now: float, period: float) -> None:
+        """Run a cycle.
+
+        Args:
+            now: Steady time in [s].
+            period: Time to the next cycle in [s].
+        """
+        try:
+            self._step(now, period)
+        except Exception as error:
+            self._gateway.abandon(now, f'the motion core raised {type(error).__name__}: {error}')
+            raise
+
+    def _step(self, now: float, period: float) -> None:
+        measured, blocked = self._feedback.state(now)
+        blocked = self.closing or blocked or self._kept(now)
+        if not self._following and not blocked and measured is not None:
+            self._begin(measured.position)
+            self._following, self._lost = True, ''
+        if not self._following or measured is None:
+            self._gateway.idle(now, measured, blocked)
+            return
+        code = GoalCode.INVALID_GOAL
+        if not blocked:
+            blocked, code = self._compare(measured.position, now), GoalCode.PATH_TOLERANCE_VIOLATED
+        if blocked and not self._lost:
+            self._lost = blocked
+            self._gateway.fail(blocked, code)
+        self._put(self._gateway.step(now, period, measured, self._lost))
+
+    def brake(self, period: float) -> None:
+        """Slow the last set-point down, without the core; for when the core has failed.
+
+        Args:
+            period: Time to the next cycle in [s].
+        """
+        self._state = hard_brake(self._state, self._gateway.model.limits, period)
+        self._output(SetPoint(self._state, Source.NONE, MotionReport()))
+        self._quiet = not self._state.moving
+
+    def _kept(self, now: float) -> str:
+        """Return why the arm did not follow, as long as somebody goes on to command it."""
+        if now - max(self._failed, self._gateway.refused) > SILENCE:
+            self._failure = ''
+        return self._failure
+
+    def _begin(self, position: Array) -> None:
+        self._gateway.begin(position)
+        self._watch.begin(position)
+
+    def _compare(self, position: Array, now: float) -> str:
+        """Begin where others have moved the arm at rest; say when it does not follow."""
+        if self._watch.moved(position, quiet=self._quiet):
+            self._begin(position)
+        if self._quiet:
+            return ''
+        if self._feedback.time == self._compared:  # nothing new was heard
+            return ''
+        self._compared = self._feedback.time
+        self._failure, self._failed = self._watch.problem(position), now
+        return self._failure
+
+    def _put(self, point: SetPoint) -> None:
+        self._state = point.state
+        self._watch.command(self._state.position)
+        idle = point.source is Source.NONE and not point.state.moving
+        if not (idle and self._quiet):
+            self._output(point)
+        self._quiet = idle
+        if idle and self._lost:
+            self._following, self._lost = False, ''
+
+
+class MotionThread:
+    """Runs cycles at absolute deadlines of the monotonic clock; after a stall it skips some.
+
+    Attributes:
+        error: What a cycle has raised; the arm was braked, and no cycle follows.
+        ended: Set when the last cycle is over.
+    """
+
+    def __init__(
+        self,
+        cycle: MotionCycle,
+        period: float,
+        begin: Callable[[], None] = lambda: None,
+    ) -> None:
+        """Prepare.
+
+        Args:
+            cycle: The cycle.
+            period: Its period in [s].
+            begin: Called once in the thread, before the first cycle.
+        """
+        self.error: Exception | None = None
+        self.ended = threading.Event()
+        self._cycle, self._period = cycle, period
+        self._begin = begin
+        self._failed: Callable[[], None] = lambda: None
+        self._ending = threading.Event()
+        self._until = math.inf
+        self._thread = threading.Thread(target=self._run, name='motion', daemon=True)
+
+    def start(self, failed: Callable[[], None] = lambda: None) -> None:
+        """Begin to run.
+
+        Args:
+            failed: Called in the thread when a cycle has raised, see :attr:`error`.
+        """
+        self._failed = failed
+        self._thread.start()
+
+    def end(self) -> None:
+        """Bring the arm to rest and take no more commands; the thread ends then."""
+        self._cycle.closing = 'the program ends'
+        self._ending.set()
+
+    def stop(self) -> None:
+        """Bring the arm to rest, and wait for the end."""
+        self.end()
+        if self._thread.is_alive():
+            self._thread.join(LAST_STOP + 1.0)
+
+    def _run(self) -> None:
+        try:
+            self._begin()
+            self._cycles(self._cycle.step, self._ends)
+        except Exception as error:  # noqa: BLE001  # the program tells it, and ends
+            self.error = error
+            self._failed()
+            with suppress(Exception):  # what has failed may be the output
+                begin = time.monotonic()
+                self._cycles(
+                    lambda _, period: self._cycle.brake(period),
+                    lambda now: self._cycle.at_rest or now > begin + LAST_STOP,
+                )
+        finally:
+            self.ended.set()
+
+    def _ends(self, now: float) -> bool:
+        if not self._ending.is_set():
+            return False
+        self._until = min(self._until, now + LAST_STOP)
+        return self._cycle.at_rest or now > self._until
+
+    def _cycles(self, step: Callable[[float, float], None], ends: Callable[[float], bool]) -> None:
+        timer = CycleTimer(self._period, time.monotonic())
+        while not ends(now := time.monotonic()):
+            step(timer.begin(now).time, self._period)
+            time.sleep(max(0.0, timer.deadline - time.monotonic()))

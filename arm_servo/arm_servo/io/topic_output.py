@@ -1,0 +1,110 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Set-points as messages to a controller elsewhere, as moveit_servo sends them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from rclpy.node import Node
+from std_msgs.msg import Float64MultiArray
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+from arm_model import ModelError
+from arm_model.ros import duration_fields
+from node_runner import ParameterReader
+
+from ..core.set_point import SetPoint
+
+TRAJECTORY = 'trajectory_msgs/JointTrajectory'
+ARRAY = 'std_msgs/Float64MultiArray'
+
+
+@dataclass(frozen=True, slots=True)
+class OutputParameters:
+    """What is published.
+
+    Attributes:
+        topic: Where to.
+        kind: :data:`TRAJECTORY` or :data:`ARRAY`.
+        positions: Positions are in it.
+        velocities: Velocities are in it.
+        accelerations: Accelerations are in it; only in trajectories.
+    """
+
+    topic: str
+    kind: str
+    positions: bool
+    velocities: bool
+    accelerations: bool
+
+
+def declare_output(node: Node, prefix: str, topic: str, kind: str) -> OutputParameters:
+    """Declare moveit_servo's parameters of the output.
+
+    Args:
+        node: The node.
+        prefix: Before each name, with its dot.
+        topic: Default of the topic.
+        kind: Default of its type.
+
+    Raises:
+        ModelError: The type is unknown, or does not carry what is to be in it.
+    """
+    read = ParameterReader(node, prefix)
+    parameters = OutputParameters(
+        read.text('command_out_topic', topic, 'where set-points are published'),
+        read.text('command_out_type', kind, f'{TRAJECTORY} or {ARRAY}'),
+        read.flag('publish_joint_positions', 'positions are in it', default=True),
+        read.flag('publish_joint_velocities', 'velocities are in it', default=kind == TRAJECTORY),
+        read.flag('publish_joint_accelerations', 'accelerations are in it', default=False),
+    )
+    if parameters.kind not in {TRAJECTORY, ARRAY}:
+        raise ModelError(
+            f'{prefix}command_out_type is {parameters.kind!r}: {TRAJECTORY} or {ARRAY}'
+        )
+    chosen = parameters.positions + parameters.velocities + parameters.accelerations
+    if not chosen or (parameters.kind == ARRAY and (chosen > 1 or parameters.accelerations)):
+        raise ModelError(
+            f'{prefix}publish_joint_...: an array has positions or velocities, a trajectory at'
+            ' least one of them'
+        )
+    return parameters
+
+
+class TopicOutput:
+    """Publishes set-points; for the thread of the cycle."""
+
+    def __init__(
+        self, node: Node, parameters: OutputParameters, joints: list[str], period: float
+    ) -> None:
+        """Advertise.
+
+        Args:
+            node: The node.
+            parameters: What is published.
+            joints: Names of the joints, in the order of set-points.
+            period: Time from the message to its point in [s].
+        """
+        kind = Float64MultiArray if parameters.kind == ARRAY else JointTrajectory
+        self._publisher = node.create_publisher(kind, parameters.topic, 10)
+        self._parameters, self._joints = parameters, joints
+        self._duration = duration_fields(period)
+
+    def __call__(self, point: SetPoint) -> None:
+        """Publish a set-point."""
+        wanted, state = self._parameters, point.state
+        if wanted.kind == ARRAY:
+            values = state.position if wanted.positions else state.velocity
+            self._publisher.publish(Float64MultiArray(data=values.tolist()))
+            return
+        row = JointTrajectoryPoint()
+        if wanted.positions:
+            row.positions = state.position.tolist()
+        if wanted.velocities:
+            row.velocities = state.velocity.tolist()
+        if wanted.accelerations:
+            row.accelerations = state.acceleration.tolist()
+        row.time_from_start.sec = self._duration['sec']
+        row.time_from_start.nanosec = self._duration['nanosec']
+        self._publisher.publish(JointTrajectory(joint_names=self._joints, points=[row]))

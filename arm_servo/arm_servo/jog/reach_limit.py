@@ -1,0 +1,182 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""At the border of the reach: stopping in front of it, and going back the way the arm came.
+
+A straight arm can fold to either side, and both bring the tool back. Whoever ran through the
+straight pose would come back on the other side, where a joint limit or a link may soon be in the
+way. So the joints are braked in front of it, and leave it to the side where they were.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+import math
+
+import numpy as np
+
+from arm_model import Array, JointLimits
+from arm_trajectory import brakeable, brakeable_velocity
+
+from .singularity import Directions, distance_to_singularity, LOST, way_out
+
+FULL = 0.05
+"""Scaled twist from which on a singular pose is left at full speed in [rad/s]."""
+
+WANDER = 3.0
+"""How far a way out is followed while the asked direction stays lost in [rad]."""
+
+ELSEWHERE = 0.05
+"""Motion of a joint between two steps from which on something else moved the arm in [rad]."""
+
+ASIDE = 1e-3
+"""Least distance along a way out that tells on which side of a singular pose one is in [rad]."""
+
+STEEPEST = 3.0
+"""Greatest change of a scaled singular value with a joint in [1/rad], to save a closer look."""
+
+FADE = 4.0
+"""Greatest speed towards a fold per way that is left in [1/s]."""
+
+LEAST_PART = 1e-5
+"""Part of a joint in a direction that counts for none."""
+
+JacobianAt = Callable[[Array], Array]
+"""Scaled Jacobian of joint positions."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WayOut:
+    """Joint speeds that lead out of a singular pose.
+
+    Attributes:
+        direction: Unit vector of joint speeds.
+        speed: How fast to go along it in [rad/s].
+        weight: How much that weighs against the asked twist, 0 to 1.
+    """
+
+    direction: Array
+    speed: float
+    weight: float
+
+
+class ReachLimit:
+    """Stops in front of singular poses, and leads out of them.
+
+    It remembers the sense in which a pose is left and where it was entered, and the last place
+    where the arm could do what was asked.
+    """
+
+    def __init__(self, limits: JointLimits, escape: float, braking: float) -> None:
+        """Remember nothing yet.
+
+        Args:
+            limits: Limits of the joints.
+            escape: Share of a joint's speed with which it leaves a singular pose.
+            braking: Share of acceleration and jerk that braking plans with.
+        """
+        self._limits = limits
+        self._escape, self._braking = escape, braking
+        self._least_acceleration = braking * float(limits.acceleration.min())
+        self._least_jerk = braking * float(limits.jerk.min())
+        self._sense: Array | None = None
+        self._entered: Array | None = None
+        self._good: Array | None = None
+        self._at: Array | None = None
+
+    def forget(self) -> None:
+        """Forget: the joints are moved each for itself."""
+        self._sense = self._entered = self._good = None
+
+    def slowed(
+        self, jacobian_at: JacobianAt, position: Array, found: Directions, command: Array
+    ) -> Directions:
+        """Brake in front of the border, so as not to fold to the other side.
+
+        Args:
+            jacobian_at: Scaled Jacobian of joint positions.
+            position: Joint positions in [rad].
+            found: The directions there.
+            command: Scaled twist that is asked (6).
+        """
+        self._remember(position, good=bool(command.any()) and not found.damped)
+        asked = float(command @ found.tool[:, -1])
+        nearest = found.least / STEEPEST
+        if abs(asked) <= found.least * min(self._surely_stoppable(nearest), FADE * nearest):
+            return found  # slow enough for a fold that is as near as can be
+        way = float(np.sign(asked)) * distance_to_singularity(jacobian_at, position, found)
+        if not 0.0 < way < np.inf:
+            return found
+        return found.slowed(command, self._stoppable(found, way))
+
+    def _stoppable(self, found: Directions, way: float) -> float:
+        """Return the speed along the last joint direction that ends within a way in [rad/s].
+
+        The last of the way fades, so that the arm rests there and does not hunt about it.
+        """
+        parts = np.maximum(np.abs(found.joints[-1]), LEAST_PART)
+        acceleration = self._braking * np.min(self._limits.acceleration / parts)
+        jerk = self._braking * np.min(self._limits.jerk / parts)
+        return min(float(brakeable(np.asarray(way), acceleration, jerk)), FADE * way)
+
+    def _surely_stoppable(self, way: float) -> float:
+        """Return a speed in any joint direction that ends within a way in [rad/s], quickly."""
+        half = 0.5 * self._least_acceleration**2 / self._least_jerk
+        return min(
+            math.sqrt(half * half + 2.0 * self._least_acceleration * way) - half,
+            math.pow(way * way * self._least_jerk, 1.0 / 3.0),
+        )
+
+    def way_out(
+        self, jacobian_at: JacobianAt, position: Array, found: Directions, command: Array
+    ) -> WayOut | None:
+        """Return the way out of a singular pose, where the command needs one and has one.
+
+        Args:
+            jacobian_at: Scaled Jacobian of joint positions.
+            position: Joint positions in [rad].
+            found: The directions there.
+            command: Scaled twist that is asked (6).
+        """
+        if not (found.lost.any() and command.any()):
+            self._sense = self._entered = None
+            return None
+        if self._entered is None:
+            self._entered = position
+        if np.linalg.norm(position - self._entered) > WANDER:
+            return None  # it leads nowhere
+        way = way_out(jacobian_at, position, found, command)
+        self._sense = None if way is None else way * self._oriented(way, position)
+        if self._sense is None:
+            return None
+        fade = 1.0 - float(found.share[-1]) / LOST
+        return WayOut(self._sense, fade * self._speed(self._sense, command), fade)
+
+    def _remember(self, position: Array, good: bool) -> None:
+        """Remember a place where the arm could do what was asked, until others move the arm."""
+        if self._at is None or np.abs(position - self._at).max() > ELSEWHERE:
+            self._good = None
+        self._at = position
+        if good:
+            self._good = position
+
+    def _speed(self, way: Array, command: Array) -> float:
+        """Return how fast to follow a way out in [rad/s]: slower for a slow command."""
+        fastest = self._escape / float(np.max(np.abs(way) / self._limits.velocity))
+        return fastest * min(1.0, float(np.linalg.norm(command)) / FULL)
+
+    def _oriented(self, way: Array, position: Array) -> float:
+        """Return the sense, 1 or -1: as before, else back, else away from the nearer limits."""
+        if self._sense is not None:
+            return 1.0 if way @ self._sense >= 0 else -1.0
+        back = 0.0 if self._good is None else float(way @ (self._good - position))
+        if abs(back) > ASIDE:
+            return 1.0 if back > 0 else -1.0
+        ways = np.array((self._limits.upper - position, position - self._limits.lower))
+        upper, lower = brakeable_velocity(ways, self._limits)
+        concerned = np.abs(way) > 0.1
+        forth, aback = (
+            float(np.min(np.where(sense * way > 0, upper, lower)[concerned], initial=np.inf))
+            for sense in (1.0, -1.0)
+        )
+        return 1.0 if forth >= aback else -1.0

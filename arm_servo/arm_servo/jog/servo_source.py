@@ -1,0 +1,233 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Jogging: an asked speed of the tool or of joints, or a pose to track, as joint speeds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import pinocchio as pin
+
+from arm_model import Array, Mask, Pose, RobotModel, RobotState, turned_twists
+
+from ..report import Cause, Limiter, MotionReport
+from .velocity_ik import IkAnswer, IkSettings, TwistTask, VelocityIk
+
+NO_AXES: Mask = np.zeros(6, dtype=np.bool_)
+"""Mask of no axis of a twist."""
+
+BASE = np.eye(3)
+"""The axes of the base."""
+
+RELEASED = np.array([2e-3] * 3 + [5e-3] * 3)
+"""Speed below which a released axis is held again in [m/s] and [rad/s]."""
+
+MIN_SHARE = 0.1
+"""Least share of a command that is carried out while held axes are off."""
+
+SLOWED, HASTENED = 0.1, 0.4
+"""Least times in which the share of a command falls to nothing and comes back in [s]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TwistCommand:
+    """An asked speed of the tool.
+
+    Attributes:
+        twist: Linear [m/s], then angular [rad/s] (6), turning about the tip.
+        link: Link along whose axes the twist is given, and follows it; the base when None.
+        axes: Rotation (3, 3) from other axes to the base, in place of a link.
+    """
+
+    twist: Array
+    link: str | None = None
+    axes: Array | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JointCommand:
+    """Asked speeds of joints.
+
+    Attributes:
+        velocity: Speeds in [rad/s], in the order of the joints.
+        commanded: Mask of the joints that are commanded; the others are held.
+    """
+
+    velocity: Array
+    commanded: Mask
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PoseCommand:
+    """A pose of the tip to go to, and to track when it moves.
+
+    Attributes:
+        pose: Pose of the tip in the base.
+        linear_speed: Greatest speed of the tip on the way there in [m/s].
+        angular_speed: Greatest angular speed of the tip on the way there in [rad/s].
+    """
+
+    pose: Pose
+    linear_speed: float = 0.4
+    angular_speed: float = 0.8
+
+
+Command = TwistCommand | JointCommand | PoseCommand
+
+
+@dataclass(frozen=True, slots=True)
+class ServoSettings:
+    """How jogging behaves.
+
+    Attributes:
+        hold: How fast held axes come back, per error, in [1/s].
+        approach: How fast a pose is approached at the end, per distance, in [1/s].
+        linear_deceleration: Deceleration towards a pose in [m/s2].
+        angular_deceleration: Angular deceleration towards a pose in [rad/s2].
+        path_error: Error of held axes at which the command is slowed down in [m].
+        drift: Mask of the axes that are never held; by default rotations of arms that have fewer
+            than six joints.
+        ik: Weights of the inverse kinematics.
+    """
+
+    hold: float = 8.0
+    approach: float = 4.0
+    linear_deceleration: float = 0.5
+    angular_deceleration: float = 1.5
+    path_error: float = 5e-4
+    drift: tuple[bool, bool, bool, bool, bool, bool] | None = None
+    ik: IkSettings = field(default_factory=IkSettings)
+
+
+class ServoSource:
+    """Turns a command into joint speeds, cycle by cycle.
+
+    Axes that are not commanded are held where they are: their pose is remembered, and errors are
+    brought back. An axis that was released is held from where it comes to rest.
+    """
+
+    def __init__(self, model: RobotModel, settings: ServoSettings | None = None) -> None:
+        """Prepare.
+
+        Args:
+            model: The arm.
+            settings: How jogging behaves.
+        """
+        self._model = model
+        self._settings = settings or ServoSettings()
+        self._ik = VelocityIk(model, self._settings.ik)
+        drift = self._settings.drift or (False,) * 3 + (len(model) < 6,) * 3
+        self._drift = np.array(drift)
+        self._length = model.reach / 3.0
+        self._held: Pose | None = None
+        self._axes_of: object = None
+        self._free = NO_AXES
+        self._share = 1.0
+
+    def reset(self) -> None:
+        """Forget what is held."""
+        self._held = None
+        self._axes_of = None
+        self._free = NO_AXES
+        self._share = 1.0
+
+    def step(self, state: RobotState, command: Command, period: float) -> IkAnswer:
+        """Find the joint speeds for a command.
+
+        Args:
+            state: Commanded state of the joints.
+            command: What is asked.
+            period: Time to the next step in [s].
+        """
+        if isinstance(command, JointCommand):
+            self.reset()
+            return self._ik.joints(state, command.velocity, command.commanded, period)
+        if isinstance(command, PoseCommand):
+            self.reset()
+            return self._toward(state, command, period)
+        return self._jog(state, command, period)
+
+    def _jog(self, state: RobotState, command: TwistCommand, period: float) -> IkAnswer:
+        pose = self._model.pose(state.position)
+        axes = self._axes(state, command)
+        family = command.link if command.axes is None else 'axes'
+        if self._held is None or family != self._axes_of:
+            self._held, self._axes_of, self._free = pose, family, NO_AXES
+        commanded = np.abs(command.twist) > 0.0
+        released = self._free & ~commanded
+        if released.any():
+            released &= self._still_moving(state, axes)
+        moved = self._free = released | commanded
+        error = _error(self._held, pose, axes)
+        error[moved | self._drift] = 0.0
+        self._held = _moved(pose, axes, error)
+        share = self._share = self._governor(error, period)
+        task = TwistTask(
+            command.twist * share, axes, moved, self._drift, self._settings.hold * error
+        )
+        answer = self._ik.cartesian(state, task, period)
+        if share == 1.0:
+            return answer
+        off = float(np.abs(error).max())
+        limiter = Limiter(Cause.HOLD, 'held axes come back first', off, share)
+        report = answer.report
+        return IkAnswer(
+            answer.velocity, MotionReport(report.factor * share, (*report.limiters, limiter))
+        )
+
+    def _axes(self, state: RobotState, command: TwistCommand) -> Array:
+        if command.axes is not None:
+            return command.axes
+        if command.link is None:
+            return BASE
+        return self._model.pose(state.position, command.link).rotation
+
+    def _still_moving(self, state: RobotState, axes: Array) -> Mask:
+        twist = self._model.jacobian(state.position) @ state.velocity
+        moving: Mask = np.abs(turned_twists(axes, twist)) > RELEASED
+        return moving
+
+    def _governor(self, error: Array, period: float) -> float:
+        """Return the share of the command that is carried out while held axes are off."""
+        scale = self._settings.path_error
+        x, y, z, *turns = error.tolist()
+        off: float = max(map(abs, (x, y, z, *(self._length * turn for turn in turns))))
+        wanted = min(1.0, max(MIN_SHARE, 1.0 - (off - scale) / (4.0 * scale)))
+        return min(max(wanted, self._share - period / SLOWED), self._share + period / HASTENED)
+
+    def _toward(self, state: RobotState, command: PoseCommand, period: float) -> IkAnswer:
+        """Approach a pose, slowing down so as to arrive at rest."""
+        settings = self._settings
+        error = _error(command.pose, self._model.pose(state.position), np.eye(3))
+        linear = _approach(
+            error[:3], settings.approach, command.linear_speed, settings.linear_deceleration
+        )
+        angular = _approach(
+            error[3:], settings.approach, command.angular_speed, settings.angular_deceleration
+        )
+        twist = np.concatenate((linear, angular))
+        return self._ik.cartesian(
+            state, TwistTask(twist, np.eye(3), ~self._drift, self._drift), period
+        )
+
+
+def _approach(error: Array, gain: float, fastest: float, deceleration: float) -> Array:
+    """Return a velocity towards a point: even, then braking, then fading."""
+    distance = float(np.linalg.norm(error))
+    if distance == 0.0:
+        return error
+    speed = min(fastest, gain * distance, np.sqrt(deceleration * distance))
+    approach: Array = error * (speed / distance)
+    return approach
+
+
+def _error(wanted: Pose, actual: Pose, axes: Array) -> Array:
+    """Return the twist from one pose to another in unit time, along some axes (6)."""
+    angular = pin.log3(wanted.rotation @ actual.rotation.T)
+    return np.concatenate((axes.T @ (wanted.position - actual.position), axes.T @ angular))
+
+
+def _moved(pose: Pose, axes: Array, twist: Array) -> Pose:
+    """Return a pose moved by a twist along some axes in unit time."""
+    return Pose(pin.exp3(axes @ twist[3:]) @ pose.rotation, pose.position + axes @ twist[:3])

@@ -1,0 +1,229 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""From an asked speed of the tool or of joints to joint speeds that keep every limit.
+
+A quadratic program finds the joint speeds x that come nearest to the asked twist V::
+
+    min  |W (J x - V)|^2 + sum_i d_i^2 (v_i' x)^2 + w (n' x - e)^2
+    with  -b(q - lower) <= x <= b(upper - q)          brakes in front of a joint's limit
+          x0 - c <= x <= x0 + c                       what accelerations can bring about soon
+          (dd/dq) x >= -k (d - margin)                brakes in front of each near pair of links
+
+Held axes weigh more in W than commanded ones, so that what a limit takes away is taken from the
+command and not paid for by a drift. d_i damps the directions that are nearly lost, and only those;
+n is the way out of a singular pose. Whatever the arm is in, standing still or leaving is feasible.
+The answer is then slowed as a whole to the joints' greatest speeds, which keeps its direction.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from arm_model import Array, frozen, Mask, RobotModel, RobotState, turned_twists
+
+from ..report import Cause, Limiter, MotionReport
+from .box_qp import Program
+from .reach_limit import ReachLimit
+from .singularity import Directions, directions
+from .velocity_bounds import Bounds, VelocityBounds, VelocityBoundsSettings
+
+AXES = ('x', 'y', 'z', 'rotation x', 'rotation y', 'rotation z')
+"""Names of the axes of a twist."""
+
+RIDGE = 1e-5
+"""Weight of the joint speeds that keeps the program definite."""
+
+
+@dataclass(frozen=True, slots=True)
+class IkSettings:
+    """How the velocity inverse kinematics weighs.
+
+    Attributes:
+        hold_weight: Weight of held axes against commanded ones.
+        drift_weight: Weight of axes that may drift.
+        escape: Share of a joint's speed with which it leaves a singular pose.
+        brakes: How it brakes in front of limits.
+    """
+
+    hold_weight: float = 30.0
+    drift_weight: float = 0.01
+    escape: float = 0.3
+    brakes: VelocityBoundsSettings = field(default_factory=VelocityBoundsSettings)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TwistTask:
+    """An asked speed of the tool.
+
+    Attributes:
+        twist: Linear [m/s], then angular [rad/s], along the task's axes (6).
+        axes: Rotation from the task's axes to the base link (3, 3).
+        commanded: Mask of the axes that the command moves (6).
+        drifting: Mask of the other axes that need not be held (6).
+        correction: Speed that brings the held axes back where they belong (6).
+    """
+
+    twist: Array
+    axes: Array
+    commanded: Mask
+    drifting: Mask
+    correction: Array = field(default_factory=lambda: np.zeros(6))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class IkAnswer:
+    """Joint speeds, and what limits them.
+
+    Attributes:
+        velocity: Joint speeds in [rad/s].
+        report: What limits them.
+    """
+
+    velocity: Array
+    report: MotionReport
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Weighted:
+    """A task with its weights: jacobian (k, n), command and correction (k)."""
+
+    jacobian: Array
+    command: Array
+    correction: Array
+
+
+class VelocityIk:
+    """Velocity inverse kinematics of an arm.
+
+    What it remembers is in :class:`ReachLimit`.
+    """
+
+    def __init__(self, model: RobotModel, settings: IkSettings | None = None) -> None:
+        """Prepare.
+
+        Args:
+            model: The arm.
+            settings: Weights and margins.
+        """
+        self._model = model
+        self._settings = settings or IkSettings()
+        self._limits = model.limits
+        self._brakes = VelocityBounds(model, self._settings.brakes)
+        length = model.reach / 3.0
+        self._scale = np.array([1.0 / length] * 3 + [1.0] * 3)
+        self._weighed = b''
+        self._axis_weights = self._scale
+        self._ridge = RIDGE * np.eye(len(model))
+        settings = self._settings
+        self._reach_limit = ReachLimit(model.limits, settings.escape, settings.brakes.braking)
+
+    def cartesian(self, state: RobotState, task: TwistTask, period: float) -> IkAnswer:
+        """Find joint speeds for a speed of the tool.
+
+        Args:
+            state: Commanded state of the joints.
+            task: What is asked.
+            period: Time to the next step in [s].
+        """
+        weights = self._weights(task)
+        bounds = self._brakes.bounds(state, period)
+        # the directions of the weighted task: how well the command does while held axes stay
+        asked = _Weighted(
+            self._turned(state.position, task.axes, weights),
+            task.twist * weights,
+            task.correction * weights,
+        )
+        found = directions(asked.jacobian, asked.command, asked.correction, self._limits.velocity)
+        position = state.position
+
+        def jacobian_at(other: Array) -> Array:
+            return self._turned(other, task.axes, weights)
+
+        found = self._reach_limit.slowed(jacobian_at, position, found, asked.command)
+        hessian = asked.jacobian.T @ asked.jacobian
+        if found.damped:
+            hessian += (found.joints.T * found.damping) @ found.joints
+        gradient = -((asked.command + asked.correction) @ asked.jacobian)
+        way = self._reach_limit.way_out(jacobian_at, position, found, asked.command)
+        if way is not None:
+            hessian += way.weight * np.outer(way.direction, way.direction)
+            gradient -= (way.weight * way.speed) * way.direction
+        return self._answer(hessian, gradient, bounds, asked, found)
+
+    def joints(
+        self, state: RobotState, velocity: Array, commanded: Mask, period: float
+    ) -> IkAnswer:
+        """Find joint speeds near asked ones; joints that are not commanded are held.
+
+        Args:
+            state: Commanded state of the joints.
+            velocity: Asked speeds in [rad/s].
+            commanded: Mask of the joints that the command moves.
+            period: Time to the next step in [s].
+        """
+        self._reach_limit.forget()
+        weight = np.where(commanded, 1.0, self._settings.hold_weight)
+        asked = _Weighted(np.diag(weight), weight * velocity, np.zeros(len(weight)))
+        hessian = np.diag(weight * weight)
+        bounds = self._brakes.bounds(state, period)
+        return self._answer(hessian, -(weight * weight * velocity), bounds, asked, None)
+
+    def _weights(self, task: TwistTask) -> Array:
+        """Return the weights of the axes; they change only with what is commanded."""
+        key = task.commanded.tobytes() + task.drifting.tobytes()
+        if key != self._weighed:
+            weights = np.where(task.commanded, 1.0, self._settings.hold_weight)
+            weights[task.drifting & ~task.commanded] = self._settings.drift_weight
+            self._weighed, self._axis_weights = key, frozen(weights * self._scale)
+        return self._axis_weights
+
+    def _turned(self, position: Array, axes: Array, weights: Array) -> Array:
+        """Return the weighted Jacobian along a task's axes."""
+        return turned_twists(axes, self._model.jacobian(position)) * weights[:, None]
+
+    def _answer(
+        self,
+        hessian: Array,
+        gradient: Array,
+        bounds: Bounds,
+        asked: _Weighted,
+        found: Directions | None,
+    ) -> IkAnswer:
+        """Solve, slow down to the joints' speeds, and say what limits."""
+        hessian += self._ridge
+        lower, upper, rows, least = bounds.lower, bounds.upper, bounds.rows, bounds.least
+        solution = Program(hessian, gradient, lower, upper, rows, least).solve()
+        if solution is None:  # too fast for the rows; standing still is feasible
+            lower, upper = np.minimum(lower, 0.0), np.maximum(upper, 0.0)
+            solution = Program(hessian, gradient, lower, upper, rows, least).solve()
+        if solution is None:
+            stuck = Limiter(Cause.SOLVER, 'no answer; standing still', 0.0, 0.0)
+            return IkAnswer(np.zeros(len(gradient)), MotionReport(0.0, (stuck,)))
+        velocity, command = solution.values, asked.command
+        excess = np.abs(velocity) / self._limits.velocity
+        fastest = int(excess.argmax())
+        slowed = 1.0 / max(1.0, float(excess[fastest]))
+        size = float(command @ command)
+        factor = float(command @ (asked.jacobian @ velocity)) * slowed / size if size else 1.0
+        limiters = self._brakes.pressing(bounds, solution.forces, factor)
+        if slowed < 0.999:
+            name, needed = self._limits.names[fastest], float(abs(velocity[fastest]))
+            limiters.append(Limiter(Cause.JOINT_VELOCITY, name, needed, slowed))
+        if found is not None and size:
+            limiters += _losses(found, command, factor)
+        return IkAnswer(velocity * slowed, MotionReport(factor, tuple(limiters)))
+
+
+def _losses(found: Directions, command: Array, factor: float) -> list[Limiter]:
+    """Name what the command loses to directions that the arm lacks here."""
+    if factor > 0.99:
+        return []
+    parts = command @ found.tool
+    kept = float(np.sum(found.share * parts * parts) / (command @ command))
+    if kept > 0.99:
+        return []
+    axis = AXES[int(np.argmax(np.abs(command)))]
+    left = min(max(min(kept, factor), 0.0), 1.0)
+    return [Limiter(Cause.SINGULARITY, f'{axis} is lost here', found.least, left)]

@@ -1,0 +1,171 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What joint_state_broadcaster publishes: joint_states and dynamic_joint_states."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+import math
+import time
+
+from control_msgs.msg import DynamicJointState, InterfaceValue
+import numpy as np
+from rclpy.duration import Duration
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
+
+from node_runner import ParameterReader
+
+from ..core.gateway import CommandGateway
+from ..core.snapshot import Snapshot
+from .controller_manager import Controller
+from .trajectory.parameters import RATES
+
+MAX_AGE = 0.5
+"""Age at which a measured value is published no more in [s]: as long as a drive may be silent."""
+
+
+@dataclass(frozen=True, slots=True)
+class JointSample:
+    """What was measured of a joint.
+
+    Attributes:
+        position: In [rad].
+        velocity: In [rad/s].
+        time: When, as steady time in [s].
+    """
+
+    position: float
+    velocity: float
+    time: float
+
+
+class JointSamples:
+    """What is known of the arm's joints, and of drives beside them such as a gripper."""
+
+    def __init__(self, joints: Sequence[str]) -> None:
+        self._joints = list(joints)
+        self._heard: dict[str, JointSample] = {}
+
+    def hear(self, joint: str, sample: JointSample) -> None:
+        """Take what the drive of another joint has measured."""
+        self._heard[joint] = sample
+
+    def fresh(self, snapshot: Snapshot, now: float) -> dict[str, JointSample]:
+        """Return what was measured lately, the arm's joints first.
+
+        Args:
+            snapshot: What the core does.
+            now: Steady time in [s].
+        """
+        return {
+            name: sample
+            for name, sample in (self._of_the_arm(snapshot) | self._heard).items()
+            if now - sample.time <= MAX_AGE
+        }
+
+    def _of_the_arm(self, snapshot: Snapshot) -> dict[str, JointSample]:
+        measured = snapshot.measured
+        if measured is None:
+            return {}
+        ages = np.zeros(len(self._joints)) if snapshot.ages is None else snapshot.ages
+        rows = zip(self._joints, measured.position, measured.velocity, ages, strict=True)
+        return {
+            name: JointSample(float(position), float(velocity), snapshot.time - float(age))
+            for name, position, velocity, age in rows
+        }
+
+
+def declare_broadcaster(node: Node) -> tuple[str, float, bool]:
+    """Declare frame and rate [Hz] of the messages, and whether dynamic ones are published.
+
+    Args:
+        node: The node.
+    """
+    read = ParameterReader(node)
+    return (
+        read.text('frame_id', 'base_link', 'frame of the messages'),
+        read.number('update_rate', 50.0, RATES, 'rate of the messages [Hz]'),
+        read.flag(
+            'publish_dynamic_joint_states', 'publish /dynamic_joint_states too', default=True
+        ),
+    )
+
+
+class JointStateBroadcaster:
+    """Publishes what the drives measure, stamped when the oldest of it was measured.
+
+    Attributes:
+        active: Whether it publishes.
+        rate: Its rate in [Hz].
+    """
+
+    def __init__(
+        self, node: Node, gateway: CommandGateway, others: Sequence[str], *, active: bool
+    ) -> None:
+        """Advertise.
+
+        Args:
+            node: The node ``joint_state_broadcaster``.
+            gateway: Commands to the core.
+            others: Drives that are no joints of the arm; they publish ``<drive>/joint_states``.
+            active: Whether it publishes from the start.
+        """
+        self.active = active
+        self._node, self._gateway = node, gateway
+        self._frame, self.rate, self._is_dynamic = declare_broadcaster(node)
+        self._samples = JointSamples(gateway.model.joints)
+        self._states = node.create_publisher(JointState, 'joint_states', 10)
+        self._dynamic = node.create_publisher(DynamicJointState, 'dynamic_joint_states', 10)
+        for name in others:
+            topic = f'{name}/joint_states'
+            node.create_subscription(JointState, topic, partial(self._hear, name), 10)
+        node.create_timer(1.0 / self.rate, self._publish)
+
+    def entry(self) -> Controller:
+        """Return it as the manager shows it."""
+        kind = 'joint_state_broadcaster/JointStateBroadcaster'
+        rate = round(self.rate)
+        return Controller(self._node.get_name(), kind, rate, self.set_active, active=self.active)
+
+    def set_active(self, active: bool) -> None:  # a callback of the manager
+        """Publish, or stop publishing."""
+        self.active = active
+
+    def _hear(self, name: str, message: JointState) -> None:
+        if name not in message.name:
+            return
+        place = list(message.name).index(name)
+        if place < len(message.position) and math.isfinite(message.position[place]):
+            has_velocity = place < len(message.velocity)
+            velocity = message.velocity[place] if has_velocity else math.nan
+            sample = JointSample(message.position[place], velocity, time.monotonic())
+            self._samples.hear(name, sample)
+
+    def _publish(self) -> None:
+        now = time.monotonic()
+        samples = self._samples.fresh(self._gateway.snapshot, now)
+        if not samples or not self.active:
+            return
+        rows = list(samples.values())
+        message = JointState(
+            name=list(samples),
+            position=[row.position for row in rows],
+            velocity=[row.velocity for row in rows],
+        )
+        age = Duration(nanoseconds=round((now - min(row.time for row in rows)) * 1e9))
+        message.header.stamp = (self._node.get_clock().now() - age).to_msg()
+        message.header.frame_id = self._frame
+        self._states.publish(message)
+        if self._is_dynamic:
+            values = [
+                InterfaceValue(
+                    interface_names=['position', 'velocity'], values=[row.position, row.velocity]
+                )
+                for row in rows
+            ]
+            dynamic = DynamicJointState(joint_names=list(samples), interface_values=values)
+            dynamic.header = message.header
+            self._dynamic.publish(dynamic)

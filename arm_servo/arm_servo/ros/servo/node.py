@@ -1,0 +1,177 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The servo's topics and services on a node."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import Future
+from dataclasses import replace
+from functools import partial
+import time
+import traceback
+from typing import Any
+
+from control_msgs.msg import JointJog
+from geometry_msgs.msg import PoseStamped, TwistStamped
+from moveit_msgs.msg import ServoStatus
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from arm_model import ArmError, ModelError
+from arm_model.ros import seconds, TfListener
+from arm_trajectory import GoalCode
+
+from ...core.gateway import CommandGateway, JOGGING
+from ...core.outcome import Outcome
+from ...core.requests import DisplacementRequest, JogRequest
+from ...exceptions import NotReadyError
+from ..refusals import Refusals
+from .command_converter import CommandConverter
+from .modes import CommandKind, ServoModes
+from .parameters import PREFIX, read_scales, Scales, ServoParameters
+from .status import status_of
+
+Convert = Callable[[Any, float], JogRequest | DisplacementRequest]
+
+FRESH = 0.5
+"""Silence after which a command begins a new motion, which may take drives back, in [s]."""
+
+FUTURE = 0.1
+"""How far ahead of this clock a stamp may be in [s]."""
+
+
+class Servo:
+    """``~/delta_twist_cmds``, ``~/delta_joint_cmds``, ``~/pose_target_cmds`` and their services.
+
+    Attributes:
+        converter: Makes requests of messages.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        gateway: CommandGateway,
+        parameters: ServoParameters,
+        prepare: Callable[[], None],
+    ) -> None:
+        """Offer them.
+
+        Args:
+            node: The servo's node.
+            gateway: Commands to the core.
+            parameters: How it behaves.
+            prepare: Called before a new motion, to get the drives back.
+        """
+        self._node, self._gateway, self._prepare = node, gateway, prepare
+        self._parameters = parameters
+        self._modes = ServoModes(node, self._stop)
+        model = gateway.model
+        frames = TfListener(node, model, parameters.frame_prefix)
+        self.converter = CommandConverter(model, frames, parameters, read_scales(node))
+        self._last = -FRESH
+        self._refusals = Refusals()
+        self._status = node.create_publisher(ServoStatus, parameters.status_topic, 10)
+        for kind, message, topic, convert in (
+            (CommandKind.TWIST, TwistStamped, parameters.twist_topic, self.converter.twist),
+            (CommandKind.JOINT_JOG, JointJog, parameters.joint_topic, self.converter.jog),
+            (CommandKind.POSE, PoseStamped, parameters.pose_topic, self.converter.pose),
+        ):
+            node.create_subscription(message, topic, partial(self._take, kind, convert), 10)
+        node.add_on_set_parameters_callback(self._check_scales)
+        node.add_post_set_parameters_callback(self._rescale)
+        node.create_timer(1.0 / parameters.status_rate, self._publish_status)
+
+    def _take(self, kind: CommandKind, convert: Convert, message: Any) -> None:  # noqa: ANN401  # messages have no type
+        begin = time.monotonic()
+        try:
+            age = self._checked_age(message)
+            self._modes.admit(kind)
+            request = convert(message, begin - age)
+            if not request.is_zero and begin - self._last > FRESH:
+                self._prepare()
+        except ArmError as error:
+            self._refuse(str(error))
+            return
+        except Exception as error:  # noqa: BLE001  # a message must not end the program
+            self._refuse(f'{type(error).__name__}: {error}')
+            self._node.get_logger().error(
+                f'a {kind.name} command raised {traceback.format_exc()}', throttle_duration_sec=5.0
+            )
+            return
+        if not request.is_zero:
+            self._last = begin
+        if isinstance(request, JogRequest):
+            # the events executor hands out no publisher, so topic and frame tell who asks
+            request = replace(request, client=(kind, message.header.frame_id))
+            self._gateway.jog(request).add_done_callback(self._note)
+            return
+        command = self._gateway.request(request)
+        command.future.add_done_callback(self._note)
+        command.ended.add_done_callback(self._note_end)
+
+    def _checked_age(self, message: Any) -> float:  # noqa: ANN401
+        """Return how long ago a message was sent in [s]."""
+        stamp = seconds(message.header.stamp)
+        if not stamp:  # as good as now
+            return 0.0
+        age = float(self._node.get_clock().now().nanoseconds) * 1e-9 - stamp
+        if age > self._parameters.timeout:
+            late = age - self._parameters.timeout
+            raise NotReadyError(
+                f'stale by {late:.2f} s: are the clocks in step? A stamp of 0 is taken as now'
+            )
+        if age < -FUTURE:
+            raise NotReadyError(f'stamped {-age:.2f} s in the future: are the clocks in step?')
+        return max(age, 0.0)
+
+    def _note(self, future: Future[Any]) -> None:
+        """Remember what became of a command; in the cycle, so nothing is logged here."""
+        error = None if future.cancelled() else future.exception()
+        if error is not None:
+            self._refuse(str(error))
+        else:
+            self._refusals.clear()
+
+    def _note_end(self, future: Future[Outcome]) -> None:
+        """Remember why a displacement did not get to its end."""
+        if future.result().code is GoalCode.PATH_TOLERANCE_VIOLATED:
+            self._refuse(future.result().reason)
+
+    def _refuse(self, reason: str) -> None:
+        self._refusals.note(reason, time.monotonic())
+
+    def _stop(self, reason: str) -> None:
+        self._gateway.stop(JOGGING, reason)
+
+    def _check_scales(self, parameters: list[Parameter]) -> SetParametersResult:
+        for parameter in parameters:
+            if parameter.name == f'{PREFIX}command_in_type':
+                known = {'unitless', 'speed_units'}
+                if parameter.value not in known:
+                    reason = f'{parameter.name}: one of {sorted(known)}'
+                    return SetParametersResult(successful=False, reason=reason)
+        return SetParametersResult(successful=True)
+
+    def _rescale(self, _parameters: list[Parameter]) -> None:
+        self.converter.scales = self._scales()
+
+    def _scales(self) -> Scales:
+        try:
+            return read_scales(self._node)
+        except ModelError:
+            return self.converter.scales
+
+    def _publish_status(self) -> None:
+        now, snapshot = time.monotonic(), self._gateway.snapshot
+        code, words = status_of(
+            snapshot,
+            self._refusals.fresh(now),
+            self._modes.paused,
+            self.converter.capped,
+            now - snapshot.time,
+        )
+        if reason := self._refusals.to_log(now):
+            self._node.get_logger().warning(f'refused: {reason}')
+        self._status.publish(ServoStatus(code=code, message=words))

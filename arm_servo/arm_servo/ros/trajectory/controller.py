@@ -1,0 +1,169 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The trajectory controller's topics, service and action on a node."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from concurrent.futures import Future
+import time
+import traceback
+from typing import Any
+
+from control_msgs.msg import JointTrajectoryControllerState, SpeedScalingFactor
+from control_msgs.srv import QueryTrajectoryState
+from rclpy.duration import Duration
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from trajectory_msgs.msg import JointTrajectory
+
+from arm_model import ArmError
+from arm_model.ros import seconds
+from arm_trajectory import TrajectoryGoal
+
+from ...core.execution import Execution
+from ...core.gateway import CommandGateway, MotionCommand
+from ...core.set_point import Source
+from ...exceptions import NotReadyError
+from .action import TrajectoryAction
+from .messages import difference, goal_of_action, goal_of_trajectory, point_of
+from .parameters import TrajectoryParameters
+from .pause import TrajectoryPause
+
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+"""For a value that counts until the next one."""
+
+
+class TrajectoryController:
+    """``~/follow_joint_trajectory``, ``~/joint_trajectory`` and what belongs to them.
+
+    Attributes:
+        active: Whether it takes trajectories.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        gateway: CommandGateway,
+        parameters: TrajectoryParameters,
+        prepare: Callable[[], None],
+    ) -> None:
+        """Offer them.
+
+        Args:
+            node: The controller's node.
+            gateway: Commands to the core.
+            parameters: How it behaves.
+            prepare: Called before a trajectory, to get the drives back.
+        """
+        self.active = True
+        self._node = node
+        self._gateway = gateway
+        self._parameters = parameters
+        self._prepare = prepare
+        self._execution: Execution | None = None
+        self._news: deque[str] = deque()
+        self._state = node.create_publisher(
+            JointTrajectoryControllerState, '~/controller_state', 10
+        )
+        node.create_subscription(JointTrajectory, '~/joint_trajectory', self._take, 10)
+        for qos in (LATCHED, 1):  # who publishes it once from a shell does not latch it
+            node.create_subscription(SpeedScalingFactor, '~/speed_scaling_input', self._scale, qos)
+        node.create_service(QueryTrajectoryState, '~/query_state', self._query)
+        TrajectoryPause(node, gateway)
+        node.create_timer(1.0 / parameters.state_rate, self._publish_state)
+        self._action = TrajectoryAction(
+            node, gateway, parameters.monitor_rate, self._convert, self._follow
+        )
+        if parameters.speed != 1.0:
+            self._override(parameters.speed)
+
+    def set_active(self, active: bool) -> None:  # a callback of the manager
+        """Take trajectories, or stop on the path and take none."""
+        self.active = active
+        if not active:
+            self._gateway.stop([Source.TRAJECTORY], 'the controller was deactivated')
+
+    @property
+    def _now(self) -> float:
+        return float(self._node.get_clock().now().nanoseconds) * 1e-9
+
+    def _convert(self, request: Any) -> TrajectoryGoal:  # noqa: ANN401  # goals have no type
+        return goal_of_action(request, self._now, self._parameters)
+
+    def _follow(self, goal: TrajectoryGoal) -> MotionCommand:
+        self._check_active()
+        self._prepare()
+        command = self._gateway.request(goal)
+        command.future.add_done_callback(self._remember)
+        return command
+
+    def _check_active(self) -> None:
+        if not self.active:
+            name = self._node.get_name()
+            raise NotReadyError(f'{name} is inactive; activate it with switch_controller')
+
+    def _remember(self, future: Future[Execution | None]) -> None:
+        if not future.cancelled() and future.exception() is None:
+            self._execution = future.result()
+
+    def _take(self, message: JointTrajectory) -> None:
+        try:
+            command = self._follow(goal_of_trajectory(message, self._now, self._parameters))
+        except ArmError as error:
+            self._news.append(f'trajectory refused: {error}')
+            return
+        except Exception:  # noqa: BLE001  # a message must not end the program
+            self._node.get_logger().error(f'trajectory refused: {traceback.format_exc()}')
+            return
+        command.future.add_done_callback(self._tell_refusal)
+
+    def _scale(self, message: SpeedScalingFactor) -> None:
+        self._override(message.factor)
+
+    def _override(self, speed: float) -> None:
+        self._gateway.override(speed).add_done_callback(self._tell_refusal)
+
+    def _tell_refusal(self, future: Future[Any]) -> None:
+        if not future.cancelled() and (error := future.exception()) is not None:
+            self._news.append(f'refused: {error}')  # the cycle must not wait for a log
+
+    def _query(
+        self, request: QueryTrajectoryState.Request, response: QueryTrajectoryState.Response
+    ) -> QueryTrajectoryState.Response:
+        snapshot, execution = self._gateway.snapshot, self._execution
+        state = snapshot.reference
+        response.message = snapshot.stale(time.monotonic() - snapshot.time)
+        if state is None or response.message:
+            response.message = response.message or snapshot.blocked
+            return response
+        ahead = seconds(request.time) - self._now if seconds(request.time) else 0.0
+        if snapshot.source is Source.TRAJECTORY and execution is not None:
+            state = execution.foreseen(ahead)
+        response.success = True
+        response.message = 'paused; ~/resume goes on' if snapshot.paused else ''
+        response.name = list(self._gateway.model.joints)
+        response.position = state.position.tolist()
+        response.velocity = state.velocity.tolist()
+        response.acceleration = state.acceleration.tolist()
+        return response
+
+    def _publish_state(self) -> None:
+        while self._news:
+            self._node.get_logger().warning(self._news.popleft())
+        snapshot = self._gateway.snapshot
+        wanted, measured = snapshot.reference, snapshot.measured
+        if wanted is None or measured is None:
+            return
+        message = JointTrajectoryControllerState(
+            joint_names=list(self._gateway.model.joints),
+            reference=point_of(wanted),
+            feedback=point_of(measured),
+            error=point_of(difference(self._gateway.model.limits, wanted, measured)),
+            output=point_of(wanted),
+            speed_scaling_factor=snapshot.speed_scaling,
+        )
+        age = Duration(nanoseconds=round((time.monotonic() - snapshot.time) * 1e9))
+        message.header.stamp = (self._node.get_clock().now() - age).to_msg()  # that of the cycle
+        self._state.publish(message)
