@@ -1,0 +1,72 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""docs/ARCHITECTURE.md names what exists, where it says."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+import re
+
+import pytest
+
+from workspace.layout import this_checkout
+from workspace.packages import find_packages
+
+PAGE = (this_checkout().root / 'docs' / 'ARCHITECTURE.md').read_text(encoding='utf-8')
+PACKAGES = find_packages(this_checkout().root)
+STEPS = re.findall(r'^\d+\. .*$', PAGE, re.MULTILINE)
+NAME = re.compile(r'[A-Z]\w+(\.\w+)?|\w+\(\)')
+
+
+@cache
+def definitions(folder: Path) -> frozenset[str]:
+    """Collect classes, their methods, and functions of all modules in a folder."""
+
+    def in_module(tree: ast.Module) -> Iterator[str]:
+        for node in tree.body:
+            if isinstance(node, (ast.ClassDef, ast.FunctionDef)):
+                yield node.name
+            if isinstance(node, ast.ClassDef):
+                methods = (each for each in node.body if isinstance(each, ast.FunctionDef))
+                yield from (f'{node.name}.{method.name}' for method in methods)
+
+    files = folder.rglob('*.py')
+    trees = (ast.parse(file.read_text(encoding='utf-8')) for file in files)
+    return frozenset(name for tree in trees for name in in_module(tree))
+
+
+def folder_of(place: str) -> Path:
+    """Return the folder of a package, or of a family in it."""
+    package, _, family = place.partition('/')
+    assert package in PACKAGES, f'there is no package {package}'
+    return PACKAGES[package].folder / package / family
+
+
+@pytest.mark.parametrize('step', STEPS)
+def test_every_name_is_where_the_page_says(step: str) -> None:
+    """A class, a method or a function(); a place counts for what follows it in the line."""
+    place = ''
+    for code in re.findall(r'`([^`]+)`', step):
+        if code.partition('/')[0] in PACKAGES:
+            place = code
+            assert folder_of(place).is_dir(), f'there is no {place}'
+        elif NAME.fullmatch(code):
+            found = code.removesuffix('()') in definitions(folder_of(place))
+            assert found, f'there is no {code} in {place}'
+
+
+def test_each_way_has_ten_steps() -> None:
+    """No more, no less, of each of four."""
+    assert len(STEPS) == 40
+
+
+def test_the_picture_shows_every_package() -> None:
+    """And none that is not there."""
+    picture = PAGE.split('```')[1]
+    own = {name for name, package in PACKAGES.items() if not package.is_copy}
+    shown = set(re.findall(r'\b(?:\w+_)+\w+\b', picture))
+    assert own - shown == set()
+    assert shown - own - {'robot_state_publisher'} == set()
