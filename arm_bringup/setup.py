@@ -38,7 +38,7 @@ setup(
             'check = arm_bringup.check:main',
             'demo = arm_bringup.demos.wave.main:main',
             'motion_demo = arm_bringup.demos.motion:main',
-            'wave_master = arm_bringup.wave_master:main',
+            'wave_master = arm_bringup.demos.wave.master:main',
         ],
     },
 )

@@ -41,7 +41,7 @@ def libraries(program: str, *arguments: str) -> set[str]:
     ('entry', 'unwanted'),
     [
         ('arm_canopen.nodes.master', FOREIGN | MODEL),
-        ('arm_bringup.wave_master', FOREIGN | MODEL),
+        ('arm_bringup.demos.wave.master', FOREIGN | MODEL),
         ('arm_servo.ros.motion_master', FOREIGN),
     ],
 )

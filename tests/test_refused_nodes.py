@@ -15,8 +15,8 @@ import rclpy
 from rclpy.node import Node
 from urdf_reader import DescriptionError
 
+from arm_bringup.demos.wave.node import WaveNode
 from arm_bringup.exceptions import BringupError
-from arm_bringup.wave_node import WaveNode
 from arm_canopen import CanopenError
 from arm_canopen.nodes.joint_state_publisher import JointStatePublisher
 from node_runner import ParameterError

@@ -13,8 +13,7 @@ from hypothesis import strategies as st
 import pytest
 from urdf_reader import JointRange
 
-from arm_bringup.exceptions import WaveError
-from arm_bringup.wave import (
+from arm_bringup.demos.wave.plan import (
     plan_swing,
     plan_wave,
     quintic_step,
@@ -23,7 +22,8 @@ from arm_bringup.wave import (
     Swing,
     WaveStyle,
 )
-from arm_bringup.wave_source import WaveSource, WaveState
+from arm_bringup.demos.wave.source import WaveSource, WaveState
+from arm_bringup.exceptions import WaveError
 from arm_canopen import Refusal, RefusalCause
 
 CYCLE = 0.01  # [s]

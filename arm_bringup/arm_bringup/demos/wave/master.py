@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from arm_canopen import run_master
 
-from .exceptions import BringupError
-from .wave_node import WaveNode
+from ...exceptions import BringupError
+from .node import WaveNode
 
 
 def main(argv: list[str] | None = None) -> int:

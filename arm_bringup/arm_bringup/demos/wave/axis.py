@@ -7,7 +7,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 import math
 
-from .wave import Swing, WaveStyle
+from .plan import Swing, WaveStyle
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,8 +11,8 @@ from enum import Enum
 import math
 from typing import TYPE_CHECKING
 
-from .wave import quintic_step, stop_duration, Swing, WaveStyle
-from .wave_axis import AxisReport, WaveAxis
+from .axis import AxisReport, WaveAxis
+from .plan import quintic_step, stop_duration, Swing, WaveStyle
 
 if TYPE_CHECKING:
     from arm_canopen import AxisFeedback, Refusal

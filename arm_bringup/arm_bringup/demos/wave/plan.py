@@ -26,7 +26,7 @@ import math
 
 from urdf_reader import JointRange
 
-from .exceptions import WaveError
+from ...exceptions import WaveError
 
 STEP_SLOPE = 15 / 8
 """Greatest first derivative of the quintic step."""

@@ -12,10 +12,10 @@ from std_srvs.srv import Trigger
 
 from node_runner import destroyed_when_refused, ParameterReader, refuse_misspelt
 
-from .description import joint_limits
-from .wave import plan_wave, WaveStyle
-from .wave_axis import AxisReport
-from .wave_source import REPORT_PERIOD, WaveReport, WaveSource
+from ...description import joint_limits
+from .axis import AxisReport
+from .plan import plan_wave, WaveStyle
+from .source import REPORT_PERIOD, WaveReport, WaveSource
 
 if TYPE_CHECKING:
     from arm_canopen import MasterProcess
