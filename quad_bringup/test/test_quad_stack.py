@@ -89,11 +89,11 @@ def test_hardware_has_no_simulator_and_simulation_has(tmp_path: Path) -> None:
     simulated = processes(tmp_path, Stack(str(port), simulate=True))
     assert set(real) == {'hardware', 'controller', 'robot_state'}
     assert set(simulated) == {'fake_xgo', *real}
-    assert bridge_of(real).link == bridge_of(simulated).link
-    assert bridge_of(real).link.path == str(port)
+    assert bridge_of(real).robot.link == bridge_of(simulated).robot.link
+    assert bridge_of(real).robot.link.path == str(port)
     assert simulator_of(simulated)[0] == port
     for part, known in ((real, False), (simulated, True)):
-        mounting = bridge_of(part).estimator.mounting
+        mounting = bridge_of(part).robot.estimator.mounting
         assert mounting.checked is mounting.rates_checked is known
 
 
@@ -102,8 +102,8 @@ def test_everyone_has_the_same_robot(tmp_path: Path, preset: str, arm: bool) -> 
     """Bridge, controller and simulator: the joints of the description, in its order."""
     specs = processes(tmp_path, Stack(str(tmp_path / 'xgo'), preset, simulate=True, arm=arm))
     names = tuple(joint.name for joint in movable_joints(robot_urdf(preset, arm=arm)))
-    assert bridge_of(specs).joints.names == names
-    assert bridge_of(specs).urdf == robot_urdf(preset, arm=arm)
+    assert bridge_of(specs).robot.joints.names == names
+    assert bridge_of(specs).robot.urdf == robot_urdf(preset, arm=arm)
     assert controller_of(specs).robot.names == names
     robot = simulator_of(specs)[1].board
     assert len(robot.servos.fitted) == len(names)
@@ -116,15 +116,15 @@ def test_a_calibration_counts(tmp_path: Path) -> None:
     values = {'joints': {'fl_hip_joint': {'sign': -1}}, 'imu': {'mounting_checked': True}}
     write_calibration(calibration, values)
     settings = bridge_of(processes(tmp_path, Stack('/dev/ttyAMA0', calibration=calibration)))
-    assert settings.joints.servos[0].sign == -1
-    assert settings.estimator.mounting.checked
+    assert settings.robot.joints.servos[0].sign == -1
+    assert settings.robot.estimator.mounting.checked
 
 
 @pytest.mark.parametrize('protocol', ['auto', 'new', 'old'])
 def test_both_ends_of_the_line_speak_the_same_protocol(tmp_path: Path, protocol: str) -> None:
     """Whichever the bridge tries first, the simulated robot answers in it."""
     specs = processes(tmp_path, Stack(str(tmp_path / 'xgo'), simulate=True, protocol=protocol))
-    first = bridge_of(specs).link.protocols[0]
+    first = bridge_of(specs).robot.link.protocols[0]
     line = simulator_of(specs)[1].line
     line.set_baud(first.baud)
     register = Code.VERSION if first is NEW else Register.FIRMWARE

@@ -94,7 +94,7 @@ def yaws(reports: Iterable[tuple[float, float | None, float]]) -> list[float]:
         )  # fmt: skip
         estimate = estimator.update(state)
         assert estimate is not None, estimator.refusal
-        place = estimator.walk(estimate)
+        place = estimator.update_odometry(estimate)
         assert place is not None
         headings.append(yaw_of(place.rotation))
     return headings

@@ -129,12 +129,13 @@ def test_joints_are_stamped_when_they_were_measured() -> None:
         return SimpleNamespace(publish=lambda _form, stamp, _numbers: stamps.update({name: stamp}))
 
     node: Any = object.__new__(HardwareNode)
-    node._estimator = Estimator(urdf, joints, EstimatorSettings())
+    estimator = Estimator(urdf, joints, EstimatorSettings())
+    node._robot = estimator
     node._settings = SimpleNamespace(deviations=DEVIATIONS, frames=FRAMES)
     node._joint_states, node._imu, node._odom = map(stream, ('joints', 'imu', 'odom'))
     node._tf = stream('tf')
     node._stamp = lambda monotonic: round(monotonic * 1e3)
-    assert node._report(state) == ''
+    node._publish(estimator.update(state))
     assert stamps == {'joints': 4992, 'imu': 5000, 'odom': 5000, 'tf': 5000}
 
 

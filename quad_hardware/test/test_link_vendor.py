@@ -98,7 +98,7 @@ def declare(*overrides: str) -> LinkOptions:
     rclpy.init(args=['--ros-args', *words], context=context)
     node = Node('hardware_node', context=context, enable_rosout=False)
     try:
-        return parameters.declare_parameters(node).link
+        return parameters.declare_parameters(node).robot.link
     finally:
         node.destroy_node()  # type: ignore[no-untyped-call]
         rclpy.shutdown(context=context)

@@ -144,7 +144,7 @@ class Estimator:
         return raised_feet(self._feet(targets))
 
     def update(self, state: Report) -> Estimate | None:
-        """Take a report; return None when it cannot be. :meth:`walk` comes next."""
+        """Take a report; return None when it cannot be. :meth:`update_odometry` comes next."""
         reason = self._plausibility.check(state)
         if reason:
             self._refused += 1
@@ -180,7 +180,7 @@ class Estimator:
             acceleration=acceleration,
         )
 
-    def walk(self, estimate: Estimate) -> OdometryState | None:
+    def update_odometry(self, estimate: Estimate) -> OdometryState | None:
         """Return where the body is by an estimate, to be called once for each.
 
         None without an attitude, for nobody knows the heading then.

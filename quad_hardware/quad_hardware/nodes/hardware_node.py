@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 import math
 import sys
 import threading
@@ -29,15 +29,13 @@ from node_runner import (
     settle_process_memory,
     spin,
 )
-from quad_description.rotations import tilt_of
 from quad_msgs.msg import JointCommand
 
-from ..estimation import Estimate, Estimator, OdometryState
+from ..estimation import Estimate, OdometryState
 from ..exceptions import CommandError, HardwareError
-from ..joints import JointCommander
 from ..joints.command import NOMINAL_PERIOD
-from ..link import Driver, LinkState, STALE_TIME
-from ..report import Report
+from ..link import LinkState
+from ..serial_robot import SerialRobot
 from . import messages
 from .diagnostics import command_diagnostic, LinkDiagnostic, robot_diagnostic
 from .parameters import declare_parameters
@@ -67,19 +65,13 @@ class HardwareNode(Node):
         """
         super().__init__('hardware_node')
         self._settings = settings = declare_parameters(self)
-        self._joints = settings.joints
-        self._estimator = Estimator(settings.urdf, settings.joints, settings.estimator)
-        self._commander = JointCommander(
-            settings.joints,
-            settings.limiter,
-            settings.command_loss,
-            raised=self._estimator.raised_feet,
-            send=self._send_angles,
-            obstacle=self._obstacle,
+        self._robot = SerialRobot(
+            settings.robot,
+            on_estimate=self._publish,
+            on_change=self._link_changed,
+            on_refusal=self._report_refused,
             warn=self._warn,
         )
-        self._driver = Driver(settings.link, self._report, self._link_changed)
-        self._latest: tuple[Report, Estimate] | None = None  # while the link is running
         self._joint_states = FastPublisher(
             self.create_publisher(JointState, 'joint_states', SENSOR_DEPTH)
         )
@@ -94,38 +86,28 @@ class HardwareNode(Node):
         self.create_service(SetBool, '~/torque', self._set_torque)
         self.create_timer(settings.diagnostics_period, self._diagnose)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        timeout = self._commander.timeout
+        timeout = self._robot.timeout
         self._silence = self.create_timer(timeout, self._miss_commands, clock=steady)
         self._descent = self.create_timer(NOMINAL_PERIOD, self._go_down, clock=steady)
         for timer in (self._silence, self._descent):
             timer.cancel()
-        count = len(self._joints.names)
-        self.get_logger().info(f'{count} joints; looking for the robot on {settings.link.path}')
+        count, path = len(self._robot.names), settings.robot.link.path
+        self.get_logger().info(f'{count} joints; looking for the robot on {path}')
 
     def begin(self) -> None:
         """Start looking for the robot."""
         priority = self._settings.thread_priority
-        self._driver.start(lambda: raise_thread_priority(self, priority, 'the serial driver'))
+        self._robot.start(lambda: raise_thread_priority(self, priority, 'the serial driver'))
 
     def end(self) -> None:
         """Close the port; the servos hold their last target, at rest."""
-        if self._commander.hazard:
-            self._miss_commands()
-        while self._commander.goes_down:
-            self._go_down()
-            time.sleep(NOMINAL_PERIOD)
-        self._driver.stop()
+        self._robot.end(self.get_logger().error)
 
-    def _report(self, state: Report) -> str:
-        """Publish a report; return why it cannot be. Runs in the thread of the driver."""
-        estimate = self._estimator.update(state)
-        if estimate is None:
-            self.get_logger().warning(
-                f'report refused: {self._estimator.refusal}',
-                throttle_duration_sec=WARN_PERIOD,
-            )
-            return self._estimator.refusal
-        self._latest = state, estimate
+    def _report_refused(self, reason: str) -> None:
+        self.get_logger().warning(f'report refused: {reason}', throttle_duration_sec=WARN_PERIOD)
+
+    def _publish(self, estimate: Estimate) -> None:
+        """Publish a report. Runs in the thread of the driver."""
         settings, stamp = self._settings, self._stamp(estimate.time)
         # what a controller waits for comes first
         self._joint_states.publish(
@@ -133,33 +115,34 @@ class HardwareNode(Node):
             self._stamp(estimate.joints_time),
             messages.joint_numbers(estimate),
         )
-        way = self._estimator.walk(estimate)
-        if estimate.attitude is None or way is None:
+        odometry = self._robot.update_odometry(estimate)
+        if estimate.attitude is None or odometry is None:
             self.get_logger().error(
-                f'no /imu, /odom and transforms: {self._estimator.health().imu_problem}; the '
+                f'no /imu, /odom and transforms: {self._robot.health().imu_problem}; the '
                 'joints are published, and the robot can lie down',
                 throttle_duration_sec=WARN_PERIOD,
             )
-            return ''
+            return
         self._imu.publish(
             messages.imu_form(estimate, settings.deviations, settings.frames.imu),
             stamp,
             messages.imu_numbers(estimate, estimate.attitude),
         )
-        self._publish_odometry(estimate, way, stamp)
-        return ''
+        self._publish_odometry(estimate, odometry, stamp)
 
-    def _publish_odometry(self, estimate: Estimate, way: OdometryState, stamp: int) -> None:
+    def _publish_odometry(self, estimate: Estimate, odometry: OdometryState, stamp: int) -> None:
         """Publish where the body is."""
         deviations, frames = self._settings.deviations, self._settings.frames
         self._odom.publish(
             messages.odometry_form(estimate, deviations, frames),
             stamp,
-            messages.odometry_numbers(estimate, way, frames),
+            messages.odometry_numbers(estimate, odometry, frames),
         )
         if frames.publish:
             self._tf.publish(
-                messages.transforms_form(frames), stamp, messages.transforms_numbers(way, frames)
+                messages.transforms_form(frames),
+                stamp,
+                messages.transforms_numbers(odometry, frames),
             )
 
     def _stamp(self, monotonic: float) -> int:
@@ -171,9 +154,6 @@ class HardwareNode(Node):
         """Say how the link is; runs in the thread of the driver."""
         if state is LinkState.RUNNING:
             notify_ready()
-        else:
-            self._latest = None  # the robot may be moved while nobody sees it
-            self._commander.lose()
         if state in {LinkState.REFUSED, LinkState.FAILED}:
             self.get_logger().error(f'{state.value}: {detail}')
         elif state in {LinkState.STALE, LinkState.CONNECTING}:
@@ -184,88 +164,59 @@ class HardwareNode(Node):
             self.get_logger().info(f'{state.value}: {detail}')
 
     def _take(self, data: bytes) -> None:
-        self._commander.counters.received += 1
-        now = time.monotonic()
         message, numbers = self._reader.read(data)
         positions = numbers[: len(message.position)]
         try:
             _check_rest(message, numbers[len(positions) :])
         except CommandError as error:
-            self._commander.refuse(error)
+            self._robot.refuse(error)
             return
-        if command := self._commander.take(positions, self._place(now), now):
-            self._estimator.command(now, command.targets)
+        if self._robot.command(positions):
             self._descent.cancel()
             self._silence.reset()
 
     def _miss_commands(self) -> None:
         """Bring the robot down when the end of its commands is a hazard, or say why not."""
         self._silence.cancel()
-        now, latest = time.monotonic(), self._latest
-        attitude = latest[1].attitude if latest is not None else None
-        tilt = None if attitude is None else tilt_of(attitude)
-        if loss := self._commander.miss(self._place(now), tilt, now):
+        if loss := self._robot.miss_commands():
             self.get_logger().error(loss)
             self._descent.reset()
 
     def _go_down(self) -> None:
-        now = time.monotonic()
-        if command := self._commander.go_down(self._place(now), now):
-            self._estimator.command(now, command.targets)
-        else:
+        if not self._robot.go_down():
             self._descent.cancel()
-
-    def _send_angles(self, angles: Mapping[int, float]) -> bool:
-        return not self._driver.limp and self._driver.command(angles)
-
-    def _obstacle(self) -> str:
-        """Say why nothing is sent to the servos."""
-        status = self._driver.status()
-        if self._driver.limp and status.state is LinkState.RUNNING:
-            return 'the servos are without torque; call ~/torque with true'
-        return status.detail
 
     def _warn(self, reason: str) -> None:
         self.get_logger().warning(reason, throttle_duration_sec=WARN_PERIOD)
-
-    def _place(self, now: float) -> dict[str, float]:
-        """Return where the joints are [rad], [m]; empty when the robot was not seen lately."""
-        latest = self._latest
-        if latest is None or now - latest[0].arrival > STALE_TIME:
-            return {}
-        return latest[1].positions
 
     def _set_torque(
         self, request: SetBool.Request, response: SetBool.Response
     ) -> SetBool.Response:
         """Let the servos go, or have them hold where they are."""
         on = bool(request.data)
-        positions = self._place(time.monotonic())
-        if on and positions:  # a servo that wakes goes to its last target
-            self._driver.command(self._joints.angles_at(positions))
-        response.success = self._driver.torque(on=on)
+        response.success = self._robot.set_torque(on=on)
         if not response.success:
-            response.message = self._driver.status().detail
+            response.message = self._robot.status().detail
             return response
-        self._commander.forget()
         response.message = 'the servos hold' if on else 'the servos are without torque'
         self.get_logger().info(response.message)
         return response
 
     def _diagnose(self) -> None:
-        name, port, latest = self.get_name(), self._settings.link.path, self._latest
+        name, port = self.get_name(), self._settings.robot.link.path
+        latest = self._robot.latest
         now = self.get_clock().now().to_msg()
         array = DiagnosticArray()
         array.header.stamp = now
         array.status = [
-            self._link.describe(name, port, self._driver.status()),
-            command_diagnostic(name, port, self._commander.counters),
+            self._link.describe(name, port, self._robot.status()),
+            command_diagnostic(name, port, self._robot.counters),
         ]
         if latest is not None:
-            state, estimate = latest
-            health = self._estimator.health()
+            report, estimate = latest
+            health = self._robot.health()
             array.status.append(
-                robot_diagnostic(name, port, state, health, signs_checked=estimate.signs_checked)
+                robot_diagnostic(name, port, report, health, signs_checked=estimate.signs_checked)
             )
             self._battery.publish(messages.battery(health.battery, now))
         self._diagnostics.publish(array)

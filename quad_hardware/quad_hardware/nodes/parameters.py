@@ -20,6 +20,7 @@ from ..link import LinkOptions
 from ..link.vendor import VENDOR
 from ..link.vendor_library import is_installed
 from ..protocol import Model, Protocol, PROTOCOLS
+from ..serial_robot import RobotSettings
 
 AUTO = 'auto'
 THREAD_PRIORITY = 50  # SCHED_FIFO: replies of the robot are read and commands sent at once
@@ -74,24 +75,14 @@ class NodeSettings:
     """Everything that the parameters say.
 
     Attributes:
-        link: Where the robot is.
-        urdf: What it is.
-        joints: Its servos.
-        limiter: How fast targets may move.
-        command_loss: What the robot does when commands break off with a leg in the air.
-        estimator: How its reports are read.
+        robot: Which robot it is, and how it is read and commanded.
         frames: Names of the frames.
         deviations: Published with the IMU.
         diagnostics_period: [s]
         thread_priority: SCHED_FIFO priority of the thread of its loop; 0 asks for none.
     """
 
-    link: LinkOptions
-    urdf: str
-    joints: JointMap
-    limiter: LimiterSettings
-    command_loss: LossReaction
-    estimator: EstimatorSettings
+    robot: RobotSettings
     frames: Frames
     deviations: Deviations
     diagnostics_period: float
@@ -120,7 +111,7 @@ def declare_parameters(node: Node) -> NodeSettings:
         vendor_method=method,
     )
     urdf = _urdf(read)
-    settings = NodeSettings(
+    robot = RobotSettings(
         link=link,
         urdf=urdf,
         joints=_joint_map(read, urdf),
@@ -137,6 +128,9 @@ def declare_parameters(node: Node) -> NodeSettings:
             'what the robot does when commands break off with a leg in the air',
         ),
         estimator=_estimator(read),
+    )
+    settings = NodeSettings(
+        robot=robot,
         frames=_frames(read),
         deviations=_deviations(read),
         diagnostics_period=read.number('diagnostics_period', 1.0, (0.1, 60.0), 'period [s]'),

@@ -1,0 +1,166 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The robot on its serial port as a back end, in real time and without ROS."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import logging
+import threading
+import time
+
+from quad_description import Backend, ImuSample, JointSample, RobotState
+
+from .estimation import Estimate
+from .estimation.imu_mounting import UNCHECKED_DEVIATION
+from .exceptions import CommandError, NoAnswerError
+from .link import LinkState, STALE_TIME
+from .serial_robot import RobotSettings, SerialRobot
+
+CONNECT_TIME = 10.0  # [s] in which the robot has to be found
+
+_log = logging.getLogger(__name__)
+
+
+class SerialBackend(Backend):
+    """Has a robot commanded and observed by its serial port.
+
+    A step ends with the next report of the robot. When no step comes for 0.5 s while a leg is in
+    the air, and at the end, the robot is laid down (see :class:`.LossReaction`).
+    """
+
+    def __init__(self, settings: RobotSettings) -> None:
+        """Prepare; :meth:`reset` opens the port.
+
+        Args:
+            settings: Which robot it is, and where.
+
+        Raises:
+            CommandError: The legs of the URDF cannot be read.
+        """
+        self._robot = SerialRobot(
+            settings,
+            on_estimate=self._take,
+            on_change=self._change,
+            on_refusal=_log.warning,
+            warn=_log.warning,
+        )
+        self.names, self.period = self._robot.names, 1.0 / settings.link.rate
+        self._arrived = threading.Condition()
+        self._state: RobotState | None = None
+        self._count = 0  # of states
+        self._running = False  # the link takes commands
+        self._targets: dict[str, float] = {}  # that were sent last, of joints nobody measures
+        self._commanding = threading.RLock()
+        self._commanded_at: float | None = None  # None: their end was dealt with
+        self._started = False
+
+    def reset(self) -> RobotState:
+        """Wait for a report; the robot stays where it is.
+
+        Raises:
+            NoAnswerError: No robot reports within 10 s.
+        """
+        if not self._started:
+            self._started = True
+            self._robot.start()
+        return self._next_state(CONNECT_TIME)
+
+    def step(self, targets: Sequence[float] | None) -> RobotState:
+        """Send targets, and wait for the next report.
+
+        Raises:
+            CommandError: The targets were not sent; says why.
+            NoAnswerError: The robot was lost.
+        """
+        if targets is not None:
+            with self._commanding:
+                if not self._robot.command(targets):
+                    raise CommandError(self._robot.counters.reason)
+                self._targets = dict(zip(self.names, targets, strict=False))
+                self._commanded_at = time.monotonic()
+        return self._next_state(STALE_TIME)
+
+    def observe(self) -> RobotState:
+        """Return what the newest report says.
+
+        Raises:
+            NoAnswerError: There is none.
+        """
+        with self._arrived:
+            if self._state is None:
+                raise NoAnswerError(self._robot.status().detail)
+            return self._state
+
+    def close(self) -> None:
+        """Lay the robot down where it may not be left as it is, and close the port."""
+        with self._commanding:
+            self._commanded_at = None
+            self._robot.end(_log.error)
+
+    def _next_state(self, timeout: float) -> RobotState:
+        with self._arrived:
+            seen = self._count
+            arrived = self._arrived.wait_for(lambda: self._running and self._count > seen, timeout)
+            if not arrived:
+                raise NoAnswerError(self._robot.status().detail)
+            return self.observe()
+
+    # -- in the thread of the driver
+
+    def _take(self, estimate: Estimate) -> None:
+        state = self._robot_state(estimate)
+        with self._arrived:
+            self._state, self._count = state, self._count + 1
+            self._arrived.notify_all()
+        if self._commanding.acquire(blocking=False):  # who holds it commands, or ends
+            try:
+                self._watch_commands()
+            finally:
+                self._commanding.release()
+
+    def _watch_commands(self) -> None:
+        """Lay the robot down when its commands ended with a leg in the air."""
+        if self._robot.goes_down:
+            self._robot.go_down()
+        elif self._commanded_at and time.monotonic() - self._commanded_at > self._robot.timeout:
+            self._commanded_at = None
+            if loss := self._robot.miss_commands():
+                _log.error(loss)
+
+    def _change(self, state: LinkState, detail: str) -> None:
+        with self._arrived:
+            self._running = state is LinkState.RUNNING
+            if not self._running:
+                self._state = None
+            self._arrived.notify_all()
+        _log.info('%s: %s', state.value, detail)
+
+    def _robot_state(self, estimate: Estimate) -> RobotState:
+        """Return an estimate in the order of all joints."""
+        place = {**self._targets, **estimate.positions}
+        joints = JointSample(
+            tuple(place.get(name, 0.0) for name in self.names),
+            tuple(estimate.velocities.get(name, 0.0) for name in self.names),
+        )
+        odometry = self._robot.update_odometry(estimate)
+        charge = self._robot.health().battery.charge
+        return RobotState(
+            joints,
+            imu_sample(estimate),
+            None if charge is None else charge / 100.0,
+            None if odometry is None else (odometry.x, odometry.y, odometry.height),
+            estimate.joints_time,
+        )
+
+
+def imu_sample(estimate: Estimate) -> ImuSample | None:
+    """Return attitude and motion of an estimate; None while the IMU is of no use."""
+    if estimate.attitude is None:
+        return None
+    return ImuSample(
+        estimate.attitude,
+        estimate.angular_velocity,
+        estimate.acceleration or (0.0, 0.0, 0.0),
+        0.0 if estimate.signs_checked else UNCHECKED_DEVIATION,
+    )

@@ -1,0 +1,218 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""A robot on its serial port in SI units: reports become estimates, targets servo angles."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+import time
+
+from quad_description.rotations import tilt_of
+
+from .estimation import Estimate, Estimator, EstimatorSettings, Health, OdometryState
+from .exceptions import CommandError
+from .joints import CommandCounters, JointCommander, JointMap, LimiterSettings, LossReaction
+from .joints.command import NOMINAL_PERIOD
+from .link import Driver, LinkOptions, LinkState, LinkStatus, STALE_TIME
+from .report import Report
+
+
+@dataclass(frozen=True, slots=True)
+class RobotSettings:
+    """Which robot it is, and how it is read and commanded.
+
+    Attributes:
+        link: Where the robot is.
+        urdf: What it is.
+        joints: Its servos.
+        limiter: How fast targets may move.
+        command_loss: What the robot does when commands break off with a leg in the air.
+        estimator: How its reports are read.
+    """
+
+    link: LinkOptions
+    urdf: str
+    joints: JointMap
+    limiter: LimiterSettings = field(default_factory=LimiterSettings)
+    command_loss: LossReaction = LossReaction.LIE
+    estimator: EstimatorSettings = field(default_factory=EstimatorSettings)
+
+
+class SerialRobot:
+    """Composes driver, estimation and the watch over joint commands.
+
+    The callbacks are called in the thread of the driver, except ``warn``; everything else may be
+    called in one other thread. Times are on the monotonic clock [s].
+
+    Attributes:
+        names: Joints in the order of targets.
+        timeout: Time after the last command at which :meth:`miss_commands` is to be called [s].
+    """
+
+    def __init__(
+        self,
+        settings: RobotSettings,
+        *,
+        on_estimate: Callable[[Estimate], None],
+        on_change: Callable[[LinkState, str], None],
+        on_refusal: Callable[[str], None],
+        warn: Callable[[str], None],
+    ) -> None:
+        """Prepare; :meth:`start` opens the port.
+
+        Args:
+            settings: Which robot it is.
+            on_estimate: Takes each report in SI units.
+            on_change: Takes the state of the link when it changes, and its detail.
+            on_refusal: Takes why a report cannot be.
+            warn: Takes what is the matter with a command.
+
+        Raises:
+            CommandError: The legs of the URDF cannot be read.
+        """
+        self.names = settings.joints.names
+        self._joints = settings.joints
+        self._on_estimate, self._on_change = on_estimate, on_change
+        self._on_refusal = on_refusal
+        self._estimator = Estimator(settings.urdf, settings.joints, settings.estimator)
+        self._commander = JointCommander(
+            settings.joints,
+            settings.limiter,
+            settings.command_loss,
+            raised=self._estimator.raised_feet,
+            send=self._send_angles,
+            obstacle=self._obstacle,
+            warn=warn,
+        )
+        self._driver = Driver(settings.link, self._report, self._link_changed)
+        self._latest: tuple[Report, Estimate] | None = None  # while the link is running
+        self.timeout = self._commander.timeout
+
+    def start(self, begin: Callable[[], None] = lambda: None) -> None:
+        """Start looking for the robot; ``begin`` is called first in the thread of the driver."""
+        self._driver.start(begin)
+
+    def end(self, report_loss: Callable[[str], None]) -> None:
+        """Lay the robot down where it may not be left as it is, and close the port.
+
+        Args:
+            report_loss: Takes what :meth:`miss_commands` says, before the robot moves.
+        """
+        if loss := self.miss_commands():
+            report_loss(loss)
+        while self._commander.goes_down:
+            self.go_down()
+            time.sleep(NOMINAL_PERIOD)
+        self._driver.stop()
+
+    # -- what is known of it
+
+    @property
+    def latest(self) -> tuple[Report, Estimate] | None:
+        """The newest report and what it says in SI units; None while the link does not run."""
+        return self._latest
+
+    @property
+    def counters(self) -> CommandCounters:
+        """What became of joint commands."""
+        return self._commander.counters
+
+    def status(self) -> LinkStatus:
+        """Return how the link is now."""
+        return self._driver.status()
+
+    def health(self) -> Health:
+        """Return how the robot is, by its latest reports."""
+        return self._estimator.health()
+
+    def update_odometry(self, estimate: Estimate) -> OdometryState | None:
+        """Return where the body is by an estimate, to be called once for each."""
+        return self._estimator.update_odometry(estimate)
+
+    # -- what may be done to it
+
+    def command(self, positions: Sequence[float]) -> bool:
+        """Send targets of the first joints [rad], [m]; return whether they were sent."""
+        self._commander.counters.received += 1
+        now = time.monotonic()
+        command = self._commander.take(positions, self._place(now), now)
+        if command is not None:
+            self._estimator.command(now, command.targets)
+        return command is not None
+
+    def refuse(self, error: CommandError) -> None:
+        """Count a command that is none."""
+        self._commander.counters.received += 1
+        self._commander.refuse(error)
+
+    def miss_commands(self) -> str:
+        """Begin to lay the robot down when the end of its commands is a hazard.
+
+        Returns:
+            What it does, or why not; empty when there is no hazard.
+        """
+        now, latest = time.monotonic(), self._latest
+        attitude = latest[1].attitude if latest is not None else None
+        tilt = None if attitude is None else tilt_of(attitude)
+        return self._commander.miss(self._place(now), tilt, now)
+
+    def go_down(self) -> bool:
+        """Send the next targets on the way down; return whether there were any."""
+        now = time.monotonic()
+        command = self._commander.go_down(self._place(now), now)
+        if command is not None:
+            self._estimator.command(now, command.targets)
+        return command is not None
+
+    @property
+    def goes_down(self) -> bool:
+        """Whether the robot is on its way down, because commands broke off."""
+        return self._commander.goes_down
+
+    def set_torque(self, *, on: bool) -> bool:
+        """Let the servos go, or have them hold where they are; return whether that is sent."""
+        positions = self._place(time.monotonic())
+        if on and positions:  # a servo that wakes goes to its last target
+            self._driver.command(self._joints.angles_at(positions))
+        sent = self._driver.torque(on=on)
+        if sent:
+            self._commander.forget()
+        return sent
+
+    # -- in the thread of the driver
+
+    def _report(self, report: Report) -> str:
+        """Take a report; return why it cannot be."""
+        estimate = self._estimator.update(report)
+        if estimate is None:
+            self._on_refusal(self._estimator.refusal)
+            return self._estimator.refusal
+        self._latest = report, estimate
+        self._on_estimate(estimate)
+        return ''
+
+    def _link_changed(self, state: LinkState, detail: str) -> None:
+        if state is not LinkState.RUNNING:
+            self._latest = None  # the robot may be moved while nobody sees it
+            self._commander.lose()
+        self._on_change(state, detail)
+
+    # -- for the commander
+
+    def _send_angles(self, angles: Mapping[int, float]) -> bool:
+        return not self._driver.limp and self._driver.command(angles)
+
+    def _obstacle(self) -> str:
+        """Say why nothing is sent to the servos."""
+        status = self._driver.status()
+        if self._driver.limp and status.state is LinkState.RUNNING:
+            return 'the servos are without torque; call ~/torque with true'
+        return status.detail
+
+    def _place(self, now: float) -> dict[str, float]:
+        """Return where the joints are [rad], [m]; empty when the robot was not seen lately."""
+        latest = self._latest
+        if latest is None or now - latest[0].arrival > STALE_TIME:
+            return {}
+        return latest[1].positions

@@ -1,0 +1,100 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The robot on a pseudo-terminal as a back end: without ROS, in real time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import math
+from pathlib import Path
+import time
+
+import pytest
+
+from quad_description import movable_joints, Pose, pose_positions, robot_urdf
+from quad_hardware.backend import SerialBackend
+from quad_hardware.exceptions import CommandError, NoAnswerError
+from quad_hardware.joints import JointMap, servo_of
+from quad_hardware.link import LinkOptions
+from quad_hardware.protocol import LEG_MOTORS, NEW, OLD, Protocol
+from quad_hardware.serial_robot import RobotSettings
+from quad_pty_peer import PtyPeer
+
+URDF = robot_urdf('lite')
+JOINTS = JointMap(map(servo_of, movable_joints(URDF)))
+POSE = pose_positions(Pose.STAND)
+STAND = [POSE[name] for name in JOINTS.names]
+
+
+@pytest.fixture(params=[NEW, OLD], ids=lambda protocol: protocol.name)
+def peer(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[PtyPeer]:
+    """A robot without physics."""
+    protocol: Protocol = request.param
+    with PtyPeer(tmp_path / 'port', protocol) as peer:
+        yield peer
+
+
+def backend_of(peer: PtyPeer) -> SerialBackend:
+    """A back end for it."""
+    return SerialBackend(RobotSettings(LinkOptions(str(peer.link)), URDF, JOINTS))
+
+
+def test_it_observes_and_commands_in_si_units(peer: PtyPeer) -> None:
+    """Attitude and joints in radians, in the order of the URDF; targets arrive as degrees."""
+    peer.behaviour.attitude = (0.0, math.degrees(0.1), 0.0)
+    with backend_of(peer) as backend:
+        state = backend.reset()
+        assert backend.names == JOINTS.names
+        assert state.imu is not None
+        assert state.imu.roll_pitch_yaw == pytest.approx((0.0, 0.1, 0.0), abs=2e-3)
+        assert state.imu.is_uncertain  # nobody has compared its signs with gravity
+        assert state.position is not None
+        for _ in range(60):
+            before, state = state, backend.step(STAND)
+            assert state.time >= before.time
+        assert state is backend.observe()
+        assert state.joints is not None
+        assert state.joints.positions == pytest.approx(STAND, abs=0.02)
+    wanted = JOINTS.angles(STAND)
+    assert {m: peer.angles[m] for m in LEG_MOTORS} == pytest.approx(wanted, abs=1.0)
+
+
+def test_what_is_no_command_is_refused(peer: PtyPeer) -> None:
+    """Before a byte leaves, with the reason."""
+    with backend_of(peer) as backend:
+        backend.reset()
+        with pytest.raises(CommandError, match='finite'):
+            backend.step([math.nan] * 12)
+        backend.step(None)
+    assert peer.commands == []
+
+
+def test_a_program_that_stops_stepping_leaves_no_leg_in_the_air(peer: PtyPeer) -> None:
+    """As with the node: 0.5 s after the last targets the robot is laid down."""
+    lifted = [q + 0.3 * (name == 'fl_thigh_joint') for name, q in POSE.items()]
+    lying = JOINTS.angles([pose_positions(Pose.LIE)[name] for name in JOINTS.names])
+    with backend_of(peer) as backend:
+        backend.reset()
+        for _ in range(80):
+            backend.step(lifted)
+        until = time.monotonic() + 10.0
+        while time.monotonic() < until:
+            if all(abs(peer.angles[motor] - lying[motor]) < 1.5 for motor in LEG_MOTORS):
+                break
+            time.sleep(0.05)
+        else:
+            pytest.fail(f'it is not laid down: {peer.angles}')
+
+
+def test_a_robot_that_is_lost_is_told(peer: PtyPeer) -> None:
+    """By the step that waits for its report."""
+
+    def step_for_ever() -> None:
+        while True:
+            backend.step(None)
+
+    with backend_of(peer) as backend:
+        backend.reset()
+        peer.behaviour.silent = True
+        with pytest.raises(NoAnswerError):
+            step_for_ever()
