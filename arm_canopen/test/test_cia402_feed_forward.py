@@ -80,7 +80,7 @@ def test_feed_forward_goes_with_the_set_points() -> None:
     assert offsets(net) == (round(SPEED * SCALE), round(EFFORT))
     assert net.drives[JOINT].velocity == pytest.approx(SPEED, rel=0.05)
     node = net.network.nodes[JOINT]
-    told = net.result(net.network.scheduler.spawn(node.read_object(0x60B1)))
+    told = net.result(net.network.scheduler.spawn(node.objects.read_object(0x60B1)))
     assert told == round(SPEED * SCALE)
 
 

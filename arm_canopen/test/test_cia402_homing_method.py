@@ -70,7 +70,7 @@ def test_the_method_that_somebody_wrote_is_used() -> None:
     """What is in the drive counts where no method is named, not what was there at boot."""
     net = network(35)
     node = net.network.nodes[JOINT]
-    net.result(node.write_object(METHOD, 0, 37))
+    net.result(node.objects.write_object(METHOD, 0, 37))
     assert 'homed by method 37' in net.result(begin(net, None))
 
 

@@ -46,8 +46,8 @@ def test_limits_that_are_written_through_the_master_hold_at_once() -> None:
     """0x607D and 0x6081, by whatever service: the next target keeps to them."""
     net = enabled(drive_config(JOINT, NODE_ID), OperationMode.CYCLIC_POSITION)
     node = net.network.nodes[JOINT]
-    net.result(node.write_object(0x607D, 1, -2_000))
-    net.result(node.write_object(0x607D, 2, 2_000))
+    net.result(node.objects.write_object(0x607D, 1, -2_000))
+    net.result(node.objects.write_object(0x607D, 2, 2_000))
     net.result(node.sdo.write(0x6081, 0, (2_000).to_bytes(4, 'little'), 0.5))
     net.run(0.1)
     with pytest.raises(DriveError, match=r'software limits -0\.2 to 0\.2'):
@@ -68,7 +68,7 @@ def test_a_write_that_the_drive_refuses_changes_nothing() -> None:
     promise = net.network.nodes[JOINT].sdo.write(0x6081, 0, b'\x01', 0.5)  # too short
     net.run(0.2)
     assert promise.error is not None
-    net.result(net.network.nodes[JOINT].write_object(0x6067, 0, 12))
+    net.result(net.network.nodes[JOINT].objects.write_object(0x6067, 0, 12))
     net.run(0.2)
     assert net.drives[JOINT].parameters == before
     assert len(net.frames(0x600 + NODE_ID, since=begin)) <= 3

@@ -387,7 +387,7 @@ def test_init_homes_by_the_method_of_bus_yml_whatever_was_tried_before() -> None
     net = booted(sdo_writes=(*MOTION_WRITES, sdo_write(0x6098, 0, 37)))
     commands = net.commands[JOINT]
     net.result(commands.run('home', commands.home(34)))
-    net.result(commands.drive.node.write_object(0x6098, 0, 35))
+    net.result(commands.drive.node.objects.write_object(0x6098, 0, 35))
     assert 'homed by method 35' in net.do(JOINT, 'home')
     assert 'homed by method 37' in net.do(JOINT, 'init')
     writes = [data[4] for data in net.frames(0x600 + NODE_ID) if data[:3] == b'\x2f\x98\x60']

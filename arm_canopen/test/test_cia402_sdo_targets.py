@@ -241,7 +241,7 @@ def test_a_target_that_came_too_late_for_its_answer_moves_nothing(mode: Operatio
         await ahead
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(net.network.nodes[JOINT], 'write_object', occupied)
+        patch.setattr(net.network.nodes[JOINT].objects, 'write_object', occupied)
         with pytest.raises(DriveError, match='did not reach its target'):
             net.result(give(net, 0.4))
     leave_behind(net, TARGETS[mode], 400)
@@ -388,7 +388,7 @@ def test_a_target_after_a_stream_is_not_stopped_by_what_was_under_way() -> None:
         await under_way
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(node, 'write_object', refused)
+        patch.setattr(node.objects, 'write_object', refused)
         commands.stream_target(0.1)
         answered = give(net, 0.3)
     under_way.reject(SdoAbortError('0x60FF refused', 0x08000022))
@@ -451,7 +451,7 @@ def test_of_values_behind_one_that_failed_only_the_newest_is_sent() -> None:
     """Whoever delivered one that was dropped is told when the device has the newest."""
     net = booted()
     node = net.network.nodes[JOINT]
-    writer, sent = node.writer(VELOCITY), []
+    writer, sent = node.objects.writer(VELOCITY), []
     under_way: Promise[None] = Promise()
 
     async def write(index: int, subindex: int, value: int) -> None:
@@ -460,7 +460,7 @@ def test_of_values_behind_one_that_failed_only_the_newest_is_sent() -> None:
             await under_way
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(node, 'write_object', write)
+        patch.setattr(node.objects, 'write_object', write)
         writer.write(1)
         writer.write(2)
         dropped = writer.deliver(3)

@@ -235,7 +235,7 @@ def test_a_drive_with_profile_velocity_0_refuses_targets() -> None:
     net.select(JOINT, OperationMode.PROFILE_POSITION)
     with pytest.raises(DriveError, match='0x6081'):
         net.commands[JOINT].set_target(0.5)
-    net.result(net.network.nodes[JOINT].write_object(0x6081, 0, 10_000))
+    net.result(net.network.nodes[JOINT].objects.write_object(0x6081, 0, 10_000))
     net.run(0.5)
     net.commands[JOINT].set_target(0.5)
     net.run(5.0)

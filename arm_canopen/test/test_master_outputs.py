@@ -114,7 +114,7 @@ def test_an_sdo_write_is_not_undone() -> None:
     """The next frame carries what was written, for whichever object it is sent."""
     net = booted()
     publish(net, OUTPUTS, 1)
-    net.result(net.network.nodes[MODULE].write_object(*OUTPUTS, 0x55))
+    net.result(net.network.nodes[MODULE].objects.write_object(*OUTPUTS, 0x55))
     net.run(0.3)
     assert read(net, OUTPUTS) == 0x55
     publish(net, MASK, 3)
@@ -130,7 +130,7 @@ def test_an_sdo_write_to_an_object_of_a_drive_that_is_mapped_stays() -> None:
     net.boot()
     assert struct.unpack('<I', net.frames(0x502)[-1]) == (10_000,)
     node = net.network.nodes['joint']
-    net.result(node.write_object(0x6081, 0, 2_000))
+    net.result(node.objects.write_object(0x6081, 0, 2_000))
     net.run(0.2)
     (speed,) = struct.unpack('<I', net.result(node.sdo.read(0x6081, 0, 0.2)))
     assert speed == 2_000
@@ -177,7 +177,7 @@ def test_an_sdo_write_is_not_undone_while_its_answer_is_awaited() -> None:
     net = drive_with_speed_mapped()
     net.devices[JOINT].faults.inject(FaultInjection(BusFault.SDO_DELAY, delay=0.1), net.now)
     begin = net.now
-    net.result(net.network.nodes[JOINT].write_object(0x6081, 0, 2_000))
+    net.result(net.network.nodes[JOINT].objects.write_object(0x6081, 0, 2_000))
     assert net.now - begin > 0.1
     assert set(speeds(net, since=begin + 1e-6)) == {2_000}
 
@@ -186,7 +186,7 @@ def test_an_sdo_write_that_is_refused_leaves_the_rpdo_as_it_was() -> None:
     """The device keeps its value, so the RPDO must not bring another one."""
     net = drive_with_speed_mapped()
     inject(net, BusFault.SDO_ABORT)
-    promise = net.network.nodes[JOINT].write_object(0x6081, 0, 2_000)
+    promise = net.network.nodes[JOINT].objects.write_object(0x6081, 0, 2_000)
     net.run_until(lambda: promise.done)
     assert promise.error is not None
     begin = net.now
@@ -199,7 +199,7 @@ def test_a_value_published_meanwhile_outlives_a_write_that_is_refused() -> None:
     net = drive_with_speed_mapped()
     node = net.network.nodes[JOINT]
     inject(net, BusFault.SDO_SILENCE)
-    promise = node.write_object(0x6081, 0, 2_000)
+    promise = node.objects.write_object(0x6081, 0, 2_000)
     net.run(0.05)
     net.network.publish_object(node, 0x6081, 0, 3_000)
     net.run_until(lambda: promise.done)
@@ -214,8 +214,8 @@ def test_a_write_that_waits_in_the_queue_changes_no_rpdo_yet() -> None:
     net = drive_with_speed_mapped()
     node = net.network.nodes[JOINT]
     net.devices[JOINT].faults.inject(FaultInjection(BusFault.SDO_DELAY, delay=0.1), net.now)
-    node.write_object(0x6081, 0, 2_000)
-    promise = node.write_object(0x6081, 0, 4_000)
+    node.objects.write_object(0x6081, 0, 2_000)
+    promise = node.objects.write_object(0x6081, 0, 4_000)
     begin = net.now + 1e-6
     net.run(0.09)
     assert set(speeds(net, since=begin)) == {2_000}

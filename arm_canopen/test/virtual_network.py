@@ -343,8 +343,10 @@ class VirtualNetwork:
 
     def begin(self, name: str, verb: str, *, preempt: bool = False) -> Promise[str]:
         """Begin a command of a drive by the name of its coroutine, without waiting."""
-        sequence: Coroutine[Promise[Any], None, str] = getattr(self.commands[name], verb)()
-        return self.commands[name].run(verb, sequence, preempt=preempt)
+        commands = self.commands[name]
+        part = commands.stops if hasattr(commands.stops, verb) else commands
+        sequence: Coroutine[Promise[Any], None, str] = getattr(part, verb)()
+        return commands.run(verb, sequence, preempt=preempt)
 
     def do(self, name: str, verb: str, *, preempt: bool = False, timeout: float = 20.0) -> str:
         """Run a command of a drive to its end; returns its answer or raises its error."""

@@ -122,7 +122,7 @@ class Drive(ModedDrive):
             self._begun = True
             self._cache.begin()
             if self.config is self.node.config.drive:  # one axis polls for all
-                poll = self.node.poll(self.node.config.poll_period)
+                poll = self.node.objects.poll(self.node.config.poll_period)
                 self._polling = self._scheduler.background(poll)
         before = self.state
         self._observe()

@@ -20,6 +20,7 @@ from .modes import Mode, NoMode
 from .position_modes import Move, ProfilePosition
 from .recovery import Recovery
 from .refusal import Refusal, RefusalCause
+from .sequences import DriveSequences
 from .stop_commands import StopCommands
 from .streaming import TargetStream
 
@@ -28,16 +29,19 @@ T = TypeVar('T')
 TAKEN_TIMEOUT = RESUME_TIMEOUT + 1.0  # [s] after which nothing leads the drive out of its halt
 
 
-class DriveCommands(StopCommands):
+class DriveCommands:
     """The commands of one drive. Each returns what was reached, or raises DriveError.
 
     Attributes:
         drive: The drive.
+        stops: Those that stop it.
     """
 
     def __init__(self, drive: Drive, scheduler: Scheduler) -> None:
         """Take the drive and the time."""
-        super().__init__(drive, scheduler)
+        self.drive = drive
+        self._steps = DriveSequences(drive, scheduler)
+        self.stops = StopCommands(drive, self._steps)
         self._scheduler = scheduler
         self._running = ''
         self._delivery = completed()  # of the target or move that was commanded last

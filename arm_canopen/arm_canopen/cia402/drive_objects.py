@@ -23,9 +23,9 @@ class DriveObjects:
         """
         self._node = node
         self._offset = AXIS_OFFSET * channel
-        self._statusword = node.reader(self.at(Index.STATUSWORD))
-        self._mode = node.reader(self.at(Index.MODE_OF_OPERATION_DISPLAY))
-        self._position = node.reader(self.at(Index.POSITION_ACTUAL))
+        self._statusword = node.objects.reader(self.at(Index.STATUSWORD))
+        self._mode = node.objects.reader(self.at(Index.MODE_OF_OPERATION_DISPLAY))
+        self._position = node.objects.reader(self.at(Index.POSITION_ACTUAL))
         self._velocity = node.image.reader(self.at(Index.VELOCITY_ACTUAL))
         self._torque = node.image.reader(self.at(Index.TORQUE_ACTUAL))
         polled_mode = node.image.reader(self.at(Index.MODE_OF_OPERATION_DISPLAY)) is None
@@ -35,8 +35,8 @@ class DriveObjects:
         self._sources = list(
             dict.fromkeys(reader.source for reader in state if reader is not None)
         )
-        self.controlword = node.writer(self.at(Index.CONTROLWORD))
-        self.mode = node.writer(self.at(Index.MODE_OF_OPERATION))
+        self.controlword = node.objects.writer(self.at(Index.CONTROLWORD))
+        self.mode = node.objects.writer(self.at(Index.MODE_OF_OPERATION))
         self._controlling = [
             output
             for output in node.image.rpdos
@@ -154,7 +154,7 @@ class DriveObjects:
         """Return a writer for the target of a profile mode, by SDO where no PDO carries it."""
         index, subindex = TARGET_OBJECTS[mode]
         entry = self._node.config.dictionary.get(self.at(index), subindex)
-        writer = self._node.writer(self.at(index), subindex)
+        writer = self._node.objects.writer(self.at(index), subindex)
         return None if writer.by_sdo and (entry is None or not entry.access.writable) else writer
 
     def held_position(self, mode: OperationMode) -> int | None:

@@ -95,7 +95,7 @@ async def _stored_method(steps: DriveSequences) -> int:
     """Return what is in 0x6098 now, which the end of the last homing may just have changed."""
     drive = steps.drive
     try:
-        stored = await drive.node.read_object(drive.objects.at(Index.HOMING_METHOD))
+        stored = await drive.node.objects.read_object(drive.objects.at(Index.HOMING_METHOD))
     except (SdoError, CodecError):
         return drive.parameters.homing_method
     return stored if isinstance(stored, int) else drive.parameters.homing_method
@@ -110,7 +110,9 @@ def _put_back(steps: DriveSequences, method: int) -> None:
             text = f'the homing method {method} was not put back into 0x6098: {written.error}'
             drive.node.report(EventKind.DRIVE, Severity.WARNING, text)
 
-    drive.node.write_object(drive.objects.at(Index.HOMING_METHOD), 0, method).when_done(look)
+    drive.node.objects.write_object(drive.objects.at(Index.HOMING_METHOD), 0, method).when_done(
+        look
+    )
 
 
 async def _choose(steps: DriveSequences, method: int | None, stored: int) -> int:
@@ -122,7 +124,7 @@ async def _choose(steps: DriveSequences, method: int | None, stored: int) -> int
     if method == stored:
         return method
     try:
-        await drive.node.write_object(drive.objects.at(Index.HOMING_METHOD), 0, method)
+        await drive.node.objects.write_object(drive.objects.at(Index.HOMING_METHOD), 0, method)
     except (SdoError, CodecError) as error:
         raise DriveError(f'{drive.name} does not take homing method {method}: {error}') from error
     return method

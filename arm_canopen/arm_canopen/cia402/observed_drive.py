@@ -174,7 +174,7 @@ class ObservedDrive:
         if self.state not in FAULTY or (index, 0) not in self.node.config.dictionary:
             return
         try:
-            code = await self.node.read_object(index)
+            code = await self.node.objects.read_object(index)
         except (SdoError, CodecError):
             return  # the statusword says that there is a fault, only its code stays unknown
         self.error = error_code_text(int(code)) if isinstance(code, int) else ''

@@ -191,7 +191,9 @@ class ParameterReader:
         if entry is None or not entry.access.readable:
             return None
         try:
-            value = await self._node.read_object(profile_index, subindex, timeout=READ_TIMEOUT)
+            value = await self._node.objects.read_object(
+                profile_index, subindex, timeout=READ_TIMEOUT
+            )
         except (SdoAbortError, CodecError):
             return None  # a drive may lack what its EDS promises; the default stands
         return value if isinstance(value, int) else None

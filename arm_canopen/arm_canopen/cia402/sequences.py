@@ -221,7 +221,7 @@ class DriveSequences:
     async def _written(self, index: int, subindex: int, value: int) -> SdoError | None:
         """Write an object; return why that failed, or None."""
         try:
-            await self.drive.node.write_object(index, subindex, value)
+            await self.drive.node.objects.write_object(index, subindex, value)
         except SdoError as error:
             return error
         return None

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from ..config.drive_model import RecoveryPolicy
 from ..exceptions import DriveError
-from ..master.scheduler import Scheduler
 from ..standard.drive import DriveState
 from .drive import Drive
 from .refusal import Refusal, RefusalCause
@@ -16,20 +15,15 @@ BRAKED_TIMEOUT = 10.0  # [s] for a halt to end in standstill, beside the time of
 
 
 class StopCommands:
-    """Disable, halt, quick stop and shutdown of one drive.
+    """Disable, halt, quick stop and shutdown of one drive."""
 
-    Attributes:
-        drive: The drive.
-    """
-
-    def __init__(self, drive: Drive, scheduler: Scheduler) -> None:
-        """Take the drive and the time."""
-        self.drive = drive
-        self._steps = DriveSequences(drive, scheduler)
+    def __init__(self, drive: Drive, steps: DriveSequences) -> None:
+        self._drive = drive
+        self._steps = steps
 
     async def disable(self) -> str:
         """Lead to Switched On, as ros2_canopen's service does; the motor is without torque."""
-        drive = self.drive
+        drive = self._drive
         await self._ready_to_stop('disabled')
         if drive.state is DriveState.OPERATION_ENABLED:
             await self._steps.reach(DriveState.SWITCHED_ON)
@@ -39,7 +33,7 @@ class StopCommands:
 
     async def halt(self) -> str:
         """Brake and stay enabled (bit 8, option code 0x605D); the next target goes on."""
-        drive = self.drive
+        drive = self._drive
         await self._ready_to_stop('halted')
         if self._is_quick_stopped():
             return f'nothing to halt: {drive.describe()}'
@@ -52,7 +46,7 @@ class StopCommands:
 
     async def quick_stop(self) -> str:
         """Quick stop; what follows depends on the drive's option code 0x605A."""
-        drive, steps = self.drive, self._steps
+        drive, steps = self._drive, self._steps
         await self._ready_to_stop('quick stop')
         if drive.state is DriveState.OPERATION_ENABLED:
             drive.goal = DriveState.QUICK_STOP_ACTIVE
@@ -72,7 +66,7 @@ class StopCommands:
         Raises:
             DriveError: It does not show that its power is away.
         """
-        drive = self.drive
+        drive = self._drive
         drive.interrupted = None
         drive.released(Refusal(RefusalCause.SHUTDOWN))
         drive.goal = DriveState.SWITCH_ON_DISABLED
@@ -87,7 +81,7 @@ class StopCommands:
         Raises:
             DriveError: It is offline or faulted.
         """
-        drive = self.drive
+        drive = self._drive
         returning = drive.interrupted is not None and drive.config.recovery is RecoveryPolicy.AUTO
         drive.interrupted = None
         try:
@@ -101,7 +95,7 @@ class StopCommands:
 
     async def _stay_disabled(self) -> None:
         """Have it enabled no more, also where the command for that is on its way already."""
-        drive, steps = self.drive, self._steps
+        drive, steps = self._drive, self._steps
         drive.goal = DriveState.SWITCH_ON_DISABLED
         await steps.settle()
         await steps.until(
@@ -112,7 +106,7 @@ class StopCommands:
 
     def _is_quick_stopped(self) -> bool:
         """Whether a quick stop runs or has ended; then no lesser stop takes its place."""
-        drive = self.drive
+        drive = self._drive
         quick_stop = DriveState.QUICK_STOP_ACTIVE
         if drive.state is not quick_stop and drive.goal is not quick_stop:
             return False

@@ -137,7 +137,7 @@ class StopSequence:
         objects = self._drive.objects
         place = objects.at(Index.CONTROLWORD)
         try:
-            await self._drive.node.write_object(place, 0, int(command), urgent=True)
+            await self._drive.node.objects.write_object(place, 0, int(command), urgent=True)
         except (SdoError, CodecError) as error:
             self._sdo_error = str(error)
             if objects.mutes_controlword and objects.can_send(int(command)):

@@ -74,10 +74,10 @@ class SdoWriter:
     by_sdo = True
 
     def __init__(
-        self, node: RemoteObjects, scheduler: Scheduler, index: int, subindex: int
+        self, objects: RemoteObjects, scheduler: Scheduler, index: int, subindex: int
     ) -> None:
         """Remember nothing written yet."""
-        self._node = node
+        self._objects = objects
         self._scheduler = scheduler
         self._address = (index, subindex)
         self._queue: deque[QueuedWrite] = deque()
@@ -90,7 +90,7 @@ class SdoWriter:
     @property
     def limits(self) -> Limits:
         """Smallest and largest value that the object holds, by its type in the EDS."""
-        return self._node.limits(*self._address)
+        return self._objects.limits(*self._address)
 
     def write(self, value: Number) -> None:
         """Have the device hold a value, cycle by cycle; each change of it is sent.
@@ -99,7 +99,7 @@ class SdoWriter:
         """
         if value == self._last and not self._is_due():
             return
-        if self._node.online:
+        if self._objects.online:
             self._enqueue(QueuedWrite(value, Promise()))
 
     def deliver(self, value: Number) -> Promise[None]:
@@ -150,16 +150,16 @@ class SdoWriter:
             self._busy = False
 
     async def _transfer(self, value: Number) -> None:
-        if not self._node.online:
+        if not self._objects.online:
             raise self._offline()
-        await self._node.write_object(*self._address, value)
+        await self._objects.write_object(*self._address, value)
 
     def _note_failure(self, error: Exception, *, repeats: bool) -> None:
         """Report the first failure, and keep values from piling up behind those that follow."""
         while len(self._queue) > 1:
             self._queue.popleft().written.follow(self._queue[-1].written)
         self._failed = not self._queue
-        if not self._node.online:
+        if not self._objects.online:
             return
         lost = isinstance(error, SdoTimeoutError)  # the time-out was pause enough
         pause = 0.0 if lost else REFUSED_PAUSE * 2**self._failures
@@ -169,9 +169,9 @@ class SdoWriter:
                 if repeats and pause
                 else ''
             )
-            self._node.report(EventKind.PDO, Severity.WARNING, f'{error}{hint}')
+            self._objects.report(EventKind.PDO, Severity.WARNING, f'{error}{hint}')
         self._write_again_at = self._scheduler.now + pause
         self._failures = min(self._failures + 1, DOUBLED_MAX)
 
     def _offline(self) -> SdoError:
-        return SdoError(f'{self._node.name} is offline')
+        return SdoError(f'{self._objects.name} is offline')

@@ -14,7 +14,7 @@ from ..standard.nmt import COMMANDED_STATES, NmtCommand, NmtState, parse_heartbe
 from ..standard.objects import Index
 from .drop_backoff import DropBackoff
 from .emergency_log import EmergencyLog
-from .events import EventKind, Report, Severity
+from .events import Event, EventKind, Report, Severity
 from .life_signs import LifeSigns
 from .pdo_watch import PdoWatch
 from .process_image import SentRpdo, SyncRound
@@ -39,10 +39,16 @@ class BootPhase(Enum):
     FAILED = 'failed'
 
 
-class RemoteNode(RemoteObjects):
+class RemoteNode:
     """One device on the bus.
 
     Attributes:
+        config: What bus.yml and its EDS say.
+        name: Name in bus.yml.
+        objects: Its objects, by PDO and SDO.
+        image: Its process image.
+        sdo: Its SDO client.
+        online: Booted, and not lost since.
         nmt_state: NMT state as received, None before the first heartbeat or boot-up and after a
             loss; of a device without heartbeat and guarding the commanded one.
         phase: How far it has booted.
@@ -72,8 +78,25 @@ class RemoteNode(RemoteObjects):
         send: Callable[[Frame], None],
         report: Report,
     ) -> None:
-        """Build the device from its configuration; arguments as of :class:`RemoteObjects`."""
-        super().__init__(config, scheduler, sync, send, report)
+        """Build the device from its configuration.
+
+        Args:
+            config: What bus.yml and its EDS say.
+            scheduler: Time.
+            sync: The SYNC round of the bus.
+            send: Hands a frame to the bus.
+            report: Takes events.
+        """
+        self.config = config
+        self.name = config.name
+        self.online = False
+        self._scheduler = scheduler
+        self._report = report
+        self.objects = RemoteObjects(
+            config, scheduler, sync, send, report=self.report, is_online=lambda: self.online
+        )
+        self.image = self.objects.image
+        self.sdo = self.objects.sdo
         self.nmt_state: NmtState | None = None
         self.phase = BootPhase.WAITING
         self.phase_detail = ''
@@ -103,6 +126,10 @@ class RemoteNode(RemoteObjects):
     def phase_text(self) -> str:
         """How far it has booted, in words."""
         return f'{self.phase.value} {self.phase_detail}'.rstrip()
+
+    def report(self, kind: EventKind, severity: Severity, text: str) -> None:
+        """Tell the owner of the network something about this device."""
+        self._report(Event(kind, severity, self.name, text))
 
     def expect_answers(self) -> None:
         """A SYNC is about to be sent: await the TPDOs that answer each one."""
@@ -207,14 +234,14 @@ class RemoteNode(RemoteObjects):
         self.left_operational = False
         self.life.stop()
         self.pdos.stop()
-        self._forget_objects(reason)
+        self.objects.forget(reason)
 
     async def unwatch(self) -> None:
         """Have the device watch the master no longer, before the master ends; never raises."""
         if not self.online or not self.watch_slot:
             return
         try:
-            await self.write_object(Index.CONSUMER_HEARTBEAT, self.watch_slot, 0)
+            await self.objects.write_object(Index.CONSUMER_HEARTBEAT, self.watch_slot, 0)
         except (SdoError, CodecError) as error:
             self.report(EventKind.BOOT, Severity.WARNING, f'goes on to watch the master: {error}')
 

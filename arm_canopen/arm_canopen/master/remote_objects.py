@@ -16,11 +16,13 @@ from ..standard.datatypes import decode, encode, Value
 from ..standard.dictionary import ObjectEntry
 from ..standard.objects import is_controlword
 from .background_objects import BackgroundReader, SdoWriter
-from .events import Event, EventKind, Report, Severity
+from .events import EventKind, Severity
 from .process_image import Limits, limits_of, ProcessImage, Reader, SyncRound, Writer
 from .scheduler import Promise, Scheduler
 from .sdo_client import SdoClient
 from .start_values import start_value
+
+ReportOfDevice = Callable[[EventKind, Severity, str], None]
 
 
 class RemoteObjects:
@@ -31,7 +33,7 @@ class RemoteObjects:
         name: Name in bus.yml.
         image: Its process image.
         sdo: Its SDO client.
-        online: Booted, and not lost since.
+        report: Takes what goes wrong with an object.
     """
 
     def __init__(
@@ -40,16 +42,19 @@ class RemoteObjects:
         scheduler: Scheduler,
         sync: SyncRound,
         send: Callable[[Frame], None],
-        report: Report,
+        *,
+        report: ReportOfDevice,
+        is_online: Callable[[], bool],
     ) -> None:
-        """Build the device from its configuration.
+        """Build the objects from the configuration of the device.
 
         Args:
             config: What bus.yml and its EDS say.
             scheduler: Time.
             sync: The SYNC round of the bus.
             send: Hands a frame to the bus.
-            report: Takes events.
+            report: Takes what goes wrong with an object.
+            is_online: Tells whether the device was booted, and not lost since.
         """
         self.config = config
         self.name = config.name
@@ -63,15 +68,16 @@ class RemoteObjects:
         )
         self.sdo = SdoClient(config.node_id, config.name, scheduler, send)
         self.sdo.on_download.append(self._object_downloaded)
-        self.online = False
+        self.report = report
+        self._is_online = is_online
         self._scheduler = scheduler
-        self._report = report
         self._polled: dict[tuple[int, int], BackgroundReader] = {}
         self._sdo_writers: list[SdoWriter] = []
 
-    def report(self, kind: EventKind, severity: Severity, text: str) -> None:
-        """Tell the owner of the network something about this device."""
-        self._report(Event(kind, severity, self.name, text))
+    @property
+    def online(self) -> bool:
+        """Whether the device was booted, and not lost since."""
+        return self._is_online()
 
     def reader(self, index: int, subindex: int = 0) -> Reader:
         """Return a reader for an object, by TPDO when it is mapped, else by polling."""
@@ -188,7 +194,7 @@ class RemoteObjects:
 
         end.when_done(set_back)
 
-    def _forget_objects(self, reason: str) -> None:
+    def forget(self, reason: str) -> None:
         """The device went away, or restarted: what it said and was told is no longer true."""
         self.image.clear()
         self.sdo.cancel_all(reason)

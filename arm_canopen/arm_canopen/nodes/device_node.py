@@ -225,7 +225,7 @@ class DeviceNode(Node):
 
         def write() -> Promise[None]:
             self.check_owner(index)
-            data = bytes_from_raw(device.entry(index, subindex).data_type, request.data)
+            data = bytes_from_raw(device.objects.entry(index, subindex).data_type, request.data)
             return device.sdo.write(index, subindex, data, device.config.sdo_timeout)
 
         return self._thread.run(write)

@@ -79,7 +79,7 @@ class ManagedBus:
                 await self._booted(device)
             elif verb in (Verb.DEACTIVATE, Verb.SHUTDOWN):
                 await self._scheduler.gather(
-                    [axis.run('shutdown', axis.shutdown(), preempt=True) for axis in axes]
+                    [axis.run('shutdown', axis.stops.shutdown(), preempt=True) for axis in axes]
                 )
 
         return work

@@ -56,7 +56,9 @@ async def leave_device(
     Raises:
         DriveError: An axis keeps its power; the device goes on to watch the master, and stops it.
     """
-    await scheduler.gather([axis.run('shutdown', axis.shutdown(), preempt=True) for axis in axes])
+    await scheduler.gather(
+        [axis.run('shutdown', axis.stops.shutdown(), preempt=True) for axis in axes]
+    )
     await device.unwatch()
 
 
