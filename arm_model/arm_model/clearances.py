@@ -47,33 +47,33 @@ class LeastClearance:
 class Clearances:
     """Measures the distances of pairs, as far as they are not known well enough.
 
-    What was measured holds on: a pair comes nearer by the turns of the joints times their levers
-    at most. Pairs that are far apart are so measured once in many cycles. It belongs to one
-    thread.
+    What was measured holds on: a pair comes nearer by the motion of the joints times its distance
+    rate bounds at most. Pairs that are far apart are so measured once in many cycles. It belongs
+    to one thread.
     """
 
-    def __init__(self, shapes: PlanningScene) -> None:
+    def __init__(self, scene: PlanningScene) -> None:
         """Begin with nothing known.
 
         Args:
-            shapes: The shapes and their pairs.
+            scene: The shapes and their pairs.
         """
-        self._shapes = shapes
-        self._data = shapes.model.createData()
-        self._results = shapes.geometry.createData()
+        self._scene = scene
+        self._data = scene.model.createData()
+        self._results = scene.geometry.createData()
         self._found = self._results.distanceResults
-        self._distances: Array = np.full(len(shapes.pairs), -np.inf)
-        self._places: Array = np.zeros_like(shapes.levers)
+        self._distances: Array = np.full(len(scene.pairs), -np.inf)
+        self._places: Array = np.zeros_like(scene.distance_rate_bounds)
 
     @property
     def pairs(self) -> Sequence[tuple[str, str]]:
         """Links of each pair of shapes."""
-        return self._shapes.pairs
+        return self._scene.pairs
 
     @property
-    def levers(self) -> Array:
+    def distance_rate_bounds(self) -> Array:
         """How far each joint changes a pair's distance at most (k, n) in [m/rad]."""
-        return self._shapes.levers
+        return self._scene.distance_rate_bounds
 
     def least(self, positions: Array, within: float) -> Array:
         """Return distances: exact ones below a distance of interest, else least ones.
@@ -86,21 +86,22 @@ class Clearances:
             Distance of each pair in [m].
         """
         turned = np.abs(positions - self._places)
-        bounds: Array = self._distances - np.einsum('kn,kn->k', turned, self._shapes.levers)
+        rates = self._scene.distance_rate_bounds
+        bounds: Array = self._distances - np.einsum('kn,kn->k', turned, rates)
         (doubtful,) = (bounds < within).nonzero()
         if not doubtful.size:
             return bounds
-        shapes, results = self._shapes, self._results
-        pin.forwardKinematics(shapes.model, self._data, positions)
-        pin.updateGeometryPlacements(shapes.model, self._data, shapes.geometry, results)
+        scene, results = self._scene, self._results
+        pin.forwardKinematics(scene.model, self._data, positions)
+        pin.updateGeometryPlacements(scene.model, self._data, scene.geometry, results)
         for pair in doubtful.tolist():
-            result = pin.computeDistance(shapes.geometry, results, pair)
+            result = pin.computeDistance(scene.geometry, results, pair)
             bounds[pair] = result.min_distance
         self._distances[doubtful] = bounds[doubtful]
         self._places[doubtful] = positions
         return bounds
 
-    def proven(self, positions: Array, within: float) -> int:
+    def provably_clear(self, positions: Array, within: float) -> int:
         """Count the leading rows at which nothing is as near, as far as is known unmeasured.
 
         Args:
@@ -108,7 +109,8 @@ class Clearances:
             within: The distance of interest in [m].
         """
         turned = np.abs(positions[:, None, :] - self._places)
-        bounds = self._distances - np.einsum('mkn,kn->mk', turned, self._shapes.levers)
+        rates = self._scene.distance_rate_bounds
+        bounds = self._distances - np.einsum('mkn,kn->mk', turned, rates)
         doubtful = (bounds < within).any(axis=1)
         return int(doubtful.argmax()) if doubtful.any() else len(positions)
 
@@ -121,7 +123,7 @@ class Clearances:
             within: The distance of interest in [m].
         """
         turned = np.maximum(upper - self._places, self._places - lower)
-        bounds = self._distances - np.einsum('kn,kn->k', turned, self._shapes.levers)
+        bounds = self._distances - np.einsum('kn,kn->k', turned, self._scene.distance_rate_bounds)
         return not (bounds < within).any()
 
     def nearest(self, positions: Array, within: float, count: int) -> list[Proximity]:
@@ -142,7 +144,7 @@ class Clearances:
             return []
         gradients = self._gradients(positions, [pair for _, pair in near])
         return [
-            Proximity(pair, self._shapes.pairs[pair], distance, gradient)
+            Proximity(pair, self._scene.pairs[pair], distance, gradient)
             for (distance, pair), gradient in zip(near, gradients, strict=True)
         ]
 
@@ -152,7 +154,7 @@ class Clearances:
         A joint with the twist v, w about the base's origin moves a point p at v + w x p; along
         the normal n, which points from the first shape to the second, that is n v + (p x n) w.
         """
-        pin.computeJointJacobians(self._shapes.model, self._data, positions)
+        pin.computeJointJacobians(self._scene.model, self._data, positions)
         wrenches = []
         for pair in pairs:
             result = self._found[pair]
@@ -160,5 +162,6 @@ class Clearances:
             x, y, z = result.normal.tolist()
             # crossed by hand: numpy's own takes ten times as long
             wrenches.append((x, y, z, b * z - c * y, c * x - a * z, a * y - b * x))
-        gradients: Array = (np.array(wrenches) @ self._data.J) * self._shapes.parting[pairs]
+        signs = self._scene.relative_motion_sign[pairs]
+        gradients: Array = (np.array(wrenches) @ self._data.J) * signs
         return gradients

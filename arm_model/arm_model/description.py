@@ -22,10 +22,10 @@ from urdf_reader import (
 
 from .arrays import Native
 
-ENDLESS = 1e9
+CONTINUOUS_BOUND = 1e9
 """Range that a continuous joint is given in [rad], so that its position is one plain angle."""
 
-TOUCH = 1e-6
+CAPSULE_TOLERANCE = 1e-6
 """How exactly spheres must sit on a cylinder's ends in [m] to make a capsule of it."""
 
 
@@ -80,7 +80,7 @@ class Description:
         shapes = _shapes(self.tree, notes)
         self.shapes = tuple(shape for link in shapes for shape in _with_capsules(shapes[link]))
         self.notes = tuple(notes)
-        self.xml = self.tree.without_continuous_joints(ENDLESS)
+        self.xml = self.tree.without_continuous_joints(CONTINUOUS_BOUND)
 
     def group_joints(self, group: Group, semantic: SemanticDescription) -> list[str]:
         """Return the joints of a group that move by themselves, from the base out.
@@ -172,8 +172,8 @@ def _cap(shapes: Sequence[Shape], radius: float, end: Native) -> Shape | None:
     for shape in shapes:
         if (
             isinstance(shape.geometry, coal.Sphere)
-            and abs(shape.geometry.radius - radius) < TOUCH
-            and np.linalg.norm(shape.placement.translation - end) < TOUCH
+            and abs(shape.geometry.radius - radius) < CAPSULE_TOLERANCE
+            and np.linalg.norm(shape.placement.translation - end) < CAPSULE_TOLERANCE
         ):
             return shape
     return None

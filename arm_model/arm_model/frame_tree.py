@@ -10,7 +10,7 @@ import numpy as np
 
 from .pose import combined, inverse, Pose
 
-STALE = 1.0
+TRANSFORM_TIMEOUT = 1.0
 """Age at which a transform of /tf counts no more in [s]."""
 
 
@@ -57,7 +57,7 @@ class FrameTree:
         """Return the pose of a frame in itself and in each of its ancestors, nearest first."""
         pose = Pose(np.eye(3), np.zeros(3))
         found = {frame: pose}
-        while (link := self._links.get(frame)) and now - link.time < STALE:
+        while (link := self._links.get(frame)) and now - link.time < TRANSFORM_TIMEOUT:
             pose, frame = combined(link.pose, pose), link.parent
             if frame in found:  # a loop: whoever publishes it is wrong
                 break

@@ -43,10 +43,10 @@ KEYS = {
 TURN = 2.0 * math.pi
 """A whole turn in [rad]."""
 
-SLACK = 1e-3
+ROUNDING_TOLERANCE = 1e-3
 """How much a limit may exceed the description's for rounding, as a share."""
 
-KNOWN = frozenset(
+KNOWN_KEYS = frozenset(
     {
         *(f'has_{kind}_limits' for kind in KEYS),
         *(key for keys in KEYS.values() for key in keys),
@@ -148,10 +148,10 @@ def _row(
     if not isinstance(entry, dict):
         known = ', '.join(table) or 'none'
         raise LimitsError(f'joint {name} is missing in the limits file, which has: {known}')
-    if unknown := sorted(set(entry) - KNOWN):
+    if unknown := sorted(set(entry) - KNOWN_KEYS):
         raise LimitsError(f'joint {name}: unknown key {unknown[0]!r} in the limits file')
     velocity = _positive(name, entry, 'velocity', span.velocity)
-    if velocity > span.velocity * (1 + SLACK):
+    if velocity > span.velocity * (1 + ROUNDING_TOLERANCE):
         raise LimitsError(
             f'joint {name}: max_velocity {velocity:g} is wider than the description'
             f' ({span.velocity:g}); a limits file may only narrow'
@@ -179,7 +179,7 @@ def _span(name: str, entry: Mapping[str, Any], span: JointRange) -> tuple[float,
     if not entry.get('has_position_limits', 'max_position' in entry):
         return span.lower, span.upper
     lower, upper = (_number(name, entry, key) for key in KEYS['position'])
-    if lower < span.lower - SLACK or upper > span.upper + SLACK:
+    if lower < span.lower - ROUNDING_TOLERANCE or upper > span.upper + ROUNDING_TOLERANCE:
         raise LimitsError(
             f'joint {name}: positions {lower:g}..{upper:g} are wider than the description'
             f' ({span.lower:g}..{span.upper:g}); a limits file may only narrow'

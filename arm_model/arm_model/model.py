@@ -20,7 +20,7 @@ from .limits import JointLimits, merge_limits
 from .pose import Pose, turned_twists
 from .scene import PlanningScene
 
-MOST_JOINTS = 8
+MAX_JOINTS = 8
 """Joints of the longest chain that is offered."""
 
 
@@ -67,8 +67,8 @@ class RobotModel:
         description, semantic = Description(urdf), parse_srdf(srdf)
         chosen = semantic.group(group if group is not None else _only(semantic))
         names = description.group_joints(chosen, semantic)
-        if len(names) > MOST_JOINTS:
-            raise ModelError(f'group {chosen.name}: {len(names)} joints, {MOST_JOINTS} at most')
+        if len(names) > MAX_JOINTS:
+            raise ModelError(f'group {chosen.name}: {len(names)} joints, {MAX_JOINTS} at most')
         self.name, self.group = description.name, chosen.name
         self.base, self.tip = _ends(description, chosen, semantic, names, tip)
         self.limits: JointLimits = merge_limits(names, description.ranges, limits)
@@ -159,7 +159,7 @@ class RobotModel:
             within: Distance of interest in [m]; where it is more, a lower bound is good enough.
         """
         least = LeastClearance(within)
-        for positions in places[self._clearances.proven(places, within) :]:
+        for positions in places[self._clearances.provably_clear(places, within) :]:
             distances = self._clearances.least(positions, within)
             pair = int(distances.argmin())
             if distances[pair] < least.distance:

@@ -13,7 +13,7 @@ import pinocchio as pin
 from .arrays import Array
 from .exceptions import CommandError
 
-UNIT = 1e-3
+UNIT_LENGTH_TOLERANCE = 1e-3
 """How far the length of a quaternion may be off."""
 
 
@@ -45,7 +45,7 @@ def rotation_of(quaternion: Sequence[float]) -> Array:
         CommandError: A number is not finite, or the length is not one.
     """
     length = float(np.linalg.norm(quaternion))
-    if not abs(length - 1.0) < UNIT:
+    if not abs(length - 1.0) < UNIT_LENGTH_TOLERANCE:
         raise CommandError(f'orientation {list(quaternion)}: its length is {length:.4g}, not 1')
     matrix: Array = pin.Quaternion(np.array(quaternion) / length).toRotationMatrix()
     return matrix

@@ -22,10 +22,10 @@ class PlanningScene:
         model: The pinocchio model.
         geometry: Its shapes and their pairs.
         pairs: Links of each pair of shapes (k).
-        parting: Sense in which each joint moves the second shape of a pair against the first
-            (k, n): 1, -1, or 0 for a joint that is not between them.
-        levers: How far each joint changes a pair's distance at most (k, n) in [m/rad], wherever
-            the arm is.
+        relative_motion_sign: Sense in which each joint moves the second shape of a pair against
+            the first (k, n): 1, -1, or 0 for a joint that is not between them.
+        distance_rate_bounds: How fast each joint changes a pair's distance at most (k, n) in
+            [m/rad], wherever the arm is.
     """
 
     def __init__(
@@ -54,11 +54,11 @@ class PlanningScene:
                 pairs.append(names)
                 ends.append((first, second))
         self.pairs: Sequence[tuple[str, str]] = tuple(pairs)
-        self.parting: Array = np.array(
+        self.relative_motion_sign: Array = np.array(
             [_between(joints[first], joints[second], model.nv) for first, second in ends]
         ).reshape(len(pairs), model.nv)
-        self.levers: Array = np.array(
-            [np.minimum(self._levers(a, b), self._levers(b, a)) for a, b in ends]
+        self.distance_rate_bounds: Array = np.array(
+            [np.minimum(self._rate_bounds(a, b), self._rate_bounds(b, a)) for a, b in ends]
         ).reshape(len(pairs), model.nv)
 
     def _attach(self, number: int, shape: Shape) -> None:
@@ -74,14 +74,14 @@ class PlanningScene:
             )
         )
 
-    def _levers(self, shape: int, other: int) -> Array:
+    def _rate_bounds(self, shape: int, other: int) -> Array:
         """Return how far each joint between two shapes moves a point of the first at most.
 
         Seen from the joint, nothing of the shape is farther away than the lengths that lead there.
         """
         objects, model = self.geometry.geometryObjects, self.model
         near, far = objects[shape].parentJoint, objects[other].parentJoint
-        levers = np.zeros(model.nv)
+        rates = np.zeros(model.nv)
         reach = _extent(objects[shape])
         outward = near < far
         # from the shape joint by joint towards the other one
@@ -94,10 +94,10 @@ class PlanningScene:
                 reach += max(
                     abs(model.lowerPositionLimit[place]), abs(model.upperPositionLimit[place])
                 )
-            levers[joint - 1] = 1.0 if sliding else reach
+            rates[joint - 1] = 1.0 if sliding else reach
             if not outward:
                 reach += _length(model, joint)
-        return levers
+        return rates
 
 
 def _between(first: int, second: int, count: int) -> Array:

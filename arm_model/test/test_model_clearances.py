@@ -40,10 +40,10 @@ def test_what_is_known_is_a_lower_bound_and_exact_where_it_matters(
 
 @pytest.mark.parametrize('model', ARMS, ids=lambda model: model.name)
 def test_no_distance_changes_faster_than_its_levers_say(model: RobotModel) -> None:
-    """Gradients anywhere are at most the levers."""
+    """Gradients anywhere are at most the bounds of their rates."""
     rng = np.random.default_rng(6)
     lower, upper = np.maximum(model.limits.lower, -4.0), np.minimum(model.limits.upper, 4.0)
-    levers = model.clearances().levers
+    bounds = model.clearances().distance_rate_bounds
     for _ in range(100):
         for near in model.nearest(rng.uniform(lower, upper), math.inf, len(model.pairs)):
-            assert (np.abs(near.gradient) <= levers[near.pair] + 1e-9).all()
+            assert (np.abs(near.gradient) <= bounds[near.pair] + 1e-9).all()

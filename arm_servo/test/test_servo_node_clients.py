@@ -15,7 +15,7 @@ from arm_servo.core.commands import twist_command
 from arm_servo.core.requests import JogRequest
 from arm_servo.ros.refusals import Refusals
 from arm_servo.ros.servo.modes import CommandKind
-from arm_servo.ros.servo.node import FRESH, Servo
+from arm_servo.ros.servo.node import NEW_MOTION_SILENCE, Servo
 
 
 class Commands:
@@ -32,7 +32,7 @@ class Commands:
         servo._modes = SimpleNamespace(admit=lambda _kind: None)
         servo._prepare = lambda: None
         servo._gateway, servo._refusals = self.drives.gateway, Refusals()
-        servo._last = -FRESH
+        servo._last = -NEW_MOTION_SILENCE
         self.servo = servo
 
     def send(self, numbers: list[float], frame: str = '') -> None:

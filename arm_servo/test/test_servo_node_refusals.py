@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from arm_servo.ros.refusals import FORGOTTEN, Refusals, REMEMBERED
+from arm_servo.ros.refusals import Refusals, REPEAT_PERIOD, STATUS_PERIOD
 
 
 def test_a_stream_with_old_stamps_is_one_line_of_the_log() -> None:
@@ -26,7 +26,7 @@ def test_the_same_mistake_made_later_is_logged_again() -> None:
     refusals = Refusals()
     refusals.note('paused', 1.0)
     assert refusals.to_log(1.0) == 'paused'
-    later = 1.1 + FORGOTTEN
+    later = 1.1 + REPEAT_PERIOD
     refusals.note('paused', later)
     assert refusals.to_log(later) == 'paused'
 
@@ -35,8 +35,8 @@ def test_the_status_forgets_a_refusal() -> None:
     """A while after it, or when a command is taken."""
     refusals = Refusals()
     refusals.note('paused', 1.0)
-    assert refusals.fresh(1.1 + REMEMBERED) == ''
-    assert refusals.to_log(1.1 + REMEMBERED) == ''
+    assert refusals.fresh(1.1 + STATUS_PERIOD) == ''
+    assert refusals.to_log(1.1 + STATUS_PERIOD) == ''
     refusals.note('paused', 3.0)
     refusals.clear()
     assert refusals.fresh(3.0) == ''

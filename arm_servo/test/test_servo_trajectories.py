@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Trajectories: on their path at any pace, refused with reasons, ended with words."""
+"""Trajectories: on their path at any speed, refused with reasons, ended with words."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ def test_pause_and_resume_stay_on_the_path(kind: str) -> None:
 @settings(max_examples=5, deadline=None)
 @given(seed=st.integers(0, 10**6))
 def test_any_speed_at_any_time_stays_on_the_path(name: str, seed: int) -> None:
-    """Speed overrides of 0 to 100 % at any time change the pace and not the path."""
+    """Speed overrides of 0 to 100 % at any time change the speed and not the path."""
     rng, core = np.random.default_rng(seed), core_of(name)
     core.follow(wave(robot(name), ready(name), rng.choice(['l', 'c', 'q'])))
     events = {
@@ -113,7 +113,7 @@ def test_any_speed_at_any_time_stays_on_the_path(name: str, seed: int) -> None:
         for time, speed in zip(rng.uniform(0, 3, 4), [*rng.random(3), 1.0], strict=True)
     }
     states = [point.state for point in stream(core, 6.0, events)]
-    assert off_the_path(states, path_of(core)) < 3e-3  # where pace and corner meet
+    assert off_the_path(states, path_of(core)) < 3e-3  # where speed and corner meet
     kept(robot(name).limits, states)
 
 
@@ -170,7 +170,7 @@ def test_a_first_point_without_time_is_caught_up_with() -> None:
 
 
 def test_the_way_to_a_first_point_heeds_the_speed_override() -> None:
-    """Where the arm begins beside a path, it gets there at the pace that is set."""
+    """Where the arm begins beside a path, it gets there at the speed that is set."""
     core, start = core_of('panda'), ready('panda')
     core.override(0.05)
     points = [GoalPoint(0.0, tuple(start + 0.049)), GoalPoint(5.0, tuple(start + 0.15))]

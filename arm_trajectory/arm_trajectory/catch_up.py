@@ -12,25 +12,25 @@ from arm_model import JointLimits, RobotState
 
 from .otg import OnlineTrajectoryGenerator, Plan
 
-SOON = (4, 10, 25, 60, 150)
-"""Cycles after which a meeting is tried."""
+INTERCEPTION_CYCLES = (4, 10, 25, 60, 150)
+"""Cycles after which an interception is tried."""
 
-TURNS = 3
-"""How often the time of a later meeting is improved."""
+MAX_ITERATIONS = 3
+"""How often the time of a later interception is improved."""
 
-NEAR = 1e-7
-"""How exactly a meeting must still be where it was planned in [rad], and 100 times in [rad/s]."""
+PLAN_TOLERANCE = 1e-7
+"""How exactly an interception must still be as planned in [rad], and 100 times in [rad/s]."""
 
-WITHIN = 1.0 + 1e-6
+ROUNDING_FACTOR = 1.0 + 1e-6
 """Rounding of velocities and accelerations that is let pass."""
 
-JOLT = 0.1
+JERK_TOLERANCE = 0.1
 """Changes of speed and place in a cycle, beyond those of an even jerk, that still count as even.
 
 As shares of j T^2 and j T^3.
 """
 
-OWN_JOLT = (0.25, 0.129)
+FOLLOWING_JERK_TOLERANCE = (0.25, 0.129)
 """The same where the state that is followed goes on: a limited jerk that turns makes as much."""
 
 
@@ -39,7 +39,7 @@ class CatchUpInterpolator:
 
     A step that the limits allow is taken exactly. Otherwise it plans to where the state will be
     when it can be met, and keeps to this plan while the state goes on as foreseen. Planned anew in
-    every cycle, the meeting would be put off again and again.
+    every cycle, the interception would be put off again and again.
     """
 
     def __init__(self, limits: JointLimits, generator: OnlineTrajectoryGenerator) -> None:
@@ -47,7 +47,7 @@ class CatchUpInterpolator:
 
         Args:
             limits: Limits of the joints.
-            generator: Plans the way to the meeting.
+            generator: Plans the way to the interception.
         """
         self._limits = limits
         self._generator = generator
@@ -84,7 +84,7 @@ class CatchUpInterpolator:
             if self._soft(state, wanted, period):
                 return wanted
         if not kept:
-            self._plan, self._elapsed = self._meeting(state, ahead, period), 0.0
+            self._plan, self._elapsed = self._interception(state, ahead, period), 0.0
         if self._plan is None:
             return None
         self._elapsed += period
@@ -103,7 +103,7 @@ class CatchUpInterpolator:
         if not self._soft(state, wanted, period):
             return False
         most = self._limits.jerk * period
-        jolt, shift = OWN_JOLT if self._exact else (JOLT, JOLT)
+        jolt, shift = FOLLOWING_JERK_TOLERANCE if self._exact else (JERK_TOLERANCE, JERK_TOLERANCE)
         mean = 0.5 * (state.acceleration + wanted.acceleration) * period
         if np.any(np.abs(wanted.velocity - state.velocity - mean) > jolt * most * period):
             return False
@@ -116,21 +116,21 @@ class CatchUpInterpolator:
         limits = self._limits
         bend = np.abs(wanted.acceleration - state.acceleration)
         return bool(
-            np.all(bend <= limits.jerk * period * WITHIN)
-            and np.all(np.abs(wanted.velocity) <= limits.velocity * WITHIN)
-            and np.all(np.abs(wanted.acceleration) <= limits.acceleration * WITHIN)
+            np.all(bend <= limits.jerk * period * ROUNDING_FACTOR)
+            and np.all(np.abs(wanted.velocity) <= limits.velocity * ROUNDING_FACTOR)
+            and np.all(np.abs(wanted.acceleration) <= limits.acceleration * ROUNDING_FACTOR)
         )
 
-    def _meeting(
+    def _interception(
         self, state: RobotState, ahead: Callable[[float], RobotState], period: float
     ) -> Plan | None:
         """Plan to where the state will be when it is met: soon where that can be, else later."""
-        for cycles in SOON:
+        for cycles in INTERCEPTION_CYCLES:
             plan = self._planned(state, self._within(ahead(cycles * period)), cycles * period)
             if plan is not None and plan.duration <= cycles * period * (1.0 + 1e-9):
                 return plan
-        time, best = SOON[-1] * period, None
-        for _ in range(TURNS):
+        time, best = INTERCEPTION_CYCLES[-1] * period, None
+        for _ in range(MAX_ITERATIONS):
             plan = self._planned(state, self._within(ahead(time)), time)
             if plan is None:
                 return best
@@ -162,6 +162,6 @@ class CatchUpInterpolator:
 
 def _same(one: RobotState, other: RobotState) -> bool:
     return bool(
-        np.abs(one.position - other.position).max() < NEAR
-        and np.abs(one.velocity - other.velocity).max() < 100.0 * NEAR
+        np.abs(one.position - other.position).max() < PLAN_TOLERANCE
+        and np.abs(one.velocity - other.velocity).max() < 100.0 * PLAN_TOLERANCE
     )

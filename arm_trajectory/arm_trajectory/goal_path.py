@@ -20,29 +20,29 @@ from .path_bounds import farthest_beyond
 from .path_rounding import rounded, with_run_out
 from .path_timing import Demand, Timing
 
-OVER = 1.02
-"""How far the speed of a segment may exceed a limit; it is walked slower then."""
+MAX_SPEED_EXCESS = 1.02
+"""How far the speed of a segment may exceed a limit; it is followed slower then."""
 
-LONGER = (1.1, 0.5)
+MAX_DELAY = (1.1, 0.5)
 """Share, and time in [s], by which a path may take longer than its last time_from_start.
 
 As much as MoveIt waits for by default: allowed_execution_duration_scaling,
 allowed_goal_duration_margin.
 """
 
-DENSE = 1e-3
+STRAIGHT_TOLERANCE = 1e-3
 """Bulge of a segment that counts as straight where its ends do not fit together in [rad]."""
 
-APPROACHES = (0.2, 0.5, 1.0, 2.0, 4.0)
+APPROACH_FACTORS = (0.2, 0.5, 1.0, 2.0, 4.0)
 """Shares by which the way to the first point is tried longer."""
 
-LEAST = 0.25
+MIN_APPROACH_MARGIN = 0.25
 """Time that such a way has beside its own in [s]: a trajectory may be joined late."""
 
-BESIDE = 1e-3
+START_TOLERANCE = 1e-3
 """How far from a first point without time the arm may be before it is taken there in [rad]."""
 
-TURNS = 8
+MAX_ITERATIONS = 8
 """How often the time that suffices is improved."""
 
 QUANTITIES = (('rad/s', 'speed'), ('rad/s2', 'acceleration'), ('rad/s3', 'jerk'))
@@ -76,7 +76,7 @@ def build_path(
 ) -> GoalPath:
     """Check a trajectory and make a path of it that begins at the commanded state.
 
-    Where joints could not follow as quickly as asked, the path is walked slower; it stays the
+    Where joints could not follow as quickly as asked, the path is followed slower; it stays the
     same. A trajectory that would take much longer then is refused.
 
     Args:
@@ -103,10 +103,15 @@ def _tried(points: Points, limits: JointLimits, state: RobotState) -> GoalPath |
     """Return the path through points, or why there is too little time for it."""
     answer = _walkable(points, limits, state)
     approach = float(points.times[0])
-    if isinstance(answer, GoalPath) or approach == 0.0 or answer.time > 2.0 * approach + LEAST:
+    if (
+        isinstance(answer, GoalPath)
+        or approach == 0.0
+        or answer.time > 2.0 * approach + MIN_APPROACH_MARGIN
+    ):
         return answer
-    for share in APPROACHES:  # only the way from the present motion to the first point is longer
-        more = share * (approach + LEAST)
+    # only the way from the present motion to the first point is longer
+    for share in APPROACH_FACTORS:
+        more = share * (approach + MIN_APPROACH_MARGIN)
         try:
             later = _walkable(points.delayed(more), limits, state)
         except GoalError:  # it would swing out beyond a limit
@@ -120,28 +125,28 @@ def _walkable(points: Points, limits: JointLimits, state: RobotState) -> GoalPat
     """Return the path through points, or why there is too little time."""
     path = _given(points, limits, state)
     demand = Timing(path, limits).fastest
-    if demand.share > OVER:
+    if demand.share > MAX_SPEED_EXCESS:
         return _Haste(_words(demand, limits), demand.time, demand.share)
     path = rounded(path, limits)
     timing = Timing(path, limits)
-    stretched, demand = timing.stretched(), timing.plainest
-    if stretched is None:
+    scaled, demand = timing.time_scaled(), timing.plainest
+    if scaled is None:
         return _Haste(_words(demand, limits), demand.time, timing.demand.share)
-    most = LONGER[0] * points.asked + LONGER[1]
-    if stretched.duration > most:
-        enough = (stretched.duration - LONGER[1]) / LONGER[0]
+    most = MAX_DELAY[0] * points.asked + MAX_DELAY[1]
+    if scaled.duration > most:
+        enough = (scaled.duration - MAX_DELAY[1]) / MAX_DELAY[0]
         return _Haste(_words(demand, limits), demand.time, enough / max(points.asked, 1e-9))
-    late = stretched.duration - points.asked
+    late = scaled.duration - points.asked
     if late < 0.01:
-        return GoalPath(stretched, '')
+        return GoalPath(scaled, '')
     cause = f'{QUANTITIES[demand.quantity][1]} of {limits.names[demand.joint]}'
-    return GoalPath(stretched, f'{late:.2f} s later than asked, for the {cause}')
+    return GoalPath(scaled, f'{late:.2f} s later than asked, for the {cause}')
 
 
 def _sufficient(points: Points, limits: JointLimits, state: RobotState, guess: float) -> float:
     """Return how many times the time suffices, in hundredths."""
     factor = _hundredths(guess)
-    for _ in range(TURNS):
+    for _ in range(MAX_ITERATIONS):
         try:
             answer = _tried(points.slowed(factor), limits, state)
         except GoalError:  # slower, an arm in motion would swing out beyond a limit
@@ -194,7 +199,7 @@ def _given(points: Points, limits: JointLimits, state: RobotState) -> Path:
 def _from_here(points: Points, limits: JointLimits, state: RobotState, rules: GoalRules) -> Points:
     """Give a first point without time the time to get there, where the arm is beside it."""
     off = np.abs(points.positions[0] - state.position)
-    if points.times[0] > 0.0 or float(off.max()) < BESIDE:
+    if points.times[0] > 0.0 or float(off.max()) < START_TOLERANCE:
         return points
     if float(off.max()) > rules.start:
         raise refuse(
@@ -238,7 +243,7 @@ def _between(points: Points, limits: JointLimits) -> list[Segment]:
         bulge = (
             segment.at(start + 0.5 * duration).position - line.at(start + 0.5 * duration).position
         )
-        if _jerky(segment, limits) and np.abs(bulge).max() < DENSE:
+        if _jerky(segment, limits) and np.abs(bulge).max() < STRAIGHT_TOLERANCE:
             segment = line
         segments.append(segment)
     return segments

@@ -17,11 +17,11 @@ from .exceptions import GoalCode, GoalError
 from .goal import GoalPoint, GoalRules, TrajectoryGoal
 from .path import PathPoint
 
-MOST = 5000
+MAX_POINTS = 5000
 """Points of a trajectory at most: they take a second to plan, for which others wait."""
 
 
-NEAREST = 0.05
+MIN_JOIN_TIME = 0.05
 """Time in which a trajectory that has begun already must not be joined yet in [s]."""
 
 
@@ -109,8 +109,10 @@ def _ordered(
     _check_joints(goal.joints, limits, rules)
     if not goal.points:
         raise refuse('the trajectory has no points')
-    if len(goal.points) > MOST:
-        raise refuse(f'{len(goal.points)} points; at most {MOST} are planned, leave some out')
+    if len(goal.points) > MAX_POINTS:
+        raise refuse(
+            f'{len(goal.points)} points; at most {MAX_POINTS} are planned, leave some out'
+        )
     for number, point in enumerate(goal.points):
         _check_point(number, point, goal)
     times = np.array([point.time for point in goal.points], dtype=np.float64)
@@ -205,7 +207,7 @@ def _upcoming(points: Points, age: float) -> Points:
             GoalCode.OLD_HEADER_TIMESTAMP,
         )
     # a point that passes in a moment cannot be met; the next one can, and the last one is the goal
-    soonest = NEAREST if age > 0.0 else 0.0
+    soonest = MIN_JOIN_TIME if age > 0.0 else 0.0
     left = slice(min(int(np.searchsorted(times, soonest)), len(times) - 1), None)
     return Points(
         times[left],

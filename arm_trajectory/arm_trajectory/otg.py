@@ -12,11 +12,11 @@ import ruckig
 
 from arm_model import Array, frozen, JointLimits, Native, RobotState
 
-ENDLESS = 1e6
+CONTINUOUS_DISTANCE = 1e6
 """What counts for the way of a joint without end in [rad]."""
 
-LEAST_SHARE = 0.05
-"""Least share of its acceleration that a joint keeps while others set the pace."""
+MIN_ACCELERATION_FACTOR = 0.05
+"""Least share of its acceleration that a joint keeps while others take longer."""
 
 
 class Plan:
@@ -196,7 +196,7 @@ def _start(demand: Native, state: RobotState) -> None:
 def _shares(change: Array, acceleration: Array) -> Array:
     """Return the share of each joint's acceleration that changes all speeds in the same time."""
     needed = np.abs(change) / acceleration
-    shares: Array = np.maximum(needed / max(float(needed.max()), 1e-12), LEAST_SHARE)
+    shares: Array = np.maximum(needed / max(float(needed.max()), 1e-12), MIN_ACCELERATION_FACTOR)
     return shares
 
 
@@ -245,7 +245,7 @@ def brakeable(distance: Array, acceleration: Array, jerk: Array) -> Array:
         acceleration: Greatest decelerations in [rad/s2].
         jerk: Greatest jerks in [rad/s3].
     """
-    way = np.minimum(np.maximum(distance, 0.0), ENDLESS)
+    way = np.minimum(np.maximum(distance, 0.0), CONTINUOUS_DISTANCE)
     half = 0.5 * acceleration * acceleration / jerk
     short = np.cbrt(way * way * jerk)
     long = np.sqrt(half * half + 2.0 * acceleration * way) - half

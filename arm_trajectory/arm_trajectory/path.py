@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Paths in joint space: polynomials over the time of a trajectory.
 
-The time of the trajectory is not that of the clock: a path is walked slower, stopped and walked on
-by :class:`PathClock`. Derivatives here are by the path's own time.
+The time of the trajectory is not that of the clock: :class:`TrajectoryTimer` follows a path
+slower, stops on it and goes on. Derivatives here are by the path's own time.
 """
 
 from __future__ import annotations

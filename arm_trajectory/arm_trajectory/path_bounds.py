@@ -19,7 +19,7 @@ _CONTROL = np.array(
     [[math.comb(row, power) / math.comb(5, power) for power in range(6)] for row in range(6)]
 )
 
-EXACT = 1e-6
+ROUNDING_TOLERANCE = 1e-6
 """Rounding that is let pass in [rad]."""
 
 
@@ -48,8 +48,10 @@ def farthest_beyond(path: Path, lower: Array, upper: Array) -> Excess | None:
     """
     scaled = path.coefficients * (path.durations[:, None] ** np.arange(6.0))[:, :, None]
     control = np.einsum('cp,kpn->kcn', _CONTROL, scaled)
-    outside = (control < lower - EXACT).any(axis=1) | (control > upper + EXACT).any(axis=1)
-    worst, most = None, EXACT
+    too_low = (control < lower - ROUNDING_TOLERANCE).any(axis=1)
+    too_high = (control > upper + ROUNDING_TOLERANCE).any(axis=1)
+    outside = too_low | too_high
+    worst, most = None, ROUNDING_TOLERANCE
     for place, joint in np.argwhere(outside).tolist():
         for share, position in _extremes(scaled[place, :, joint]):
             beyond = max(lower[joint] - position, position - upper[joint])
@@ -64,6 +66,8 @@ def _extremes(coefficients: Array) -> list[tuple[float, float]]:
     """Return the ends and turning points of a polynomial on 0..1, and its values there."""
     slopes = coefficients[1:] * np.arange(1.0, 6.0)
     turning = np.roots(slopes[::-1])
-    inner = turning.real[(np.abs(turning.imag) < EXACT) & (turning.real > 0) & (turning.real < 1)]
+    inner = turning.real[
+        (np.abs(turning.imag) < ROUNDING_TOLERANCE) & (turning.real > 0) & (turning.real < 1)
+    ]
     shares = [0.0, *inner.tolist(), 1.0]
     return [(share, float(np.polyval(coefficients[::-1], share))) for share in shares]

@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Whether links of the arm meet on a way, found before anything moves.
 
-A way is looked at in steps in which no link moves by more than :data:`STEP` against another, so a
-contact that is passed over is shallower than that. Distances are measured only where the levers of
-:class:`CollisionModel` do not prove that a pair is still apart.
+A way is looked at in steps in which no link moves by more than :data:`MAX_STEP` against another,
+so a contact that is passed over is shallower than that. Distances are measured only where the
+distance rate bounds of the planning scene do not prove that a pair is clear.
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ import numpy as np
 
 from arm_model import Array, RobotModel
 
-STEP = 0.005
+MAX_STEP = 0.005
 """Greatest motion of a link against another from one look to the next in [m]."""
 
-COARSE = 0.01
+COARSE_PERIOD = 0.01
 """Time between the places from which the steps are laid out in [s]."""
 
-MOST = 50_000
+MAX_SAMPLES = 50_000
 """Looks at one way at most: beyond 250 m of motion they are farther apart."""
 
-FARTHEST = 64
-"""Looks that are proven at once at most."""
+MAX_BATCH = 64
+"""Looks that are proven clear at once at most."""
 
-TOUCH = 1e-4
+CONTACT_TOLERANCE = 1e-4
 """Overlap that is let pass in [m], for rounding; in contact already, how much more of it."""
 
 
@@ -73,26 +73,26 @@ class PathCheck:
         floor = np.full(len(self._clearances.pairs), -np.inf)
         place, ahead = 0, 1
         while place < len(rows):
-            passed = self._clearances.proven(rows[place : place + ahead], 0.0)
+            passed = self._clearances.provably_clear(rows[place : place + ahead], 0.0)
             if passed:
-                floor.fill(-TOUCH)
-                place, ahead = place + passed, min(2 * ahead, FARTHEST)
+                floor.fill(-CONTACT_TOLERANCE)
+                place, ahead = place + passed, min(2 * ahead, MAX_BATCH)
                 continue
             distances = self._clearances.least(rows[place], 0.0)
             deeper = distances < floor
             if deeper.any():
                 links = self._clearances.pairs[int(deeper.argmax())]
                 return Contact(links, float(times[place]))
-            floor = np.maximum(floor, np.minimum(distances, 0.0) - TOUCH)
+            floor = np.maximum(floor, np.minimum(distances, 0.0) - CONTACT_TOLERANCE)
             place, ahead = place + 1, 1
         return None
 
     def _looks(self, positions_at: Callable[[Array], Array], duration: float) -> Array:
         """Return the times to look at: dense where the arm moves fast."""
-        coarse = np.linspace(0.0, duration, math.ceil(duration / COARSE) + 2)
+        coarse = np.linspace(0.0, duration, math.ceil(duration / COARSE_PERIOD) + 2)
         turns = np.abs(np.diff(positions_at(coarse), axis=0))
-        motion = (turns @ self._clearances.levers.T).max(axis=1)
+        motion = (turns @ self._clearances.distance_rate_bounds.T).max(axis=1)
         along = np.concatenate(((0.0,), np.cumsum(motion)))
-        count = min(math.ceil(along[-1] / STEP), MOST)
+        count = min(math.ceil(along[-1] / MAX_STEP), MAX_SAMPLES)
         times: Array = np.interp(np.linspace(0.0, along[-1], count + 1), along, coarse)
         return times

@@ -12,19 +12,19 @@ from arm_model import Array, JointLimits
 
 from .path import Path, PathPoint, quintic, Segment, shifted
 
-ROOM = 1.25
+DURATION_FACTOR = 1.25
 """How much longer than its peaks need the rounding of a corner takes: segments bend too."""
 
-BRIEFEST = 0.02
+MIN_HALF_TIME = 0.02
 """Least half time of a rounding in [s]: a few cycles, so that sampling does not see a corner."""
 
-CUT = 0.005
+OVERLAP_TOLERANCE = 0.005
 """How far roundings that overlap may lead off the path in [rad]."""
 
-BULGE = 0.007
+DEVIATION_FACTOR = 0.007
 """Greatest way off the path of a rounded step of acceleration, as a share of E d^2."""
 
-MERGED = 1e-7
+MERGE_TOLERANCE = 1e-7
 """Changes of the polynomial that are nearer than this count as one in [s]."""
 
 
@@ -117,9 +117,9 @@ def _needed(jumps: Array, bends: Array, limits: JointLimits) -> Array:
     by_acceleration = np.max(0.75 * jump / limits.acceleration, axis=1)
     by_jerk = np.max(np.sqrt(1.5 * jump / limits.jerk), axis=1)
     by_bend = np.max(1.125 * bend / limits.jerk, axis=1)
-    needed = ROOM * np.maximum(np.maximum(by_acceleration, by_jerk), by_bend)
+    needed = DURATION_FACTOR * np.maximum(np.maximum(by_acceleration, by_jerk), by_bend)
     none = np.maximum((jump / limits.velocity).max(1), (bend / limits.acceleration).max(1)) < 1e-6
-    halves: Array = np.where(none, 0.0, np.maximum(needed, BRIEFEST))
+    halves: Array = np.where(none, 0.0, np.maximum(needed, MIN_HALF_TIME))
     return halves
 
 
@@ -127,7 +127,10 @@ def _halves(corners: _Corners, path: Path, limits: JointLimits) -> Array:
     """Return half the time of each rounding in [s]; 0 without a corner."""
     jump = np.maximum(np.abs(corners.jumps).max(axis=1), 1e-12)
     bend = np.maximum(np.abs(corners.bends).max(axis=1), 1e-12)
-    harmless = np.minimum(CUT / (3.0 / 16.0 * jump), np.sqrt(CUT / (BULGE * bend)))
+    harmless = np.minimum(
+        OVERLAP_TOLERANCE / (3.0 / 16.0 * jump),
+        np.sqrt(OVERLAP_TOLERANCE / (DEVIATION_FACTOR * bend)),
+    )
     halves = np.minimum(
         _needed(corners.jumps, corners.bends, limits), np.maximum(corners.rooms, harmless)
     )
@@ -159,8 +162,8 @@ def _breaks(base: Path, times: Array, halves: Array) -> Array:
     begin, end = base.starts[0], base.duration
     ends = (times[rounds] - halves[rounds], times[rounds], times[rounds] + halves[rounds])
     inner = np.sort(np.concatenate((base.starts[1:], *ends)))
-    inner = inner[(inner > begin + MERGED) & (inner < end - MERGED)]
-    apart = np.diff(inner, prepend=begin) > MERGED
+    inner = inner[(inner > begin + MERGE_TOLERANCE) & (inner < end - MERGE_TOLERANCE)]
+    apart = np.diff(inner, prepend=begin) > MERGE_TOLERANCE
     breaks: Array = np.concatenate(((begin,), inner[apart], (end,)))
     return breaks
 

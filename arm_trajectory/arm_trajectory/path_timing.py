@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Paths walked slower where joints could not follow: the same places, more time.
+"""Paths followed slower where joints could not follow: the same places, more time.
 
 Planners know speeds and accelerations, seldom jerks, and only at their points; what lies between
-may ask more. The path q(s) is walked as q(s(t)) with ds/dt = 1/r. The stretch r(s) >= 1 is a
+may ask more. The path q(s) is followed as q(s(t)) with ds/dt = 1/r. The scaling r(s) >= 1 is a
 cubic B-spline, so the path stays smooth to the acceleration, and what it asks is, by the chain
 rule with u = 1/r, derivatives by s written as primes::
 
@@ -25,28 +25,28 @@ from arm_model import Array, JointLimits, Places
 
 from .path import Path, quintics, Segment
 
-SPACING = 0.01
+MAX_SPACING = 0.01
 """Greatest distance of the places that are looked at in [s]."""
 
-MOST = 4000
+MAX_SAMPLES = 4000
 """Places in about a path: long ones are looked at less densely."""
 
-INNER = 4
+MIN_SEGMENT_SAMPLES = 4
 """Least number of parts in which each segment is looked at."""
 
-KNOTS = (0.06, 0.15, 0.4)
+KNOT_SPACINGS = (0.06, 0.15, 0.4)
 """Distances of the spline's knots that are tried in [s]: short ones lose less time."""
 
-TURNS = 60
+MAX_ITERATIONS = 60
 """How often the spline is improved at most."""
 
-FULL = (0.99, 0.96, 0.9)
-"""Shares of the limits that stretches aim at, until what lies between the places is within too."""
+LIMIT_FACTORS = (0.99, 0.96, 0.9)
+"""Shares of the limits that scalings aim at, until what lies between the places is within too."""
 
-BETWEEN = (1.0, 1.01, 1.03)
+BETWEEN_FACTORS = (1.0, 1.01, 1.03)
 """How much greater velocity, acceleration and jerk may be between the places, as factors."""
 
-PIECE = 0.02
+MAX_SEGMENT_DURATION = 0.02
 """Greatest length of the new segments in [s] of the given path."""
 
 
@@ -70,7 +70,7 @@ class Demand:
 
 
 class Timing:
-    """What a path asks of the joints, and the stretch that brings it within their limits."""
+    """What a path asks of the joints, and the scaling that brings it within their limits."""
 
     def __init__(self, path: Path, limits: JointLimits) -> None:
         """Look at a path.
@@ -109,63 +109,65 @@ class Timing:
             float(shares.max()), int(joint), int(quantity), float(self._times[place]), value
         )
 
-    def stretched(self) -> Path | None:
+    def time_scaled(self) -> Path | None:
         """Return the path within the limits, as quick as a spline makes it; None for no way.
 
         A path that joins a motion begins with its speed; what is asked there cannot be changed.
         """
         if self.demand.share <= 1.0:
             return self._path
-        for full in FULL:
-            found = [each for knots in KNOTS if (each := self._solved(knots, full)) is not None]
+        for full in LIMIT_FACTORS:
+            found = [
+                each for knots in KNOT_SPACINGS if (each := self._solved(knots, full)) is not None
+            ]
             if not found:
                 return None
-            path = _walked(self._path, min(found, key=lambda stretch: stretch.duration))
+            path = _scaled_path(self._path, min(found, key=lambda scaling: scaling.duration))
             if Timing(path, self._limits).demand.share <= 1.0:
                 return path
         return None
 
-    def _solved(self, knots: float, full: float) -> _Stretch | None:
-        """Return the stretch with knots about a distance apart, if there is one."""
+    def _solved(self, knots: float, full: float) -> TimeScaling | None:
+        """Return the scaling with knots about a distance apart, if there is one."""
         count = max(math.ceil(self._path.duration / knots), 1)
-        stretch = _Stretch(np.ones(count + 3), self._path.duration)
+        scaling = TimeScaling(np.ones(count + 3), self._path.duration)
         pinned = 3 if self._path.joined else 0
-        cells, basis = stretch.basis(self._times)
-        for _ in range(TURNS):
-            r, slope, bend = (stretch.derived(cells, row) for row in basis)
+        cells, basis = scaling.basis(self._times)
+        for _ in range(MAX_ITERATIONS):
+            r, slope, bend = (scaling.derived(cells, row) for row in basis)
             needed = self._needed(r, slope, bend, full)
             if needed.max() <= 1.0:
-                return stretch
+                return scaling
             most = np.ones(count)
             np.maximum.at(most, cells, needed)
             wide = np.concatenate((np.ones(3), most, np.ones(3)))
             growth = np.max([wide[shift : shift + count + 3] for shift in range(4)], axis=0)
             growth[:pinned] = 1.0
-            stretch = _Stretch(stretch.coefficients * growth, stretch.length)
+            scaling = TimeScaling(scaling.coefficients * growth, scaling.length)
         return None
 
     def _needed(self, r: Array, slope: Array, bend: Array, full: float) -> Array:
-        """Return the greatest factor of time at each place under a stretch."""
+        """Return the greatest factor of time at each place under a scaling."""
         u = 1.0 / r
         first = -slope * u**2
         second = (2.0 * slope**2 * u - bend) * u**2
         rate, change, jolt = u, u * first, u * (first**2 + u * second)
         speed, acceleration, jerk = self._rates
-        walked = [
+        scaled = [
             speed * rate[:, None],
             acceleration * (rate**2)[:, None] + speed * change[:, None],
             jerk * (rate**3)[:, None]
             + 3.0 * acceleration * (rate * change)[:, None]
             + speed * jolt[:, None],
         ]
-        needed: Array = self._shares(walked, full).max(axis=(0, 2))
+        needed: Array = self._shares(scaled, full).max(axis=(0, 2))
         return needed
 
     def _shares(self, rates: list[Array], full: float) -> Array:
         """Return the factors of time (3, m, n) by velocity, acceleration and jerk."""
         limits = self._limits
         speed, acceleration, jerk = (
-            np.abs(rate) * (more / full) for rate, more in zip(rates, BETWEEN, strict=True)
+            np.abs(rate) * (more / full) for rate, more in zip(rates, BETWEEN_FACTORS, strict=True)
         )
         return np.array(
             (
@@ -176,7 +178,7 @@ class Timing:
         )
 
 
-class _Stretch:
+class TimeScaling:
     """A cubic B-spline over a path: seconds for each second of it."""
 
     def __init__(self, coefficients: Array, length: float) -> None:
@@ -186,7 +188,7 @@ class _Stretch:
 
     @property
     def duration(self) -> float:
-        """How long the stretched path lasts in [s]."""
+        """How long the scaled path lasts in [s]."""
         return float(self.times(np.array([0.0, self.length]))[-1])
 
     def basis(self, times: Array) -> tuple[Places, Array]:
@@ -207,7 +209,7 @@ class _Stretch:
         return derived
 
     def times(self, places: Array) -> Array:
-        """Return the stretched times of places of the path that begin at 0 in [s]."""
+        """Return the scaled times of places of the path that begin at 0 in [s]."""
         knots = np.arange(1, len(self.coefficients) - 3) * self._width
         fine = np.unique(np.concatenate((places, knots)))
         middle, half = 0.5 * (fine[:-1] + fine[1:]), 0.5 * np.diff(fine)
@@ -222,29 +224,29 @@ class _Stretch:
 
 def _places(path: Path) -> tuple[Places, Array]:
     """Return segments and times in them, at which a path is looked at."""
-    spacing = max(SPACING, path.duration / MOST)
+    spacing = max(MAX_SPACING, path.duration / MAX_SAMPLES)
     lasts = path.durations
-    counts = np.maximum(np.ceil(lasts / spacing).astype(int), INNER) + 1
+    counts = np.maximum(np.ceil(lasts / spacing).astype(int), MIN_SEGMENT_SAMPLES) + 1
     places = np.repeat(np.arange(len(counts)), counts)
     number = np.arange(len(places)) - np.repeat(np.cumsum(counts) - counts, counts)
     return places, lasts[places] * number / (counts[places] - 1)
 
 
-def _walked(path: Path, stretch: _Stretch) -> Path:
-    """Return a path as the stretch makes it."""
+def _scaled_path(path: Path, scaling: TimeScaling) -> Path:
+    """Return a path as the scaling makes it."""
     lasts = path.durations
-    counts = np.ceil(lasts / PIECE).astype(int)
+    counts = np.ceil(lasts / MAX_SEGMENT_DURATION).astype(int)
     places = np.repeat(np.arange(len(counts)), counts)
     number = np.arange(len(places)) - np.repeat(np.cumsum(counts) - counts, counts)
     offsets = lasts[places] * number / counts[places]
     places, offsets = np.append(places, len(counts) - 1), np.append(offsets, lasts[-1])
     given = path.starts[places] + offsets
-    cells, basis = stretch.basis(given)
-    r, slope = (stretch.derived(cells, row) for row in basis[:2])
+    cells, basis = scaling.basis(given)
+    r, slope = (scaling.derived(cells, row) for row in basis[:2])
     q, speed, bend = (path.derived(order, places, offsets) for order in range(3))
     velocity = speed / r[:, None]
     acceleration = bend / (r**2)[:, None] - speed * (slope / r**3)[:, None]
-    times = stretch.times(given)
+    times = scaling.times(given)
     lengths = np.diff(times)
     pieces = quintics(lengths, q, velocity, acceleration)
     return Path(

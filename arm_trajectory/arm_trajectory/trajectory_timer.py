@@ -13,25 +13,25 @@ from arm_model import JointLimits
 
 from .path import Path
 
-QUICKEST = 10.0
+MAX_SCALING_RATE = 10.0
 """Greatest change of the speed scaling in [1/s], for where the path asks nothing of the joints."""
 
-ABRUPTEST = 200.0
+MAX_SCALING_ACCELERATION = 200.0
 """Greatest change of that in [1/s2]."""
 
-SHARE = 0.9
+ACCELERATION_FACTOR = 0.9
 """Share of the joints' acceleration that a change of the speed scaling may bring them to."""
 
-JERK_SHARE = 0.4
+JERK_FACTOR = 0.4
 """Share of the joints' jerk that a change of the speed scaling may ask."""
 
-SPREAD = 5.0
+MIN_BUILD_UP_CYCLES = 5.0
 """Cycles at least in which a change of the speed scaling builds up."""
 
-FLOOR = 0.2
+MIN_ROOM_FACTOR = 0.2
 """Share of its room that a change of the speed scaling has where the path leaves none."""
 
-SOON = 0.01
+JERK_LOOKAHEAD = 0.01
 """How far ahead on the path its own jerk is looked for in [s]."""
 
 
@@ -128,7 +128,7 @@ class TrajectoryTimer:
             self.time += self.speed_scaling * period
             return
         quickest, abruptest = self._room(path, 1.0 if wanted > self.speed_scaling else -1.0)
-        abruptest = min(abruptest, quickest / (SPREAD * period))
+        abruptest = min(abruptest, quickest / (MIN_BUILD_UP_CYCLES * period))
         demand = self._demand
         demand.current_position = [self.time]
         demand.current_velocity = [self.speed_scaling]
@@ -176,20 +176,24 @@ class TrajectoryTimer:
 
     def _room(self, path: Path, sense: float) -> tuple[float, float]:
         """Return how fast the speed scaling may change in [1/s], and that in [1/s2]."""
-        here, soon, limits = path.at(self.time), path.at(self.time + SOON), self._limits
+        here, soon, limits = path.at(self.time), path.at(self.time + JERK_LOOKAHEAD), self._limits
         speed = np.maximum(np.abs(here.velocity), 1e-9)
         bend = np.maximum(np.abs(here.acceleration), np.abs(soon.acceleration))
         bend *= self.speed_scaling
         used = sense * np.sign(here.velocity) * here.acceleration * self.speed_scaling**2
-        room = np.maximum(SHARE * limits.acceleration - used, FLOOR * limits.acceleration)
+        room = np.maximum(
+            ACCELERATION_FACTOR * limits.acceleration - used, MIN_ROOM_FACTOR * limits.acceleration
+        )
         # by the chain rule a change c of the scaling p costs jerk: three times acceleration p c,
         # and velocity dc/dt, beside the path's own jerk p^3
         quickest = min(
             float(np.min(room / speed)),
-            float(np.min(JERK_SHARE * limits.jerk / np.maximum(3.0 * bend, 1e-9))),
+            float(np.min(JERK_FACTOR * limits.jerk / np.maximum(3.0 * bend, 1e-9))),
         )
-        own = np.abs(soon.acceleration - here.acceleration) / SOON * self.speed_scaling**3
+        own = (
+            np.abs(soon.acceleration - here.acceleration) / JERK_LOOKAHEAD * self.speed_scaling**3
+        )
         left = limits.jerk - own - 3.0 * bend * abs(self.change)
-        left = JERK_SHARE * np.maximum(left, FLOOR * limits.jerk)
+        left = JERK_FACTOR * np.maximum(left, MIN_ROOM_FACTOR * limits.jerk)
         abruptest = float(np.min(left / speed))
-        return min(quickest, QUICKEST), min(abruptest, ABRUPTEST)
+        return min(quickest, MAX_SCALING_RATE), min(abruptest, MAX_SCALING_ACCELERATION)

@@ -12,7 +12,7 @@ import pytest
 
 from arm_model import Array
 from arm_trajectory import PathCheck
-from arm_trajectory.path_check import STEP
+from arm_trajectory.path_check import MAX_STEP
 
 pytestmark = pytest.mark.slow
 
@@ -35,4 +35,4 @@ def test_what_is_refused_collides_and_what_is_accepted_does_not(name: str, seed:
 
     if model.clearance(begin) > 0.0:
         found = PathCheck(model).contact(positions, 4.0)
-        assert least < 0.0 if found else least > -STEP
+        assert least < 0.0 if found else least > -MAX_STEP

@@ -86,16 +86,16 @@ def test_rounded_paths_are_smooth(seed: int, step: float) -> None:
 
 @settings(max_examples=20, deadline=None)
 @given(seed=st.integers(0, 10**6))
-def test_stretched_paths_lead_through_the_same_places(seed: int) -> None:
-    """A path that is walked slower is the same path, within the limits."""
+def test_time_scaled_paths_lead_through_the_same_places(seed: int) -> None:
+    """A path that is followed slower is the same path, within the limits."""
     limits = robot('gp110').limits
     rows = np.random.default_rng(seed).uniform(-0.3, 0.3, (5, 6))
     lines = [linear(0.25 * n, 0.25, rows[n], rows[n + 1]) for n in range(4)]
     given_path = rounded(Path(lines), limits)
-    stretched = Timing(given_path, limits).stretched()
-    assume(stretched is not None and stretched is not given_path)
-    assert stretched is not None
-    assert Timing(stretched, limits).demand.share <= 1.0
+    scaled = Timing(given_path, limits).time_scaled()
+    assume(scaled is not None and scaled is not given_path)
+    assert scaled is not None
+    assert Timing(scaled, limits).demand.share <= 1.0
     there = given_path.positions(np.linspace(0.0, given_path.duration, 3000))
-    for place in stretched.positions(np.linspace(0.0, stretched.duration, 60)):
+    for place in scaled.positions(np.linspace(0.0, scaled.duration, 60)):
         assert np.abs(there - place).max(axis=1).min() < 2e-3  # as dense as the places are

@@ -19,7 +19,7 @@ from ..model import RobotModel
 from ..pose import Pose, rotation_of
 from .numbers import seconds, xyz, xyzw
 
-STATIC = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+STATIC_QOS = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 """How /tf_static is published."""
 
 
@@ -71,7 +71,7 @@ class TfListener:
     def _listen(self) -> None:
         self._tree = FrameTree()
         self._node.create_subscription(TFMessage, '/tf', self._take, 100)
-        self._node.create_subscription(TFMessage, '/tf_static', self._take_static, STATIC)
+        self._node.create_subscription(TFMessage, '/tf_static', self._take_static, STATIC_QOS)
 
     def _take(self, message: TFMessage) -> None:
         now, clock = time.monotonic(), float(self._node.get_clock().now().nanoseconds) * 1e-9

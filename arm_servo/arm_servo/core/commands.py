@@ -15,7 +15,7 @@ from arm_model import Array, checked, combined, CommandError, Mask, Pose, RobotM
 from ..jog.servo_source import Command, JointCommand, PoseCommand, TwistCommand
 from .requests import JogRequest
 
-SKEW = 1e-3
+ROTATION_TOLERANCE = 1e-3
 """How far a rotation may be from one, for rounding of quaternions."""
 
 
@@ -120,6 +120,6 @@ def duration_of(duration: float | None, default: float) -> float:
 def _rotation(values: Array, what: str) -> Array:
     rotation = checked(np.ravel(values), 9, what).reshape(3, 3)
     off = float(np.abs(rotation @ rotation.T - np.eye(3)).max())
-    if off > SKEW or np.linalg.det(rotation) < 0.0:
+    if off > ROTATION_TOLERANCE or np.linalg.det(rotation) < 0.0:
         raise CommandError(f'{what}: it is no rotation; is the quaternion of unit length?')
     return rotation

@@ -27,16 +27,16 @@ from arm_trajectory import (
 
 from .outcome import Outcome
 
-ARRIVED = 1e-6
+ARRIVAL_TOLERANCE = 1e-6
 """How near to the end the set-points must be to have arrived in [rad]."""
 
-CHASING = 0.7
+MAX_CATCH_UP_SCALING = 0.7
 """Speed scaling at most while the arm catches up with the path."""
 
-MET = 1e-3
+PATH_MET_TOLERANCE = 1e-3
 """How near to the path the set-points must be to have met it in [rad]."""
 
-ASTRAY = 0.02
+PATH_LEFT_TOLERANCE = 0.02
 """How far from the path the set-points may be once they have met it in [rad]."""
 
 
@@ -245,7 +245,11 @@ class Execution:
         if self.phase is Phase.STOPPING:
             return 0.0
         # joints that give their utmost for the path cannot catch up
-        return min(speed_scaling, CHASING) if self._off > MET else speed_scaling
+        return (
+            min(speed_scaling, MAX_CATCH_UP_SCALING)
+            if self._off > PATH_MET_TOLERANCE
+            else speed_scaling
+        )
 
     def _waits(self, speed_scaling: float, period: float) -> bool:
         """Whether it does not begin now: before its time, or at rest in a pause or a stop."""
@@ -306,15 +310,15 @@ class Execution:
         """Return how far the set-points are from the path that they had met, if it is too far."""
         joint = int(np.argmax(np.abs(error)))
         self._off = float(abs(error[joint]))
-        self._met = self._met or self._off < MET
-        if not self._met or self._off <= ASTRAY:
+        self._met = self._met or self._off < PATH_MET_TOLERANCE
+        if not self._met or self._off <= PATH_LEFT_TOLERANCE:
             return None
         name = self._limits.names[joint]
         return f'{name}: the set-point is {error[joint]:+.4f} rad off the path'
 
     def _settle(self, state: RobotState, violation: str | None, period: float) -> None:
         """Wait at the end until the arm has arrived, or the time for that is over."""
-        arrived = np.allclose(state.position, self._path.end.position, atol=ARRIVED)
+        arrived = np.allclose(state.position, self._path.end.position, atol=ARRIVAL_TOLERANCE)
         if violation is None and arrived and not state.moving:
             late = f', {self._late}' if self._late else ''
             self.ending = Outcome(GoalCode.SUCCESSFUL, f'the goal is reached{late}')

@@ -33,7 +33,7 @@ from .safety_filter import SafetyFilter
 from .set_point import SetPoint, Source
 from .settings import CoreSettings
 
-DISPLACED = 0.01
+PREPARED_STATE_TOLERANCE = 0.01
 """How far the arm may be from where a trajectory was prepared in [rad]."""
 
 PAUSED = 'the arm is paused; resume first (~/resume of the trajectory controller)'
@@ -451,7 +451,7 @@ class MotionCore:
         """Make sure that the arm is where a trajectory was prepared; else its way is another."""
         off = np.abs(state.position - planned.position)
         joint = int(np.argmax(off))
-        if off[joint] > DISPLACED:
+        if off[joint] > PREPARED_STATE_TOLERANCE:
             raise StateMovedError(
                 GoalCode.INVALID_GOAL,
                 f'{self._model.joints[joint]} was moved by {off[joint]:.3f} rad while the'

@@ -11,16 +11,16 @@ from arm_trajectory import hard_brake, OnlineTrajectoryGenerator, Plan
 
 from ..report import Cause, Limiter
 
-TOUCH = 1e-4
+CONTACT_TOLERANCE = 1e-4
 """Change of a distance that is let pass, in all, in [m]: sliding along is no approach."""
 
-LOOKS, MOST_LOOKS = 6, 40
+MIN_SAMPLES, MAX_SAMPLES = 6, 40
 """How many places of a stop distances are looked at, at least and at most."""
 
-STRIDE = 0.1
+MAX_STRIDE = 0.1
 """Way of all joints between two looks in [rad]."""
 
-EXACT = 1e-7
+ROUNDING_TOLERANCE = 1e-7
 """Rounding of ruckig's positions that is let pass in [rad]."""
 
 
@@ -102,7 +102,9 @@ class SafetyFilter:
         if stop is None:
             return np.ones_like(beyond), None
         lower, upper = stop.extremes
-        return beyond | (lower < self._lower - EXACT) | (upper > self._upper + EXACT), stop
+        too_low = lower < self._lower - ROUNDING_TOLERANCE
+        too_high = upper > self._upper + ROUNDING_TOLERANCE
+        return beyond | too_low | too_high, stop
 
     def _limit(self, wanted: RobotState, joint: int) -> Limiter:
         """Name the limit that a joint would break."""
@@ -138,13 +140,13 @@ class SafetyFilter:
             self._floor = clearance if now is None else self._least(now).distance
             self._floor = min(self._floor, clearance)
         near = self._least(stop)
-        if near.distance < self._floor - TOUCH:
+        if near.distance < self._floor - CONTACT_TOLERANCE:
             # what stopping now brings about cannot be had better
             now = self._generator.brake(state)
-            least = self._floor - TOUCH
+            least = self._floor - CONTACT_TOLERANCE
             least = least if now is None else min(self._floor, self._least(now).distance)
-            self._floor = min(self._floor, least + TOUCH)
-        if near.distance < self._floor - TOUCH - EXACT:
+            self._floor = min(self._floor, least + CONTACT_TOLERANCE)
+        if near.distance < self._floor - CONTACT_TOLERANCE - ROUNDING_TOLERANCE:
             return near
         self._floor = max(self._floor, min(near.distance, clearance))
         return None
@@ -154,7 +156,7 @@ class SafetyFilter:
         if self._model.stays_apart(*stop.extremes, self._clearance):
             return LeastClearance(self._clearance)
         way = np.ptp(np.stack(stop.extremes), axis=0).sum()
-        looks = min(max(LOOKS, round(way / STRIDE)), MOST_LOOKS)
+        looks = min(max(MIN_SAMPLES, round(way / MAX_STRIDE)), MAX_SAMPLES)
         times = np.linspace(0.0, stop.duration, looks + 1)[1:].tolist()
         places = np.array([stop.at(time).position for time in times])
         return self._model.least_clearance(places, self._clearance)
@@ -166,7 +168,11 @@ class SafetyFilter:
             return None
         after = plan.at(period)
         beyond, stop = self._beyond(after)
-        if stop is None or beyond.any() or self._least(plan).distance < self._floor - TOUCH:
+        if (
+            stop is None
+            or beyond.any()
+            or self._least(plan).distance < self._floor - CONTACT_TOLERANCE
+        ):
             return None
         self._remember(stop)
         return after

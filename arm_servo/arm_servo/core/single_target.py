@@ -11,10 +11,10 @@ from arm_trajectory import GoalCode, OnlineTrajectoryGenerator, Plan
 
 from .outcome import Outcome
 
-ARRIVED = 1e-6
+ARRIVAL_TOLERANCE = 1e-6
 """How near to the target the set-points must be to have arrived in [rad]."""
 
-SLOWEST = 0.01
+MIN_SPEED_FACTOR = 0.01
 """Least share of the speed that a target is approached with."""
 
 
@@ -48,7 +48,7 @@ class SingleTarget:
             state: Commanded state of the joints.
             speed_scaling: Share of the speed, 0 to 1.
         """
-        speed_scaling = max(speed_scaling, SLOWEST)
+        speed_scaling = max(speed_scaling, MIN_SPEED_FACTOR)
         if speed_scaling != self._planned_for:
             self._planned_for = speed_scaling
             self._planner = self._generator.slowed(speed_scaling, self._max_speed)
@@ -77,7 +77,7 @@ class SingleTarget:
         Args:
             state: Commanded state of the joints.
         """
-        if not state.moving and np.allclose(state.position, self.target, atol=ARRIVED):
+        if not state.moving and np.allclose(state.position, self.target, atol=ARRIVAL_TOLERANCE):
             self.end(Outcome(GoalCode.SUCCESSFUL, 'the target is reached'))
 
     def end(self, outcome: Outcome) -> None:

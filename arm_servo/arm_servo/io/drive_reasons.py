@@ -34,7 +34,7 @@ REMEDIES: Mapping[RefusalCause, str] = {
     RefusalCause.SHUTDOWN: 'start the master again',
 }
 
-SILENT_SHARE = 0.5
+SILENT_AGE_FACTOR = 0.5
 """Share of the age of a silent drive from which on another one counts as silent, too."""
 
 PLURAL = {'is': 'are', 'has': 'have', 'was': 'were', 'does': 'do', 'moves': 'move'}
@@ -74,7 +74,7 @@ def what_happened(feedback: Sequence[AxisFeedback], released: Released) -> tuple
     oldest = max((axis.age for axis in feedback if _is_silent(axis)), default=math.inf)
     for number, axis in enumerate(feedback):
         # what cuts several drives off at once shows of some of them a few cycles later
-        if causes[number][1] is None and axis.age > SILENT_SHARE * oldest:
+        if causes[number][1] is None and axis.age > SILENT_AGE_FACTOR * oldest:
             detail = f'the last is {axis.age:.1f} s old'
             causes[number] = axis.name, Refusal(RefusalCause.SILENT, detail)
     is_behind = any(

@@ -11,16 +11,16 @@ import numpy as np
 
 from arm_model import Array, JointLimits
 
-MOVED = 0.002
+REST_TOLERANCE = 0.002
 """How far an arm at rest may turn by itself in [rad]; more was done by others."""
 
-LEARNING = 0.1
+MEAN_GAIN = 0.1
 """Share of a new measurement in the mean and in the noise of an arm at rest."""
 
 NOISE_ALLOWANCE, MEAN_ALLOWANCE = 8.0, 2.0
 """How many times its noise a measurement, and the mean of many, may be off by itself."""
 
-ARRIVING = 0.02
+ARRIVAL_TOLERANCE = 0.02
 """The same while it may still be on its last way, from all that was commanded."""
 
 
@@ -103,24 +103,24 @@ class FollowingWatch:
         self._still = self._still + 1 if quiet else 0
         if self._still <= 1:
             self._mean = self._last = measured
-        allowed = np.maximum(MOVED, NOISE_ALLOWANCE * self._noise)
+        allowed = np.maximum(REST_TOLERANCE, NOISE_ALLOWANCE * self._noise)
         self._learn(measured)
         if self._still <= self._quiet:
             self._rest = self._mean
-            return quiet and bool(self.errors(measured).max() > ARRIVING)
+            return quiet and bool(self.errors(measured).max() > ARRIVAL_TOLERANCE)
         aside = np.abs(self._unwound(measured, self._rest) - self._rest)
         drifted = np.abs(self._mean - self._rest)
         return bool(
             np.any(aside > allowed)
-            or np.any(drifted > np.maximum(MOVED, MEAN_ALLOWANCE * self._noise))
+            or np.any(drifted > np.maximum(REST_TOLERANCE, MEAN_ALLOWANCE * self._noise))
         )
 
     def _learn(self, measured: Array) -> None:
         """Take a measurement into the mean and the noise."""
         near = self._unwound(measured, self._last)
-        self._noise = self._noise + LEARNING * (np.abs(near - self._last) - self._noise)
+        self._noise = self._noise + MEAN_GAIN * (np.abs(near - self._last) - self._noise)
         self._last = near
-        self._mean = self._mean + LEARNING * (self._unwound(measured, self._mean) - self._mean)
+        self._mean = self._mean + MEAN_GAIN * (self._unwound(measured, self._mean) - self._mean)
 
     def _unwound(self, measured: Array, near: Array) -> Array:
         """Add whole turns to continuous joints."""

@@ -22,10 +22,10 @@ from ..report import MotionReport
 from .following import FollowingWatch
 from .joint_feedback import JointFeedback
 
-SILENCE = 0.3
+RESYNC_SILENCE = 0.3
 """How long nobody must command an arm that did not follow, before it takes commands, in [s]."""
 
-LAST_STOP = 3.0
+STOP_TIMEOUT = 3.0
 """Longest time for the arm to come to rest at the end of the program in [s]."""
 
 
@@ -108,7 +108,7 @@ class MotionCycle:
 
     def _kept(self, now: float) -> str:
         """Return why the arm did not follow, as long as somebody goes on to command it."""
-        if now - max(self._failed, self._gateway.refused) > SILENCE:
+        if now - max(self._failed, self._gateway.refused) > RESYNC_SILENCE:
             self._failure = ''
         return self._failure
 
@@ -187,7 +187,7 @@ class MotionThread:
         """Bring the arm to rest, and wait for the end."""
         self.end()
         if self._thread.is_alive():
-            self._thread.join(LAST_STOP + 1.0)
+            self._thread.join(STOP_TIMEOUT + 1.0)
 
     def _run(self) -> None:
         try:
@@ -200,7 +200,7 @@ class MotionThread:
                 begin = time.monotonic()
                 self._cycles(
                     lambda _, period: self._cycle.brake(period),
-                    lambda now: self._cycle.at_rest or now > begin + LAST_STOP,
+                    lambda now: self._cycle.at_rest or now > begin + STOP_TIMEOUT,
                 )
         finally:
             self.ended.set()
@@ -208,7 +208,7 @@ class MotionThread:
     def _ends(self, now: float) -> bool:
         if not self._ending.is_set():
             return False
-        self._until = min(self._until, now + LAST_STOP)
+        self._until = min(self._until, now + STOP_TIMEOUT)
         return self._cycle.at_rest or now > self._until
 
     def _cycles(self, step: Callable[[float, float], None], ends: Callable[[float], bool]) -> None:

@@ -13,10 +13,10 @@ from arm_model import Array, RobotModel, RobotState
 from ..report import MotionReport
 from .servo_source import Command, ServoSettings, ServoSource, TwistCommand
 
-CALM = 0.02
+REST_SPEED_FACTOR = 0.02
 """Share of a joint's speed below which a released jog needs no line any more."""
 
-LONGEST = 1.0
+MAX_SLOW_DOWN_TIME = 1.0
 """Longest time for which a released jog is slowed down along its line in [s]."""
 
 
@@ -79,11 +79,11 @@ class Jogging:
 
     def _slowing(self, state: RobotState, now: float) -> Command | None:
         """Return what slows a stale jog down along its line; None for the last of it."""
-        calm = np.all(np.abs(state.velocity) < CALM * self._limits.velocity)
+        calm = np.all(np.abs(state.velocity) < REST_SPEED_FACTOR * self._limits.velocity)
         if calm or not isinstance(self._command, TwistCommand):
             return None
         if self._slowing_since is None:
             self._slowing_since = now
-        if now - self._slowing_since > LONGEST:
+        if now - self._slowing_since > MAX_SLOW_DOWN_TIME:
             return None
         return replace(self._command, twist=np.zeros(6))

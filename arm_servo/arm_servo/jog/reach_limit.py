@@ -18,27 +18,27 @@ import numpy as np
 from arm_model import Array, JointLimits
 from arm_trajectory import brakeable, brakeable_velocity
 
-from .singularity import Directions, distance_to_singularity, LOST, way_out
+from .singularity import Directions, distance_to_singularity, LOST_SPEED_FACTOR, way_out
 
-FULL = 0.05
+FULL_SPEED_TWIST = 0.05
 """Scaled twist from which on a singular pose is left at full speed in [rad/s]."""
 
-WANDER = 3.0
+MAX_ESCAPE_MOTION = 3.0
 """How far a way out is followed while the asked direction stays lost in [rad]."""
 
-ELSEWHERE = 0.05
+MAX_STEP_MOTION = 0.05
 """Motion of a joint between two steps from which on something else moved the arm in [rad]."""
 
-ASIDE = 1e-3
+MIN_SIDE_DISTANCE = 1e-3
 """Least distance along a way out that tells on which side of a singular pose one is in [rad]."""
 
-STEEPEST = 3.0
+MAX_SINGULAR_VALUE_RATE = 3.0
 """Greatest change of a scaled singular value with a joint in [1/rad], to save a closer look."""
 
-FADE = 4.0
+MAX_APPROACH_RATE = 4.0
 """Greatest speed towards a fold per way that is left in [1/s]."""
 
-LEAST_PART = 1e-5
+MIN_COMPONENT = 1e-5
 """Part of a joint in a direction that counts for none."""
 
 JacobianAt = Callable[[Array], Array]
@@ -101,8 +101,9 @@ class ReachLimit:
         """
         self._remember(position, good=bool(command.any()) and not found.damped)
         asked = float(command @ found.tool[:, -1])
-        nearest = found.least / STEEPEST
-        if abs(asked) <= found.least * min(self._surely_stoppable(nearest), FADE * nearest):
+        nearest = found.least / MAX_SINGULAR_VALUE_RATE
+        slow = min(self._surely_stoppable(nearest), MAX_APPROACH_RATE * nearest)
+        if abs(asked) <= found.least * slow:
             return found  # slow enough for a fold that is as near as can be
         way = float(np.sign(asked)) * distance_to_singularity(jacobian_at, position, found)
         if not 0.0 < way < np.inf:
@@ -114,10 +115,10 @@ class ReachLimit:
 
         The last of the way fades, so that the arm rests there and does not hunt about it.
         """
-        parts = np.maximum(np.abs(found.joints[-1]), LEAST_PART)
+        parts = np.maximum(np.abs(found.joints[-1]), MIN_COMPONENT)
         acceleration = self._braking * np.min(self._limits.acceleration / parts)
         jerk = self._braking * np.min(self._limits.jerk / parts)
-        return min(float(brakeable(np.asarray(way), acceleration, jerk)), FADE * way)
+        return min(float(brakeable(np.asarray(way), acceleration, jerk)), MAX_APPROACH_RATE * way)
 
     def _surely_stoppable(self, way: float) -> float:
         """Return a speed in any joint direction that ends within a way in [rad/s], quickly."""
@@ -143,18 +144,18 @@ class ReachLimit:
             return None
         if self._entered is None:
             self._entered = position
-        if np.linalg.norm(position - self._entered) > WANDER:
+        if np.linalg.norm(position - self._entered) > MAX_ESCAPE_MOTION:
             return None  # it leads nowhere
         way = way_out(jacobian_at, position, found, command)
         self._sense = None if way is None else way * self._oriented(way, position)
         if self._sense is None:
             return None
-        fade = 1.0 - float(found.share[-1]) / LOST
+        fade = 1.0 - float(found.share[-1]) / LOST_SPEED_FACTOR
         return WayOut(self._sense, fade * self._speed(self._sense, command), fade)
 
     def _remember(self, position: Array, good: bool) -> None:
         """Remember a place where the arm could do what was asked, until others move the arm."""
-        if self._at is None or np.abs(position - self._at).max() > ELSEWHERE:
+        if self._at is None or np.abs(position - self._at).max() > MAX_STEP_MOTION:
             self._good = None
         self._at = position
         if good:
@@ -163,14 +164,14 @@ class ReachLimit:
     def _speed(self, way: Array, command: Array) -> float:
         """Return how fast to follow a way out in [rad/s]: slower for a slow command."""
         fastest = self._escape / float(np.max(np.abs(way) / self._limits.velocity))
-        return fastest * min(1.0, float(np.linalg.norm(command)) / FULL)
+        return fastest * min(1.0, float(np.linalg.norm(command)) / FULL_SPEED_TWIST)
 
     def _oriented(self, way: Array, position: Array) -> float:
         """Return the sense, 1 or -1: as before, else back, else away from the nearer limits."""
         if self._sense is not None:
             return 1.0 if way @ self._sense >= 0 else -1.0
         back = 0.0 if self._good is None else float(way @ (self._good - position))
-        if abs(back) > ASIDE:
+        if abs(back) > MIN_SIDE_DISTANCE:
             return 1.0 if back > 0 else -1.0
         ways = np.array((self._limits.upper - position, position - self._limits.lower))
         upper, lower = brakeable_velocity(ways, self._limits)

@@ -20,10 +20,10 @@ NO_AXES: Mask = np.zeros(6, dtype=np.bool_)
 BASE = np.eye(3)
 """The axes of the base."""
 
-RELEASED = np.array([2e-3] * 3 + [5e-3] * 3)
+RELEASED_SPEED = np.array([2e-3] * 3 + [5e-3] * 3)
 """Speed below which a released axis is held again in [m/s] and [rad/s]."""
 
-MIN_SHARE = 0.1
+MIN_COMMAND_FACTOR = 0.1
 """Least share of a command that is carried out while held axes are off."""
 
 SLOWED, HASTENED = 0.1, 0.4
@@ -185,7 +185,7 @@ class ServoSource:
 
     def _still_moving(self, state: RobotState, axes: Array) -> Mask:
         twist = self._model.jacobian(state.position) @ state.velocity
-        moving: Mask = np.abs(turned_twists(axes, twist)) > RELEASED
+        moving: Mask = np.abs(turned_twists(axes, twist)) > RELEASED_SPEED
         return moving
 
     def _governor(self, error: Array, period: float) -> float:
@@ -193,7 +193,7 @@ class ServoSource:
         scale = self._settings.path_error
         x, y, z, *turns = error.tolist()
         off: float = max(map(abs, (x, y, z, *(self._length * turn for turn in turns))))
-        wanted = min(1.0, max(MIN_SHARE, 1.0 - (off - scale) / (4.0 * scale)))
+        wanted = min(1.0, max(MIN_COMMAND_FACTOR, 1.0 - (off - scale) / (4.0 * scale)))
         return min(max(wanted, self._share - period / SLOWED), self._share + period / HASTENED)
 
     def _toward(self, state: RobotState, command: PoseCommand, period: float) -> IkAnswer:

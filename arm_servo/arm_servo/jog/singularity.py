@@ -16,28 +16,28 @@ import numpy as np
 
 from arm_model import Array, Mask
 
-SHARE = 0.5
+SPEED_FACTOR = 0.5
 """Share of a joint's speed that a direction on its own may ask before it is damped."""
 
-HOLD_SHARE = 0.05
+HOLD_SPEED_FACTOR = 0.05
 """Share of a joint's speed that bringing back a held axis may ask before it is damped."""
 
-LEAST = 0.004
+MIN_SINGULAR_VALUE = 0.004
 """Singular value of the scaled Jacobian below which a direction is damped for any command."""
 
-GOOD = 0.4
+REGULAR_SINGULAR_VALUE = 0.4
 """Singular value of the scaled Jacobian above which a direction is never damped."""
 
-LOST = 0.5
+LOST_SPEED_FACTOR = 0.5
 """Share of the asked speed below which a direction counts as lost."""
 
-STEP = 1e-3
+DIFFERENCE_STEP = 1e-3
 """Step of the differences that look for a way out in [rad]."""
 
-TINY = 1e-6
+MIN_SPEED = 1e-6
 """Speed that stands for none in [rad/s]."""
 
-CURVED = 0.02
+MIN_CURVATURE = 0.02
 """Least curvature of a way out, in scaled tool speed per squared joint speed."""
 
 
@@ -72,7 +72,7 @@ class Directions:
             fastest: Greatest speed along the last joint direction in [rad/s].
         """
         asked, least = abs(float(command @ self.tool[:, -1])), self.least
-        needed = asked * least / max(fastest, TINY) - least * least
+        needed = asked * least / max(fastest, MIN_SPEED) - least * least
         if needed <= self.damping[-1]:
             return self
         damping = np.append(self.damping[:-1], needed)
@@ -87,7 +87,7 @@ class Directions:
     @property
     def lost(self) -> Mask:
         """Mask of the lost directions."""
-        mask: Mask = self.share < LOST
+        mask: Mask = self.share < LOST_SPEED_FACTOR
         return mask
 
 
@@ -106,10 +106,10 @@ def directions(jacobian: Array, command: Array, correction: Array, fastest: Arra
     """
     tool, values, joints = np.linalg.svd(jacobian, full_matrices=False)
     allowed = 1.0 / np.max(np.abs(joints) / fastest, axis=1)
-    asked = np.abs(command @ tool) / SHARE + np.abs(correction @ tool) / HOLD_SHARE
-    knee = np.maximum(asked / allowed, LEAST)
+    asked = np.abs(command @ tool) / SPEED_FACTOR + np.abs(correction @ tool) / HOLD_SPEED_FACTOR
+    knee = np.maximum(asked / allowed, MIN_SINGULAR_VALUE)
     # a good direction whose command is too fast is slowed down with all others, not damped
-    poor = np.minimum(np.maximum(2.0 - values / (0.5 * GOOD), 0.0), 1.0)
+    poor = np.minimum(np.maximum(2.0 - values / (0.5 * REGULAR_SINGULAR_VALUE), 0.0), 1.0)
     damping = poor * np.maximum(knee * knee - values * values, 0.0) / 4.0
     share = values * values / (values * values + damping)
     return Directions(tool, joints, values, damping, share)
@@ -132,8 +132,9 @@ def distance_to_singularity(
         The way in [rad], below zero against the direction; infinity where there is none.
     """
     along, tool = found.joints[-1], found.tool[:, -1]
-    change = (float(tool @ jacobian_at(position + STEP * along) @ along) - found.least) / STEP
-    return -found.least / change if abs(change) > CURVED * STEP else float('inf')
+    beside = float(tool @ jacobian_at(position + DIFFERENCE_STEP * along) @ along)
+    change = (beside - found.least) / DIFFERENCE_STEP
+    return -found.least / change if abs(change) > MIN_CURVATURE * DIFFERENCE_STEP else float('inf')
 
 
 def way_out(
@@ -163,22 +164,20 @@ def way_out(
         return None
     null = found.joints[lost]
     along /= size
+    steps = DIFFERENCE_STEP * null
     turning = np.array(
-        [
-            (jacobian_at(position + STEP * n) - jacobian_at(position - STEP * n)).T @ along
-            for n in null
-        ]
-    ) / (2.0 * STEP)  # (k, n): change of J'u along each lost joint direction
+        [(jacobian_at(position + n) - jacobian_at(position - n)).T @ along for n in steps]
+    ) / (2.0 * DIFFERENCE_STEP)  # (k, n): change of J'u along each lost joint direction
     curvature = turning @ null.T
     bends, ways = np.linalg.eigh((curvature + curvature.T) / 2.0)
-    if bends[-1] > CURVED:
+    if bends[-1] > MIN_CURVATURE:
         direction: Array = ways[:, -1] @ null
         return direction
-    still = ways[:, bends > -CURVED]
+    still = ways[:, bends > -MIN_CURVATURE]
     if not still.size:
         return None
     _, sizes, turned = np.linalg.svd(turning.T @ still, full_matrices=False)
-    if sizes[0] < CURVED:
+    if sizes[0] < MIN_CURVATURE:
         return None
     turned_out: Array = (still @ turned[0]) @ null
     return turned_out

@@ -14,16 +14,16 @@ from arm_trajectory import brakeable_velocity
 
 from ..report import Cause, Limiter
 
-PRESSING = 1e-9
+ACTIVE_FORCE = 1e-9
 """Force of a bound above which it counts as pressing."""
 
-ALONE = 0.3
+MIN_DECELERATION_FACTOR = 0.3
 """Least share of its deceleration that a joint plans with while others take longer to stop."""
 
-CREEP = 3.0
+MIN_APPROACH_CYCLES = 3.0
 """Least time for the rest of the way to a limit, in cycles."""
 
-BOTH = np.array([[-1.0], [1.0]])
+SIGNS = np.array([[-1.0], [1.0]])
 """Signs of the two ways of a joint."""
 
 
@@ -111,9 +111,9 @@ class VelocityBounds:
         # the last of the way is not run through in a cycle
         brakeable = np.minimum(
             brakeable_velocity(left, self._in_step(state)),
-            np.maximum(left, 0.0) / (CREEP * period),
+            np.maximum(left, 0.0) / (MIN_APPROACH_CYCLES * period),
         )
-        slowest, fastest = brakeable * BOTH
+        slowest, fastest = brakeable * SIGNS
         lower = np.minimum(np.maximum(slowest, state.velocity - self._change), fastest)
         upper = np.maximum(np.minimum(fastest, state.velocity + self._change), slowest)
         rows = np.array([pair.gradient for pair in near]).reshape(len(near), len(limits))
@@ -130,7 +130,7 @@ class VelocityBounds:
         limits, speeds = self._limits, np.abs(state.velocity)
         longest = float(np.max(speeds / limits.acceleration))
         part = speeds / (longest * limits.acceleration) if longest > 0.0 else np.ones(len(speeds))
-        share = self._share * np.maximum(part, ALONE)
+        share = self._share * np.maximum(part, MIN_DECELERATION_FACTOR)
         return JointLimits(
             limits.names,
             limits.lower,
@@ -142,8 +142,8 @@ class VelocityBounds:
 
     def _lead(self, state: RobotState) -> Array:
         """Return the way down and up that goes by while an acceleration is taken back (2, n)."""
-        acceleration = np.maximum(BOTH * state.acceleration, 0.0)
-        velocity = np.maximum(BOTH * state.velocity, 0.0)
+        acceleration = np.maximum(SIGNS * state.acceleration, 0.0)
+        velocity = np.maximum(SIGNS * state.velocity, 0.0)
         time = acceleration / self._limits.jerk
         lead: Array = (velocity + acceleration * time / 3.0) * time
         return lead
@@ -159,7 +159,9 @@ class VelocityBounds:
         count, share = len(self._limits), min(max(factor, 0.0), 1.0)
         found = []
         strength = np.abs(forces)
-        for place in sorted(np.flatnonzero(strength > PRESSING), key=lambda each: -strength[each]):
+        for place in sorted(
+            np.flatnonzero(strength > ACTIVE_FORCE), key=lambda each: -strength[each]
+        ):
             if place >= count:
                 pair = bounds.near[place - count]
                 name = ' - '.join(pair.links)
@@ -175,7 +177,7 @@ class VelocityBounds:
             bound, brakeable, way = bounds.upper, bounds.fastest, bounds.above
         else:
             bound, brakeable, way = -bounds.lower, -bounds.slowest, bounds.below
-        if bound[joint] < brakeable[joint] - PRESSING:
+        if bound[joint] < brakeable[joint] - ACTIVE_FORCE:
             return Limiter(Cause.JOINT_ACCELERATION, name, float(bound[joint]), share)
         if brakeable[joint] >= self._limits.velocity[joint]:
             return Limiter(Cause.JOINT_VELOCITY, name, float(bound[joint]), share)

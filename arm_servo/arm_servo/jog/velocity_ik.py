@@ -32,7 +32,7 @@ from .velocity_bounds import Bounds, VelocityBounds, VelocityBoundsSettings
 AXES = ('x', 'y', 'z', 'rotation x', 'rotation y', 'rotation z')
 """Names of the axes of a twist."""
 
-RIDGE = 1e-5
+REGULARIZATION = 1e-5
 """Weight of the joint speeds that keeps the program definite."""
 
 
@@ -110,12 +110,12 @@ class VelocityIk:
         self._model = model
         self._settings = settings or IkSettings()
         self._limits = model.limits
-        self._brakes = VelocityBounds(model, self._settings.brakes)
+        self._velocity_bounds = VelocityBounds(model, self._settings.brakes)
         length = model.reach / 3.0
         self._scale = np.array([1.0 / length] * 3 + [1.0] * 3)
         self._weighed = b''
         self._axis_weights = self._scale
-        self._ridge = RIDGE * np.eye(len(model))
+        self._regularization = REGULARIZATION * np.eye(len(model))
         settings = self._settings
         self._reach_limit = ReachLimit(model.limits, settings.escape, settings.brakes.braking)
 
@@ -128,7 +128,7 @@ class VelocityIk:
             period: Time to the next step in [s].
         """
         weights = self._weights(task)
-        bounds = self._brakes.bounds(state, period)
+        bounds = self._velocity_bounds.bounds(state, period)
         # the directions of the weighted task: how well the command does while held axes stay
         asked = _Weighted(
             self._turned(state.position, task.axes, weights),
@@ -167,7 +167,7 @@ class VelocityIk:
         weight = np.where(commanded, 1.0, self._settings.hold_weight)
         asked = _Weighted(np.diag(weight), weight * velocity, np.zeros(len(weight)))
         hessian = np.diag(weight * weight)
-        bounds = self._brakes.bounds(state, period)
+        bounds = self._velocity_bounds.bounds(state, period)
         return self._answer(hessian, -(weight * weight * velocity), bounds, asked, None)
 
     def _weights(self, task: TwistTask) -> Array:
@@ -192,7 +192,7 @@ class VelocityIk:
         found: Directions | None,
     ) -> IkAnswer:
         """Solve, slow down to the joints' speeds, and say what limits."""
-        hessian += self._ridge
+        hessian += self._regularization
         lower, upper, rows, least = bounds.lower, bounds.upper, bounds.rows, bounds.least
         solution = Program(hessian, gradient, lower, upper, rows, least).solve()
         if solution is None:  # too fast for the rows; standing still is feasible
@@ -207,7 +207,7 @@ class VelocityIk:
         slowed = 1.0 / max(1.0, float(excess[fastest]))
         size = float(command @ command)
         factor = float(command @ (asked.jacobian @ velocity)) * slowed / size if size else 1.0
-        limiters = self._brakes.pressing(bounds, solution.forces, factor)
+        limiters = self._velocity_bounds.pressing(bounds, solution.forces, factor)
         if slowed < 0.999:
             name, needed = self._limits.names[fastest], float(abs(velocity[fastest]))
             limiters.append(Limiter(Cause.JOINT_VELOCITY, name, needed, slowed))

@@ -21,7 +21,7 @@ from node_runner import ParameterReader
 from ..core.gateway import CommandGateway
 from ..core.snapshot import Snapshot
 from .controller_manager import Controller
-from .trajectory.parameters import RATES
+from .trajectory.parameters import RATE_RANGE
 
 MAX_AGE = 0.5
 """Age at which a measured value is published no more in [s]: as long as a drive may be silent."""
@@ -87,7 +87,7 @@ def declare_broadcaster(node: Node) -> tuple[str, float, bool]:
     read = ParameterReader(node)
     return (
         read.text('frame_id', 'base_link', 'frame of the messages'),
-        read.number('update_rate', 50.0, RATES, 'rate of the messages [Hz]'),
+        read.number('update_rate', 50.0, RATE_RANGE, 'rate of the messages [Hz]'),
         read.flag(
             'publish_dynamic_joint_states', 'publish /dynamic_joint_states too', default=True
         ),

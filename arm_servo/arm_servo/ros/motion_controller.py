@@ -20,7 +20,7 @@ from .servo.node import Servo
 from .servo.parameters import declare_servo
 from .standalone import declare_loop, keep_drives, make_loop, MakeNode, run_standalone
 from .trajectory.parameters import declare_trajectory
-from .trajectory_program import offer_trajectories, OUTPUT
+from .trajectory_program import offer_trajectories, OUTPUT_TOPIC
 
 
 def _build(make_node: MakeNode) -> MotionThread:
@@ -32,7 +32,7 @@ def _build(make_node: MakeNode) -> MotionThread:
     trajectory = declare_trajectory(node, model.joints)
     jogging = declare_servo(servo, model)
     loop = declare_loop(node, '')
-    output = declare_output(node, '', OUTPUT, ARRAY)
+    output = declare_output(node, '', OUTPUT_TOPIC, ARRAY)
     settings = CoreSettings(
         jogging.settings,
         trajectory.execution,

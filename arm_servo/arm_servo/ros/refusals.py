@@ -7,13 +7,13 @@ from __future__ import annotations
 import math
 import re
 
-REMEMBERED = 0.5
+STATUS_PERIOD = 0.5
 """How long a refusal is told in the status in [s]."""
 
-FORGOTTEN = 5.0
+REPEAT_PERIOD = 5.0
 """Time without a refusal after which one that was logged is logged again in [s]."""
 
-NUMBERS = re.compile(r'(?<![\w.])\d+(\.\d+)?')
+NUMBER_PATTERN = re.compile(r'(?<![\w.])\d+(\.\d+)?')
 """What differs from message to message of one stream, such as the age of its stamps."""
 
 
@@ -45,7 +45,7 @@ class Refusals:
             now: Steady time in [s].
         """
         reason, since = self._last
-        return reason if now - since <= REMEMBERED else ''
+        return reason if now - since <= STATUS_PERIOD else ''
 
     def to_log(self, now: float) -> str:
         """Return the refusal if it is not in the log; one that differs in numbers only is.
@@ -56,6 +56,6 @@ class Refusals:
         reason = self.fresh(now)
         if not reason:
             return ''
-        kind, (logged, seen) = NUMBERS.sub('', reason), self._logged
+        kind, (logged, seen) = NUMBER_PATTERN.sub('', reason), self._logged
         self._logged = (kind, now)
-        return '' if kind == logged and now - seen < FORGOTTEN else reason
+        return '' if kind == logged and now - seen < REPEAT_PERIOD else reason

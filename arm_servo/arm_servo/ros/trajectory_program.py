@@ -20,7 +20,7 @@ from .standalone import declare_loop, keep_drives, make_loop, MakeNode, run_stan
 from .trajectory.controller import TrajectoryController
 from .trajectory.parameters import declare_trajectory, TrajectoryParameters
 
-OUTPUT = 'forward_position_controller/commands'
+OUTPUT_TOPIC = 'forward_position_controller/commands'
 """Default of command_out_topic, the name that ros2_controllers' examples use."""
 
 
@@ -31,7 +31,7 @@ def _build(make_node: MakeNode) -> MotionThread:
     node = make_node(name)
     trajectory = declare_trajectory(node, model.joints)
     loop = declare_loop(node, '')
-    output = declare_output(node, '', OUTPUT, ARRAY)
+    output = declare_output(node, '', OUTPUT_TOPIC, ARRAY)
     settings = CoreSettings(execution=trajectory.execution, check_self_collision=trajectory.check)
     gateway, thread = make_loop(node, model, settings, loop, output)
     offer_trajectories(manager, node, gateway, trajectory, loop.period)

@@ -39,10 +39,10 @@ from .key_map import (
 from .requests import CommandType, Request, SwitchType, TogglePause
 from .scales import Scales, Steps
 
-FACTOR = 1.25  # of a speed key
-SLOWEST = 0.01  # share of full speed
-TAP = 0.2  # share of the speed while a key may be up already: without releases that takes 0.5 s
-SAID = 1.0  # [s] in which a stroke that moves nothing is not told again
+SPEED_STEP_FACTOR = 1.25  # of a speed key
+MIN_SPEED = 0.01  # share of full speed
+TAP_SPEED_FACTOR = 0.2  # while a key may be up already: without releases that takes 0.5 s
+NOTE_PERIOD = 1.0  # [s] in which a stroke that moves nothing is not told again
 
 REQUESTS: dict[str, Request] = {
     HELP_KEY: Note(HELP),
@@ -86,8 +86,8 @@ class KeyboardTeleop:
         Raises:
             SettingError: The speed is not between 0.01 and 1.
         """
-        if not SLOWEST <= speed <= 1.0:
-            raise SettingError(f'speed is {speed}: it must be {SLOWEST} to 1, of full speed')
+        if not MIN_SPEED <= speed <= 1.0:
+            raise SettingError(f'speed is {speed}: it must be {MIN_SPEED} to 1, of full speed')
         self.speed = speed
         self.frame = frame
         self.sign = 1
@@ -112,7 +112,7 @@ class KeyboardTeleop:
         key = self._held.current(now)
         if key is None:
             return None
-        return self._motion(key, TAP if self._held.is_tap(now) else 1.0)
+        return self._motion(key, TAP_SPEED_FACTOR if self._held.is_tap(now) else 1.0)
 
     def step(self, now: float) -> Jog | None:
         """Say what to publish now; call it after every event and when it is due.
@@ -174,7 +174,7 @@ class KeyboardTeleop:
 
     def _no_joint(self, event: KeyEvent) -> list[Request]:
         self._let_go()
-        again = self._told[0] == event.key and event.time < self._told[1] + SAID
+        again = self._told[0] == event.key and event.time < self._told[1] + NOTE_PERIOD
         if not event.is_stroke or event.action is KeyAction.REPEATED:
             return []
         self._told = event.key, event.time
@@ -204,5 +204,5 @@ class KeyboardTeleop:
 
     def _change_speed(self, steps: int) -> list[Request]:
         before = self.speed
-        self.speed = min(max(before * FACTOR**steps, SLOWEST), 1.0)
+        self.speed = min(max(before * SPEED_STEP_FACTOR**steps, MIN_SPEED), 1.0)
         return [Note('this speed is the limit')] if self.speed == before else []

@@ -28,8 +28,8 @@ from .scales import Scales
 from .screen import ServoView
 from .servo_settings import ServoSettings, SettingsClient
 
-FLUSH_PATIENCE = Duration(nanoseconds=300_000_000)
-STATUS_PATIENCE = 1.0  # [s] after which a status is history
+FLUSH_TIMEOUT = Duration(nanoseconds=300_000_000)
+STATUS_TIMEOUT = 1.0  # [s] after which a status is history
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
@@ -92,7 +92,7 @@ class ServoLink:
         Args:
             now: Time [s].
         """
-        if self._status is None or now - self._status[1] > STATUS_PATIENCE:
+        if self._status is None or now - self._status[1] > STATUS_TIMEOUT:
             return None
         return self._status[0]
 
@@ -148,7 +148,7 @@ class ServoLink:
     def flush(self) -> None:
         """Wait until what was published has arrived, before the program ends."""
         for publisher in (self._twist, self._jog):
-            publisher.wait_for_all_acked(FLUSH_PATIENCE)
+            publisher.wait_for_all_acked(FLUSH_TIMEOUT)
 
     def _publish_joint(self, jog: JointJog) -> None:
         if jog.joint >= len(self.names.joints):

@@ -39,7 +39,7 @@ NAMES = (
 )
 """Parameters that are asked for; MoveIt's node has some of them, that of arm_servo others."""
 
-RETRY = 3.0  # [s]
+RETRY_PERIOD = 3.0  # [s]
 
 
 @dataclass(slots=True)
@@ -109,7 +109,7 @@ class SettingsClient:
         Args:
             now: Time [s].
         """
-        if self._settings.complete or now < self._asked + RETRY:
+        if self._settings.complete or now < self._asked + RETRY_PERIOD:
             return
         if not self._client.service_is_ready():
             return

@@ -35,10 +35,10 @@ from .status import status_of
 
 Convert = Callable[[Any, float], JogRequest | DisplacementRequest]
 
-FRESH = 0.5
+NEW_MOTION_SILENCE = 0.5
 """Silence after which a command begins a new motion, which may take drives back, in [s]."""
 
-FUTURE = 0.1
+MAX_STAMP_AHEAD = 0.1
 """How far ahead of this clock a stamp may be in [s]."""
 
 
@@ -70,7 +70,7 @@ class Servo:
         model = gateway.model
         frames = TfListener(node, model, parameters.frame_prefix)
         self.converter = CommandConverter(model, frames, parameters, read_scales(node))
-        self._last = -FRESH
+        self._last = -NEW_MOTION_SILENCE
         self._refusals = Refusals()
         self._status = node.create_publisher(ServoStatus, parameters.status_topic, 10)
         for kind, message, topic, convert in (
@@ -89,7 +89,7 @@ class Servo:
             age = self._checked_age(message)
             self._modes.admit(kind)
             request = convert(message, begin - age)
-            if not request.is_zero and begin - self._last > FRESH:
+            if not request.is_zero and begin - self._last > NEW_MOTION_SILENCE:
                 self._prepare()
         except ArmError as error:
             self._refuse(str(error))
@@ -122,7 +122,7 @@ class Servo:
             raise NotReadyError(
                 f'stale by {late:.2f} s: are the clocks in step? A stamp of 0 is taken as now'
             )
-        if age < -FUTURE:
+        if age < -MAX_STAMP_AHEAD:
             raise NotReadyError(f'stamped {-age:.2f} s in the future: are the clocks in step?')
         return max(age, 0.0)
 

@@ -23,7 +23,7 @@ DEFAULT_LINEAR_SPEED, DEFAULT_ANGULAR_SPEED = 0.4, 0.8
 """Scales of the tool's speeds in [m/s] and [rad/s]."""
 
 
-CLEARANCE_SHARE = 0.5
+CLEARANCE_FACTOR = 0.5
 """Share of the distance at which jogs come to rest in front of links that a stop may use up."""
 
 
@@ -135,7 +135,7 @@ def declare_servo(node: Node, model: RobotModel) -> ServoParameters:
         read.text('pose_command_in_topic', '~/pose_target_cmds', 'topic of poses'),
         read.text('status_topic', '~/status', 'topic of the status'),
         read.number('status_rate', 25.0, (1.0, 500.0), 'rate of the status [Hz]'),
-        CLEARANCE_SHARE * threshold if checks else None,
+        CLEARANCE_FACTOR * threshold if checks else None,
         ServoSettings(ik=IkSettings(brakes=brakes)),
         read.text('frame_prefix', '', 'what robot_state_publisher puts before frames in TF'),
     )

@@ -10,7 +10,7 @@ from ...core.set_point import Source
 from ...core.snapshot import Snapshot
 from ...report import Cause, MotionReport
 
-HALTED = 0.02
+HALTED_SPEED_FACTOR = 0.02
 """Share of the asked speed below which a motion counts as halted."""
 
 
@@ -34,7 +34,7 @@ def code_of(report: MotionReport) -> StatusCode:
         report: What limits the motion.
     """
     for limiter in report.limiters:
-        halted = limiter.factor < HALTED
+        halted = limiter.factor < HALTED_SPEED_FACTOR
         if limiter.cause is Cause.COLLISION:
             return StatusCode.HALT_FOR_COLLISION if halted else StatusCode.DECELERATE_FOR_COLLISION
         if limiter.cause is Cause.SINGULARITY:

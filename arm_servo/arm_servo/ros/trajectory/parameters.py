@@ -15,10 +15,10 @@ from node_runner import ParameterReader
 
 from ...core.execution import ExecutionSettings
 
-RATES = (0.1, 1000.0)
+RATE_RANGE = (0.1, 1000.0)
 """Span of rates in [Hz]."""
 
-GOAL = 0.05
+GOAL_TOLERANCE = 0.05
 """Default tolerance at the goal in [rad]: an arm that has not arrived is no success."""
 
 GOAL_TIME = 5.0
@@ -72,7 +72,8 @@ def declare_trajectory(node: Node, joints: Sequence[str]) -> TrajectoryParameter
     )
     path = {name: JointTolerance(_constraint(read, name, 'trajectory', 0.0)) for name in joints}
     goal = {
-        name: JointTolerance(_constraint(read, name, 'goal', GOAL), stopped) for name in joints
+        name: JointTolerance(_constraint(read, name, 'goal', GOAL_TOLERANCE), stopped)
+        for name in joints
     }
     rules = GoalRules(
         partial=read.flag(
@@ -94,8 +95,8 @@ def declare_trajectory(node: Node, joints: Sequence[str]) -> TrajectoryParameter
         ExecutionSettings(rules=rules, goal=JointTolerance(0.0, stopped), goal_time=goal_time),
         path,
         goal,
-        read.number('action_monitor_rate', 20.0, RATES, "rate of the action's feedback [Hz]"),
-        read.number('state_publish_rate', 50.0, RATES, 'rate of ~/controller_state [Hz]'),
+        read.number('action_monitor_rate', 20.0, RATE_RANGE, "rate of the action's feedback [Hz]"),
+        read.number('state_publish_rate', 50.0, RATE_RANGE, 'rate of ~/controller_state [Hz]'),
         read.number(
             'speed_scaling.initial_scaling_factor', 1.0, (0.0, 1.0), 'speed at the start, 0 to 1'
         ),

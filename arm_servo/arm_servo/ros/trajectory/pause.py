@@ -15,7 +15,7 @@ from ...core.gateway import CommandGateway
 from ...core.set_point import Source
 from ...core.snapshot import Snapshot
 
-WHAT = {
+SOURCE_WORDS = {
     Source.TRAJECTORY: 'the trajectory',
     Source.TARGET: 'the single target',
     Source.JOG: 'the jog',
@@ -74,7 +74,7 @@ def words_of_pause(snapshot: Snapshot) -> str:
         return 'paused; nothing is under way, and trajectories wait for ~/resume'
     if snapshot.source is Source.JOG:
         return 'paused; the jog ends, and trajectories wait for ~/resume'
-    return f'paused; {WHAT[snapshot.source]} comes to rest on its path until ~/resume'
+    return f'paused; {SOURCE_WORDS[snapshot.source]} comes to rest on its path until ~/resume'
 
 
 def words_of_resume(snapshot: Snapshot) -> str:
@@ -89,4 +89,4 @@ def words_of_resume(snapshot: Snapshot) -> str:
         return 'no longer paused, but the speed override is 0; see ~/speed_scaling_input'
     if snapshot.source is Source.NONE:
         return 'takes commands again; nothing is under way'
-    return f'{WHAT[snapshot.source]} goes on'
+    return f'{SOURCE_WORDS[snapshot.source]} goes on'
