@@ -11,17 +11,11 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
 from arm_model import ArmError
-from node_runner import destroyed_when_refused, ParameterReader, refuse_misspelt, run_program
-from operator_input import CommandStream, OperatorInputError
-from operator_input.devices import InputDevices, KernelDevices
-from operator_input.gamepad import (
-    AUTO,
-    Deadman,
-    DEADMAN_BUTTONS,
-    Gamepad,
-    GamepadSession,
-    GamepadState,
-)
+from node_runner import destroyed_when_refused, ParameterReader, refuse_misspelt
+from operator_input import CommandStream
+from operator_input.devices import InputDevices
+from operator_input.gamepad import GamepadSession, GamepadState
+from operator_input.ros import declare_deadman, declare_gamepad, run_gamepad
 
 from .gamepad_teleop import GamepadTeleop
 from .jog import Jog, rest_of
@@ -55,37 +49,15 @@ class ServoGamepad(Node):
         self.teleop = GamepadTeleop(
             read.number('speed', 0.3, (0.01, 1.0), "share of the servo's full speed"),
             read.number('turbo_speed', 1.0, (0.01, 1.0), 'the same with the turbo button'),
-            Deadman(
-                enable=read.choice(
-                    'enable_button', 'left_shoulder', DEADMAN_BUTTONS, 'held to move'
-                ),
-                turbo=read.choice(
-                    'turbo_button', 'right_shoulder', DEADMAN_BUTTONS, 'held to move fast'
-                ),
-                timeout=read.number(
-                    'deadman_timeout', 3.0, (0.5, 3600.0), 'without any change of the gamepad [s]'
-                ),
-                full_deflection_timeout=read.number(
-                    'deadman_full_deflection_timeout',
-                    10.0,
-                    (0.5, 3600.0),
-                    'the same, what is deflected at its end [s]',
-                ),
-            ),
+            declare_deadman(self),
             CommandStream(1.0 / rate, rest_of),
         )
         servo = read.text('servo', 'servo_node', 'name of the servo node')
         base = read.text('base_frame', '', "base frame; empty takes the arm's base link")
         tool = read.text('tool_frame', '', "tool frame; empty takes the arm's tip link")
-        preset = read.text('preset', AUTO, 'auto, xbox, ps or generic')
-        device = read.text('device', '', 'path, or expression for the name; empty for any')
-        dead_zone = read.number('deadzone', 0.08, (0.0, 0.9), 'share of the way that is rest')
+        self.gamepad = declare_gamepad(self, devices)
         refuse_misspelt(self)
-        say = self.get_logger().info
-        self.link = ServoLink(self, servo, say, base, tool)
-        self.gamepad = Gamepad(
-            devices or KernelDevices(), preset=preset, device=device, dead_zone=dead_zone, say=say
-        )
+        self.link = ServoLink(self, servo, self.get_logger().info, base, tool)
 
 
 class Session(GamepadSession[Jog]):
@@ -134,13 +106,7 @@ class Session(GamepadSession[Jog]):
 
 def main() -> int:
     """Run until Ctrl-C; return the exit code."""
-    return run_program('servo_gamepad', _serve, ArmError, OperatorInputError)
-
-
-def _serve(stop: threading.Event) -> None:
-    node = ServoGamepad()
-    Session(node, stop).run()
-    node.destroy_node()
+    return run_gamepad('servo_gamepad', ServoGamepad, Session, ArmError)
 
 
 if __name__ == '__main__':

@@ -11,15 +11,9 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
 from arm_model import ArmError
-from node_runner import destroyed_when_refused, ParameterReader, refuse_misspelt, run_program
-from operator_input import (
-    AutoRepeat,
-    CommandStream,
-    HeldKeys,
-    Keyboard,
-    KeyboardSession,
-    OperatorInputError,
-)
+from node_runner import destroyed_when_refused, ParameterReader, refuse_misspelt
+from operator_input import CommandStream, Keyboard, KeyboardSession
+from operator_input.ros import declare_keyboard, run_keyboard
 
 from .jog import Jog, rest_of
 from .key_map import HELP
@@ -37,8 +31,7 @@ class ServoKeyboardInput(Node):
         teleop: Decides what to publish.
         servo: Name of the servo's node.
         frames: Names of the base frame and the tool frame; empty takes the robot's.
-        kitty: Ask the terminal for releases.
-        evdev: Ask this machine's keyboards for releases.
+        keyboard: How keys and their releases are read.
     """
 
     @destroyed_when_refused
@@ -50,10 +43,7 @@ class ServoKeyboardInput(Node):
         """
         super().__init__('servo_keyboard_input')
         read = ParameterReader(self)
-        first = read.number('first_timeout', 0.5, (0.05, 2.0), 'First time-out of a key [s]')
-        repeat = read.number('repeat_timeout', 0.15, (0.05, 1.0), 'Time-out of its repeats [s]')
-        self.kitty = read.flag('kitty', 'Ask the terminal for true key releases', default=True)
-        self.evdev = read.flag('evdev', "Ask this machine's keyboards for them", default=True)
+        self.keyboard = declare_keyboard(self)
         self.servo = read.text('servo', 'servo_node', 'name of the servo node')
         self.frames = (
             read.text('base_frame', '', "base frame; empty takes the arm's base link"),
@@ -65,8 +55,8 @@ class ServoKeyboardInput(Node):
             read.number('linear_step', 1e-3, (1e-5, 0.1), 'single step of the tool [m]'),
             read.number('angular_step', 0.01745, (1e-4, 0.5), 'single step [rad]'),
         )
-        held = HeldKeys(AutoRepeat(max(first, repeat), repeat))
-        self.teleop = KeyboardTeleop(speed, steps, held, CommandStream(1.0 / rate, rest_of))
+        held, stream = self.keyboard.held_keys(), CommandStream(1.0 / rate, rest_of)
+        self.teleop = KeyboardTeleop(speed, steps, held, stream)
         refuse_misspelt(self)
 
 
@@ -137,16 +127,7 @@ class Session(KeyboardSession[Jog, Request]):
 
 def main() -> int:
     """Run until Ctrl-C; return the exit code."""
-    errors = ArmError, OperatorInputError
-    # a second Ctrl-C must not leave the terminal as the program has it
-    return run_program('servo_keyboard_input', _serve, *errors, patient=True)
-
-
-def _serve(stop: threading.Event) -> None:
-    node = ServoKeyboardInput()
-    with Keyboard(kitty=node.kitty, evdev=node.evdev) as keyboard:
-        Session(node, keyboard, stop).run()
-    node.destroy_node()
+    return run_keyboard('servo_keyboard_input', ServoKeyboardInput, Session, ArmError)
 
 
 if __name__ == '__main__':

@@ -11,17 +11,10 @@ import time
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
-from node_runner import destroyed_when_refused, ParameterReader, refuse_misspelt, run_program
-from operator_input import OperatorInputError
-from operator_input.devices import InputDevices, KernelDevices
-from operator_input.gamepad import (
-    AUTO,
-    Deadman,
-    DEADMAN_BUTTONS,
-    Gamepad,
-    GamepadSession,
-    GamepadState,
-)
+from node_runner import destroyed_when_refused, refuse_misspelt
+from operator_input.devices import InputDevices
+from operator_input.gamepad import GamepadSession, GamepadState
+from operator_input.ros import declare_deadman, declare_gamepad, run_gamepad
 
 from ..exceptions import TeleopError
 from ..gamepad_teleop import GamepadTeleop
@@ -57,39 +50,16 @@ class TeleopGamepad(Node):
             PresetError: There is no preset of that name.
         """
         super().__init__('teleop_gamepad')
-        read = ParameterReader(self)
         self.outputs = Outputs(self)
         self.teleop = GamepadTeleop(
             declare_speeds(self, '', NORMAL),
             declare_speeds(self, 'turbo_', TURBO),
-            Deadman(
-                enable=read.choice(
-                    'enable_button', 'left_shoulder', DEADMAN_BUTTONS, 'held to move'
-                ),
-                turbo=read.choice(
-                    'turbo_button', 'right_shoulder', DEADMAN_BUTTONS, 'held to move fast'
-                ),
-                timeout=read.number(
-                    'deadman_timeout', 3.0, (0.5, 3600.0), 'without any change of the gamepad [s]'
-                ),
-                full_deflection_timeout=read.number(
-                    'deadman_full_deflection_timeout',
-                    10.0,
-                    (0.5, 3600.0),
-                    'the same, what is deflected at its end [s]',
-                ),
-            ),
+            declare_deadman(self),
             declare_steps(self),
             declare_stream(self),
         )
-        preset = read.text('preset', AUTO, 'auto, xbox, ps or generic')
-        device = read.text('device', '', 'path, or expression for the name; empty for any')
-        dead_zone = read.number('deadzone', 0.08, (0.0, 0.9), 'share of the way that is rest')
+        self.gamepad = declare_gamepad(self, devices)
         refuse_misspelt(self)
-        say = self.get_logger().info
-        self.gamepad = Gamepad(
-            devices or KernelDevices(), preset=preset, device=device, dead_zone=dead_zone, say=say
-        )
 
 
 class Session(GamepadSession[Velocity]):
@@ -148,13 +118,7 @@ class Session(GamepadSession[Velocity]):
 
 def main() -> int:
     """Run until Ctrl-C; return the exit code."""
-    return run_program('teleop_gamepad', _serve, TeleopError, OperatorInputError)
-
-
-def _serve(stop: threading.Event) -> None:
-    node = TeleopGamepad()
-    Session(node, stop).run()
-    node.destroy_node()
+    return run_gamepad('teleop_gamepad', TeleopGamepad, Session, TeleopError)
 
 
 if __name__ == '__main__':

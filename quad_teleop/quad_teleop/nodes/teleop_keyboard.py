@@ -11,14 +11,9 @@ import time
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
-from node_runner import destroyed_when_refused, ParameterReader, refuse_misspelt, run_program
-from operator_input import (
-    AutoRepeat,
-    HeldKeys,
-    Keyboard,
-    KeyboardSession,
-    OperatorInputError,
-)
+from node_runner import destroyed_when_refused, refuse_misspelt
+from operator_input import Keyboard, KeyboardSession
+from operator_input.ros import declare_keyboard, run_keyboard
 
 from ..exceptions import TeleopError
 from ..key_map import HELP
@@ -38,8 +33,7 @@ class TeleopKeyboard(Node):
     Attributes:
         teleop: Decides what to publish.
         outputs: Publishes it.
-        kitty: Ask the terminal for releases.
-        evdev: Ask this machine's keyboards for releases.
+        keyboard: How keys and their releases are read.
     """
 
     @destroyed_when_refused
@@ -51,16 +45,12 @@ class TeleopKeyboard(Node):
             SettingError: Parameters make no sense together.
         """
         super().__init__('teleop_keyboard')
-        read = ParameterReader(self)
-        first = read.number('first_timeout', 0.5, (0.05, 2.0), 'first time-out of a key [s]')
-        repeat = read.number('repeat_timeout', 0.15, (0.05, 1.0), 'time-out of its repeats [s]')
-        self.kitty = read.flag('kitty', 'ask the terminal for true key releases', default=True)
-        self.evdev = read.flag('evdev', "ask this machine's keyboards for them", default=True)
+        self.keyboard = declare_keyboard(self)
         self.outputs = Outputs(self)
         self.teleop = KeyboardTeleop(
             declare_speeds(self, '', Speeds()),
             declare_steps(self),
-            HeldKeys(AutoRepeat(max(first, repeat), repeat)),
+            self.keyboard.held_keys(),
             declare_stream(self),
         )
         refuse_misspelt(self)
@@ -133,16 +123,7 @@ class Session(KeyboardSession[Velocity, Request]):
 
 def main() -> int:
     """Run until Ctrl-C; return the exit code."""
-    errors = TeleopError, OperatorInputError
-    # a second Ctrl-C must not leave the terminal as the program has it
-    return run_program('teleop_keyboard', _serve, *errors, patient=True)
-
-
-def _serve(stop: threading.Event) -> None:
-    node = TeleopKeyboard()
-    with Keyboard(kitty=node.kitty, evdev=node.evdev) as keyboard:
-        Session(node, keyboard, stop).run()
-    node.destroy_node()
+    return run_keyboard('teleop_keyboard', TeleopKeyboard, Session, TeleopError)
 
 
 if __name__ == '__main__':
