@@ -26,8 +26,8 @@ import psutil
 from rclpy.qos import qos_profile_sensor_data
 from simulated_quad import AHEAD, SimulatedQuad
 
-from quad_bringup.demo.itinerary import Velocity
 from quad_bringup.demo.report import velocity_text
+from quad_bringup.demo.segments import Velocity
 from quad_bringup.demo.track import mean_velocity, Pose, Track
 
 if TYPE_CHECKING:

@@ -14,9 +14,9 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from disturbance import Disturbance, Event, full_cpu
 from simulated_quad import SimulatedQuad
 
-from quad_bringup.demo.itinerary import Velocity
-from quad_bringup.demo.track import tilt_of
+from quad_bringup.demo.segments import Velocity
 from quad_description import movable_joints, robot_urdf
+from quad_description.rotations import tilt_of
 from quad_hardware.joints import JointMap, servo_of
 
 if TYPE_CHECKING:

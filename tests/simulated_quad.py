@@ -19,8 +19,8 @@ from serial_tap import SerialTap
 from std_msgs.msg import String
 
 from process_supervisor import find_executable, write_parameters
-from quad_bringup.demo.itinerary import Velocity
 from quad_bringup.demo.main import GROUND_TRUTH
+from quad_bringup.demo.segments import Velocity
 from quad_bringup.stack import quad_processes, Stack
 from quad_description import movable_joints, robot_urdf
 from quad_msgs.srv import SetMode

@@ -13,8 +13,8 @@ from isolation import reserve
 import pytest
 from simulated_quad import SimulatedQuad
 
-from quad_bringup.demo.track import tilt_of
 from quad_description import Pose, pose_positions, quadruped, raised_feet, robot_urdf
+from quad_description.rotations import tilt_of
 from quad_msgs.msg import JointCommand
 
 pytestmark = pytest.mark.scenario

@@ -15,7 +15,7 @@ from isolation import reserve
 import pytest
 from simulated_quad import SimulatedQuad
 
-from quad_bringup.demo.track import tilt_of
+from quad_description.rotations import tilt_of
 from quad_msgs.srv import InjectFault
 
 if TYPE_CHECKING:

@@ -19,8 +19,8 @@ from process_supervisor import (
 )
 
 from .exceptions import BringupError
-from .leaving import join_ros, lie_down, stand_still
 from .session import add_arguments, session
+from .shutdown import join_ros, lie_down, stand_still
 
 HINT = """in a second terminal:
     ros2 run quad_teleop teleop_keyboard{hint}

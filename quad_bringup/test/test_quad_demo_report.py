@@ -16,15 +16,15 @@ from rich.console import Console
 
 from demo_runner import DemoStatus
 from quad_bringup.demo.figures import Figures
-from quad_bringup.demo.itinerary import Stretch, Velocity
+from quad_bringup.demo.period_statistics import PeriodFigures
 from quad_bringup.demo.report import Measured, problems, progress_line, summary_lines
-from quad_bringup.demo.rhythm import Rhythm
+from quad_bringup.demo.segments import Segment, Velocity
 from quad_bringup.demo.view import BODY_LINES, NARROWEST, QuadView
 
 LEGS = ('fl', 'fr', 'bl', 'br')
 JOINTS = [f'{leg}_{part}_joint' for leg in LEGS for part in ('hip', 'thigh', 'calf')]
-WALK = Stretch('walk', Velocity(forward=0.2), 8.0)
-TURN = Stretch('turn', Velocity(turn=0.8), 5.0)
+WALK = Segment('walk', Velocity(forward=0.2), 8.0)
+TURN = Segment('turn', Velocity(turn=0.8), 5.0)
 GOOD = Figures(
     state='walk',
     commanded=WALK.velocity,
@@ -35,7 +35,7 @@ GOOD = Figures(
     tilt_max=math.radians(2.5),
     targets=dict.fromkeys(JOINTS, 0.5),
     positions=dict.fromkeys(JOINTS, 0.49),
-    rhythm=Rhythm(50.0, 0.0001, 0.0009),
+    periods=PeriodFigures(50.0, 0.0001, 0.0009),
     battery=87.0,
 )
 STRETCHES = [
@@ -58,7 +58,7 @@ def test_a_robot_that_moves_as_told_is_no_problem() -> None:
 
 def test_a_slow_robot_that_stands_has_not_walked() -> None:
     """What may be missing of a crawl is less than the whole of it."""
-    crawl = Stretch('walk', Velocity(forward=0.04), 8.0)
+    crawl = Segment('walk', Velocity(forward=0.04), 8.0)
     stands, walks = (Measured(crawl, Velocity(forward=speed), None) for speed in (0.0, 0.03))
     assert 'walk: commanded +0.040' in problems(GOOD, [stands])[0]
     assert problems(GOOD, [walks]) == []
@@ -76,7 +76,7 @@ def test_a_slow_robot_that_stands_has_not_walked() -> None:
     ids=['slow', 'sideways', 'turning', 'nan', 'unknown'],
 )
 def test_a_robot_that_moves_otherwise_is_told(moved: Velocity | None, words: str) -> None:
-    """By the stretch, with both velocities."""
+    """By the segment, with both velocities."""
     (text,) = problems(GOOD, [Measured(WALK, moved, None)])
     assert re.search(words, text)
 
@@ -95,8 +95,8 @@ def test_odometry_counts_where_there_is_no_ground_truth() -> None:
         ({'fault': 'fallen: tilt 80°'}, 'in a fault: fallen'),
         ({'tilt_max': math.radians(20.0)}, 'leaned by 20.0°'),
         ({'tilt_max': math.nan}, 'leaned by'),
-        ({'rhythm': Rhythm(31.0, 0.01, 0.02)}, '31.0 joint commands a second'),
-        ({'rhythm': Rhythm()}, 'joint commands a second'),
+        ({'periods': PeriodFigures(31.0, 0.01, 0.02)}, '31.0 joint commands a second'),
+        ({'periods': PeriodFigures()}, 'joint commands a second'),
     ],
     ids=['fault', 'tilt', 'no tilt', 'slow loop', 'no loop'],
 )
@@ -147,7 +147,7 @@ pictures = st.builds(
     tilt=numbers,
     tilt_max=numbers,
     targets=st.dictionaries(st.sampled_from(JOINTS), numbers),
-    rhythm=st.builds(Rhythm, numbers, numbers, numbers),
+    periods=st.builds(PeriodFigures, numbers, numbers, numbers),
     battery=numbers,
 )
 

@@ -13,9 +13,9 @@ import pytest
 from process_supervisor import CallError, GivenUpError, Outcome, Phase
 from quad_bringup.demo import scenario as scenario_module
 from quad_bringup.demo.figures import Figures
-from quad_bringup.demo.itinerary import STANDSTILL, Velocity
-from quad_bringup.demo.rhythm import Rhythm
+from quad_bringup.demo.period_statistics import PeriodFigures
 from quad_bringup.demo.scenario import Milestones, WalkScenario
+from quad_bringup.demo.segments import STANDSTILL, Velocity
 from quad_bringup.demo.track import Milestone
 
 STEP = 0.05
@@ -50,7 +50,7 @@ class Robot:
         self.refuses = ''
         self.after: Callable[[str], None] = lambda what: None
         self.given_up: Callable[[], bool] = lambda: False
-        self.figures = Figures(state='lie', tilt_max=0.0, rhythm=Rhythm(50.0, 0.0, 0.0))
+        self.figures = Figures(state='lie', tilt_max=0.0, periods=PeriodFigures(50.0, 0.0, 0.0))
         self.milestones = Milestones(Milestone(0.0), None)
         self.missing: list[str] = []
         self._clock, self._factor = clock, factor
@@ -114,7 +114,7 @@ def run(scenario: WalkScenario, supervisor: FakeSupervisor, robot: Robot) -> Non
 
 
 def test_it_stands_up_walks_turns_strafes_stops_and_lies_down(clock: Clock) -> None:
-    """With a summary of each stretch; at the end nobody commands anything any more."""
+    """With a summary of each segment; at the end nobody commands anything any more."""
     display, supervisor, robot = FakeDisplay(), FakeSupervisor(), Robot(clock)
     scenario = WalkScenario(display, 'walk', 20.0)
     run(scenario, supervisor, robot)

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from quad_bringup.demo.itinerary import Velocity
+from quad_bringup.demo.segments import Velocity
 from quad_bringup.demo.track import mean_velocity, Milestone, Pose, Track
 from quad_description.rotations import tilt_of
 

@@ -22,7 +22,7 @@ from message_templates import FastReader
 from quad_controller.gait.parameters import GaitParameters
 from quad_controller.nodes.control_loop import ControlLoop
 from quad_controller.nodes.diagnostics import state_diagnostic
-from quad_controller.nodes.joint_reader import CommandScope, JointReader
+from quad_controller.nodes.joint_reader import CommandFilter, JointReader
 from quad_controller.nodes.messages import body_pose, charge, IMU_NUMBERS, imu_sample
 from quad_controller.policy.observation import gravity
 from quad_controller.policy.options import GravitySource
@@ -91,13 +91,13 @@ def test_a_joint_of_the_arm_that_is_never_reported_is_where_it_is_sent() -> None
 def test_a_joint_that_nobody_measures_is_left_alone_until_it_is_to_move() -> None:
     """Nobody knows how far it would jump."""
     targets, names = (*FOLDED, 0.4), ('arm_yaw_joint',)
-    still = CommandScope(ARM_ROBOT, others_move=False)
-    assert still.cut(targets, 'walk', names) == FOLDED
-    assert still.cut(targets, 'walk', ()) == targets
-    posed = CommandScope(ARM_ROBOT, others_move=True)
-    assert posed.cut(targets, 'to lie', names) == FOLDED
-    assert posed.cut(targets, 'to stand', names) == targets
-    assert posed.cut(targets, 'lie', names) == targets
+    still = CommandFilter(ARM_ROBOT, others_move=False)
+    assert still.select(targets, 'walk', names) == FOLDED
+    assert still.select(targets, 'walk', ()) == targets
+    posed = CommandFilter(ARM_ROBOT, others_move=True)
+    assert posed.select(targets, 'to lie', names) == FOLDED
+    assert posed.select(targets, 'to stand', names) == targets
+    assert posed.select(targets, 'lie', names) == targets
 
 
 def imu(attitude: float = 0.0, rate: float = 0.0, force: float = 0.0) -> Imu:

@@ -19,7 +19,7 @@ from quad_controller.exceptions import ParameterError, PolicyError
 from quad_controller.gait.generator import GaitGenerator
 from quad_controller.gait.parameters import GaitParameters
 from quad_controller.gait.velocity import REST, Velocity
-from quad_controller.policy.load import admit, load_policy, LoadedPolicy
+from quad_controller.policy.load import load_policy, LoadedPolicy, validate_policy
 from quad_controller.policy.network import OnnxNetwork
 from quad_controller.policy.observation import gravity
 from quad_controller.policy.options import GravitySource, ImuFrame, PolicyOptions
@@ -39,7 +39,7 @@ MJLAB_TERMS = 'base_ang_vel,projected_gravity,command,phase,joint_pos,joint_vel,
 
 def check(network: FakeNetwork, options: PolicyOptions | None = None) -> LoadedPolicy:
     """Check a network as a policy of the test's robot."""
-    return admit(
+    return validate_policy(
         'test', network, ROBOT, STAND,
         options=options or PolicyOptions(), period=PERIOD, clock=lambda: 0.0,
     )  # fmt: skip
@@ -88,7 +88,7 @@ def test_a_policy_runs_at_the_rate_of_its_training_only(rate: float) -> None:
     for changes, fits in (({}, False), ({'step_dt': f'{1.0 / rate}'}, True)):
         report = ''
         try:
-            admit(
+            validate_policy(
                 'test', FakeNetwork(metadata(**changes)), ROBOT, STAND,
                 options=PolicyOptions(), period=1.0 / rate, clock=lambda: 0.0,
             )  # fmt: skip
@@ -287,7 +287,7 @@ def test_joints_that_the_robot_lacks_may_be_held() -> None:
 def test_joints_that_the_policy_lacks_stay() -> None:
     """An arm that the policy does not know keeps the targets that it had."""
     network = FakeNetwork(metadata())
-    loaded = admit(
+    loaded = validate_policy(
         'test', network, ARM_ROBOT, (*STAND, 0.7),
         options=PolicyOptions(), period=PERIOD, clock=lambda: 0.0,
     )  # fmt: skip

@@ -189,15 +189,15 @@ def _link(element: ET.Element, tag: str) -> str:
 def _limits(joint: ET.Element, name: str, kind: JointKind, *, needed: bool) -> JointLimits:
     element = joint.find('limit')
     given = {} if element is None else element.attrib
-    lacking = [key for key in ('velocity', 'effort') if key not in given]
-    if needed and lacking:
+    missing = [key for key in ('velocity', 'effort') if key not in given]
+    if needed and missing:
         raise DescriptionError(
-            f'joint {name}: a {kind.value} joint needs <limit .../> with {" and ".join(lacking)}'
+            f'joint {name}: a {kind.value} joint needs <limit .../> with {" and ".join(missing)}'
         )
     if element is None:
         return JointLimits()
     velocity, effort = (
-        math.inf if key in lacking else _number(element, key, name)
+        math.inf if key in missing else _number(element, key, name)
         for key in ('velocity', 'effort')
     )
     if kind is JointKind.CONTINUOUS:

@@ -152,7 +152,7 @@ def test_a_robot_of_no_known_firmware_is_calibrated(tmp_path: Path) -> None:
 
 def test_no_robot_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """With the remedy, and nothing is written."""
-    monkeypatch.setattr(robot, 'PATIENCE', 0.5)
+    monkeypatch.setattr(robot, 'REPORT_TIMEOUT', 0.5)
     script = Script('')
     command = ['joints', '--port', str(tmp_path / 'none'), '--output', str(tmp_path / 'x')]
     assert run_calibrate(command, script) == 1

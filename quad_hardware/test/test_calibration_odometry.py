@@ -149,7 +149,7 @@ def test_nobody_there_is_said(
     """Without a robot in the domain, and nothing is written."""
     for name, value in isolation.env.items():
         monkeypatch.setenv(name, value)
-    monkeypatch.setattr(odometry, 'PATIENCE', 0.3)
+    monkeypatch.setattr(odometry, 'ODOMETRY_TIMEOUT', 0.3)
     script = Script('')
     output = tmp_path / 'found.yaml'
     assert run_calibrate(['odometry', '--output', str(output)], script) == 1

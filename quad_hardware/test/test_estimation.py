@@ -32,7 +32,7 @@ from quad_hardware.estimation.gravity import (
     gravity_from_acceleration,
     GravityCheck,
 )
-from quad_hardware.estimation.plausibility import PATIENCE, Plausibility
+from quad_hardware.estimation.plausibility import MAX_REFUSALS, Plausibility
 from quad_hardware.estimation.sample_clock import SampleClock
 from quad_hardware.joints import JointMap, servo_of
 from quad_hardware.protocol import LEG_MOTORS
@@ -212,7 +212,7 @@ def test_a_report_that_cannot_be_is_refused(change: dict[str, object], reason: s
     """However often it comes, and the message says what is wrong with it."""
     plausibility = Plausibility(LEG_MOTORS)
     assert plausibility.check(STATE) == ''
-    for _ in range(PATIENCE + 3):
+    for _ in range(MAX_REFUSALS + 3):
         assert reason in plausibility.check(replace(STATE, **change))  # type: ignore[arg-type]
     assert plausibility.check(STATE) == ''
 
@@ -235,7 +235,7 @@ def test_a_dead_imu_is_no_reason_to_refuse_the_joints(
     assert plausibility.check(STATE) == ''
     dead = [replace(STATE, arrival=0.02 * tick, **change) for tick in range(1, 20)]  # type: ignore[arg-type]
     answers = [bool(plausibility.check(state)) for state in dead]
-    assert answers == [True] * PATIENCE + [False] * (len(dead) - PATIENCE)
+    assert answers == [True] * MAX_REFUSALS + [False] * (len(dead) - MAX_REFUSALS)
     assert plausibility.imu_problem
     beyond = replace(dead[-1], positions={11: 1e5})
     assert 'motor 11' in plausibility.check(beyond)
@@ -263,8 +263,8 @@ def test_a_jump_is_believed_when_it_stays() -> None:
     plausibility = Plausibility(LEG_MOTORS)
     plausibility.check(STATE)
     jumped = replace(STATE, positions=dict.fromkeys(LEG_MOTORS, 90.0))
-    answers = [bool(plausibility.check(jumped)) for _ in range(PATIENCE + 2)]
-    assert answers == [True] * PATIENCE + [False] * 2
+    answers = [bool(plausibility.check(jumped)) for _ in range(MAX_REFUSALS + 2)]
+    assert answers == [True] * MAX_REFUSALS + [False] * 2
     turned = replace(jumped, attitude=(0.0, 0.0, 179.0))
     assert 'attitude' in plausibility.check(turned)
     later = replace(turned, arrival=1.0)

@@ -29,7 +29,7 @@ from .line.server import Server
 from .options import Simulation
 
 TRUTH_PERIOD = 0.05  # [s]
-PATIENCE = 1.0  # [s] the loop answers within milliseconds
+ANSWER_TIMEOUT = 1.0  # [s] the loop answers within milliseconds
 END_ALL = 'none'
 SWITCH_INTERVAL = 0.0005  # [s] how long a callback may keep the robot from the interpreter
 
@@ -99,7 +99,7 @@ class FakeXgoNode(Node):
 
     def _do(self, action: Callable[[], str]) -> tuple[bool, str]:
         try:
-            return True, self._server.submit(action).result(PATIENCE)
+            return True, self._server.submit(action).result(ANSWER_TIMEOUT)
         except SetupError as error:
             return False, str(error)
         except NotDoneError:

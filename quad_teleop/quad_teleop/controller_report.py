@@ -11,7 +11,7 @@ from enum import IntEnum
 NAME = 'controller_node: state'
 """Name of the status, after a namespace if there is one."""
 
-PATIENCE = 3.0  # [s] after which a report is history
+REPORT_TIMEOUT = 3.0  # [s] after which a report is history
 FOLLOWS_VELOCITIES = frozenset({'walk', 'turn', 'policy'})
 """Modes in which velocities do anything."""
 
@@ -49,7 +49,7 @@ class ControllerReport:
         Args:
             now: Time [s].
         """
-        return now - self.time < PATIENCE
+        return now - self.time < REPORT_TIMEOUT
 
     @property
     def has_fault(self) -> bool:

@@ -20,9 +20,9 @@ from quad_msgs.msg import JointCommand
 
 from ..mode_client import ModeClient
 from .figures import Figures, UNKNOWN
-from .itinerary import STANDSTILL, Velocity
-from .rhythm import Beat
+from .period_statistics import PeriodStatistics
 from .scenario import Milestones
+from .segments import STANDSTILL, Velocity
 from .track import Pose, Track
 
 COMMAND_PERIOD = 0.1
@@ -58,7 +58,7 @@ class QuadClient(ModeClient):
         super().__init__('demo', given_up, namespace)
         self._joints = list(joints)
         self._truth, self._odometry = Track(), Track()
-        self._beat = Beat(LOOP_PERIOD)
+        self._periods = PeriodStatistics(LOOP_PERIOD)
         self._commanded: Velocity | None = None
         self._reason = ''
         self._height = self._tilt = self._tilt_max = self._battery = math.nan
@@ -96,7 +96,7 @@ class QuadClient(ModeClient):
             tilt_max=self._tilt_max,
             targets=self._targets,
             positions=self._positions,
-            rhythm=self._beat.rhythm(),
+            periods=self._periods.figures(),
             battery=self._battery,
         )
 
@@ -128,9 +128,9 @@ class QuadClient(ModeClient):
         self._send()
 
     def watch_tilt(self) -> None:
-        """Measure the greatest tilt, and the rhythm of the loop, from now on."""
+        """Measure the greatest tilt, and the periods of the loop, from now on."""
         self._tilt_max = self._tilt
-        self._beat = Beat(LOOP_PERIOD)
+        self._periods = PeriodStatistics(LOOP_PERIOD)
 
     def _send(self) -> None:
         if self._commanded is None:
@@ -159,7 +159,7 @@ class QuadClient(ModeClient):
         self._battery = 100.0 * message.percentage
 
     def _take_targets(self, message: JointCommand) -> None:
-        self._beat.take(_seconds(message.header.stamp))
+        self._periods.take(_seconds(message.header.stamp))
         self._targets = dict(zip(self._joints, message.position, strict=False))
 
     def _take_diagnostics(self, message: DiagnosticArray) -> None:

@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 import math
 
-from .itinerary import STANDSTILL, Velocity
-from .rhythm import Rhythm
+from .period_statistics import PeriodFigures
+from .segments import STANDSTILL, Velocity
 
 UNKNOWN = 'unknown'
 
@@ -29,7 +29,7 @@ class Figures:
         tilt_max: Greatest of it since the robot began to walk, in [rad].
         targets: Joint targets in [rad] by name.
         positions: Joint positions in [rad] by name.
-        rhythm: Of /joint_command.
+        periods: Of /joint_command.
         battery: Charge in [%].
     """
 
@@ -43,5 +43,5 @@ class Figures:
     tilt_max: float = math.nan
     targets: Mapping[str, float] = field(default_factory=dict)
     positions: Mapping[str, float] = field(default_factory=dict)
-    rhythm: Rhythm = Rhythm()  # noqa: RUF009  # frozen
+    periods: PeriodFigures = PeriodFigures()  # noqa: RUF009  # frozen
     battery: float = math.nan

@@ -17,8 +17,8 @@ from quad_description import LEGS
 from ..exceptions import BringupError
 from ..session import add_arguments, Session, session
 from .figures import Figures
-from .itinerary import share_of, SHORTEST
 from .scenario import Client, WalkScenario
+from .segments import share_of, SHORTEST
 from .view import QuadView
 
 GROUND_TRUTH = 'fake_xgo/ground_truth'

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import math
 
 from .figures import Figures, UNKNOWN
-from .itinerary import Stretch, Velocity
+from .segments import Segment, Velocity
 
 LINEAR_TOLERANCE = 0.04
 """Greatest difference of commanded and measured speed in [m/s]."""
@@ -25,15 +25,15 @@ LOWEST_RATE = 45.0
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """A stretch of the demo, and what came of it.
+    """A segment of the demo, and what came of it.
 
     Attributes:
-        stretch: What was commanded.
+        segment: What was commanded.
         measured: Mean velocity of the simulated body; None without ground truth.
         odometry: Mean velocity by /odom; None without it.
     """
 
-    stretch: Stretch
+    segment: Segment
     measured: Velocity | None
     odometry: Velocity | None
 
@@ -49,7 +49,7 @@ def progress_line(figures: Figures) -> str:
     Args:
         figures: The latest.
     """
-    if figures.state == UNKNOWN or math.isnan(figures.rhythm.rate):
+    if figures.state == UNKNOWN or math.isnan(figures.periods.rate):
         return 'waiting for the controller'
     speed = figures.measured or figures.odometry
     return (
@@ -90,10 +90,10 @@ def rhythm_text(figures: Figures) -> str:
     Args:
         figures: The latest.
     """
-    rhythm = figures.rhythm
+    periods = figures.periods
     return (
-        f'joint commands {rhythm.rate:.1f} Hz, jitter p50/p99 '
-        f'{1000 * rhythm.jitter_p50:.2f}/{1000 * rhythm.jitter_p99:.2f} ms'
+        f'joint commands {periods.rate:.1f} Hz, jitter p50/p99 '
+        f'{1000 * periods.jitter_p50:.2f}/{1000 * periods.jitter_p99:.2f} ms'
     )
 
 
@@ -107,8 +107,8 @@ def summary_lines(figures: Figures, stretches: Sequence[Measured]) -> list[str]:
     head = f'{"[m/s, rad/s]":<14}  {"commanded":^19}  {"in physics":^19}  {"by /odom":^19}'
     names = f'{"":<14}' + 3 * f'  {"ahead":>6} {"left":>6} {"turn":>5}'
     rows = [
-        f'{each.stretch.name:<7}{each.stretch.duration:5.1f} s  '
-        f'{_columns(each.stretch.velocity)}  {_columns(each.measured)}  {_columns(each.odometry)}'
+        f'{each.segment.name:<7}{each.segment.duration:5.1f} s  '
+        f'{_columns(each.segment.velocity)}  {_columns(each.measured)}  {_columns(each.odometry)}'
         for each in stretches
     ]
     body = f'tilt at most {math.degrees(figures.tilt_max):.1f}°, {rhythm_text(figures)}'
@@ -132,8 +132,8 @@ def problems(figures: Figures, stretches: Sequence[Measured]) -> list[str]:
 
 
 def _wrong_speed(each: Measured) -> Iterator[str]:
-    name = each.stretch.name
-    speed, wanted = each.best, each.stretch.velocity
+    name = each.segment.name
+    speed, wanted = each.best, each.segment.velocity
     if speed is None:
         yield f'{name}: nobody says how the robot moved, neither ground truth nor /odom'
         return
@@ -156,8 +156,8 @@ def _wrong_body(figures: Figures) -> Iterator[str]:
             f'the body leaned by {math.degrees(figures.tilt_max):.1f}°, more than '
             f'{math.degrees(TILT_LIMIT):.0f}°'
         )
-    if not figures.rhythm.rate >= LOWEST_RATE:
+    if not figures.periods.rate >= LOWEST_RATE:
         yield (
-            f'{figures.rhythm.rate:.1f} joint commands a second, less than {LOWEST_RATE:g}: '
+            f'{figures.periods.rate:.1f} joint commands a second, less than {LOWEST_RATE:g}: '
             'is this machine too busy?'
         )

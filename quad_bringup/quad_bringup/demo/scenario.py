@@ -14,8 +14,8 @@ from demo_runner import DemoClient, DemoResult, DemoScenario, Display
 from process_supervisor import CallError
 
 from .figures import Figures
-from .itinerary import itinerary, STANDSTILL, Stretch, Velocity
 from .report import Measured, problems, summary_lines
+from .segments import Segment, segments, STANDSTILL, Velocity
 from .track import mean_velocity, Milestone
 
 FIND_TIMEOUT = 20.0
@@ -90,10 +90,10 @@ class WalkScenario(DemoScenario[Client]):
         self._moving.set()
         client.watch_tilt()
         self._reach(client, self._mode, self._mode)
-        for stretch in itinerary(self._duration, self._share):
+        for segment in segments(self._duration, self._share):
             if self.left:
                 break
-            self._go(client, stretch)
+            self._go(client, segment)
         self._conclude(client.figures)
         client.command(STANDSTILL)
         self._reach(client, 'lie', 'lying down')
@@ -116,19 +116,19 @@ class WalkScenario(DemoScenario[Client]):
         client.set_mode(mode, MODE_TIMEOUT)
         self._wait(client, lambda: client.figures.state == mode, MODE_TIMEOUT, f'mode {mode}')
 
-    def _go(self, client: Client, stretch: Stretch) -> None:
-        """Command the velocity of a stretch, and measure what comes of it."""
-        self._enter(stretch.name)
-        client.command(stretch.velocity)
+    def _go(self, client: Client, segment: Segment) -> None:
+        """Command the velocity of a segment, and measure what comes of it."""
+        self._enter(segment.name)
+        client.command(segment.velocity)
         begin = time.monotonic()
-        self._wait_for_time(client, begin + stretch.settling)
+        self._wait_for_time(client, begin + segment.settling)
         before = client.milestones
-        self._wait_for_time(client, begin + stretch.duration)
+        self._wait_for_time(client, begin + segment.duration)
         after = client.milestones
         if self.left:
             return  # cut short: that is no measurement
         measured = Measured(
-            stretch,
+            segment,
             _between(before.measured, after.measured),
             _between(before.odometry, after.odometry),
         )

@@ -10,7 +10,7 @@ import math
 
 from quad_description.rotations import Quaternion, tilt_of, yaw_of
 
-from .itinerary import Velocity
+from .segments import Velocity
 
 WINDOW = 1.0
 """Time in [s] over which the velocity of the moment is taken."""

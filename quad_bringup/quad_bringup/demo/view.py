@@ -16,8 +16,8 @@ from rich.text import Text
 from demo_runner import compose, DemoStatus
 
 from .figures import Figures
-from .itinerary import Velocity
 from .report import progress_line
+from .segments import Velocity
 
 NARROWEST = 80
 """Columns of a terminal below which there is no table."""
@@ -134,11 +134,11 @@ def _body_line(figures: Figures) -> Text:
 
 
 def _loop_line(figures: Figures) -> Text:
-    rhythm = figures.rhythm
-    if not math.isfinite(rhythm.rate):
+    periods = figures.periods
+    if not math.isfinite(periods.rate):
         return Text('loop  waiting for the controller', style='dim')
     return Text.assemble(
         ('loop  ', 'bold'),
-        f'{rhythm.rate:.1f} Hz   jitter p50 {1000 * rhythm.jitter_p50:.2f} ms   '
-        f'p99 {1000 * rhythm.jitter_p99:.2f} ms',
+        f'{periods.rate:.1f} Hz   jitter p50 {1000 * periods.jitter_p50:.2f} ms   '
+        f'p99 {1000 * periods.jitter_p99:.2f} ms',
     )

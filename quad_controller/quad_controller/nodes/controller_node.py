@@ -48,7 +48,7 @@ from ..states.status import EventKind, Output, Status
 from . import messages
 from .control_loop import ControlLoop
 from .diagnostics import loop_diagnostic, state_diagnostic
-from .joint_reader import CommandScope, JointReader
+from .joint_reader import CommandFilter, JointReader
 from .parameters import changed_gait, declare_parameters
 
 COMMAND_QOS = QoSProfile(
@@ -98,10 +98,10 @@ class ControllerNode(Node):
         self._joint_states = FastReader(JointState, 'position', 'velocity')
         self._imu = FastReader(Imu, *messages.IMU_NUMBERS)
         self._joints = JointReader(settings.robot)
-        self._scope = CommandScope(
+        self._filter = CommandFilter(
             settings.robot, others_move=bool(settings.arm_pose) or policy is not None
         )
-        self._targets = self._controller.typical
+        self._targets = self._controller.fallback_positions
         self._unreported: tuple[str, ...] = ()
         self._title = ''
         self._ready = False
@@ -259,7 +259,7 @@ class ControllerNode(Node):
         if output.targets is not None:
             now = self.get_clock().now().nanoseconds
             self._targets = output.targets
-            sent = self._scope.cut(output.targets, output.title, self._joints.unreported)
+            sent = self._filter.select(output.targets, output.title, self._joints.unreported)
             self._commands.publish(messages.JointCommands(len(sent)), now, sent)
             if shadow := output.shadow:
                 self._shadow.publish(messages.JointCommands(len(shadow)), now, shadow)

@@ -83,7 +83,7 @@ class JointReader:
         self._seen = names
 
 
-class CommandScope:
+class CommandFilter:
     """Decides how many joints a command is for: all, or the first ones, which are the legs."""
 
     def __init__(self, robot: Quadruped, *, others_move: bool) -> None:
@@ -99,7 +99,7 @@ class CommandScope:
         self._others_move = others_move
         self._moved = False
 
-    def cut(self, targets: Targets, title: str, unreported: Sequence[str]) -> Targets:
+    def select(self, targets: Targets, title: str, unreported: Sequence[str]) -> Targets:
         """Return the targets to send.
 
         Args:

@@ -202,18 +202,18 @@ def _joints(metadata: PolicyMetadata, robot: Quadruped, options: PolicyOptions) 
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         yield _row('joint_names', 'each once', f'twice: {", ".join(twice)}', fits=False)
-    lacking = [name for name in names if name not in robot.names]
+    missing = [name for name in names if name not in robot.names]
     legs = [robot.names[index] for indices in robot.leg_indices for index in indices]
     unmoved = [name for name in legs if name not in names]
     found = f'{len(names)} joints'
-    if lacking:
-        found = f'not in the robot: {", ".join(lacking)}'
+    if missing:
+        found = f'not in the robot: {", ".join(missing)}'
     if unmoved:
         found += f'; legs without: {", ".join(unmoved)}'
-    held = bool(lacking) and not unmoved and options.hold_missing
+    held = bool(missing) and not unmoved and options.hold_missing
     if held:
         found += ' (held at default)'
-    fits = not unmoved and (not lacking or held)
+    fits = not unmoved and (not missing or held)
     verdict = Verdict.REFUSE if not fits else Verdict.WARN if held else Verdict.OK
     yield Row('joint_names', f"all of the legs', of {len(robot.names)}", found, verdict)
     ours = [name for name in robot.names if name in names]

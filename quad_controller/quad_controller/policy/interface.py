@@ -25,7 +25,7 @@ class PolicyStep:
     reason: str = ''
 
 
-def lacking(joints: JointSample, imu: ImuSample) -> str:
+def missing_inputs(joints: JointSample, imu: ImuSample) -> str:
     """Say what is not measured that a policy has to be told; nothing when all is there.
 
     Args:

@@ -63,12 +63,12 @@ def load_policy(
         PolicyError: It cannot be loaded or does not fit; the message has the table.
     """
     network = OnnxNetwork(path)
-    return admit(
+    return validate_policy(
         path.name, network, robot, stand, options=options, period=period, clock=time.perf_counter
     )
 
 
-def admit(
+def validate_policy(
     name: str,
     network: Network,
     robot: Quadruped,

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import math
 
 from ..exceptions import PolicyError
-from . import extras
+from . import metadata_keys
 
 OWN_KEYS = {
     'phase_period': 'period of the phase in [s]',
@@ -82,11 +82,11 @@ def read_metadata(values: Mapping[str, str]) -> PolicyMetadata:
         phase_threshold=_optional(values, 'phase_command_threshold'),
         imu_frame=values.get('imu_frame'),
         kind=values.get('kind', ''),
-        step_periods=extras.step_periods(values),
-        observation_sizes=extras.observation_sizes(values),
-        action_sizes=extras.action_sizes(values),
-        unusual=extras.changing(values),
-        unknown=extras.not_understood(values),
+        step_periods=metadata_keys.step_periods(values),
+        observation_sizes=metadata_keys.observation_sizes(values),
+        action_sizes=metadata_keys.action_sizes(values),
+        unusual=metadata_keys.changing(values),
+        unknown=metadata_keys.not_understood(values),
     )
 
 

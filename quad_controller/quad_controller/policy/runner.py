@@ -12,7 +12,7 @@ import numpy as np
 from quad_description import ImuSample, JointSample, Quadruped, Targets
 
 from ..gait.velocity import Velocity
-from .interface import lacking, PolicyStep
+from .interface import missing_inputs, PolicyStep
 from .metadata import PolicyMetadata
 from .network import Floats, Network
 from .observation import ObservationBuilder
@@ -132,8 +132,8 @@ class PolicyRunner:
             dt: Duration of the step in [s].
         """
         self._builder.advance(dt)
-        if lack := lacking(joints, imu):
-            return PolicyStep(None, lack)
+        if missing := missing_inputs(joints, imu):
+            return PolicyStep(None, missing)
         observation = self.observe(joints, imu, velocity)
         if not np.isfinite(observation).all():
             return PolicyStep(None, 'the observation holds what is no number')

@@ -21,7 +21,7 @@ from ..gait.generator import GaitGenerator
 from ..gait.parameters import GaitParameters
 from ..gait.schedule import Gait
 from ..gait.velocity import Velocity
-from ..policy.interface import lacking, Policy
+from ..policy.interface import missing_inputs, Policy
 from .commands import Commands
 from .faults import Fault, FaultLatch
 from .health import Health
@@ -89,8 +89,8 @@ class Controller:
             if not limits.velocity > 0.0:
                 raise DescriptionError(f'{name} has no velocity limit (limit velocity="...")')
         poses = Poses(robot, states.lie_height, arm_pose)
-        self._typical = poses.typical
-        self._generator = GaitGenerator(robot, gait, poses.typical)
+        self._fallback_positions = poses.fallback_positions
+        self._generator = GaitGenerator(robot, gait, poses.fallback_positions)
         self._generator.choose(first_gait)
         self._robot = robot
         self._policy, self._policy_refusal = policy, policy_refusal
@@ -165,9 +165,9 @@ class Controller:
         return Answer(True, 'tuned')
 
     @property
-    def typical(self) -> Targets:
+    def fallback_positions(self) -> Targets:
         """Positions of all joints that are assumed of those that nobody has measured [rad]."""
-        return self._typical
+        return self._fallback_positions
 
     @property
     def status(self) -> Status:
@@ -380,4 +380,4 @@ class Controller:
         joints, imu = self._health.joints, self._health.imu
         if joints is None or imu is None:
             return 'a policy needs joint states and an attitude; there are none yet'
-        return self._health.uncertainty or lacking(joints, imu)
+        return self._health.uncertainty or missing_inputs(joints, imu)

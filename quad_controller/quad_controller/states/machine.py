@@ -52,8 +52,8 @@ class Poses:
             )
         self._robot = robot
         self._arm = dict(zip(robot.others, arm_pose, strict=True)) if arm_pose else {}
-        self.typical = self.with_arm([0.0] * len(robot.names))
-        self._lying = robot.solve(robot.footprint(lie_height, self.typical))
+        self.fallback_positions = self.with_arm([0.0] * len(robot.names))
+        self._lying = robot.solve(robot.footprint(lie_height, self.fallback_positions))
 
     def with_arm(self, targets: Sequence[float]) -> Targets:
         """Return targets of all joints with those that are no legs' as the parameter says."""

@@ -28,7 +28,7 @@ from ..estimation.imu_mounting import ImuMounting
 from ..exceptions import CommandError
 from ..report import Report
 from .console import Console
-from .robot import HandheldRobot, ImuReading
+from .robot import ImuReading, LimpRobot
 
 MIN_TILT = math.radians(8.0)  # [rad] that tells a direction from a hand that shakes
 MIN_TURN = math.radians(20.0)  # [rad]
@@ -71,7 +71,7 @@ _ROTATIONS = tuple(
 """An IMU lies on its board, the right way up or upside down, along an edge of the body."""
 
 
-def calibrate_imu(console: Console, robot: HandheldRobot) -> ImuMounting:
+def calibrate_imu(console: Console, robot: LimpRobot) -> ImuMounting:
     """Have a person tilt the robot, and return how the IMU is mounted.
 
     Raises:

@@ -20,7 +20,7 @@ from ..protocol import Model, Protocol, PROTOCOLS
 from .console import CancelledError, Console, TerminalConsole
 from .imu import calibrate_imu
 from .parameter_file import imu_parameters, servo_parameters, write_parameters
-from .robot import HandheldRobot
+from .robot import LimpRobot
 from .wizard import calibrate_joints, zero_all
 
 DEFAULT_FILE = Path('quad_calibration.yaml')
@@ -65,7 +65,7 @@ def _joints(options: argparse.Namespace, console: Console) -> None:
     chosen = [servo for servo in servos if not options.joint or servo.joint in options.joint]
     console.say(f'{len(chosen)} joints. The servos will let go: support the robot.')
     motors = [servo.motor for servo in servos]
-    with HandheldRobot(_link(options), motors) as robot:
+    with LimpRobot(_link(options), motors) as robot:
         console.ask('Enter takes their torque away; Ctrl-C leaves')
         with robot.limp():
             if options.zero_only:
@@ -81,7 +81,7 @@ def _joints(options: argparse.Namespace, console: Console) -> None:
 
 def _imu(options: argparse.Namespace, console: Console) -> None:
     console.say('The servos stay as they are. Hold the robot by its body, not by its legs.')
-    with HandheldRobot(_link(options), ()) as robot:
+    with LimpRobot(_link(options), ()) as robot:
         found = imu_parameters(calibrate_imu(console, robot))
     console.say(f'found: {found["imu"]}')
     write_parameters(options.output, found)

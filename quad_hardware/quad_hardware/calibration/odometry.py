@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from typing_extensions import Self
 
 PERIOD = 0.05  # [s] between velocities
-PATIENCE = 10.0  # [s] for odometry to come
+ODOMETRY_TIMEOUT = 10.0  # [s] for odometry to come
 SLOWEST_SHARE = 0.3  # of the speed asked for, below which the robot does not walk
 SETTLING = 1.5  # [s] to stop
 
@@ -78,7 +78,7 @@ class Walker:
             NoAnswerError: Nobody publishes /odom.
         """
         self._place = None
-        deadline = time.monotonic() + PATIENCE
+        deadline = time.monotonic() + ODOMETRY_TIMEOUT
         while self._place is None:
             if time.monotonic() > deadline:
                 raise NoAnswerError(
@@ -96,7 +96,7 @@ class Walker:
         client = self._node.create_client(GetParameters, 'hardware_node/get_parameters')
         name = f'odometry.scale_{axis.value}'
         future = None
-        deadline = time.monotonic() + PATIENCE
+        deadline = time.monotonic() + ODOMETRY_TIMEOUT
         while time.monotonic() < deadline:
             if future is None and client.service_is_ready():
                 future = client.call_async(GetParameters.Request(names=[name]))
@@ -114,7 +114,7 @@ class Walker:
             NoAnswerError: The robot does not walk, or /odom fell silent.
         """
         start = self.place()
-        deadline = time.monotonic() + distance / (speed * SLOWEST_SHARE) + PATIENCE / 2
+        deadline = time.monotonic() + distance / (speed * SLOWEST_SHARE) + ODOMETRY_TIMEOUT / 2
         try:
             while start.way(self.place(), axis) < distance:
                 if time.monotonic() > deadline:

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 SAMPLES = 15  # reports that one reading is the median of
 LONGEST_WAY = 6000  # reports between two readings, the newest; two minutes
-PATIENCE = 4.0  # [s] for a robot to report
+REPORT_TIMEOUT = 4.0  # [s] for a robot to report
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +44,7 @@ class ImuReading:
     on_the_way: Sequence[Report] = ()
 
 
-class HandheldRobot:
+class LimpRobot:
     """Reads angles, takes torque away and gives it back."""
 
     def __init__(self, options: LinkOptions, motors: Collection[int]) -> None:
@@ -68,7 +68,7 @@ class HandheldRobot:
         """
         with self._changed:
             self._recent.clear()
-            if not self._changed.wait_for(lambda: len(self._recent) == SAMPLES, PATIENCE):
+            if not self._changed.wait_for(lambda: len(self._recent) == SAMPLES, REPORT_TIMEOUT):
                 raise NoAnswerError(self._driver.status().detail)
             motors = set[int].intersection(*(set(angles) for angles in self._recent))
             return {m: median(angles[m] for angles in self._recent) for m in sorted(motors)}
@@ -82,7 +82,7 @@ class HandheldRobot:
         with self._changed:
             way = tuple(self._imu)
             self._imu.clear()
-            if not self._changed.wait_for(lambda: len(self._imu) >= SAMPLES, PATIENCE):
+            if not self._changed.wait_for(lambda: len(self._imu) >= SAMPLES, REPORT_TIMEOUT):
                 raise NoAnswerError(self._driver.status().detail)
             states = list(self._imu)
         roll, pitch, yaw = map(_mean_angle, zip(*(s.attitude for s in states), strict=True))

@@ -12,7 +12,7 @@ from ..exceptions import CommandError
 from ..joints import JointServo
 from .console import ask_yes, Console
 from .joints import moved_motor, with_direction, with_limits, with_zero
-from .robot import HandheldRobot
+from .robot import LimpRobot
 
 # what zero and the positive direction look like (quad_description)
 _PLACES = {
@@ -28,7 +28,7 @@ _ARM_PLACE = ('the joint is where the URDF draws it at zero', 'turn it the way o
 
 
 def calibrate_joints(
-    console: Console, robot: HandheldRobot, servos: Iterable[JointServo], *, limits: bool
+    console: Console, robot: LimpRobot, servos: Iterable[JointServo], *, limits: bool
 ) -> list[JointServo]:
     """Ask for zero, direction and, if wanted, both ends of each joint.
 
@@ -45,7 +45,7 @@ def calibrate_joints(
 
 
 def _calibrate(
-    console: Console, robot: HandheldRobot, servo: JointServo, *, limits: bool
+    console: Console, robot: LimpRobot, servo: JointServo, *, limits: bool
 ) -> JointServo:
     zero_place, direction = _place_of(servo.joint)
     while True:
@@ -90,7 +90,7 @@ def _found(
     return with_direction(servo, before[servo.motor], after[servo.motor])
 
 
-def _ends(console: Console, robot: HandheldRobot, servo: JointServo) -> JointServo:
+def _ends(console: Console, robot: LimpRobot, servo: JointServo) -> JointServo:
     console.ask('  move it to one end of its travel. Enter')
     one = robot.angles()[servo.motor]
     console.ask('  move it to the other end. Enter')

@@ -16,7 +16,7 @@ LARGEST_JUMP = 60.0  # [deg] between reports; a servo does 12 degrees in 20 ms
 LARGEST_LAG = 0.1  # [s] between the robot's clock and ours from one report to the next
 JUMP_TIME = 0.1  # [s] after which anything may have happened
 NOT_FINITE = 'a number is not finite'
-PATIENCE = 2  # doubtful reports in a row that are refused, before they are believed
+MAX_REFUSALS = 2  # doubtful reports in a row that are refused, before they are believed
 
 
 class Plausibility:
@@ -49,7 +49,7 @@ class Plausibility:
         doubt = '' if self.imu_problem else imu
         if not doubt and last is not None and state.arrival - last.arrival < JUMP_TIME:
             doubt = self._jump(last, state, attitude=not (imu or self.imu_problem))
-        if doubt and self._refused < PATIENCE:
+        if doubt and self._refused < MAX_REFUSALS:
             self._refused += 1
             return doubt
         self._refused = 0

@@ -11,7 +11,7 @@ from ..report import DEVICE_TIME_WRAP, Report
 DRIFT = 1e-4  # share by which the robot's clock may be off
 RESTART = 1.0  # [s] a difference beyond that is a robot that began anew
 LATE = 0.1  # [s] a report that is later than others by that may be right, and they wrong
-PATIENCE = 0.5  # [s] for which all reports are late, until they are believed
+LATE_TIMEOUT = 0.5  # [s] for which all reports are late, until they are believed
 
 
 class SampleClock:
@@ -50,4 +50,4 @@ class SampleClock:
             self._late_since = math.inf
             return False
         self._late_since = min(self._late_since, begun)
-        return begun - self._late_since > PATIENCE
+        return begun - self._late_since > LATE_TIMEOUT

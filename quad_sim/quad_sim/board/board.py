@@ -14,7 +14,7 @@ from quad_hardware.protocol import Fault, Model, MOTOR_ORDER
 
 from ..plant.plant import Plant
 from ..plant.state import Measurement
-from .power import Battery, HOT, LOW_BATTERY, Overload, Warmth
+from .power import Battery, HOT, LOW_BATTERY, Overload, ServoThermalModel
 from .servos import Mount, Servos
 from .turning import Turn
 from .walking import Walker
@@ -88,7 +88,7 @@ class Board:
         self._plant = plant
         self._efforts = [joint.limits.effort for joint in joints]
         self._with_arm = len(joints) > len(pose_positions(Pose.STAND))
-        self._warmth = Warmth(len(joints))
+        self._thermal_model = ServoThermalModel(len(joints))
         self._overload = Overload(len(joints))
         self._now = now
         self._measured = plant.measure()
@@ -169,7 +169,7 @@ class Board:
     @property
     def temperatures(self) -> tuple[float, ...]:
         """Temperatures of the servos by slot [degC]."""
-        return self.servos.by_slot(self._warmth.temperatures)
+        return self.servos.by_slot(self._thermal_model.temperatures)
 
     @property
     def faults(self) -> Fault:
@@ -177,7 +177,7 @@ class Board:
         faults = Fault(0)
         if self.battery.charge < LOW_BATTERY:
             faults |= Fault.LOW_BATTERY
-        if self._warmth.temperatures.max() > HOT:
+        if self._thermal_model.temperatures.max() > HOT:
             faults |= Fault.OVERHEATED
         if self._overload.lasts:
             faults |= Fault.OVERLOAD
@@ -255,5 +255,5 @@ class Board:
         self._power_at = self._now + POWER_PERIOD
         torques = self.measure().torques
         self.battery.advance(torques, POWER_PERIOD)
-        self._warmth.advance(torques / self._efforts, POWER_PERIOD)
+        self._thermal_model.advance(torques / self._efforts, POWER_PERIOD)
         self._overload.advance(torques / self._efforts, POWER_PERIOD)

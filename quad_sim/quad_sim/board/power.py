@@ -53,7 +53,7 @@ class Battery:
         return EMPTY + (FULL - EMPTY) * self.charge / 100.0 - RESISTANCE * self.current
 
 
-class Warmth:
+class ServoThermalModel:
     """Temperatures of the servos, of first order in the square of their loads."""
 
     def __init__(self, count: int) -> None:

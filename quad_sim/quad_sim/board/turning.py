@@ -8,7 +8,7 @@ import math
 
 RATE = math.radians(60.0)  # [rad/s]
 CLOSE = math.radians(2.0)  # [rad] from here on it counts as done: the last stride adds the rest
-PATIENCE = 3.0  # times the time that it should take; a robot that cannot turn gives up
+MAX_DURATION_RATIO = 3.0  # times the time that it should take; a robot that cannot turn gives up
 
 
 class Turn:
@@ -24,7 +24,7 @@ class Turn:
         """
         self._left = angle
         self._yaw = yaw
-        self._deadline = now + 1.0 + PATIENCE * abs(angle) / RATE
+        self._deadline = now + 1.0 + MAX_DURATION_RATIO * abs(angle) / RATE
 
     def rate(self, yaw: float, now: float) -> float:
         """Return how fast to turn [rad/s].

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What the demo's robot is told to do, stretch by stretch."""
+"""What the demo's robot is told to do, segment by segment."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from quad_controller.gait.parameters import GaitParameters
 from quad_controller.gait.schedule import Gait
 
 SHORTEST = 6.0
-"""Least duration in [s] in which every stretch can show something."""
+"""Least duration in [s] in which every segment can show something."""
 SETTLING = 1.0
-"""Time in [s] of a stretch that is not measured: the robot takes up speed."""
+"""Time in [s] of a segment that is not measured: the robot takes up speed."""
 SETTLING_SHARE = 0.4
-"""Largest part of a stretch that is settling."""
+"""Largest part of a segment that is settling."""
 USUAL = 20.0
 """Duration in [s] of a round when the demo has no end."""
 
@@ -44,7 +44,7 @@ STANDSTILL = Velocity()
 
 
 @dataclass(frozen=True, slots=True)
-class Stretch:
+class Segment:
     """A part of the demo with one velocity.
 
     Attributes:
@@ -69,7 +69,7 @@ SHARES = (
     ('strafe', Velocity(left=0.1), 0.25),
     ('stop', STANDSTILL, 0.1),
 )
-"""Stretches of a round, with their share of its time; speeds that the XGO's trot is made for."""
+"""Segments of a round, with their share of its time; speeds that the XGO's trot is made for."""
 
 
 def share_of(gait: str) -> float:
@@ -82,7 +82,7 @@ def share_of(gait: str) -> float:
     return top_speed(Gait(gait)) / top_speed(Gait.TROT)
 
 
-def one_round(duration: float, share: float = 1.0) -> list[Stretch]:
+def one_round(duration: float, share: float = 1.0) -> list[Segment]:
     """Plan a round.
 
     Args:
@@ -95,11 +95,11 @@ def one_round(duration: float, share: float = 1.0) -> list[Stretch]:
     if not duration >= SHORTEST:
         raise ValueError(f'{duration:g} s is too short; the demo needs {SHORTEST:g} s')
     return [
-        Stretch(name, velocity.scaled(share), part * duration) for name, velocity, part in SHARES
+        Segment(name, velocity.scaled(share), part * duration) for name, velocity, part in SHARES
     ]
 
 
-def itinerary(duration: float | None, share: float = 1.0) -> Iterator[Stretch]:
+def segments(duration: float | None, share: float = 1.0) -> Iterator[Segment]:
     """Say what comes after what.
 
     Args:

@@ -9,7 +9,7 @@ from collections.abc import Callable
 import pytest
 
 from process_supervisor import CallError, GivenUpError
-from quad_bringup.leaving import lie_down, stand_still
+from quad_bringup.shutdown import lie_down, stand_still
 
 
 class Controller:

@@ -13,7 +13,7 @@ KEPT = 3000
 
 
 @dataclass(frozen=True, slots=True)
-class Rhythm:
+class PeriodFigures:
     """How regular a stream was.
 
     Attributes:
@@ -27,7 +27,7 @@ class Rhythm:
     jitter_p99: float = math.nan
 
 
-class Beat:
+class PeriodStatistics:
     """Listens to the stamps of a stream."""
 
     def __init__(self, period: float) -> None:
@@ -50,14 +50,14 @@ class Beat:
             self._intervals.append(stamp - self._last)
         self._last = stamp
 
-    def rhythm(self) -> Rhythm:
+    def figures(self) -> PeriodFigures:
         """Say how regular it was."""
         if not self._intervals:
-            return Rhythm()
+            return PeriodFigures()
         total = sum(self._intervals)
         deviations = sorted(abs(each - self._period) for each in self._intervals)
         rate = len(deviations) / total if total > 0 else math.inf
-        return Rhythm(rate, _percentile(deviations, 0.5), _percentile(deviations, 0.99))
+        return PeriodFigures(rate, _percentile(deviations, 0.5), _percentile(deviations, 0.99))
 
 
 def _percentile(ordered: list[float], share: float) -> float:
