@@ -5,7 +5,8 @@
 The names here are for those who talk to devices without a network around them.
 """
 
+from .other_master import MasterFrames
 from .scheduler import Promise, Scheduler
 from .sdo_client import SdoClient
 
-__all__ = ['Promise', 'Scheduler', 'SdoClient']
+__all__ = ['MasterFrames', 'Promise', 'Scheduler', 'SdoClient']

@@ -34,6 +34,11 @@ class Evidence(IntEnum):
     SYNC = 2
     RPDO = 3
 
+    @property
+    def title(self) -> str:
+        """Such frames, in words."""
+        return ('NMT commands', 'its heartbeat', 'SYNC', 'RPDOs')[self]
+
 
 @dataclass(frozen=True, slots=True, order=True)
 class MasterFrame:
@@ -51,12 +56,17 @@ class MasterFrame:
 class MasterFrames:
     """Reads from frames of others what only the master of this bus would send."""
 
-    def __init__(self, config: BusConfig) -> None:
+    def __init__(self, config: BusConfig | None) -> None:
         """Note which frames are those of the master.
 
         Args:
-            config: The bus.
+            config: The bus; None where no file says what is on it.
         """
+        self._frames: dict[int, MasterFrame] = {}
+        sync = MasterFrame(Evidence.SYNC, f'SYNC (0x{CobId.SYNC:03X})')
+        if config is None:
+            self._frames[CobId.SYNC] = sync
+            return
         master = config.master
         heartbeat = CobId.HEARTBEAT + master.node_id
         from_devices = {pdo.cob_id for node in config.nodes for pdo in node.tpdos}
@@ -71,7 +81,7 @@ class MasterFrames:
         text = f'the heartbeat 0x{heartbeat:03X} of node id {master.node_id}, which is our own'
         self._frames[heartbeat] = MasterFrame(Evidence.HEARTBEAT, text)
         if master.sync_period > 0:
-            self._frames[CobId.SYNC] = MasterFrame(Evidence.SYNC, f'SYNC (0x{CobId.SYNC:03X})')
+            self._frames[CobId.SYNC] = sync
 
     def read(self, frame: Frame) -> MasterFrame | None:
         """Return what a frame of somebody else says, None when any device may send it."""

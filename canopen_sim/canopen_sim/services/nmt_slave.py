@@ -8,19 +8,16 @@ from typing import Protocol
 
 from arm_canopen.can.frame import Frame
 from arm_canopen.standard.cob_id import CobId, NODE_ID_MAX
-from arm_canopen.standard.nmt import ALL_NODES, NmtCommand, NmtState
+from arm_canopen.standard.nmt import (
+    ALL_NODES,
+    COMMANDED_STATES,
+    NmtCommand,
+    NmtState,
+    parse_nmt,
+    RESETS,
+)
 
 from ..timed import NEVER
-
-NMT_TARGETS: dict[NmtCommand, NmtState] = {
-    NmtCommand.START: NmtState.OPERATIONAL,
-    NmtCommand.STOP: NmtState.STOPPED,
-    NmtCommand.ENTER_PRE_OPERATIONAL: NmtState.PRE_OPERATIONAL,
-}
-"""Where a command leads from every state but Initialisation (CiA 301, figure 48)."""
-
-RESETS = frozenset({NmtCommand.RESET_NODE, NmtCommand.RESET_COMMUNICATION})
-NMT_BYTES = 2  # [byte]
 
 
 class NmtObserver(Protocol):
@@ -59,16 +56,14 @@ class NmtSlave:
 
     def receive(self, frame: Frame, now: float) -> None:
         """Obey a command; anything that is none is ignored."""
-        if len(frame.data) != NMT_BYTES or frame.data[1] not in (ALL_NODES, self.node_id):
+        parsed = parse_nmt(frame.data)
+        if parsed is None or parsed[1] not in (ALL_NODES, self.node_id):
             return
-        try:
-            command = NmtCommand(frame.data[0])
-        except ValueError:
-            return
+        command, _ = parsed
         if command in RESETS:
             self._initialise(command, now)
         elif self.state is not NmtState.BOOT_UP:
-            self.enter(NMT_TARGETS[command], now)
+            self.enter(COMMANDED_STATES[command], now)
 
     def enter(self, state: NmtState, now: float) -> None:
         """Go to a state; nothing happens when it is the present one."""

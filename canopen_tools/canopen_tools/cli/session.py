@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 
 from arm_canopen.can import Bus, Frame
 from arm_canopen.config.model import BusConfig
-from arm_canopen.master import Promise, Scheduler, SdoClient
+from arm_canopen.master import MasterFrames, Promise, Scheduler, SdoClient
 from arm_canopen.standard.cob_id import CobId, NODE_ID_MAX, NODE_ID_MIN
 from arm_canopen.standard.nmt import NmtState, parse_heartbeat
 
@@ -51,11 +51,7 @@ class Session:
         self._clients: dict[int, SdoClient] = {}
         self._sdo_times: dict[int, float] = {}
         self._master_id = config.master.node_id if config is not None else None
-        self._rpdos = (
-            {pdo.cob_id for node in config.nodes for pdo in node.rpdos if pdo.enabled}
-            if config is not None
-            else set()
-        )
+        self._master_frames = MasterFrames(config)
 
     def listen(self, duration: float, until: Callable[[], bool] = lambda: False) -> None:
         """Listen for a time in [s], or until a condition holds."""
@@ -120,13 +116,10 @@ class Session:
 
     def _note_master(self, frame: Frame, function: int, node_id: int) -> None:
         """Note what only a master sends; own frames never arrive here."""
-        if frame.can_id == CobId.NMT:
-            self.masters.add('NMT commands')
-        elif frame.can_id == CobId.SYNC:
-            self.masters.add('SYNC')
-        elif frame.can_id in self._rpdos:
-            self.masters.add('RPDOs')
+        kind = self._master_frames.read(frame)
+        if kind is not None:
+            self.masters.add(kind.evidence.title)
         elif function == CobId.SDO_REQUEST and node_id:
             self.masters.add('SDO requests')
-        elif function == CobId.HEARTBEAT and (frame.is_remote or node_id == self._master_id):
-            self.masters.add('node guarding' if frame.is_remote else 'its heartbeat')
+        elif function == CobId.HEARTBEAT and frame.is_remote:
+            self.masters.add('node guarding')
