@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from argparse import Namespace
+from collections.abc import Callable, Hashable, Iterator
 import contextlib
 import math
 import time
@@ -13,7 +14,7 @@ from typing import TypeVar
 from ..aliases import Endpoint, NamesAndTypes
 from .discovery import Patience, wait
 from .names import is_hidden, NodeName
-from .session import Session
+from .session import open_session, Session
 
 T = TypeVar('T')
 
@@ -22,6 +23,7 @@ class Graph:
     """What is in the ROS graph, and waiting for it.
 
     Attributes:
+        session: The session that looks.
         domain_id: The ROS domain.
     """
 
@@ -32,6 +34,7 @@ class Graph:
             session: The session; its node is part of the graph.
             spin_time: Longest time [s] to wait for discovery; None decides by the graph.
         """
+        self.session = session
         self._node = session.node
         self._spin_time = spin_time
         self.domain_id: int = session.node.context.get_domain_id()
@@ -146,6 +149,22 @@ class Graph:
         while found is None and (left := deadline - time.monotonic()) > 0.0:
             found = self.wait_for(look, left)
         return found
+
+
+@contextlib.contextmanager
+def open_graph(args: Namespace, spin_time: float | None = None) -> Iterator[Graph]:
+    """Join the ROS graph for one command, and look at it.
+
+    Args:
+        args: Parsed arguments; `use_sim_time` and `spin_time` are looked at.
+        spin_time: Longest time [s] to wait for discovery when the arguments name none.
+
+    Yields:
+        The graph; the node that looks at it is gone afterwards.
+    """
+    with open_session(args) as session:
+        asked: float | None = args.spin_time
+        yield Graph(session, asked if spin_time is None else asked or spin_time)
 
 
 def _visible(pairs: NamesAndTypes, hidden: bool) -> NamesAndTypes:

@@ -9,9 +9,8 @@ from argparse import ArgumentParser, Namespace
 from ..aliases import NamesAndTypes
 from ..cli.arguments import add_graph_arguments
 from ..ros.actions import action_names, clients_and_servers
-from ..ros.graph import Graph
+from ..ros.graph import open_graph
 from ..ros.names import absolute
-from ..ros.session import open_session
 from .names import add_list_arguments, print_names, print_types
 
 
@@ -19,22 +18,14 @@ class List:
     """Output a list of action names."""
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """Add the command's own arguments.
-
-        Args:
-            parser: The command's parser.
-        """
+        """Add the command's own arguments."""
         add_list_arguments(parser, 'actions')
 
     def main(self, args: Namespace) -> None:
-        """Print the actions.
-
-        Args:
-            args: The parsed arguments.
-        """
-        with open_session(args) as session:
-            Graph(session, args.spin_time).settle()
-            actions = action_names(session)
+        """Print the actions."""
+        with open_graph(args) as graph:
+            graph.settle()
+            actions = action_names(graph.session)
         print_names(actions, args)
 
 
@@ -42,11 +33,7 @@ class Info:
     """Print information about an action."""
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """Add the command's own arguments.
-
-        Args:
-            parser: The command's parser.
-        """
+        """Add the command's own arguments."""
         add_graph_arguments(parser)
         parser.add_argument(
             'action_name', help="Name of the ROS action to get info (e.g. '/fibonacci')"
@@ -62,17 +49,12 @@ class Info:
         )
 
     def main(self, args: Namespace) -> None:
-        """Print who offers and who uses the action; nobody is no error, as in ros2cli.
-
-        Args:
-            args: The parsed arguments.
-        """
+        """Print who offers and who uses the action; nobody is no error, as in ros2cli."""
         name = absolute(args.action_name)
-        with open_session(args) as session:
-            graph = Graph(session, args.spin_time)
-            graph.wait_for(lambda: dict(action_names(session)).get(name))
+        with open_graph(args) as graph:
+            graph.wait_for(lambda: dict(action_names(graph.session)).get(name))
             graph.settle()
-            clients, servers = clients_and_servers(session, graph, name)
+            clients, servers = clients_and_servers(graph.session, graph, name)
         print(f'Action: {args.action_name}')
         for title, nodes in (('clients', clients), ('servers', servers)):
             print(f'Action {title}: {len(nodes)}')
@@ -89,11 +71,7 @@ class Type:
     """Print a action's type."""
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """Add the command's own arguments.
-
-        Args:
-            parser: The command's parser.
-        """
+        """Add the command's own arguments."""
         add_graph_arguments(parser)
         parser.add_argument(
             'action_name', help="Name of the ROS action to get type (e.g. '/fibonacci')"
@@ -102,12 +80,10 @@ class Type:
     def main(self, args: Namespace) -> int:
         """Print the types.
 
-        Args:
-            args: The parsed arguments.
-
         Returns:
             The exit code: 1 when there is no such action.
         """
-        with open_session(args) as session:
-            graph = Graph(session, args.spin_time)
-            return print_types(args.action_name, graph, lambda _: action_names(session), True)
+        with open_graph(args) as graph:
+            return print_types(
+                args.action_name, graph, lambda _: action_names(graph.session), True
+            )

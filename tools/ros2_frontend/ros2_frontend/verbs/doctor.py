@@ -22,20 +22,16 @@ from ..health.topics import (
     Topic,
 )
 from ..ros.discovery import take_census
-from ..ros.graph import Graph
+from ..ros.graph import Graph, open_graph
 from ..ros.participants import read_ports
-from ..ros.session import open_session, Session
+from ..ros.session import Session
 
 
 class Doctor:
     """Check ROS setup and other potential issues."""
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """Add the command's own arguments.
-
-        Args:
-            parser: The command's parser.
-        """
+        """Add the command's own arguments."""
         add_graph_arguments(parser)
         parser.add_argument('--report', '-r', action='store_true', help='Print all reports.')
         parser.add_argument(
@@ -58,17 +54,12 @@ class Doctor:
         )
 
     def main(self, args: Namespace) -> None:
-        """Look at everything and print what may be wrong; exit code 0, as ros2cli.
-
-        Args:
-            args: The parsed arguments.
-        """
-        with open_session(args) as session:
-            graph = Graph(session, args.spin_time)
+        """Look at everything and print what may be wrong; exit code 0, as ros2cli."""
+        with open_graph(args) as graph:
             graph.settle()
             topics = read_topics(graph)
             discovery = _check_discovery(graph)
-            reports = _reports(session, graph, topics)
+            reports = _reports(graph.session, graph, topics)
         if args.report:
             for report in reports.values():
                 print(report.text())

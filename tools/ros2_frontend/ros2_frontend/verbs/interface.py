@@ -41,19 +41,11 @@ class List:
     """List all interface types available."""
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """Add the command's own arguments.
-
-        Args:
-            parser: The command's parser.
-        """
+        """Add the command's own arguments."""
         _add_kind_flags(parser, 'Print out only the {} types')
 
     def main(self, args: Namespace) -> None:
-        """Print the types, grouped by kind.
-
-        Args:
-            args: The parsed arguments.
-        """
+        """Print the types, grouped by kind."""
         for kind, title in _TITLES.items():
             if args.kinds and kind not in args.kinds:
                 continue
@@ -67,19 +59,11 @@ class Packages:
     """Output a list of packages that provide interfaces."""
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """Add the command's own arguments.
-
-        Args:
-            parser: The command's parser.
-        """
+        """Add the command's own arguments."""
         _add_kind_flags(parser, 'Only list packages that generate {}s')
 
     def main(self, args: Namespace) -> None:
-        """Print the packages.
-
-        Args:
-            args: The parsed arguments.
-        """
+        """Print the packages."""
         for name in all_interfaces(args.kinds or Kind):
             print(name)
 
@@ -88,20 +72,13 @@ class Package:
     """Output a list of available interface types within one package."""
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """Add the command's own arguments.
-
-        Args:
-            parser: The command's parser.
-        """
+        """Add the command's own arguments."""
         parser.add_argument(
             'package_name', help="Name of the ROS package (e.g. 'example_interfaces')"
         )
 
     def main(self, args: Namespace) -> None:
         """Print the types.
-
-        Args:
-            args: The parsed arguments.
 
         Raises:
             UnknownNameError: When the package defines none.
@@ -114,11 +91,7 @@ class Proto:
     """Output an interface prototype."""
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """Add the command's own arguments.
-
-        Args:
-            parser: The command's parser.
-        """
+        """Add the command's own arguments."""
         parser.add_argument(
             'type', help="Show an interface definition (e.g. 'example_interfaces/msg/String')"
         )
@@ -128,9 +101,6 @@ class Proto:
 
     def main(self, args: Namespace) -> None:
         """Print the defaults of a message, request or goal as YAML.
-
-        Args:
-            args: The parsed arguments.
 
         Raises:
             UnknownNameError: When there is no such interface.
@@ -150,11 +120,7 @@ class Show:
     """Output the interface definition."""
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """Add the command's own arguments.
-
-        Args:
-            parser: The command's parser.
-        """
+        """Add the command's own arguments."""
         comments = parser.add_mutually_exclusive_group()
         comments.add_argument(
             '--all-comments',
@@ -173,9 +139,6 @@ class Show:
 
     def main(self, args: Namespace) -> None:
         """Print the definition with those of its fields' types.
-
-        Args:
-            args: The parsed arguments.
 
         Raises:
             FrontendError: When no type is given on stdin.

@@ -11,9 +11,9 @@ from ..aliases import Message
 from ..cli.arguments import add_graph_arguments
 from ..cli.errors import FrontendError, NoAnswerError
 from ..ros.calls import call
-from ..ros.graph import Graph
+from ..ros.graph import Graph, open_graph
 from ..ros.names import NodeName
-from ..ros.session import open_session, Session
+from ..ros.session import Session
 from .node_argument import add_node_argument, find_node
 
 _GET_STATE = 'lifecycle_msgs/srv/GetState'
@@ -34,11 +34,7 @@ class Nodes:
     """Output a list of nodes with lifecycle."""
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """Add the command's own arguments.
-
-        Args:
-            parser: The command's parser.
-        """
+        """Add the command's own arguments."""
         add_graph_arguments(parser)
         parser.add_argument(
             '-a', '--all', action='store_true', help='Display all nodes even hidden ones'
@@ -51,13 +47,8 @@ class Nodes:
         )
 
     def main(self, args: Namespace) -> None:
-        """Print the nodes.
-
-        Args:
-            args: The parsed arguments.
-        """
-        with open_session(args) as session:
-            graph = Graph(session, args.spin_time)
+        """Print the nodes."""
+        with open_graph(args) as graph:
             graph.settle()
             nodes = _lifecycle_nodes(graph, args.all)
         if args.count_nodes:
@@ -71,18 +62,11 @@ class Get:
     """Get lifecycle state for one or more nodes."""
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """Add the command's own arguments.
-
-        Args:
-            parser: The command's parser.
-        """
+        """Add the command's own arguments."""
         add_node_argument(parser, optional=True)
 
     def main(self, args: Namespace) -> int:
         """Print the state of one node, or of all that have one.
-
-        Args:
-            args: The parsed arguments.
 
         Returns:
             The exit code: 1 when the one node does not tell its state.
@@ -91,15 +75,14 @@ class Get:
             UnknownNameError: When there is no such node.
         """
         hidden = args.include_hidden_nodes
-        with open_session(args) as session:
-            graph = Graph(session, args.spin_time)
+        with open_graph(args) as graph:
             if args.node_name:
-                state = _state(session, find_node(args.node_name, graph, hidden))
+                state = _state(graph.session, find_node(args.node_name, graph, hidden))
                 print(f'{state.label} [{state.id}]')
                 return 0
             graph.settle()
             for node in _lifecycle_nodes(graph, hidden):
-                _print_state(session, node)
+                _print_state(graph.session, node)
         return 0
 
 
@@ -120,11 +103,7 @@ class List:
     """Output a list of available transitions."""
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """Add the command's own arguments.
-
-        Args:
-            parser: The command's parser.
-        """
+        """Add the command's own arguments."""
         add_node_argument(parser)
         parser.add_argument(
             '-a', '--all', action='store_true', help='Display all existing transitions'
@@ -133,17 +112,13 @@ class List:
     def main(self, args: Namespace) -> None:
         """Print the transitions that the node can make now, or all of its state machine.
 
-        Args:
-            args: The parsed arguments.
-
         Raises:
             UnknownNameError: When there is no such node.
         """
         query = 'get_transition_graph' if args.all else 'get_available_transitions'
-        with open_session(args) as session:
-            graph = Graph(session, args.spin_time)
+        with open_graph(args) as graph:
             node = find_node(args.node_name, graph, args.include_hidden_nodes)
-            found = _transitions(session, node, query)
+            found = _transitions(graph.session, node, query)
         for entry in found:
             print(f'- {entry.transition.label} [{entry.transition.id}]')
             print(f'\tStart: {entry.start_state.label}')
@@ -161,34 +136,26 @@ class Set:
     """Trigger lifecycle state transition."""
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """Add the command's own arguments.
-
-        Args:
-            parser: The command's parser.
-        """
+        """Add the command's own arguments."""
         add_node_argument(parser)
         parser.add_argument('transition', help='The lifecycle transition')
 
     def main(self, args: Namespace) -> None:
         """Make the node go through a transition, named by label or number.
 
-        Args:
-            args: The parsed arguments.
-
         Raises:
             UnknownNameError: When there is no such node.
             FrontendError: When it has no such transition now.
         """
-        with open_session(args) as session:
-            graph = Graph(session, args.spin_time)
+        with open_graph(args) as graph:
             node = find_node(args.node_name, graph, args.include_hidden_nodes)
-            found = [entry.transition for entry in _transitions(session, node)]
+            found = [entry.transition for entry in _transitions(graph.session, node)]
             wanted = [t for t in found if args.transition in {t.label, str(t.id)}]
             if not wanted:
                 listed = ''.join(f'\n- {t.label} [{t.id}]' for t in found)
                 raise FrontendError(f'Unknown transition requested, available ones are:{listed}')
             service = f'{node.full_name}/change_state'
-            success = call(session, _CHANGE_STATE, service, transition=wanted[0]).success
+            success = call(graph.session, _CHANGE_STATE, service, transition=wanted[0]).success
         if success:
             print('Transitioning successful')
         else:

@@ -10,9 +10,8 @@ import sys
 
 from ..aliases import NamesAndTypes, Node
 from ..cli.arguments import add_graph_arguments
-from ..ros.graph import Graph
+from ..ros.graph import open_graph
 from ..ros.names import is_hidden
-from ..ros.session import open_session
 from .node_argument import find_node
 
 
@@ -20,11 +19,7 @@ class List:
     """Output a list of available nodes."""
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """Add the command's own arguments.
-
-        Args:
-            parser: The command's parser.
-        """
+        """Add the command's own arguments."""
         add_graph_arguments(parser)
         parser.add_argument(
             '-a', '--all', action='store_true', help='Display all nodes even hidden ones'
@@ -37,13 +32,8 @@ class List:
         )
 
     def main(self, args: Namespace) -> None:
-        """Print the names, sorted.
-
-        Args:
-            args: The parsed arguments.
-        """
-        with open_session(args) as session:
-            graph = Graph(session, args.spin_time)
+        """Print the names, sorted."""
+        with open_graph(args) as graph:
             graph.settle()
             names = sorted(node.full_name for node in graph.nodes(hidden=args.all))
         if args.count_nodes:
@@ -63,11 +53,7 @@ class Info:
     """Output information about a node."""
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """Add the command's own arguments.
-
-        Args:
-            parser: The command's parser.
-        """
+        """Add the command's own arguments."""
         add_graph_arguments(parser)
         parser.add_argument('node_name', help='Node name to request information about')
         parser.add_argument(
@@ -79,15 +65,11 @@ class Info:
     def main(self, args: Namespace) -> None:
         """Print what the node offers and uses.
 
-        Args:
-            args: The parsed arguments.
-
         Raises:
             UnknownNameError: When there is no such node.
         """
         unknown = f"Unable to find node '{args.node_name}'"
-        with open_session(args) as session:
-            graph = Graph(session, args.spin_time)
+        with open_graph(args) as graph:
             wanted = find_node(args.node_name, graph, args.include_hidden, unknown)
             graph.settle()
             count = graph.nodes(hidden=True).count(wanted)
@@ -99,7 +81,7 @@ class Info:
                 )
             print(wanted.full_name)
             for title, query in _queries():
-                entries = query(session.node, wanted.name, wanted.namespace)
+                entries = query(graph.session.node, wanted.name, wanted.namespace)
                 print(f'  {title}:')
                 _print_entries(entries, args.include_hidden)
 

@@ -11,7 +11,7 @@ from ..aliases import Message
 from ..cli.arguments import positive_float
 from ..cli.errors import FrontendError
 from ..cli.suggest import hint
-from ..ros.graph import Graph
+from ..ros.graph import open_graph
 from ..ros.names import NodeName
 from ..ros.parameters import (
     get_values,
@@ -22,7 +22,7 @@ from ..ros.parameters import (
     set_values,
     value_of,
 )
-from ..ros.session import open_session, Session
+from ..ros.session import Session
 from .node_argument import add_node_argument, find_node
 
 
@@ -30,11 +30,7 @@ class Get:
     """Get parameter."""
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """Add the command's own arguments.
-
-        Args:
-            parser: The command's parser.
-        """
+        """Add the command's own arguments."""
         add_node_argument(parser)
         parser.add_argument('parameter_name', help='Name of the parameter')
         parser.add_argument('--hide-type', action='store_true', help='Hide the type information')
@@ -43,19 +39,15 @@ class Get:
     def main(self, args: Namespace) -> None:
         """Print the value.
 
-        Args:
-            args: The parsed arguments.
-
         Raises:
             UnknownNameError: When there is no such node.
             FrontendError: When the node has no such parameter.
         """
-        with open_session(args) as session:
-            graph = Graph(session, args.spin_time or args.timeout)
+        with open_graph(args, args.timeout) as graph:
             node = find_node(args.node_name, graph, args.include_hidden_nodes)
-            values = get_values(session, node, [args.parameter_name])
+            values = get_values(graph.session, node, [args.parameter_name])
             if not values:
-                raise FrontendError('Parameter not set' + _near(session, node, args))
+                raise FrontendError('Parameter not set' + _near(graph.session, node, args))
         value = value_of(values[0], raw=True)
         if args.hide_type:
             print(value)
@@ -67,11 +59,7 @@ class Set:
     """Set parameter."""
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """Add the command's own arguments.
-
-        Args:
-            parser: The command's parser.
-        """
+        """Add the command's own arguments."""
         add_node_argument(parser)
         parser.add_argument('parameter_name', help='Name of the parameter')
         parser.add_argument('value', help='Value of the parameter')
@@ -80,18 +68,14 @@ class Set:
     def main(self, args: Namespace) -> None:
         """Set the value; a refusal is told on stderr, with exit code 0 as in ros2cli.
 
-        Args:
-            args: The parsed arguments.
-
         Raises:
             UnknownNameError: When there is no such node.
         """
         wanted = parameter(args.parameter_name, parse_value(args.value))
-        with open_session(args) as session:
-            graph = Graph(session, args.spin_time or args.timeout)
+        with open_graph(args, args.timeout) as graph:
             node = find_node(args.node_name, graph, args.include_hidden_nodes)
-            result = set_values(session, node, [wanted])[0]
-            near = '' if result.successful else _near(session, node, args)
+            result = set_values(graph.session, node, [wanted])[0]
+            near = '' if result.successful else _near(graph.session, node, args)
         _tell(result, 'Set parameter successful', 'Setting parameter failed', near)
 
 
@@ -99,11 +83,7 @@ class Delete:
     """Delete parameter."""
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """Add the command's own arguments.
-
-        Args:
-            parser: The command's parser.
-        """
+        """Add the command's own arguments."""
         add_node_argument(parser)
         parser.add_argument('parameter_name', help='Name of the parameter')
         _add_timeout(parser)
@@ -111,17 +91,13 @@ class Delete:
     def main(self, args: Namespace) -> None:
         """Delete the parameter; a refusal is told on stderr, with exit code 0 as in ros2cli.
 
-        Args:
-            args: The parsed arguments.
-
         Raises:
             UnknownNameError: When there is no such node.
         """
-        with open_session(args) as session:
-            graph = Graph(session, args.spin_time or args.timeout)
+        with open_graph(args, args.timeout) as graph:
             node = find_node(args.node_name, graph, args.include_hidden_nodes)
-            result = set_values(session, node, [parameter(args.parameter_name, None)])[0]
-            near = '' if result.successful else _near(session, node, args)
+            result = set_values(graph.session, node, [parameter(args.parameter_name, None)])[0]
+            near = '' if result.successful else _near(graph.session, node, args)
         _tell(result, 'Deleted parameter successfully', 'Deleting parameter failed', near)
 
 

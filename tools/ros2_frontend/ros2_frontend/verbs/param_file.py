@@ -10,9 +10,8 @@ import sys
 
 from ..cli.errors import FrontendError
 from ..messages.parameter_file import dump, values_for
-from ..ros.graph import Graph
+from ..ros.graph import open_graph
 from ..ros.parameters import get_values, list_names, parameter, set_values, value_of
-from ..ros.session import open_session
 from .node_argument import add_node_argument, find_node
 
 
@@ -20,27 +19,19 @@ class Dump:
     """Show all of the parameters of a node in a YAML file format."""
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """Add the command's own arguments.
-
-        Args:
-            parser: The command's parser.
-        """
+        """Add the command's own arguments."""
         add_node_argument(parser)
 
     def main(self, args: Namespace) -> None:
         """Print the parameters as a file that `load` and `--params-file` read.
 
-        Args:
-            args: The parsed arguments.
-
         Raises:
             UnknownNameError: When there is no such node.
         """
-        with open_session(args) as session:
-            graph = Graph(session, args.spin_time)
+        with open_graph(args) as graph:
             node = find_node(args.node_name, graph, args.include_hidden_nodes)
-            names = list_names(session, node)
-            values = [value_of(value) for value in get_values(session, node, names)]
+            names = list_names(graph.session, node)
+            values = [value_of(value) for value in get_values(graph.session, node, names)]
         print(dump(node.full_name, dict(zip(names, values, strict=True))))
 
 
@@ -48,11 +39,7 @@ class Load:
     """Load parameter file for a node."""
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """Add the command's own arguments.
-
-        Args:
-            parser: The command's parser.
-        """
+        """Add the command's own arguments."""
         add_node_argument(parser)
         parser.add_argument('parameter_file', help='Parameter file')
         parser.add_argument(
@@ -64,20 +51,16 @@ class Load:
     def main(self, args: Namespace) -> None:
         """Set all parameters of a file that are for the node; tell each result.
 
-        Args:
-            args: The parsed arguments.
-
         Raises:
             UnknownNameError: When there is no such node.
             FrontendError: When the file cannot be read or has nothing for the node.
         """
         text = _read(args.parameter_file)
-        with open_session(args) as session:
-            graph = Graph(session, args.spin_time)
+        with open_graph(args) as graph:
             node = find_node(args.node_name, graph, args.include_hidden_nodes)
             wanted = values_for(node.full_name, text, use_wildcard=not args.no_use_wildcard)
             parameters = [parameter(name, value) for name, value in wanted.items()]
-            results = set_values(session, node, parameters)
+            results = set_values(graph.session, node, parameters)
         for name, result in zip(wanted, results, strict=True):
             outcome = 'successful' if result.successful else 'failed'
             reason = f': {result.reason}' if result.reason else ''

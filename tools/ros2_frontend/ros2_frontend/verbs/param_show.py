@@ -11,10 +11,10 @@ import sys
 
 from ..aliases import Message
 from ..cli.errors import FrontendError, NoAnswerError
-from ..ros.graph import Graph
+from ..ros.graph import Graph, open_graph
 from ..ros.names import NodeName
 from ..ros.parameters import describe, list_names, TYPE_NAMES
-from ..ros.session import open_session, Session
+from ..ros.session import Session
 from .node_argument import add_node_argument, find_node
 
 
@@ -22,11 +22,7 @@ class List:
     """Output a list of available parameters."""
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """Add the command's own arguments.
-
-        Args:
-            parser: The command's parser.
-        """
+        """Add the command's own arguments."""
         add_node_argument(parser, optional=True)
         parser.add_argument(
             '--filter',
@@ -46,26 +42,22 @@ class List:
     def main(self, args: Namespace) -> None:
         """Print the names, below their node's when all nodes are asked.
 
-        Args:
-            args: The parsed arguments.
-
         Raises:
             UnknownNameError: When there is no such node.
             FrontendError: When the filter is no regular expression.
         """
         pattern = _compile(args.filter)
-        with open_session(args) as session:
-            graph = Graph(session, args.spin_time)
+        with open_graph(args) as graph:
             for node in _nodes(args, graph):
                 try:
-                    names = list_names(session, node, args.param_prefixes)
+                    names = list_names(graph.session, node, args.param_prefixes)
                 except NoAnswerError as error:
                     print(error, file=sys.stderr)
                     continue
                 names = [name for name in names if pattern.match(name)]
                 if names and not args.node_name:
                     print(f'{node.full_name}:')
-                _print_names(session, node, names, args.param_type)
+                _print_names(graph.session, node, names, args.param_type)
 
 
 def _compile(text: str | None) -> re.Pattern[str]:
@@ -98,27 +90,19 @@ class Describe:
     """Show descriptive information about declared parameters."""
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """Add the command's own arguments.
-
-        Args:
-            parser: The command's parser.
-        """
+        """Add the command's own arguments."""
         add_node_argument(parser)
         parser.add_argument('parameter_names', nargs='+', help='Names of the parameters')
 
     def main(self, args: Namespace) -> None:
         """Print what the node tells of the parameters.
 
-        Args:
-            args: The parsed arguments.
-
         Raises:
             UnknownNameError: When there is no such node.
         """
-        with open_session(args) as session:
-            graph = Graph(session, args.spin_time)
+        with open_graph(args) as graph:
             node = find_node(args.node_name, graph, args.include_hidden_nodes)
-            descriptors = describe(session, node, args.parameter_names)
+            descriptors = describe(graph.session, node, args.parameter_names)
         for descriptor in descriptors:
             _print_descriptor(descriptor)
 

@@ -24,11 +24,7 @@ class List:
         """
 
     def main(self, args: Namespace) -> None:
-        """Print the names, sorted.
-
-        Args:
-            args: The parsed arguments.
-        """
+        """Print the names, sorted."""
         for name in package_prefixes():
             print(name)
 
@@ -37,11 +33,7 @@ class Executables:
     """Output a list of package specific executables."""
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """Add the command's own arguments.
-
-        Args:
-            parser: The command's parser.
-        """
+        """Add the command's own arguments."""
         parser.add_argument('package_name', nargs='?', help='The package name')
         parser.add_argument(
             '--full-path', action='store_true', help='Show full path of each executable'
@@ -49,9 +41,6 @@ class Executables:
 
     def main(self, args: Namespace) -> None:
         """Print package and executable, one pair per line.
-
-        Args:
-            args: The parsed arguments.
 
         Raises:
             UnknownNameError: When there is no such package.
@@ -66,11 +55,7 @@ class Prefix:
     """Output the prefix path of a package."""
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """Add the command's own arguments.
-
-        Args:
-            parser: The command's parser.
-        """
+        """Add the command's own arguments."""
         parser.add_argument('package_name', help='The package name')
         parser.add_argument(
             '--share', action='store_true', help='Show share directory for the package'
@@ -78,9 +63,6 @@ class Prefix:
 
     def main(self, args: Namespace) -> None:
         """Print the path.
-
-        Args:
-            args: The parsed arguments.
 
         Raises:
             UnknownNameError: When there is no such package.
@@ -93,19 +75,12 @@ class Xml:
     """Output the XML of the package manifest or a specific tag."""
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """Add the command's own arguments.
-
-        Args:
-            parser: The command's parser.
-        """
+        """Add the command's own arguments."""
         parser.add_argument('package_name', help='The package name')
         parser.add_argument('-t', '--tag', help='The XML tag to output, e.g. version')
 
     def main(self, args: Namespace) -> None:
         """Print the manifest or the text of each of its elements with the tag.
-
-        Args:
-            args: The parsed arguments.
 
         Raises:
             UnknownNameError: When there is no such package.

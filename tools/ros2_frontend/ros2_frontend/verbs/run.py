@@ -26,11 +26,7 @@ class Run:
     """Run a package specific executable."""
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """Add the command's own arguments.
-
-        Args:
-            parser: The command's parser.
-        """
+        """Add the command's own arguments."""
         parser.add_argument(
             '--prefix',
             help='Prefix command, which should go before the executable. '
@@ -45,9 +41,6 @@ class Run:
 
     def main(self, args: Namespace) -> NoReturn:
         """Replace this process by the executable.
-
-        Args:
-            args: The parsed arguments.
 
         Raises:
             UnknownNameError: When there is no such package or executable.

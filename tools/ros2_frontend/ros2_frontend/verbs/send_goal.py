@@ -38,11 +38,7 @@ class SendGoal:
     """Send an action goal."""
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """Add the command's own arguments.
-
-        Args:
-            parser: The command's parser.
-        """
+        """Add the command's own arguments."""
         add_graph_arguments(parser)
         parser.add_argument('action_name', help="Name of the ROS action (e.g. '/fibonacci')")
         parser.add_argument(
@@ -63,9 +59,6 @@ class SendGoal:
 
     def main(self, args: Namespace) -> None:
         """Send the goal and wait for its result; Ctrl-C cancels it.
-
-        Args:
-            args: The parsed arguments.
 
         Raises:
             BadTypeError: When the type is not installed or no action.

@@ -28,11 +28,7 @@ class Call:
     """Call a service."""
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """Add the command's own arguments.
-
-        Args:
-            parser: The command's parser.
-        """
+        """Add the command's own arguments."""
         add_graph_arguments(parser)
         parser.add_argument(
             'service_name', help="Name of the ROS service to call to (e.g. '/add_two_ints')"
@@ -68,9 +64,6 @@ class Call:
 
     def main(self, args: Namespace) -> None:
         """Call once, or at a rate until Ctrl-C.
-
-        Args:
-            args: The parsed arguments.
 
         Raises:
             BadTypeError: When the type is not installed or no service.

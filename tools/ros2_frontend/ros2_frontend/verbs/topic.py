@@ -9,9 +9,8 @@ from collections.abc import Callable
 
 from ..aliases import NamesAndTypes
 from ..cli.arguments import add_graph_arguments
-from ..ros.graph import Graph
+from ..ros.graph import open_graph
 from ..ros.names import absolute
-from ..ros.session import open_session
 from .names import (
     add_find_arguments,
     add_hidden_flag,
@@ -29,11 +28,7 @@ class List:
     """Output a list of available topics."""
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """Add the command's own arguments.
-
-        Args:
-            parser: The command's parser.
-        """
+        """Add the command's own arguments."""
         add_list_arguments(parser, _NOUN)
         add_hidden_flag(parser, _NOUN)
         parser.add_argument(
@@ -41,18 +36,19 @@ class List:
         )
 
     def main(self, args: Namespace) -> None:
-        """Print the topics.
-
-        Args:
-            args: The parsed arguments.
-        """
-        with open_session(args) as session:
-            graph = Graph(session, args.spin_time)
+        """Print the topics."""
+        with open_graph(args) as graph:
             graph.settle()
             topics = graph.topics(args.include_hidden_topics)
             if args.verbose and topics and not args.count:
-                print(_block('Published', 'publisher', topics, session.node.count_publishers))
-                print(_block('Subscribed', 'subscriber', topics, session.node.count_subscribers))
+                print(
+                    _block('Published', 'publisher', topics, graph.session.node.count_publishers)
+                )
+                print(
+                    _block(
+                        'Subscribed', 'subscriber', topics, graph.session.node.count_subscribers
+                    )
+                )
                 return
         print_names(topics, args)
 
@@ -71,11 +67,7 @@ class Info:
     """Print information about a topic."""
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """Add the command's own arguments.
-
-        Args:
-            parser: The command's parser.
-        """
+        """Add the command's own arguments."""
         add_graph_arguments(parser)
         parser.add_argument(
             'topic_name', help="Name of the ROS topic to get info (e.g. '/chatter')"
@@ -92,15 +84,11 @@ class Info:
     def main(self, args: Namespace) -> None:
         """Print type and counts, or every endpoint.
 
-        Args:
-            args: The parsed arguments.
-
         Raises:
             UnknownNameError: When there is no such topic.
         """
         name = absolute(args.topic_name)
-        with open_session(args) as session:
-            graph = Graph(session, args.spin_time)
+        with open_graph(args) as graph:
             types = types_of(name, graph, graph.topics, f"Unknown topic '{args.topic_name}'")
             graph.settle()
             publishers, subscriptions = graph.publishers(name), graph.subscriptions(name)
@@ -116,11 +104,7 @@ class Type:
     """Print a topic's type."""
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """Add the command's own arguments.
-
-        Args:
-            parser: The command's parser.
-        """
+        """Add the command's own arguments."""
         add_graph_arguments(parser)
         parser.add_argument(
             'topic_name', help="Name of the ROS topic to get type (e.g. '/chatter')"
@@ -129,14 +113,10 @@ class Type:
     def main(self, args: Namespace) -> int:
         """Print the types.
 
-        Args:
-            args: The parsed arguments.
-
         Returns:
             The exit code: 1 when there is no such topic.
         """
-        with open_session(args) as session:
-            graph = Graph(session, args.spin_time)
+        with open_graph(args) as graph:
             return print_types(args.topic_name, graph, graph.topics, args.include_hidden_topics)
 
 
@@ -144,22 +124,13 @@ class Find:
     """Output a list of available topics of a given type."""
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """Add the command's own arguments.
-
-        Args:
-            parser: The command's parser.
-        """
+        """Add the command's own arguments."""
         add_find_arguments(parser, _NOUN, 'std_msgs/msg/String')
         add_hidden_flag(parser, _NOUN)
 
     def main(self, args: Namespace) -> None:
-        """Print the topics that have the type.
-
-        Args:
-            args: The parsed arguments.
-        """
-        with open_session(args) as session:
-            graph = Graph(session, args.spin_time)
+        """Print the topics that have the type."""
+        with open_graph(args) as graph:
             graph.settle()
             topics = graph.topics(args.include_hidden_topics)
         print_found(topics, args.topic_type, args.count)

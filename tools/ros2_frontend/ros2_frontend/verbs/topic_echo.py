@@ -12,10 +12,9 @@ from ..cli.arguments import add_graph_arguments, positive_float, unsigned_int
 from ..messages.csv_text import to_csv
 from ..messages.document import Abbreviation, to_document
 from ..messages.yaml_text import to_yaml
-from ..ros.graph import Graph
+from ..ros.graph import open_graph
 from ..ros.names import absolute
 from ..ros.qos import add_qos_arguments, matching_profile
-from ..ros.session import open_session
 from .expression import compile_filter, parse_path, select
 from .topic_types import class_of_topic, message_class
 
@@ -26,11 +25,7 @@ class Echo:
     """Output messages from a topic."""
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """Add the command's own arguments.
-
-        Args:
-            parser: The command's parser.
-        """
+        """Add the command's own arguments."""
         add_graph_arguments(parser)
         parser.add_argument(
             'topic_name', help="Name of the ROS topic to listen to (e.g. '/chatter')"
@@ -45,9 +40,6 @@ class Echo:
     def main(self, args: Namespace) -> None:
         """Print messages until Ctrl-C, `--once` or `--timeout`.
 
-        Args:
-            args: The parsed arguments.
-
         Raises:
             FrontendError: When the topic's type cannot be told or imported.
         """
@@ -59,12 +51,11 @@ class Echo:
         events = SubscriptionEventCallbacks(
             message_lost=None if args.no_lost_messages else print_lost
         )
-        with open_session(args) as session:
-            graph = Graph(session, args.spin_time)
+        with open_graph(args) as graph:
             if wanted is None:
                 wanted = class_of_topic(args.topic_name, graph)
             graph.wait_for(lambda: graph.publishers(topic) or None)
-            session.node.create_subscription(
+            graph.session.node.create_subscription(
                 wanted,
                 topic,
                 printer.take,
@@ -72,7 +63,7 @@ class Echo:
                 event_callbacks=events,
                 raw=args.raw,
             )
-            session.spin_until(lambda: args.once and printer.count > 0, args.timeout)
+            graph.session.spin_until(lambda: args.once and printer.count > 0, args.timeout)
 
 
 def _add_selection(parser: ArgumentParser) -> None:

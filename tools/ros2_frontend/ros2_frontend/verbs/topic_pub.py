@@ -30,11 +30,7 @@ class Pub:
     """Publish a message to a topic."""
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """Add the command's own arguments.
-
-        Args:
-            parser: The command's parser.
-        """
+        """Add the command's own arguments."""
         add_graph_arguments(parser)
         parser.add_argument(
             'topic_name', help="Name of the ROS topic to publish to (e.g. '/chatter')"
@@ -57,9 +53,6 @@ class Pub:
 
     def main(self, args: Namespace) -> None:
         """Publish until Ctrl-C, or as often as asked.
-
-        Args:
-            args: The parsed arguments.
 
         Raises:
             FieldValueError: When the values do not fit the message.

@@ -53,11 +53,7 @@ class Hz:
     """Print the average receiving rate to screen."""
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """Add the command's own arguments.
-
-        Args:
-            parser: The command's parser.
-        """
+        """Add the command's own arguments."""
         _add_common(parser, "Name of the ROS topic to listen to (e.g. '/chatter')", _LONG_WINDOW)
         parser.add_argument(
             '--filter',
@@ -74,11 +70,7 @@ class Hz:
         )
 
     def main(self, args: Namespace) -> None:
-        """Print the rate once a second until Ctrl-C.
-
-        Args:
-            args: The parsed arguments.
-        """
+        """Print the rate once a second until Ctrl-C."""
         periods = Periods(args.window)
         accepts = compile_filter(args.filter_expr)
         with open_session(args) as session:
@@ -100,19 +92,11 @@ class Bw:
     """Display bandwidth used by topic."""
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """Add the command's own arguments.
-
-        Args:
-            parser: The command's parser.
-        """
+        """Add the command's own arguments."""
         _add_common(parser, 'Topic name to monitor for bandwidth utilization', _SHORT_WINDOW)
 
     def main(self, args: Namespace) -> None:
-        """Print the bandwidth once a second until Ctrl-C.
-
-        Args:
-            args: The parsed arguments.
-        """
+        """Print the bandwidth once a second until Ctrl-C."""
         sizes = Sizes(args.window)
         with open_session(args) as session:
 
@@ -128,18 +112,11 @@ class Delay:
     """Display delay of topic from timestamp in header."""
 
     def add_arguments(self, parser: ArgumentParser) -> None:
-        """Add the command's own arguments.
-
-        Args:
-            parser: The command's parser.
-        """
+        """Add the command's own arguments."""
         _add_common(parser, 'Topic name to calculate the delay for', _LONG_WINDOW)
 
     def main(self, args: Namespace) -> None:
         """Print the delay once a second until Ctrl-C.
-
-        Args:
-            args: The parsed arguments.
 
         Raises:
             FrontendError: When the messages have no header.
