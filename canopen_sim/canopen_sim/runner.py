@@ -47,7 +47,7 @@ class DeviceRunner:
         Args:
             bus: An open bus; it stays the caller's to close.
         """
-        self.host = DeviceHost(self._send, _tell_defect)
+        self.host = DeviceHost(self._send, _log_defect)
         self._bus = bus
         self._lock = threading.Lock()
         self._ended = False
@@ -126,7 +126,7 @@ class DeviceRunner:
             frames = self._bus.receive(timeout)
         except BusError as error:
             if not self._stopping:
-                self._tell_failure(error)
+                self._log_failure(error)
                 time.sleep(RETRY_PAUSE)
             return []
         self._bus_failed = self._bus_failed and not frames
@@ -138,9 +138,9 @@ class DeviceRunner:
         try:
             self._bus.send(frame)
         except BusError as error:
-            self._tell_failure(error)
+            self._log_failure(error)
 
-    def _tell_failure(self, error: BusError) -> None:
+    def _log_failure(self, error: BusError) -> None:
         """Log the first failure; the next one after frames have arrived again."""
         if not self._bus_failed:
             self._bus_failed = True
@@ -166,5 +166,5 @@ def _is_process_data(can_id: int) -> bool:
     return CobId.SYNC <= can_id < CobId.SDO_RESPONSE or heartbeat
 
 
-def _tell_defect(device: Device, error: Exception) -> None:
+def _log_defect(device: Device, error: Exception) -> None:
     logger.error('a defect in the simulated device %d', device.node_id, exc_info=error)

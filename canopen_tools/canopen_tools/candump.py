@@ -133,7 +133,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         # the interpreter flushes stdout once more when it ends
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except (CanopenError, OSError) as error:
-        _tell(str(error))
+        _print_note(str(error))
         return 1
     return 0
 
@@ -167,8 +167,8 @@ def _show_bus(options: argparse.Namespace, config: BusConfig | None) -> None:
         listener = Listener(bus, options.timeout)
         for number in (signal.SIGINT, signal.SIGTERM):
             stack.callback(signal.signal, number, signal.signal(number, listener.stop))
-        _tell(f'listening on {bus.name}')
-        stack.callback(_tell_counters, bus)
+        _print_note(f'listening on {bus.name}')
+        stack.callback(_print_counters, bus)
         for frames in listener.batches():
             if log is not None:
                 for frame in frames:
@@ -194,13 +194,13 @@ def _screen(options: argparse.Namespace, config: BusConfig | None, wall_offset: 
     )
 
 
-def _tell_counters(bus: Bus) -> None:
+def _print_counters(bus: Bus) -> None:
     counters = bus.counters
     malformed = f', {counters.malformed} malformed' if counters.malformed else ''
-    _tell(f'{counters.received} frames, {counters.lost} lost{malformed}')
+    _print_note(f'{counters.received} frames, {counters.lost} lost{malformed}')
 
 
-def _tell(text: str) -> None:
+def _print_note(text: str) -> None:
     """Write for a person, beside the frames."""
     with suppress(BrokenPipeError):
         sys.stderr.write(f'candump: {text}\n')

@@ -151,9 +151,9 @@ class MotionGroup:
             if drive in attachment.owned:
                 attachment.owned.remove(drive)
                 attachment.streaming.discard(drive.name)
-                self._tell(attachment.source, drive.name, refusal)
+                self._notify(attachment.source, drive.name, refusal)
 
-    def _tell(self, source: MotionSource, axis: str, refusal: Refusal) -> None:
+    def _notify(self, source: MotionSource, axis: str, refusal: Refusal) -> None:
         try:
             source.released(axis, refusal)
         except Exception as error:  # noqa: BLE001  # whoever takes the drive away must not suffer

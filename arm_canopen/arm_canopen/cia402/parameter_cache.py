@@ -16,7 +16,7 @@ from ..standard.objects import AXIS_OFFSET
 from .parameters import DriveParameters, ParameterReader, REFRESHED
 from .units import Units
 
-ASK_AGAIN = 1.0  # [s] after which a drive is asked again for what it did not answer
+RETRY_PERIOD = 1.0  # [s] after which a drive is asked again for what it did not answer
 
 
 class ParameterCache:
@@ -52,20 +52,20 @@ class ParameterCache:
         self._reader = ParameterReader(node, config, units)
         self._scheduler = scheduler
         self._warn = warn
-        self._asking: Task[None] | None = None
+        self._reading: Task[None] | None = None
         self._outdated = False
         node.sdo.on_download.append(self._object_downloaded)
 
     def begin(self) -> None:
         """Ask a device that was booted."""
-        self._asking = self._scheduler.background(self._ask())
+        self._reading = self._scheduler.background(self._keep_reading())
 
     def forget(self, reason: str) -> None:
         """The device is lost; what comes back may be another one."""
         self.known = self._outdated = False
         self._reader.forget()
-        if self._asking is not None:
-            self._asking.cancel(SdoError(reason))
+        if self._reading is not None:
+            self._reading.cancel(SdoError(reason))
 
     def _object_downloaded(
         self, index: int, subindex: int, data: bytes, end: Promise[None]
@@ -78,21 +78,21 @@ class ParameterCache:
         if not self.known or end.error is not None:
             return
         self._outdated = True
-        if self._asking is None or self._asking.done:
-            self._asking = self._scheduler.background(self._ask())
+        if self._reading is None or self._reading.done:
+            self._reading = self._scheduler.background(self._keep_reading())
 
-    async def _ask(self) -> None:
-        reason = await self._unread()
+    async def _keep_reading(self) -> None:
+        reason = await self._read()
         if reason and self.known:
             self._warn(f'its limits were changed, and it does not tell the new ones: {reason}')
         elif reason:
             self._warn(f'its parameters are unknown, so it takes no commands: {reason}')
         while reason or self._outdated:
             if reason:
-                await self._scheduler.timer(ASK_AGAIN)
-            reason = await self._unread()
+                await self._scheduler.timer(RETRY_PERIOD)
+            reason = await self._read()
 
-    async def _unread(self) -> str:
+    async def _read(self) -> str:
         """Read the parameters; return why that could not be done, or nothing."""
         self._outdated = False
         try:

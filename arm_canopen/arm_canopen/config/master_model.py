@@ -42,7 +42,7 @@ class MasterConfig:
         emcy_inhibit_time: Shortest time between two EMCY frames of the master in [s].
         error_behavior: 0x1029 of the master by sub-index: what it does when it loses a device.
         identity: 0x1018 of the master, for the files of other tools.
-        boot_time: How long mandatory devices may take to boot in [s]; 0 for ever.
+        boot_time: How long mandatory devices may take to boot in [s]; 0 for no limit.
         boot_timeout: SDO timeout during boot in [s].
     """
 

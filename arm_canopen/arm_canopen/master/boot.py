@@ -29,7 +29,7 @@ IDENTITY_FAULTS = {
 }
 """The fault of each attribute of Identity that differs."""
 
-STATE_PATIENCE = 0.5  # [s] to wait for a life sign beyond the period of the heartbeat
+STATE_TIMEOUT = 0.5  # [s] to wait for a life sign beyond the period of the heartbeat
 RESTORE_SIGNATURE = b'load'  # CiA 301, 7.5.2.14
 
 
@@ -72,7 +72,7 @@ class BootProcess:
             bus,
             on_write=lambda place: self._enter(BootPhase.CONFIGURING, place),
         )
-        self._told = ''
+        self._reported = ''
         self._fault = BootFault.CONFIGURATION
         self._restored = False
 
@@ -110,7 +110,7 @@ class BootProcess:
     async def _find(self) -> None:
         self._enter(BootPhase.WAITING)
         while not await self._answers():
-            self._tell_once(
+            self._report_once(
                 f'{BootFault.NO_ANSWER.value}: no answer yet: neither a boot-up message nor an '
                 'answer to 0x1000; is it powered, wired, terminated, on this bit rate and on node '
                 f'id {self._node.config.node_id}?'
@@ -187,7 +187,7 @@ class BootProcess:
         self._fault = BootFault.NO_HEARTBEAT
         self._enter(BootPhase.STATE)
         self._ask_state(node.config.node_id)
-        patience = node.config.heartbeat_producer + STATE_PATIENCE
+        patience = node.config.heartbeat_producer + STATE_TIMEOUT
         try:
             await self._scheduler.until(lambda: node.nmt_state is not None, patience)
         except TimeoutError:
@@ -220,7 +220,7 @@ class BootProcess:
 
     def _go_online(self, text: str, *, taken_over: bool = False) -> None:
         self._node.go_online(self._scheduler.now, taken_over=taken_over)
-        self._told = ''
+        self._reported = ''
         self._enter(BootPhase.OPERATIONAL)
         self._node.report(EventKind.BOOT, Severity.INFO, text)
 
@@ -245,12 +245,12 @@ class BootProcess:
         since = self._scheduler.now
         self._ask_state(node.config.node_id)
         try:
-            await self._scheduler.until(lambda: node.life.last > since, STATE_PATIENCE)
+            await self._scheduler.until(lambda: node.life.last > since, STATE_TIMEOUT)
         except TimeoutError:
             raise BootError(
                 f'{node.name} (node {node.config.node_id}) has never answered node guarding; it '
                 'is not started, because its loss would go unnoticed. It is asked again every '
-                f'{node.config.boot_timeout + STATE_PATIENCE:g} s; give it a heartbeat_producer '
+                f'{node.config.boot_timeout + STATE_TIMEOUT:g} s; give it a heartbeat_producer '
                 'instead of guard_time, or guard_time: 0 if it has neither'
             ) from None
 
@@ -275,10 +275,10 @@ class BootProcess:
     def _fail(self, reason: str) -> None:
         step, fault = self._node.phase.value, self._fault
         self._enter(BootPhase.FAILED, f'{fault.value}, {step}: {reason}')
-        self._tell_once(f'boot failed ({fault.value}, {fault.text}) while {step}: {reason}')
+        self._report_once(f'boot failed ({fault.value}, {fault.text}) while {step}: {reason}')
 
-    def _tell_once(self, text: str) -> None:
-        """Say a reason when it is new; it is tried again for ever, but not said again."""
-        if text != self._told:
-            self._told = text
+    def _report_once(self, text: str) -> None:
+        """Say a reason when it is new; it is tried again without end, but not reported again."""
+        if text != self._reported:
+            self._reported = text
             self._node.report(EventKind.BOOT_FAILED, Severity.WARNING, text)

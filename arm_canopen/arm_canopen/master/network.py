@@ -325,7 +325,7 @@ class Network:
         self, other_master: OtherMasterWatch
     ) -> Iterator[tuple[int, Callable[[Frame], None]]]:
         """Say who takes the frames of which identifier."""
-        yield CobId.NMT, self._hear_nmt
+        yield CobId.NMT, self._receive_nmt
         yield CobId.HEARTBEAT + self.config.master.node_id, other_master.receive
         yield CobId.SYNC, other_master.receive
         for node in self.nodes.values():
@@ -338,7 +338,7 @@ class Network:
             for entry in node.image.tpdos:
                 yield entry.config.cob_id, entry.receive
 
-    def _hear_nmt(self, frame: Frame) -> None:
+    def _receive_nmt(self, frame: Frame) -> None:
         """Note what another master or a tool commands, so that it is not worked against."""
         parsed = parse_nmt(frame.data)
         if parsed is not None:

@@ -36,7 +36,7 @@ class PdoWatch:
         self._stopped: set[int] = set()
         self._may_get_lost = ''  # numbers of TPDOs, as at the last boot
         for entry in inputs:
-            entry.on_short = self._tell_short
+            entry.on_short = self._report_short
 
     def stop(self) -> None:
         """The device went away."""
@@ -89,7 +89,7 @@ class PdoWatch:
                     'again'
                 )
 
-    def _tell_short(self, entry: ReceivedTpdo, length: int) -> None:
+    def _report_short(self, entry: ReceivedTpdo, length: int) -> None:
         if entry.length_errors == 1:
             self._warn(
                 f'TPDO {entry.config.number} (0x{entry.config.cob_id:03X}) has {length} bytes, '

@@ -25,7 +25,7 @@ from .statistics import CycleFigures, CycleStatistics
 
 T = TypeVar('T')
 
-PAUSE_TOLD = 0.1  # [s] lateness of a cycle that is worth a word
+REPORTED_LATENESS = 0.1  # [s] lateness of a cycle that is worth a word
 REOPEN_PAUSE = 0.1  # [s] between two looks at a bus that went away
 
 ENDED = 'the CANopen master has ended'
@@ -164,7 +164,7 @@ class NetworkThread:
         self._cycle_time = cycle.time
         frames = self._receive(0.0)
         self._take([frame for frame in frames if frame.timestamp < now])
-        if cycle.late > PAUSE_TOLD:
+        if cycle.late > REPORTED_LATENESS:
             self._guarded(partial(self.network.note_pause, cycle.late))
         self._guarded(partial(self.network.cycle, now, self.period))
         self._take([frame for frame in frames if frame.timestamp >= now])

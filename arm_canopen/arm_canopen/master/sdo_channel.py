@@ -146,14 +146,14 @@ class SdoChannel:
             SdoTimeoutError: It did not answer; it was told that the transfer is over.
             SdoError: The transfer was cancelled.
         """
-        answer = await self._ask(question, match, timeout, repeat=repeat)
+        answer = await self._request(question, match, timeout, repeat=repeat)
         if not isinstance(answer, Abort):
             return answer
         self.counters.aborted += 1
         text = f'{self._title} refused {_place(self.address)}: {abort_text(answer.code)}'
         raise SdoAbortError(text, answer.code)
 
-    async def _ask(
+    async def _request(
         self, question: bytes | None, match: Match[T], timeout: float, *, repeat: bool
     ) -> T | Abort:
         self._match, self._strays, asked = match, 0, 0
@@ -199,7 +199,7 @@ class SdoChannel:
         question = UploadRequest(*marker).encode()
         try:
             # a refusal is an answer all the same
-            await self._ask(question, response(UploadResponse, marker), timeout, repeat=True)
+            await self._request(question, response(UploadResponse, marker), timeout, repeat=True)
         except SdoTimeoutError:
             raise SdoTimeoutError(self._silence((index, subindex), timeout)) from None
 

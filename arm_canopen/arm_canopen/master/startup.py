@@ -59,7 +59,7 @@ class Startup:
         missing = self._missing()
         if missing and not self.complete:
             names = '; '.join(f'{node.name}: {node.phase_text}' for node in missing)
-            self._tell(
+            self._report_error(
                 f'mandatory devices have not booted within {self._config.boot_time:g} s, so no '
                 f'device is started: {names}'
             )
@@ -113,16 +113,16 @@ class Startup:
             return
         if self._config.reset_all_nodes:
             self.complete = False
-            self._tell(f'{node.name} is mandatory and lost: all devices are reset')
+            self._report_error(f'{node.name} is mandatory and lost: all devices are reset')
             self._send_nmt(NmtCommand.RESET_NODE, ALL_NODES)
         elif self._config.stop_all_nodes:
-            self._tell(
+            self._report_error(
                 f'{node.name} is mandatory and lost: all devices are stopped; start them by '
                 '~/nmt_start_node when it is back'
             )
             self._send_nmt(NmtCommand.STOP, ALL_NODES)
         else:
-            self._tell(f'{node.name} is mandatory and lost; the others go on without it')
+            self._report_error(f'{node.name} is mandatory and lost; the others go on without it')
 
-    def _tell(self, text: str) -> None:
+    def _report_error(self, text: str) -> None:
         self._report(Event(EventKind.BOOT_FAILED, Severity.ERROR, '', text))

@@ -192,9 +192,9 @@ class DeviceNode(Node):
             value,
         )
         sent = self._thread.call(publish)
-        sent.add_done_callback(self._tell_unsent)
+        sent.add_done_callback(self._log_unsent)
 
-    def _tell_unsent(self, sent: Future[None]) -> None:
+    def _log_unsent(self, sent: Future[None]) -> None:
         error = sent.exception()
         if error is not None:
             self.get_logger().warning(f'~/tpdo: {error}')

@@ -33,7 +33,7 @@ CONNECTION_CODE = 0x8130
 DC_VOLTAGE = 48_000  # [mV]
 CONTROL_PERIOD = 0.005  # [s] how often the drive looks at its axis without SYNC
 SYNC_PERIOD_MAX = 0.02  # [s] a slower SYNC is not what the drive waits for
-SYNC_PATIENCE = 1.5  # periods that it waits for a SYNC
+SYNC_TIMEOUT_PERIODS = 1.5  # periods that it waits for a SYNC
 
 HALT = int(Controlword.HALT)
 VOLTAGE_ENABLED = int(Statusword.VOLTAGE_ENABLED)
@@ -416,7 +416,7 @@ class Drive:
             return
         period = CONTROL_PERIOD
         if self._clock.period <= SYNC_PERIOD_MAX and self._clock.alive(now):
-            period = SYNC_PATIENCE * self._clock.period
+            period = SYNC_TIMEOUT_PERIODS * self._clock.period
         self.deadline = now + period
         if now < self._axis.motion.end < self.deadline:
             self.deadline = self._axis.motion.end

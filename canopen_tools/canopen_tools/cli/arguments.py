@@ -105,7 +105,7 @@ def add_node_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def take_parameters(options: argparse.Namespace, parameters: Mapping[str, str]) -> None:
+def apply_parameters(options: argparse.Namespace, parameters: Mapping[str, str]) -> None:
     """Fill options that were not given from ROS parameters of the names that the nodes have."""
     if 'can' in options:
         options.can = options.can or parameters.get('can_interface_name') or 'auto'

@@ -14,7 +14,7 @@ from arm_canopen.config.drive_units import AxisUnits
 from arm_canopen.config.traffic import LoadEstimate, Traffic
 
 from .arguments import bitrate, SubParsers
-from .output import counted, RED, say, say_problem, say_table, YELLOW
+from .output import counted, print_line, print_problem, print_table, RED, YELLOW
 
 
 def add_parser(parsers: SubParsers) -> None:
@@ -41,19 +41,19 @@ def run(options: argparse.Namespace) -> int:
     """Check a file; return the exit code."""
     report = check_file(options.bus_yml, options.bitrate)
     for problem in report.errors:
-        say_problem(problem, 'error', RED)
+        print_problem(problem, 'error', RED)
     for problem in report.warnings:
-        say_problem(problem, 'warning', YELLOW)
+        print_problem(problem, 'warning', YELLOW)
     if report.units:
-        _say_units(report.units)
+        _print_units(report.units)
     if report.load is not None and report.load.traffic:
-        _say_load(report.load, each=options.frames)
+        _print_load(report.load, each=options.frames)
     errors, warnings = len(report.errors), len(report.warnings)
-    say(f'{options.bus_yml}: {counted(errors, "error")}, {counted(warnings, "warning")}')
+    print_line(f'{options.bus_yml}: {counted(errors, "error")}, {counted(warnings, "warning")}')
     return 1 if errors or (options.strict and warnings) else 0
 
 
-def _say_units(units: Iterable[AxisUnits]) -> None:
+def _print_units(units: Iterable[AxisUnits]) -> None:
     rows = [
         (
             axis.name,
@@ -65,26 +65,26 @@ def _say_units(units: Iterable[AxisUnits]) -> None:
         for axis in units
     ]
     head = ('1.0 of', 'increments', 'rad', 'velocity units', 'by')
-    say_table(head, rows, right='increments,rad,velocity units')
+    print_table(head, rows, right='increments,rad,velocity units')
 
 
-def _say_load(load: LoadEstimate, *, each: bool) -> None:
+def _print_load(load: LoadEstimate, *, each: bool) -> None:
     if each:
         rows = [
             (f'{t.service} of {t.device}', f'{t.cob_id:03X}', *_figures([t], load.bitrate))
             for t in sorted(load.traffic, key=lambda t: t.cob_id)
         ]
         head = ('frame', 'id', 'bytes', 'frames/s', 'load', 'when')
-        say_table(head, rows, right='bytes,frames/s,load')
+        print_table(head, rows, right='bytes,frames/s,load')
     else:
-        _say_groups(load)
-    say(
+        _print_groups(load)
+    print_line(
         f'load at {load.bitrate / 1000:g} kbit/s: {load.frames_per_second:.0f} frames/s, '
         f'{load.load:.1%} ({load.load_worst:.1%} with the most stuffing)'
     )
 
 
-def _say_groups(load: LoadEstimate) -> None:
+def _print_groups(load: LoadEstimate) -> None:
     """List equal frames of several devices in one row."""
 
     def likeness(item: Traffic) -> tuple[str, int, str]:
@@ -96,7 +96,7 @@ def _say_groups(load: LoadEstimate) -> None:
         (group[0].service, str(len(group)), *_figures(group, load.bitrate)) for group in groups
     ]
     head = ('frame', 'devices', 'bytes', 'frames/s', 'load', 'when')
-    say_table(head, rows, right='devices,bytes,frames/s,load')
+    print_table(head, rows, right='devices,bytes,frames/s,load')
 
 
 def _figures(group: Iterable[Traffic], bit_rate: int) -> tuple[str, str, str, str]:

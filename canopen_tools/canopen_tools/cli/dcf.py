@@ -15,7 +15,7 @@ from ..dcf.master import master_dcf
 from ..monitor.object_names import ObjectNames
 from ..monitor.value_text import data_text
 from .arguments import SubParsers
-from .output import counted, say, warn
+from .output import counted, print_line, warn
 
 
 def add_parser(parsers: SubParsers) -> None:
@@ -68,12 +68,12 @@ def run(options: argparse.Namespace) -> int:
     }
     (out / 'master.dcf').write_text(master_dcf(config, upload_files), encoding='utf-8')
     for node in config.nodes:
-        say(f'{out / node.name}.bin: {counted(len(writes[node.name]), "write")}')
+        print_line(f'{out / node.name}.bin: {counted(len(writes[node.name]), "write")}')
         if options.verbose:
             _show(ObjectNames(node.dictionary), writes[node.name])
     if own:
-        say(f'{out / "master.bin"}: {counted(len(own), "write")}')
-    say(f'{out / "master.dcf"}: {counted(len(config.nodes), "device")}')
+        print_line(f'{out / "master.bin"}: {counted(len(own), "write")}')
+    print_line(f'{out / "master.dcf"}: {counted(len(config.nodes), "device")}')
     return 0
 
 
@@ -89,4 +89,4 @@ def _show(names: ObjectNames, writes: list[SdoWrite]) -> None:
     for write in writes:
         data_type = names.data_type(write.index, write.subindex)
         value = data_text(write.index, write.subindex, data_type, write.data)
-        say(f'    {names.title(write.index, write.subindex)} = {value}')
+        print_line(f'    {names.title(write.index, write.subindex)} = {value}')

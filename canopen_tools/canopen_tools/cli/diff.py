@@ -19,7 +19,7 @@ from ..expected import expected_defaults, expected_objects
 from ..monitor.object_names import ObjectNames
 from ..monitor.value_text import data_text
 from .arguments import add_node_arguments, SubParsers, UsageError
-from .output import say, say_table
+from .output import print_line, print_table
 from .session import Session
 from .target import find_target, Target, warn_of_master
 
@@ -70,12 +70,12 @@ def run(options: argparse.Namespace) -> int:
     shown = [row for row in rows if options.all or not row.is_equal]
     if shown:
         names = ObjectNames(target.dictionary)
-        say_table(
+        print_table(
             ('', 'object', 'file', 'device', 'said by'),
             [_cells(target, names, row) for row in shown],
         )
     different = sum(not row.is_equal for row in rows)
-    say(f'{target.name}: {len(rows)} objects compared, {different or "none"} different')
+    print_line(f'{target.name}: {len(rows)} objects compared, {different or "none"} different')
     return 1 if different else 0
 
 

@@ -12,7 +12,7 @@ from arm_canopen.config.pdo_direction import RPDO, TPDO
 
 from ..eds_lint.lint import EdsReport, lint_eds
 from .arguments import SubParsers
-from .output import counted, RED, say, say_problem, YELLOW
+from .output import counted, print_line, print_problem, RED, YELLOW
 
 
 def add_parser(parsers: SubParsers) -> None:
@@ -37,12 +37,12 @@ def run(options: argparse.Namespace) -> int:
 
 def _show(path: Path, report: EdsReport) -> EdsReport:
     for problem in report.errors:
-        say_problem(problem, 'error', RED)
+        print_problem(problem, 'error', RED)
     for problem in report.warnings:
-        say_problem(problem, 'warning', YELLOW)
+        print_problem(problem, 'warning', YELLOW)
     what = f'{_summary(report.eds)}; ' if report.eds is not None else ''
     errors, warnings = len(report.errors), len(report.warnings)
-    say(f'{path}: {what}{counted(errors, "error")}, {counted(warnings, "warning")}')
+    print_line(f'{path}: {what}{counted(errors, "error")}, {counted(warnings, "warning")}')
     return report
 
 

@@ -25,7 +25,7 @@ from .arguments import (
     UsageError,
     whole_number,
 )
-from .output import counted, say, say_table, warn
+from .output import counted, print_line, print_table, warn
 from .session import Session
 
 BOOT_WAIT = 2.0  # [s] for the boot-up message of a device that has got its first node id
@@ -105,8 +105,8 @@ def run_scan(options: argparse.Namespace) -> int:
         while (address := session.run(master.fast_scan())) is not None:
             found.append(address)
     if found:
-        say_table(HEAD, [str(address).split() for address in found])
-    say(f'{counted(len(found), "device")} without node id')
+        print_table(HEAD, [str(address).split() for address in found])
+    print_line(f'{counted(len(found), "device")} without node id')
     return 0 if found else 1
 
 
@@ -116,7 +116,7 @@ def run_inquire(options: argparse.Namespace) -> int:
         _select(session, master, options)
         address = session.run(master.inquire_address())
         present = session.run(master.inquire_node_id())
-    say_table((*HEAD, 'node'), [(*str(address).split(), _node_text(present))])
+    print_table((*HEAD, 'node'), [(*str(address).split(), _node_text(present))])
     return 0
 
 
@@ -135,7 +135,7 @@ def run_set(options: argparse.Namespace) -> int:
         _select(session, master, options)
         address = session.run(master.inquire_address())
         before = session.run(master.inquire_node_id())
-        say(f'device {address}, node id {_node_text(before)}')
+        print_line(f'device {address}, node id {_node_text(before)}')
         _configure(session, master, options)
         if options.activate is not None:
             master.activate_bit_rate(options.activate)
@@ -190,13 +190,13 @@ def _select(session: Session, master: LssMaster, options: argparse.Namespace) ->
 def _configure(session: Session, master: LssMaster, options: argparse.Namespace) -> None:
     if options.node_id is not None:
         session.run(master.set_node_id(options.node_id))
-        say(f'node id {options.node_id}: taken')
+        print_line(f'node id {options.node_id}: taken')
     if options.bitrate is not None:
         session.run(master.set_bit_rate(options.bitrate))
-        say(f'bit rate {options.bitrate / 1000:g} kbit/s: taken')
+        print_line(f'bit rate {options.bitrate / 1000:g} kbit/s: taken')
     if options.store:
         session.run(master.store())
-        say('stored')
+        print_line('stored')
     else:
         warn('not stored: the device forgets it without power (--store)')
 
@@ -218,7 +218,7 @@ def _let_go(session: Session, master: LssMaster, new_id: int | None, before: int
         return 0
     session.listen(BOOT_WAIT, lambda: new_id in booted)
     if new_id in booted:
-        say(f'node {new_id} has booted')
+        print_line(f'node {new_id} has booted')
         return 0
     warn(f'no boot-up message of node {new_id} came within {BOOT_WAIT:g} s')
     return 1

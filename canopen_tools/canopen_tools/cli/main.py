@@ -19,7 +19,7 @@ from arm_canopen.exceptions import CanopenError
 
 from ..ros_arguments import split_ros_arguments
 from . import check, dcf, diff, eds, lss, objects, scan
-from .arguments import take_parameters, UsageError
+from .arguments import apply_parameters, UsageError
 from .output import warn
 
 VERBS = (check, eds, scan, objects, diff, dcf, lss)
@@ -44,7 +44,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except ValueError as error:
         parser.error(str(error))
     options = parser.parse_args(arguments.own)
-    take_parameters(options, arguments.parameters)
+    apply_parameters(options, arguments.parameters)
     try:
         code = int(options.run(options))
         sys.stdout.flush()

@@ -16,7 +16,7 @@ from arm_canopen.standard.objects import Index
 from ..monitor.object_names import ObjectNames
 from ..monitor.value_text import data_text
 from .arguments import add_node_arguments, SubParsers, UsageError
-from .output import say, warn
+from .output import print_line, warn
 from .session import Session
 from .target import find_target, Target, warn_of_master
 
@@ -75,9 +75,9 @@ def read(options: argparse.Namespace) -> int:
         for entry in entries:
             data = _upload(session, target, entry)
             if options.value:
-                say(_plain(entry, data))
+                print_line(_plain(entry, data))
             else:
-                say(f'{_title(target, entry)} = {_meaning(entry, data)}')
+                print_line(f'{_title(target, entry)} = {_meaning(entry, data)}')
     return 0
 
 
@@ -98,15 +98,15 @@ def write(options: argparse.Namespace) -> int:
         session.run(download())
         title = _title(target, entry)
         if entry.index in COMMANDS or not entry.access.readable:
-            say(f'{title} was written')
+            print_line(f'{title} was written')
             return 0
         try:
             held = _upload(session, target, entry)
         except SdoAbortError as error:  # commands, and what restarts the device
-            say(f'{title} was written')
+            print_line(f'{title} was written')
             warn(f'it cannot be read back: {error}')
             return 0
-    say(f'{title} = {_meaning(entry, held)}')
+    print_line(f'{title} = {_meaning(entry, held)}')
     if held != data:
         warn(f'the device holds another value than {_meaning(entry, data)}, which was written')
         return 1

@@ -14,7 +14,7 @@ from arm_canopen.config.model import Problem
 RED, YELLOW, RESET = '\x1b[1;31m', '\x1b[33m', '\x1b[0m'
 
 
-def say(text: str = '') -> None:
+def print_line(text: str = '') -> None:
     """Write a line of the result.
 
     Raises:
@@ -31,13 +31,13 @@ def warn(text: str) -> None:
         sys.stderr.flush()
 
 
-def say_problem(problem: Problem, kind: str, color: str) -> None:
+def print_problem(problem: Problem, kind: str, color: str) -> None:
     """Write a problem as compilers do, its remedy in the line below."""
     place = f'{problem.file}:{problem.line}' if problem.line else str(problem.file)
     key = f'{problem.key}: ' if problem.key else ''
-    say(f'{place}: {painted(kind, color)}: {key}{problem.message}')
+    print_line(f'{place}: {painted(kind, color)}: {key}{problem.message}')
     if problem.remedy:
-        say(f'    {problem.remedy}')
+        print_line(f'    {problem.remedy}')
 
 
 def painted(text: str, color: str) -> str:
@@ -47,7 +47,7 @@ def painted(text: str, color: str) -> str:
     return f'{color}{text}{RESET}'
 
 
-def say_table(head: Sequence[str], rows: Sequence[Sequence[str]], right: str = '') -> None:
+def print_table(head: Sequence[str], rows: Sequence[Sequence[str]], right: str = '') -> None:
     """Write a table.
 
     Args:
@@ -62,7 +62,7 @@ def say_table(head: Sequence[str], rows: Sequence[Sequence[str]], right: str = '
             cell.rjust(width) if title in flush_right else cell.ljust(width)
             for cell, width, title in zip(row, widths, head, strict=True)
         )
-        say('  '.join(cells).rstrip())
+        print_line('  '.join(cells).rstrip())
 
 
 def counted(number: int, noun: str) -> str:

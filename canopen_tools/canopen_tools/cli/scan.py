@@ -20,7 +20,7 @@ from arm_canopen.standard.sdo import UploadRequest
 
 from ..lss_master import LssMaster
 from .arguments import add_bus_arguments, seconds, SubParsers
-from .output import counted, say, say_table, warn
+from .output import counted, print_line, print_table, warn
 from .session import Session
 
 LISTEN = 1.5  # [s] many devices send a heartbeat each second
@@ -110,7 +110,7 @@ def run(options: argparse.Namespace) -> int:
             _find_silent(session, found)
             for device in found.values():
                 _identify(session, device)
-            _ask_for_unnumbered(session)
+            _find_unconfigured(session)
         return _show(found, config, asked=options.ask or not session.masters)
 
 
@@ -160,7 +160,7 @@ def _find_silent(session: Session, found: dict[int, Found]) -> None:
         found.setdefault(node_id, Found(node_id, session.states.get(node_id))).answers = True
 
 
-def _ask_for_unnumbered(session: Session) -> None:
+def _find_unconfigured(session: Session) -> None:
     """Say it when there is a device that no node id reaches, as it has none (CiA 305)."""
     master = LssMaster(session.scheduler, session.send)
     session.listeners.append(master.receive)
@@ -212,8 +212,8 @@ def _show(found: dict[int, Found], config: BusConfig | None, *, asked: bool) -> 
         )
         for device in devices
     ]
-    say_table((*head, '') if named else head, rows, right='node')
-    say(f'{counted(len(present), "device")}')
+    print_table((*head, '') if named else head, rows, right='node')
+    print_line(f'{counted(len(present), "device")}')
     return 1 if not present or any(remarks.values()) else 0
 
 

@@ -108,13 +108,13 @@ class _Linter:
             return
         first = entries[0]
         if first.subindex != 0:
-            self._tell_error(first, '', f'0x{index:04X} has no sub-index 0', 'add it')
+            self._add_error(first, '', f'0x{index:04X} has no sub-index 0', 'add it')
             return
         count = first.default
         if not isinstance(count, int) or any(index in indices for indices in COUNTED_BY_USE):
             return
         if count != highest:
-            self._tell(
+            self._add_warning(
                 first,
                 'defaultvalue',
                 f'sub-index 0 is {count}, but the highest sub-index is {highest}',
@@ -123,7 +123,9 @@ class _Linter:
 
     def _check_name(self, entry: ObjectEntry) -> None:
         if not entry.name:
-            self._tell(entry, 'parametername', 'the object has no ParameterName', 'give it one')
+            self._add_warning(
+                entry, 'parametername', 'the object has no ParameterName', 'give it one'
+            )
 
     def _check_standard(self, entry: ObjectEntry) -> None:
         """Compare with what CiA 301 and the profile of the device say of the object."""
@@ -131,7 +133,7 @@ class _Linter:
         if standard is None:
             return
         if entry.data_type is not standard.data_type:
-            self._tell_error(
+            self._add_error(
                 entry,
                 'datatype',
                 f'the data type is {entry.data_type.name}, by the standard it is '
@@ -144,7 +146,7 @@ class _Linter:
                 Role.SETTING: 'written by the master',
                 Role.EITHER: 'readable',
             }[standard.role]
-            self._tell(
+            self._add_warning(
                 entry,
                 'accesstype',
                 f'AccessType is {entry.access.value}, but the object is {wanted}',
@@ -156,7 +158,7 @@ class _Linter:
         if isinstance(value, bool) or not isinstance(value, (int, float)) or entry.node_relative:
             return
         if (low is not None and value < low) or (high is not None and value > high):
-            self._tell_error(
+            self._add_error(
                 entry,
                 'defaultvalue',
                 f'the default {value} is beyond its limits ({_limits(low, high)})',
@@ -165,18 +167,18 @@ class _Linter:
 
     def _check_mappable(self, entry: ObjectEntry) -> None:
         if entry.pdo_mappable and bit_length(entry.data_type) is None:
-            self._tell_error(
+            self._add_error(
                 entry,
                 'pdomapping',
                 f'PDOMapping is 1, but {entry.data_type.name} has no fixed length',
                 'write PDOMapping=0',
             )
         if entry.pdo_mappable and entry.access is AccessType.CONSTANT and entry.subindex:
-            self._tell(
+            self._add_warning(
                 entry, 'pdomapping', 'PDOMapping is 1, but it is constant', 'write PDOMapping=0'
             )
         if not entry.pdo_mappable and entry.access in DIRECTED:
-            self._tell(
+            self._add_warning(
                 entry,
                 'pdomapping',
                 f'AccessType {entry.access.value} names a direction of PDOs, but PDOMapping is 0',
@@ -187,7 +189,7 @@ class _Linter:
             (TPDO_VALUES, 'TPDO', entry.tpdo_mappable),
         ):
             if self._is_drive and entry.index in indices and not mappable:
-                self._tell(
+                self._add_warning(
                     entry,
                     'pdomapping',
                     f'it cannot be mapped into a {title} (PDOMapping {int(entry.pdo_mappable)}, '
@@ -205,10 +207,10 @@ class _Linter:
         title = section.title if section is not None else f'{entry.index:04X}'
         return Place(self._path, line, key=f'[{title}]')
 
-    def _tell(self, entry: ObjectEntry, key: str, message: str, remedy: str) -> None:
+    def _add_warning(self, entry: ObjectEntry, key: str, message: str, remedy: str) -> None:
         self._findings.warning(self._place(entry, key), _named(entry, message), remedy)
 
-    def _tell_error(self, entry: ObjectEntry, key: str, message: str, remedy: str) -> None:
+    def _add_error(self, entry: ObjectEntry, key: str, message: str, remedy: str) -> None:
         self._findings.error(self._place(entry, key), _named(entry, message), remedy)
 
 
