@@ -33,6 +33,7 @@ def check_motion(robot: Robot, urdf: str, joints: Sequence[str]) -> list[Finding
     """
     try:
         from arm_model import LimitsError, load_limits, ModelError, RobotModel
+        from arm_servo import check_arm
     except ImportError as problem:
         return [
             warning(
@@ -48,6 +49,7 @@ def check_motion(robot: Robot, urdf: str, joints: Sequence[str]) -> list[Finding
     findings = list(_limits(robot, limits, joints))
     try:
         model = RobotModel(urdf, robot.semantic.read_text(encoding='utf-8'), limits)
+        check_arm(model)
     except LimitsError as problem:
         remedy = (
             'give each joint of the group max_velocity, max_acceleration and max_jerk, none wider'

@@ -20,12 +20,9 @@ from .limits import JointLimits, merge_limits
 from .pose import Pose, turned_twists
 from .scene import PlanningScene
 
-MAX_JOINTS = 8
-"""Joints of the longest chain that is offered."""
-
 
 class RobotModel:
-    """An arm: a group of joints between a base and a tip link.
+    """An arm: a group of joints, in a chain or a tree, with a base and a tip link.
 
     Poses and Jacobians are expressed in the base link; twists and Jacobian rows are linear before
     angular, taken at the origin of the tip. Positions are plain angles, also of continuous joints.
@@ -67,18 +64,19 @@ class RobotModel:
         description, semantic = Description(urdf), parse_srdf(srdf)
         chosen = semantic.group(group if group is not None else _only(semantic))
         names = description.group_joints(chosen, semantic)
-        if len(names) > MAX_JOINTS:
-            raise ModelError(f'group {chosen.name}: {len(names)} joints, {MAX_JOINTS} at most')
         self.name, self.group = description.name, chosen.name
+        self._model = _reduced(description, names)
         self.base, self.tip = _ends(description, chosen, semantic, names, tip)
-        self.limits: JointLimits = merge_limits(names, description.ranges, limits)
+        ordered = list(self._model.names)[1:]  # after the universe; of a chain, from the base out
+        self.limits: JointLimits = merge_limits(ordered, description.ranges, limits)
         notes = list(description.notes)
         self.poses = _poses(self.limits, semantic.poses.get(chosen.name, {}), notes)
         self.notes = tuple(notes)
-        self._model = _reduced(description, names)
         self._data = self._model.createData()
         self._tip_frame = self._model.getFrameId(self.tip)
         self._base_frame = self._model.getFrameId(self.base)
+        if self._model.frames[self._base_frame].parentJoint:
+            raise ModelError(f'group {self.group}: its base link {self.base!r} is moved by it')
         self._at = b''  # positions of the kinematics that are cached
         self.scene = PlanningScene(self._model, description.shapes, semantic.checks)
         self._clearances = Clearances(self.scene)
@@ -92,6 +90,11 @@ class RobotModel:
     def joints(self) -> tuple[str, ...]:
         """Names of the joints, in order."""
         return self.limits.names
+
+    @property
+    def serial(self) -> bool:
+        """Whether all joints are on one chain, which ends in the tip."""
+        return len(self._trunk()) == len(self)
 
     @property
     def pairs(self) -> Sequence[tuple[str, str]]:
@@ -218,11 +221,15 @@ class RobotModel:
         self.check_link(link)
         return int(self._tip_frame if link is None else self._model.getFrameId(link))
 
+    def _trunk(self) -> list[int]:
+        """Return the joints that move the tip, from the base out."""
+        return list(self._model.supports[self._model.frames[self._tip_frame].parentJoint])[1:]
+
     def _reach(self) -> float:
         """Sum the lengths from joint to joint out to the tip."""
         lengths = [
-            np.linalg.norm(self._model.jointPlacements[i].translation)
-            for i in range(2, self._model.njoints)
+            np.linalg.norm(self._model.jointPlacements[joint].translation)
+            for joint in self._trunk()[1:]
         ]
         tip = self._model.frames[self._tip_frame].placement.translation
         return float(sum(lengths) + np.linalg.norm(tip))
@@ -246,14 +253,12 @@ def _ends(
     chains = list(group.chains)
     for name in group.subgroups:
         chains += semantic.group(name).chains
-    base = chains[0][0] if chains else description.joints[joints[0]].parent
     end = tip or (chains[-1][1] if chains else description.joints[joints[-1]].child)
-    on_chain = {joint.name for joint in description.tree.chain(base, end)}
-    if beside := [name for name in joints if name not in on_chain]:
-        raise ModelError(
-            f'group {group.name}: joint {beside[0]} is not between {base!r} and {end!r};'
-            ' the joints of an arm are one chain'
-        )
+    tree = description.tree
+    inward = {tree.root, *(joint.parent for joint in tree.chain(tree.root, end))}
+    bases = [base for base, _ in chains] or [description.joints[joints[0]].parent]
+    base = next((link for link in bases if link in inward), bases[0])
+    tree.chain(base, end)  # or says why not
     return base, end
 
 

@@ -34,7 +34,8 @@ class PlanningScene:
         """Attach the shapes and pair them.
 
         Args:
-            model: A pinocchio model of one chain; links are frames of it.
+            model: A pinocchio model of joints with one degree of freedom each; links are frames
+                of it.
             shapes: Shapes of the links.
             checks: Tells whether two links are checked.
         """
@@ -55,7 +56,7 @@ class PlanningScene:
                 ends.append((first, second))
         self.pairs: Sequence[tuple[str, str]] = tuple(pairs)
         self.relative_motion_sign: Array = np.array(
-            [_between(joints[first], joints[second], model.nv) for first, second in ends]
+            [_signs(model, joints[first], joints[second]) for first, second in ends]
         ).reshape(len(pairs), model.nv)
         self.distance_rate_bounds: Array = np.array(
             [np.minimum(self._rate_bounds(a, b), self._rate_bounds(b, a)) for a, b in ends]
@@ -80,32 +81,47 @@ class PlanningScene:
         Seen from the joint, nothing of the shape is farther away than the lengths that lead there.
         """
         objects, model = self.geometry.geometryObjects, self.model
-        near, far = objects[shape].parentJoint, objects[other].parentJoint
+        inward, outward = _between(model, objects[shape].parentJoint, objects[other].parentJoint)
         rates = np.zeros(model.nv)
         reach = _extent(objects[shape])
-        outward = near < far
         # from the shape joint by joint towards the other one
-        for joint in range(near + 1, far + 1) if outward else range(near, far, -1):
-            if outward:
-                reach += _length(model, joint)
-            sliding = model.joints[joint].shortname().startswith('JointModelP')
-            if sliding:
-                place = joint - 1
-                reach += max(
-                    abs(model.lowerPositionLimit[place]), abs(model.upperPositionLimit[place])
-                )
-            rates[joint - 1] = 1.0 if sliding else reach
-            if not outward:
-                reach += _length(model, joint)
+        for joint in inward:
+            reach += _travel(model, joint)
+            rates[joint - 1] = 1.0 if _slides(model, joint) else reach
+            reach += _length(model, joint)
+        for joint in outward:
+            reach += _length(model, joint)
+            reach += _travel(model, joint)
+            rates[joint - 1] = 1.0 if _slides(model, joint) else reach
         return rates
 
 
-def _between(first: int, second: int, count: int) -> Array:
-    """Return the sense in which each joint of a chain moves one body against another."""
-    senses = np.zeros(count)
-    senses[first:second] = 1.0
-    senses[second:first] = -1.0
-    return senses
+def _between(model: Native, first: int, second: int) -> tuple[list[int], list[int]]:
+    """Return the joints from a body in to the common trunk, and from there out to another."""
+    above, below = list(model.supports[first]), list(model.supports[second])
+    inward = [joint for joint in above if joint not in below]
+    return inward[::-1], [joint for joint in below if joint not in above]
+
+
+def _signs(model: Native, first: int, second: int) -> Array:
+    """Return the sense in which each joint moves one body against another."""
+    signs = np.zeros(model.nv)
+    inward, outward = _between(model, first, second)
+    signs[[joint - 1 for joint in outward]] = 1.0
+    signs[[joint - 1 for joint in inward]] = -1.0
+    return signs
+
+
+def _slides(model: Native, joint: int) -> bool:
+    return str(model.joints[joint].shortname()).startswith('JointModelP')
+
+
+def _travel(model: Native, joint: int) -> float:
+    """Return how far a sliding joint moves from its zero at most in [m]."""
+    if not _slides(model, joint):
+        return 0.0
+    lower, upper = model.lowerPositionLimit[joint - 1], model.upperPositionLimit[joint - 1]
+    return float(max(abs(lower), abs(upper)))
 
 
 def _extent(shape: Native) -> float:

@@ -87,3 +87,55 @@ def chain_texts(kinds: str) -> tuple[str, str, dict[str, Any]]:
 def chain(kinds: str) -> RobotModel:
     """Return a chain, see :func:`chain_texts`."""
     return RobotModel(*chain_texts(kinds))
+
+
+ARM_KINDS = {'left': 'yyp', 'right': 'yc'}
+"""Joints of each arm of :func:`two_arms`, by the letters of :func:`chain_texts`."""
+
+
+@cache
+def two_arms(group: str = 'both', tip: str | None = None) -> RobotModel:
+    """Return two arms on a torso that turns about z.
+
+    Args:
+        group: both (with the torso), left or right.
+        tip: The tip; by default that of the last arm of the group.
+    """
+    sphere = '<collision><geometry><sphere radius="0.04"/></geometry></collision>'
+    parts = [
+        f'<robot name="two_arms"><link name="base">{sphere}</link>',
+        _joint('torso', 'z', 'base', '0 0 0.2'),
+    ]
+    for side, kinds in ARM_KINDS.items():
+        parent, y = 'torso_link', 0.15 if side == 'left' else -0.15
+        for number, kind in enumerate(kinds):
+            name = f'{side}_{number + 1}'
+            parts.append(_joint(name, kind, parent, f'0.05 {y} 0.1'))
+            parent, y = f'{name}_link', 0.0
+    chains = {side: f'{side}_{len(kinds)}_link' for side, kinds in ARM_KINDS.items()}
+    groups = ''.join(
+        f'<group name="{side}"><chain base_link="torso_link" tip_link="{end}"/></group>'
+        for side, end in chains.items()
+    )
+    srdf = (
+        f'<robot name="two_arms">{groups}<group name="both"><chain base_link="base"'
+        ' tip_link="torso_link"/><group name="left"/><group name="right"/></group></robot>'
+    )
+    names = ['torso', *(f'{side}_{n + 1}' for side, k in ARM_KINDS.items() for n in range(len(k)))]
+    limits = {
+        name: {'max_velocity': 2.0, 'max_acceleration': 5.0, 'max_jerk': 50.0} for name in names
+    }
+    return RobotModel(''.join([*parts, '</robot>']), srdf, limits, group, tip)
+
+
+def _joint(name: str, kind: str, parent: str, xyz: str) -> str:
+    """Return a joint by its letter, and the link with a sphere that it moves."""
+    axis = {'y': '0 1 0', 'p': '1 0 0'}.get(kind, '0 0 1')
+    sort = {'c': 'continuous', 'p': 'prismatic'}.get(kind, 'revolute')
+    return (
+        f'<link name="{name}_link"><collision><origin xyz="0.05 0 0"/><geometry>'
+        f'<sphere radius="0.03"/></geometry></collision></link>'
+        f'<joint name="{name}" type="{sort}"><origin xyz="{xyz}"/><parent link="{parent}"/>'
+        f'<child link="{name}_link"/><axis xyz="{axis}"/>'
+        '<limit lower="-1.5" upper="1.5" velocity="2" effort="1"/></joint>'
+    )

@@ -6,14 +6,14 @@ from __future__ import annotations
 
 import math
 
-from model_robots import chain, robot, ROBOTS
+from model_robots import chain, robot, ROBOTS, two_arms
 import numpy as np
 import pytest
 
 from arm_model import RobotModel
 
-ARMS = [*(robot(name) for name in ROBOTS), chain('zpyypz')]
-"""The robots, and a chain with sliding joints."""
+ARMS = [*(robot(name) for name in ROBOTS), chain('zpyypz'), two_arms()]
+"""The robots, a chain with sliding joints, and a tree."""
 
 ROUNDING = 1e-4
 """Accuracy of a distance that was searched for from another begin in [m]."""
@@ -39,7 +39,7 @@ def test_what_is_known_is_a_lower_bound_and_exact_where_it_matters(
 
 
 @pytest.mark.parametrize('model', ARMS, ids=lambda model: model.name)
-def test_no_distance_changes_faster_than_its_levers_say(model: RobotModel) -> None:
+def test_no_distance_changes_faster_than_its_bounds_say(model: RobotModel) -> None:
     """Gradients anywhere are at most the bounds of their rates."""
     rng = np.random.default_rng(6)
     lower, upper = np.maximum(model.limits.lower, -4.0), np.minimum(model.limits.upper, 4.0)

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from .core.execution import Execution, ExecutionSettings, Feedback, Phase
-from .core.motion_core import MotionCore
+from .core.motion_core import check_arm, MotionCore
 from .core.outcome import Outcome
 from .core.set_point import SetPoint, Source
 from .core.settings import CoreSettings
@@ -33,5 +33,6 @@ __all__ = [
     'SetPoint',
     'Source',
     'VelocityBoundsSettings',
+    'check_arm',
     'check_parameters',
 ]

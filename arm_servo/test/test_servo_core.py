@@ -10,13 +10,13 @@ import math
 
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from model_robots import ready, robot, ROBOTS
+from model_robots import chain, ready, robot, ROBOTS, two_arms
 import numpy as np
 import pytest
 from servo_runs import twist_between
 from servo_streams import kept, PERIOD, stream, wave
 
-from arm_model import CommandError, Pose
+from arm_model import CommandError, ModelError, Pose
 from arm_servo import Cause, MotionCore, NotReadyError, Phase, SetPoint, Source
 from arm_trajectory import GoalCode, OnlineTrajectoryGenerator
 
@@ -333,3 +333,12 @@ def test_bad_commands_are_refused_before_anything_moves(
         command(core)
     points: list[SetPoint] = stream(core, 0.1)
     assert not any(point.state.moving for point in points)
+
+
+def test_what_is_no_chain_is_refused() -> None:
+    """A group of two arms is a model, and no arm to jog; each of them is one."""
+    MotionCore(two_arms('left'))
+    with pytest.raises(ModelError, match=r'group both: .* not one chain'):
+        MotionCore(two_arms())
+    with pytest.raises(ModelError, match='9 joints, 8 at most'):
+        MotionCore(chain('zyyzyyzyy'))

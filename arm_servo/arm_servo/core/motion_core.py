@@ -17,7 +17,7 @@ import math
 
 import numpy as np
 
-from arm_model import Array, checked, CommandError, Pose, RobotModel, RobotState
+from arm_model import Array, checked, CommandError, ModelError, Pose, RobotModel, RobotState
 from arm_trajectory import GoalCode, OnlineTrajectoryGenerator, StateMovedError, TrajectoryGoal
 
 from ..exceptions import NotReadyError
@@ -36,7 +36,25 @@ from .settings import CoreSettings
 PREPARED_STATE_TOLERANCE = 0.01
 """How far the arm may be from where a trajectory was prepared in [rad]."""
 
+MAX_JOINTS = 8
+"""Joints of the longest chain that is jogged."""
+
 PAUSED = 'the arm is paused; resume first (~/resume of the trajectory controller)'
+
+
+def check_arm(model: RobotModel) -> None:
+    """Make sure that a model is an arm that the core can move.
+
+    Raises:
+        ModelError: It is no chain, or too long.
+    """
+    if not model.serial:
+        raise ModelError(
+            f'group {model.group}: its joints are not one chain from {model.base!r} to'
+            f' {model.tip!r}; choose a group, or a tip_link, that makes them one'
+        )
+    if len(model) > MAX_JOINTS:
+        raise ModelError(f'group {model.group}: {len(model)} joints, {MAX_JOINTS} at most')
 
 
 class MotionCore:
@@ -52,7 +70,11 @@ class MotionCore:
         Args:
             model: The arm.
             settings: How the core behaves.
+
+        Raises:
+            ModelError: The core cannot move such an arm.
         """
+        check_arm(model)
         self._model = model
         self._settings = settings or CoreSettings()
         generator = OnlineTrajectoryGenerator(model.limits)
