@@ -84,8 +84,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             sys.stdout.write(f'{quad.title}\n{hint}\n')
             join = partial(join_ros, namespace=ros.namespace)
             end = stand_still if arguments.hold else lie_down
-            farewell = partial(end, make_client=join)
-            return supervise(quad.processes, farewell=farewell).exit_code
+            shutdown = partial(end, make_client=join)
+            return supervise(quad.processes, shutdown=shutdown).exit_code
     except (BringupError, SupervisorError) as error:
         sys.stderr.write(f'{error}\n')
         return USAGE_ERROR

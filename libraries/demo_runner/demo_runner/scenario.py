@@ -87,7 +87,7 @@ class DemoScenario(ABC, Generic[ClientT]):
         """
         self.result = DemoResult()
         self._display = display
-        self._leaving = threading.Event()
+        self._ending = threading.Event()
         self._moving = threading.Event()
         self._next_picture = 0.0
         self._phase = ''
@@ -95,7 +95,7 @@ class DemoScenario(ABC, Generic[ClientT]):
     @property
     def left(self) -> bool:
         """The user asked for the end."""
-        return self._leaving.is_set()
+        return self._ending.is_set()
 
     def leave(self) -> bool:
         """Ask for the end, from any thread.
@@ -103,7 +103,7 @@ class DemoScenario(ABC, Generic[ClientT]):
         Returns:
             True when the robot moves: then the scenario brings it to rest before all is stopped.
         """
-        self._leaving.set()
+        self._ending.set()
         return self._moving.is_set()
 
     def run(self, supervisor: Supervisor, make_client: MakeClient[ClientT]) -> None:

@@ -13,7 +13,7 @@ from time import monotonic
 ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 """Ctrl-C, what stops services, and the closing of the terminal."""
 
-SAME_WISH = 0.5
+ECHO_TIME = 0.5
 """A SIGINT this soon after the first signal in [s] is its echo: a key that bounces, or a signal to
 a process and to its group."""
 
@@ -23,7 +23,7 @@ def stop_on_signals(
 ) -> threading.Event:
     """Set an event at the first signal of :data:`ENDING`; nothing is torn in the middle.
 
-    A second SIGINT, later than :data:`SAME_WISH`, ends the process at once. A SIGTERM or SIGHUP
+    A second SIGINT, later than :data:`ECHO_TIME`, ends the process at once. A SIGTERM or SIGHUP
     does not: what stops processes (``ros2 launch``, say) sends one when the first signal seems to
     do nothing, while a robot comes to rest. A SIGHUP that is ignored already stays so, as
     ``nohup`` wants it.
@@ -41,7 +41,7 @@ def stop_on_signals(
     def handle(number: int, _frame: object) -> None:
         nonlocal first
         now = clock()
-        if now - first >= SAME_WISH and number == signal.SIGINT and not patient:
+        if now - first >= ECHO_TIME and number == signal.SIGINT and not patient:
             signal.signal(number, signal.SIG_DFL)
             signal.raise_signal(number)
         first = min(first, now)

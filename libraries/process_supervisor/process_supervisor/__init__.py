@@ -11,7 +11,7 @@ packages, :mod:`.exclusive` keeps a second bring-up away, :mod:`.terminal` and :
 what the processes write.
 """
 
-from .console import explain, Farewell, supervise, USAGE_ERROR
+from .console import explain, Shutdown, supervise, USAGE_ERROR
 from .exceptions import CallError, GivenUpError, StartError, SupervisorError
 from .exclusive import exclusive
 from .nodes import (
@@ -29,7 +29,7 @@ from .nodes import (
 )
 from .ros_options import add_namespace, parse_with_ros, RosOptions
 from .runner import Runner
-from .spec import POLITE, ProcessSpec, StopStep
+from .spec import ProcessSpec, STOP_STEPS, StopStep
 from .supervision import Notice, Outcome, Phase, Severity, Supervision
 from .terminal import is_smart, LineWriter, Painter, severity_of, wants_colour
 
@@ -38,11 +38,10 @@ __version__ = '0.1.0'
 __all__ = [
     'EVERY_NODE',
     'LOG_FORMAT',
-    'POLITE',
+    'STOP_STEPS',
     'USAGE_ERROR',
     'CallError',
     'Executable',
-    'Farewell',
     'FindExecutable',
     'GivenUpError',
     'LineWriter',
@@ -54,6 +53,7 @@ __all__ = [
     'RosOptions',
     'Runner',
     'Severity',
+    'Shutdown',
     'StartError',
     'StopStep',
     'Supervision',

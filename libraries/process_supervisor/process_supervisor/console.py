@@ -19,7 +19,7 @@ USAGE_ERROR = 2
 """Exit code of a bring-up when nothing was started."""
 
 
-class Farewell(Protocol):
+class Shutdown(Protocol):
     """What is done at the first Ctrl-C, while all processes still run."""
 
     def __call__(self, say: Callable[[str], None], given_up: Callable[[], bool]) -> None:
@@ -32,14 +32,14 @@ class Farewell(Protocol):
 
 
 def supervise(
-    processes: Sequence[ProcessSpec], name: str = 'bringup', farewell: Farewell | None = None
+    processes: Sequence[ProcessSpec], name: str = 'bringup', shutdown: Shutdown | None = None
 ) -> Outcome:
     """Run processes with their output on standard output, until Ctrl-C or one ends.
 
     Args:
         processes: What to run.
         name: Name before the supervisor's own lines.
-        farewell: Done in a thread before they are stopped, if all had got ready.
+        shutdown: Done in a thread before they are stopped, if all had got ready.
 
     Returns:
         How it ended.
@@ -51,23 +51,23 @@ def supervise(
     def notify(notice: Notice) -> None:
         write(painter.notice(notice))
 
-    leaving = _Leaving(farewell, notify)
+    thread = _ShutdownThread(shutdown, notify)
     with Runner(
         processes,
         lambda name, line: write(painter.line(name, line)),
         notify,
-        on_interrupt=leaving.begin,
+        on_interrupt=thread.begin,
     ) as runner:
-        leaving.runner = runner
+        thread.runner = runner
         outcome = runner.run()
-        leaving.join()
+        thread.join()
     if outcome.exit_code:
         notify(Notice(Severity.ERROR, explain(outcome)))
     return outcome
 
 
-class _Leaving:
-    """Runs a farewell beside the supervisor.
+class _ShutdownThread:
+    """Runs a shutdown beside the supervisor.
 
     Attributes:
         runner: What is stopped after it.
@@ -75,15 +75,15 @@ class _Leaving:
 
     runner: Runner
 
-    def __init__(self, farewell: Farewell | None, notify: Callable[[Notice], None]) -> None:
-        self._farewell, self._notify = farewell, notify
+    def __init__(self, shutdown: Shutdown | None, notify: Callable[[Notice], None]) -> None:
+        self._shutdown, self._notify = shutdown, notify
         self._thread: threading.Thread | None = None
 
     def begin(self) -> bool:
-        """Begin it at Ctrl-C; false when there is none, or nothing to say good-bye to yet."""
-        if self._farewell is None or self.runner.phase is not Phase.RUNNING:
+        """Begin it at Ctrl-C; false when there is none, or not all are ready yet."""
+        if self._shutdown is None or self.runner.phase is not Phase.RUNNING:
             return False
-        self._thread = threading.Thread(target=self._run, args=[self._farewell], name='farewell')
+        self._thread = threading.Thread(target=self._run, args=[self._shutdown], name='shutdown')
         self._thread.start()
         return True
 
@@ -92,10 +92,10 @@ class _Leaving:
         if self._thread is not None:
             self._thread.join()
 
-    def _run(self, farewell: Farewell) -> None:
+    def _run(self, shutdown: Shutdown) -> None:
         outcome = Outcome(0, 'stopped by the user')
         try:
-            farewell(
+            shutdown(
                 lambda text: self._notify(Notice(Severity.INFO, text)),
                 lambda: self.runner.phase is not Phase.RUNNING,
             )

@@ -22,7 +22,7 @@ class StopStep:
     patience: float
 
 
-POLITE = (
+STOP_STEPS = (
     StopStep(Signals.SIGTERM, 20.0),
     StopStep(Signals.SIGINT, 2.0),
     StopStep(Signals.SIGKILL, 2.0),
@@ -57,7 +57,7 @@ class ProcessSpec:
     ready_timeout: float = 30.0
     required: bool = True
     stop_order: int = 0
-    stop_steps: tuple[StopStep, ...] = POLITE
+    stop_steps: tuple[StopStep, ...] = STOP_STEPS
 
     def __post_init__(self) -> None:
         """Refuse what would only fail later.

@@ -18,7 +18,7 @@ from .stopping import StopSequence
 LAST_LINES = 12
 """How many lines of a process are kept to explain its end."""
 
-SAME_WISH = 0.5
+ECHO_TIME = 0.5
 """An interrupt this soon after another one in [s] is its echo: a key that bounces, or a signal to
 a process and to its group."""
 
@@ -211,12 +211,12 @@ class Supervision:
             self._check_ready(now)
 
     def interrupt(self, now: float) -> None:
-        """Ctrl-C: stop; again, later than :data:`SAME_WISH`: stop at once.
+        """Ctrl-C: stop; again, later than :data:`ECHO_TIME`: stop at once.
 
         Args:
             now: Steady time in [s].
         """
-        if 0.0 <= now - self._interrupted < SAME_WISH:
+        if 0.0 <= now - self._interrupted < ECHO_TIME:
             return
         self._interrupted = now
         deferred, self._on_interrupt = self._on_interrupt, None

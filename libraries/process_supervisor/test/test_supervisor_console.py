@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""A bring-up on standard output, with a farewell before everything is stopped."""
+"""A bring-up on standard output, with a shutdown before everything is stopped."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import threading
 import pytest
 from small_processes import PATIENCE, program
 
-from process_supervisor import Farewell, LineWriter, Outcome, supervise
+from process_supervisor import LineWriter, Outcome, Shutdown, supervise
 
 Say = Callable[[str], None]
 GivenUp = Callable[[], bool]
@@ -23,10 +23,10 @@ def ctrl_c() -> None:
 
 
 def run_until(
-    capsys: pytest.CaptureFixture[str], *kinds: str, farewell: Farewell | None
+    capsys: pytest.CaptureFixture[str], *kinds: str, shutdown: Shutdown | None
 ) -> tuple[Outcome, list[str]]:
     """Run small processes; they say good-bye by themselves when they are stopped."""
-    outcome = supervise([program(kind, notifies_ready=True) for kind in kinds], farewell=farewell)
+    outcome = supervise([program(kind, notifies_ready=True) for kind in kinds], shutdown=shutdown)
     return outcome, capsys.readouterr().out.splitlines()
 
 
@@ -47,31 +47,31 @@ class CtrlC:
             ctrl_c()
 
 
-def test_a_farewell_is_done_before_anybody_is_stopped(
+def test_a_shutdown_is_done_before_anybody_is_stopped(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """What it says is among the lines; the exit code is 0."""
 
-    def farewell(say: Say, given_up: GivenUp) -> None:
+    def shutdown(say: Say, given_up: GivenUp) -> None:
         assert not given_up()
         say('lying down')
 
     CtrlC(monkeypatch, 'all is ready')
-    outcome, lines = run_until(capsys, 'good', farewell=farewell)
+    outcome, lines = run_until(capsys, 'good', shutdown=shutdown)
     assert outcome == Outcome(0, 'stopped by the user')
-    farewells = [index for index, line in enumerate(lines) if 'lying down' in line]
+    announced = [index for index, line in enumerate(lines) if 'lying down' in line]
     byes = [index for index, line in enumerate(lines) if line.endswith('| bye')]
-    assert len(farewells) == len(byes) == 1
-    assert farewells < byes
+    assert len(announced) == len(byes) == 1
+    assert announced < byes
 
 
-def test_ctrl_c_again_ends_a_farewell(
+def test_ctrl_c_again_ends_a_shutdown(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It is told that it is no longer wanted, and everything is stopped at once."""
     given_up_in_time = threading.Event()
 
-    def farewell(say: Say, given_up: GivenUp) -> None:
+    def shutdown(say: Say, given_up: GivenUp) -> None:
         wait = threading.Event()
         for _ in range(round(PATIENCE / 0.1)):
             signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
@@ -81,35 +81,35 @@ def test_ctrl_c_again_ends_a_farewell(
             wait.wait(0.1)
 
     CtrlC(monkeypatch, 'all is ready')
-    outcome, _ = run_until(capsys, 'good', farewell=farewell)
+    outcome, _ = run_until(capsys, 'good', shutdown=shutdown)
     assert outcome.exit_code == 0
     assert given_up_in_time.is_set()
 
 
-def test_a_farewell_that_fails_stops_everything_all_the_same(
+def test_a_shutdown_that_fails_stops_everything_all_the_same(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """No process is left because of a mistake in it."""
 
-    def farewell(say: Say, given_up: GivenUp) -> None:
-        raise ZeroDivisionError('in the farewell')
+    def shutdown(say: Say, given_up: GivenUp) -> None:
+        raise ZeroDivisionError('in the shutdown')
 
     CtrlC(monkeypatch, 'all is ready')
-    outcome, lines = run_until(capsys, 'good', farewell=farewell)
-    assert outcome == Outcome(1, 'ZeroDivisionError: in the farewell')
+    outcome, lines = run_until(capsys, 'good', shutdown=shutdown)
+    assert outcome == Outcome(1, 'ZeroDivisionError: in the shutdown')
     assert any(line.endswith('| bye') for line in lines)
 
 
-def test_without_readiness_there_is_no_farewell(
+def test_without_readiness_there_is_no_shutdown(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Ctrl-C during the start stops at once."""
 
-    def farewell(say: Say, given_up: GivenUp) -> None:
+    def shutdown(say: Say, given_up: GivenUp) -> None:
         say('never')
 
     CtrlC(monkeypatch, 'good is ready')
     specs = [program('good', notifies_ready=True), program('silent', notifies_ready=True)]
-    outcome = supervise(specs, farewell=farewell)
+    outcome = supervise(specs, shutdown=shutdown)
     assert outcome.exit_code == 0
     assert 'never\n' not in capsys.readouterr().out

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ros2_frontend.ros.participants import DiscoveryPorts, parse_ports, read_ports
-from ros2_frontend.ros.spdp import Inquiry, PaperParticipant
+from ros2_frontend.ros.spdp import Inquiry, ProbeParticipant
 
 HEAD = (
     '   sl  local_address rem_address   st tx_queue rx_queue tr tm->when retrnsmt   uid  timeout'
@@ -67,8 +67,8 @@ def parameters(data: bytes) -> dict[int, bytes]:
 @given(st.binary(min_size=12, max_size=12), st.integers(1, 2**16 - 1))
 def test_announcement_is_well_formed(prefix: bytes, port: int) -> None:
     """Header, one DATA of the right length, GUID, and the address where answers go."""
-    paper = PaperParticipant(prefix, port)
-    message = paper.announcement()
+    probe = ProbeParticipant(prefix, port)
+    message = probe.announcement()
     assert message[:6] == b'RTPS\x02\x02'
     assert message[8:20] == prefix
     kind, flags, length = struct.unpack_from('<BBH', message, 20)
@@ -76,23 +76,23 @@ def test_announcement_is_well_formed(prefix: bytes, port: int) -> None:
     payload = message[24 + 20 :]
     assert payload[:4] == b'\x00\x03\x00\x00'
     fields = parameters(payload[4:])
-    assert fields[0x50] == paper.guid
+    assert fields[0x50] == probe.guid
     kind_, port_ = struct.unpack_from('<iI', fields[0x32])
     assert (kind_, port_, fields[0x32][-4:]) == (1, port, bytes((127, 0, 0, 1)))
     assert all(len(value) % 4 == 0 for value in fields.values())
 
 
-def test_farewell_disposes_of_the_same_participant() -> None:
+def test_disposal_names_the_same_participant() -> None:
     """Status disposed and unregistered, with the key of the announcement."""
-    paper = PaperParticipant(bytes(range(12)), 7410)
-    message = paper.farewell()
+    probe = ProbeParticipant(bytes(range(12)), 7410)
+    message = probe.disposal()
     inline = parameters(message[24 + 20 :])
-    assert inline[0x70] == paper.guid
+    assert inline[0x70] == probe.guid
     assert inline[0x71] == bytes((0, 0, 0, 3))
 
 
 def test_an_inquiry_asks_all_others_and_takes_it_back() -> None:
-    """Each other port gets an announcement, and in the end the farewell of the same GUID."""
+    """Each other port gets an announcement, and in the end the disposal of the same GUID."""
     with (
         socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as one,
         socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as two,

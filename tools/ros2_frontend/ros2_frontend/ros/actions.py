@@ -8,45 +8,38 @@ from collections.abc import Callable
 
 from ..aliases import NamesAndTypes, Node
 from .graph import Graph
-from .session import Session
 
 
-def action_names(session: Session) -> NamesAndTypes:
+def action_names(graph: Graph) -> NamesAndTypes:
     """The actions and their types, sorted by name.
 
     Args:
-        session: The session whose node looks.
+        graph: The graph.
 
     Returns:
         Name and types of each.
     """
     from rclpy.action.graph import get_action_names_and_types
 
-    return sorted(get_action_names_and_types(session.node))
+    return sorted(get_action_names_and_types(graph.session.node))
 
 
-def offered_actions(session: Session, graph: Graph) -> set[str]:
+def offered_actions(graph: Graph) -> set[str]:
     """The actions that some node offers; `action_names` names those that are only used, too.
 
     Args:
-        session: The session whose node looks.
         graph: The graph with the nodes.
 
     Returns:
         Their names.
     """
-    return {
-        name for name, _ in action_names(session) if clients_and_servers(session, graph, name)[1]
-    }
+    return {name for name, _ in action_names(graph) if clients_and_servers(graph, name)[1]}
 
 
-def clients_and_servers(
-    session: Session, graph: Graph, action: str
-) -> tuple[NamesAndTypes, NamesAndTypes]:
+def clients_and_servers(graph: Graph, action: str) -> tuple[NamesAndTypes, NamesAndTypes]:
     """The nodes that use and that offer an action.
 
     Args:
-        session: The session whose node looks.
         graph: The graph with the nodes.
         action: The action's absolute name.
 
@@ -59,20 +52,20 @@ def clients_and_servers(
     )
 
     return (
-        _nodes_with(get_action_client_names_and_types_by_node, session, graph, action),
-        _nodes_with(get_action_server_names_and_types_by_node, session, graph, action),
+        _nodes_with(get_action_client_names_and_types_by_node, graph, action),
+        _nodes_with(get_action_server_names_and_types_by_node, graph, action),
     )
 
 
 def _nodes_with(
-    query: Callable[[Node, str, str], NamesAndTypes], session: Session, graph: Graph, action: str
+    query: Callable[[Node, str, str], NamesAndTypes], graph: Graph, action: str
 ) -> NamesAndTypes:
     from rclpy.node import NodeNameNonExistentError
 
     found: NamesAndTypes = []
     for node in sorted(graph.nodes(hidden=True)):
         try:
-            types = dict(query(session.node, node.name, node.namespace)).get(action)
+            types = dict(query(graph.session.node, node.name, node.namespace)).get(action)
         except NodeNameNonExistentError:  # it left meanwhile
             continue
         if types:

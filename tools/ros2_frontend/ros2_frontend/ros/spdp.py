@@ -8,7 +8,7 @@ others speak again by themselves up to 3 s later. (Seen in 7 of 10 starts on two
 delay makes `ros2 node list` come out empty now and then.)
 
 The cure is in the protocol: who hears of a new participant answers it. So once our participant
-listens, a message from a short-lived participant that exists only on paper, and that has our
+listens, a message from a short-lived participant that exists only in these bytes, and that has our
 address, makes all of them answer to us. It is taken back as soon as discovery is complete, and
 its lease ends after a second in any case. DDSI-RTPS 2.2: SPDP 8.5.3, message 8.3, parameters
 9.6.2.2, encapsulation 10.
@@ -55,7 +55,7 @@ _DISPOSED_AND_UNREGISTERED = bytes((0, 0, 0, 3))
 
 
 @dataclass(frozen=True, slots=True)
-class PaperParticipant:
+class ProbeParticipant:
     """A participant that exists only in what it says.
 
     Attributes:
@@ -85,7 +85,7 @@ class PaperParticipant:
         )
         return self._message(1, _WITH_DATA, b'', _PL_CDR_LE + _list(parameters))
 
-    def farewell(self) -> bytes:
+    def disposal(self) -> bytes:
         """The RTPS message that says it is gone."""
         inline = _list(
             (
@@ -127,7 +127,7 @@ class Inquiry:
 
     def __init__(self) -> None:
         """Ask nobody yet."""
-        self._asked: list[tuple[PaperParticipant, frozenset[int]]] = []
+        self._asked: list[tuple[ProbeParticipant, frozenset[int]]] = []
 
     def ask(self, ports: DiscoveryPorts) -> None:
         """Ask everybody else on this host; the answers go to our own participant.
@@ -136,14 +136,14 @@ class Inquiry:
             ports: Where all of them listen.
         """
         for own in sorted(ports.own)[:1]:
-            paper = PaperParticipant(os.urandom(_PREFIX_SIZE), own)
-            self._asked.append((paper, ports.others))
-            _send(paper.announcement(), ports.others)
+            probe = ProbeParticipant(os.urandom(_PREFIX_SIZE), own)
+            self._asked.append((probe, ports.others))
+            _send(probe.announcement(), ports.others)
 
     def close(self) -> None:
         """Let everybody forget the participant that asked."""
-        for paper, ports in self._asked:
-            _send(paper.farewell(), ports)
+        for probe, ports in self._asked:
+            _send(probe.disposal(), ports)
         self._asked.clear()
 
 

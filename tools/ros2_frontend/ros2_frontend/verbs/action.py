@@ -25,7 +25,7 @@ class List:
         """Print the actions."""
         with open_graph(args) as graph:
             graph.settle()
-            actions = action_names(graph.session)
+            actions = action_names(graph)
         print_names(actions, args)
 
 
@@ -52,9 +52,9 @@ class Info:
         """Print who offers and who uses the action; nobody is no error, as in ros2cli."""
         name = absolute(args.action_name)
         with open_graph(args) as graph:
-            graph.wait_for(lambda: dict(action_names(graph.session)).get(name))
+            graph.wait_for(lambda: dict(action_names(graph)).get(name))
             graph.settle()
-            clients, servers = clients_and_servers(graph.session, graph, name)
+            clients, servers = clients_and_servers(graph, name)
         print(f'Action: {args.action_name}')
         for title, nodes in (('clients', clients), ('servers', servers)):
             print(f'Action {title}: {len(nodes)}')
@@ -84,6 +84,4 @@ class Type:
             The exit code: 1 when there is no such action.
         """
         with open_graph(args) as graph:
-            return print_types(
-                args.action_name, graph, lambda _: action_names(graph.session), True
-            )
+            return print_types(args.action_name, graph, lambda _: action_names(graph), True)

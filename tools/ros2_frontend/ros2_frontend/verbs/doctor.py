@@ -24,7 +24,6 @@ from ..health.topics import (
 from ..ros.discovery import take_census
 from ..ros.graph import Graph, open_graph
 from ..ros.participants import read_ports
-from ..ros.session import Session
 
 
 class Doctor:
@@ -59,7 +58,7 @@ class Doctor:
             graph.settle()
             topics = read_topics(graph)
             discovery = _check_discovery(graph)
-            reports = _reports(graph.session, graph, topics)
+            reports = _reports(graph, topics)
         if args.report:
             for report in reports.values():
                 print(report.text())
@@ -107,7 +106,7 @@ def _check_discovery(graph: Graph) -> list[Finding]:
     ]
 
 
-def _reports(session: Session, graph: Graph, topics: list[Topic]) -> Mapping[str, Report]:
+def _reports(graph: Graph, topics: list[Topic]) -> Mapping[str, Report]:
     """The reports by the name of the check that they belong to."""
     from rclpy.utilities import get_rmw_implementation_identifier
 
@@ -119,7 +118,7 @@ def _reports(session: Session, graph: Graph, topics: list[Topic]) -> Mapping[str
             ('domain', graph.domain_id),
             ('participants on this host', ports.count),
             ('nodes', len(graph.nodes(hidden=True)) - 1),
-            ('own node', session.node.get_name()),
+            ('own node', graph.session.node.get_name()),
         ),
     )
     return {

@@ -136,7 +136,7 @@ def _await_server(client: Handle, session: Session, args: Namespace) -> None:
     if graph.wait_for(lambda: client.server_is_ready() or None):
         return
     name = absolute(args.action_name)
-    known = offered_actions(session, graph)
+    known = offered_actions(graph)
     if name not in known:
         print(f"There is no action '{name}' yet.{hint(name, known)}", file=sys.stderr)
     graph.wait_until(lambda: client.server_is_ready() or None)
