@@ -23,9 +23,9 @@ from quad_hardware.protocol import (
     Frame,
     HOST_KINDS,
     Kind,
-    NEW,
     ROBOT_KINDS,
     StreamParser,
+    V2,
 )
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ class SerialTap:
         self.reports: list[float] = []
         self.noise = 0.0
         self._chance = random.Random(0)
-        self._host, self._pushed = (StreamParser(NEW, k) for k in (HOST_KINDS, ROBOT_KINDS))
+        self._host, self._pushed = (StreamParser(V2, k) for k in (HOST_KINDS, ROBOT_KINDS))
         self._robot = os.open(robot, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
         self._bridge, self._far = os.openpty()
         for end in (self._robot, self._far):
@@ -168,7 +168,7 @@ class SerialTap:
 
     def _take(self, frame: Frame) -> None:
         if frame.address == Code.SERVOS:
-            fields = NEW.functions[Code.SERVOS].unpack(frame.payload)
+            fields = V2.functions[Code.SERVOS].unpack(frame.payload)
             motors = (round(motor) for motor in fields['motor'])
             angles = dict(zip(motors, fields['angle'], strict=True))
             self.targets.append(Target(time.monotonic(), angles))

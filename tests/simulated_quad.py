@@ -62,9 +62,9 @@ class SimulatedQuad:
         self._folder = folder
         parameters = folder / 'parameters.yaml'
         write_parameters(parameters, urdf)
-        robot = Stack(str(folder / 'robot'), simulate=True, protocol='new')
+        robot = Stack(str(folder / 'robot'), simulate=True, protocol='v2')
         port = folder / ('tapped' if tapped else 'robot')
-        bridge = Stack(str(port), simulate=True, protocol='new')
+        bridge = Stack(str(port), simulate=True, protocol='v2')
         specs = [
             quad_processes(robot, parameters, find_executable)[0],
             *quad_processes(bridge, parameters, find_executable)[1:3],

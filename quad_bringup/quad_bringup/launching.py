@@ -39,7 +39,7 @@ LAUNCH_ARGUMENTS = (
     LaunchArgument('gait', '', 'trot, crawl or pace'),
     LaunchArgument('policy', '', 'ONNX policy to load'),
     LaunchArgument('servo', '', 'servo model of a simulated robot'),
-    LaunchArgument('protocol', '', 'auto, new, old or vendor'),
+    LaunchArgument('protocol', '', 'auto, v2, v1 or vendor'),
     LaunchArgument('calibration', '', 'parameters of the serial bridge'),
     LaunchArgument('namespace', '', 'namespace of all nodes, and prefix of TF frames'),
     LaunchArgument('network', '', 'interfaces or peers that DDS is opened to'),

@@ -21,7 +21,7 @@ from quad_description import movable_joints, robot_urdf
 from quad_hardware.calibration.parameter_file import write_parameters as write_calibration
 from quad_hardware.nodes.parameters import declare_parameters as hardware_parameters
 from quad_hardware.nodes.parameters import NodeSettings as HardwareSettings
-from quad_hardware.protocol import Code, Frame, Kind, NEW, Register, ROBOT_KINDS, StreamParser
+from quad_hardware.protocol import Code, Frame, Kind, Register, ROBOT_KINDS, StreamParser, V2
 from quad_sim import ServoModel
 from quad_sim.options import build, parse_arguments, parse_servo, Simulation
 
@@ -120,15 +120,15 @@ def test_a_calibration_counts(tmp_path: Path) -> None:
     assert settings.robot.estimator.mounting.checked
 
 
-@pytest.mark.parametrize('protocol', ['auto', 'new', 'old'])
+@pytest.mark.parametrize('protocol', ['auto', 'v2', 'v1'])
 def test_both_ends_of_the_line_speak_the_same_protocol(tmp_path: Path, protocol: str) -> None:
     """Whichever the bridge tries first, the simulated robot answers in it."""
     specs = processes(tmp_path, Stack(str(tmp_path / 'xgo'), simulate=True, protocol=protocol))
     first = bridge_of(specs).robot.link.protocols[0]
     line = simulator_of(specs)[1].line
     line.set_baud(first.baud)
-    register = Code.VERSION if first is NEW else Register.FIRMWARE
-    request = Frame(Kind.READ, register, b'' if first is NEW else bytes((10,)))
+    register = Code.VERSION if first is V2 else Register.FIRMWARE
+    request = Frame(Kind.READ, register, b'' if first is V2 else bytes((10,)))
     line.receive(request.encode(first), 0.0)
     heard = StreamParser(first, ROBOT_KINDS).feed(line.advance(0.1))
     assert [frame.address for frame in heard] == [register]

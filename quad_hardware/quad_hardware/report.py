@@ -31,7 +31,7 @@ class Report:
         voltage: Voltage of the battery [V]; None where it is not reported.
         device_time: When it was made, on the clock of the robot [s], which wraps at
             :data:`DEVICE_TIME_WRAP`; None where it is not reported.
-        faults: Fault bits of the new protocol.
+        faults: Fault bits of protocol v2.
         temperatures: Of the servos by motor id [°C]; empty where they are not reported.
         joints_age: By how much the angles were measured before the rest [s].
     """

@@ -20,7 +20,7 @@ from sensor_msgs.msg import BatteryState, Imu, JointState
 from tf2_msgs.msg import TFMessage
 
 from quad_hardware.nodes.hardware_node import COMMAND_QOS
-from quad_hardware.protocol import NEW, Protocol
+from quad_hardware.protocol import Protocol, V2
 from quad_msgs.msg import JointCommand
 from quad_pty_peer import Behaviour, PtyPeer
 
@@ -188,7 +188,7 @@ class NodeRig(Rig):
     """
 
     def __init__(
-        self, isolation: Isolation, folder: Path, *arguments: str, protocol: Protocol = NEW
+        self, isolation: Isolation, folder: Path, *arguments: str, protocol: Protocol = V2
     ) -> None:
         """Plug the robot in, start the node and listen."""
         self._protocol = protocol

@@ -6,9 +6,9 @@ from __future__ import annotations
 
 from hypothesis import strategies as st
 
-from quad_hardware.protocol import Frame, HOST_KINDS, NEW, OLD, Protocol, ROBOT_KINDS
+from quad_hardware.protocol import Frame, HOST_KINDS, Protocol, ROBOT_KINDS, V1, V2
 
-PROTOCOLS = st.sampled_from([OLD, NEW])
+PROTOCOLS = st.sampled_from([V1, V2])
 SIDES = st.sampled_from([HOST_KINDS, ROBOT_KINDS])
 
 

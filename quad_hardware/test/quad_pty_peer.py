@@ -27,13 +27,13 @@ from quad_hardware.protocol import (
     Model,
     MOTOR_OF_REGISTER,
     MOTOR_ORDER,
-    NEW,
-    OLD,
     Protocol,
     Register,
     scatter,
     StreamParser,
     Torque,
+    V1,
+    V2,
 )
 
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ class Behaviour:
         corrupt: Share of the bytes sent that are damaged.
         attitude: Roll, pitch, yaw [deg].
         acceleration: Specific force [m/s²].
-        gyro: Signs of the gyro of the old protocol.
+        gyro: Signs of the gyro of protocol v1.
         latency: Latency timer of the adapter between robot and host [s]; 0 for none.
     """
 
@@ -84,7 +84,7 @@ class PtyPeer:
     """
 
     link: Path
-    protocol: Protocol = NEW
+    protocol: Protocol = V2
     firmware: str = 'L-2.0.0'
     behaviour: Behaviour = field(default_factory=Behaviour)
     angles: dict[int, float] = field(default_factory=lambda: dict.fromkeys(MOTOR_ORDER, 0.0))
@@ -181,7 +181,7 @@ class PtyPeer:
                 self._say(self._state().frame())
 
     def _take(self, frame: Frame) -> None:
-        (self._new if self.protocol is NEW else self._old)(frame)
+        (self._new if self.protocol is V2 else self._old)(frame)
 
     def _state(self) -> Feedback:
         return Feedback(
@@ -227,7 +227,7 @@ class PtyPeer:
         elif frame.address == Code.TORQUE:
             self.torque = bool(frame.payload[1])
         elif frame.address == Code.SERVOS:
-            values = NEW.functions[Code.SERVOS].unpack(frame.payload)
+            values = V2.functions[Code.SERVOS].unpack(frame.payload)
             self._set({int(m): a for m, a in zip(values['motor'], values['angle'], strict=True)})
 
     def _old(self, frame: Frame) -> None:
@@ -251,7 +251,7 @@ class PtyPeer:
             self._say(Frame(Kind.REPLY, frame.address, data))
         elif frame.address == Register.IMU:
             attitude, rates = self._moved()
-            values = OLD.functions[Register.IMU].pack(
+            values = V1.functions[Register.IMU].pack(
                 acceleration=self.behaviour.acceleration, rate=rates, attitude=attitude
             )
             self._say(Frame(Kind.REPLY, frame.address, values))

@@ -37,7 +37,7 @@ from quad_hardware.estimation.gravity import STANDARD_GRAVITY
 from quad_hardware.estimation.imu_mounting import ImuMounting
 from quad_hardware.exceptions import CommandError
 from quad_hardware.joints import JointMap, servo_of
-from quad_hardware.protocol import LEG_MOTORS, OLD
+from quad_hardware.protocol import LEG_MOTORS, V1
 from quad_hardware.report import Report
 from quad_pty_peer import PtyPeer
 
@@ -267,9 +267,9 @@ def test_a_robot_that_was_not_watched_turning_proves_no_gyro() -> None:
 
 
 def test_a_person_proves_the_gyro_over_the_serial_line(tmp_path: Path) -> None:
-    """In the old protocol, which has one: its signs are in the file, and that they are proven."""
+    """In protocol v1, which has one: its signs are in the file, and that they are proven."""
     output, bodies = tmp_path / 'found.yaml', held(ImuMounting())
-    with PtyPeer(tmp_path / 'port', OLD) as peer:
+    with PtyPeer(tmp_path / 'port', V1) as peer:
         peer.behaviour.gyro = (1.0, -1.0, 1.0)
 
         def hold(stance: Stance) -> Callable[[], None]:
@@ -314,4 +314,4 @@ def test_a_person_finds_it_and_the_file_has_it(tmp_path: Path) -> None:
     assert found == imu_parameters(find_mounting(readings))['imu']
     assert isinstance(found, dict)
     assert found['mounting_checked'] is True
-    assert 'rates_checked' not in found  # the new protocol reports no gyro
+    assert 'rates_checked' not in found  # protocol v2 reports no gyro

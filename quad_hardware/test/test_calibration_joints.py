@@ -27,7 +27,7 @@ from quad_hardware.calibration.main import run_calibrate
 from quad_hardware.calibration.parameter_file import read_parameters, write_parameters
 from quad_hardware.exceptions import CommandError
 from quad_hardware.joints import JointServo
-from quad_hardware.protocol import NEW, OLD, Protocol
+from quad_hardware.protocol import Protocol, V1, V2
 from quad_pty_peer import PtyPeer
 
 pytestmark = pytest.mark.slow
@@ -67,7 +67,7 @@ def test_limits_are_measured_within_those_of_the_urdf() -> None:
         with_limits(KNEE, 1.0, 2.0)
 
 
-@pytest.mark.parametrize('protocol', [NEW, OLD], ids=lambda protocol: protocol.name)
+@pytest.mark.parametrize('protocol', [V2, V1], ids=lambda protocol: protocol.name)
 def test_a_joint_is_calibrated_by_hand(tmp_path: Path, protocol: Protocol) -> None:
     """Torque off, two places, torque on where it is, and the file has what was found."""
     output = tmp_path / 'found.yaml'
@@ -140,8 +140,8 @@ def test_all_zeros_at_once(tmp_path: Path) -> None:
 def test_a_robot_of_no_known_firmware_is_calibrated(tmp_path: Path) -> None:
     """The message names the option, and the option does it."""
     output = tmp_path / 'found.yaml'
-    command = ['joints', '--zero-only', '--output', str(output), '--protocol', 'old']
-    with PtyPeer(tmp_path / 'port', OLD, firmware='X-1') as peer:
+    command = ['joints', '--zero-only', '--output', str(output), '--protocol', 'v1']
+    with PtyPeer(tmp_path / 'port', V1, firmware='X-1') as peer:
         command += ['--port', str(peer.link)]
         script = Script('', '')
         assert run_calibrate(command, script) == 1
@@ -196,7 +196,7 @@ def test_skipped_joints_write_no_file(tmp_path: Path) -> None:
     """What was there before is not written as if it had been found."""
     output = tmp_path / 'found.yaml'
     script = Script('', 's')
-    with PtyPeer(tmp_path / 'port', NEW):
+    with PtyPeer(tmp_path / 'port', V2):
         command = ['joints', '--port', str(tmp_path / 'port'), '--joint', 'fl_calf_joint']
         assert run_calibrate([*command, '--output', str(output)], script) == 1
     assert script.said[-1] == 'every joint was skipped; nothing was written'

@@ -20,7 +20,7 @@ from quad_hardware.doctor.host_checks import check_environment, check_memory
 from quad_hardware.doctor.port_checks import check_latency, check_port, port_users
 from quad_hardware.doctor.tree import links_without_place
 from quad_hardware.link import latency_timer, SerialPort
-from quad_hardware.protocol import OLD
+from quad_hardware.protocol import V1
 from quad_pty_peer import PtyPeer
 
 pytestmark = pytest.mark.slow
@@ -120,9 +120,9 @@ def test_scarce_memory_is_told() -> None:
 
 def test_a_port_is_judged_by_what_answers(tmp_path: Path) -> None:
     """The robot and its protocol; who else has the port; silence; no port; no device."""
-    with PtyPeer(tmp_path / 'port', OLD) as peer:
+    with PtyPeer(tmp_path / 'port', V1) as peer:
         path = str(peer.link)
-        assert 'L-2.0.0, old protocol at 115200' in str(found(check_port(path), 'robot'))
+        assert 'L-2.0.0, protocol v1 at 115200' in str(found(check_port(path), 'robot'))
         assert 'at 80 %' in str(found(check_port(path), 'battery'))
         peer.behaviour.silent = True
         assert found(check_port(path), 'robot').severity is Severity.ERROR
@@ -170,7 +170,7 @@ def test_a_simulated_robot_is_asked(isolation: Isolation, tmp_path: Path) -> Non
         robot.wait_for(f'at {link}')
         assert list(port_users(os.path.realpath(link))) == []
         findings = list(check_port(str(link)))
-        assert 'new protocol at 2000000 baud' in found(findings, 'robot').message
+        assert 'protocol v2 at 2000000 baud' in found(findings, 'robot').message
         assert found(findings, 'battery').severity is Severity.GOOD
         assert robot.is_running()
 

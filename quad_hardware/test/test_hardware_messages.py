@@ -118,7 +118,7 @@ def odometry(state: OdometryState, frames: Frames) -> Odometry:
 
 
 def test_joints_are_stamped_when_they_were_measured() -> None:
-    """The old protocol asks for them 8 ms before the IMU; who differentiates must know."""
+    """Protocol v1 asks for them 8 ms before the IMU; who differentiates must know."""
     urdf = robot_urdf('lite')
     joints = JointMap(servo_of(joint) for joint in movable_joints(urdf))
     angles = dict.fromkeys(LEG_MOTORS, 0.0)
@@ -211,7 +211,7 @@ def test_an_unknown_charge_is_nan() -> None:
 def link_status(**changes: object) -> LinkStatus:
     """A link that runs, but for what is changed."""
     status = LinkStatus(
-        LinkState.RUNNING, 'reports arrive', 'new', 2_000_000, 'L-2', 1, 0.01, 5, 0,
+        LinkState.RUNNING, 'reports arrive', 'v2', 2_000_000, 'L-2', 1, 0.01, 5, 0,
         ParserCounters(frames=1000), DialectCounters(),
     )  # fmt: skip
     return replace(status, **changes)  # type: ignore[arg-type]

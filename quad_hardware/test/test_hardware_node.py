@@ -18,7 +18,7 @@ from std_srvs.srv import SetBool
 from quad_description import movable_joints, Pose, pose_positions, robot_urdf
 from quad_hardware.joints import LimiterSettings
 from quad_hardware.joints.command import LONGEST_PERIOD
-from quad_hardware.protocol import BULK_READ_ORDER, MOTOR_ORDER, NEW, OLD, Protocol
+from quad_hardware.protocol import BULK_READ_ORDER, MOTOR_ORDER, Protocol, V1, V2
 from quad_node_rig import NodeRig, TIMEOUT
 
 pytestmark = [pytest.mark.scenario, pytest.mark.xdist_group('hardware_node')]
@@ -31,7 +31,7 @@ LEGS_ORDER = [13, 12, 11, 23, 22, 21, 43, 42, 41, 33, 32, 31]
 
 @pytest.fixture(scope='module')
 def shared_rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[NodeRig]:
-    """The node with a robot of the new protocol, started once."""
+    """The node with a robot of protocol v2, started once."""
     with reserve() as isolation, NodeRig(isolation, tmp_path_factory.mktemp('port')) as rig:
         yield rig
 
@@ -252,13 +252,13 @@ def test_torque_is_taken_and_given_by_service(rig: NodeRig) -> None:
     assert rig.peer.commands[-1][11] == pytest.approx(20.0, abs=0.01)
 
 
-@pytest.mark.parametrize('protocol', [NEW, OLD], ids=lambda protocol: protocol.name)
+@pytest.mark.parametrize('protocol', [V2, V1], ids=lambda protocol: protocol.name)
 def test_torque_comes_back_where_the_arm_is(
     isolation: Isolation, tmp_path: Path, protocol: Protocol
 ) -> None:
     """Every servo that is reported is told its place before it wakes; an arm would snap back."""
     torque = '/hardware_node/torque'
-    reported = set(MOTOR_ORDER if protocol is NEW else BULK_READ_ORDER)
+    reported = set(MOTOR_ORDER if protocol is V2 else BULK_READ_ORDER)
     with NodeRig(isolation, tmp_path, '-p', 'arm:=true', protocol=protocol) as rig:
         assert rig.client.call(SetBool, torque, SetBool.Request(data=False)).success
         rig.client.spin_until(lambda: not rig.peer.torque, TIMEOUT, 'torque off')

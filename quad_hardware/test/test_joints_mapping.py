@@ -14,8 +14,8 @@ import pytest
 from quad_description import movable_joints, robot_urdf
 from quad_hardware.exceptions import CommandError
 from quad_hardware.joints import JointMap, JointServo, servo_of
-from quad_hardware.link.new_dialect import NewDialect
-from quad_hardware.link.old_dialect import OldDialect
+from quad_hardware.link.v1_dialect import V1Dialect
+from quad_hardware.link.v2_dialect import V2Dialect
 from quad_hardware.protocol import LEG_MOTORS, Model
 
 ARM = movable_joints(robot_urdf('lite', arm=True))
@@ -53,7 +53,7 @@ def test_every_joint_of_the_robot_has_its_motor() -> None:
 
 
 def test_servos_that_are_not_reported_are_left_out() -> None:
-    """The old protocol does not read motor 54; nothing is made up for its joint."""
+    """Protocol v1 does not read motor 54; nothing is made up for its joint."""
     joints = JointMap(servo_of(joint) for joint in ARM)
     angles = dict.fromkeys(LEG_MOTORS, 90.0)
     assert joints.positions(angles) == dict.fromkeys(joints.names[:12], pytest.approx(math.pi / 2))
@@ -107,7 +107,7 @@ def test_every_target_fits_into_a_frame(
     for model in Model:
         for position in (servo.lower, servo.upper):
             angles = {**dict.fromkeys(LEG_MOTORS, 0.0), servo.motor: servo.angle(position)}
-            for dialect in (NewDialect(0.0), OldDialect(0.0, model)):
+            for dialect in (V2Dialect(0.0), V1Dialect(0.0, model)):
                 dialect.command(angles)
 
 

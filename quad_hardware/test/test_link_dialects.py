@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 import pytest
 
 from quad_hardware.link.dialect import Dialect
-from quad_hardware.link.new_dialect import ASK_AGAIN, NewDialect
-from quad_hardware.link.old_dialect import HOST_GAP, OldDialect
 from quad_hardware.link.unseen_servo import LOWEST_RATE, UnseenServo
+from quad_hardware.link.v1_dialect import HOST_GAP, V1Dialect
+from quad_hardware.link.v2_dialect import ASK_AGAIN, V2Dialect
 from quad_hardware.protocol import (
     ANGLE_SPANS,
     BULK_READ_ORDER,
@@ -27,19 +27,19 @@ from quad_hardware.protocol import (
     LEG_MOTORS,
     Model,
     MOTOR_ORDER,
-    NEW,
-    OLD,
     Register,
     StreamParser,
+    V1,
+    V2,
 )
 from quad_hardware.report import Report
 
 LEGS = dict.fromkeys(LEG_MOTORS, 10.0)
-IMU = OLD.functions[Register.IMU]
+IMU = V1.functions[Register.IMU]
 
 
 def answer(frame: Frame) -> Frame:
-    """What a robot of the old protocol answers."""
+    """What a robot of protocol v1 answers."""
     if frame.address == Register.IMU:
         payload = IMU.pack(acceleration=(0, 0, 9.8), rate=(0, 0, 10.0), attitude=(1.0, 2.0, 3.0))
     else:
@@ -48,12 +48,12 @@ def answer(frame: Frame) -> Frame:
 
 
 class OldRig:
-    """A robot of the old protocol in virtual time: answers when request and answer are over."""
+    """A robot of protocol v1 in virtual time: answers when request and answer are over."""
 
     def __init__(self, latency: float = 0.002) -> None:
         """Begin at time zero."""
         self.now = 0.0
-        self.dialect: Dialect[Frame] = OldDialect(self.now)
+        self.dialect: Dialect[Frame] = V1Dialect(self.now)
         self.latency = latency
         self.lose_each = 0
         self._asked = 0
@@ -61,7 +61,7 @@ class OldRig:
         self.states: list[Report] = []
         self.angles_at: list[float] = []  # [s] when half an answer about the motors was there
         self._answers: list[tuple[float, Frame]] = []
-        self._parser = StreamParser(OLD, HOST_KINDS)
+        self._parser = StreamParser(V1, HOST_KINDS)
 
     def _answers_to(self, frame: Frame) -> bool:
         if frame.kind is not Kind.READ or self.latency == math.inf:
@@ -78,12 +78,12 @@ class OldRig:
                 self.sent.append((self.now, frame))
                 if self._answers_to(frame):
                     reply = answer(frame)
-                    wire = OLD.wire_time(len(step.send) + len(reply.encode(OLD)))
+                    wire = V1.wire_time(len(step.send) + len(reply.encode(V1)))
                     self._answers.append((self.now + wire + self.latency, reply))
             if self._answers and self._answers[0][0] <= max(step.wake, self.now):
                 self.now, reply = self._answers.pop(0)
                 if reply.address == Register.MOTORS:
-                    self.angles_at.append(self.now - OLD.wire_time(len(reply.encode(OLD))) / 2)
+                    self.angles_at.append(self.now - V1.wire_time(len(reply.encode(V1))) / 2)
                 state = self.dialect.handle_frame(reply, self.now)
                 self.states += [state] if state else []
             else:
@@ -130,7 +130,7 @@ def test_commands_of_the_old_protocol_fit_into_50_hz() -> None:
     assert writes[0].payload[0] == span.encode(10.0)
     assert len(rig.states) >= 49
     for (t0, frame), (t1, _) in zip(rig.sent, rig.sent[1:], strict=False):
-        wire = OLD.wire_time(len(frame.encode(OLD)))
+        wire = V1.wire_time(len(frame.encode(V1)))
         assert t1 - t0 >= wire + HOST_GAP - 1e-9
 
 
@@ -244,9 +244,9 @@ def test_a_lost_answer_costs_little_on_a_quick_board() -> None:
 
 def test_half_a_report_is_no_report() -> None:
     """An IMU answer without the angles of its period gives nothing."""
-    dialect = OldDialect(0.0)
+    dialect = V1Dialect(0.0)
     motors = dialect.step(0.0)
-    (request,) = StreamParser(OLD, HOST_KINDS).feed(motors.send)
+    (request,) = StreamParser(V1, HOST_KINDS).feed(motors.send)
     assert dialect.handle_frame(Frame(Kind.REPLY, Register.IMU, bytes(24)), 0.001) is None
     assert dialect.counters.unusable == 1
     assert dialect.handle_frame(answer(request), 0.002) is None
@@ -256,7 +256,7 @@ def test_half_a_report_is_no_report() -> None:
 
 def test_a_command_withdrawn_is_not_sent() -> None:
     """In either protocol."""
-    for dialect in (OldDialect(0.0), NewDialect(0.0)):
+    for dialect in (V1Dialect(0.0), V2Dialect(0.0)):
         dialect.step(0.0)
         dialect.command(LEGS)
         dialect.torque(on=False)
@@ -268,8 +268,8 @@ def test_a_command_withdrawn_is_not_sent() -> None:
 
 def test_the_new_protocol_asks_until_states_come() -> None:
     """Feedback is switched on at the start, and again whenever it stops."""
-    dialect = NewDialect(0.0)
-    asked = [f.address for f in StreamParser(NEW, HOST_KINDS).feed(dialect.step(0.0).send)]
+    dialect = V2Dialect(0.0)
+    asked = [f.address for f in StreamParser(V2, HOST_KINDS).feed(dialect.step(0.0).send)]
     assert asked == [Code.FEEDBACK_RATE, Code.FEEDBACK]
     assert dialect.step(ASK_AGAIN / 2).send == b''
     assert dialect.handle_frame(Feedback().frame(), ASK_AGAIN / 2) is not None
@@ -280,18 +280,18 @@ def test_the_new_protocol_asks_until_states_come() -> None:
 @given(st.dictionaries(st.sampled_from(MOTOR_ORDER), st.floats(-180, 180), min_size=1))
 def test_a_command_of_the_new_protocol_is_one_frame(angles: dict[int, float]) -> None:
     """All servos at once, to a hundredth of a degree."""
-    dialect = NewDialect(0.0)
+    dialect = V2Dialect(0.0)
     dialect.step(0.0)
     dialect.command(angles)
-    (frame,) = StreamParser(NEW, HOST_KINDS).feed(dialect.step(0.001).send)
-    values = NEW.functions[Code.SERVOS].unpack(frame.payload)
+    (frame,) = StreamParser(V2, HOST_KINDS).feed(dialect.step(0.001).send)
+    values = V2.functions[Code.SERVOS].unpack(frame.payload)
     sent = dict(zip(values['motor'], values['angle'], strict=True))
     assert sent == pytest.approx(angles, abs=0.0051)
 
 
 def test_lost_states_are_counted_by_their_sequence() -> None:
     """Across the wrap; a robot that restarted lost nothing; frames cut short do not count."""
-    dialect = NewDialect(0.0)
+    dialect = V2Dialect(0.0)
     for sequence in (65533, 65535, 0, 3):
         dialect.handle_frame(Feedback(sequence=sequence).frame(), 0.0)
     assert dialect.counters.lost == 3

@@ -16,9 +16,9 @@ import serial
 from quad_hardware.exceptions import LinkError
 from quad_hardware.link import Driver, LinkOptions, LinkState, SerialPort
 from quad_hardware.link.dialect import Dialect
-from quad_hardware.link.new_dialect import NewDialect
-from quad_hardware.link.old_dialect import OldDialect
-from quad_hardware.protocol import LEG_MOTORS, NEW, OLD
+from quad_hardware.link.v1_dialect import V1Dialect
+from quad_hardware.link.v2_dialect import V2Dialect
+from quad_hardware.protocol import LEG_MOTORS, V1, V2
 from quad_hardware.report import Report
 from quad_pty_peer import PtyPeer
 
@@ -64,7 +64,7 @@ def wait_for(condition: Callable[[], bool], what: str) -> None:
         time.sleep(0.002)
 
 
-@pytest.fixture(params=[NEW, OLD], ids=lambda protocol: protocol.name)
+@pytest.fixture(params=[V2, V1], ids=lambda protocol: protocol.name)
 def rig(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Rig]:
     """A running driver with a robot of either protocol."""
     with PtyPeer(tmp_path / 'port', request.param) as peer:
@@ -103,7 +103,7 @@ def test_an_adapter_is_asked_to_keep_nothing_back(
     asked: list[bool] = []
     monkeypatch.setattr(serial.Serial, 'set_low_latency_mode', lambda _, on: asked.append(on))
     with PtyPeer(tmp_path / 'port') as peer:
-        SerialPort(str(peer.link), NEW.baud).close()
+        SerialPort(str(peer.link), V2.baud).close()
     assert asked == [True]
 
 
@@ -158,7 +158,7 @@ def test_no_command_slips_through_when_the_robot_falls_silent(
     def command_meanwhile(_: Dialect[Any]) -> None:
         answers.append((rig.driver.command(LEGS), rig.driver.torque(on=False)))
 
-    for dialect in (NewDialect, OldDialect):
+    for dialect in (V2Dialect, V1Dialect):
         monkeypatch.setattr(dialect, 'cancel_pending', command_meanwhile)
     rig.reports(1)
     rig.peer.behaviour.silent = True
@@ -242,7 +242,7 @@ def test_damaged_bytes_cost_reports_and_nothing_else(rig: Rig) -> None:
 
 def test_a_rider_is_not_taken_for_a_dog(tmp_path: Path) -> None:
     """A firmware without legs is refused by name; nothing is sent to it."""
-    with PtyPeer(tmp_path / 'port', OLD, firmware='R-3.0') as peer:
+    with PtyPeer(tmp_path / 'port', V1, firmware='R-3.0') as peer:
         rig = Rig(peer)
         rig.driver.start()
         wait_for(

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The driver through a library with the vendor's public names, to a robot of the new protocol."""
+"""The driver through a library with the vendor's public names, to a robot of protocol v2."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from quad_hardware.exceptions import CommandError, LinkError
 from quad_hardware.link import Driver, LinkOptions, LinkState
 from quad_hardware.link.session import open_session
 from quad_hardware.nodes import parameters
-from quad_hardware.protocol import LEG_MOTORS, NEW
+from quad_hardware.protocol import LEG_MOTORS, V2
 from quad_hardware.report import Report
 from quad_pty_peer import PtyPeer
 
@@ -29,7 +29,7 @@ METHOD = 'write_servo_angle'  # of our stand-in; what the vendor calls it is not
 
 @pytest.fixture
 def peer(tmp_path: Path) -> Iterator[PtyPeer]:
-    """A robot of the new protocol."""
+    """A robot of protocol v2."""
     with PtyPeer(tmp_path / 'port') as peer:
         yield peer
 
@@ -86,7 +86,7 @@ def test_a_method_that_is_not_there_is_refused(peer: PtyPeer, method: str) -> No
 
 def test_no_other_way_is_tried(tmp_path: Path) -> None:
     """Where the library finds no robot, nobody else looks for one."""
-    options = LinkOptions(str(tmp_path / 'none'), (NEW,), vendor=True, vendor_method=METHOD)
+    options = LinkOptions(str(tmp_path / 'none'), (V2,), vendor=True, vendor_method=METHOD)
     with pytest.raises(LinkError, match='xgo_lib2 cannot open'):
         open_session(options)
 
@@ -125,8 +125,8 @@ def test_what_would_have_to_be_guessed_is_refused(
     ('installed', 'overrides', 'vendor'),
     [
         (False, (), False),
-        (True, ('protocol:=new',), False),
-        (True, ('protocol:=old',), False),
+        (True, ('protocol:=v2',), False),
+        (True, ('protocol:=v1',), False),
         (True, ('protocol:=vendor', f'vendor_servo_method:={METHOD}'), True),
     ],
 )

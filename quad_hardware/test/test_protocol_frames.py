@@ -18,14 +18,14 @@ from quad_hardware.protocol import (
     Frame,
     HOST_KINDS,
     Kind,
-    NEW,
-    OLD,
     Protocol,
     Register,
     ROBOT_KINDS,
     STATE,
     StreamParser,
     Torque,
+    V1,
+    V2,
 )
 from quad_protocol_strategies import frames, PROTOCOLS
 
@@ -63,24 +63,24 @@ GOLDEN = [
 
 @pytest.mark.parametrize(('frame', 'text'), GOLDEN)
 def test_the_vendors_frames_are_made_and_read(frame: Frame, text: str) -> None:
-    """The golden frames of the old protocol, byte for byte, in both directions."""
+    """The golden frames of protocol v1, byte for byte, in both directions."""
     wire = bytes.fromhex(text)
-    assert frame.encode(OLD) == wire
-    assert StreamParser(OLD, KINDS).feed(wire) == [frame]
+    assert frame.encode(V1) == wire
+    assert StreamParser(V1, KINDS).feed(wire) == [frame]
 
 
 def test_the_state_frame_is_as_stated() -> None:
     """254 bytes in all, and the valid attitude at offsets 20 to 31."""
-    wire = Feedback(attitude=(1.5, -2.0, 90.0)).frame().encode(NEW)
+    wire = Feedback(attitude=(1.5, -2.0, 90.0)).frame().encode(V2)
     assert len(wire) == 254
     assert wire[:2] + wire[-2:] == bytes.fromhex('55 00 00 AA')
     assert struct.unpack_from('<3f', wire, 6 + 20) == (1.5, -2.0, 90.0)
-    assert NEW.wire_time(len(wire)) == pytest.approx(1.27e-3)
+    assert V2.wire_time(len(wire)) == pytest.approx(1.27e-3)
 
 
 def test_feedback_on_is_the_documented_frame() -> None:
     """The example of the assumed layout."""
-    wire = Frame(Kind.WRITE, Code.FEEDBACK, b'\x01').encode(NEW)
+    wire = Frame(Kind.WRITE, Code.FEEDBACK, b'\x01').encode(V2)
     assert wire == bytes.fromhex('55 00 0A 00 01 03 01 F0 00 AA')
 
 
@@ -94,8 +94,8 @@ def test_every_frame_survives_its_bytes(data: st.DataObject, protocol: Protocol)
 def test_what_does_not_fit_is_refused_with_the_reason() -> None:
     """Too much payload, a kind the protocol lacks, an address that is too large."""
     with pytest.raises(CodecError, match='takes 247'):
-        Frame(Kind.WRITE, 0x50, bytes(248)).encode(OLD)
+        Frame(Kind.WRITE, 0x50, bytes(248)).encode(V1)
     with pytest.raises(CodecError, match='no frame of kind PUSH'):
-        Frame(Kind.PUSH, STATE.address).encode(OLD)
-    with pytest.raises(CodecError, match='0x110 does not fit the old'):
-        Frame(Kind.READ, STATE.address).encode(OLD)
+        Frame(Kind.PUSH, STATE.address).encode(V1)
+    with pytest.raises(CodecError, match='0x110 does not fit protocol v1'):
+        Frame(Kind.READ, STATE.address).encode(V1)

@@ -15,16 +15,16 @@ from quad_hardware.protocol import (
     Frame,
     HOST_KINDS,
     Kind,
-    NEW,
-    OLD,
     Protocol,
     ROBOT_KINDS,
     StreamParser,
+    V1,
+    V2,
 )
 from quad_protocol_strategies import cut, frames, PROTOCOLS
 
 KINDS = HOST_KINDS | ROBOT_KINDS
-STATE_WIRE = Feedback(sequence=7).frame().encode(NEW)
+STATE_WIRE = Feedback(sequence=7).frame().encode(V2)
 
 
 @given(st.data(), PROTOCOLS)
@@ -79,7 +79,7 @@ def test_pieces_make_no_difference(data: bytes, protocol: Protocol) -> None:
     assert whole.counters == single.counters
 
 
-@pytest.mark.parametrize('protocol', [OLD, NEW], ids=lambda protocol: protocol.name)
+@pytest.mark.parametrize('protocol', [V1, V2], ids=lambda protocol: protocol.name)
 def test_a_megabyte_of_noise_is_survived(protocol: Protocol) -> None:
     """1 MB of random bytes with frames in between: every frame comes out, memory stays small."""
     rng = random.Random(1)
@@ -97,7 +97,7 @@ def test_a_megabyte_of_noise_is_survived(protocol: Protocol) -> None:
 
 def test_the_worst_noise_costs_no_memory() -> None:
     """A stream of nothing but headers keeps less than a frame."""
-    parser = StreamParser(NEW, KINDS)
+    parser = StreamParser(V2, KINDS)
     for noise in (b'\x55\x00' * 5000, b'\x55' * 5000, b'\x55\x00\xfe\x20' * 5000):
         parser.feed(noise)
         assert parser.pending < 255
@@ -108,7 +108,7 @@ def test_a_flipped_byte_costs_one_frame_only(position: int, flip: int) -> None:
     """Between two whole frames, a damaged one is dropped and nothing else."""
     damaged = bytearray(STATE_WIRE)
     damaged[position] ^= flip
-    parser = StreamParser(NEW, ROBOT_KINDS)
+    parser = StreamParser(V2, ROBOT_KINDS)
     found = parser.feed(STATE_WIRE + bytes(damaged) + STATE_WIRE) + parser.expire()
     assert found == [Feedback(sequence=7).frame()] * 2
     assert parser.counters.skipped == len(STATE_WIRE)
@@ -116,6 +116,6 @@ def test_a_flipped_byte_costs_one_frame_only(position: int, flip: int) -> None:
 
 def test_the_other_sides_frames_are_no_frames() -> None:
     """A host that hears its own echo does not take it for an answer."""
-    parser = StreamParser(OLD, ROBOT_KINDS)
-    assert parser.feed(Frame(Kind.READ, 1, b'\x01').encode(OLD)) == []
+    parser = StreamParser(V1, ROBOT_KINDS)
+    assert parser.feed(Frame(Kind.READ, 1, b'\x01').encode(V1)) == []
     assert parser.counters.bad_kind == 1

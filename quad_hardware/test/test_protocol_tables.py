@@ -27,18 +27,18 @@ from quad_hardware.protocol import (
     MOTOR_OF_JOINT,
     MOTOR_OF_REGISTER,
     MOTOR_ORDER,
-    NEW,
-    OLD,
     Register,
     REGISTER_OF_MOTOR,
     Scalar,
     scatter,
     slot_of,
     Span,
+    V1,
+    V2,
 )
 from quad_hardware.protocol.page import protocol_page
 
-ROWS = [*OLD.functions.values(), *NEW.functions.values()]
+ROWS = [*V1.functions.values(), *V2.functions.values()]
 SPANS = [span for row in ROWS for span in row.spans.values()]
 FLOATS = st.floats(width=32, allow_nan=False, allow_infinity=False)
 
@@ -65,7 +65,7 @@ def test_payloads_survive(data: st.DataObject, row: Function) -> None:
 @given(st.lists(st.tuples(st.integers(0, 255), st.floats(-327, 327)), min_size=1, max_size=16))
 def test_groups_in_one_go_are_groups_one_by_one(groups: list[tuple[int, float]]) -> None:
     """The same bytes; and what does not fit is refused by the name of the row."""
-    row = NEW.functions[Code.SERVOS]
+    row = V2.functions[Code.SERVOS]
     one_by_one = [row.pack(motor=(motor,), angle=(angle,)) for motor, angle in groups]
     assert row.pack_groups(groups) == b''.join(one_by_one)
     for wrong in (400.0, math.nan):
@@ -99,7 +99,7 @@ def test_a_byte_is_the_nearest_one(span: Span, value: float) -> None:
 
 def test_zero_of_a_symmetric_range_is_the_neutral_byte() -> None:
     """0x80 stops, as the vendor's documents say (its library sends 0x7F)."""
-    assert OLD.functions[Register.VX].spans[Model.LITE].encode(0.0) == 0x80
+    assert V1.functions[Register.VX].spans[Model.LITE].encode(0.0) == 0x80
 
 
 def test_nan_has_no_byte() -> None:
@@ -144,7 +144,7 @@ def test_a_slot_may_hold_anything() -> None:
 
 def test_refusals_name_row_field_and_need() -> None:
     """Wrong counts, names, values and lengths say what would have been right."""
-    servos = NEW.functions[Code.SERVOS]
+    servos = V2.functions[Code.SERVOS]
     with pytest.raises(CodecError, match='servos: angle missing or unknown'):
         servos.pack(motor=(11,))
     with pytest.raises(CodecError, match='angle: 2 values given, 1 needed'):

@@ -16,7 +16,7 @@ from quad_hardware.backend import SerialBackend
 from quad_hardware.exceptions import CommandError, NoAnswerError
 from quad_hardware.joints import JointMap, servo_of
 from quad_hardware.link import LinkOptions
-from quad_hardware.protocol import LEG_MOTORS, NEW, OLD, Protocol
+from quad_hardware.protocol import LEG_MOTORS, Protocol, V1, V2
 from quad_hardware.serial_robot import RobotSettings
 from quad_pty_peer import PtyPeer
 
@@ -26,7 +26,7 @@ POSE = pose_positions(Pose.STAND)
 STAND = [POSE[name] for name in JOINTS.names]
 
 
-@pytest.fixture(params=[NEW, OLD], ids=lambda protocol: protocol.name)
+@pytest.fixture(params=[V2, V1], ids=lambda protocol: protocol.name)
 def peer(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[PtyPeer]:
     """A robot without physics."""
     protocol: Protocol = request.param

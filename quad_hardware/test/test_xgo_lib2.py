@@ -17,7 +17,7 @@ from xgo_lib2.errors import XgoError, XgoNotSupportedError, XgoTimeoutError
 from xgo_lib2.feedback import DeviceState, SendStateParser
 from xgo_lib2.registry import feedback_slot_of
 
-from quad_hardware.protocol import Feedback, LEG_MOTORS, NEW, OLD
+from quad_hardware.protocol import Feedback, LEG_MOTORS, V1, V2
 from quad_pty_peer import PtyPeer
 
 ROOT = Path(__file__).parents[1]
@@ -42,7 +42,7 @@ for st in parser.feed_bytes(ser.read(4096)):
 """
 
 
-@pytest.fixture(params=[NEW, OLD], ids=lambda protocol: protocol.name)
+@pytest.fixture(params=[V2, V1], ids=lambda protocol: protocol.name)
 def peer(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[PtyPeer]:
     """A robot of either protocol."""
     with PtyPeer(tmp_path / 'port', request.param) as peer:
@@ -50,19 +50,19 @@ def peer(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[PtyPeer]:
 
 
 @pytest.fixture
-def new_peer(tmp_path: Path) -> Iterator[PtyPeer]:
-    """A robot of the new protocol."""
+def v2_peer(tmp_path: Path) -> Iterator[PtyPeer]:
+    """A robot of protocol v2."""
     with PtyPeer(tmp_path / 'port') as peer:
         yield peer
 
 
 def test_the_articles_snippets_run_as_printed(
-    new_peer: PtyPeer, capsys: pytest.CaptureFixture[str]
+    v2_peer: PtyPeer, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Version and battery, states switched on, then 16 angles in each of them."""
-    exec(CLIENT.replace('PORT', str(new_peer.link)), {})  # noqa: S102
+    exec(CLIENT.replace('PORT', str(v2_peer.link)), {})  # noqa: S102
     assert capsys.readouterr().out == 'L-2.0.0 80\n'
-    with serial.Serial(str(new_peer.link), 2_000_000, timeout=0.2) as ser:
+    with serial.Serial(str(v2_peer.link), 2_000_000, timeout=0.2) as ser:
         names: dict[str, object] = {'ser': ser}
         exec(FEEDBACK, names)  # noqa: S102
     state = names['st']
@@ -77,7 +77,7 @@ def test_either_protocol_is_found_and_used(peer: PtyPeer) -> None:
     with XgoDog(str(peer.link)) as dog:
         assert dog.protocol == peer.protocol.name
         assert (dog.read_version(), dog.system_read_battery()) == ('L-2.0.0', 80)
-        if dog.protocol == 'new':
+        if dog.protocol == 'v2':
             dog.system_set_feedback(1)
         imu = dog.read_imu()
         assert (imu.roll, imu.pitch, imu.yaw) == (1.5, -2.5, 90.0)
@@ -89,8 +89,8 @@ def test_either_protocol_is_found_and_used(peer: PtyPeer) -> None:
 
 
 def test_what_a_robot_cannot_do_is_said(tmp_path: Path) -> None:
-    """The old protocol pushes nothing; a silent port is a time-out; no port names the remedy."""
-    with PtyPeer(tmp_path / 'port', OLD) as peer:
+    """Protocol v1 pushes nothing; a silent port is a time-out; no port names the remedy."""
+    with PtyPeer(tmp_path / 'port', V1) as peer:
         with XgoDog(str(peer.link)) as dog, pytest.raises(XgoNotSupportedError, match='read_imu'):
             dog.system_set_feedback(1)
         peer.behaviour.silent = True
@@ -100,27 +100,27 @@ def test_what_a_robot_cannot_do_is_said(tmp_path: Path) -> None:
         XgoDog(str(tmp_path / 'nothing'))
 
 
-def test_a_wrong_motor_or_angle_is_refused(new_peer: PtyPeer) -> None:
+def test_a_wrong_motor_or_angle_is_refused(v2_peer: PtyPeer) -> None:
     """Nothing is sent, not even for the motors that are right."""
-    with XgoDog(str(new_peer.link)) as dog:
+    with XgoDog(str(v2_peer.link)) as dog:
         with pytest.raises(ValueError, match='no motor has id 14'):
             dog.write_servo_angles({11: 1.0, 14: 1.0})
         with pytest.raises(ValueError, match='motor 12: nan'):
             dog.write_servo_angles({11: 1.0, 12: float('nan')})
         assert dog.read_version()
-    assert new_peer.commands == []
+    assert v2_peer.commands == []
 
 
-def test_a_port_has_one_user(new_peer: PtyPeer) -> None:
+def test_a_port_has_one_user(v2_peer: PtyPeer) -> None:
     """A second program is told that the port is taken, and does not steal bytes."""
-    with XgoDog(str(new_peer.link)), pytest.raises(XgoError, match='another program has it open'):
-        XgoDog(str(new_peer.link))
+    with XgoDog(str(v2_peer.link)), pytest.raises(XgoError, match='another program has it open'):
+        XgoDog(str(v2_peer.link))
 
 
 def test_slots_of_the_feedback() -> None:
     """Motors stand in the order of their ids, and the states are in that order."""
     assert [feedback_slot_of(motor) for motor in LEG_MOTORS] == list(range(12))
-    wire = Feedback(position=tuple(float(n) for n in range(16))).frame().encode(NEW)
+    wire = Feedback(position=tuple(float(n) for n in range(16))).frame().encode(V2)
     (state,) = SendStateParser().feed_bytes(b'\x55\x00noise' + wire)
     assert state.joint_pos_deg[feedback_slot_of(21)] == 3.0
 

@@ -21,10 +21,10 @@ from quad_hardware.protocol import (
     Kind,
     Model,
     model_of_firmware,
-    NEW,
     Register,
     REGISTER_OF_MOTOR,
     slot_of,
+    V2,
 )
 
 from .errors import XgoError, XgoNotSupportedError, XgoTimeoutError
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from typing_extensions import Self
 
 TIMEOUT = 0.5  # [s] for an answer
-HOST_GAP = 0.001  # [s] between commands of the old protocol
+HOST_GAP = 0.001  # [s] between commands of protocol v1
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +86,7 @@ class XgoDog:
         Raises:
             XgoError: The robot does not answer, or the port was lost.
         """
-        if self._is_new:
+        if self._is_v2:
             answer = self._ask(Frame(Kind.READ, Code.VERSION), 10)
         else:
             answer = self._read_register(Register.FIRMWARE, 10)
@@ -98,7 +98,7 @@ class XgoDog:
         Raises:
             XgoError: The robot does not answer, or the port was lost.
         """
-        if self._is_new:
+        if self._is_v2:
             return self._ask(Frame(Kind.READ, Code.BATTERY), 1)[0]
         return self._read_register(Register.BATTERY, 1)[0]
 
@@ -106,13 +106,12 @@ class XgoDog:
         """Have the robot push its state about 50 times a second (1), or no longer (0).
 
         Raises:
-            XgoNotSupportedError: It speaks the old protocol, which is polled.
+            XgoNotSupportedError: It speaks protocol v1, which is polled.
             XgoError: The port was lost.
         """
-        if not self._is_new:
+        if not self._is_v2:
             raise XgoNotSupportedError(
-                'a robot of the old protocol pushes nothing; ask with read_imu and '
-                'read_servo_angles'
+                'a robot of protocol v1 pushes nothing; ask with read_imu and read_servo_angles'
             )
         self._send(Frame(Kind.WRITE, Code.FEEDBACK, bytes((bool(on),))))
 
@@ -140,9 +139,9 @@ class XgoDog:
         """Return attitude and acceleration.
 
         Raises:
-            XgoError: The robot does not answer; in the new protocol, it pushes no states.
+            XgoError: The robot does not answer; in protocol v2, it pushes no states.
         """
-        if self._is_new:
+        if self._is_v2:
             self._states.clear()
             state = self.read_state()
             return Imu(state.roll, state.pitch, state.yaw, state.acceleration)
@@ -179,8 +178,8 @@ class XgoDog:
             slot_of(motor)
             if not math.isfinite(angle):
                 raise ValueError(f'motor {motor}: {angle} is no angle')
-        if self._is_new:
-            servos = NEW.functions[Code.SERVOS]
+        if self._is_v2:
+            servos = V2.functions[Code.SERVOS]
             with _as_xgo_errors():
                 groups = (servos.pack(motor=(m,), angle=(a,)) for m, a in angles.items())
                 payload = b''.join(groups)
@@ -210,8 +209,8 @@ class XgoDog:
         self.close()
 
     @property
-    def _is_new(self) -> bool:
-        return self._connection.protocol is NEW
+    def _is_v2(self) -> bool:
+        return self._connection.protocol is V2
 
     @property
     def _model(self) -> Model:

@@ -11,11 +11,11 @@ from quad_hardware.protocol import (
     decode_feedback,
     Feedback,
     Kind,
-    NEW,
     ParserCounters,
     ROBOT_KINDS,
     STATE,
     StreamParser,
+    V2,
 )
 
 
@@ -51,7 +51,7 @@ class SendStateParser:
 
     def __init__(self) -> None:
         """Begin with an empty buffer."""
-        self._parser = StreamParser(NEW, ROBOT_KINDS)
+        self._parser = StreamParser(V2, ROBOT_KINDS)
 
     @property
     def counters(self) -> ParserCounters:

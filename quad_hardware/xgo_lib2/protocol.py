@@ -7,18 +7,22 @@ from quad_hardware.protocol import (
     Frame,
     HOST_KINDS,
     Kind,
-    NEW,
-    OLD,
     Protocol,
     ROBOT_KINDS,
     StreamParser,
+    V1,
+    V2,
 )
+
+NEW, OLD = V2, V1
 
 __all__ = [
     'HOST_KINDS',
     'NEW',
     'OLD',
     'ROBOT_KINDS',
+    'V1',
+    'V2',
     'Frame',
     'Kind',
     'Protocol',

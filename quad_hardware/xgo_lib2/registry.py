@@ -6,12 +6,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from quad_hardware.protocol import Function, MOTOR_ORDER, NEW, slot_of
+from quad_hardware.protocol import Function, MOTOR_ORDER, slot_of, V2
 
 MOTOR_IDS = MOTOR_ORDER
 
 FUNCTIONS: Mapping[tuple[int, int], Function] = {
-    divmod(address, 256): function for address, function in NEW.functions.items()
+    divmod(address, 256): function for address, function in V2.functions.items()
 }
 
 

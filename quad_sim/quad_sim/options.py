@@ -11,7 +11,7 @@ import math
 from pathlib import Path
 
 from quad_description import Pose, pose_positions, PRESETS, robot_urdf
-from quad_hardware.protocol import Model, NEW, OLD, Protocol
+from quad_hardware.protocol import Model, Protocol, protocol_argument, V1, V2
 
 from .board.board import Board
 from .board.servos import Mount
@@ -26,7 +26,7 @@ from .plant.terrain import Terrain
 DEFAULT_LINK = Path('/tmp/xgo')  # noqa: S108  the path that the documentation names
 SETTLE_TIME = 1.0  # [s] until a robot that was put down is at rest
 
-_PROTOCOLS: dict[str, tuple[Protocol, ...]] = {'both': (NEW, OLD), 'new': (NEW,), 'old': (OLD,)}
+_PROTOCOLS: dict[str, tuple[Protocol, ...]] = {'both': (V2, V1), V2.name: (V2,), V1.name: (V1,)}
 _NOISE = {'none': NONE, 'board': BOARD}
 
 
@@ -53,14 +53,21 @@ def parse_arguments(argv: Sequence[str]) -> argparse.Namespace:
     )
     add = parser.add_argument
     add('--link', type=Path, default=DEFAULT_LINK, help='path of the port (%(default)s)')
-    add('--protocol', choices=_PROTOCOLS, default='both', help='what the board speaks')
+    add(
+        '--protocol',
+        type=protocol_argument,
+        choices=_PROTOCOLS,
+        default='both',
+        help='what the board speaks',
+    )
     add('--baud', type=int, default=0, help='speed to assume [bit/s]; 0: what the host sets')
     add(
+        '--v1-baud',
         '--old-baud',
         type=int,
-        default=OLD.baud,
+        default=V1.baud,
         metavar='BAUD',
-        help='speed of the old protocol (%(default)s); programs have switched boards to others',
+        help='speed of protocol v1 (%(default)s); programs have switched boards to others',
     )
     add('--preset', choices=PRESETS, default='lite', help='the robot (%(default)s)')
     add('--arm', action='store_true', help='with the arm on its back')
@@ -78,8 +85,7 @@ def parse_arguments(argv: Sequence[str]) -> argparse.Namespace:
         type=float,
         default=0.0,
         metavar='S',
-        help='the board loses frames of '
-        'the old protocol that follow each other faster, e.g. 0.001',
+        help='the board loses frames of protocol v1 that follow each other faster, e.g. 0.001',
     )
     add('--fault', action='append', default=[], metavar='KIND,name=value', help=_fault_help())
     add('--seed', type=int, default=0, help='of noise and damage (%(default)s)')
@@ -108,7 +114,7 @@ def build(options: argparse.Namespace) -> Simulation:
     if len(options.firmware) > 10 or not options.firmware.isascii():
         raise SetupError(f'--firmware {options.firmware!r}: give up to 10 ASCII characters')
     faults = FaultPlan(parse_fault(text) for text in options.fault)
-    speeds = _choose_speeds(options.protocol, options.old_baud, options.baud)
+    speeds = _choose_speeds(options.protocol, options.v1_baud, options.baud)
     try:
         urdf = robot_urdf(options.preset, options.arm, options.trunk_mass)
     except ValueError as error:
@@ -176,15 +182,15 @@ def parse_mount(text: str) -> tuple[int, Mount]:
         raise SetupError(f'--mount {text!r}: give ID=SIGN,DEGREES, such as 12=-1,4.5') from None
 
 
-def _choose_speeds(name: str, old_baud: int, baud: int) -> Mapping[int, Protocol]:
+def _choose_speeds(name: str, v1_baud: int, baud: int) -> Mapping[int, Protocol]:
     protocols = _PROTOCOLS[name]
     own = {protocol: protocol.baud for protocol in protocols}
-    if old_baud <= 0:
-        raise SetupError(f'--old-baud {old_baud}: give bits a second, e.g. {OLD.baud}')
-    if OLD in protocols:
-        own[OLD] = old_baud
+    if v1_baud <= 0:
+        raise SetupError(f'--v1-baud {v1_baud}: give bits a second, e.g. {V1.baud}')
+    if V1 in protocols:
+        own[V1] = v1_baud
     if len(set(own.values())) < len(own):
-        raise SetupError(f'--old-baud {old_baud} is that of the new one; add --protocol old')
+        raise SetupError(f'--v1-baud {v1_baud} is that of v2; add --protocol v1')
     speeds = {speed: protocol for protocol, speed in own.items()}
     if baud and baud not in speeds:
         known = ', '.join(f'{speed} ({protocol.name})' for speed, protocol in speeds.items())

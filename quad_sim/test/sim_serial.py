@@ -12,7 +12,7 @@ import time
 
 import serial
 
-from quad_hardware.protocol import Frame, NEW, Protocol, ROBOT_KINDS, StreamParser
+from quad_hardware.protocol import Frame, Protocol, ROBOT_KINDS, StreamParser, V2
 from quad_sim.line.pseudo_terminal import PseudoTerminal
 from quad_sim.line.server import Server
 from quad_sim.options import build, parse_arguments, Simulation
@@ -51,7 +51,7 @@ def serve(link: Path, *arguments: str) -> Iterator[Served]:
 class Listener:
     """Collects the frames that a robot sends."""
 
-    def __init__(self, path: Path, protocol: Protocol = NEW) -> None:
+    def __init__(self, path: Path, protocol: Protocol = V2) -> None:
         """Open the port at the protocol's speed."""
         self.protocol = protocol
         self.port = serial.Serial(str(path), protocol.baud, timeout=0.05)

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from quad_hardware.protocol import Frame, NEW, Protocol, ROBOT_KINDS, StreamParser
+from quad_hardware.protocol import Frame, Protocol, ROBOT_KINDS, StreamParser, V2
 from quad_sim.options import build, parse_arguments
 
 TICK = 0.001  # [s]
@@ -13,7 +13,7 @@ TICK = 0.001  # [s]
 class VirtualRobot:
     """The robot that the arguments of fake_xgo describe; nothing here waits."""
 
-    def __init__(self, *arguments: str, protocol: Protocol = NEW) -> None:
+    def __init__(self, *arguments: str, protocol: Protocol = V2) -> None:
         """Build it and begin at time zero."""
         self.simulation = build(parse_arguments(list(arguments)))
         self.line = self.simulation.line

@@ -15,7 +15,7 @@ import serial
 from sim_serial import Listener, PATIENCE, serve
 from sim_virtual import VirtualRobot
 
-from quad_hardware.protocol import Code, decode_feedback, Fault, Frame, Kind, NEW
+from quad_hardware.protocol import Code, decode_feedback, Fault, Frame, Kind, V2
 from quad_sim import SetupError
 from quad_sim.line.faults import Fault as LineFault
 from quad_sim.line.faults import FaultKind, FaultPlan, make_fault, parse_fault
@@ -94,7 +94,7 @@ def test_silence_begins_and_ends() -> None:
     robot.send(ON)
     assert len(robot.run(1.0)) >= 48
     robot.run(0.01)
-    move = NEW.functions[Code.SERVO].pack(motor=(12,), angle=(33.0,))
+    move = V2.functions[Code.SERVO].pack(motor=(12,), angle=(33.0,))
     robot.send(Frame(Kind.WRITE, Code.SERVO, move))
     assert robot.run(0.4) == []
     back = [decode_feedback(frame.payload) for frame in robot.run(0.3)]
@@ -167,7 +167,7 @@ def test_a_dead_imu_says_no_number_and_the_servos_obey() -> None:
     assert dead.faults & Fault.IMU
     assert all(map(math.isnan, dead.attitude))
     robot.send(
-        Frame(Kind.WRITE, Code.SERVO, NEW.functions[Code.SERVO].pack(motor=(11,), angle=(20.0,)))
+        Frame(Kind.WRITE, Code.SERVO, V2.functions[Code.SERVO].pack(motor=(11,), angle=(20.0,)))
     )
     *_, after = (decode_feedback(frame.payload) for frame in robot.run(1.0))
     assert after.position[0] == pytest.approx(20.0, abs=1.0)
@@ -214,7 +214,7 @@ def test_the_same_bytes_at_the_same_times_have_the_same_answer() -> None:
         robot.send(ON)
         robot.run(0.1)
         robot.send(ON)
-        move = NEW.functions[Code.SERVO].pack(motor=(12,), angle=(50.0,))
+        move = V2.functions[Code.SERVO].pack(motor=(12,), angle=(50.0,))
         for _ in range(5):
             robot.send(Frame(Kind.WRITE, Code.SERVO, move))
             robot.run(0.1)

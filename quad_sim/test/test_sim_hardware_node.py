@@ -94,8 +94,8 @@ def test_a_fault_ends_in_standing_and_without_a_jump(
 
 
 def test_the_old_protocol_does_as_well(rig: XgoRig) -> None:
-    """The same robot, asked in its old protocol: the gyro is measured, joints are coarser."""
-    rig.restart('-p', 'protocol:=old')
+    """The same robot, asked in protocol v1: the gyro is measured, joints are coarser."""
+    rig.restart('-p', 'protocol:=v1')
     rig.stream(STAND, 1.2)
     assert list(rig.hear('/joint_states', 3).position) == pytest.approx(STAND, abs=0.1)
     covariance = rig.hear('/imu').angular_velocity_covariance

@@ -26,6 +26,7 @@ from std_srvs.srv import Trigger
 from quad_hardware.protocol import Code, decode_feedback, Frame, Kind
 from quad_msgs.srv import InjectFault, Push
 from quad_sim.fake_xgo import run, split_ros_arguments
+from quad_sim.options import parse_arguments
 
 PACKAGE = Path(__file__).parents[1]
 VERSION = Frame(Kind.READ, Code.VERSION)
@@ -95,6 +96,13 @@ def test_a_path_in_use_is_refused_and_a_dead_one_replaced(tmp_path: Path) -> Non
         assert process.wait(PATIENCE) == 0
 
 
+def test_former_names_are_accepted(capsys: pytest.CaptureFixture[str]) -> None:
+    """With a warning that has the present one."""
+    options = parse_arguments(['--protocol', 'old', '--old-baud', '2000000'])
+    assert (options.protocol, options.v1_baud) == ('v1', 2_000_000)
+    assert "is called 'v1' now" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize('package', ['quad_sim', 'quad_hardware'])
 def test_it_is_found_under_both_names(package: str) -> None:
     """``ros2 run quad_hardware fake_xgo`` is the name that others have printed."""
@@ -112,12 +120,12 @@ def test_it_is_found_under_both_names(package: str) -> None:
         (['--friction', '0'], 'friction 0'),
         (['--battery', '120'], 'give 0 to 100'),
         (['--firmware', 'much too long'], 'up to 10 ASCII'),
-        (['--protocol', 'old', '--baud', '2000000'], '115200 \\(old\\)'),
+        (['--protocol', 'v1', '--baud', '2000000'], '115200 \\(v1\\)'),
         (['--fault', 'fire'], 'there are drop'),
         (['--trunk-mass', '0'], 'trunk_mass'),
         (['--command-gap', '-1'], 'command-gap'),
-        (['--old-baud', '2000000'], 'add --protocol old'),
-        (['--old-baud', '0'], 'give bits a second'),
+        (['--v1-baud', '2000000'], 'add --protocol v1'),
+        (['--v1-baud', '0'], 'give bits a second'),
         (['--mount', '12'], 'give ID=SIGN,DEGREES'),
         (['--mount', '12=2'], 'sign 2'),
         (['--mount', '14=1'], 'no servo has id 14'),

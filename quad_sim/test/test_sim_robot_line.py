@@ -17,11 +17,11 @@ from quad_hardware.protocol import (
     Code,
     Frame,
     Kind,
-    NEW,
-    OLD,
     Protocol,
     Register,
     ROBOT_KINDS,
+    V1,
+    V2,
 )
 from quad_sim.board.board import LONGEST_LAG
 
@@ -30,10 +30,10 @@ pytestmark = pytest.mark.slow
 KINEMATIC = ('--physics', 'none', '--noise', 'none')
 LIMITS = movable_joints(robot_urdf('lite'))
 QUESTION = {
-    OLD: Frame(Kind.READ, Register.BATTERY, b'\x01'),
-    NEW: Frame(Kind.READ, Code.BATTERY),
+    V1: Frame(Kind.READ, Register.BATTERY, b'\x01'),
+    V2: Frame(Kind.READ, Code.BATTERY),
 }
-both = pytest.mark.parametrize('protocol', [OLD, NEW], ids=['old', 'new'])
+both = pytest.mark.parametrize('protocol', [V1, V2], ids=['v1', 'v2'])
 
 
 def answers(robot: VirtualRobot) -> bool:
@@ -103,35 +103,35 @@ def test_a_frame_may_come_in_any_two_pieces(protocol: Protocol, cut: int) -> Non
 
 
 @pytest.mark.parametrize(
-    'address', [a for a, f in OLD.functions.items() if Access.READ in f.access]
+    'address', [a for a, f in V1.functions.items() if Access.READ in f.access]
 )
 def test_every_register_that_can_be_read_has_as_many_bytes_as_were_asked_for(address: int) -> None:
     """The answer's length is that of the question, as the vendor's library relies on."""
-    robot = VirtualRobot(*KINEMATIC, protocol=OLD)
-    for count in (1, OLD.functions[address].length, 24):
+    robot = VirtualRobot(*KINEMATIC, protocol=V1)
+    for count in (1, V1.functions[address].length, 24):
         (answer,) = robot.ask(Frame(Kind.READ, address, bytes((count,))))
         assert (answer.kind, answer.address, len(answer.payload)) == (Kind.REPLY, address, count)
 
 
 def test_any_number_of_bytes_may_be_asked_for() -> None:
     """None and more than a frame takes are not answered; everything between is."""
-    robot = VirtualRobot(*KINEMATIC, protocol=OLD)
+    robot = VirtualRobot(*KINEMATIC, protocol=V1)
     for count in (0, 1, 2, 24, 100, 246, 247, 248, 255):
         robot.send(Frame(Kind.READ, Register.BATTERY, bytes((count,))))
         assert [len(f.payload) for f in robot.run(0.03)] == ([count] if 0 < count <= 247 else [])
 
 
 def test_the_old_protocol_may_run_at_another_speed() -> None:
-    """A board that a program has switched to 2 Mbaud hears the old protocol only there."""
-    robot = VirtualRobot(*KINEMATIC, '--protocol', 'old', '--old-baud', '2000000', protocol=OLD)
-    assert robot.ask(QUESTION[OLD]) == []
+    """A board that a program has switched to 2 Mbaud hears protocol v1 only there."""
+    robot = VirtualRobot(*KINEMATIC, '--protocol', 'v1', '--v1-baud', '2000000', protocol=V1)
+    assert robot.ask(QUESTION[V1]) == []
     robot.line.set_baud(2_000_000)
     assert answers(robot)
 
 
 def test_a_write_runs_through_the_registers() -> None:
     """Three bytes at VX are VX, VY and VYAW; walking and bulk angles do not disturb each other."""
-    robot = VirtualRobot(*KINEMATIC, protocol=OLD)
+    robot = VirtualRobot(*KINEMATIC, protocol=V1)
     robot.ask(Frame(Kind.WRITE, Register.VX, bytes((255, 0, 128))))
     ahead, aside, turning = robot.simulation.board.walker.command
     assert ahead > 0 > aside

@@ -11,7 +11,7 @@ import pytest
 from sim_virtual import VirtualRobot
 
 from quad_description import movable_joints, robot_urdf
-from quad_hardware.protocol import Frame, Kind, OLD, Register
+from quad_hardware.protocol import Frame, Kind, Register, V1
 
 NEUTRAL = 128
 MAX_TILT = math.radians(8.0)  # [rad]
@@ -20,8 +20,8 @@ JOINTS = movable_joints(robot_urdf('lite'))
 
 
 def standing(*arguments: str) -> VirtualRobot:
-    """A robot of the old protocol on its feet."""
-    return VirtualRobot('--start', 'stand', '--noise', 'none', *arguments, protocol=OLD)
+    """A robot of protocol v1 on its feet."""
+    return VirtualRobot('--start', 'stand', '--noise', 'none', *arguments, protocol=V1)
 
 
 def write(robot: VirtualRobot, register: int, byte: int) -> None:

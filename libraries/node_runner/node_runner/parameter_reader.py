@@ -77,11 +77,46 @@ class ParameterReader:
         return read
 
     def choice(
-        self, name: str, default: str, values: Mapping[str, Choice], meaning: str
+        self,
+        name: str,
+        default: str,
+        values: Mapping[str, Choice],
+        meaning: str,
+        *,
+        former: Mapping[str, str] | None = None,
     ) -> Choice:
-        """Declare and read one of several names; return what it stands for."""
+        """Declare and read one of several names; return what it stands for.
+
+        Args:
+            name: Of the parameter.
+            default: One of the names.
+            values: What the names stand for.
+            meaning: Of the parameter.
+            former: Present names by former ones, which are accepted with a warning.
+        """
         chosen = self.text(name, default, f'{meaning} ({", ".join(values)})')
+        if former and chosen in former:
+            self._warn(f"{self._prefix}{name} '{chosen}' is called '{former[chosen]}' now")
+            chosen = former[chosen]
         return parameter_values.choice(self._prefix + name, chosen, values)
+
+    def accept_former_name(self, former: str, name: str) -> None:
+        """Take what is given under a former name for a parameter, with a warning; then declare it.
+
+        Args:
+            former: Name that the parameter had.
+            name: Name that it has.
+        """
+        overrides = self._node._parameter_overrides  # noqa: SLF001  # no public way to ask
+        given = overrides.pop(self._prefix + former, None)
+        if given is not None:
+            self._warn(f'parameter {self._prefix}{former} is called {self._prefix}{name} now')
+            overrides.setdefault(
+                self._prefix + name, Parameter(self._prefix + name, value=given.value)
+            )
+
+    def _warn(self, text: str) -> None:
+        self._node.get_logger().warning(f'{text}; the former name is accepted for a while')
 
     def _given(self, name: str, default: object) -> tuple[str, object]:
         """Return the full name, and the value from outside or else the default."""

@@ -148,3 +148,18 @@ def test_other_names_are_left_alone(name: str) -> None:
             refuse_similar([name], ['speed'])
     else:
         refuse_similar([name], ['rate', 'speed'])
+
+
+def test_former_names_count_and_are_warned_of(isolation: Isolation) -> None:
+    """Of a parameter, and of a choice; what is given under the present name comes first."""
+    gaits = {'trot': 1, 'crawl': 2}
+    with node_with(isolation, 'pace:=1.5', 'gait:=walk') as node:
+        read = ParameterReader(node)
+        read.accept_former_name('pace', 'speed')
+        assert read.number('speed', 1.0, SPAN, 'a ratio') == 1.5
+        assert read.choice('gait', 'trot', gaits, 'a gait', former={'walk': 'crawl'}) == 2
+        assert refuse_misspelt(node) == []
+    with node_with(isolation, 'pace:=1.5', 'speed:=0.7') as node:
+        read = ParameterReader(node)
+        read.accept_former_name('pace', 'speed')
+        assert read.number('speed', 1.0, SPAN, 'a ratio') == 0.7

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Joint states in the robot's order, and what to do about joints that nobody measures.
 
-The legs must be measured. An arm's servo need not be: the old protocol of the XGO does not report
+The legs must be measured. An arm's servo need not be: protocol v1 of the XGO does not report
 one of them. Such a joint counts as being where it is sent, and is not sent anywhere before it is
 to move, because nobody knows how far it would jump.
 """

@@ -50,7 +50,7 @@ STATE_MEANINGS: Mapping[str, str] = {
     'blend_speed': 'fastest joint between two poses [rad/s]',
     'blend_time': 'shortest time between two poses [s]',
     'hold_band': 'a held joint that is further off is not pulled back [rad]',
-    'target_speed': 'speed of set-points per speed of joints; soft servos need 2',
+    'setpoint_speed_ratio': 'speed of set-points per speed of joints; soft servos need 2',
 }
 SERVO_RANGES: Mapping[str, tuple[tuple[float, float], str]] = {
     'kp': ((0.01, 1000.0), 'stiffness of a servo [N m/rad]'),
@@ -204,6 +204,7 @@ def _policy_options(read: ParameterReader) -> PolicyOptions:
 
 def _states(read: ParameterReader) -> StateParameters:
     default = StateParameters()
+    read.accept_former_name('target_speed', 'setpoint_speed_ratio')
     values = {
         name: read.number(name, getattr(default, name), STATE_RANGES[name], meaning)
         for name, meaning in STATE_MEANINGS.items()

@@ -98,7 +98,7 @@ class Controller:
         self._shadow = Shadow(policy) if policy is not None and dry_run else None
         self._commands = Commands(states.command_timeout)
         self._health = Health(len(robot.names), states)
-        self._limiter = StepLimiter(robot.limits, states.period, states.target_speed)
+        self._limiter = StepLimiter(robot.limits, states.period, states.setpoint_speed_ratio)
         self._tracking = TrackingMonitor(robot.names)
         self._latch = FaultLatch()
         self._notices = Notices()

@@ -30,8 +30,8 @@ class StateParameters:
         blend_speed: Speed of the fastest joint between two poses in [rad/s].
         blend_time: Shortest time between two poses in [s].
         hold_band: How far a joint may be off a set-point that holds it, in [rad]; it follows then.
-        target_speed: Speed of a set-point per speed of its joint; a soft servo that is compensated
-            for has its set-point further ahead, and needs 2.
+        setpoint_speed_ratio: Speed of a set-point per speed of its joint; a soft servo that is
+            compensated for has its set-point further ahead, and needs 2.
         policy_fallback_walks: Whether the gait goes on walking when a policy fails, or stands.
     """
 
@@ -50,7 +50,7 @@ class StateParameters:
     blend_speed: float = 1.0
     blend_time: float = 1.0
     hold_band: float = 0.25
-    target_speed: float = 1.0
+    setpoint_speed_ratio: float = 1.0
     policy_fallback_walks: bool = False
 
     def __post_init__(self) -> None:
@@ -84,7 +84,7 @@ STATE_RANGES: dict[str, tuple[float, float]] = {
     'lie_height': (0.01, 1.0),
     'blend_speed': (0.1, 10.0),
     'blend_time': (0.2, 10.0),
-    'target_speed': (0.05, 5.0),
+    'setpoint_speed_ratio': (0.05, 5.0),
     'hold_band': (0.02, 3.2),
 }
 """Range of each parameter, both ends included; units as in :class:`StateParameters`."""

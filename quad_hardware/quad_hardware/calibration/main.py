@@ -16,7 +16,7 @@ from quad_description import movable_joints, PRESETS, robot_urdf
 from ..exceptions import CommandError, HardwareError
 from ..joints import servo_of
 from ..link import LinkOptions
-from ..protocol import Model, Protocol, PROTOCOLS
+from ..protocol import Model, Protocol, protocol_argument, PROTOCOLS
 from .console import CancelledError, Console, TerminalConsole
 from .imu import calibrate_imu
 from .parameter_file import imu_parameters, servo_parameters, write_parameters
@@ -117,6 +117,7 @@ def _parser() -> argparse.ArgumentParser:
         kind.add_argument('--port', default='/dev/ttyAMA0', help='of the robot (%(default)s)')
         kind.add_argument(
             '--protocol',
+            type=protocol_argument,
             choices=_PROTOCOLS,
             default=AUTO,
             help='what the robot speaks (%(default)s)',
@@ -125,7 +126,7 @@ def _parser() -> argparse.ArgumentParser:
             '--model',
             choices=_MODELS,
             default=AUTO,
-            help='ranges of the old protocol (%(default)s)',
+            help='ranges of protocol v1 (%(default)s)',
         )
     joints.add_argument('--preset', choices=PRESETS, default='lite', help='(%(default)s)')
     joints.add_argument('--arm', action='store_true', help='with the arm on its back')

@@ -15,7 +15,7 @@ from serial.tools import list_ports
 from ..estimation.battery import LOW_BATTERY
 from ..exceptions import LinkError, NoAnswerError
 from ..link import ask_battery, connect, latency_problem, latency_timer
-from ..protocol import model_of_firmware, OLD
+from ..protocol import model_of_firmware, V1
 from .finding import error, Finding, good, note, warning
 
 GROUP = 'dialout'
@@ -115,9 +115,9 @@ def _ask(path: str) -> Iterator[Finding]:
         yield error('robot', str(problem), 'see the message')
         return
     protocol = connection.protocol
-    yield good('robot', f'{connection.firmware}, {protocol.name} protocol at {port.baud} baud')
+    yield good('robot', f'{connection.firmware}, protocol {protocol.name} at {port.baud} baud')
     model = model_of_firmware(connection.firmware)
-    if model is None and protocol is OLD:
+    if model is None and protocol is V1:
         remedy = 'set the parameter model of hardware_node to mini, lite or wheeled'
         yield warning('firmware', 'its first letter names no quadruped', remedy)
     yield _judge_battery(charge)

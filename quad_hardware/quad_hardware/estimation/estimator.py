@@ -57,7 +57,7 @@ class Estimate:
 
     Attributes:
         time: When it was made, on the monotonic clock [s].
-        joints_time: When the joints were measured [s]; the old protocol asks for them before.
+        joints_time: When the joints were measured [s]; protocol v1 asks for them before.
         positions: By joint [rad], of the gripper [m]; joints that are not reported are missing.
         velocities: Of the same joints [rad/s], [m/s].
         attitude: From base_link to the world, (x, y, z, w); its yaw is the robot's. None while

@@ -26,7 +26,7 @@ def low_pass_share(cutoff: float, elapsed: float) -> float:
 class AttitudeRate:
     """Angular velocity from the difference of attitudes, in the frame of the body.
 
-    By quaternions, so that a yaw that wraps is no jump. There is no raw gyro in the new protocol.
+    By quaternions, so that a yaw that wraps is no jump. There is no raw gyro in protocol v2.
     """
 
     def __init__(self, cutoff: float) -> None:

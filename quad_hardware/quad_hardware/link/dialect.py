@@ -25,9 +25,9 @@ class DialectCounters:
 
     Attributes:
         states: Reports of the robot.
-        lost: Reports that never came, by their sequence numbers (new protocol).
-        unanswered: Requests without an answer in time (old protocol).
-        refused: Frames that the robot refused (new protocol).
+        lost: Reports that never came, by their sequence numbers (v2).
+        unanswered: Requests without an answer in time (v1).
+        refused: Frames that the robot refused (v2).
         unusable: Valid frames whose contents are not.
     """
 

@@ -196,8 +196,8 @@ class Driver:
         self._connections += 1
         self._latency = latency_timer(session.port.path)
         found = (
-            f'{session.firmware} on {session.port.path} speaks the {dialect.protocol.name} '
-            f'protocol at {session.port.baud} baud'
+            f'{session.firmware} on {session.port.path} speaks protocol '
+            f'{dialect.protocol.name} at {session.port.baud} baud'
         )
         problem = latency_problem(session.port.path, self._latency)
         self._enter(LinkState.WAITING, '; '.join(filter(None, (found, problem))))

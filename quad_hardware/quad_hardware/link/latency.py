@@ -3,7 +3,7 @@
 """Adapters that keep bytes back: FTDI's send what is no full packet when a timer has run out.
 
 The timer is 16 ms as delivered, so a report of the robot comes that much late, and a question of
-the old protocol is answered that much later.
+protocol v1 is answered that much later.
 """
 
 from __future__ import annotations

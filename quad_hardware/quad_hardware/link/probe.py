@@ -14,12 +14,12 @@ from ..protocol import (
     Code,
     Frame,
     Kind,
-    NEW,
     Protocol,
     PROTOCOLS,
     Register,
     ROBOT_KINDS,
     StreamParser,
+    V2,
 )
 from .port import SerialPort
 
@@ -61,7 +61,7 @@ def connect(path: str, protocols: Iterable[Protocol] = PROTOCOLS, baud: int = 0)
     tried = []
     for protocol in protocols:
         speed = baud or protocol.baud
-        tried.append(f'{protocol.name} protocol at {speed} baud')
+        tried.append(f'protocol {protocol.name} at {speed} baud')
         port = SerialPort(path, speed)
         try:
             firmware = ask_firmware(port, protocol)
@@ -83,7 +83,7 @@ def ask_firmware(port: SerialPort, protocol: Protocol) -> str | None:
     Raises:
         LinkError: The port was lost.
     """
-    if protocol is NEW:
+    if protocol is V2:
         request = Frame(Kind.READ, Code.VERSION)
     else:
         request = Frame(Kind.READ, Register.FIRMWARE, bytes((FIRMWARE_SIZE,)))
@@ -101,7 +101,7 @@ def ask_battery(port: SerialPort, protocol: Protocol) -> int | None:
         LinkError: The port was lost.
     """
     request = Frame(Kind.READ, Register.BATTERY, bytes((BATTERY_SIZE,)))
-    if protocol is NEW:
+    if protocol is V2:
         request = Frame(Kind.READ, Code.BATTERY)
     for _ in range(ATTEMPTS):
         answer = ask(port, protocol, request, BATTERY_SIZE, ANSWER_TIME)

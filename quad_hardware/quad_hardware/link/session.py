@@ -15,18 +15,18 @@ from ..protocol import (
     Frame,
     Model,
     model_of_firmware,
-    NEW,
     ParserCounters,
     Protocol,
     PROTOCOLS,
     ROBOT_KINDS,
     StreamParser,
+    V2,
 )
 from .dialect import Dialect
-from .new_dialect import NewDialect
-from .old_dialect import OldDialect
 from .port import Port
 from .probe import connect, Connection
+from .v1_dialect import V1Dialect
+from .v2_dialect import V2Dialect
 from .vendor import VendorDialect, VendorParser, VendorPort
 
 
@@ -38,7 +38,7 @@ class LinkOptions:
         path: Device file.
         protocols: What to try, in this order.
         baud: Speed [bit/s]; 0 takes each protocol's own.
-        model: Whose ranges scale bytes in the old protocol; None asks the firmware.
+        model: Whose ranges scale bytes in protocol v1; None asks the firmware.
         rate: Reports a second [Hz].
         vendor: Go through the vendor's own library, and try nothing else.
         vendor_method: Name of its method that writes a servo angle.
@@ -127,12 +127,12 @@ def _open_vendor(options: LinkOptions) -> Session:
 
 def _make_dialect(connection: Connection, options: LinkOptions) -> Dialect[Frame]:
     now = time.monotonic()
-    if connection.protocol is NEW:
-        return NewDialect(now, options.rate)
+    if connection.protocol is V2:
+        return V2Dialect(now, options.rate)
     model = options.model or model_of_firmware(connection.firmware)
     if model is None:
         raise LinkError(
             f'firmware {connection.firmware!r} is of no known quadruped (M mini, L lite, W or MW '
             'wheeled); name its ranges with the parameter or option model'
         )
-    return OldDialect(now, model, options.rate)
+    return V1Dialect(now, model, options.rate)

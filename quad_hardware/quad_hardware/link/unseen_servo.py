@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where a servo may be that the robot does not report: from anywhere, to where it was sent.
 
-The old protocol reads 15 of 16 servos; the yaw of the arm, 54, is the one that is left out. The
+Protocol v1 reads 15 of 16 servos; the yaw of the arm, 54, is the one that is left out. The
 first time that it is sent somewhere, it may turn by its whole range. So it is sent at the lowest
 speed, until it must have arrived.
 """

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The vendor's own xgo_lib2 as a way to a robot, where it is installed.
 
-It knows the layout of the new protocol, which is not public. What is public of it is used as it
+It knows the layout of protocol v2, which is not public. What is public of it is used as it
 is: ``client.XgoDog(port)``, ``read_version``, ``system_set_feedback``,
 ``feedback.SendStateParser.feed_bytes``, and the names in its states. The method that writes a
 servo angle by motor id is not public, and has to be named. Looked for, and told when they are not
@@ -19,20 +19,20 @@ import os
 from quad_description.rotations import Vector
 
 from ..exceptions import LinkError
-from ..protocol import MOTOR_ORDER, NEW, ParserCounters, Protocol
+from ..protocol import MOTOR_ORDER, ParserCounters, Protocol, V2
 from ..report import Report
 from .dialect import Dialect, Step
-from .new_dialect import ASK_AGAIN, STATE_WIRE_TIME
 from .port import CHUNK
+from .v2_dialect import ASK_AGAIN, STATE_WIRE_TIME
 from .vendor_library import Dog, find_serial, find_write_method, StateParser
 
 VENDOR = Protocol(
     name='vendor',
     origin='the vendor’s xgo_lib2',
-    baud=NEW.baud,
-    address_size=NEW.address_size,
-    kinds=NEW.kinds,
-    functions=NEW.functions,
+    baud=V2.baud,
+    address_size=V2.address_size,
+    kinds=V2.kinds,
+    functions=V2.functions,
 )
 _ACCELERATIONS = ('acceleration', 'acc', 'accel', 'linear_acceleration')
 
@@ -64,7 +64,7 @@ class VendorPort:
             self.close()
             raise LinkError(
                 'no serial port is found in the XgoDog of xgo_lib2; '
-                'set protocol to new or old to do without it'
+                'set protocol to v2 or v1 to do without it'
             )
         self._descriptor = int(port.fileno())
 

@@ -19,7 +19,7 @@ from ..joints import JointMap, JointServo, LimiterSettings, LossReaction, servo_
 from ..link import LinkOptions
 from ..link.vendor import VENDOR
 from ..link.vendor_library import is_installed
-from ..protocol import Model, Protocol, PROTOCOLS
+from ..protocol import FORMER_NAMES, Model, Protocol, PROTOCOLS
 from ..serial_robot import RobotSettings
 
 AUTO = 'auto'
@@ -98,14 +98,18 @@ def declare_parameters(node: Node) -> NodeSettings:
     """
     read = ParameterReader(node)
     protocols = read.choice(
-        'protocol', AUTO, _PROTOCOLS, 'auto: asks the robot; vendor: by the vendor’s xgo_lib2'
+        'protocol',
+        AUTO,
+        _PROTOCOLS,
+        'auto: asks the robot; vendor: by the vendor’s xgo_lib2',
+        former=FORMER_NAMES,
     )
     method = read.text('vendor_servo_method', '', 'of the vendor’s XgoDog, writes one servo angle')
     link = LinkOptions(
         path=read.text('port', '/dev/ttyAMA0', 'serial port of the robot'),
         protocols=protocols,
         baud=read.whole('baud', 0, (0, 4_000_000), 'speed [bit/s]; 0: that of the protocol'),
-        model=read.choice('model', AUTO, _MODELS, 'ranges of the old protocol; auto: by firmware'),
+        model=read.choice('model', AUTO, _MODELS, 'ranges of protocol v1; auto: by firmware'),
         rate=read.whole('rate', 50, (10, 100), 'reports a second [Hz]'),
         vendor=_vendor(protocols, method),
         vendor_method=method,
@@ -156,7 +160,7 @@ def _vendor(protocols: tuple[Protocol, ...], method: str) -> bool:
     if installed and len(protocols) > 1:
         raise CommandError(
             'protocol auto: xgo_lib2 of the vendor is installed for this Python, and which way to '
-            'the robot is meant is not guessed; set protocol to vendor, new or old'
+            'the robot is meant is not guessed; set protocol to vendor, v2 or v1'
         )
     return wanted
 

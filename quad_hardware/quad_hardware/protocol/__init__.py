@@ -4,15 +4,15 @@ r"""Both serial protocols of the XGO: one table each, codecs and a stream parser
 
 The driver, the simulated robot, ``xgo_lib2`` and the protocol page all read these tables::
 
-    robot = StreamParser(OLD, HOST_KINDS)  # what a robot hears
+    robot = StreamParser(V1, HOST_KINDS)  # what a robot hears
     for frame in robot.feed(port.read(4096)):
         if frame.kind is Kind.READ and frame.address == Register.BATTERY:
-            port.write(Frame(Kind.REPLY, frame.address, b'\x55').encode(OLD))
+            port.write(Frame(Kind.REPLY, frame.address, b'\x55').encode(V1))
 """
 
 from .feedback import decode_feedback, Feedback
 from .frame import checksum, Frame
-from .function_table import ALL_MOTORS, Code, Fault, NEW, Refusal, STATE
+from .function_table import ALL_MOTORS, Code, Fault, Refusal, STATE, V2
 from .motors import (
     ANGLE_SPANS,
     ARM_MOTORS,
@@ -22,16 +22,17 @@ from .motors import (
     MOTOR_ORDER,
     slot_of,
 )
+from .names import FORMER_NAMES, protocol_argument
 from .parser import ParserCounters, StreamParser
 from .register_table import (
     ACTION_RESET,
     model_of_firmware,
     MOTOR_OF_REGISTER,
-    OLD,
     Register,
     REGISTER_OF_MOTOR,
     scatter,
     Torque,
+    V1,
 )
 from .schema import (
     Access,
@@ -46,7 +47,7 @@ from .schema import (
     Span,
 )
 
-PROTOCOLS = (NEW, OLD)  # in the order of probing
+PROTOCOLS = (V2, V1)  # in the order of probing
 
 __all__ = [
     'ACTION_RESET',
@@ -54,17 +55,18 @@ __all__ = [
     'ANGLE_SPANS',
     'ARM_MOTORS',
     'BULK_READ_ORDER',
+    'FORMER_NAMES',
     'HOST_KINDS',
     'LEG_MOTORS',
     'MOTOR_OF_JOINT',
     'MOTOR_OF_REGISTER',
     'MOTOR_ORDER',
-    'NEW',
-    'OLD',
     'PROTOCOLS',
     'REGISTER_OF_MOTOR',
     'ROBOT_KINDS',
     'STATE',
+    'V1',
+    'V2',
     'Access',
     'Code',
     'Fault',
@@ -85,6 +87,7 @@ __all__ = [
     'checksum',
     'decode_feedback',
     'model_of_firmware',
+    'protocol_argument',
     'scatter',
     'slot_of',
 ]

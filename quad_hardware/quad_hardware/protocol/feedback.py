@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The state frame of the new protocol as a value, both ways."""
+"""The state frame of protocol v2 as a value, both ways."""
 
 from __future__ import annotations
 

@@ -20,8 +20,8 @@ class Frame:
 
     Attributes:
         kind: What it is for.
-        address: Register (old protocol), or ``main << 8 | sub`` (new protocol).
-        payload: Data; of a READ of the old protocol, one byte: how many to read.
+        address: Register (v1), or ``main << 8 | sub`` (v2).
+        payload: Data; of a READ of protocol v1, one byte: how many to read.
     """
 
     kind: Kind
@@ -38,16 +38,16 @@ class Frame:
         length = protocol.overhead + len(self.payload)
         if length > protocol.max_length:
             raise CodecError(
-                f'payload of {len(self.payload)} bytes: a frame of the {protocol.name} protocol '
+                f'payload of {len(self.payload)} bytes: a frame of protocol {protocol.name} '
                 f'takes {protocol.max_length - protocol.overhead}; send it in parts'
             )
         if self.kind not in protocol.kinds:
-            raise CodecError(f'the {protocol.name} protocol has no frame of kind {self.kind.name}')
+            raise CodecError(f'protocol {protocol.name} has no frame of kind {self.kind.name}')
         try:
             address = self.address.to_bytes(protocol.address_size, 'big')
         except OverflowError as error:
             raise CodecError(
-                f'address {self.address:#x} does not fit the {protocol.name} protocol'
+                f'address {self.address:#x} does not fit protocol {protocol.name}'
             ) from error
         body = bytes((length, self.kind)) + address + self.payload
         return HEADER + body + bytes((checksum(body),)) + TAIL

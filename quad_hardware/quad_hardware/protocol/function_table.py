@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The table of the new protocol: main and sub codes, states pushed at 50 Hz, 2 Mbaud.
+"""The table of protocol v2: main and sub codes, states pushed at 50 Hz, 2 Mbaud.
 
 OUR ASSUMPTION. The vendor has not published this layout. What is stated about it: header and
 tail, a checksum, main and sub codes, a state frame of 254 bytes about 50 times a second, the valid
@@ -79,8 +79,8 @@ STATE = Function(
     size=245,
 )
 
-NEW = Protocol(
-    name='new',
+V2 = Protocol(
+    name='v2',
     origin='our assumption; the vendor’s layout is not public',
     baud=2_000_000,
     address_size=2,

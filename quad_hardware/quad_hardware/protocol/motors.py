@@ -18,7 +18,7 @@ from .schema import Model, Span
 LEG_MOTORS = (11, 12, 13, 21, 22, 23, 31, 32, 33, 41, 42, 43)
 ARM_MOTORS = (51, 52, 53, 54)
 MOTOR_ORDER = LEG_MOTORS + ARM_MOTORS  # slots of the feedback frame
-BULK_READ_ORDER = MOTOR_ORDER[:15]  # what reading 15 bytes at 0x50 answers (old protocol)
+BULK_READ_ORDER = MOTOR_ORDER[:15]  # what reading 15 bytes at 0x50 answers (v1)
 
 _SLOT = {motor: slot for slot, motor in enumerate(MOTOR_ORDER)}
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 import sys
 
-from . import NEW, OLD
+from . import V1, V2
 from .motors import MOTOR_ORDER
 from .schema import Access, Field, Function, Kind, Protocol
 
@@ -31,13 +31,13 @@ def protocol_page() -> str:
         f'Motors, in the order of the wire: {", ".join(map(str, MOTOR_ORDER))}.',
         '',
     ]
-    for protocol in (OLD, NEW):
+    for protocol in (V1, V2):
         lines += _section(protocol)
     return '\n'.join(lines)
 
 
 def _section(protocol: Protocol) -> Iterator[str]:
-    yield f'## The {protocol.name} protocol'
+    yield f'## Protocol {protocol.name}'
     yield ''
     yield (
         f'Layout: {protocol.origin}. {protocol.baud} baud, 8N1; address of '

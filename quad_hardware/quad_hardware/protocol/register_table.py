@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The table of the old protocol: one-byte registers at 115200 baud.
+"""The table of protocol v1: one-byte registers at 115200 baud.
 
 Public: the vendor's serial protocol page and its Python libraries (XGO-PythonLib 1.0.0, xgolib
 1.1.5). A register is a function code and no memory cell: 0x62 answers four bytes, 0x63 four
@@ -192,8 +192,8 @@ def _arm_rows() -> Iterator[Function]:
     yield _byte(0x77, 'arm_r', 'polar position', _spans((80, 140)), 'mm')
 
 
-OLD = Protocol(
-    name='old',
+V1 = Protocol(
+    name='v1',
     origin='public: the vendor’s protocol page and Python libraries',
     baud=115200,
     address_size=1,
@@ -219,7 +219,7 @@ def scatter(address: int, payload: bytes) -> Iterator[tuple[int, bytes]]:
     """
     start = 0
     while start < len(payload):
-        function = OLD.functions.get(address)
+        function = V1.functions.get(address)
         size = function.length if function else 1
         yield address, payload[start : start + size]
         start += size

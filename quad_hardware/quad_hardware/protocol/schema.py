@@ -23,8 +23,8 @@ class Kind(IntEnum):
     WRITE = 0x00  # host to robot, not answered
     READ = 0x02  # host to robot
     REPLY = 0x12  # robot to host, answers READ
-    NACK = 0x1F  # robot to host, refuses a frame (new protocol only)
-    PUSH = 0x20  # robot to host, unasked (new protocol only)
+    NACK = 0x1F  # robot to host, refuses a frame (v2 only)
+    PUSH = 0x20  # robot to host, unasked (v2 only)
 
 
 HOST_KINDS = frozenset({Kind.WRITE, Kind.READ})  # what a host sends

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The board's side of the new protocol: functions, and states pushed unasked."""
+"""The board's side of protocol v2: functions, and states pushed unasked."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import math
 
 from quad_description.rotations import Vector
 from quad_hardware.exceptions import CodecError
-from quad_hardware.protocol import Access, Code, Feedback, Frame, Kind, NEW, Refusal
+from quad_hardware.protocol import Access, Code, Feedback, Frame, Kind, Refusal, V2
 
 from ..plant.state import Measurement
 from .board import Board
@@ -31,7 +31,7 @@ class RefusedError(Exception):
 
 
 class Functions:
-    """Answers frames of the new protocol and pushes states."""
+    """Answers frames of protocol v2 and pushes states."""
 
     def __init__(self, board: Board) -> None:
         """Begin without feedback.
@@ -91,7 +91,7 @@ class Functions:
         return frame
 
     def _carry_out(self, frame: Frame) -> Frame | None:
-        function = NEW.functions.get(frame.address)
+        function = V2.functions.get(frame.address)
         if function is None:
             raise RefusedError(Refusal.UNKNOWN_FUNCTION)
         if frame.kind is Kind.READ:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The board's side of the old protocol: registers that are read and written.
+"""The board's side of protocol v1: registers that are read and written.
 
 Every register of the table is taken; those that move nothing here (teaching, LED, swinging of the
 body, actions other than 1, 2 and 255) are kept as bytes and otherwise mean nothing.
@@ -20,11 +20,11 @@ from quad_hardware.protocol import (
     Frame,
     Kind,
     MOTOR_OF_REGISTER,
-    OLD,
     Register,
     scatter,
     slot_of,
     Torque,
+    V1,
 )
 
 from .board import Board
@@ -34,7 +34,7 @@ NEUTRAL = (127, 128)  # the vendor's library encodes zero as 127, its documents 
 LIE_DOWN, STAND_UP = 1, 2  # actions, of register 0x3E
 LEG_NAMES = {1: 'fl', 2: 'fr', 3: 'br', 4: 'bl'}
 INT16 = 32767
-LONGEST_ANSWER = OLD.max_length - OLD.overhead  # [B]
+LONGEST_ANSWER = V1.max_length - V1.overhead  # [B]
 
 _BODY = {0x33: 'x', 0x34: 'y', 0x35: 'z', 0x36: 'roll', 0x37: 'pitch', 0x38: 'yaw'}
 _FEET = range(0x40, 0x4C)
@@ -44,7 +44,7 @@ _ORIGIN, _HEIGHT, _MARK_TIME, _TURN, _MIDDLE = 0x06, 0x35, 0x3C, 0x3F, 0x5F
 
 
 class Registers:
-    """Answers frames of the old protocol."""
+    """Answers frames of protocol v1."""
 
     def __init__(self, board: Board) -> None:
         """Begin with empty registers.
@@ -93,7 +93,7 @@ class Registers:
 
     def _read(self, address: int, count: int) -> bytes | None:
         """Return that many bytes, None from a register that cannot be read."""
-        function = OLD.functions.get(address)
+        function = V1.functions.get(address)
         if function is None or Access.READ not in function.access:
             return None
         if address in MOTOR_OF_REGISTER:
@@ -109,7 +109,7 @@ class Registers:
         )
 
     def _value(self, address: int) -> bytes:
-        function, board = OLD.functions[address], self._board
+        function, board = V1.functions[address], self._board
         if address == Register.BATTERY:
             return bytes((board.battery.percent,))
         if address == Register.FIRMWARE:
@@ -128,7 +128,7 @@ class Registers:
 
     def _imu(self) -> bytes:
         measured = self._board.measure()
-        function = OLD.functions[Register.IMU]
+        function = V1.functions[Register.IMU]
         acceleration, rate, _ = function.fields
         return function.pack(
             acceleration=[
@@ -146,7 +146,7 @@ class Registers:
     def _write(self, frame: Frame) -> None:
         motors: dict[int, float] = {}
         for address, data in scatter(frame.address, frame.payload):
-            function = OLD.functions.get(address)
+            function = V1.functions.get(address)
             if function is None or not function.accepts(len(data)):
                 continue
             self._memory[address] = data
@@ -237,7 +237,7 @@ class Registers:
         return self._decoded(address)
 
     def _decoded(self, address: int) -> float:
-        span = OLD.functions[address].spans[self._board.model]
+        span = V1.functions[address].spans[self._board.model]
         return span.decode(self._memory[address][0])
 
 

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 import math
 
-from quad_hardware.protocol import Frame, HOST_KINDS, NEW, OLD, Protocol, StreamParser
+from quad_hardware.protocol import Frame, HOST_KINDS, Protocol, StreamParser, V1, V2
 
 from ..board.board import Board
 from ..board.functions import Functions
@@ -62,7 +62,7 @@ class RobotLine:
             speeds: What it speaks, by baud rate [bit/s]; both protocols at their own for None.
             faults: What goes wrong, and when.
             fixed_baud: Speed to assume [bit/s] whatever the host sets; 0 for the host's.
-            command_gap: Least time between two frames of the host in the old protocol [s]; a frame
+            command_gap: Least time between two frames of the host in protocol v1 [s]; a frame
                 that comes sooner is lost, as the vendor warns.
             seed: Of the damage on the line.
         """
@@ -72,7 +72,7 @@ class RobotLine:
         self.to_host = Wire(self.faults, FaultKind.SILENCE, seed + 1, slow=True)
         self._board = board
         self._functions, self._registers = Functions(board), Registers(board)
-        self._by_baud = dict(speeds or {NEW.baud: NEW, OLD.baud: OLD})
+        self._by_baud = dict(speeds or {V2.baud: V2, V1.baud: V1})
         self._forget_partial_frames()
         self._fixed_baud = fixed_baud
         self._command_gap = command_gap
@@ -138,7 +138,7 @@ class RobotLine:
         self._board.advance(now)
         frame = self._functions.push(now)
         if self._board.awake:
-            self._say(frame, NEW, now)
+            self._say(frame, V2, now)
 
     def _hear(self, arrived: Arrival) -> None:
         baud = self._baud
@@ -163,11 +163,11 @@ class RobotLine:
         self._frame_end = end
         if not self._board.awake:
             return
-        if protocol is OLD and gap < self._command_gap:
+        if protocol is V1 and gap < self._command_gap:
             self.statistics.hurried += 1
             return
         self.statistics.frames += 1
-        handler = self._functions if protocol is NEW else self._registers
+        handler = self._functions if protocol is V2 else self._registers
         for answer in handler.handle(frame, now):
             self._say(answer, protocol, now)
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""A client of the old protocol written from the public description of its bytes.
+"""A client of protocol v1 written from the public description of its bytes.
 
 It shares nothing with the product: no table, no codec, no parser. Its habits are those of the
 vendor's library: zero is encoded as 127, servos are written one frame at a time, an answer is read
@@ -18,7 +18,7 @@ SPEED_RANGES = {0x30: 25.0, 0x31: 18.0, 0x32: 100.0}
 GAP = 0.001  # [s] the vendor's advice
 
 
-class OldClient:
+class V1Client:
     """What a program of somebody else does with the robot."""
 
     def __init__(self, path: str) -> None:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The simulated robot satisfies a client of the old protocol that shares no code with it."""
+"""The simulated robot satisfies a client of protocol v1 that shares no code with it."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from pathlib import Path
 import time
 
 import pytest
-from sim_old_client import OldClient
 from sim_serial import PATIENCE, serve, Served
+from sim_v1_client import V1Client
 
 pytestmark = pytest.mark.slow
 
@@ -45,10 +45,10 @@ def wait(condition: Callable[[], bool], what: str) -> None:
 
 
 @contextmanager
-def robot(path: Path, *arguments: str) -> Iterator[tuple[OldClient, Served]]:
+def robot(path: Path, *arguments: str) -> Iterator[tuple[V1Client, Served]]:
     """Give a client of a living robot."""
     with serve(path / 'xgo', '--noise', 'none', *arguments) as served:
-        client = OldClient(str(path / 'xgo'))
+        client = V1Client(str(path / 'xgo'))
         try:
             yield client, served
         finally:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Conversation in the new protocol: the robot pushes its state, commands go out at once."""
+"""Conversation in protocol v2: the robot pushes its state, commands go out at once."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from ..protocol import (
     Frame,
     Kind,
     MOTOR_ORDER,
-    NEW,
     STATE,
+    V2,
 )
 from ..report import Report
 from .dialect import Dialect, Step
 
 ASK_AGAIN = 0.3  # [s] of silence after which the robot is asked to push its state
-_SERVOS = NEW.functions[Code.SERVOS]
-STATE_WIRE_TIME = NEW.wire_time(NEW.overhead + STATE.length)  # [s]
+_SERVOS = V2.functions[Code.SERVOS]
+STATE_WIRE_TIME = V2.wire_time(V2.overhead + STATE.length)  # [s]
 _SEQUENCE = 1 << 16
 
 
-class NewDialect(Dialect[Frame]):
+class V2Dialect(Dialect[Frame]):
     """Asks for 50 states a second, and again whenever they stop coming."""
 
     def __init__(self, now: float, rate: int = 50) -> None:
@@ -37,12 +37,12 @@ class NewDialect(Dialect[Frame]):
             now: Time [s].
             rate: Reports a second [Hz].
         """
-        super().__init__(NEW, now)
+        super().__init__(V2, now)
         asking = (
             Frame(Kind.WRITE, Code.FEEDBACK_RATE, bytes((rate,))),
             Frame(Kind.WRITE, Code.FEEDBACK, b'\x01'),
         )
-        self._ask = b''.join(frame.encode(NEW) for frame in asking)
+        self._ask = b''.join(frame.encode(V2) for frame in asking)
         self._ask_at = now
         self._pending = self._torque = b''
         self._sequence: int | None = None
@@ -60,12 +60,12 @@ class NewDialect(Dialect[Frame]):
     def command(self, angles: Mapping[int, float]) -> None:
         """Set the angles that are sent at the next step, in one frame."""
         payload = _SERVOS.pack_groups(list(angles.items()))
-        self._pending = Frame(Kind.WRITE, Code.SERVOS, payload).encode(NEW)
+        self._pending = Frame(Kind.WRITE, Code.SERVOS, payload).encode(V2)
 
     def torque(self, *, on: bool) -> None:
         """Have all servos hold their place, or let go, behind a pending command."""
-        payload = NEW.functions[Code.TORQUE].pack(motor=(ALL_MOTORS,), on=(on,))
-        self._torque = Frame(Kind.WRITE, Code.TORQUE, payload).encode(NEW)
+        payload = V2.functions[Code.TORQUE].pack(motor=(ALL_MOTORS,), on=(on,))
+        self._torque = Frame(Kind.WRITE, Code.TORQUE, payload).encode(V2)
 
     def cancel_pending(self) -> None:
         """Forget what has not been sent yet."""

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Conversation in the old protocol: 50 times a second two bulk reads, and a bulk write between.
+"""Conversation in protocol v1: 50 times a second two bulk reads, and a bulk write between.
 
 A bulk write of 12 servos, a read of 15 and a read of the IMU take 8.1 ms of a 20 ms period at
 115200 baud; one frame per servo, as the vendor's library sends them, would not fit.
@@ -23,10 +23,10 @@ from ..protocol import (
     Kind,
     LEG_MOTORS,
     Model,
-    OLD,
     Register,
     REGISTER_OF_MOTOR,
     Torque,
+    V1,
 )
 from ..report import Report
 from .dialect import Dialect, Step
@@ -39,7 +39,7 @@ LATENCY_DECAY = 0.98  # by which a slow answer is forgotten with each quick one
 BATTERY_PERIOD = 2.0  # [s]
 ARM_AGAIN = 0.5  # [s] after which an arm joint is sent again, for a frame may be lost
 _BOARDS_OWN, _FORGOTTEN = -1, -2  # speeds that nobody set, or that a restart may have undone
-_IMU = OLD.functions[Register.IMU]
+_IMU = V1.functions[Register.IMU]
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,12 +49,12 @@ class _Request:
 
     def encode(self) -> bytes:
         """Return the bytes of the request."""
-        return Frame(Kind.READ, self.register, bytes((self.size,))).encode(OLD)
+        return Frame(Kind.READ, self.register, bytes((self.size,))).encode(V1)
 
     @property
     def wire_time(self) -> float:
         """Time on the line, request and answer [s]."""
-        return OLD.wire_time(len(self.encode()) + OLD.overhead + self.size)
+        return V1.wire_time(len(self.encode()) + V1.overhead + self.size)
 
 
 _READ_MOTORS = _Request(Register.MOTORS, len(BULK_READ_ORDER))
@@ -62,7 +62,7 @@ _READ_IMU = _Request(Register.IMU, _IMU.length)
 _READ_BATTERY = _Request(Register.BATTERY, 1)
 
 
-class OldDialect(Dialect[Frame]):
+class V1Dialect(Dialect[Frame]):
     """Polls a robot; a command goes out as soon as the line is free.
 
     A board that is slower than the period makes the reports fewer. How long an answer is waited
@@ -77,7 +77,7 @@ class OldDialect(Dialect[Frame]):
             model: Whose ranges scale the bytes.
             rate: Reports a second [Hz].
         """
-        super().__init__(OLD, now)
+        super().__init__(V1, now)
         self._spans = ANGLE_SPANS[model]
         self._period = 1.0 / rate
         self._cycle_at = now
@@ -135,7 +135,7 @@ class OldDialect(Dialect[Frame]):
             self._begin_cycle(now)
         send = self._next(now) if now >= self._free_at else b''
         if send:
-            self._free_at = now + OLD.wire_time(len(send)) + HOST_GAP
+            self._free_at = now + V1.wire_time(len(send)) + HOST_GAP
         return Step(send, self._wake())
 
     def handle_frame(self, frame: Frame, now: float) -> Report | None:
@@ -190,12 +190,12 @@ class OldDialect(Dialect[Frame]):
     def _next(self, now: float) -> bytes:
         if self._legs:
             payload, self._legs = self._legs, b''
-            return Frame(Kind.WRITE, Register.MOTORS, payload).encode(OLD)
+            return Frame(Kind.WRITE, Register.MOTORS, payload).encode(V1)
         if arm := self._next_of_arm(now):
             return arm
         if self._torque:
             payload, self._torque = self._torque, b''
-            return Frame(Kind.WRITE, Register.TORQUE, payload).encode(OLD)
+            return Frame(Kind.WRITE, Register.TORQUE, payload).encode(V1)
         if self._waiting is None and self._queue:
             self._waiting = self._queue.popleft()
             self._asked_at = now
@@ -211,11 +211,11 @@ class OldDialect(Dialect[Frame]):
             speed = self._speed_of(motor, now)
             if speed != self._speed:  # it counts for every single servo that follows
                 self._speed, self._arm[motor] = speed, payload
-                return Frame(Kind.WRITE, Register.MOTOR_SPEED, bytes((speed,))).encode(OLD)
+                return Frame(Kind.WRITE, Register.MOTOR_SPEED, bytes((speed,))).encode(V1)
             self._arm_sent[motor] = payload, now + ARM_AGAIN
             if motor in self._unseen:
                 self._unseen[motor].send(self._spans[motor].decode(payload[0]), now)
-            return Frame(Kind.WRITE, REGISTER_OF_MOTOR[motor], payload).encode(OLD)
+            return Frame(Kind.WRITE, REGISTER_OF_MOTOR[motor], payload).encode(V1)
         return b''
 
     def _speed_of(self, motor: int, now: float) -> int:
@@ -255,7 +255,7 @@ class OldDialect(Dialect[Frame]):
 
 def _on_the_line(payload: bytes) -> float:
     """Return how long the answer with a payload takes [s]."""
-    return OLD.wire_time(OLD.overhead + len(payload))
+    return V1.wire_time(V1.overhead + len(payload))
 
 
 def _vector(values: tuple[float, ...]) -> Vector:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The simulated robot in the new protocol: states pushed, functions carried out or refused."""
+"""The simulated robot in protocol v2: states pushed, functions carried out or refused."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from quad_hardware.protocol import (
     Frame,
     Kind,
     MOTOR_ORDER,
-    NEW,
-    OLD,
     Refusal,
     Register,
     slot_of,
+    V1,
+    V2,
 )
 
 KINEMATIC = ('--physics', 'none', '--noise', 'none')
@@ -91,7 +91,7 @@ def test_many_servos_go_where_one_frame_sends_them() -> None:
     motors = MOTOR_ORDER
     angles = [2.5 * (slot % 5) - 5.0 for slot in range(len(motors))]
     payload = b''.join(
-        NEW.functions[Code.SERVOS].pack(motor=(motor,), angle=(angle,))
+        V2.functions[Code.SERVOS].pack(motor=(motor,), angle=(angle,))
         for motor, angle in zip(motors, angles, strict=True)
     )
     robot.send(Frame(Kind.WRITE, Code.SERVOS, payload))
@@ -103,7 +103,7 @@ def test_one_servo_goes_at_its_speed() -> None:
     """Speed 255 is at once; a low speed takes time and shows in the velocities."""
     robot = VirtualRobot(*KINEMATIC)
     robot.send(FEEDBACK_ON)
-    move = NEW.functions[Code.SERVO]
+    move = V2.functions[Code.SERVO]
     robot.send(Frame(Kind.WRITE, Code.SERVO, move.pack(motor=(12,), angle=(20.0,))))
     assert states(robot.run(0.1))[-1].position[slot_of(12)] == pytest.approx(20.0, abs=0.01)
     robot.send(Frame(Kind.WRITE, Code.SPEED, bytes((12, 10))))
@@ -122,7 +122,7 @@ def test_a_servo_that_is_mounted_otherwise_reads_otherwise() -> None:
     slot = slot_of(12)
     assert state.position[slot] == pytest.approx(4.5 - plain.position[slot], abs=1e-3)
     assert state.position[slot + 1 :] == plain.position[slot + 1 :]
-    move = NEW.functions[Code.SERVO].pack(motor=(12,), angle=(4.5 - 30.0,))
+    move = V2.functions[Code.SERVO].pack(motor=(12,), angle=(4.5 - 30.0,))
     robot.send(Frame(Kind.WRITE, Code.SERVO, move))
     under_way = states(robot.run(0.02))
     assert all(state.velocity[slot] >= 0.0 for state in under_way)
@@ -155,7 +155,7 @@ def test_a_servo_that_wakes_goes_to_its_last_target(*, told: bool) -> None:
     assert max(abs(a - b) for a, b in zip(standing, sunk, strict=True)) > 15.0
     if told:
         groups = (
-            NEW.functions[Code.SERVOS].pack(motor=(motor,), angle=(angle,))
+            V2.functions[Code.SERVOS].pack(motor=(motor,), angle=(angle,))
             for motor, angle in zip(MOTOR_ORDER, sunk, strict=True)
         )
         robot.ask(Frame(Kind.WRITE, Code.SERVOS, b''.join(groups)))
@@ -239,19 +239,19 @@ def test_heavy_load_drains_the_battery_and_warms_the_servos() -> None:
 
 def test_a_robot_of_one_protocol_is_deaf_at_the_other_speed() -> None:
     """At another baud rate nothing is understood, and at the right one everything again."""
-    robot = VirtualRobot(*KINEMATIC, '--protocol', 'old')
+    robot = VirtualRobot(*KINEMATIC, '--protocol', 'v1')
     assert robot.ask(Frame(Kind.READ, Code.VERSION)) == []
     assert robot.line.statistics.garbled > 0
-    other = VirtualRobot(*KINEMATIC, '--protocol', 'new', protocol=OLD)
+    other = VirtualRobot(*KINEMATIC, '--protocol', 'v2', protocol=V1)
     assert other.ask(Frame(Kind.READ, Register.BATTERY, b'\1')) == []
 
 
 def test_states_stay_away_from_a_host_that_went_on_to_the_other_speed() -> None:
-    """After a probe of the new protocol no state disturbs the old one."""
+    """After a probe of protocol v2 no state disturbs v1."""
     robot = VirtualRobot(*KINEMATIC)
     robot.send(FEEDBACK_ON)
     robot.run(0.1)
-    robot.line.set_baud(OLD.baud)
+    robot.line.set_baud(V1.baud)
     robot.heard = b''
     robot.run(0.2)
     assert robot.heard == b''

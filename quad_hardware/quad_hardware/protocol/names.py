@@ -1,0 +1,23 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Names of the protocols on command lines and in parameters."""
+
+from __future__ import annotations
+
+import sys
+
+from .function_table import V2
+from .register_table import V1
+
+FORMER_NAMES = {'old': V1.name, 'new': V2.name}
+"""Present names by former ones, which are accepted with a warning."""
+
+
+def protocol_argument(text: str) -> str:
+    """Return the name of a protocol, for the ``type`` of an argument with choices."""
+    if text in FORMER_NAMES:
+        sys.stderr.write(
+            f"warning: protocol '{text}' is called '{FORMER_NAMES[text]}' now; the former name is "
+            'accepted for a while\n'
+        )
+    return FORMER_NAMES.get(text, text)
