@@ -151,7 +151,7 @@ def joint_state_latency(arm: SimulatedArm, recorder: BusRecorder) -> Rows:
     publisher = arm.start(
         'canopen_joint_state_publisher', '-p', f'robot_description:={urdf(arm.joints)}'
     )
-    publisher.wait_for(f'publishing {len(arm.joints)} joints')
+    publisher.wait_until_ready()
     arrivals: list[tuple[float, int]] = []
 
     def take(message: JointState) -> None:

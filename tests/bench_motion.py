@@ -269,7 +269,7 @@ def servo_share(isolation: Isolation, folder: Path, period: float) -> float:
         client.node.create_timer(
             0.01, lambda: states.publish(JointState(name=JOINTS, position=at))
         )
-        process.wait_for('ready for commands')
+        process.wait_until_ready()
         return busy_share(client, process)
 
 

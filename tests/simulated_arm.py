@@ -54,7 +54,7 @@ class SimulatedArm:
             self.client = self._stack.enter_context(RosClient(isolation.domain_id))
             self.slaves = self.start('fake_slaves')
             self.master = self.start('master')
-            self.master.wait_for(f'all {len(self.joints)} devices operational')
+            self.master.wait_until_ready()
         except BaseException:
             self._stack.close()
             raise

@@ -38,7 +38,7 @@ def test_article_moves_a_joint(arm: SimulatedArm) -> None:
     publisher = arm.start(
         'canopen_joint_state_publisher', '-p', f'robot_description:={one_joint_urdf()}'
     )
-    publisher.wait_for('publishing 1 joints')
+    publisher.wait_until_ready()
     answer = call(arm, '/panda_joint1/init', TRIGGER)
     assert 'success=True' in answer
     assert 'Operation enabled' in answer
@@ -64,7 +64,7 @@ def test_joint_states_come_at_the_rate_of_sync(arm: SimulatedArm) -> None:
     publisher = arm.start(
         'canopen_joint_state_publisher', '-p', f'robot_description:={one_joint_urdf()}'
     )
-    publisher.wait_for('publishing 1 joints')
+    publisher.wait_until_ready()
     hz = arm.run('ros2', 'topic', 'hz', '/joint_states')
     # once is enough: a machine that pauses slows everything for a while, SYNC included
     hz.wait_for(r'average rate: (9[0-9]|10[0-9])\.', 40.0)
