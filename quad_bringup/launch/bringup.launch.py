@@ -11,7 +11,7 @@ from __future__ import annotations
 from launch import LaunchContext, LaunchDescription
 from launch.actions import DeclareLaunchArgument, ExecuteProcess, OpaqueFunction, Shutdown
 
-from quad_bringup.launching import LAUNCH_ARGUMENTS, STOP_PATIENCE, words
+from quad_bringup.launching import argv, LAUNCH_ARGUMENTS, STOP_TIMEOUT
 
 
 def _bringup(context: LaunchContext) -> list[ExecuteProcess]:
@@ -21,9 +21,9 @@ def _bringup(context: LaunchContext) -> list[ExecuteProcess]:
     }
     return [
         ExecuteProcess(
-            cmd=['ros2', 'run', 'quad_bringup', 'bringup', *words(values)],
+            cmd=['ros2', 'run', 'quad_bringup', 'bringup', *argv(values)],
             output='screen',
-            sigterm_timeout=f'{STOP_PATIENCE:g}',
+            sigterm_timeout=f'{STOP_TIMEOUT:g}',
             on_exit=Shutdown(),
         )
     ]

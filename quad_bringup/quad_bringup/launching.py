@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from .exceptions import ArgumentError
 
-STOP_PATIENCE = 30.0
+STOP_TIMEOUT = 30.0
 """Time in [s] that launch gives the bring-up to stop its processes in order."""
 TRUE, FALSE = 'true', 'false'
 
@@ -47,14 +47,14 @@ LAUNCH_ARGUMENTS = (
 """What the launch file takes; the port is that of the robot's computer."""
 
 
-def words(values: Mapping[str, str]) -> list[str]:
+def argv(values: Mapping[str, str]) -> list[str]:
     """Make the bring-up's command line.
 
     Args:
         values: Value of each launch argument.
 
     Returns:
-        Its words; those that the bring-up has defaults for are left out when they are empty.
+        Its arguments; those that the bring-up has defaults for are left out when they are empty.
 
     Raises:
         ArgumentError: A flag is neither true nor false.

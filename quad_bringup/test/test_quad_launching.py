@@ -10,14 +10,14 @@ import pytest
 
 from quad_bringup.bringup import parse
 from quad_bringup.exceptions import ArgumentError
-from quad_bringup.launching import LAUNCH_ARGUMENTS, words
+from quad_bringup.launching import argv, LAUNCH_ARGUMENTS
 
 DEFAULTS = {argument.name: argument.default for argument in LAUNCH_ARGUMENTS}
 
 
 def test_without_arguments_it_is_the_real_robot_on_its_own_computer() -> None:
     """As in the article: ros2 launch quad_bringup bringup.launch.py."""
-    arguments = parse(words(DEFAULTS))[0]
+    arguments = parse(argv(DEFAULTS))[0]
     assert not arguments.simulate
     assert arguments.port == '/dev/ttyAMA0'
     assert arguments.preset == 'lite'
@@ -26,15 +26,15 @@ def test_without_arguments_it_is_the_real_robot_on_its_own_computer() -> None:
 def test_every_argument_reaches_the_bring_up() -> None:
     """Under its own name."""
     given = {'preset': 'mini', 'arm': 'True', 'policy': '/a.onnx', 'calibration': '/c.yaml'}
-    arguments = parse(words({**DEFAULTS, **given, 'port': '/dev/ttyUSB0'}))[0]
+    arguments = parse(argv({**DEFAULTS, **given, 'port': '/dev/ttyUSB0'}))[0]
     assert (arguments.port, arguments.preset, arguments.arm) == ('/dev/ttyUSB0', 'mini', True)
     assert (arguments.policy, arguments.calibration) == (Path('/a.onnx'), Path('/c.yaml'))
-    assert parse(words({**DEFAULTS, 'gait': 'pace'}))[0].gait == 'pace'
+    assert parse(argv({**DEFAULTS, 'gait': 'pace'}))[0].gait == 'pace'
 
 
 def test_a_simulated_robot_has_a_port_of_its_own() -> None:
     """The default port is no reason to refuse."""
-    arguments = parse(words({**DEFAULTS, 'simulate': 'true'}))[0]
+    arguments = parse(argv({**DEFAULTS, 'simulate': 'true'}))[0]
     assert arguments.simulate
     assert arguments.port is None
 
@@ -42,7 +42,7 @@ def test_a_simulated_robot_has_a_port_of_its_own() -> None:
 def test_a_flag_that_is_neither_true_nor_false_is_refused() -> None:
     """With its name."""
     with pytest.raises(ArgumentError, match='arm:=maybe'):
-        words({**DEFAULTS, 'arm': 'maybe'})
+        argv({**DEFAULTS, 'arm': 'maybe'})
 
 
 def test_launch_can_read_the_file() -> None:

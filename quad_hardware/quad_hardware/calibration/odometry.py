@@ -19,6 +19,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
 from node_runner import init_ros
+from quad_description.rotations import yaw_of
 
 from ..estimation import SCALES
 from ..exceptions import NoAnswerError
@@ -137,7 +138,7 @@ class Walker:
 
     def _take(self, message: Odometry) -> None:
         position, turn = message.pose.pose.position, message.pose.pose.orientation
-        yaw = math.atan2(2 * (turn.w * turn.z + turn.x * turn.y), 1 - 2 * (turn.y**2 + turn.z**2))
+        yaw = yaw_of((turn.x, turn.y, turn.z, turn.w))
         self._place = Place(position.x, position.y, yaw)
 
     def __enter__(self) -> Self:

@@ -85,7 +85,7 @@ class V1Dialect(Dialect[Frame]):
         self._queue: deque[_Request] = deque()
         self._waiting: _Request | None = None
         self._asked_at = now
-        self._patience = LONGEST_LATENCY
+        self._latency_limit = LONGEST_LATENCY
         self._free_at = now
         self._legs = self._torque = b''
         self._arm: dict[int, bytes] = {}
@@ -150,8 +150,8 @@ class V1Dialect(Dialect[Frame]):
             return None
         self._waiting = None
         took = now - self._asked_at - waiting.wire_time
-        wanted = max(2 * took, LATENCY_DECAY * self._patience, SHORTEST_LATENCY)
-        self._patience = min(wanted, LONGEST_LATENCY)
+        wanted = max(2 * took, LATENCY_DECAY * self._latency_limit, SHORTEST_LATENCY)
+        self._latency_limit = min(wanted, LONGEST_LATENCY)
         if waiting is _READ_BATTERY:
             self._charges.append(frame.payload[0])
         elif waiting is _READ_MOTORS:
@@ -168,12 +168,12 @@ class V1Dialect(Dialect[Frame]):
         return min(commands, self._free_at if self._queue else self._cycle_at)
 
     def _deadline(self, request: _Request) -> float:
-        return self._asked_at + request.wire_time + self._patience
+        return self._asked_at + request.wire_time + self._latency_limit
 
     def _give_up(self) -> None:
         """Go on without an answer: the rest of this period is of no use."""
         self._counters.unanswered += 1
-        self._patience = min(1.5 * self._patience, LONGEST_LATENCY)
+        self._latency_limit = min(1.5 * self._latency_limit, LONGEST_LATENCY)
         self._waiting = None
         self._queue.clear()
 
