@@ -238,7 +238,7 @@ class RobotModel:
 def _only(semantic: SemanticDescription) -> str:
     if len(semantic.groups) != 1:
         known = ', '.join(semantic.groups) or 'none'
-        raise ModelError(f'the SRDF has the groups {known}: name the one to move')
+        raise ModelError(f'the SRDF has the groups {known}: choose one (parameter group)')
     return next(iter(semantic.groups))
 
 
