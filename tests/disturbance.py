@@ -140,10 +140,15 @@ def until(end: float, events: Iterable[Event]) -> Iterator[Event]:
 
 @contextmanager
 def full_cpu() -> Iterator[None]:
-    """Keep every core busy."""
+    """Keep every core busy.
+
+    Linux shares cores out by session (autogroup): in this one, it would be the test itself, with
+    its serial cable, and others in the same terminal that are slow, instead of the robot's nodes.
+    """
+    loop = [sys.executable, '-c', 'while True: pass']
     with ExitStack() as stack:
         for _ in os.sched_getaffinity(0):
-            busy = subprocess.Popen([sys.executable, '-c', 'while True: pass'])
+            busy = subprocess.Popen(loop, start_new_session=True)
             stack.callback(busy.wait)
             stack.callback(busy.kill)
         yield

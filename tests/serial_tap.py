@@ -106,6 +106,16 @@ class SerialTap:
         """
         return max(self._steps(since), default=0.0)
 
+    def longest_silence(self, since: float) -> float:
+        """Return the longest time in [s] in which the bridge heard no state of the robot.
+
+        Args:
+            since: Steady time in [s] at which the first silence begins at the earliest.
+        """
+        heard = (report for report in list(self.reports) if report > since)
+        times = [since, *heard, time.monotonic()]
+        return max(after - before for before, after in itertools.pairwise(times))
+
     def _steps(self, since: float) -> Iterator[float]:
         for before, after in itertools.pairwise(list(self.targets)):
             if after.time >= since:

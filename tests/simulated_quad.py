@@ -104,6 +104,8 @@ class SimulatedQuad:
 
     def start(self, name: str) -> RunningProcess:
         """Start a process, once more after it was killed, and wait until it is ready."""
+        if name == 'controller':
+            self.states.clear()  # what one that was killed said last is not its successor's
         spec = self._specs[name]
         environment = {**self._isolation.env, **spec.environment}
         process = self._stack.enter_context(RunningProcess(spec.argv, environment))
@@ -152,9 +154,19 @@ class SimulatedQuad:
         return str(self.states[-1].data) if self.states else ''
 
     def stand(self) -> None:
-        """Let it stand up, and wait until it does."""
+        """Let it stand up, and wait until it does.
+
+        Raises:
+            AssertionError: It does not, or a fault stops it on its way.
+        """
         self.set_mode('stand')
-        self.client.spin_until(lambda: self.state == 'stand', 20.0, 'standing')
+        asked = len(self.states)
+
+        def ended() -> bool:
+            return self.state == 'stand' or any(s.data == 'fault' for s in self.states[asked:])
+
+        self.client.spin_until(ended, PATIENCE, 'standing')
+        assert self.state == 'stand', f'does not stand: {self.processes["controller"].lines[-1]}'
 
     def walk(self, seconds: float, velocity: Velocity = AHEAD) -> None:
         """Command a velocity, ten times a second, for so long."""
