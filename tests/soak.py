@@ -175,8 +175,15 @@ class Robots:
             del messages[:-1]
         self._continue()
         if self.quad.state != 'walk':
-            self.failures.append(f'quadruped: {self.quad.processes["controller"].lines[-1]}')
+            for name, process in self.quad.processes.items():
+                print(f'{name}: ' + '\n    '.join(process.lines[-5:]))
+            self._failed(f'quadruped: {self.quad.processes["controller"].lines[-1]}')
             self._walk()
+
+    def _failed(self, words: str) -> None:
+        """Say it at once: what follows may keep the verdict from being reached."""
+        print(time.strftime('%H:%M:%S'), words, flush=True)
+        self.failures.append(words)
 
     def _walk(self) -> None:
         quad = self.quad
@@ -193,7 +200,7 @@ class Robots:
         elif self._result.done():
             result = self._result.result().result
             if result.error_code != FollowJointTrajectory.Result.SUCCESSFUL:
-                self.failures.append(f'arm: {result.error_string}')
+                self._failed(f'arm: {result.error_string}')
             self.goals += 1
             self._away = not self._away
             goal = goal_to(AWAY if self._away else READY, WAY_TIME)
