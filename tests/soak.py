@@ -30,6 +30,7 @@ from simulated_quad import SimulatedQuad
 
 from arm_canopen.can import open_bus
 from arm_canopen.standard.cob_id import CobId
+from quad_msgs.srv import InjectFault
 
 if TYPE_CHECKING:
     from types import TracebackType
@@ -57,6 +58,8 @@ LOST, LATE = 'frames_lost', 'missed_pdos'
 """Counters of the master: frames that the kernel dropped, TPDOs that came after their cycle."""
 PATIENCE = 20.0
 """Longest time in [s] until it walks."""
+CHARGING = 1200.0
+"""Time in [s] between two full batteries of the quadruped; one lasts twice as long at a walk."""
 AT_THE_END = 1
 """SYNCs whose answers may not be there yet."""
 
@@ -160,6 +163,7 @@ class Robots:
         assert self._client.wait_for_server(20.0)
         arm.follow()
         self._walk()
+        self._charge_at = time.monotonic() + CHARGING
         self._away = False
         self._sent = self._client.send_goal_async(goal_to(READY, WAY_TIME))
         self._result = None
@@ -174,9 +178,25 @@ class Robots:
         for messages in (self.quad.joints, self.quad.states, self.quad.truth, self._reports):
             del messages[:-1]
         self._continue()
+        if time.monotonic() >= self._charge_at:
+            self._charge_at += CHARGING
+            self._charge()
         if self.quad.state != 'walk':
-            self.failures.append(f'quadruped: {self.quad.processes["controller"].lines[-1]}')
+            for name, process in self.quad.processes.items():
+                print(f'{name}: ' + '\n    '.join(process.lines[-5:]))
+            self._failed(f'quadruped: {self.quad.processes["controller"].lines[-1]}')
             self._walk()
+
+    def _failed(self, words: str) -> None:
+        """Say it at once: what follows may keep the verdict from being reached."""
+        print(time.strftime('%H:%M:%S'), words, flush=True)
+        self.failures.append(words)
+
+    def _charge(self) -> None:
+        full = InjectFault.Request(fault='battery', settings=['level=100'], duration=1.0)
+        answer = self.quad.client.call(InjectFault, '/fake_xgo/fault', full)
+        if not answer.success:
+            self._failed(f'quadruped: no battery: {answer.message}')
 
     def _walk(self) -> None:
         quad = self.quad
@@ -193,7 +213,7 @@ class Robots:
         elif self._result.done():
             result = self._result.result().result
             if result.error_code != FollowJointTrajectory.Result.SUCCESSFUL:
-                self.failures.append(f'arm: {result.error_string}')
+                self._failed(f'arm: {result.error_string}')
             self.goals += 1
             self._away = not self._away
             goal = goal_to(AWAY if self._away else READY, WAY_TIME)
