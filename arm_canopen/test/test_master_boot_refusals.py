@@ -73,6 +73,14 @@ def test_a_device_that_cannot_watch_the_master_boots(code: int) -> None:
     assert scene.net.network.nodes[NODE].watch_slot == 0
 
 
+def test_a_device_that_watches_the_master_already_is_left_in_peace_at_the_end() -> None:
+    """Its 0x1016 is constant, and right: the master that goes undoes the watch where it can."""
+    scene = Refusing(io_config(heartbeat_consumer=True), refuses={(0x1016, 1): READ_ONLY})
+    scene.device.values[0x1016, 1] = struct.pack('<I', 3 << 16 | 250)  # node id, and time in [ms]
+    assert scene.boot() == []
+    assert scene.net.network.nodes[NODE].watch_slot == 1
+
+
 def test_a_device_that_shall_watch_the_master_has_to() -> None:
     """Where bus.yml asks for it, the device is not started; the key is named."""
     config = io_config(heartbeat_consumer=True)

@@ -16,6 +16,7 @@ import pinocchio as pin
 import pytest
 
 from arm_model import Array, CommandError, load_limits, ModelError, Pose, RobotModel
+from arm_model.description import Description
 
 CHAINS = ('zyy', 'zyyz', 'zyyzy', 'cyyzyz', 'zpyzyzc', 'zyzyzyzy')
 
@@ -125,6 +126,15 @@ def test_continuous_joints_have_no_end() -> None:
     turned = np.array([4 * math.pi, 0.1, 0.2, 0.3, 0.4, 0.5])
     back = turned - np.array([4 * math.pi, 0.0, 0.0, 0.0, 0.0, 0.0])
     assert model.pose(turned).position == pytest.approx(model.pose(back).position, abs=1e-9)
+
+
+def test_a_wheel_whose_velocity_nobody_gives_is_no_reason_to_refuse_the_arm() -> None:
+    """Public descriptions write velocity 0 for continuous joints."""
+    text = (
+        '<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="continuous">'
+        '<parent link="a"/><child link="b"/><limit effort="0" velocity="0"/></joint></robot>'
+    )
+    assert Description(text).ranges['j'].velocity == 0.0
 
 
 Broken = Callable[[str, str, dict[str, Any]], tuple[str, str, dict[str, Any]]]

@@ -42,7 +42,7 @@ class Stack:
         arm: The robot has its arm.
         gait: Gait of the controller.
         policy: Policy that the controller loads; None for the geometric gait alone.
-        protocol: Serial protocol, ``new`` or ``old``; ``auto`` asks the robot.
+        protocol: Serial protocol, ``v2`` or ``v1``; ``auto`` asks the robot.
         calibration: Parameter file that ``quad_hardware calibrate`` has written.
         ready_timeout: How long each process may take to be ready in [s].
         ros: Options of all nodes.

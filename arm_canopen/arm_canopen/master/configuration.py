@@ -90,10 +90,16 @@ class Configurator:
             SdoError: The device does not answer.
         """
         found = []
+        written = {write.address for write in boot_writes(self._bus, self._node.config)}
         for write in held_after_boot(self._bus, self._node.config):
             if write.index not in PDO_OBJECTS or write.is_own_timer:
                 continue
-            present = await self._node.sdo.read(*write.address, self._sdo_timeout)
+            try:
+                present = await self._node.sdo.read(*write.address, self._sdo_timeout)
+            except SdoAbortError:
+                if write.address in written:
+                    raise
+                continue  # a mapping that the device has for good, and does not show
             if not write.fits(present):
                 found.append(f'{write.place} is {write.text(present)} instead of {write.text()}')
         return found
@@ -130,12 +136,12 @@ class Configurator:
         try:
             await self.write(SdoWrite(*write.address, data))
         except SdoAbortError as error:
-            if write.temporary or await self._holds(write):
-                return  # where the writes that follow need it, they are refused, too
-            self._refused(write, error)
-        else:
-            if write.key == WATCH_KEY:
-                self._node.watch_slot = write.subindex if any(data) else 0
+            if not (write.temporary or await self._holds(write)):
+                self._refused(write, error)
+                return
+            # where the writes that follow need it, they are refused, too
+        if write.key == WATCH_KEY:
+            self._node.watch_slot = write.subindex if any(data) else 0
 
     def _refused(self, write: BootWrite, error: SdoAbortError) -> None:
         """Go on without what nobody asked for; raise an SdoError for what bus.yml wants."""

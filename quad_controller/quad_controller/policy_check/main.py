@@ -10,7 +10,7 @@ import math
 import signal
 import sys
 
-from quad_description import Backend, PRESETS, quadruped, robot_urdf
+from quad_description import Backend, DescriptionError, PRESETS, quadruped, robot_urdf
 
 from ..exceptions import QuadControllerError
 from ..gait.generator import GaitGenerator
@@ -57,7 +57,7 @@ def run(arguments: Sequence[str]) -> int:
         velocity = Velocity(*options.walk)
         with _physics(urdf, options.servo) as backend:
             walked = walk(backend, robot, loaded.runner, velocity, options.duration)
-    except QuadControllerError as error:
+    except (QuadControllerError, DescriptionError) as error:
         _print(str(error))
         return 1
     _print(
