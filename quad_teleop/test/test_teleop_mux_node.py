@@ -117,8 +117,13 @@ def test_stamped_in_and_out(isolation: Isolation, client: RosClient) -> None:
         client.spin_until(lambda: count('cmd_vel_out') > 0, PATIENCE, 'output')
         message = TwistStamped(twist=forward(0.5))
         message.header.frame_id = 'base_link'
-        keyboard.publish(message)
-        client.spin_until(lambda: len(heard) > 1, PATIENCE, 'velocity and zero')
+
+        def passes() -> bool:
+            """Publish; the multiplexer may not know this listener yet."""
+            keyboard.publish(message)
+            return bool(heard)
+
+        client.spin_until(passes, PATIENCE, 'velocity')
+        client.spin_until(lambda: heard[-1].twist == Twist(), PATIENCE, 'zero')
     assert heard[0] == message
-    assert heard[1].twist == Twist()
-    assert heard[1].header.stamp.sec > 0
+    assert heard[-1].header.stamp.sec > 0
