@@ -7,7 +7,7 @@
     CanopenError
     ├── ConfigError (ValueError)     a bus.yml or EDS is wrong; lists every problem
     ├── BusError (OSError)           a CAN interface cannot be opened, or refuses a frame
-    ├── OtherMasterError                   another master leads this bus already
+    ├── OtherMasterError             another master leads this bus already
     ├── CodecError (ValueError)      a value does not fit its type, or bytes are no message
     ├── ObjectError (LookupError)    a device has no object of that name or number
     ├── SdoError                     a device did not do what an SDO asked
@@ -24,14 +24,38 @@ Arguments of the wrong kind from a *programmer* stay ``ValueError``/``TypeError`
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from .config.model import Problem
+from dataclasses import dataclass
+from pathlib import Path
 
 
 class CanopenError(Exception):
     """Root of all errors of this package."""
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """Something wrong with a configuration file.
+
+    Attributes:
+        file: The file.
+        line: Line, from 1; 0 when the whole file is meant.
+        key: Path of the key, such as ``nodes.joint1.tpdo.1.mapping``; empty when none applies.
+        message: What is wrong, and with which value.
+        remedy: What to do about it.
+    """
+
+    file: Path
+    line: int
+    key: str
+    message: str
+    remedy: str
+
+    def __str__(self) -> str:
+        """Write it as compilers do: file, line, key, message, remedy."""
+        place = f'{self.file}:{self.line}' if self.line else str(self.file)
+        key = f'{self.key}: ' if self.key else ''
+        remedy = f' ({self.remedy})' if self.remedy else ''
+        return f'{place}: {key}{self.message}{remedy}'
 
 
 class ConfigError(CanopenError, ValueError):

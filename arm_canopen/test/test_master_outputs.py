@@ -23,7 +23,7 @@ from virtual_network import (
 
 from arm_canopen.config.checks import check_bus
 from arm_canopen.config.model import NodeConfig
-from arm_canopen.exceptions import CanopenError
+from arm_canopen.exceptions import CanopenError, CodecError
 from arm_canopen.standard.drive import OperationMode
 from arm_canopen.standard.nmt import NmtCommand
 from canopen_sim.faults.faults import BusFault, FaultInjection
@@ -170,6 +170,21 @@ def test_the_first_targets_of_a_drive_are_where_it_is() -> None:
     net.run_until(net.all_ready, 5.0)
     (at,) = {round(0.3 * SCALE), *net.targets('a', since=begin)}
     assert at == round(net.drives['a'].position * SCALE)
+
+
+def test_the_position_of_a_drive_is_read_once_for_all_its_targets() -> None:
+    """The targets of modes 7 and 8 both start where the drive is."""
+    net = VirtualNetwork(bus_config(every_mode(drive_config('a', 2))))
+    net.boot()
+    begun = [data for data in net.frames(0x602) if data[:4] == b'\x40\x64\x60\0']
+    assert len(begun) == 1
+
+
+def test_a_boot_write_that_fits_no_type_is_refused() -> None:
+    """An RPDO must not carry what the EDS has as default, while boot writes something else."""
+    short = replace(sdo_write(*OUTPUTS, 0x44), data=b'\x44')
+    with pytest.raises(CodecError, match=rf'{MODULE}: the write of 0x6083:00 at boot'):
+        booted(module(sdo_writes=(short,)))
 
 
 def test_an_sdo_write_is_not_undone_while_its_answer_is_awaited() -> None:

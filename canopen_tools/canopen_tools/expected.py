@@ -4,9 +4,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
-from arm_canopen.config.boot_plan import BootWrite, held_after_boot
+from arm_canopen.config.boot_plan import BootWrite, held_after_boot, HeldConsumers
 from arm_canopen.config.model import BusConfig, NodeConfig
 from arm_canopen.exceptions import CodecError
 from arm_canopen.standard.datatypes import DataType, encode
@@ -17,7 +17,7 @@ FROM_EDS = ('device_type', 'vendor_id', 'product_code')
 
 
 def expected_objects(
-    config: BusConfig, node: NodeConfig, consumers: Mapping[int, int] | None = None
+    config: BusConfig, node: NodeConfig, consumers: HeldConsumers | None = None
 ) -> list[BootWrite]:
     """Return everything that bus.yml decides of a device: its identity, and what boot leaves.
 

@@ -17,7 +17,14 @@ from virtual_network import (
     with_defaults,
 )
 
-from arm_canopen.config.boot_plan import boot_writes, BootWrite, held_after_boot
+from arm_canopen.config.boot_plan import (
+    boot_writes,
+    BootWrite,
+    consumer_to_read,
+    held_after_boot,
+    HeldConsumers,
+    WATCH_KEY,
+)
 from arm_canopen.config.identity import Identity
 from arm_canopen.config.model import NodeConfig
 from arm_canopen.master.configuration import Configurator, PDO_OBJECTS
@@ -119,6 +126,30 @@ def test_take_over_and_diff_find_what_boot_leaves_and_every_change_of_it(held: i
         (found,) = scene.differences()
         assert found.startswith(item.place)
         variable.value = before
+
+
+@pytest.mark.parametrize(
+    ('entries', 'taken'),
+    [
+        ({1: 0}, 1),
+        ({1: OTHER, 3: 0}, 3),
+        ({1: OTHER, 3: 1 << 16 | 100}, 3),  # the master's, from before
+        ({1: OTHER, 3: OTHER, 4: OTHER}, None),
+        ({1: None}, 1),  # it cannot be read, and may be free
+        ({1: OTHER, 3: None}, None),  # the EDS promises more than the device has
+    ],
+)
+def test_which_entries_are_read_and_which_one_is_the_masters(
+    entries: HeldConsumers, taken: int | None
+) -> None:
+    """Up to the first that is free; entry 2 belongs to the DCF."""
+    scene = Scene(0)
+    held: dict[int, int | None] = {}
+    while (subindex := consumer_to_read(scene.config, scene.node, held)) is not None:
+        held[subindex] = entries[subindex]
+    assert held == entries
+    writes = boot_writes(scene.config, scene.node, held)
+    assert [w.subindex for w in writes if w.key == WATCH_KEY] == ([taken] if taken else [])
 
 
 def test_a_complete_dcf_holds_the_plan() -> None:

@@ -291,6 +291,21 @@ def test_diff_shows_what_bus_yml_has_otherwise(
     assert output.splitlines()[-1].endswith('objects compared, none different')
 
 
+def test_diff_takes_the_entry_of_the_heartbeat_consumer_that_boot_takes(
+    name: str, runner: DeviceRunner, bus_yml: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Boot writes to the first one where a device lets nobody read it, and not behind it."""
+
+    def refuse() -> None:
+        fault = FaultInjection(BusFault.SDO_ABORT, object=(0x1016, 1))
+        runner.host.devices[0].faults.inject(fault, time.monotonic())
+
+    runner.call(refuse).result(DEADLINE)
+    assert main(['diff', 'left', '--can', name, '--bus-config', bus_yml]) == 1
+    rows = [line for line in capsys.readouterr().out.splitlines() if '0x1016' in line]
+    assert [row.split()[1] for row in rows] == ['0x1016:01']
+
+
 @pytest.mark.usefixtures('runner')
 def test_diff_with_an_eds(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     """Without bus.yml the defaults of all objects that can be written count."""

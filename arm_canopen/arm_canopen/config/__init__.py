@@ -6,12 +6,13 @@
 is wrong and raise one ``ConfigError`` whose problems name file, line, key and remedy.
 """
 
+from ..exceptions import Problem
 from .drive_model import DriveConfig
 from .eds import Eds, load_eds
 from .identity import Identity
 from .load import load_bus
 from .master_model import MasterConfig
-from .model import BusConfig, NodeConfig, PdoConfig, Problem, SdoWrite
+from .model import BusConfig, NodeConfig, PdoConfig, SdoWrite
 
 __all__ = [
     'BusConfig',

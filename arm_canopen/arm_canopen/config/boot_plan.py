@@ -32,6 +32,8 @@ ERROR_CONTROL = (
 )
 WATCH_KEY = 'heartbeat_consumer'
 TIMER_KEY = 'event_timer'
+HeldConsumers = Mapping[int, int | None]
+"""What a device holds in its entries of 0x1016, by sub-index; None where it refuses to be read."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +49,7 @@ class BootWrite:
         mask: Bits that count, None for all; the device keeps the others.
         temporary: It makes room for the writes that follow, and does not stay.
         unless_default: An exported DCF leaves it out where the EDS has it as default.
+        fixed: The device has it for good, so it is not written.
     """
 
     index: int
@@ -57,6 +60,7 @@ class BootWrite:
     mask: int | None = None
     temporary: bool = False
     unless_default: bool = False
+    fixed: bool = False
 
     @property
     def address(self) -> tuple[int, int]:
@@ -98,21 +102,21 @@ class BootWrite:
 
 
 def boot_writes(
-    bus: BusConfig, node: NodeConfig, consumers: Mapping[int, int] | None = None
+    bus: BusConfig, node: NodeConfig, consumers: HeldConsumers | None = None
 ) -> list[BootWrite]:
     """Return everything that is written to a device at boot, in this order.
 
     Args:
         bus: The bus.
         node: The device.
-        consumers: What the device holds in the :func:`watch_slots` of 0x1016; None: what its EDS
-            says.
+        consumers: What the device holds in 0x1016, read while :func:`consumer_to_read` names an
+            entry; None: what its EDS says.
     """
     return list(_Plan(bus, node, consumers).writes())
 
 
 def held_after_boot(
-    bus: BusConfig, node: NodeConfig, consumers: Mapping[int, int] | None = None
+    bus: BusConfig, node: NodeConfig, consumers: HeldConsumers | None = None
 ) -> list[BootWrite]:
     """Return what the device holds after its boot: what was written, and mappings that it has.
 
@@ -130,11 +134,27 @@ def is_requested(bus: BusConfig, node: NodeConfig, *keys: str) -> bool:
     return not bus.locations or (node.name, *keys) in bus.locations
 
 
-def watch_slots(bus: BusConfig, node: NodeConfig) -> list[int]:
+def consumer_to_read(bus: BusConfig, node: NodeConfig, held: HeldConsumers) -> int | None:
+    """Return the entry of 0x1016 that has to be read next; None when the master's is known.
+
+    Args:
+        bus: The bus.
+        node: The device.
+        held: What was read so far.
+    """
+    for subindex in _watch_slots(bus, node):
+        if subindex not in held:
+            return subindex
+        if held[subindex] is None or _is_free(held, subindex, bus.master.node_id):
+            return None  # entries behind one that cannot be read are promised by the EDS only
+    return None
+
+
+def _watch_slots(bus: BusConfig, node: NodeConfig) -> list[int]:
     """Return the entries of 0x1016 that may be the master's: no file has another use for them."""
     others = {w.subindex for w in node.sdo_writes if w.index == Index.CONSUMER_HEARTBEAT}
     for subindex, word in _consumers_of_dcf(node).items():
-        if not is_free_slot(word, bus.master.node_id):
+        if not _is_free_word(word, bus.master.node_id):
             others.add(subindex)
     return [
         entry.subindex
@@ -143,8 +163,17 @@ def watch_slots(bus: BusConfig, node: NodeConfig) -> list[int]:
     ]
 
 
-def is_free_slot(word: int, master_id: int) -> bool:
-    """Tell whether an entry of 0x1016 may be the master's: it is, or it is not used."""
+def _is_free(held: HeldConsumers, subindex: int, master_id: int) -> bool:
+    """Tell whether the master may use an entry of 0x1016 of a device.
+
+    The first entry counts as free where it cannot be read.
+    """
+    word = held.get(subindex)
+    return subindex == 1 if word is None else _is_free_word(word, master_id)
+
+
+def _is_free_word(word: int, master_id: int) -> bool:
+    """Tell whether an entry of 0x1016 is unused, or the master's."""
     entry = ConsumerHeartbeatTime.parse(word)
     return entry.node_id == master_id or not entry.used
 
@@ -159,9 +188,7 @@ def watch_word(bus: BusConfig, node: NodeConfig) -> int:
 class _Plan:
     """Lists the writes for one device."""
 
-    def __init__(
-        self, bus: BusConfig, node: NodeConfig, consumers: Mapping[int, int] | None
-    ) -> None:
+    def __init__(self, bus: BusConfig, node: NodeConfig, consumers: HeldConsumers | None) -> None:
         self._bus = bus
         self._node = node
         self._consumers = _eds_consumers(bus, node) if consumers is None else consumers
@@ -188,10 +215,11 @@ class _Plan:
         """Have the device watch the master, or no longer, in the first entry that is free."""
         master_id = self._bus.master.node_id
         entries = {**self._consumers, **_consumers_of_dcf(self._node)}  # which was written before
-        slots = [sub for sub in watch_slots(self._bus, self._node) if sub in entries]
-        slot = next((sub for sub in slots if is_free_slot(entries[sub], master_id)), 0)
+        slots = [sub for sub in _watch_slots(self._bus, self._node) if sub in entries]
+        slot = next((sub for sub in slots if _is_free(entries, sub, master_id)), 0)
         word = watch_word(self._bus, self._node)
-        if slot and (word or ConsumerHeartbeatTime.parse(entries[slot]).node_id == master_id):
+        own = ConsumerHeartbeatTime.parse(entries.get(slot) or 0).node_id == master_id
+        if slot and (word or own):
             yield _number(
                 (Index.CONSUMER_HEARTBEAT, slot),
                 word,
@@ -309,7 +337,7 @@ def _consumers_of_dcf(node: NodeConfig) -> dict[int, int]:
 def _eds_consumers(bus: BusConfig, node: NodeConfig) -> dict[int, int]:
     entries = {
         subindex: node.dictionary.get(Index.CONSUMER_HEARTBEAT, subindex)
-        for subindex in watch_slots(bus, node)
+        for subindex in _watch_slots(bus, node)
     }
     return {
         subindex: entry.default if entry is not None and isinstance(entry.default, int) else 0
@@ -323,9 +351,10 @@ def _fixed_mappings(node: NodeConfig) -> Iterator[BootWrite]:
         for pdo in pdos:
             if pdo.configured and pdo.enabled and pdo.fixed_mapping:
                 index, key = direction.mapping + pdo.number - 1, f'{direction.name}.{pdo.number}'
-                yield _number((index, 0), len(pdo.mapping), DataType.UNSIGNED8, key)
+                yield _number((index, 0), len(pdo.mapping), DataType.UNSIGNED8, key, fixed=True)
                 for subindex, mapped in enumerate(pdo.mapping, start=1):
-                    yield _number((index, subindex), mapped.word, DataType.UNSIGNED32, key)
+                    address, word = (index, subindex), mapped.word
+                    yield _number(address, word, DataType.UNSIGNED32, key, fixed=True)
 
 
 def _written(write: SdoWrite, *, unless_default: bool = False) -> BootWrite:
@@ -351,6 +380,7 @@ def _number(  # the fields of a record
     mask: int | None = None,
     temporary: bool = False,
     unless_default: bool = False,
+    fixed: bool = False,
 ) -> BootWrite:
     data = encode(data_type, value)
-    return BootWrite(*address, data, key, requested, mask, temporary, unless_default)
+    return BootWrite(*address, data, key, requested, mask, temporary, unless_default, fixed)

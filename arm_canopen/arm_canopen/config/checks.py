@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 import os
 
-from ..exceptions import ConfigError
+from ..exceptions import ConfigError, Problem
 from .check_drives import check_drive
 from .check_network import (
     check_heartbeats,
@@ -26,7 +26,7 @@ from .check_subject import Subject
 from .drive_units import axis_units, AxisUnits, check_units
 from .findings import Findings, Place
 from .load import read_bus
-from .model import BusConfig, Problem
+from .model import BusConfig
 from .traffic import estimate_load, LoadEstimate
 
 HIGH_LOAD = 0.7

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import os
 from pathlib import Path
 
+from ..exceptions import Problem
 from ..standard.cob_id import NODE_ID_MAX, NODE_ID_MIN
 from ..standard.dictionary import ObjectDictionary
 from .eds_ini import decode_text, IniFile, read_ini
 from .eds_objects import ObjectReader
 from .eds_values import parse_integer
 from .findings import Findings, Place
-from .model import Problem
 
 SIZE_MAX = 16 * 1024 * 1024  # [byte] larger files are no EDS
 DUMMY_TYPES = range(0x0002, 0x0008)  # INTEGER8 to UNSIGNED32 (CiA 301, 7.4.7.1)

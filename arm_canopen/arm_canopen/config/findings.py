@@ -8,8 +8,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..exceptions import ConfigError
-from .model import Problem
+from ..exceptions import ConfigError, Problem
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,11 +5,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from ..exceptions import CodecError
+from ..exceptions import CodecError, Problem
 from ..standard.datatypes import DataType, decode, Value
 from ..standard.dictionary import ObjectDictionary
 from ..standard.objects import AXIS_OFFSET, COMMANDS
@@ -115,8 +114,8 @@ class NodeConfig:
         poll_period: How often objects that no PDO carries are read in [s] (``period`` of bus.yml).
         tpdos: All TPDOs of the device, by ascending number.
         rpdos: All RPDOs of the device, by ascending number.
-        sdo_writes: ``error_behavior``, ``time_cob_id``, the objects of a concise DCF and the
-            ``sdo`` list of bus.yml, in the order of writing.
+        sdo_writes: ``time_cob_id``, ``error_behavior`` and the list ``sdo`` of bus.yml, in the
+            order of writing.
         parameter_writes: What its DCF wants written before all else: ParameterValues that are
             not the defaults.
         axes: The axes of a CiA 402 drive, by ascending channel.
@@ -167,13 +166,19 @@ class NodeConfig:
             index: Object index.
             subindex: Sub-index.
             data_type: Its type where the EDS does not have it.
+
+        Raises:
+            CodecError: What is written to it at boot does not fit its type.
         """
         entry = self.dictionary.get(index, subindex)
         write = self.write_of(index, subindex)
         known_type = entry.data_type if entry is not None else data_type
         if write is not None and known_type is not None:
-            with suppress(CodecError):
+            try:
                 return decode(known_type, write.data)
+            except CodecError as error:
+                place = f'0x{index:04X}:{subindex:02X}'
+                raise CodecError(f'{self.name}: the write of {place} at boot: {error}') from None
         return None if entry is None else entry.default
 
     @property
@@ -209,32 +214,6 @@ class NodeConfig:
     def joints(self) -> tuple[str, ...]:
         """Names of the joints that it drives: its own, or those of its channels."""
         return tuple(axis.name for axis in self.axes) if self.is_drive else ()
-
-
-@dataclass(frozen=True, slots=True)
-class Problem:
-    """Something wrong with a configuration file.
-
-    Attributes:
-        file: The file.
-        line: Line, from 1; 0 when the whole file is meant.
-        key: Path of the key, such as ``nodes.joint1.tpdo.1.mapping``; empty when none applies.
-        message: What is wrong, and with which value.
-        remedy: What to do about it.
-    """
-
-    file: Path
-    line: int
-    key: str
-    message: str
-    remedy: str
-
-    def __str__(self) -> str:
-        """Write it as compilers do: file, line, key, message, remedy."""
-        place = f'{self.file}:{self.line}' if self.line else str(self.file)
-        key = f'{self.key}: ' if self.key else ''
-        remedy = f' ({self.remedy})' if self.remedy else ''
-        return f'{place}: {key}{self.message}{remedy}'
 
 
 @dataclass(frozen=True, slots=True)

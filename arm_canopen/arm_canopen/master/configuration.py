@@ -5,15 +5,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 
 from ..config.boot_plan import (
     boot_writes,
     BootWrite,
+    consumer_to_read,
     ERROR_CONTROL,
     held_after_boot,
-    is_free_slot,
     WATCH_KEY,
-    watch_slots,
     watch_word,
 )
 from ..config.model import BusConfig, SdoWrite
@@ -90,16 +90,15 @@ class Configurator:
             SdoError: The device does not answer.
         """
         found = []
-        written = {write.address for write in boot_writes(self._bus, self._node.config)}
         for write in held_after_boot(self._bus, self._node.config):
             if write.index not in PDO_OBJECTS or write.is_own_timer:
                 continue
             try:
                 present = await self._node.sdo.read(*write.address, self._sdo_timeout)
             except SdoAbortError:
-                if write.address in written:
+                if not write.fixed:
                     raise
-                continue  # a mapping that the device has for good, and does not show
+                continue  # the device does not show it
             if not write.fits(present):
                 found.append(f'{write.place} is {write.text(present)} instead of {write.text()}')
         return found
@@ -180,18 +179,13 @@ class Configurator:
             self._warn(f'watches others in all entries of 0x1016, and not the master, {UNWATCHED}')
         return writes
 
-    async def _consumers(self) -> dict[int, int]:
+    async def _consumers(self) -> dict[int, int | None]:
         """Return what the device has in 0x1016, up to the first entry that is free."""
-        held: dict[int, int] = {}
-        for subindex in watch_slots(self._bus, self._node.config):
-            try:
+        held: dict[int, int | None] = {}
+        while (subindex := consumer_to_read(self._bus, self._node.config, held)) is not None:
+            held[subindex] = None
+            with suppress(SdoAbortError):
                 held[subindex] = await self.read_number(Index.CONSUMER_HEARTBEAT, subindex)
-            except SdoAbortError:
-                if subindex == 1:  # it cannot be read; a later one is promised by the EDS only
-                    held[subindex] = 0
-                break
-            if is_free_slot(held[subindex], self._bus.master.node_id):
-                break
         return held
 
     def _warn(self, text: str) -> None:

@@ -56,13 +56,17 @@ async def read_outputs(node: RemoteNode, timeout: float) -> None:
     Raises:
         SdoError: The device does not answer.
     """
+    read: dict[tuple[int, int], Number | None] = {}  # several targets start with one position
     for output, position, mapped in _mapped(node):
-        value = start_value(node.config, mapped)
-        source = _source(node, mapped)
+        value, source = None, _source(node, mapped)
         if source is not None and _is_readable(node, source):
-            with suppress(SdoAbortError, CodecError):
-                value = await _present(node, source, timeout)
-        output.values[position] = value
+            address = source.index, source.subindex
+            if address not in read:
+                read[address] = None
+                with suppress(SdoAbortError, CodecError):
+                    read[address] = await _present(node, source, timeout)
+            value = read[address]
+        output.values[position] = start_value(node.config, mapped) if value is None else value
 
 
 def _is_readable(node: RemoteNode, mapped: MappedObject) -> bool:

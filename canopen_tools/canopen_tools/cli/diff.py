@@ -5,12 +5,11 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 
 from arm_canopen.can import open_bus
-from arm_canopen.config.boot_plan import BootWrite, watch_slots
+from arm_canopen.config.boot_plan import BootWrite, consumer_to_read, HeldConsumers
 from arm_canopen.exceptions import SdoAbortError
 from arm_canopen.standard.objects import Index
 from arm_canopen.standard.sdo_abort import abort_text
@@ -79,19 +78,20 @@ def run(options: argparse.Namespace) -> int:
     return 1 if different else 0
 
 
-def _consumers(session: Session, target: Target) -> dict[int, int]:
+def _consumers(session: Session, target: Target) -> HeldConsumers:
     """Return what the device has in the entries of 0x1016 of which boot takes one."""
-    held: dict[int, int] = {}
+    held: dict[int, int | None] = {}
     if target.bus is None or target.config is None:
         return held
-    for subindex in watch_slots(target.bus, target.config):
+    while (subindex := consumer_to_read(target.bus, target.config, held)) is not None:
+        held[subindex] = None
         with suppress(SdoAbortError):
             data = _read(session, target, Index.CONSUMER_HEARTBEAT, subindex)
             held[subindex] = int.from_bytes(data, 'little')
     return held
 
 
-def _objects(target: Target, consumers: Mapping[int, int], *, defaults: bool) -> list[BootWrite]:
+def _objects(target: Target, consumers: HeldConsumers, *, defaults: bool) -> list[BootWrite]:
     """Return what to compare.
 
     Args:
