@@ -11,11 +11,12 @@ from collections.abc import Sequence
 from concurrent.futures import Future
 from itertools import pairwise
 
+from drive_samples import bus_config, drive_config, PERIOD, SCALE
 from model_robots import ready, robot
 import numpy as np
 import pytest
 from servo_commands import InlineWorker, outcome
-from virtual_network import bus_config, drive_config, PERIOD, SCALE, VirtualNetwork
+from virtual_network import VirtualNetwork
 
 from arm_canopen import MotionSource
 from arm_canopen.standard.drive import DriveState, OperationMode

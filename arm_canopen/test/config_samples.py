@@ -85,6 +85,15 @@ DRIVE_ROWS: tuple[Row, ...] = (
     Row(0x60C2, 2, 'Interpolation time index', 2, 'rw', '-3', low='-128', high='63'),
     Row(0x60FF, 0, 'Target velocity', 4, 'rww', '0', mappable=True),
 )
+FACTOR_ROWS: tuple[Row, ...] = (
+    Row(0x608F, 0, 'Highest sub-index', 5, 'const', '2'),
+    Row(0x608F, 1, 'Encoder increments', 7, 'rw', '4096'),
+    Row(0x608F, 2, 'Motor revolutions', 7, 'rw', '1'),
+    Row(0x6092, 0, 'Highest sub-index', 5, 'const', '2'),
+    Row(0x6092, 1, 'Feed', 7, 'rw', '6283185'),
+    Row(0x6092, 2, 'Shaft revolutions', 7, 'rw', '10'),
+)
+"""A factor group of 100,000 increments per rad."""
 
 
 def eds_text(rows: Iterable[Row] = DRIVE_ROWS) -> str:

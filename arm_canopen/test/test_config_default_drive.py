@@ -4,19 +4,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 import importlib.util
 from pathlib import Path
 
 from config_samples import BUS, load_text
 import pytest
-from virtual_network import bus_config, drive_config, drive_dictionary, VirtualNetwork
 
-from arm_canopen.config import load_eds
 from arm_canopen.config.eds_files import DEFAULT_DRIVE
 from arm_canopen.exceptions import ConfigError
-from arm_canopen.master.events import Severity
-from arm_canopen.standard.drive import OperationMode
 
 PACKAGE = Path(__file__).parents[1]
 
@@ -43,20 +38,6 @@ def test_another_device_needs_its_eds(tmp_path: Path) -> None:
     )
     with pytest.raises(ConfigError, match="no 'dcf'"):
         load_text(tmp_path, text)
-
-
-def test_a_drive_moves_by_the_default_dictionary() -> None:
-    """The simulated drive, whose own EDS nobody has read, is booted, enabled and moved."""
-    general = load_eds(DEFAULT_DRIVE).dictionary
-    config = replace(drive_config('a', 2), dictionary=general.for_node(2), sdo_writes=())
-    net = VirtualNetwork(bus_config(config), dictionaries={'a': drive_dictionary().for_node(2)})
-    net.boot()
-    net.do('a', 'init')
-    net.select('a', OperationMode.PROFILE_POSITION)
-    net.commands['a'].set_target(0.5)
-    net.run(10.0)
-    assert net.drives['a'].position == pytest.approx(0.5, abs=1e-3)
-    assert net.told(Severity.ERROR) == []
 
 
 def test_the_default_dictionary_is_made_from_the_simulated_drive() -> None:

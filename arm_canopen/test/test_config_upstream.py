@@ -4,19 +4,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 from config_cases import added
 from config_samples import BUS, errors_of, load_text, TWO_AXES_EDS, write_bus
 import pytest
-from virtual_network import bus_config, drive_config, drive_dictionary, VirtualNetwork
 
 from arm_canopen.config.checks import check_file
-from arm_canopen.exceptions import DriveError
-from arm_canopen.master.events import Severity
-from arm_canopen.standard.dictionary import ObjectDictionary
-from arm_canopen.standard.drive import DriveState, OperationMode
+from arm_canopen.standard.drive import DriveState
 
 JOINT = 'joint1'
 
@@ -65,96 +60,6 @@ def test_each_axis_needs_its_controlword(tmp_path: Path) -> None:
     found = [warning.message for warning in warnings if 'in the cycle' in warning.message]
     assert ['0x6840' in found[0], '0x6841' in found[1]] == [True, True]
     assert all('joint1_1' in message for message in found)
-
-
-def without_default(*indices: int) -> ObjectDictionary:
-    """Return the drive's dictionary as a vendor writes it: objects without defaults."""
-    return ObjectDictionary(
-        replace(entry, default=None) if entry.index in indices else entry
-        for entry in drive_dictionary().for_node(2)
-    )
-
-
-def booted(dictionary: ObjectDictionary, **changes: object) -> VirtualNetwork:
-    """Boot a drive that has this dictionary."""
-    config = replace(drive_config(JOINT, 2), dictionary=dictionary, **changes)  # type: ignore[arg-type]
-    net = VirtualNetwork(bus_config(config))
-    net.boot()
-    return net
-
-
-def test_a_simulated_drive_has_the_modes_that_its_objects_allow() -> None:
-    """0x6502 of EPOS, Kollmorgen and Elmo has no default; the drive is of use all the same."""
-    net = booted(without_default(0x6502))
-    told = net.drives[JOINT].parameters.supported_modes
-    wanted = (OperationMode.PROFILE_POSITION, OperationMode.HOMING, OperationMode.CYCLIC_TORQUE)
-    assert told
-    assert all(told & mode.support_bit for mode in wanted)
-    net.do(JOINT, 'init')
-    net.select(JOINT, OperationMode.PROFILE_POSITION)
-    net.commands[JOINT].set_target(0.3)
-    net.run(5.0)
-    assert net.drives[JOINT].position == pytest.approx(0.3, abs=1e-3)
-
-
-def test_it_has_no_mode_whose_object_is_missing() -> None:
-    """Without 0x6071 there is no torque mode, and without 0x6042 no velocity mode."""
-    dictionary = ObjectDictionary(
-        entry for entry in without_default(0x6502) if entry.index not in (0x6071, 0x6042)
-    )
-    told = booted(dictionary).drives[JOINT].parameters.supported_modes
-    assert told
-    missing = (OperationMode.PROFILE_TORQUE, OperationMode.CYCLIC_TORQUE, OperationMode.VELOCITY)
-    assert not any(told & mode.support_bit for mode in missing)
-    assert told & OperationMode.PROFILE_VELOCITY.support_bit
-
-
-def unmapped() -> VirtualNetwork:
-    """Boot a drive whose RPDOs carry controlword and mode only."""
-    config = drive_config(JOINT, 2)
-    net = VirtualNetwork(bus_config(replace(config, rpdos=config.rpdos[:1])))
-    net.boot()
-    net.do(JOINT, 'init')
-    return net
-
-
-def test_a_target_without_an_rpdo_goes_by_sdo() -> None:
-    """As with ros2_canopen; each target is reached, and no edge comes before its value."""
-    net = unmapped()
-    net.select(JOINT, OperationMode.PROFILE_POSITION)
-    for target in (0.5, -0.2, 0.9):
-        net.commands[JOINT].set_target(target)
-        net.run(5.0)
-        assert net.drives[JOINT].position == pytest.approx(target, abs=1e-3)
-    assert net.told(Severity.WARNING) == []
-
-
-def test_a_velocity_without_an_rpdo_goes_by_sdo() -> None:
-    """And so does the standstill that ends it."""
-    net = unmapped()
-    net.select(JOINT, OperationMode.PROFILE_VELOCITY)
-    net.commands[JOINT].set_target(0.4)
-    net.run(1.0)
-    assert net.drives[JOINT].rate == pytest.approx(0.4, abs=0.02)
-    net.do(JOINT, 'halt')
-    net.run(1.0)
-    assert net.drives[JOINT].rate == pytest.approx(0.0, abs=0.01)
-
-
-def test_an_idle_drive_fills_no_bus_with_its_targets() -> None:
-    """Enabled and at rest, nothing is written by SDO."""
-    net = unmapped()
-    net.select(JOINT, OperationMode.PROFILE_POSITION)
-    net.run(0.5)
-    begin = net.now
-    net.run(2.0)
-    assert net.frames(0x602, since=begin) == []
-
-
-def test_a_stream_needs_its_rpdo() -> None:
-    """A target in every cycle does not go by SDO; the object to be mapped is named."""
-    with pytest.raises(DriveError, match='0x607A is in no RPDO'):
-        unmapped().select(JOINT, OperationMode.CYCLIC_POSITION)
 
 
 @pytest.mark.parametrize(

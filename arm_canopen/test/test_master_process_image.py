@@ -8,10 +8,10 @@ from collections.abc import Callable
 from dataclasses import replace
 import struct
 
+from drive_samples import drive_config, pdo, sdo_write
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
-from virtual_network import drive_config, pdo, sdo_write
 
 from arm_canopen.can.frame import Frame
 from arm_canopen.config.model import PdoConfig

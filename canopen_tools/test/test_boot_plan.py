@@ -7,15 +7,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 from device_rig import Rig
+from drive_samples import bus_config, drive_config, drive_dictionary, sdo_write, with_defaults
 import pytest
-from virtual_network import (
-    bus_config,
-    drive_config,
-    drive_dictionary,
-    sdo_write,
-    VirtualNetwork,
-    with_defaults,
-)
+from virtual_network import VirtualNetwork
 
 from arm_canopen.config.boot_plan import (
     boot_writes,

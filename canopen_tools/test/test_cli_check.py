@@ -11,7 +11,7 @@ import subprocess
 import sys
 
 from can_addresses import free_multicast
-from config_samples import eds_text, write_bus
+from config_samples import DRIVE_ROWS, eds_text, FACTOR_ROWS, write_bus
 import pytest
 from tool_environment import ENVIRONMENT, REPOSITORY
 
@@ -76,6 +76,13 @@ def test_a_good_file_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     path.write_text(path.read_text().replace('  tpdo:', '  heartbeat_producer: 100\n  tpdo:', 1))
     assert main(['check', '--strict', str(path)]) == 0
     assert capsys.readouterr().out.splitlines()[-1] == f'{path}: 0 errors, 0 warnings'
+
+
+def test_units_are_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A row for each axis: what 1.0 is in increments, in [rad], and of the velocity."""
+    main(['check', str(write_bus(tmp_path, eds=eds_text((*DRIVE_ROWS, *FACTOR_ROWS))))])
+    row = next(line for line in capsys.readouterr().out.splitlines() if line.startswith('joint1'))
+    assert row.split()[:4] == ['joint1', '1000', '0.01', '1000']
 
 
 @pytest.mark.parametrize(

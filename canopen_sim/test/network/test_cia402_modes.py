@@ -1,0 +1,572 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Every mode and every command of a drive, against a simulated one in virtual time."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+import math
+import struct
+from typing import Any
+
+from drive_samples import (
+    bus_config,
+    drive_config,
+    drive_dictionary,
+    every_mode,
+    MOTION_WRITES,
+    PERIOD,
+    SCALE,
+    sdo_write,
+    with_defaults,
+)
+import pytest
+from virtual_network import VirtualNetwork
+
+from arm_canopen.can.frame import Frame
+from arm_canopen.cia402.homing import HomingProgress
+from arm_canopen.cia402.position_modes import Move, QUEUE_MAX
+from arm_canopen.config.drive_model import DriveConfig, RecoveryPolicy
+from arm_canopen.config.model import NodeConfig
+from arm_canopen.exceptions import DriveError
+from arm_canopen.master.events import Severity
+from arm_canopen.standard.drive import DriveState, OperationMode
+
+pytestmark = pytest.mark.slow
+
+JOINT = 'joint1'
+CLEAR = b'\xc4\x60\x06'  # 0x60C4:06 in an SDO
+NODE_ID = 2
+SPEEDS = [OperationMode.VELOCITY, OperationMode.PROFILE_VELOCITY, OperationMode.CYCLIC_VELOCITY]
+TORQUES = [OperationMode.PROFILE_TORQUE, OperationMode.CYCLIC_TORQUE]
+POSITIONS = [
+    OperationMode.PROFILE_POSITION,
+    OperationMode.INTERPOLATED_POSITION,
+    OperationMode.CYCLIC_POSITION,
+]
+ALL = [*POSITIONS, *SPEEDS, *TORQUES]
+
+
+def by_name(value: object) -> str:
+    """Name a mode in the id of a test."""
+    return value.name if isinstance(value, OperationMode) else str(value)
+
+
+def full_drive(**changes: Any) -> NodeConfig:
+    """Return a drive whose RPDOs carry the targets of all modes."""
+    return every_mode(drive_config(JOINT, NODE_ID, **changes))
+
+
+def booted(**changes: Any) -> VirtualNetwork:
+    """Return a network with such a drive, booted."""
+    net = VirtualNetwork(bus_config(full_drive(**changes)))
+    net.boot()
+    return net
+
+
+def enable(net: VirtualNetwork, mode: OperationMode) -> None:
+    """Enable the drive and select a mode."""
+    net.do(JOINT, 'init')
+    net.select(JOINT, mode)
+
+
+def motor(net: VirtualNetwork) -> float:
+    """Return where the motor really is in [rad]."""
+    drive = net.devices[JOINT].drive
+    assert drive is not None
+    return drive.position / SCALE
+
+
+def speed(net: VirtualNetwork) -> float:
+    """Return how fast the drive says that it turns in [rad/s]."""
+    return net.drives[JOINT].velocity
+
+
+def target_of(mode: OperationMode) -> float:
+    """Return a target that sets the drive in motion for a second."""
+    if mode in TORQUES:
+        return 200.0
+    return 0.4 if mode in SPEEDS else 0.9
+
+
+@pytest.mark.parametrize('mode', ALL, ids=by_name)
+def test_every_mode_is_selected_and_moves_nothing(mode: OperationMode) -> None:
+    """0x6061 shows it, the answer says it, and the motor stays; a second time it is a success."""
+    net = booted()
+    net.do(JOINT, 'init')
+    before = motor(net)
+    assert f'mode {mode.title}' in net.select(JOINT, mode)
+    net.run(0.5)
+    assert motor(net) == pytest.approx(before, abs=1e-3)
+    assert 'already in mode' in net.select(JOINT, mode)
+
+
+@pytest.mark.parametrize('mode', SPEEDS, ids=by_name)
+def test_a_velocity_is_reached_within_the_acceleration(mode: OperationMode) -> None:
+    """Commanded once, it is held; zero stops it."""
+    net = booted()
+    enable(net, mode)
+    net.commands[JOINT].set_target(0.4)
+    net.run(1.5)
+    assert speed(net) == pytest.approx(0.4, rel=0.05)
+    net.commands[JOINT].set_target(0.0)
+    net.run(1.5)
+    assert speed(net) == pytest.approx(0.0, abs=0.01)
+
+
+@pytest.mark.parametrize('mode', TORQUES, ids=by_name)
+def test_a_torque_moves_the_motor(mode: OperationMode) -> None:
+    """In units of effort: one of bus.yml's is a per mille of the rated torque here."""
+    net = booted()
+    enable(net, mode)
+    net.commands[JOINT].set_target(200.0)
+    net.run(1.0)
+    assert struct.unpack('<h', net.frames(0x400 + NODE_ID)[-1][4:6])[0] == 200
+    fast = speed(net)
+    assert fast > 0.05
+    net.commands[JOINT].set_target(0.0)
+    net.run(3.0)
+    assert speed(net) < 0.5 * fast  # it runs out against its friction
+
+
+@pytest.mark.parametrize('mode', [*POSITIONS, *SPEEDS], ids=by_name)
+def test_halt_brakes_and_the_next_target_goes_on(mode: OperationMode) -> None:
+    """The drive stays enabled; nothing of the old target comes back."""
+    net = booted()
+    enable(net, mode)
+    net.commands[JOINT].set_target(target_of(mode))
+    net.run(0.6)
+    assert speed(net) > 0.2
+    answer = net.do(JOINT, 'halt', preempt=True)
+    assert 'Operation enabled' in answer
+    assert 'halted' in answer
+    net.run(0.3)
+    rest = motor(net)
+    net.run(1.0)
+    assert motor(net) == pytest.approx(rest, abs=1e-3)
+    net.commands[JOINT].set_target(-0.3)
+    fastest = 0.0
+    for _ in range(400):
+        net.run(PERIOD)
+        fastest = max(fastest, speed(net))
+    assert fastest < 0.05, 'it went on with the old target'
+    if mode in SPEEDS:
+        assert speed(net) == pytest.approx(-0.3, rel=0.05)
+    else:
+        assert motor(net) == pytest.approx(-0.3, abs=2e-3)
+
+
+@pytest.mark.parametrize('mode', ALL, ids=by_name)
+def test_quick_stop_stops_and_disables(mode: OperationMode) -> None:
+    """By option code 2 the drive ends in Switch on disabled."""
+    net = booted()
+    enable(net, mode)
+    net.commands[JOINT].set_target(target_of(mode))
+    net.run(0.5)
+    assert speed(net) > 0.05
+    net.do(JOINT, 'quick_stop', preempt=True)
+    net.run(2.0)
+    assert net.drives[JOINT].state is DriveState.SWITCH_ON_DISABLED
+    assert speed(net) == pytest.approx(0.0, abs=0.01)
+
+
+def test_a_switch_to_torque_keeps_the_load() -> None:
+    """Mode 10 begins with the torque that holds the axis, not with zero."""
+    net = booted()
+    enable(net, OperationMode.CYCLIC_POSITION)
+    drive = net.devices[JOINT].drive
+    assert drive is not None
+    drive.set_load(150, net.now)
+    net.run(1.0)
+    held = motor(net)
+    net.select(JOINT, OperationMode.CYCLIC_TORQUE)
+    first = struct.unpack('<h', net.frames(0x400 + NODE_ID)[-1][4:6])[0]
+    assert abs(first) == pytest.approx(150, abs=30)
+    net.run(0.2)
+    assert motor(net) == pytest.approx(held, abs=0.05)
+
+
+def test_queued_moves_are_all_made_in_their_order() -> None:
+    """However fast they come: none is lost, and each is passed."""
+    net = booted()
+    enable(net, OperationMode.PROFILE_POSITION)
+    targets = [0.1, -0.05, 0.15, 0.0, 0.2, 0.05]
+    for target in targets:
+        net.commands[JOINT].move(Move(target, immediate=False))
+    turns, positions = [], [motor(net)]
+    for _ in range(1500):
+        net.run(PERIOD)
+        positions.append(motor(net))
+    for a, b, c in zip(positions, positions[1:], positions[2:], strict=False):
+        if (b - a) * (c - b) < 0:
+            turns.append(b)
+    assert positions[-1] == pytest.approx(targets[-1], abs=1e-3)
+    assert turns[: len(targets) - 1] == pytest.approx(targets[:-1], abs=5e-3)
+
+
+def test_of_immediate_moves_the_newest_counts() -> None:
+    """A move that is replaced while it waits is not made."""
+    net = booted()
+    enable(net, OperationMode.PROFILE_POSITION)
+    for target in (0.5, -0.5, 0.2):
+        net.commands[JOINT].move(Move(target))
+    lowest = 0.0
+    for _ in range(200):
+        net.run(PERIOD)
+        lowest = min(lowest, motor(net))
+    assert lowest > -0.05
+    assert motor(net) == pytest.approx(0.2, abs=1e-3)
+
+
+def test_relative_moves_add_up() -> None:
+    """Bit 6: from the last set-point on, also from one that is not reached yet."""
+    net = booted()
+    enable(net, OperationMode.PROFILE_POSITION)
+    for _ in range(3):
+        assert 'to ' in net.commands[JOINT].move(Move(0.1, relative=True, immediate=False))
+    net.run(3.0)
+    assert motor(net) == pytest.approx(0.3, abs=1e-3)
+
+
+def test_moves_are_for_mode_1_and_within_the_limits() -> None:
+    """Another mode, a limit and a full queue are refused in words."""
+    limits = (*MOTION_WRITES, sdo_write(0x607D, 1, -5_000), sdo_write(0x607D, 2, 5_000))
+    net = booted(sdo_writes=limits)
+    enable(net, OperationMode.CYCLIC_POSITION)
+    with pytest.raises(DriveError, match='only in mode 1'):
+        net.commands[JOINT].move(Move(0.1))
+    net.select(JOINT, OperationMode.PROFILE_POSITION)
+    with pytest.raises(DriveError, match=r'software limits -0\.5 to 0\.5'):
+        net.commands[JOINT].move(Move(0.6))
+    net.commands[JOINT].move(Move(0.4))
+    with pytest.raises(DriveError, match='software limits'):
+        net.commands[JOINT].move(Move(0.2, relative=True))
+    for _ in range(QUEUE_MAX - 1):
+        net.commands[JOINT].move(Move(0.1, immediate=False))
+    with pytest.raises(DriveError, match='moves wait'):
+        net.commands[JOINT].move(Move(0.1, immediate=False))
+
+
+@pytest.mark.parametrize('mode', TORQUES, ids=by_name)
+def test_halt_in_a_torque_mode_holds_the_axis(mode: OperationMode) -> None:
+    """The drive brakes and holds (bit 8); the next torque begins from what holds it."""
+    net = booted()
+    enable(net, mode)
+    net.commands[JOINT].set_target(200.0)
+    net.run(0.5)
+    assert speed(net) > 0.05
+    assert 'halted' in net.do(JOINT, 'halt', preempt=True)
+    net.run(0.5)
+    rest = motor(net)
+    net.run(1.0)
+    assert motor(net) == pytest.approx(rest, abs=1e-3)
+    net.commands[JOINT].set_target(-200.0)
+    net.run(0.5)
+    assert speed(net) < -0.05
+
+
+@pytest.mark.parametrize('mode', ALL, ids=by_name)
+def test_a_stream_that_ends_is_a_smooth_stop(mode: OperationMode) -> None:
+    """Said once; a target that is commanded afterwards stands for itself."""
+    net = booted()
+    enable(net, mode)
+    for n in range(100):
+        value = target_of(mode) / 2 if mode not in POSITIONS else 0.002 * n
+        net.commands[JOINT].stream_target(value)
+        net.run(PERIOD)
+    if mode not in TORQUES:
+        assert speed(net) == pytest.approx(0.2, abs=0.06)
+    net.run(2.0)
+    assert speed(net) == pytest.approx(0.0, abs=0.01)
+    said = [text for text in net.told(Severity.WARNING) if 'stream of targets has paused' in text]
+    assert len(said) == 1
+    assert ('stopped' in said[0]) is (mode is not OperationMode.PROFILE_POSITION)
+    net.commands[JOINT].set_target(0.1 if mode not in TORQUES else 0.0)
+    net.run(2.0)
+    assert len([t for t in net.told(Severity.WARNING) if 'has paused' in t]) == 1
+
+
+def test_a_stream_never_jumps() -> None:
+    """A first value far away is approached within the limits of the profile."""
+    net = booted()
+    enable(net, OperationMode.CYCLIC_POSITION)
+    net.commands[JOINT].stream_target(0.9)
+    targets = []
+    for _ in range(60):
+        net.run(PERIOD)
+        net.commands[JOINT].stream_target(0.9)
+        targets.append(net.targets(JOINT)[-1])
+    steps = [abs(b - a) for a, b in pairwise(targets)]
+    assert max(steps) <= 1.01 * SCALE * PERIOD  # 1 rad/s
+
+
+@pytest.mark.parametrize('mode', ALL, ids=by_name)
+@pytest.mark.parametrize('value', [math.nan, math.inf, 1e12], ids=str)
+def test_what_is_no_target_is_refused(mode: OperationMode, value: float) -> None:
+    """Nothing leaves: neither by service nor by stream."""
+    net = booted()
+    enable(net, mode)
+    for command in (net.commands[JOINT].set_target, net.commands[JOINT].stream_target):
+        with pytest.raises(DriveError, match=JOINT):
+            command(value)
+    net.run(0.5)
+    assert speed(net) == pytest.approx(0.0, abs=0.01)
+
+
+def test_home_is_a_command_of_its_own() -> None:
+    """It enables, tells its phases, sets the reference and returns to the mode of before."""
+    net = booted(sdo_writes=(*MOTION_WRITES, sdo_write(0x607C, 0, 2_000)))
+    phases: list[HomingProgress] = []
+    commands = net.commands[JOINT]
+    answer = net.result(commands.run('home', commands.home(35, phases.append)))
+    assert 'homed by method 35' in answer
+    assert phases == list(HomingProgress)
+    assert net.drives[JOINT].state is DriveState.OPERATION_ENABLED
+    assert net.drives[JOINT].mode.number is OperationMode.NO_MODE
+    net.run(0.1)
+    assert net.drives[JOINT].position == pytest.approx(0.2, abs=1e-3)
+
+
+def test_a_second_homing_is_a_new_one() -> None:
+    """Right after another one, too: the bits of the last do not pass for its own."""
+    speeds = (
+        sdo_write(0x6099, 1, 2_000),
+        sdo_write(0x6099, 2, 1_000),
+        sdo_write(0x609A, 0, 9_000),
+    )
+    net = booted(sdo_writes=(*MOTION_WRITES, *speeds))
+    commands = net.commands[JOINT]
+    net.result(commands.run('home', commands.home(35)))
+    running = commands.run('home', commands.home(17))
+    net.run(0.5)
+    assert not running.done
+    assert speed(net) < -0.01
+    net.result(running)
+    assert motor(net) == pytest.approx(0.0, abs=0.02)  # the switch is the new zero
+
+
+def test_a_homing_method_that_fails_says_so() -> None:
+    """A method that the drive does not have, and one that ends in a homing error."""
+    net = booted()
+    with pytest.raises(DriveError, match='no homing method'):
+        net.do(JOINT, 'home')
+    with pytest.raises(DriveError, match=r'homing method 36|method 36'):
+        net.result(net.commands[JOINT].run('home', net.commands[JOINT].home(36)))
+
+
+def test_homing_is_cancelled_by_a_halt() -> None:
+    """The command ends with the reason, bit 4 is taken back, the motor stands."""
+    net = booted()
+    commands = net.commands[JOINT]
+    running = commands.run('home', commands.home(17))
+    net.run(0.5)
+    assert not running.done
+    net.do(JOINT, 'quick_stop', preempt=True)
+    assert 'ended by quick_stop' in str(running.error)
+    net.run(1.0)
+    assert speed(net) == pytest.approx(0.0, abs=0.01)
+
+
+@pytest.mark.parametrize('asked', [True, False])
+def test_init_homes_only_where_bus_yml_asks(asked: bool) -> None:
+    """A method that is merely stored in the drive is named, not run."""
+    writes = (*MOTION_WRITES, sdo_write(0x6098, 0, 37)) if asked else MOTION_WRITES
+    dictionary = drive_dictionary().for_node(NODE_ID)
+    stored = with_defaults(dictionary, {(0x6098, 0): 37})
+    config = full_drive(sdo_writes=writes)
+    net = VirtualNetwork(bus_config(config), dictionaries={JOINT: stored})
+    net.boot()
+    answer = net.do(JOINT, 'init')
+    assert ('homed by method 37' in answer) is asked
+    assert ('call ~/home' in answer) is not asked
+
+
+def test_init_homes_by_the_method_of_bus_yml_whatever_was_tried_before() -> None:
+    """A method that somebody wrote counts for ~/home, and the drive keeps it after ~/init."""
+    net = booted(sdo_writes=(*MOTION_WRITES, sdo_write(0x6098, 0, 37)))
+    commands = net.commands[JOINT]
+    net.result(commands.run('home', commands.home(34)))
+    net.result(commands.drive.node.objects.write_object(0x6098, 0, 35))
+    assert 'homed by method 35' in net.do(JOINT, 'home')
+    assert 'homed by method 37' in net.do(JOINT, 'init')
+    writes = [data[4] for data in net.frames(0x600 + NODE_ID) if data[:3] == b'\x2f\x98\x60']
+    assert writes == [37, 34, 37, 35, 37, 35]
+
+
+@pytest.mark.parametrize('policy', list(RecoveryPolicy), ids=lambda policy: policy.value)
+def test_recovery_after_a_power_cut_is_by_policy(policy: RecoveryPolicy) -> None:
+    """By policy it is enabled again, in its mode, and moves nowhere; by default it is not."""
+    config = full_drive()
+    config = replace(config, axes=(replace(config.drive, recovery=policy),))
+    net = VirtualNetwork(bus_config(config))
+    net.boot()
+    enable(net, OperationMode.CYCLIC_POSITION)
+    net.commands[JOINT].set_target(0.5)
+    net.run(0.3)
+    net.power_off(JOINT)
+    net.run(1.0)
+    net.power_on(JOINT)
+    net.run_until(net.all_ready)
+    rest = motor(net)
+    net.run(3.0)
+    again = policy is RecoveryPolicy.AUTO
+    assert (net.drives[JOINT].state is DriveState.OPERATION_ENABLED) is again
+    assert motor(net) == pytest.approx(rest, abs=1e-3)
+    assert any('enabled again (recovery: auto)' in text for text in net.told()) is again
+    if again:
+        assert net.drives[JOINT].mode.number is OperationMode.CYCLIC_POSITION
+
+
+def test_recovery_does_not_reset_a_fault() -> None:
+    """A drive that comes back faulted is explained and left alone."""
+    config = full_drive()
+    config = replace(config, axes=(replace(config.drive, recovery=RecoveryPolicy.AUTO),))
+    net = VirtualNetwork(bus_config(config))
+    net.boot()
+    enable(net, OperationMode.CYCLIC_POSITION)
+    net.power_off(JOINT)
+    net.run(1.0)
+    device = net.power_on(JOINT)
+    assert device.drive is not None
+    device.drive.raise_fault(0x4310, net.now)
+    net.run_until(net.all_ready)
+    net.run(1.0)
+    assert net.drives[JOINT].state is DriveState.FAULT
+    assert any('not enabled again' in text for text in net.told())
+
+
+def test_without_voltage_the_answer_names_the_safety_circuit() -> None:
+    """STO low at the start is no failure of the bring-up; init says what is missing."""
+    net = VirtualNetwork(bus_config(full_drive()))
+    drive = net.devices[JOINT].drive
+    assert drive is not None
+    drive.set_voltage(False, net.now)
+    net.boot()
+    with pytest.raises(DriveError, match='bit 4: is the safe torque off'):
+        net.do(JOINT, 'init')
+    drive.set_voltage(True, net.now)
+    net.run(0.5)
+    assert net.drives[JOINT].state is not DriveState.OPERATION_ENABLED
+    net.do(JOINT, 'init')
+
+
+def test_units_come_from_the_drive_when_bus_yml_has_none() -> None:
+    """0x608F, 0x6091 and 0x6092: a revolution of the shaft is 2 pi."""
+    factors = {
+        (0x608F, 1): 4096,
+        (0x608F, 2): 1,
+        (0x6091, 1): 50,
+        (0x6091, 2): 1,
+        (0x6092, 1): 360_000,
+        (0x6092, 2): 1,
+    }
+    dictionary = with_defaults(drive_dictionary().for_node(NODE_ID), factors)
+    axis = DriveConfig(name=JOINT, scale_from_factor_group=True)
+    config = replace(full_drive(), axes=(axis,), dictionary=dictionary)
+    net = VirtualNetwork(bus_config(config))
+    net.boot()
+    assert net.drives[JOINT].units.position_to_device(2 * math.pi) == 360_000
+    assert net.drives[JOINT].units.velocity_to_device(2 * math.pi) == 360_000
+    assert '0x608F' in net.drives[JOINT].parameters.units
+
+
+def test_unknown_quirks_are_refused_with_those_that_exist() -> None:
+    """A typing error in bus.yml is not silently the standard."""
+    config = full_drive()
+    config = replace(config, axes=(replace(config.drive, quirks='fesot'),))
+    with pytest.raises(DriveError, match="'fesot' are unknown; known: festo_cmmp"):
+        VirtualNetwork(bus_config(config))
+
+
+def test_the_buffer_of_mode_7_is_emptied_first() -> None:
+    """0x60C4:06 gets 0 and 1 before 0x6060 gets 7, so that no old set-point waits in it."""
+    net = booted()
+    net.do(JOINT, 'init')
+    begin = net.now
+    net.select(JOINT, OperationMode.INTERPOLATED_POSITION)
+    writes = [data for data in net.frames(0x600 + NODE_ID, since=begin) if data[1:4] == CLEAR]
+    assert [data[4] for data in writes] == [0, 1]
+    sent = [sent for sent in net.wire.log if sent.time >= begin]
+    last_write = max(n for n, entry in enumerate(sent) if entry.frame.data[1:4] == CLEAR)
+    first_seven = min(
+        n
+        for n, entry in enumerate(sent)
+        if entry.frame.can_id == 0x200 + NODE_ID and entry.frame.data[2] == 7
+    )
+    assert last_write < first_seven
+
+
+@pytest.mark.parametrize('told', [0, 1, 3], ids='EDS default {}'.format)
+@pytest.mark.parametrize('mapped', [True, False], ids=['RPDO', 'SDO'])
+def test_a_drive_that_refuses_mode_zero_is_never_sent_it(told: int, mapped: bool) -> None:
+    """Quirk `no_mode_zero`: from boot on it is sent the mode that it has, not its EDS default."""
+    dictionary = with_defaults(drive_dictionary(), {(0x6060, 0): told}).for_node(NODE_ID)
+    config = full_drive(dictionary=dictionary, scales={'quirks': 'no_mode_zero'})
+    if not mapped:
+        first = replace(config.rpdos[0], mapping=config.rpdos[0].mapping[:1])
+        config = replace(config, rpdos=(first, *config.rpdos[1:]))
+    has = with_defaults(drive_dictionary(), {(0x6060, 0): 1, (0x6061, 0): 1}).for_node(NODE_ID)
+    net = VirtualNetwork(bus_config(config), dictionaries={JOINT: has})
+    net.boot()
+    net.run(0.2)
+    net.do(JOINT, 'init')
+    net.run(0.2)
+    assert modes_sent(net, mapped=mapped) == ({1} if mapped else set())
+    net.select(JOINT, OperationMode.PROFILE_VELOCITY)
+    net.power_off(JOINT)
+    net.run(1.0)
+    begin = net.now
+    net.power_on(JOINT)
+    net.run_until(net.all_ready)
+    net.run(0.2)
+    assert modes_sent(net, mapped=mapped, since=begin) == ({1} if mapped else set())
+
+
+def modes_sent(net: VirtualNetwork, *, mapped: bool, since: float = 0.0) -> set[int]:
+    """Return the values of 0x6060 that the drive was sent, by RPDO or by SDO."""
+    if mapped:
+        return {data[2] for data in net.frames(0x200 + NODE_ID, since=since)}
+    requests = net.frames(0x600 + NODE_ID, since=since)
+    return {data[4] for data in requests if data[:3] == b'\x2f\x60\x60'}
+
+
+@pytest.mark.parametrize('every', [1, 2, 3, 4])
+def test_a_fault_reset_reaches_a_drive_that_looks_less_often(every: int) -> None:
+    """The pulse lasts several cycles, so that no rate of the drive misses it each time."""
+    net = booted()
+    net.do(JOINT, 'init')
+    drive = net.devices[JOINT].drive
+    assert drive is not None
+    sent: list[int] = []
+
+    def loses(sender: str, frame: Frame) -> bool:
+        sent.append(frame.can_id)
+        return frame.can_id == 0x200 + NODE_ID and sent.count(frame.can_id) % every != 0
+
+    net.wire.loses = loses
+    drive.raise_fault(0x3210, net.now)
+    net.run(0.3)
+    net.do(JOINT, 'recover')
+    assert net.drives[JOINT].state is DriveState.OPERATION_ENABLED
+
+
+def test_a_drive_that_interpolates_only_in_motion_is_no_warning() -> None:
+    """In mode 7 some clear bit 12 at standstill; targets are reached, and nothing is reported."""
+    net = booted()
+    enable(net, OperationMode.INTERPOLATED_POSITION)
+    drive = net.devices[JOINT].drive
+    assert drive is not None
+
+    def alters(sender: str, frame: Frame) -> Frame:
+        if frame.can_id != 0x180 + NODE_ID or abs(drive.velocity) > 1e-6:
+            return frame
+        data = frame.data
+        return frame._replace(data=data[:1] + bytes((data[1] & ~0x10,)) + data[2:])
+
+    net.wire.alters = alters
+    for target in (0.3, 0.6, 0.1):
+        net.commands[JOINT].set_target(target)
+        net.run(2.0)
+        assert motor(net) == pytest.approx(target, abs=1e-3)
+    assert net.told(Severity.WARNING) == []

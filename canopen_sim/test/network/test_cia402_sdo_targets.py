@@ -1,0 +1,555 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Targets that no RPDO carries: confirmed before they act, refused in words, written once."""
+
+from __future__ import annotations
+
+import contextlib
+from dataclasses import replace
+from itertools import cycle
+import random
+
+from drive_samples import bus_config, drive_config, every_mode, PERIOD, SCALE
+import pytest
+from virtual_network import VirtualNetwork
+
+from arm_canopen.can.frame import Frame
+from arm_canopen.cia402.position_modes import Move
+from arm_canopen.config.model import NodeConfig
+from arm_canopen.exceptions import DriveError, SdoAbortError, SdoTimeoutError
+from arm_canopen.master.events import Severity
+from arm_canopen.master.scheduler import Promise
+from arm_canopen.standard.drive import DriveState, OperationMode
+from canopen_sim.faults.faults import BusFault, FaultInjection
+
+JOINT, NODE_ID = 'joint1', 2
+REQUEST, ANSWER = 0x600 + NODE_ID, 0x580 + NODE_ID
+DOWNLOADS = frozenset({0x22, 0x23, 0x27, 0x2B, 0x2F})
+POSITION, VELOCITY, VL_VELOCITY, TORQUE = 0x607A, 0x60FF, 0x6042, 0x6071
+TARGETS = {
+    OperationMode.PROFILE_POSITION: POSITION,
+    OperationMode.VELOCITY: VL_VELOCITY,
+    OperationMode.PROFILE_VELOCITY: VELOCITY,
+    OperationMode.PROFILE_TORQUE: TORQUE,
+}
+SIZES = {POSITION: 4, VELOCITY: 4, VL_VELOCITY: 2, TORQUE: 2}
+
+
+def unmapped() -> NodeConfig:
+    """Return a drive whose RPDOs carry controlword and mode only."""
+    config = every_mode(drive_config(JOINT, NODE_ID))
+    return replace(config, rpdos=config.rpdos[:1])
+
+
+def booted(config: NodeConfig | None = None) -> VirtualNetwork:
+    """Boot such a drive."""
+    net = VirtualNetwork(bus_config(config or unmapped()))
+    net.boot()
+    return net
+
+
+def running_in(mode: OperationMode) -> VirtualNetwork:
+    """Boot such a drive, enable it, and select a mode."""
+    net = booted()
+    net.do(JOINT, 'init')
+    net.select(JOINT, mode)
+    return net
+
+
+def motor(net: VirtualNetwork) -> float:
+    """Return where the motor really is in [rad]."""
+    drive = net.devices[JOINT].drive
+    assert drive is not None
+    return drive.position / SCALE
+
+
+def leave_behind(net: VirtualNetwork, index: int, value: int) -> None:
+    """Let another client have written an object of the drive."""
+    data = value.to_bytes(SIZES[index], 'little', signed=True)
+    net.devices[JOINT].store.write(index, 0, data, net.now)
+
+
+def refuse(net: VirtualNetwork, index: int) -> None:
+    """Let the drive abort all transfers of an object."""
+    fault = FaultInjection(BusFault.SDO_ABORT, object=(index, 0), abort=0x08000022)
+    net.devices[JOINT].faults.inject(fault, net.now)
+
+
+def accept(net: VirtualNetwork) -> None:
+    """Let the drive take everything again."""
+    net.devices[JOINT].faults.end(net.now)
+
+
+def downloads(net: VirtualNetwork, since: float = 0.0) -> list[int]:
+    """Return the objects that the master has written by SDO."""
+    frames = net.frames(REQUEST, since=since)
+    return [int.from_bytes(d[1:3], 'little') for d in frames if d[0] in DOWNLOADS]
+
+
+def give(net: VirtualNetwork, target: float) -> Promise[str]:
+    """Command a target as the service ~/target does."""
+    commands = net.commands[JOINT]
+    return commands.give(lambda: commands.set_target(target))
+
+
+# ------------------------------------------------------------------ nothing stale acts
+
+
+@pytest.mark.parametrize('mode', TARGETS)
+def test_what_others_left_in_the_target_moves_nothing_at_enable(mode: OperationMode) -> None:
+    """The holding value is written whatever the master wrote before, ahead of the enable."""
+    net = running_in(mode)
+    net.do(JOINT, 'disable')
+    leave_behind(net, TARGETS[mode], 3_000)
+    begin, before = net.now, motor(net)
+    net.do(JOINT, 'enable')
+    net.run(1.0)
+    assert motor(net) == pytest.approx(before, abs=1e-3)
+    assert downloads(net, since=begin) == [TARGETS[mode]]
+
+
+@pytest.mark.parametrize('mode', TARGETS)
+def test_what_others_left_in_the_target_moves_nothing_at_a_switch(mode: OperationMode) -> None:
+    """Also where the drive stays enabled, and the mode was left a moment ago."""
+    net = running_in(mode)
+    other = OperationMode.PROFILE_POSITION
+    if mode is other:
+        other = OperationMode.PROFILE_VELOCITY
+    net.select(JOINT, other)
+    leave_behind(net, TARGETS[mode], 3_000)
+    before = motor(net)
+    net.select(JOINT, mode)
+    net.run(1.0)
+    assert motor(net) == pytest.approx(before, abs=1e-3)
+
+
+@pytest.mark.parametrize('mode', TARGETS)
+def test_a_refused_holding_value_keeps_the_drive_disabled(mode: OperationMode) -> None:
+    """The answer has the object and the reason of the drive."""
+    net = running_in(mode)
+    net.do(JOINT, 'disable')
+    leave_behind(net, TARGETS[mode], 3_000)
+    refuse(net, TARGETS[mode])
+    with pytest.raises(DriveError, match=f'0x{TARGETS[mode]:04X}.*present device state'):
+        net.do(JOINT, 'enable')
+    net.run(0.5)
+    assert net.drives[JOINT].state is not DriveState.OPERATION_ENABLED
+    accept(net)
+    assert 'Operation enabled' in net.do(JOINT, 'enable')
+
+
+def test_the_mode_that_a_drive_stays_in_is_held_at_enable() -> None:
+    """It does not follow to mode 0; what others left in the target of mode 3 would move it."""
+    net = running_in(OperationMode.PROFILE_VELOCITY)
+
+    def stays_in_mode_3(sender: str, frame: Frame) -> Frame:
+        mode_command = frame.can_id == 0x200 + NODE_ID
+        return frame._replace(data=frame.data[:2] + b'\x03') if mode_command else frame
+
+    net.wire.alters = stays_in_mode_3
+    net.do(JOINT, 'init')
+    net.do(JOINT, 'disable')
+    leave_behind(net, VELOCITY, 3_000)
+    before = motor(net)
+    net.do(JOINT, 'enable')
+    assert net.drives[JOINT].mode.number is OperationMode.NO_MODE
+    assert net.drives[JOINT].objects.mode_display == OperationMode.PROFILE_VELOCITY
+    net.run(1.0)
+    assert motor(net) == pytest.approx(before, abs=1e-3)
+
+
+def test_a_refused_holding_value_keeps_the_mode() -> None:
+    """The mode of before stays selected, and halted."""
+    net = running_in(OperationMode.PROFILE_POSITION)
+    leave_behind(net, VELOCITY, 3_000)
+    refuse(net, VELOCITY)
+    before = motor(net)
+    with pytest.raises(DriveError, match='0x60FF'):
+        net.select(JOINT, OperationMode.PROFILE_VELOCITY)
+    net.run(0.5)
+    assert net.drives[JOINT].objects.mode_display == OperationMode.PROFILE_POSITION
+    assert motor(net) == pytest.approx(before, abs=1e-3)
+    net.result(give(net, 0.2))
+    net.run(2.0)
+    assert motor(net) == pytest.approx(0.2, abs=1e-3)
+
+
+# ------------------------------------------------------------------ taken means delivered
+
+
+@pytest.mark.parametrize(
+    ('mode', 'target'),
+    [(OperationMode.PROFILE_VELOCITY, 0.3), (OperationMode.PROFILE_TORQUE, 3.0)],
+)
+def test_the_end_of_a_halt_does_not_overtake_its_target(
+    mode: OperationMode, target: float
+) -> None:
+    """However late it arrives, bit 8 goes after the new target has come."""
+    net = running_in(mode)
+    net.do(JOINT, 'halt')
+    net.run(0.2)
+    begin = net.now
+    fault = FaultInjection(BusFault.SDO_DELAY, delay=0.15)  # within the SDO time-out
+    net.devices[JOINT].faults.inject(fault, begin)
+    net.result(give(net, target))
+    assert net.now - begin > 0.15
+    words = [s for s in net.wire.log if s.frame.can_id == 0x200 + NODE_ID and s.time >= begin]
+    halted = [bool(sent.frame.data[1]) for sent in words if sent.time < begin + 0.15]
+    assert all(halted)
+
+
+def test_a_target_that_is_refused_at_the_end_of_a_halt_leaves_it_halted() -> None:
+    """And the next one, which is taken, ends it."""
+    net = running_in(OperationMode.PROFILE_VELOCITY)
+    net.result(give(net, 0.4))
+    net.run(1.0)
+    net.do(JOINT, 'halt')
+    refuse(net, VELOCITY)
+    with pytest.raises(DriveError, match='present device state'):
+        net.result(give(net, -0.3))
+    net.run(1.0)
+    assert net.drives[JOINT].halted
+    assert abs(net.drives[JOINT].rate) < 0.01
+    accept(net)
+    net.result(give(net, -0.3))
+    net.run(1.0)
+    assert net.drives[JOINT].rate == pytest.approx(-0.3, abs=0.02)
+
+
+def test_moves_of_which_the_first_is_refused_leave_a_halted_axis_halted_at_once() -> None:
+    """The ones behind it are not waited for, and are answered when they are queued."""
+    net = running_in(OperationMode.PROFILE_POSITION)
+    net.do(JOINT, 'halt')
+    refuse(net, POSITION)
+    commands = net.commands[JOINT]
+    first = commands.give(lambda: commands.move(Move(0.1)))
+    second = commands.give(lambda: commands.move(Move(0.2, immediate=False)))
+    net.run(0.5)
+    assert isinstance(first.error, DriveError)
+    assert second.done
+    assert net.drives[JOINT].halted
+    assert not net.drives[JOINT].halt.leaving
+
+
+@pytest.mark.parametrize('mode', [OperationMode.PROFILE_POSITION, OperationMode.PROFILE_VELOCITY])
+def test_a_target_that_came_too_late_for_its_answer_moves_nothing(mode: OperationMode) -> None:
+    """Its SDO waits behind a long transfer of somebody else; the answer is an error by then."""
+    net = running_in(mode)
+    net.result(give(net, 0.0))
+    ahead: Promise[None] = Promise()
+
+    async def occupied(*address: object) -> None:
+        await ahead
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(net.network.nodes[JOINT].objects, 'write_object', occupied)
+        with pytest.raises(DriveError, match='did not reach its target'):
+            net.result(give(net, 0.4))
+    leave_behind(net, TARGETS[mode], 400)
+    ahead.resolve(None)
+    net.run(1.0)
+    assert motor(net) == pytest.approx(0.0, abs=1e-3)
+    net.result(give(net, 0.2))
+    net.run(2.0)
+    assert motor(net) > 0.1
+
+
+# ------------------------------------------------------------------ refused targets
+
+
+@pytest.mark.parametrize('mode', TARGETS)
+def test_a_refused_target_is_answered_with_the_reason(mode: OperationMode) -> None:
+    """What the drive did before goes on, and the next target is executed."""
+    net = running_in(mode)
+    refuse(net, TARGETS[mode])
+    with pytest.raises(DriveError, match='present device state'):
+        net.result(give(net, 0.4 if mode is not OperationMode.PROFILE_TORQUE else 100.0))
+    net.run(1.0)
+    assert motor(net) == pytest.approx(0.0, abs=1e-3)
+    accept(net)
+    target = 0.3 if mode is not OperationMode.PROFILE_TORQUE else 200.0
+    assert 'target' in net.result(give(net, target))
+    net.run(3.0)
+    assert motor(net) > 0.05
+    if mode is OperationMode.PROFILE_POSITION:
+        assert motor(net) == pytest.approx(target, abs=1e-3)
+
+
+def test_a_target_that_is_not_answered_is_no_success() -> None:
+    """A drive that is silent says nothing of what it has taken; the next target moves it."""
+    net = running_in(OperationMode.PROFILE_POSITION)
+    net.wire.loses = lambda sender, frame: frame.can_id == REQUEST
+    with pytest.raises(DriveError, match='did not answer'):
+        net.result(give(net, 0.4))
+    net.wire.loses = lambda sender, frame: False
+    net.run(1.0)
+    assert motor(net) == pytest.approx(0.0, abs=1e-3)
+    net.result(give(net, 0.3))
+    net.run(2.0)
+    assert motor(net) == pytest.approx(0.3, abs=1e-3)
+
+
+@pytest.mark.parametrize('mode', [m for m in TARGETS if m != OperationMode.PROFILE_POSITION])
+def test_a_target_whose_answer_is_lost_does_not_go_on_moving(mode: OperationMode) -> None:
+    """The drive has it, and nobody knows: as the answer is an error, the axis is halted."""
+    net = running_in(mode)
+    net.run(0.1)
+    net.wire.loses = lambda sender, frame: frame.can_id == ANSWER
+    with pytest.raises(DriveError, match='did not answer'):
+        net.result(give(net, 0.4 if mode is not OperationMode.PROFILE_TORQUE else 200.0))
+    net.run(1.0)
+    assert abs(net.drives[JOINT].rate) < 0.01
+    net.wire.loses = lambda sender, frame: False
+    net.run(0.5)
+    net.result(give(net, 0.2 if mode is not OperationMode.PROFILE_TORQUE else 200.0))
+    net.run(1.0)
+    assert net.drives[JOINT].rate > 0.1
+
+
+@pytest.mark.parametrize('verb', ['halt', 'disable', 'quick_stop'])
+def test_a_stop_before_the_target_is_in_the_drive_is_no_success(verb: str) -> None:
+    """Whatever the drive answers later: the target moves nothing any more."""
+    net = running_in(OperationMode.PROFILE_VELOCITY)
+    net.devices[JOINT].faults.inject(FaultInjection(BusFault.SDO_DELAY, delay=0.15), net.now)
+    answered = give(net, 0.4)
+    net.do(JOINT, verb, preempt=True)
+    with pytest.raises(DriveError, match='stopped before'):
+        net.result(answered)
+
+
+def test_the_moves_behind_a_refused_one_are_dropped() -> None:
+    """Each counts from the one before, so none of them would end where it should."""
+    net = running_in(OperationMode.PROFILE_POSITION)
+    commands = net.commands[JOINT]
+    refuse(net, POSITION)
+    commands.move(Move(0.1))
+    commands.move(Move(0.2, immediate=False))
+    commands.move(Move(0.2, relative=True, immediate=False))
+    net.run(1.0)
+    accept(net)
+    net.run(2.0)
+    assert motor(net) == pytest.approx(0.0, abs=1e-3)
+    with pytest.raises(DriveError, match='absolute position first'):
+        commands.move(Move(0.1, relative=True))
+
+
+def test_of_targets_that_come_faster_than_they_are_written_the_newest_counts() -> None:
+    """Each is answered when the drive has the newest."""
+    net = running_in(OperationMode.PROFILE_VELOCITY)
+    begin = net.now
+    answers = [give(net, 0.01 * n) for n in range(1, 30)]
+    net.run(1.0)
+    assert all('target' in answered.result() for answered in answers)
+    assert len(downloads(net, since=begin)) <= 2
+    assert net.drives[JOINT].rate == pytest.approx(0.29, abs=0.02)
+
+
+@pytest.mark.parametrize('mode', [OperationMode.PROFILE_POSITION, OperationMode.PROFILE_VELOCITY])
+def test_any_number_of_targets_may_come_while_one_is_written(mode: OperationMode) -> None:
+    """A client that does not wait for its answers gets all of them."""
+    net = running_in(mode)
+    net.devices[JOINT].faults.inject(FaultInjection(BusFault.SDO_DELAY, delay=0.1), net.now)
+    answers = []
+    for n in range(2_000):
+        answers.append(give(net, 1e-4 * n))
+        if n % 50 == 0:
+            net.run(PERIOD)
+    net.run(1.0)
+    assert all('target' in answered.result() for answered in answers)
+
+
+def test_a_stream_whose_targets_are_refused_stops_the_axis() -> None:
+    """Nobody waits for an answer, so it is a warning, and the stream has ended."""
+    net = running_in(OperationMode.PROFILE_VELOCITY)
+    commands = net.commands[JOINT]
+    net.result(give(net, 0.2))
+    net.run(0.5)
+    refuse(net, VELOCITY)
+    begin, refused = net.now, ''
+    for _ in range(50):
+        try:
+            commands.stream_target(0.3)
+        except DriveError as error:
+            refused = str(error)
+        net.run(PERIOD)
+    assert 'was ended by a target that the drive did not take' in refused
+    assert len(downloads(net, since=begin)) < 5
+    net.run(1.0)
+    assert abs(net.drives[JOINT].rate) < 0.01
+
+
+def test_a_target_after_a_stream_is_not_stopped_by_what_was_under_way() -> None:
+    """The drive refuses the last of the stream, which the single target has ended."""
+    net = running_in(OperationMode.PROFILE_VELOCITY)
+    net.run(0.1)  # the writer pauses after the value that holds it
+    commands, node = net.commands[JOINT], net.network.nodes[JOINT]
+    under_way: Promise[None] = Promise()
+
+    async def refused(*address: object) -> None:
+        await under_way
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(node.objects, 'write_object', refused)
+        commands.stream_target(0.1)
+        answered = give(net, 0.3)
+    under_way.reject(SdoAbortError('0x60FF refused', 0x08000022))
+    assert 'target' in net.result(answered)
+    net.run(1.0)
+    assert not net.drives[JOINT].halted
+    assert net.drives[JOINT].rate == pytest.approx(0.3, abs=0.02)
+
+
+# ------------------------------------------------------------------ nothing unasked
+
+
+def test_only_the_target_of_the_mode_is_written() -> None:
+    """From boot to a mode and back, 0x6042 and 0x6071 belong to whoever else uses them."""
+    net = booted()
+    net.run(1.0)
+    assert not set(downloads(net)) & set(TARGETS.values())
+    net.do(JOINT, 'init')
+    assert not set(downloads(net)) & set(TARGETS.values())
+    net.select(JOINT, OperationMode.PROFILE_VELOCITY)
+    net.do(JOINT, 'disable')
+    net.do(JOINT, 'enable')
+    net.run(1.0)
+    assert set(downloads(net)) & set(TARGETS.values()) == {VELOCITY}
+
+
+def test_a_drive_that_is_moved_by_hand_is_not_written_to() -> None:
+    """Disabled, and its position changing in each cycle."""
+    net = running_in(OperationMode.PROFILE_POSITION)
+    net.do(JOINT, 'disable')
+    noise = cycle((b'\x00', b'\x05'))
+    net.wire.alters = lambda sender, frame: (
+        frame._replace(data=next(noise) + frame.data[1:])
+        if frame.can_id == 0x280 + NODE_ID
+        else frame
+    )
+    begin = net.now
+    net.run(2.0)
+    assert downloads(net, since=begin) == []
+
+
+def test_a_controlword_that_is_refused_is_written_seldom() -> None:
+    """Once, then ever less often, with one warning; taken again, it is written as it changes."""
+    config = unmapped()
+    mode_only = replace(config.rpdos[0], mapping=config.rpdos[0].mapping[1:])
+    net = booted(replace(config, rpdos=(mode_only,)))
+    net.do(JOINT, 'init')
+    refuse(net, 0x6040)
+    begin = net.now
+    promise = net.begin(JOINT, 'disable')
+    net.run(4.0)
+    assert 2 <= downloads(net, since=begin).count(0x6040) <= 4
+    assert len([text for text in net.told(Severity.WARNING) if '0x6040' in text]) == 1
+    accept(net)
+    net.run_until(lambda: promise.done, 10.0)
+    net.run_until(lambda: net.drives[JOINT].state is not DriveState.OPERATION_ENABLED, 10.0)
+
+
+def test_of_values_behind_one_that_failed_only_the_newest_is_sent() -> None:
+    """Whoever delivered one that was dropped is told when the device has the newest."""
+    net = booted()
+    node = net.network.nodes[JOINT]
+    writer, sent = node.objects.writer(VELOCITY), []
+    under_way: Promise[None] = Promise()
+
+    async def write(index: int, subindex: int, value: int) -> None:
+        sent.append(value)
+        if len(sent) == 1:
+            await under_way
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(node.objects, 'write_object', write)
+        writer.write(1)
+        writer.write(2)
+        dropped = writer.deliver(3)
+        writer.write(4)
+        under_way.reject(SdoTimeoutError('did not answer'))
+        net.run(0.2)
+    assert sent == [1, 4]
+    assert dropped.done
+    assert dropped.error is None
+
+
+# ------------------------------------------------------------------ all of it in any order
+
+SELECTED = (
+    OperationMode.PROFILE_POSITION,
+    OperationMode.VELOCITY,
+    OperationMode.PROFILE_VELOCITY,
+)
+
+
+class Client:
+    """Commands a drive at random, which is silent, refuses, and is written to by others.
+
+    Attributes:
+        net: The network.
+        commanded: A target may be in force, or on its way.
+        log: What was done.
+    """
+
+    def __init__(self, seed: int) -> None:
+        """Enable the drive."""
+        self.net = booted()
+        self.net.do(JOINT, 'init')
+        self.commanded = False
+        self.log: list[str] = []
+        self._random = random.Random(seed)
+
+    def act(self) -> None:
+        """Do one thing."""
+        often = (self._give, self._stop, self._select)
+        seldom = (self._enable, self._leave_behind, self._disturb, self._calm)
+        act = self._random.choice((*often, *often, *seldom))
+        self.log.append(act.__name__)
+        with contextlib.suppress(DriveError):
+            act()
+
+    def _give(self) -> None:
+        answered = give(self.net, self._random.uniform(-0.3, 0.3))
+        self.net.run(self._random.choice((0.0, 0.005, 0.05, 0.3, 1.0)))
+        self.commanded |= not answered.done or answered.error is None
+
+    def _stop(self) -> None:
+        self.commanded = False
+        self.net.do(JOINT, self._random.choice(('halt', 'disable')), preempt=True)
+
+    def _select(self) -> None:
+        if 'already' not in self.net.select(JOINT, self._random.choice(SELECTED)):
+            self.commanded = False
+
+    def _enable(self) -> None:
+        self.net.do(JOINT, 'enable')
+
+    def _leave_behind(self) -> None:
+        drive = self.net.drives[JOINT]
+        acting = TARGETS.get(OperationMode(drive.objects.mode_display))
+        idle = [index for index in TARGETS.values() if index != acting or not drive.acts]
+        leave_behind(self.net, self._random.choice(idle), self._random.randint(-3_000, 3_000))
+
+    def _disturb(self) -> None:
+        if self._random.random() < 0.5:
+            refuse(self.net, self._random.choice(list(TARGETS.values())))
+        else:
+            self.net.wire.loses = lambda sender, frame: frame.can_id == REQUEST
+
+    def _calm(self) -> None:
+        accept(self.net)
+        self.net.wire.loses = lambda sender, frame: False
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('seed', range(8))
+def test_nothing_moves_that_was_not_commanded(seed: int) -> None:
+    """Stopped, switched or enabled, the axis rests until a target came after that."""
+    client = Client(seed)
+    for _ in range(30):
+        client.act()
+        if not client.commanded:
+            client.net.run(1.0)
+            before = motor(client.net)
+            client.net.run(0.3)
+            assert motor(client.net) == pytest.approx(before, abs=1e-3), client.log

@@ -1,0 +1,176 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""A stream of targets never wins over a command, and comes back only as a new one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from drive_samples import bus_config, drive_config, PERIOD, SCALE
+import pytest
+from virtual_network import VirtualNetwork
+
+from arm_canopen.exceptions import DriveError
+from arm_canopen.master.events import Severity
+from arm_canopen.master.scheduler import Promise
+from arm_canopen.standard.drive import OperationMode
+
+JOINT = 'joint1'
+STEP = 0.005  # [rad] of the stream in each cycle: 0.5 rad/s
+
+
+class Publisher:
+    """A client that sends a target in each cycle, whatever becomes of it."""
+
+    def __init__(self, mode: OperationMode) -> None:
+        """Enable a drive in a mode."""
+        self.net = VirtualNetwork(bus_config(drive_config(JOINT, 2)))
+        self.net.boot()
+        self.net.do(JOINT, 'init')
+        self.net.select(JOINT, mode)
+        self.commands = self.net.commands[JOINT]
+        self.value = 0.0
+        self.refusals: list[str] = []
+
+    def publish(self, duration: float, until: Callable[[], bool] = lambda: False) -> None:
+        """Send for a time in [s], or until something holds."""
+        end = self.net.now + duration
+        while self.net.now < end and not until():
+            self.value += STEP
+            try:
+                self.commands.stream_target(self.value)
+            except DriveError as error:
+                self.refusals.append(str(error))
+            self.net.run(PERIOD)
+
+    def result(self, promise: Promise[str]) -> str:
+        """Go on publishing until a command is done, and return its answer."""
+        self.publish(15.0, lambda: promise.done)
+        return promise.result()
+
+    @property
+    def motor(self) -> float:
+        """Where the motor is in [rad]."""
+        drive = self.net.devices[JOINT].drive
+        assert drive is not None
+        return drive.position / SCALE
+
+
+COMMANDS: dict[str, Callable[[Publisher], Promise[str]]] = {
+    'halt': lambda client: client.net.begin(JOINT, 'halt', preempt=True),
+    'init': lambda client: client.net.begin(JOINT, 'init'),
+    'velocity mode': lambda client: client.commands.run(
+        'velocity_mode', client.commands.select_mode(OperationMode.PROFILE_VELOCITY)
+    ),
+    'disable': lambda client: client.net.begin(JOINT, 'disable', preempt=True),
+}
+
+
+@pytest.mark.parametrize('name', COMMANDS)
+@pytest.mark.parametrize('mode', [OperationMode.CYCLIC_POSITION, OperationMode.PROFILE_POSITION])
+def test_a_command_wins_over_a_stream(mode: OperationMode, name: str) -> None:
+    """It succeeds while the stream goes on, and nothing moves after it."""
+    client = Publisher(mode)
+    client.publish(1.0)
+    begin = client.motor
+    assert client.net.drives[JOINT].velocity > 0.3
+    client.result(COMMANDS[name](client))
+    assert client.motor - begin < 0.15
+    rest = client.motor
+    client.publish(2.0)
+    assert client.motor == pytest.approx(rest, abs=0.03)  # at most it runs out of its braking
+    assert 'ended by' in client.refusals[-1]
+    assert 'pause of 200 ms' in client.refusals[-1]
+
+
+@pytest.mark.parametrize('mode', [OperationMode.CYCLIC_POSITION, OperationMode.PROFILE_POSITION])
+def test_after_a_pause_a_new_stream_is_followed(mode: OperationMode) -> None:
+    """It ends the halt as any other target would."""
+    client = Publisher(mode)
+    client.publish(0.5)
+    client.result(client.net.begin(JOINT, 'halt', preempt=True))
+    client.publish(0.5)
+    client.net.run(0.25)
+    client.refusals.clear()
+    client.publish(1.0)
+    assert client.refusals == []
+    assert client.motor == pytest.approx(client.value, abs=0.6)
+    assert client.net.drives[JOINT].velocity > 0.3
+    assert not client.net.drives[JOINT].halted
+
+
+def test_a_drive_that_is_enabled_again_waits_for_a_new_stream() -> None:
+    """A publisher that never stopped does not set it in motion."""
+    client = Publisher(OperationMode.CYCLIC_POSITION)
+    client.publish(0.5)
+    client.result(client.net.begin(JOINT, 'disable', preempt=True))
+    client.publish(0.5)
+    rest = client.motor
+    client.result(client.net.begin(JOINT, 'enable'))
+    client.publish(1.0)
+    assert client.motor == pytest.approx(rest, abs=1e-3)
+
+
+def test_a_single_target_ends_a_stream() -> None:
+    """The answer is true: the drive goes where the service has sent it."""
+    client = Publisher(OperationMode.CYCLIC_POSITION)
+    client.publish(0.5)
+    client.commands.set_target(-0.2)
+    client.publish(3.0)
+    assert client.motor == pytest.approx(-0.2, abs=2e-3)
+    assert 'ended by a single target' in client.refusals[-1]
+
+
+@pytest.mark.parametrize('name', ['halt', 'velocity mode'])
+def test_no_target_is_taken_while_a_command_runs(name: str) -> None:
+    """Neither a target nor a move: it would undo the command, or be dropped by it."""
+    client = Publisher(OperationMode.PROFILE_POSITION)
+    client.commands.set_target(3.0)
+    client.net.run(0.5)
+    running = COMMANDS[name](client)
+    client.net.run(0.02)
+    assert not running.done
+    with pytest.raises(DriveError, match=r'takes no target while .* is running'):
+        client.commands.set_target(0.0)
+    client.net.result(running)
+
+
+@pytest.mark.parametrize(
+    'mode',
+    [
+        OperationMode.PROFILE_POSITION,
+        OperationMode.CYCLIC_POSITION,
+        OperationMode.PROFILE_VELOCITY,
+        OperationMode.CYCLIC_VELOCITY,
+    ],
+)
+def test_nothing_is_called_stopped_that_moves(mode: OperationMode) -> None:
+    """A pause of the stream is reported as what it is at that moment."""
+    client = Publisher(mode)
+    position = mode in (OperationMode.PROFILE_POSITION, OperationMode.CYCLIC_POSITION)
+    for _ in range(60):
+        client.commands.stream_target(3.0 if position else 0.8)
+        client.net.run(PERIOD)
+    drive = client.net.drives[JOINT]
+    assert drive.velocity > 0.5
+    while not (said := [text for text in client.net.told() if 'has paused' in text]):
+        client.net.run(PERIOD)
+    moves = abs(drive.velocity) > 0.02
+    assert ('stopped' in said[0]) is not moves
+    assert moves is (mode is OperationMode.PROFILE_POSITION)
+    client.net.run(5.0)
+    assert client.net.told(Severity.WARNING) == said
+    assert (client.motor == pytest.approx(3.0, abs=0.01)) is moves
+
+
+def test_an_axis_that_does_not_stop_is_reported() -> None:
+    """Its RPDOs are lost, so it goes on at the last velocity that it was told."""
+    client = Publisher(OperationMode.PROFILE_VELOCITY)
+    for _ in range(60):
+        client.commands.stream_target(0.8)
+        client.net.run(PERIOD)
+    client.net.wire.loses = lambda sender, frame: frame.can_id in (0x202, 0x302)
+    client.net.run(4.0)
+    (error,) = client.net.told(Severity.ERROR)
+    assert 'has not come to rest' in error
+    assert not [text for text in client.net.told() if 'stopped' in text]

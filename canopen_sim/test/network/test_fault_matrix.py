@@ -1,0 +1,502 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The fault matrix: each fault in each mode, in motion, and what comes of it.
+
+What the master says, what the drives do, how it recovers; and that nothing moves unasked before,
+in between and after. Two drives move: the fault meets the first, and the second is the witness.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+import random
+
+from drive_samples import (
+    bus_config,
+    drive_config,
+    drive_dictionary,
+    every_mode,
+    MOTION_WRITES,
+    SCALE,
+    sdo_write,
+    with_defaults,
+)
+import pytest
+from virtual_network import VirtualNetwork
+
+from arm_canopen import RefusalCause
+from arm_canopen.can.frame import Frame
+from arm_canopen.config.identity import Identity
+from arm_canopen.exceptions import DriveError, SdoError
+from arm_canopen.master.events import EventKind, Severity
+from arm_canopen.standard.drive import DriveState, OperationMode
+from canopen_sim.drive.drive import Drive as SimulatedDrive
+
+pytestmark = pytest.mark.slow
+
+FAULTY, WITNESS = 'joint1', 'joint2'
+NODE_ID = 2  # of the faulty one
+SPEED = 0.5  # [rad/s]
+FAR = 0.9  # [rad]
+CYCLE = 0.02  # [s] twice the usual one: half the frames to compute
+SETTLING = 1.0  # [s] for a fault to be noticed and every ramp to end
+CREEP = 0.002  # [rad] that a motor without torque may still roll
+TORQUE = 200.0  # [per mille] of the rated one
+POSITION_MODES = [
+    OperationMode.PROFILE_POSITION,
+    OperationMode.INTERPOLATED_POSITION,
+    OperationMode.CYCLIC_POSITION,
+]
+VELOCITY_MODES = [
+    OperationMode.VELOCITY,
+    OperationMode.PROFILE_VELOCITY,
+    OperationMode.CYCLIC_VELOCITY,
+]
+TORQUE_MODES = [OperationMode.PROFILE_TORQUE, OperationMode.CYCLIC_TORQUE]
+MODES = [*POSITION_MODES, *VELOCITY_MODES, *TORQUE_MODES]
+
+
+class Way(Enum):
+    """What brings the faulty drive back."""
+
+    NONE = 'it never stopped'
+    INIT = 'init'
+    RECOVER = 'recover'
+    ENABLE = 'enable'
+
+
+def target_of(mode: OperationMode) -> float:
+    """Return a target that sets a drive in motion."""
+    if mode in TORQUE_MODES:
+        return TORQUE
+    return SPEED if mode in VELOCITY_MODES else FAR
+
+
+class Arm:
+    """Two drives and their master."""
+
+    def __init__(self, patience: float = 0.3) -> None:
+        """Boot them; both sides watch each other's heartbeat, with this consumer time in [s]."""
+        watching = {
+            'heartbeat_consumer': True,
+            'heartbeat_timeout': patience,
+            'sdo_writes': (*MOTION_WRITES, sdo_write(0x60C2, 1, round(1000 * CYCLE))),
+        }
+        self.net = VirtualNetwork(
+            bus_config(
+                every_mode(drive_config(FAULTY, 2, **watching)),
+                every_mode(drive_config(WITNESS, 3, **watching)),
+                heartbeat_producer=0.1,
+                heartbeat_timeout=patience,
+                sync_period=CYCLE,
+                cycle_period=CYCLE,
+            )
+        )
+        self.net.boot()
+
+    def simulated(self, name: str = FAULTY) -> SimulatedDrive:
+        """Return the drive of a simulated device."""
+        drive = self.net.devices[name].drive
+        assert drive is not None
+        return drive
+
+    def motor(self, name: str) -> float:
+        """Return where a motor really is in [rad]."""
+        return self.simulated(name).position / SCALE
+
+    def state(self, name: str = FAULTY) -> DriveState:
+        """Return the state in which a simulated drive really is."""
+        return self.simulated(name).state
+
+    def move(self, mode: OperationMode) -> None:
+        """Set both drives in motion in a mode."""
+        for name in (FAULTY, WITNESS):
+            self.net.do(name, 'init')
+            self.net.select(name, mode)
+        for name in (FAULTY, WITNESS):
+            self.net.commands[name].set_target(target_of(mode))
+        self.net.run(0.6)
+        assert self.motor(FAULTY) > 0.05
+        assert self.motor(WITNESS) > 0.05
+
+    def stop(self, name: str, mode: OperationMode) -> None:
+        """Have a drive stand that is enabled."""
+        if mode not in POSITION_MODES:
+            self.net.do(name, 'halt', preempt=True)
+        self.net.run(SETTLING)
+
+    def stands(self, *names: str, duration: float = 0.5) -> None:
+        """Check that motors rest for a while, whatever their drives do."""
+        before = {name: self.motor(name) for name in names}
+        self.net.run(duration)
+        for name in names:
+            assert self.motor(name) == pytest.approx(before[name], abs=CREEP), self.net.story()
+
+    def lose(self, *cob_ids: int) -> None:
+        """Lose all frames of some identifiers."""
+        self.net.wire.loses = lambda sender, frame: frame.can_id in cob_ids
+
+
+def kill(arm: Arm) -> None:
+    """Cut the supply of the whole device."""
+    arm.net.power_off(FAULTY)
+
+
+def revive(arm: Arm) -> None:
+    """Switch it on again, and let it boot."""
+    arm.net.power_on(FAULTY)
+
+
+def reboot(arm: Arm) -> None:
+    """Restart it faster than its heartbeat could be missed."""
+    arm.net.power_off(FAULTY)
+    arm.net.run(0.05)
+    arm.net.power_on(FAULTY)
+
+
+def silence_master(arm: Arm) -> None:
+    """Nothing of the master reaches the bus any more."""
+    arm.net.wire.loses = lambda sender, frame: sender == 'master'
+
+
+def cut_bus(arm: Arm) -> None:
+    """Nothing reaches anybody, and the master's interface is down."""
+    arm.net.wire.loses = lambda sender, frame: True
+    arm.net.wire.refuses = 'the interface is down'
+
+
+def mend_bus(arm: Arm) -> None:
+    """Everything reaches everybody."""
+    arm.net.wire.loses = lambda sender, frame: False
+    arm.net.wire.refuses = ''
+
+
+def over_current(arm: Arm) -> None:
+    """Raise a fault with EMCY 0x2310."""
+    arm.simulated().raise_fault(0x2310, arm.net.now)
+
+
+def open_safety_circuit(arm: Arm) -> None:
+    """Take the voltage away."""
+    arm.simulated().set_voltage(False, arm.net.now)
+
+
+def close_safety_circuit(arm: Arm) -> None:
+    """Give it back."""
+    arm.simulated().set_voltage(True, arm.net.now)
+
+
+def following_error(arm: Arm) -> None:
+    """Raise the fault of a motor that does not follow."""
+    arm.simulated().raise_fault(0x8611, arm.net.now)
+
+
+def stop_heartbeat(arm: Arm) -> None:
+    """Lose the heartbeats of the device, and nothing else."""
+    arm.lose(0x700 + NODE_ID)
+
+
+def stop_sdo(arm: Arm) -> None:
+    """Lose the SDO answers of the device, and nothing else."""
+    arm.lose(0x580 + NODE_ID)
+
+
+def nothing(arm: Arm) -> None:
+    """Leave it as it is."""
+    del arm
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A row of the matrix.
+
+    Attributes:
+        name: What happens.
+        happen: Makes it happen.
+        reports: What the master reports as an error of every drive that is met, or of the bus.
+        state: States in one of which the drive ends; None when it is gone.
+        cause: Why targets are refused meanwhile.
+        emcy: Code of the EMCY that the master has received, None when it need not have one.
+        witness_stops: The other drive is met, too.
+        cure: Removes the cause.
+        way: What brings the drive back.
+    """
+
+    name: str
+    happen: Callable[[Arm], None]
+    reports: EventKind
+    state: DriveState | None
+    cause: RefusalCause
+    cure: Callable[[Arm], None]
+    way: Way
+    emcy: int | None = None
+    witness_stops: bool = False
+
+    def __str__(self) -> str:
+        """Name the row in the id of a test."""
+        return self.name
+
+
+SWITCHED_OFF, FAULT = DriveState.SWITCH_ON_DISABLED, DriveState.FAULT
+FAULTS = (
+    Fault(
+        'slave killed',
+        kill,
+        EventKind.HEARTBEAT_LOST,
+        None,
+        RefusalCause.OFFLINE,
+        revive,
+        Way.INIT,
+    ),
+    Fault(
+        'slave rebooted',
+        reboot,
+        EventKind.HEARTBEAT_LOST,
+        SWITCHED_OFF,
+        RefusalCause.NOT_ENABLED,
+        nothing,
+        Way.INIT,
+    ),
+    Fault(
+        'master unheard',
+        silence_master,
+        EventKind.HEARTBEAT_LOST,
+        FAULT,
+        RefusalCause.OFFLINE,
+        mend_bus,
+        Way.RECOVER,
+        emcy=0x8130,
+        witness_stops=True,
+    ),
+    Fault(
+        'bus down',
+        cut_bus,
+        EventKind.BUS,
+        FAULT,
+        RefusalCause.OFFLINE,
+        mend_bus,
+        Way.RECOVER,
+        witness_stops=True,
+    ),
+    Fault(
+        'EMCY',
+        over_current,
+        EventKind.DRIVE,
+        FAULT,
+        RefusalCause.FAULT,
+        nothing,
+        Way.RECOVER,
+        emcy=0x2310,
+    ),
+    Fault(
+        'STO low',
+        open_safety_circuit,
+        EventKind.DRIVE,
+        FAULT,
+        RefusalCause.FAULT,
+        close_safety_circuit,
+        Way.RECOVER,
+    ),
+    Fault(
+        'following error',
+        following_error,
+        EventKind.DRIVE,
+        FAULT,
+        RefusalCause.FAULT,
+        nothing,
+        Way.RECOVER,
+        emcy=0x8611,
+    ),
+    Fault(
+        'heartbeat stopped',
+        stop_heartbeat,
+        EventKind.HEARTBEAT_LOST,
+        SWITCHED_OFF,
+        RefusalCause.OFFLINE,
+        mend_bus,
+        Way.ENABLE,
+    ),
+)
+
+
+@pytest.mark.parametrize('mode', MODES, ids=lambda mode: mode.name)
+@pytest.mark.parametrize('fault', FAULTS, ids=str)
+def test_fault_in_motion(fault: Fault, mode: OperationMode) -> None:
+    """It is reported, the drive stops, refuses targets, and only a command brings it back."""
+    arm = Arm()
+    arm.move(mode)
+    before = len(arm.net.events)
+    fault.happen(arm)
+    if fault.witness_stops:
+        arm.net.run(SETTLING)
+    else:
+        arm.stop(WITNESS, mode)
+    met = [FAULTY, WITNESS] if fault.witness_stops else [FAULTY]
+    for name in met:
+        errors = [event for event in arm.net.events[before:] if event.severity is Severity.ERROR]
+        assert any(event.kind is fault.reports and event.node in (name, '') for event in errors), (
+            arm.net.story()
+        )
+        codes = [emcy.code for _, emcy in arm.net.network.nodes[name].emergencies.history]
+        assert fault.emcy is None or fault.emcy in codes
+        refusal = arm.net.drives[name].refusal
+        assert refusal is not None
+        assert refusal.cause is fault.cause
+        with pytest.raises(DriveError):
+            arm.net.commands[name].set_target(0.1)
+    if fault.state is not None:
+        assert arm.state() is fault.state, arm.net.story()
+        arm.stands(FAULTY)
+    assert (arm.state(WITNESS) is not DriveState.OPERATION_ENABLED) is fault.witness_stops
+
+    fault.cure(arm)
+    arm.net.run_until(arm.net.all_ready)
+    arm.stands(FAULTY, WITNESS)
+    for name in met:
+        assert arm.state(name) is not DriveState.OPERATION_ENABLED, 'enabled by itself'
+    for name in met:
+        arm.net.do(name, fault.way.value)
+        arm.net.select(name, mode)
+    arm.stands(FAULTY, WITNESS)
+    assert_obeys(arm, mode)
+
+
+@pytest.mark.parametrize('fault', [f for f in FAULTS if not f.witness_stops], ids=str)
+def test_fault_while_homing(fault: Fault) -> None:
+    """The command ends with the reason, the axis stops, and homing does not go on by itself."""
+    arm = Arm()
+    commands = arm.net.commands[FAULTY]
+    running = commands.run('home', commands.home(17))
+    arm.net.run(1.0)
+    assert not running.done
+    fault.happen(arm)
+    arm.net.run(SETTLING)
+    assert running.error is not None
+    assert isinstance(running.error, (DriveError, SdoError))
+    fault.cure(arm)
+    arm.net.run_until(arm.net.all_ready)
+    arm.stands(FAULTY)
+    assert arm.state() is not DriveState.OPERATION_ENABLED
+    arm.net.do(FAULTY, fault.way.value)
+    arm.stands(FAULTY)
+
+
+def assert_obeys(arm: Arm, mode: OperationMode) -> None:
+    """Check that the drive goes where it is sent now."""
+    if mode not in POSITION_MODES:
+        arm.net.commands[FAULTY].set_target(-target_of(mode))
+        arm.net.run_until(lambda: arm.net.drives[FAULTY].velocity < -0.1, 1.0)
+        return
+    arm.net.commands[FAULTY].set_target(-0.2)
+    arm.net.run(2.0)
+    assert arm.motor(FAULTY) == pytest.approx(-0.2, abs=0.01)
+
+
+TPDOS, RPDOS = (0x180, 0x280, 0x380), (0x200, 0x300, 0x400)
+STREAMED = (OperationMode.INTERPOLATED_POSITION, OperationMode.CYCLIC_POSITION)
+
+
+@pytest.mark.parametrize('mode', MODES, ids=lambda mode: mode.name)
+@pytest.mark.parametrize('names', [(FAULTY,), (FAULTY, WITNESS)], ids=['one', 'all'])
+@pytest.mark.parametrize(
+    'lost', [TPDOS, RPDOS, (*TPDOS, *RPDOS)], ids=['TPDOs lost', 'RPDOs lost', 'both lost']
+)
+def test_lost_pdos_in_motion(
+    lost: tuple[int, ...], names: tuple[str, ...], mode: OperationMode
+) -> None:
+    """A drive that cannot be seen is halted and refuses targets, one that cannot be led is told.
+
+    Neither is disabled, and when the PDOs come again nothing moves before a new target.
+    """
+    arm = Arm()
+    arm.move(mode)
+    silent, deaf = set(TPDOS) <= set(lost), set(RPDOS) <= set(lost)
+    arm.lose(
+        *(base + arm.net.network.nodes[name].config.node_id for name in names for base in lost)
+    )
+    for name in {FAULTY, WITNESS} - set(names):
+        arm.stop(name, mode)
+    arm.net.run(1.0)
+    for name in names:
+        drive = arm.net.drives[name]
+        causes = {text for text in arm.net.told(Severity.ERROR) if f'{name}: stopped' in text}
+        assert drive.accepts_targets is not silent
+        assert drive.halted is bool(causes) is (silent or mode in STREAMED), arm.net.story()
+        if silent:
+            with pytest.raises(DriveError, match='TPDOs'):
+                arm.net.commands[name].set_target(0.1)
+    if not deaf or mode in POSITION_MODES:  # else nothing that the master sends reaches them
+        arm.stands(*names)
+    elif not silent:
+        halts = [arm.net.begin(name, 'halt', preempt=True) for name in names]
+        arm.net.run(0.5)
+        assert not any(halt.done for halt in halts)  # none is told to stand while it moves
+    mend_bus(arm)
+    arm.net.run(0.7)
+    arm.stands(FAULTY, WITNESS)
+    for name in (FAULTY, WITNESS):
+        assert arm.state(name) is DriveState.OPERATION_ENABLED
+        assert arm.net.drives[name].accepts_targets
+    assert_obeys(arm, mode)
+
+
+@pytest.mark.parametrize('mode', MODES, ids=lambda mode: mode.name)
+def test_sdo_time_outs_do_not_disturb_motion(mode: OperationMode) -> None:
+    """The cycle needs no SDO: only who asks for one hears of it, with object and device."""
+    arm = Arm()
+    arm.move(mode)
+    stop_sdo(arm)
+    with pytest.raises(SdoError, match=r'joint1.*0x1008|0x1008.*joint1'):
+        arm.net.result(arm.net.network.nodes[FAULTY].sdo.read(0x1008, 0, 0.2))
+    arm.stop(FAULTY, mode)
+    assert arm.state() is DriveState.OPERATION_ENABLED
+    mend_bus(arm)
+    arm.net.run(1.0)
+    assert_obeys(arm, mode)
+
+
+@pytest.mark.parametrize('mode', MODES, ids=lambda mode: mode.name)
+def test_a_twentieth_of_all_frames_lost(mode: OperationMode) -> None:
+    """Boot, enabling and motion succeed all the same, and what was lost is counted."""
+    chance = random.Random(int(mode))
+    arm = Arm(patience=1.0)  # of three heartbeats all are lost too often
+
+    def loses(sender: str, frame: Frame) -> bool:
+        del sender, frame
+        return chance.random() < 0.05
+
+    arm.net.wire.loses = loses
+    arm.move(mode)
+    arm.stop(FAULTY, mode)
+    arm.stop(WITNESS, mode)
+    assert arm.state() is DriveState.OPERATION_ENABLED
+    arm.stands(FAULTY, WITNESS)
+    assert_obeys(arm, mode)
+    assert arm.net.network.missed_pdos > 0
+    assert arm.net.network.nodes[FAULTY].online
+
+
+def test_another_device_than_expected_is_not_driven() -> None:
+    """Its identity is said, it stays disabled, the others run, and the right one boots later."""
+    other = with_defaults(drive_dictionary().for_node(NODE_ID), {(0x1018, 1): 0x1234})
+    config = bus_config(
+        drive_config(FAULTY, NODE_ID, identity=Identity(vendor_id=0xFFFF)),
+        drive_config(WITNESS, 3),
+    )
+    net = VirtualNetwork(config, dictionaries={FAULTY: other})
+    net.start()
+    net.run_until(lambda: net.drives[WITNESS].ready)
+    net.run(2.0)
+    assert any('another device: vendor id 0x00001234' in text for text in net.told())
+    with pytest.raises(DriveError, match='vendor id'):
+        net.do(FAULTY, 'init')
+    net.do(WITNESS, 'init')
+    assert (stranger := net.devices[FAULTY].drive) is not None
+    assert stranger.state is DriveState.SWITCH_ON_DISABLED
+    net.power_off(FAULTY)
+    net._dictionaries.clear()
+    net.power_on(FAULTY)
+    net.run_until(net.all_ready)
+    net.do(FAULTY, 'init')

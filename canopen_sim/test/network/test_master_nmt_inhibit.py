@@ -1,0 +1,108 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""NMT inhibit time (0x102A) on a bus with several drives: nobody is taken for lost by waiting."""
+
+from __future__ import annotations
+
+import itertools
+
+from drive_samples import bus_config, drive_config
+import pytest
+from virtual_network import Sent, START, VirtualNetwork
+
+from arm_canopen.master.events import EventKind
+from arm_canopen.standard.cob_id import CobId
+from arm_canopen.standard.nmt import NmtCommand
+
+pytestmark = pytest.mark.slow
+
+NODE_IDS = range(2, 9)
+SDO_DOWNLOAD = 1  # command specifier of an initiated download (CiA 301, 7.2.4.3.3)
+
+
+def seven_drives(inhibit_time: float) -> VirtualNetwork:
+    """Return a bus of seven drives whose master waits between NMT commands."""
+    configs = [drive_config(f'joint{number}', number) for number in NODE_IDS]
+    return VirtualNetwork(bus_config(*configs, nmt_inhibit_time=inhibit_time))
+
+
+def nmt_commands(net: VirtualNetwork) -> list[Sent]:
+    """Return the NMT commands that were on the bus."""
+    return [sent for sent in net.wire.log if sent.frame.can_id == CobId.NMT]
+
+
+def sent_at(net: VirtualNetwork, command: NmtCommand, node_id: int) -> list[float]:
+    """Return when a command was sent to a node id in [s]."""
+    data = bytes((command, node_id))
+    return [sent.time for sent in nmt_commands(net) if sent.frame.data == data]
+
+
+@pytest.mark.parametrize('inhibit_time', [0.02, 0.05, 0.1])
+def test_seven_drives_boot_and_stay(inhibit_time: float) -> None:
+    """All of them are operational at the end of their one boot, and none drops out afterwards."""
+    net = seven_drives(inhibit_time)
+    net.boot()
+    net.run(1.5)
+    assert net.all_ready()
+    assert [event for event in net.events if event.kind is EventKind.HEARTBEAT_LOST] == []
+    times = [sent.time for sent in nmt_commands(net)]
+    assert len(times) == 1 + 2 * len(NODE_IDS)
+    assert min(b - a for a, b in itertools.pairwise(times)) >= inhibit_time - 1e-9
+
+
+def test_no_device_is_configured_before_it_is_pre_operational() -> None:
+    """PDO parameters may only be written while the device processes no PDOs."""
+    net = seven_drives(0.1)
+    net.boot()
+    for node_id in NODE_IDS:
+        (stopped,) = sent_at(net, NmtCommand.ENTER_PRE_OPERATIONAL, node_id)
+        writes = [
+            sent.time
+            for sent in net.wire.log
+            if sent.frame.can_id == CobId.SDO_REQUEST + node_id
+            and sent.frame.data[0] >> 5 == SDO_DOWNLOAD
+        ]
+        assert writes
+        assert min(writes) >= stopped
+
+
+def test_devices_that_are_reset_one_by_one_boot_once() -> None:
+    """The boot of a device begins when its own reset has left, not while that waits."""
+    alive = drive_config('alive', 20, reset_communication=False)
+    configs = [drive_config(f'joint{number}', number) for number in NODE_IDS]
+    net = VirtualNetwork(bus_config(*configs, alive, nmt_inhibit_time=0.1))
+    net.boot()
+    for node_id in NODE_IDS:
+        (reset,) = sent_at(net, NmtCommand.RESET_COMMUNICATION, node_id)
+        (stopped,) = sent_at(net, NmtCommand.ENTER_PRE_OPERATIONAL, node_id)
+        (started,) = sent_at(net, NmtCommand.START, node_id)
+        assert START <= reset < stopped < started
+
+
+def test_a_start_that_waits_is_withdrawn_when_its_device_restarts() -> None:
+    """The device that came back is not the one that was configured."""
+    net = seven_drives(0.1)
+    net.start()
+    last = NODE_IDS[-1]
+    net.run_until(lambda: bool(sent_at(net, NmtCommand.ENTER_PRE_OPERATIONAL, last)))
+    net.run(0.02)  # configured by now; its start waits behind those of the others
+    assert not sent_at(net, NmtCommand.START, last)
+    net.power_off(f'joint{last}')
+    net.power_on(f'joint{last}')
+    net.run_until(net.all_ready)
+    (first, again) = sent_at(net, NmtCommand.ENTER_PRE_OPERATIONAL, last)
+    (started,) = sent_at(net, NmtCommand.START, last)
+    assert first < again < started
+
+
+def test_a_command_is_done_when_it_has_left() -> None:
+    """Whoever sends a command may wait for it to be on the bus."""
+    net = seven_drives(0.1)
+    net.boot()
+    net.run(0.2)
+    net.network.advance(net.now)
+    begin = net.now
+    sent = [net.network.send_nmt(NmtCommand.START, node_id) for node_id in NODE_IDS]
+    assert [promise.done for promise in sent] == [True] + [False] * 6
+    net.result(sent[-1])
+    assert net.now - begin == pytest.approx(0.6)

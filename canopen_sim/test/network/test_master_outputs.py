@@ -1,0 +1,287 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""RPDOs of devices without a driver: nothing leaves unasked, and nothing is undone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+import struct
+
+from drive_samples import (
+    bus_config,
+    drive_config,
+    drive_dictionary,
+    every_mode,
+    pdo,
+    PERIOD,
+    SCALE,
+    sdo_write,
+    with_defaults,
+)
+import pytest
+from virtual_network import VirtualNetwork
+
+from arm_canopen.config.checks import check_bus
+from arm_canopen.config.model import NodeConfig
+from arm_canopen.exceptions import CanopenError, CodecError
+from arm_canopen.standard.drive import OperationMode
+from arm_canopen.standard.nmt import NmtCommand
+from canopen_sim.faults.faults import BusFault, FaultInjection
+
+MODULE = 'module'
+NODE_ID = 5
+OUTPUTS = (0x6083, 0)  # stands for the outputs of a module
+MASK = (0x6084, 0)
+COB_ID, SYNC_COB_ID = 0x205, 0x305
+JOINT, SPEEDS = 'joint', 0x502
+
+
+def module(**changes: object) -> NodeConfig:
+    """Return an I/O module with outputs in an event-driven and in a synchronous RPDO."""
+    config = drive_config(MODULE, NODE_ID, driver='ros2_canopen::ProxyDriver', sdo_writes=())
+    rpdos = (
+        pdo(1, COB_ID, OUTPUTS, MASK, transmission=255),
+        pdo(2, SYNC_COB_ID, (0x6071, 0), transmission=1),
+    )
+    return replace(config, rpdos=rpdos, tpdos=(), **changes)  # type: ignore[arg-type]
+
+
+def booted(config: NodeConfig | None = None, **held: int) -> VirtualNetwork:
+    """Boot the module, whose outputs hold something already."""
+    config = config or module()
+    values = {OUTPUTS: held.get('outputs', 0), MASK: held.get('mask', 0)}
+    dictionary = with_defaults(drive_dictionary().for_node(NODE_ID), values)
+    net = VirtualNetwork(bus_config(config), dictionaries={MODULE: dictionary})
+    net.boot()
+    return net
+
+
+def read(net: VirtualNetwork, place: tuple[int, int]) -> int:
+    """Return what an object of the device holds."""
+    return int(net.result(net.network.nodes[MODULE].sdo.read(*place, 0.2))[0])
+
+
+def publish(net: VirtualNetwork, place: tuple[int, int], value: int) -> None:
+    """Publish an object as ``~/tpdo`` does."""
+    net.network.publish_object(net.network.nodes[MODULE], *place, value)
+
+
+def test_nothing_leaves_before_somebody_publishes() -> None:
+    """The outputs of a module are not forced to a default by the start of a master."""
+    net = booted(outputs=0x2A)
+    net.run(1.0)
+    assert net.frames(COB_ID) == net.frames(SYNC_COB_ID) == []
+    assert read(net, OUTPUTS) == 0x2A
+
+
+def test_what_is_published_leaves_once_and_at_once() -> None:
+    """Two values within a cycle are two frames, so that no edge is lost."""
+    net = booted()
+    begin = net.now
+    publish(net, OUTPUTS, 1)
+    publish(net, OUTPUTS, 0)
+    net.run(0.5 * PERIOD)
+    net.run(0.5)
+    sent = net.frames(COB_ID, since=begin)
+    assert [data[0] for data in sent] == [1, 0]
+
+
+def test_what_waits_for_sync_leaves_with_the_cycle() -> None:
+    """Of two values before a SYNC the last one counts."""
+    net = booted()
+    publish(net, (0x6071, 0), 5)
+    publish(net, (0x6071, 0), -7)
+    net.run(0.5)
+    assert [struct.unpack('<h', data) for data in net.frames(SYNC_COB_ID)] == [(-7,)]
+
+
+def test_the_other_objects_of_the_frame_stay_as_the_device_has_them() -> None:
+    """The start-up has read what nobody published."""
+    net = booted(outputs=0x11, mask=0x22)
+    publish(net, MASK, 0x33)
+    net.run(0.1)
+    assert [struct.unpack('<II', data) for data in net.frames(COB_ID)] == [(0x11, 0x33)]
+
+
+def test_what_bus_yml_writes_is_what_the_frame_carries() -> None:
+    """Present values are those after the configuration."""
+    net = booted(module(sdo_writes=(sdo_write(*OUTPUTS, 0x44),)), outputs=0x11)
+    publish(net, MASK, 1)
+    assert struct.unpack('<II', net.frames(COB_ID)[-1]) == (0x44, 1)
+
+
+def test_an_sdo_write_is_not_undone() -> None:
+    """The next frame carries what was written, for whichever object it is sent."""
+    net = booted()
+    publish(net, OUTPUTS, 1)
+    net.result(net.network.nodes[MODULE].objects.write_object(*OUTPUTS, 0x55))
+    net.run(0.3)
+    assert read(net, OUTPUTS) == 0x55
+    publish(net, MASK, 3)
+    net.run(0.3)
+    assert read(net, OUTPUTS) == 0x55
+
+
+def test_an_sdo_write_to_an_object_of_a_drive_that_is_mapped_stays() -> None:
+    """The RPDOs of a drive leave in each cycle, with what was written."""
+    config = drive_config('joint', 2)
+    speeds = pdo(4, 0x502, (0x6081, 0))
+    net = VirtualNetwork(bus_config(replace(config, rpdos=(*config.rpdos, speeds))))
+    net.boot()
+    assert struct.unpack('<I', net.frames(0x502)[-1]) == (10_000,)
+    node = net.network.nodes['joint']
+    net.result(node.objects.write_object(0x6081, 0, 2_000))
+    net.run(0.2)
+    (speed,) = struct.unpack('<I', net.result(node.sdo.read(0x6081, 0, 0.2)))
+    assert speed == 2_000
+
+
+def drive_with_speed_mapped() -> VirtualNetwork:
+    """Boot a drive that has its profile velocity of 10000 in an RPDO, which leaves each cycle."""
+    config = drive_config(JOINT, 2)
+    speeds = pdo(4, SPEEDS, (0x6081, 0))
+    net = VirtualNetwork(bus_config(replace(config, rpdos=(*config.rpdos, speeds))))
+    net.boot()
+    return net
+
+
+def speeds(net: VirtualNetwork, since: float) -> list[int]:
+    """Return the profile velocities that the RPDO has carried."""
+    return [struct.unpack('<I', data)[0] for data in net.frames(SPEEDS, since=since)]
+
+
+def inject(net: VirtualNetwork, fault: BusFault, **settings: float) -> None:
+    """Let the drive answer the SDO for its profile velocity so."""
+    injection = FaultInjection(fault, object=(0x6081, 0), **settings)  # type: ignore[arg-type]
+    net.devices[JOINT].faults.inject(injection, net.now)
+
+
+def test_the_first_targets_of_a_drive_are_where_it_is() -> None:
+    """A drive that comes back is booted, and its first RPDOs leave before its first TPDOs."""
+    net = VirtualNetwork(bus_config(every_mode(drive_config('a', 2))))
+    net.boot()
+    net.do('a', 'init')
+    net.select('a', OperationMode.CYCLIC_POSITION)
+    net.commands['a'].set_target(0.3)
+    net.run(3.0)
+    begin = net.now
+    net.devices['a'].faults.inject(FaultInjection(BusFault.DISCONNECT, duration=1.0), begin)
+    net.run_until(lambda: not net.drives['a'].node.online, 1.0)
+    net.run_until(net.all_ready, 5.0)
+    (at,) = {round(0.3 * SCALE), *net.targets('a', since=begin)}
+    assert at == round(net.drives['a'].position * SCALE)
+
+
+def test_the_position_of_a_drive_is_read_once_for_all_its_targets() -> None:
+    """The targets of modes 7 and 8 both start where the drive is."""
+    net = VirtualNetwork(bus_config(every_mode(drive_config('a', 2))))
+    net.boot()
+    begun = [data for data in net.frames(0x602) if data[:4] == b'\x40\x64\x60\0']
+    assert len(begun) == 1
+
+
+def test_a_boot_write_that_fits_no_type_is_refused() -> None:
+    """An RPDO must not carry what the EDS has as default, while boot writes something else."""
+    short = replace(sdo_write(*OUTPUTS, 0x44), data=b'\x44')
+    with pytest.raises(CodecError, match=rf'{MODULE}: the write of 0x6083:00 at boot'):
+        booted(module(sdo_writes=(short,)))
+
+
+def test_an_sdo_write_is_not_undone_while_its_answer_is_awaited() -> None:
+    """The device may have taken it at once, so the RPDO carries it from when the request left."""
+    net = drive_with_speed_mapped()
+    net.devices[JOINT].faults.inject(FaultInjection(BusFault.SDO_DELAY, delay=0.1), net.now)
+    begin = net.now
+    net.result(net.network.nodes[JOINT].objects.write_object(0x6081, 0, 2_000))
+    assert net.now - begin > 0.1
+    assert set(speeds(net, since=begin + 1e-6)) == {2_000}
+
+
+def test_an_sdo_write_that_is_refused_leaves_the_rpdo_as_it_was() -> None:
+    """The device keeps its value, so the RPDO must not bring another one."""
+    net = drive_with_speed_mapped()
+    inject(net, BusFault.SDO_ABORT)
+    promise = net.network.nodes[JOINT].objects.write_object(0x6081, 0, 2_000)
+    net.run_until(lambda: promise.done)
+    assert promise.error is not None
+    begin = net.now
+    net.run(0.2)
+    assert set(speeds(net, since=begin)) == {10_000}
+
+
+def test_a_value_published_meanwhile_outlives_a_write_that_is_refused() -> None:
+    """Set back is only what the request has set."""
+    net = drive_with_speed_mapped()
+    node = net.network.nodes[JOINT]
+    inject(net, BusFault.SDO_SILENCE)
+    promise = node.objects.write_object(0x6081, 0, 2_000)
+    net.run(0.05)
+    net.network.publish_object(node, 0x6081, 0, 3_000)
+    net.run_until(lambda: promise.done)
+    assert promise.error is not None
+    begin = net.now
+    net.run(0.2)
+    assert set(speeds(net, since=begin)) == {3_000}
+
+
+def test_a_write_that_waits_in_the_queue_changes_no_rpdo_yet() -> None:
+    """Of two writes the first one's value leaves until the second one is on its way."""
+    net = drive_with_speed_mapped()
+    node = net.network.nodes[JOINT]
+    net.devices[JOINT].faults.inject(FaultInjection(BusFault.SDO_DELAY, delay=0.1), net.now)
+    node.objects.write_object(0x6081, 0, 2_000)
+    promise = node.objects.write_object(0x6081, 0, 4_000)
+    begin = net.now + 1e-6
+    net.run(0.09)
+    assert set(speeds(net, since=begin)) == {2_000}
+    net.result(promise)
+    net.run(0.1)
+    assert speeds(net, since=begin)[-1] == 4_000
+
+
+def test_a_device_that_restarts_is_asked_again() -> None:
+    """What was published to the one before is not sent to the new one."""
+    net = booted(outputs=0x11)
+    publish(net, OUTPUTS, 0x99)
+    net.run(0.1)
+    net.network.send_nmt(NmtCommand.RESET_NODE, NODE_ID)
+    net.run(0.05)
+    net.run_until(net.all_ready)
+    begin = net.now
+    net.run(0.5)
+    assert net.frames(COB_ID, since=begin) == []
+    publish(net, MASK, 1)
+    assert struct.unpack('<II', net.frames(COB_ID)[-1]) == (0x11, 1)
+
+
+def test_a_deadline_is_kept_once_something_was_published() -> None:
+    """A device that watches its RPDO gets it again and again, but not before."""
+    config = module()
+    rpdo = replace(config.rpdos[0], event_time=0.1)
+    net = booted(replace(config, rpdos=(rpdo,)))
+    net.run(0.5)
+    assert net.frames(COB_ID) == []
+    publish(net, OUTPUTS, 1)
+    begin = net.now
+    net.run(1.0)
+    times = [sent.time for sent in net.wire.log if sent.frame.can_id == COB_ID]
+    gaps = [later - time for time, later in zip([begin, *times], times, strict=False)]
+    assert len(times) > 10
+    assert max(gaps) < 0.1
+
+
+def test_a_device_that_is_not_there_is_told() -> None:
+    """Nothing is kept for later, when it would surprise."""
+    net = VirtualNetwork(bus_config(module()), absent=[MODULE])
+    net.start()
+    net.run(0.1)
+    with pytest.raises(CanopenError, match='not operational'):
+        publish(net, OUTPUTS, 1)
+
+
+def test_check_counts_no_frames_that_nobody_sends() -> None:
+    """The load of the bus has the RPDOs of the module at rate 0."""
+    load = check_bus(bus_config(module())).load
+    assert load is not None
+    rates = {item.service: item.rate for item in load.traffic}
+    assert rates['RPDO 1'] == rates['RPDO 2'] == 0.0

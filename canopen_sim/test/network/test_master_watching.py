@@ -1,0 +1,192 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What the master notices of its devices: guarding, PDOs that stop or do not fit, EMCYs; TIME."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from datetime import datetime, timezone
+
+from drive_samples import bus_config, drive_config, pdo, sdo_write, with_defaults
+import pytest
+from virtual_network import VirtualNetwork
+
+from arm_canopen.can.frame import Frame
+from arm_canopen.config.model import NodeConfig
+from arm_canopen.exceptions import CodecError
+from arm_canopen.master.events import Severity
+from arm_canopen.master.guarding import Guarding
+from arm_canopen.master.network import Network
+from arm_canopen.standard.time_of_day import decode_time_of_day, encode_time_of_day
+
+GUARD_TIME = 0.05  # [s]
+
+
+def guarded_config(**changes: object) -> NodeConfig:
+    """Return a drive without heartbeat, which is asked for its state."""
+    own = {
+        'heartbeat_producer': 0.0,
+        'heartbeat_timeout': 0.0,
+        'guard_time': GUARD_TIME,
+        'life_time_factor': 4,
+        'retry_factor': 3,
+    }
+    return replace(drive_config('a', 2), **{**own, **changes})  # type: ignore[arg-type]
+
+
+def test_a_device_without_heartbeat_is_asked() -> None:
+    """Every guard time; its answers keep it online and tell its NMT state."""
+    net = VirtualNetwork(bus_config(guarded_config()))
+    net.boot()
+    net.run(1.0)
+    node = net.network.nodes['a']
+    questions = [sent.time for sent in net.wire.log if sent.frame.is_remote]
+    assert node.online
+    assert len(questions) == pytest.approx(1.0 / GUARD_TIME, abs=3)
+    assert node.nmt_state is not None
+    assert net.told(Severity.WARNING) == []
+
+
+def test_a_guarded_device_that_does_not_answer_is_lost_and_found() -> None:
+    """After the retries, with the count in words; it is booted again when it is back."""
+    net = VirtualNetwork(bus_config(guarded_config()))
+    net.boot()
+    net.run(0.5)
+    net.power_off('a')
+    begin = net.now
+    net.run_until(lambda: not net.network.nodes['a'].online)
+    assert net.now - begin <= GUARD_TIME * 4 + 0.02
+    assert any('no answer to node guarding 3 times' in text for text in net.told(Severity.ERROR))
+    net.power_on('a')
+    net.run_until(lambda: net.network.nodes['a'].online)
+
+
+def test_a_device_that_never_answers_guarding_is_told_once_and_left_in_peace() -> None:
+    """It is not booted again and again: it has to answer before it is configured again."""
+    net = VirtualNetwork(bus_config(guarded_config()))
+    node = net.network.nodes['a']
+    deaf = {'a'}
+    # RTR frames do not reach it, as in a controller that has no remote frames
+    net.wire.loses = lambda sender, frame: frame.is_remote and bool(deaf)
+    net.boot()
+    net.run_until(lambda: not node.online)
+    begin = net.now
+    net.run(30.0)
+    assert not node.online
+    assert len(net.told(Severity.WARNING)) == 2, net.told(Severity.WARNING)
+    assert 'no answer to node guarding 3 times' in net.told(Severity.ERROR)[0]
+    assert 'has never answered node guarding' in net.told(Severity.WARNING)[-1]
+    assert 'guard_time: 0' in net.told(Severity.WARNING)[-1]
+    assert net.frames(0x000, since=begin + 2.0).count(b'\x01\x02') == 0
+    questions = [s for s in net.wire.log if s.frame.is_remote and s.time > begin + 2.0]
+    assert len(questions) <= 28
+    deaf.clear()
+    net.run_until(lambda: node.online)
+    net.run(2.0)
+    assert node.online
+
+
+def test_an_answer_that_is_repeated_is_none() -> None:
+    """The toggle bit tells a new answer from an old one."""
+    asked: list[Frame] = []
+    guarding = Guarding(5, 0.1, 2, asked.append)
+    guarding.start(0.0)
+    assert not guarding.advance(0.0)
+    assert guarding.receive(b'\x05')
+    assert not guarding.receive(b'\x05')
+    assert guarding.receive(b'\x85')
+    assert not guarding.advance(0.1)
+    assert not guarding.receive(b'\x85')
+    assert not guarding.advance(0.2)
+    assert guarding.advance(0.31)
+    assert asked == [Frame(0x705, is_remote=True)] * 3
+
+
+def test_an_emergency_is_heard_where_the_device_sends_it() -> None:
+    """Under the identifier of 0x1014: as bus.yml writes it, else as the EDS has it."""
+    written = drive_config('a', 2)
+    written = replace(written, sdo_writes=(*written.sdo_writes, sdo_write(0x1014, 0, 0x0A2)))
+    eds = drive_config('b', 3)
+    eds = replace(eds, dictionary=with_defaults(eds.dictionary, {(0x1014, 0): 0x0B3}))
+    silent = drive_config('c', 4)
+    silent = replace(silent, dictionary=with_defaults(silent.dictionary, {(0x1014, 0): 1 << 31}))
+    net = VirtualNetwork(bus_config(written, eds, silent), absent=['b', 'c'])
+    for can_id in (0x0A2, 0x0B3, 0x084):
+        net.network.receive(Frame(can_id, bytes.fromhex('10 23 01 00 00 00 00 00'), net.now))
+    heard = {name: node.emergencies.last is not None for name, node in net.network.nodes.items()}
+    assert heard == {'a': True, 'b': True, 'c': False}
+
+
+def test_the_last_emergencies_are_remembered() -> None:
+    """With their times, also after their end."""
+    net = VirtualNetwork(bus_config(drive_config('a', 2)))
+    for second, code in enumerate(('10 23', '00 00', '10 43')):
+        data = bytes.fromhex(f'{code} 01 00 00 00 00 00')
+        net.network.receive(Frame(0x082, data, net.now + second))
+    history = net.network.nodes['a'].emergencies.history
+    assert [emergency.code for _, emergency in history] == [0x2310, 0x0000, 0x4310]
+    assert [time - net.now for time, _ in history] == [0.0, 1.0, 2.0]
+
+
+def test_a_pdo_of_another_length_is_told_once() -> None:
+    """With both lengths; a second one is counted only."""
+    net = VirtualNetwork(bus_config(drive_config('a', 2)))
+    net.boot()
+    for _ in range(3):
+        net.network.receive(Frame(0x182, b'\0', net.now))
+    told = [text for text in net.told(Severity.WARNING) if 'TPDO 1 (0x182) has 1 bytes' in text]
+    assert len(told) == 1
+
+
+def test_a_pdo_with_an_event_time_that_stops_is_told() -> None:
+    """The device takes no targets until it comes again."""
+    config = drive_config('a', 2)
+    timed = replace(pdo(3, 0x382, (0x6077, 0), transmission=255), event_time=0.02)
+    net = VirtualNetwork(bus_config(replace(config, tpdos=(*config.tpdos, timed))))
+    net.boot()
+    net.run(0.5)
+    node = net.network.nodes['a']
+    assert net.drives['a'].fresh
+    for handler in (0x382,):
+        net.network._handlers[handler] = lambda frame: None
+    net.run(0.2)
+    assert not net.drives['a'].fresh
+    assert any('TPDO 3 (0x382) has stopped: none for 60 ms' in text for text in net.told())
+    node.image.tpdos[-1].receive(Frame(0x382, bytes(2), net.now))
+    net.run(0.01)
+    assert net.drives['a'].fresh
+
+
+def test_pdos_that_come_after_the_window_are_counted() -> None:
+    """`sync_window`: what answers a SYNC too late is no answer of that moment."""
+    net = VirtualNetwork(bus_config(drive_config('a', 2), sync_window=0.0001))
+    net.boot()
+    net.run(0.2)
+    assert net.network.late_pdos > 10
+    patient = VirtualNetwork(bus_config(drive_config('a', 2), sync_window=0.005))
+    patient.boot()
+    patient.run(0.2)
+    assert patient.network.late_pdos == 0
+
+
+def test_time_is_sent_as_often_as_asked() -> None:
+    """TIME carries the time of day in milliseconds since midnight and days since 1984."""
+    moment = datetime(2026, 11, 21, 7, 30, 0, 250_000, tzinfo=timezone.utc)
+    sent: list[Frame] = []
+    config = bus_config(time_period=0.5, time_cob_id=0x4000_0100)
+    network = Network(config, sent.append, lambda event: None, lambda: moment)
+    network.start(10.0)
+    for cycle in range(100):
+        network.cycle(10.0 + cycle * 0.01, 0.01)
+    times = [frame.data for frame in sent if frame.can_id == 0x100]
+    assert len(times) == 2
+    assert decode_time_of_day(times[0]) == moment
+    assert times[0] == bytes.fromhex('BA FD 9B 01') + (15665).to_bytes(2, 'little')
+
+
+def test_a_time_that_does_not_fit_is_refused() -> None:
+    """Before 1984 there is none."""
+    with pytest.raises(CodecError, match='1983'):
+        encode_time_of_day(datetime(1983, 12, 31, tzinfo=timezone.utc))
+    with pytest.raises(CodecError, match='6 bytes'):
+        decode_time_of_day(b'')
