@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What the sensors of a quadruped say, in SI units and the frames of REP 103 and 145."""
+"""State of a quadruped as its sensors measure it: SI units, frames of REP 103 and 145."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 import math
 
@@ -27,13 +28,27 @@ class JointSample:
     Attributes:
         positions: In [rad] or [m].
         velocities: In [rad/s] or [m/s]; None when they are not measured.
+        time: When they were measured, on the clock of the back end in [s].
+        unmeasured: Places of the joints that no sensor measures; their positions are those that
+            were commanded last.
     """
 
     positions: tuple[float, ...]
     velocities: tuple[float, ...] | None
+    time: float = 0.0
+    unmeasured: tuple[int, ...] = ()
+
+    def measured(self, names: Sequence[str]) -> dict[str, float]:
+        """Return the positions that are measured, by joint.
+
+        Args:
+            names: Joints of the robot.
+        """
+        positions = zip(names, self.positions, strict=True)
+        return {name: p for i, (name, p) in enumerate(positions) if i not in self.unmeasured}
 
     def problem(self, count: int) -> str:
-        """Say what is wrong with it, nothing when it can be used.
+        """Return what is wrong with it, nothing when it can be used.
 
         Args:
             count: How many joints there are.
@@ -44,7 +59,7 @@ class JointSample:
             if len(values) != count:
                 return f'{len(values)} joint {what} instead of {count}'
             if not all(map(math.isfinite, values)):
-                return f'joint {what} that are no numbers'
+                return f'joint {what} that are not finite'
         return ''
 
 
@@ -55,15 +70,18 @@ class ImuSample:
     Attributes:
         orientation: Unit quaternion of the body in the world, x, y, z, w.
         angular_velocity: In [rad/s]; None when it is not measured.
-        acceleration: Specific force in [m/s^2]: +9.81 along z at rest (REP 145).
+        acceleration: Specific force in [m/s^2]: +9.81 along z at rest (REP 145); None when it is
+            not measured.
         deviation: Standard deviation of roll or pitch, the larger one, in [rad]; 0 when it is not
-            said. A heading is only held against itself, so that of yaw does not matter.
+            known. A heading is only held against itself, so that of yaw does not matter.
+        rate_differentiated: The angular velocity is the orientation's derivative, not a gyro's.
     """
 
     orientation: Quaternion
     angular_velocity: Vector | None
-    acceleration: Vector
+    acceleration: Vector | None
     deviation: float = 0.0
+    rate_differentiated: bool = False
 
     @property
     def is_uncertain(self) -> bool:
@@ -71,12 +89,12 @@ class ImuSample:
         return self.deviation > MAX_DEVIATION
 
     def problem(self) -> str:
-        """Say what is wrong with it, nothing when it can be used."""
-        parts = (*self.orientation, *(self.angular_velocity or ()), *self.acceleration)
+        """Return what is wrong with it, nothing when it can be used."""
+        parts = (*self.orientation, *(self.angular_velocity or ()), *(self.acceleration or ()))
         if not all(map(math.isfinite, parts)):
-            return 'imu values that are no numbers'
+            return 'imu values that are not finite'
         if abs(math.hypot(*self.orientation) - 1.0) > NORM_TOLERANCE:
-            return 'an imu orientation that is no unit quaternion'
+            return 'an imu orientation that is not a unit quaternion'
         return ''
 
     @property
@@ -101,10 +119,11 @@ class RobotState:
 
     Attributes:
         joints: The newest joint states, None when there were none.
-        imu: The newest attitude, None when there was none.
-        battery: Charge 0 to 1, None when nothing was said of it.
+        imu: The newest attitude, None when there was none or the IMU is of no use.
+        battery: Charge 0 to 1, None while it is unknown.
         position: Of base_link in the world in [m]; None where the back end does not know it.
-        time: When the joints were measured, on the clock of the back end in [s].
+        time: When it was measured, on the clock of the back end in [s]; the joints may have been
+            measured before.
     """
 
     joints: JointSample | None = None

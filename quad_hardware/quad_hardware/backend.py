@@ -5,14 +5,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 import logging
 import threading
 import time
 
-from quad_description import Backend, ImuSample, JointSample, RobotState
+from quad_description import Backend, RobotState
 
-from .estimation import Estimate
-from .estimation.imu_mounting import UNCHECKED_DEVIATION
 from .exceptions import CommandError, NoAnswerError
 from .link import LinkState, STALE_TIME
 from .serial_robot import RobotSettings, SerialRobot
@@ -40,7 +39,7 @@ class SerialBackend(Backend):
         """
         self._robot = SerialRobot(
             settings,
-            on_estimate=self._take,
+            on_state=self._take,
             on_change=self._change,
             on_refusal=_log.warning,
             warn=_log.warning,
@@ -50,7 +49,6 @@ class SerialBackend(Backend):
         self._state: RobotState | None = None
         self._count = 0  # of states
         self._running = False  # the link takes commands
-        self._targets: dict[str, float] = {}  # that were sent last, of joints nobody measures
         self._commanding = threading.RLock()
         self._commanded_at: float | None = None  # None: their end was dealt with
         self._started = False
@@ -77,7 +75,6 @@ class SerialBackend(Backend):
             with self._commanding:
                 if not self._robot.command(targets):
                     raise CommandError(self._robot.counters.reason)
-                self._targets = dict(zip(self.names, targets, strict=False))
                 self._commanded_at = time.monotonic()
         return self._next_state(STALE_TIME)
 
@@ -108,8 +105,10 @@ class SerialBackend(Backend):
 
     # -- in the thread of the driver
 
-    def _take(self, estimate: Estimate) -> None:
-        state = self._robot_state(estimate)
+    def _take(self, state: RobotState) -> None:
+        odometry = self._robot.update_odometry(state)
+        if odometry is not None:
+            state = replace(state, position=(odometry.x, odometry.y, odometry.height))
         with self._arrived:
             self._state, self._count = state, self._count + 1
             self._arrived.notify_all()
@@ -135,32 +134,3 @@ class SerialBackend(Backend):
                 self._state = None
             self._arrived.notify_all()
         _log.info('%s: %s', state.value, detail)
-
-    def _robot_state(self, estimate: Estimate) -> RobotState:
-        """Return an estimate in the order of all joints."""
-        place = {**self._targets, **estimate.positions}
-        joints = JointSample(
-            tuple(place.get(name, 0.0) for name in self.names),
-            tuple(estimate.velocities.get(name, 0.0) for name in self.names),
-        )
-        odometry = self._robot.update_odometry(estimate)
-        charge = self._robot.health().battery.charge
-        return RobotState(
-            joints,
-            imu_sample(estimate),
-            None if charge is None else charge / 100.0,
-            None if odometry is None else (odometry.x, odometry.y, odometry.height),
-            estimate.joints_time,
-        )
-
-
-def imu_sample(estimate: Estimate) -> ImuSample | None:
-    """Return attitude and motion of an estimate; None while the IMU is of no use."""
-    if estimate.attitude is None:
-        return None
-    return ImuSample(
-        estimate.attitude,
-        estimate.angular_velocity,
-        estimate.acceleration or (0.0, 0.0, 0.0),
-        0.0 if estimate.signs_checked else UNCHECKED_DEVIATION,
-    )

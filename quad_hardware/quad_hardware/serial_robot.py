@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""A robot on its serial port in SI units: reports become estimates, targets servo angles."""
+"""A robot on its serial port in SI units: reports become states, targets servo angles."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 import time
 
-from quad_description.rotations import tilt_of
+from quad_description import RobotState
 
-from .estimation import Estimate, Estimator, EstimatorSettings, Health, OdometryState
+from .estimation import Estimator, EstimatorSettings, Health, OdometryState
 from .exceptions import CommandError
 from .joints import CommandCounters, JointCommander, JointMap, LimiterSettings, LossReaction
 from .joints.command import NOMINAL_PERIOD
@@ -54,7 +54,7 @@ class SerialRobot:
         self,
         settings: RobotSettings,
         *,
-        on_estimate: Callable[[Estimate], None],
+        on_state: Callable[[RobotState], None],
         on_change: Callable[[LinkState, str], None],
         on_refusal: Callable[[str], None],
         warn: Callable[[str], None],
@@ -63,7 +63,7 @@ class SerialRobot:
 
         Args:
             settings: Which robot it is.
-            on_estimate: Takes each report in SI units.
+            on_state: Takes each report as a state in SI units, without the position.
             on_change: Takes the state of the link when it changes, and its detail.
             on_refusal: Takes why a report cannot be.
             warn: Takes what is the matter with a command.
@@ -73,7 +73,7 @@ class SerialRobot:
         """
         self.names = settings.joints.names
         self._joints = settings.joints
-        self._on_estimate, self._on_change = on_estimate, on_change
+        self._on_state, self._on_change = on_state, on_change
         self._on_refusal = on_refusal
         self._estimator = Estimator(settings.urdf, settings.joints, settings.estimator)
         self._commander = JointCommander(
@@ -86,7 +86,7 @@ class SerialRobot:
             warn=warn,
         )
         self._driver = Driver(settings.link, self._report, self._link_changed)
-        self._latest: tuple[Report, Estimate] | None = None  # while the link is running
+        self._latest: tuple[Report, RobotState] | None = None  # while the link is running
         self.timeout = self._commander.timeout
 
     def start(self, begin: Callable[[], None] = lambda: None) -> None:
@@ -109,8 +109,8 @@ class SerialRobot:
     # -- what is known of it
 
     @property
-    def latest(self) -> tuple[Report, Estimate] | None:
-        """The newest report and what it says in SI units; None while the link does not run."""
+    def latest(self) -> tuple[Report, RobotState] | None:
+        """The newest report and its state; None while the link does not run."""
         return self._latest
 
     @property
@@ -126,9 +126,9 @@ class SerialRobot:
         """Return how the robot is, by its latest reports."""
         return self._estimator.health()
 
-    def update_odometry(self, estimate: Estimate) -> OdometryState | None:
-        """Return where the body is by an estimate, to be called once for each."""
-        return self._estimator.update_odometry(estimate)
+    def update_odometry(self, state: RobotState) -> OdometryState | None:
+        """Return where the body is by a state, to be called once for each."""
+        return self._estimator.update_odometry(state)
 
     # -- what may be done to it
 
@@ -153,9 +153,8 @@ class SerialRobot:
             What it does, or why not; empty when there is no hazard.
         """
         now, latest = time.monotonic(), self._latest
-        attitude = latest[1].attitude if latest is not None else None
-        tilt = None if attitude is None else tilt_of(attitude)
-        return self._commander.miss(self._place(now), tilt, now)
+        imu = latest[1].imu if latest is not None else None
+        return self._commander.miss(self._place(now), None if imu is None else imu.tilt, now)
 
     def go_down(self) -> bool:
         """Send the next targets on the way down; return whether there were any."""
@@ -184,12 +183,12 @@ class SerialRobot:
 
     def _report(self, report: Report) -> str:
         """Take a report; return why it cannot be."""
-        estimate = self._estimator.update(report)
-        if estimate is None:
+        state = self._estimator.update(report)
+        if state is None:
             self._on_refusal(self._estimator.refusal)
             return self._estimator.refusal
-        self._latest = report, estimate
-        self._on_estimate(estimate)
+        self._latest = report, state
+        self._on_state(state)
         return ''
 
     def _link_changed(self, state: LinkState, detail: str) -> None:
@@ -215,4 +214,5 @@ class SerialRobot:
         latest = self._latest
         if latest is None or now - latest[0].arrival > STALE_TIME:
             return {}
-        return latest[1].positions
+        joints = latest[1].joints
+        return {} if joints is None else joints.measured(self.names)

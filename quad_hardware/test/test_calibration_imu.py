@@ -133,7 +133,7 @@ def test_reports_are_published_for_the_body(mounting: ImuMounting) -> None:
     body, turning = from_roll_pitch_yaw(0.2, -0.3, 1.0), (0.5, -1.0, 2.0)
     seen = report(mounting, body)
     rates = signed(mounting.rate_signs, rotate(conjugate(mounting.rotation), turning))
-    state = Report(
+    reported = Report(
         arrival=0.0,
         wire_time=0.001,
         attitude=seen.attitude,
@@ -142,13 +142,13 @@ def test_reports_are_published_for_the_body(mounting: ImuMounting) -> None:
         positions=dict.fromkeys(LEG_MOTORS, 0.0),
         velocities=dict.fromkeys(LEG_MOTORS, 0.0),
     )
-    estimate = estimator.update(state)
-    assert estimate is not None
-    assert estimate.attitude is not None
-    assert down_in_body(estimate.attitude) == pytest.approx(down_in_body(body), abs=1e-6)
+    state = estimator.update(reported)
+    assert state is not None
+    assert state.imu is not None
+    assert state.imu.down == pytest.approx(down_in_body(body), abs=1e-6)
     up = rotate(conjugate(body), (0.0, 0.0, STANDARD_GRAVITY))
-    assert estimate.acceleration == pytest.approx(up, abs=1e-6)
-    assert estimate.angular_velocity == pytest.approx(turning, abs=1e-9)
+    assert state.imu.acceleration == pytest.approx(up, abs=1e-6)
+    assert state.imu.angular_velocity == pytest.approx(turning, abs=1e-9)
 
 
 def test_a_turned_imu_is_a_turned_imu() -> None:

@@ -78,9 +78,10 @@ def test_signs_are_checked_when_those_of_the_gyro_are(
     urdf = robot_urdf('lite')
     joints = JointMap(map(servo_of, movable_joints(urdf)))
     settings = EstimatorSettings(rate_source=source, mounting=mounting)
-    estimate = Estimator(urdf, joints, settings).update(replace(STATE, rates=gyro))
-    assert estimate is not None
-    assert estimate.signs_checked is checked
+    state = Estimator(urdf, joints, settings).update(replace(STATE, rates=gyro))
+    assert state is not None
+    assert state.imu is not None
+    assert state.imu.is_uncertain is not checked
 
 
 @given(ROTATIONS, st.tuples(*[st.floats(-4, 4)] * 3))
@@ -271,6 +272,23 @@ def test_a_jump_is_believed_when_it_stays() -> None:
     assert plausibility.check(later) == ''
     wrapped = replace(turned, arrival=1.02, attitude=(0.0, 0.0, -179.0))
     assert plausibility.check(wrapped) == ''
+
+
+def test_a_joint_that_is_not_reported_is_where_it_was_sent() -> None:
+    """Protocol v1 reports one servo of the arm not; the state says which joint that is."""
+    urdf = robot_urdf('lite', arm=True)
+    joints = JointMap(map(servo_of, movable_joints(urdf)))
+    estimator = Estimator(urdf, joints, EstimatorSettings())
+    targets = [0.01 * place for place in range(len(joints.names))]
+    estimator.command(0.0, targets[:12])
+    estimator.command(0.0, targets)
+    estimator.command(0.0, [0.0] * 12)
+    state = estimator.update(STATE)
+    assert state is not None
+    assert state.joints is not None
+    assert state.joints.unmeasured == tuple(range(12, len(joints.names)))
+    assert state.joints.positions[12:] == tuple(targets[12:])
+    assert tuple(state.joints.measured(joints.names)) == joints.names[:12]
 
 
 def test_estimation_needs_no_serial_port() -> None:

@@ -88,13 +88,13 @@ def yaws(reports: Iterable[tuple[float, float | None, float]]) -> list[float]:
     estimator = Estimator(URDF, joints, EstimatorSettings())
     headings = []
     for arrival, device_time, yaw in reports:
-        state = Report(
+        report = Report(
             arrival=arrival, wire_time=0.001, attitude=(0.0, 0.0, yaw), acceleration=None,
             positions=dict.fromkeys(LEG_MOTORS, 0.0), velocities={}, device_time=device_time,
         )  # fmt: skip
-        estimate = estimator.update(state)
-        assert estimate is not None, estimator.refusal
-        place = estimator.update_odometry(estimate)
+        state = estimator.update(report)
+        assert state is not None, estimator.refusal
+        place = estimator.update_odometry(state)
         assert place is not None
         headings.append(yaw_of(place.rotation))
     return headings

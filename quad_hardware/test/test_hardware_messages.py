@@ -20,7 +20,7 @@ from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import Imu
 
 from message_templates import MessageTemplate, SerializedTemplate
-from quad_description import movable_joints, robot_urdf
+from quad_description import ImuSample, JointSample, movable_joints, robot_urdf
 from quad_description.rotations import (
     from_roll_pitch_yaw,
     IDENTITY,
@@ -30,8 +30,9 @@ from quad_description.rotations import (
     yaw_of,
 )
 from quad_description.rotations import Quaternion as Rotation
-from quad_hardware.estimation import Battery, Estimate, Health, OdometryState
+from quad_hardware.estimation import Battery, Health, OdometryState
 from quad_hardware.estimation.estimator import Estimator, EstimatorSettings
+from quad_hardware.estimation.imu_mounting import UNCHECKED_DEVIATION
 from quad_hardware.joints import CommandCounters, JointMap, servo_of
 from quad_hardware.link import DialectCounters, LinkState, LinkStatus
 from quad_hardware.nodes import messages
@@ -50,17 +51,7 @@ FRAMES = Frames('odom', 'base_link', 'base_footprint', 'imu_link', False, True)
 PARENT = replace(FRAMES, footprint_is_parent=True)
 DEVIATIONS = Deviations(orientation=0.02, rate=0.15, gyro=0.02, acceleration=0.3)
 PLACE = OdometryState(1.0, 2.0, 0.11, IDENTITY, 0.2, 0.05, 3.0, (True,) * 4)
-ESTIMATE = Estimate(
-    time=0.0,
-    joints_time=0.0,
-    positions={'b': 0.1, 'a': 0.2},
-    velocities={'a': 2.0, 'b': 1.0},
-    attitude=IDENTITY,
-    angular_velocity=(0.1, 0.2, 0.3),
-    rate_measured=False,
-    signs_checked=True,
-    acceleration=(0.0, 0.0, 9.8),
-)
+IMU = ImuSample(IDENTITY, (0.1, 0.2, 0.3), (0.0, 0.0, 9.8), rate_differentiated=True)
 ROTATIONS = st.builds(from_roll_pitch_yaw, *[st.floats(-1.2, 1.2)] * 3)
 
 
@@ -94,25 +85,27 @@ def pose(transform: Transform) -> tuple[Vector, Rotation]:
 
 
 def test_joints_keep_their_order() -> None:
-    """Each velocity stands beside its name; efforts are left out."""
-    form = messages.joint_states_form(ESTIMATE)
-    message = form.message(STAMP, messages.joint_numbers(ESTIMATE))
+    """Each velocity stands beside its name; efforts, and joints not measured, are left out."""
+    joints = JointSample((0.1, 0.5, 0.2), (1.0, 0.0, 2.0), unmeasured=(1,))
+    form = messages.joint_states_form(('b', 'arm', 'a'), joints)
+    message = form.message(STAMP, messages.joint_numbers(joints))
     assert message.name == ['b', 'a']
+    assert list(message.position) == [0.1, 0.2]
     assert list(message.velocity) == [1.0, 2.0]
     assert list(message.effort) == []
 
 
-def imu(estimate: Estimate) -> Imu:
-    """The message of an estimate."""
-    form = messages.imu_form(estimate, DEVIATIONS, 'imu_link')
-    message: Imu = form.message(STAMP, messages.imu_numbers(estimate, IDENTITY))
+def imu(sample: ImuSample) -> Imu:
+    """The message of a sample."""
+    form = messages.imu_form(sample, DEVIATIONS, 'imu_link')
+    message: Imu = form.message(STAMP, messages.imu_numbers(sample))
     return message
 
 
 def odometry(state: OdometryState, frames: Frames) -> Odometry:
     """The message of a place."""
-    form = messages.odometry_form(ESTIMATE, DEVIATIONS, frames)
-    numbers = messages.odometry_numbers(ESTIMATE, state, frames)
+    form = messages.odometry_form(IMU, DEVIATIONS, frames)
+    numbers = messages.odometry_numbers(IMU, state, frames)
     message: Odometry = form.message(STAMP, numbers)
     return message
 
@@ -130,7 +123,7 @@ def test_joints_are_stamped_when_they_were_measured() -> None:
 
     node: Any = object.__new__(HardwareNode)
     estimator = Estimator(urdf, joints, EstimatorSettings())
-    node._robot = estimator
+    node._robot = SimpleNamespace(names=joints.names, update_odometry=estimator.update_odometry)
     node._settings = SimpleNamespace(deviations=DEVIATIONS, frames=FRAMES)
     node._joint_states, node._imu, node._odom = map(stream, ('joints', 'imu', 'odom'))
     node._tf = stream('tf')
@@ -141,9 +134,9 @@ def test_joints_are_stamped_when_they_were_measured() -> None:
 
 def test_a_differentiated_rate_says_so_by_its_covariance() -> None:
     """Larger than a gyro's; and minus one when there is none (REP 145)."""
-    differentiated = imu(ESTIMATE)
-    gyro = imu(replace(ESTIMATE, rate_measured=True))
-    none = imu(replace(ESTIMATE, angular_velocity=None))
+    differentiated = imu(IMU)
+    gyro = imu(replace(IMU, rate_differentiated=False))
+    none = imu(replace(IMU, angular_velocity=None))
     assert differentiated.angular_velocity_covariance[0] == pytest.approx(0.15**2)
     assert gyro.angular_velocity_covariance[8] == pytest.approx(0.02**2)
     assert none.angular_velocity_covariance[0] == -1.0
@@ -292,9 +285,9 @@ def test_the_level_of_the_robot(
 @pytest.mark.parametrize('checked', [True, False])
 def test_an_orientation_whose_signs_nobody_checked_is_uncertain(checked: bool) -> None:
     """In /imu and /odom, so that nobody levels by it, and in the diagnostics."""
-    estimate = replace(ESTIMATE, signs_checked=checked)
-    imu = messages.imu_form(estimate, DEVIATIONS, 'imu_link')
-    odometry = messages.odometry_form(estimate, DEVIATIONS, FRAMES)
+    sample = replace(IMU, deviation=0.0 if checked else UNCHECKED_DEVIATION)
+    imu = messages.imu_form(sample, DEVIATIONS, 'imu_link')
+    odometry = messages.odometry_form(sample, DEVIATIONS, FRAMES)
     expected = DEVIATIONS.orientation if checked else pytest.approx(math.pi / 2)
     assert imu.orientation == odometry.tilt == expected
     state = Report(0.0, 0.0, (0, 0, 0), (0, 0, 9.8), {}, {})

@@ -64,10 +64,7 @@ def imu_sample(message: Imu, numbers: Sequence[float]) -> ImuSample:
     return ImuSample(
         (x, y, z, w),
         None if message.angular_velocity_covariance[0] == UNMEASURED else (rx, ry, rz),
-        # no force at all is no gravity, so nobody believes it
-        (0.0, 0.0, 0.0)
-        if message.linear_acceleration_covariance[0] == UNMEASURED
-        else (fx, fy, fz),
+        None if message.linear_acceleration_covariance[0] == UNMEASURED else (fx, fy, fz),
         math.sqrt(max(covariance[0], covariance[4])),
     )
 

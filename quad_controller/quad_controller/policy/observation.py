@@ -60,7 +60,7 @@ def gravity(imu: ImuSample, source: GravitySource) -> Vector:
         source: What to believe.
     """
     down = imu.down
-    if source is GravitySource.EULER:
+    if source is GravitySource.EULER or imu.acceleration is None:
         return down
     x, y, z = imu.acceleration
     size = math.sqrt(x * x + y * y + z * z)

@@ -3,14 +3,13 @@
 """What the robot does not report and the controller needs: rates, odometry, height."""
 
 from .battery import Battery
-from .estimator import Estimate, Estimator, EstimatorSettings, Health, RateSource
+from .estimator import Estimator, EstimatorSettings, Health, RateSource
 from .imu_mounting import ImuMounting
 from .odometry import OdometrySettings, OdometryState, SCALES
 
 __all__ = [
     'SCALES',
     'Battery',
-    'Estimate',
     'Estimator',
     'EstimatorSettings',
     'Health',

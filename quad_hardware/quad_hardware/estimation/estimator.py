@@ -1,15 +1,21 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Everything that is published of a report: joints, IMU, odometry, in SI units."""
+"""From a report of the robot, in the units of the wire, to its state in SI units."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 
-from quad_description import DescriptionError, quadruped, raised_feet
-from quad_description.rotations import Quaternion, Vector
+from quad_description import (
+    DescriptionError,
+    ImuSample,
+    JointSample,
+    quadruped,
+    raised_feet,
+    RobotState,
+)
 
 from ..exceptions import CommandError
 from ..joints import JointMap
@@ -18,7 +24,7 @@ from .battery import Battery, BatteryFilter
 from .board_watch import BoardWatch
 from .filters import AttitudeRate, JointRate
 from .gravity import GravityCheck
-from .imu_mounting import ImuMounting
+from .imu_mounting import ImuMounting, UNCHECKED_DEVIATION
 from .odometry import LegOdometry, OdometrySettings, OdometryState
 from .plausibility import Plausibility
 from .sample_clock import SampleClock
@@ -52,35 +58,6 @@ class EstimatorSettings:
 
 
 @dataclass(frozen=True, slots=True)
-class Estimate:
-    """One report in SI units.
-
-    Attributes:
-        time: When it was made, on the monotonic clock [s].
-        joints_time: When the joints were measured [s]; protocol v1 asks for them before.
-        positions: By joint [rad], of the gripper [m]; joints that are not reported are missing.
-        velocities: Of the same joints [rad/s], [m/s].
-        attitude: From base_link to the world, (x, y, z, w); its yaw is the robot's. None while
-            the IMU is of no use; rate and acceleration are None, too.
-        angular_velocity: Of the body, in base_link [rad/s]; None when it is not wanted.
-        rate_measured: The angular velocity is that of a gyro.
-        signs_checked: Somebody has compared the attitude with gravity on this robot, and the gyro
-            with the attitude where it is the gyro's.
-        acceleration: Specific force in base_link [m/s²]; None where it is not reported.
-    """
-
-    time: float
-    joints_time: float
-    positions: dict[str, float]
-    velocities: dict[str, float]
-    attitude: Quaternion | None
-    angular_velocity: Vector | None
-    rate_measured: bool
-    signs_checked: bool
-    acceleration: Vector | None
-
-
-@dataclass(frozen=True, slots=True)
 class Health:
     """What is looked at now and then.
 
@@ -101,7 +78,7 @@ class Health:
 
 
 class Estimator:
-    """Turns reports into estimates.
+    """Turns reports into states of the robot.
 
     Attributes:
         refusal: Why the last report that was refused could not be.
@@ -116,6 +93,7 @@ class Estimator:
         self._refused = 0
         self.refusal = ''
         self._joints = joints
+        self._sent: dict[str, float] = {}  # targets that were sent last
         self._settings = settings
         try:
             self._robot = quadruped(urdf)
@@ -137,58 +115,41 @@ class Estimator:
             time: When, on the monotonic clock [s].
             targets: Positions of the first joints, in their order [rad].
         """
-        self._odometry.command(time, self._feet(targets))
+        self._sent = {**self._sent, **dict(zip(self._joints.names, targets, strict=False))}
+        self._odometry.command(time, self._robot.feet(targets))
 
     def raised_feet(self, targets: Sequence[float]) -> tuple[str, ...]:
         """Return the feet that are in the air at targets of the first joints [rad]."""
-        return raised_feet(self._feet(targets))
+        return raised_feet(self._robot.feet(targets))
 
-    def update(self, state: Report) -> Estimate | None:
-        """Take a report; return None when it cannot be. :meth:`update_odometry` comes next."""
-        reason = self._plausibility.check(state)
-        if reason:
+    def update(self, report: Report) -> RobotState | None:
+        """Return what a report measures; None when it cannot be.
+
+        :meth:`update_odometry` comes next.
+        """
+        if reason := self._plausibility.check(report):
             self._refused += 1
             self.refusal = reason
             return None
-        time = self._clock.time(state)
-        joints_time = time - state.joints_age
-        positions = self._joints.positions(state.positions)
-        velocities = self._joints.velocities(state.velocities)
-        if not velocities:
-            velocities = self._joint_rate.update(joints_time, positions)
-        self._battery.take(state)
-        if self._plausibility.imu_problem:
-            return Estimate(
-                time, joints_time, positions, velocities, None, None, False, False, None
-            )
-        if self._boards.restarted(state):
-            self._odometry.keep_heading()
-        mounting, felt = self._settings.mounting, state.acceleration
-        attitude = mounting.attitude(state.attitude)
-        acceleration = None if felt is None else mounting.acceleration(felt)
-        self._gravity.take(attitude, acceleration)
-        rate, measured = self._angular_velocity(time, attitude, state)
-        return Estimate(
+        time = self._clock.time(report)
+        self._battery.take(report)
+        charge = self._battery.state.charge
+        return RobotState(
+            self._joint_sample(report, time - report.joints_age),
+            None if self._plausibility.imu_problem else self._imu_sample(report, time),
+            None if charge is None else charge / 100.0,
             time=time,
-            joints_time=joints_time,
-            positions=positions,
-            velocities=velocities,
-            attitude=attitude,
-            angular_velocity=rate,
-            rate_measured=measured,
-            signs_checked=mounting.checked and (mounting.rates_checked or not measured),
-            acceleration=acceleration,
         )
 
-    def update_odometry(self, estimate: Estimate) -> OdometryState | None:
-        """Return where the body is by an estimate, to be called once for each.
+    def update_odometry(self, state: RobotState) -> OdometryState | None:
+        """Return where the body is by a state, to be called once for each.
 
         None without an attitude, for nobody knows the heading then.
         """
-        if estimate.attitude is None:
+        if state.imu is None or state.joints is None:
             return None
-        feet = self._robot.foot_poses(self._ordered(estimate.positions))
-        return self._odometry.update(estimate.joints_time, feet, estimate.attitude)
+        feet = self._robot.foot_poses(state.joints.positions)
+        return self._odometry.update(state.joints.time, feet, state.imu.orientation)
 
     def health(self) -> Health:
         """Return how the robot is, by its latest reports."""
@@ -196,20 +157,34 @@ class Estimator:
         error = None if imu_problem else self._gravity.error
         return Health(self._battery.state, error, self._refused, self.refusal, imu_problem)
 
-    def _angular_velocity(
-        self, time: float, attitude: Quaternion, state: Report
-    ) -> tuple[Vector | None, bool]:
-        source = self._settings.rate_source
-        differentiated = self._rate.update(time, attitude)
-        if source is RateSource.NONE:
-            return None, False
-        if source is RateSource.AUTO and state.rates is not None:
-            return self._settings.mounting.rate(state.rates), True
-        return differentiated, False
+    def _joint_sample(self, report: Report, time: float) -> JointSample:
+        positions = self._joints.positions(report.positions)
+        velocities = self._joints.velocities(report.velocities)
+        if not velocities:
+            velocities = self._joint_rate.update(time, positions)
+        names, known = self._joints.names, {**self._sent, **positions}
+        return JointSample(
+            tuple(known.get(name, 0.0) for name in names),
+            tuple(velocities.get(name, 0.0) for name in names),
+            time,
+            tuple(place for place, name in enumerate(names) if name not in positions),
+        )
 
-    def _feet(self, targets: Sequence[float]) -> Sequence[Vector]:
-        named = dict(zip(self._joints.names, targets, strict=False))  # without those of an arm
-        return self._robot.feet(self._ordered(named))
-
-    def _ordered(self, positions: Mapping[str, float]) -> list[float]:
-        return [positions.get(name, 0.0) for name in self._robot.names]
+    def _imu_sample(self, report: Report, time: float) -> ImuSample:
+        if self._boards.restarted(report):
+            self._odometry.keep_heading()
+        mounting, felt = self._settings.mounting, report.acceleration
+        orientation = mounting.attitude(report.attitude)
+        acceleration = None if felt is None else mounting.acceleration(felt)
+        self._gravity.take(orientation, acceleration)
+        source, differentiated = self._settings.rate_source, self._rate.update(time, orientation)
+        gyro = report.rates if source is RateSource.AUTO else None
+        rate = differentiated if gyro is None else mounting.rate(gyro)
+        checked = mounting.checked and (mounting.rates_checked or gyro is None)
+        return ImuSample(
+            orientation,
+            None if source is RateSource.NONE else rate,
+            acceleration,
+            0.0 if checked else UNCHECKED_DEVIATION,
+            rate_differentiated=gyro is None,
+        )

@@ -29,9 +29,9 @@ from node_runner import (
     settle_process_memory,
     spin,
 )
+from quad_description import RobotState
 from quad_msgs.msg import JointCommand
 
-from ..estimation import Estimate, OdometryState
 from ..exceptions import CommandError, HardwareError
 from ..joints.command import NOMINAL_PERIOD
 from ..link import LinkState
@@ -67,7 +67,7 @@ class HardwareNode(Node):
         self._settings = settings = declare_parameters(self)
         self._robot = SerialRobot(
             settings.robot,
-            on_estimate=self._publish,
+            on_state=self._publish,
             on_change=self._link_changed,
             on_refusal=self._report_refused,
             warn=self._warn,
@@ -106,37 +106,34 @@ class HardwareNode(Node):
     def _report_refused(self, reason: str) -> None:
         self.get_logger().warning(f'report refused: {reason}', throttle_duration_sec=WARN_PERIOD)
 
-    def _publish(self, estimate: Estimate) -> None:
+    def _publish(self, state: RobotState) -> None:
         """Publish a report. Runs in the thread of the driver."""
-        settings, stamp = self._settings, self._stamp(estimate.time)
         # what a controller waits for comes first
-        self._joint_states.publish(
-            messages.JointStates(tuple(estimate.positions)),
-            self._stamp(estimate.joints_time),
-            messages.joint_numbers(estimate),
-        )
-        odometry = self._robot.update_odometry(estimate)
-        if estimate.attitude is None or odometry is None:
+        if (joints := state.joints) is not None:
+            self._joint_states.publish(
+                messages.joint_states_form(self._robot.names, joints),
+                self._stamp(joints.time),
+                messages.joint_numbers(joints),
+            )
+        odometry = self._robot.update_odometry(state)
+        if state.imu is None or odometry is None:
             self.get_logger().error(
                 f'no /imu, /odom and transforms: {self._robot.health().imu_problem}; the '
                 'joints are published, and the robot can lie down',
                 throttle_duration_sec=WARN_PERIOD,
             )
             return
+        settings, stamp = self._settings, self._stamp(state.time)
+        deviations, frames = settings.deviations, settings.frames
         self._imu.publish(
-            messages.imu_form(estimate, settings.deviations, settings.frames.imu),
+            messages.imu_form(state.imu, deviations, frames.imu),
             stamp,
-            messages.imu_numbers(estimate, estimate.attitude),
+            messages.imu_numbers(state.imu),
         )
-        self._publish_odometry(estimate, odometry, stamp)
-
-    def _publish_odometry(self, estimate: Estimate, odometry: OdometryState, stamp: int) -> None:
-        """Publish where the body is."""
-        deviations, frames = self._settings.deviations, self._settings.frames
         self._odom.publish(
-            messages.odometry_form(estimate, deviations, frames),
+            messages.odometry_form(state.imu, deviations, frames),
             stamp,
-            messages.odometry_numbers(estimate, odometry, frames),
+            messages.odometry_numbers(state.imu, odometry, frames),
         )
         if frames.publish:
             self._tf.publish(
@@ -213,10 +210,11 @@ class HardwareNode(Node):
             command_diagnostic(name, port, self._robot.counters),
         ]
         if latest is not None:
-            report, estimate = latest
+            report, state = latest
             health = self._robot.health()
+            checked = state.imu is not None and not state.imu.is_uncertain
             array.status.append(
-                robot_diagnostic(name, port, report, health, signs_checked=estimate.signs_checked)
+                robot_diagnostic(name, port, report, health, signs_checked=checked)
             )
             self._battery.publish(messages.battery(health.battery, now))
         self._diagnostics.publish(array)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Estimates as ROS messages (REP 103, 105, 145).
+"""The state of the robot as ROS messages (REP 103, 105, 145).
 
 What is published with every report comes as a form, which makes the message, and as the numbers
 that change from one message to the next.
@@ -20,11 +20,11 @@ from sensor_msgs.msg import BatteryState, Imu, JointState
 from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
+from quad_description import ImuSample, JointSample
 from quad_description.rotations import about_z, conjugate, multiply, rotate, yaw_of
 from quad_description.rotations import Quaternion as Rotation
 
-from ..estimation import Battery, Estimate, OdometryState
-from ..estimation.imu_mounting import UNCHECKED_DEVIATION
+from ..estimation import Battery, OdometryState
 from .parameters import Deviations, Frames
 
 NOT_THERE = [-1.0, *([0.0] * 8)]  # covariance of what is not measured (REP 145)
@@ -61,15 +61,20 @@ class JointStates:
         )
 
 
-def joint_states_form(estimate: Estimate) -> JointStates:
-    """Return the form for the joints of an estimate."""
-    return JointStates(tuple(estimate.positions))
+def joint_states_form(names: Sequence[str], joints: JointSample) -> JointStates:
+    """Return the form for the joints that are measured, of all joints by name."""
+    return JointStates(tuple(joints.measured(names)))
 
 
-def joint_numbers(estimate: Estimate) -> Numbers:
+def joint_numbers(joints: JointSample) -> Numbers:
     """Return what :class:`JointStates` takes."""
-    velocities = estimate.velocities
-    return [*estimate.positions.values(), *(velocities[name] for name in estimate.positions)]
+    both = joints.positions, joints.velocities or ()
+    return [
+        number
+        for numbers in both
+        for place, number in enumerate(numbers)
+        if place not in joints.unmeasured
+    ]
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,20 +106,19 @@ class ImuForm:
         return message
 
 
-def imu_form(estimate: Estimate, deviations: Deviations, frame: str) -> ImuForm:
-    """Return the form for what an estimate holds."""
+def imu_form(imu: ImuSample, deviations: Deviations, frame: str) -> ImuForm:
+    """Return the form for what a sample holds."""
     return ImuForm(
         frame,
-        _orientation_deviation(estimate, deviations),
-        None if estimate.acceleration is None else deviations.acceleration,
-        _rate_deviation(estimate, deviations),
+        max(deviations.orientation, imu.deviation),
+        None if imu.acceleration is None else deviations.acceleration,
+        _rate_deviation(imu, deviations),
     )
 
 
-def imu_numbers(estimate: Estimate, attitude: Rotation) -> Numbers:
+def imu_numbers(imu: ImuSample) -> Numbers:
     """Return what :class:`ImuForm` takes; zeros for what is not measured."""
-    rate, force = estimate.angular_velocity or _ZERO, estimate.acceleration or _ZERO
-    return (*attitude, *rate, *force)
+    return (*imu.orientation, *(imu.angular_velocity or _ZERO), *(imu.acceleration or _ZERO))
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,18 +156,18 @@ class OdometryForm:
         return message
 
 
-def odometry_form(estimate: Estimate, deviations: Deviations, frames: Frames) -> OdometryForm:
-    """Return the form for what an estimate holds."""
+def odometry_form(imu: ImuSample, deviations: Deviations, frames: Frames) -> OdometryForm:
+    """Return the form for what a sample holds."""
     child = frames.footprint if frames.footprint_is_parent else frames.base
-    tilt = _orientation_deviation(estimate, deviations)
-    return OdometryForm(frames.odom, child, tilt, _rate_deviation(estimate, deviations))
+    tilt = max(deviations.orientation, imu.deviation)
+    return OdometryForm(frames.odom, child, tilt, _rate_deviation(imu, deviations))
 
 
-def odometry_numbers(estimate: Estimate, state: OdometryState, frames: Frames) -> Numbers:
+def odometry_numbers(imu: ImuSample, state: OdometryState, frames: Frames) -> Numbers:
     """Return what :class:`OdometryForm` takes."""
     rotation, height = state.rotation, state.height
     velocity = (state.velocity_x, state.velocity_y, 0.0)  # over the ground, level
-    rate = estimate.angular_velocity or _ZERO  # in the body
+    rate = imu.angular_velocity or _ZERO  # in the body
     if frames.footprint_is_parent:
         rate = rotate(_level(rotation), rate)
         rotation, height = about_z(yaw_of(rotation)), 0.0
@@ -234,16 +238,10 @@ def battery(state: Battery, stamp: Time) -> BatteryState:
 _ZERO = (0.0, 0.0, 0.0)
 
 
-def _orientation_deviation(estimate: Estimate, deviations: Deviations) -> float:
-    """Return that of an attitude; whoever levels by one with unknown signs has to be told."""
-    known = deviations.orientation
-    return known if estimate.signs_checked else max(known, UNCHECKED_DEVIATION)
-
-
-def _rate_deviation(estimate: Estimate, deviations: Deviations) -> float | None:
-    if estimate.angular_velocity is None:
+def _rate_deviation(imu: ImuSample, deviations: Deviations) -> float | None:
+    if imu.angular_velocity is None:
         return None
-    return deviations.gyro if estimate.rate_measured else deviations.rate
+    return deviations.rate if imu.rate_differentiated else deviations.gyro
 
 
 def _level(rotation: Rotation) -> Rotation:

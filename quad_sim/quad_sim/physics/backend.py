@@ -52,7 +52,7 @@ class PhysicsBackend(Backend):
         pose = robot.base_pose
         positions, velocities = robot.joint_positions, robot.joint_velocities
         return RobotState(
-            JointSample(tuple(positions.tolist()), tuple(velocities.tolist())),
+            JointSample(tuple(positions.tolist()), tuple(velocities.tolist()), robot.time),
             ImuSample(pose.orientation, robot.base_velocity.angular, robot.imu.specific_force),
             position=pose.position,
             time=robot.time,
