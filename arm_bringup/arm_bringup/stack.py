@@ -16,6 +16,7 @@ from process_supervisor import (
     node_argv,
     ProcessSpec,
     RosOptions,
+    STATE_PUBLISHERS,
 )
 
 from .robots import Robot
@@ -27,11 +28,6 @@ MOTION_MASTER = Executable('arm_servo', 'motion_master')
 MOTION_CONTROLLER = Executable('arm_servo', 'motion_controller')
 """Trajectories and jogging for drives that another process has."""
 
-STATE_PUBLISHERS = (
-    Executable('robot_state_publisher', 'robot_state_publisher'),
-    Executable('robot_viewer', 'robot_state_publisher'),
-)
-"""What makes /tf: the public one where ROS has it."""
 TF_RATE = '100.0'
 """Greatest rate of /tf in [Hz]; its default of 20 would halve what /joint_states has."""
 
@@ -175,6 +171,8 @@ def _state_publisher(stack: Stack, parameters: Path, find: FindExecutable) -> Pr
         name='robot_state',
         argv=node_argv(executable, find, values, (parameters,), stack.ros),
         environment=LOG_FORMAT,
+        notifies_ready=executable.notifies_ready,
+        ready_timeout=stack.ready_timeout,
         required=False,
         stop_order=THEN_LISTENERS,
     )

@@ -13,7 +13,7 @@ import signal
 from isolation import Isolation
 import pytest
 from small_bringup import read_until, SmallWorkspace
-from small_processes import PATIENCE
+from small_processes import PATIENCE, service_manager
 
 pytestmark = pytest.mark.slow
 
@@ -195,3 +195,18 @@ def test_help_names_the_robots(workspace: SmallWorkspace) -> None:
     assert code == 0
     for words in ('robots: gp110, panda', '--simulate', '--can', 'can0', 'Ctrl-C'):
         assert words in output
+
+
+def test_systemd_hears_when_the_robot_is_up_and_when_it_goes_down(
+    workspace: SmallWorkspace,
+) -> None:
+    """``Type=notify`` of a unit waits for the whole bring-up."""
+    with service_manager() as (address, manager):
+        workspace.environment['NOTIFY_SOCKET'] = address
+        with workspace.bringup('panda', '--simulate', '--can', 'auto') as process:
+            read_until(process, 'all is ready')
+            assert manager.recv(100) == b'READY=1'
+            process.send_signal(signal.SIGTERM)
+            process.communicate(timeout=PATIENCE)
+            assert manager.recv(100) == b'STOPPING=1'
+        assert process.returncode == 0

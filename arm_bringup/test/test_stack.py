@@ -168,9 +168,10 @@ def test_the_master_stops_before_the_slaves(tmp_path: Path) -> None:
 def test_the_public_robot_state_publisher_runs_where_it_is_installed(
     tmp_path: Path, packages: list[str], taken: str
 ) -> None:
-    """Ours elsewhere; it is no reason to end when it dies."""
+    """Ours elsewhere, which says when it is ready; it is no reason to end when it dies."""
     found = processes(tmp_path, Stack(ROBOT, 'can0', simulate=True), *packages)
     assert not found['robot_state'].required
+    assert found['robot_state'].notifies_ready == (taken == 'robot_viewer')
     assert found['robot_state'].argv[0].endswith(f'{taken}/robot_state_publisher')
 
 

@@ -16,13 +16,9 @@ from process_supervisor import (
     ProcessSpec,
     RosOptions,
     StartError,
+    STATE_PUBLISHERS,
 )
 
-STATE_PUBLISHERS = (
-    Executable('robot_state_publisher', 'robot_state_publisher'),
-    Executable('robot_viewer', 'robot_state_publisher'),
-)
-"""What makes /tf of the legs: the public one where ROS has it."""
 TF_RATE = 100.0
 """Greatest rate of /tf in [Hz]; its default of 20 would halve what /joint_states has."""
 
@@ -150,6 +146,8 @@ def _state_publisher(stack: Stack, parameters: Path, find: FindExecutable) -> Pr
         name='robot_state',
         argv=node_argv(executable, find, values, (parameters,), stack.ros),
         environment=LOG_FORMAT,
+        notifies_ready=executable.notifies_ready,
+        ready_timeout=stack.ready_timeout,
         required=False,
         stop_order=THEN_BRIDGE,
     )

@@ -12,7 +12,7 @@ import signal
 from isolation import Isolation
 import pytest
 from small_bringup import read_until, SmallWorkspace
-from small_processes import PATIENCE
+from small_processes import PATIENCE, service_manager
 
 pytestmark = pytest.mark.slow
 
@@ -51,6 +51,7 @@ def test_ctrl_c_ends_it_with_0_in_order(workspace: SmallWorkspace) -> None:
         rest, _ = process.communicate(timeout=PATIENCE)
     assert process.returncode == 0, rest
     assert 'XGO lite, simulated' in seen
+    assert 'robot_state is ready' in seen
     byes = [line.split()[0] for line in rest.splitlines() if line.endswith('| bye')]
     assert byes[0] == 'controller'
     assert set(byes[1:3]) == {'hardware', 'robot_state'}
@@ -142,3 +143,18 @@ def test_simulations_in_other_namespaces_run_side_by_side(workspace: SmallWorksp
             process.send_signal(signal.SIGINT)
             process.communicate(timeout=PATIENCE)
             assert process.returncode == 0
+
+
+def test_systemd_hears_when_the_robot_is_up_and_when_it_goes_down(
+    workspace: SmallWorkspace,
+) -> None:
+    """``Type=notify`` of a unit waits for the whole bring-up."""
+    with service_manager() as (address, manager):
+        workspace.environment['NOTIFY_SOCKET'] = address
+        with workspace.bringup('--simulate') as process:
+            read_until(process, 'all is ready')
+            assert manager.recv(100) == b'READY=1'
+            process.send_signal(signal.SIGTERM)
+            process.communicate(timeout=PATIENCE)
+            assert manager.recv(100) == b'STOPPING=1'
+        assert process.returncode == 0

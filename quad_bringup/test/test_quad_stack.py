@@ -158,11 +158,13 @@ def test_who_commands_stops_before_who_transmits_before_who_obeys(tmp_path: Path
 
 
 def test_the_public_robot_state_publisher_runs_where_it_is_installed(tmp_path: Path) -> None:
-    """Ours elsewhere; /tf is no reason to end when it dies."""
+    """Ours elsewhere, which says when it is ready; /tf is no reason to end when it dies."""
     ours = processes(tmp_path, Stack('p'))['robot_state']
     public = processes(tmp_path, Stack('p'), 'robot_state_publisher')['robot_state']
     assert ours.argv[0].endswith('robot_viewer/robot_state_publisher')
     assert public.argv[0].endswith('robot_state_publisher/robot_state_publisher')
+    assert ours.notifies_ready
+    assert not public.notifies_ready
     assert not ours.required
     assert not public.required
 

@@ -54,6 +54,11 @@ def urdf(tmp_path: Path) -> Path:
     return file
 
 
+def test_it_reports_that_it_is_ready(start: StartNode, urdf: Path) -> None:
+    """As in sd_notify(3), when it publishes."""
+    start(str(urdf)).wait_until_ready()
+
+
 def frames(messages: list[TFMessage]) -> dict[str, Any]:
     """Return the last transform of each child frame."""
     return {each.child_frame_id: each for message in messages for each in message.transforms}

@@ -25,6 +25,7 @@ from .nodes import (
     node_argv,
     parameters_by_node,
     ros_domain,
+    STATE_PUBLISHERS,
     write_parameters,
 )
 from .ros_options import add_namespace, parse_with_ros, RosOptions
@@ -38,6 +39,7 @@ __version__ = '0.1.0'
 __all__ = [
     'EVERY_NODE',
     'LOG_FORMAT',
+    'STATE_PUBLISHERS',
     'STOP_STEPS',
     'USAGE_ERROR',
     'CallError',

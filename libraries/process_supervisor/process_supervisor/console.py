@@ -10,6 +10,7 @@ import sys
 import threading
 from typing import Protocol
 
+from .readiness import ServiceManager
 from .runner import Runner
 from .spec import ProcessSpec
 from .supervision import Notice, Outcome, Phase, Severity
@@ -17,6 +18,9 @@ from .terminal import LineWriter, Painter, wants_colour
 
 USAGE_ERROR = 2
 """Exit code of a bring-up when nothing was started."""
+
+REPORTED_STATES = {Phase.RUNNING: 'READY=1', Phase.STOPPING: 'STOPPING=1'}
+"""What the service manager of a bring-up hears of its phases, in the words of sd_notify(3)."""
 
 
 class Shutdown(Protocol):
@@ -36,6 +40,9 @@ def supervise(
 ) -> Outcome:
     """Run processes with their output on standard output, until Ctrl-C or one ends.
 
+    That all are ready, and that all are stopped, is reported to systemd or whoever else
+    ``NOTIFY_SOCKET`` names, as in sd_notify(3).
+
     Args:
         processes: What to run.
         name: Name before the supervisor's own lines.
@@ -51,12 +58,23 @@ def supervise(
     def notify(notice: Notice) -> None:
         write(painter.notice(notice))
 
+    manager = ServiceManager()
+
+    def report(phase: Phase) -> None:
+        if phase in REPORTED_STATES:
+            manager.report(REPORTED_STATES[phase])
+
+    def interrupted() -> bool:
+        report(Phase.STOPPING)
+        return thread.begin()
+
     thread = _ShutdownThread(shutdown, notify)
     with Runner(
         processes,
         lambda name, line: write(painter.line(name, line)),
         notify,
-        on_interrupt=thread.begin,
+        on_interrupt=interrupted,
+        on_phase=report,
     ) as runner:
         thread.runner = runner
         outcome = runner.run()

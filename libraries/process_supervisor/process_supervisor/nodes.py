@@ -42,10 +42,19 @@ class Executable:
     Attributes:
         package: Name of the package.
         name: Name of the executable.
+        notifies_ready: It reports that it is ready, as in :class:`.ProcessSpec`.
     """
 
     package: str
     name: str
+    notifies_ready: bool = True
+
+
+STATE_PUBLISHERS = (
+    Executable('robot_state_publisher', 'robot_state_publisher', notifies_ready=False),
+    Executable('robot_viewer', 'robot_state_publisher'),
+)
+"""Programs that make /tf of a description and /joint_states: the public one where ROS has it."""
 
 
 def find_executable(package: str, name: str) -> Path | None:

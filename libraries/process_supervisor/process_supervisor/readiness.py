@@ -1,10 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Where a process reports that it is ready: the socket of sd_notify(3)."""
+"""Both ends of the socket of sd_notify(3), where a process reports that it is ready."""
 
 from __future__ import annotations
 
 import contextlib
+import os
 import socket
 
 VARIABLE = 'NOTIFY_SOCKET'
@@ -42,3 +43,28 @@ class ReadinessSocket:
     def close(self) -> None:
         """Close it."""
         self._socket.close()
+
+
+class ServiceManager:
+    """Whoever started this process and waits for its readiness: systemd for ``Type=notify``."""
+
+    def __init__(self) -> None:
+        """Find it; the processes that this one starts will not."""
+        address = os.environ.pop(VARIABLE, '')
+        self._address = f'\0{address[1:]}' if address.startswith('@') else address
+        self._reported = ''
+
+    def report(self, state: str) -> None:
+        """Report a state, if somebody waits for it; the same one again is no news.
+
+        Args:
+            state: One of sd_notify(3), such as ``READY=1``.
+        """
+        if not self._address or state == self._reported:
+            return
+        self._reported = state
+        with (
+            socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as sender,
+            contextlib.suppress(OSError),
+        ):
+            sender.sendto(state.encode(), self._address)

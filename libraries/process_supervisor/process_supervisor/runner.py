@@ -99,6 +99,7 @@ class Runner:
         notify: Callable[[Notice], None],
         *,
         on_interrupt: Callable[[], bool] | None = None,
+        on_phase: Callable[[Phase], None] = lambda _: None,
     ) -> None:
         """Take the plan; nothing is started yet.
 
@@ -107,6 +108,7 @@ class Runner:
             write: Takes each line of output, with the name of the process first.
             notify: Takes each notice of the supervision.
             on_interrupt: As in :class:`.Supervision`.
+            on_phase: As in :class:`.Supervision`.
         """
         self._write = write
         self._children: dict[str, _Child] = {}
@@ -115,7 +117,7 @@ class Runner:
         self._wake_read, self._wake_write = socket.socketpair()
         self._requests: queue.SimpleQueue[Outcome] = queue.SimpleQueue()
         self._supervision = Supervision(
-            specs, self._start, self._send, notify, on_interrupt=on_interrupt
+            specs, self._start, self._send, notify, on_interrupt=on_interrupt, on_phase=on_phase
         )
         self._restore: list[Callable[[], object]] = []
 

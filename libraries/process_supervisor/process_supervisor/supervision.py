@@ -99,6 +99,7 @@ class Supervision:
         notify: Callable[[Notice], None],
         *,
         on_interrupt: Callable[[], bool] | None = None,
+        on_phase: Callable[[Phase], None] = lambda _: None,
     ) -> None:
         """Take the plan; nothing is started yet.
 
@@ -109,6 +110,7 @@ class Supervision:
             notify: Tells the user something.
             on_interrupt: Asked at the first interrupt before everything is stopped; true when it
                 takes care of stopping, false or None to stop at once.
+            on_phase: Called when another phase begins.
 
         Raises:
             ValueError: Two processes have the same name.
@@ -118,6 +120,7 @@ class Supervision:
         self._start = start
         self._notify = notify
         self._on_interrupt = on_interrupt
+        self._on_phase = on_phase
         self._interrupted = math.inf
         self._begun = 0.0
         self._stopping = StopSequence(send)
@@ -126,6 +129,10 @@ class Supervision:
             if spec.name in self._children:
                 raise ValueError(f'two processes are called {spec.name!r}')
             self._children[spec.name] = _Child(spec, math.inf)
+
+    def _enter(self, phase: Phase) -> None:
+        self.phase = phase
+        self._on_phase(phase)
 
     @property
     def running(self) -> tuple[str, ...]:
@@ -143,7 +150,7 @@ class Supervision:
         Args:
             now: Steady time in [s].
         """
-        self.phase = Phase.STARTING
+        self._enter(Phase.STARTING)
         self._begun = now
         for name, child in self._children.items():
             child.deadline = now + child.spec.ready_timeout
@@ -182,7 +189,7 @@ class Supervision:
 
     def _check_ready(self, now: float) -> None:
         if self.phase is Phase.STARTING and not self.waiting:
-            self.phase = Phase.RUNNING
+            self._enter(Phase.RUNNING)
             self._say(f'all is ready ({now - self._begun:.1f} s)')
 
     def exited(self, name: str, returncode: int, now: float) -> None:
@@ -237,7 +244,7 @@ class Supervision:
         if self.phase in {Phase.STOPPING, Phase.STOPPED}:
             return
         self.outcome = outcome
-        self.phase = Phase.STOPPING
+        self._enter(Phase.STOPPING)
         for name in self.running:
             spec = self._children[name].spec
             steps = [(step.signal, step.patience) for step in spec.stop_steps]
@@ -267,16 +274,21 @@ class Supervision:
     def _check_deadlines(self, now: float) -> None:
         for name in self.waiting:
             child = self._children[name]
-            if now >= child.deadline:
-                limit = f'{child.spec.ready_timeout:g} s'
-                self._fail(name, f'{name} did not get ready within {limit}', now)
+            if now < child.deadline:
+                continue
+            late = f'{name} did not get ready within {child.spec.ready_timeout:g} s'
+            if child.spec.required:
+                self._fail(name, late, now)
                 return
+            child.ready = True
+            self._say(f'{late}; going on without it', Severity.WARNING)
+        self._check_ready(now)
 
     def _advance_stop(self, now: float) -> None:
         self._stopping.advance(now)
         if not self._stopping.finished:
             return
-        self.phase = Phase.STOPPED
+        self._enter(Phase.STOPPED)
         if self._stopping.abandoned:
             names = ', '.join(self._stopping.abandoned)
             self._say(f'not even SIGKILL ended {names}', Severity.ERROR)

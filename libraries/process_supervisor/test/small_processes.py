@@ -4,10 +4,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 import os
 import select
 from signal import Signals
+import socket
 import sys
 import time
 
@@ -78,6 +80,15 @@ PROGRAMS = {
             while True: signal.pause()
         print('child', child, flush=True)
     """,
+    # leaves a child behind in a session of its own, which writes for as long as somebody reads
+    'daemon': """
+        os.write(1, b'first words\\n')
+        if os.fork() == 0:
+            os.setsid()
+            while True: os.write(1, b'noise\\n')
+        os.write(1, b'last words\\n')
+        os._exit(7)
+    """,
 }
 """Source of each program."""
 
@@ -90,6 +101,15 @@ def program(kind: str, name: str = '', **options: object) -> ProcessSpec:
     argv = (sys.executable, '-I', '-S', '-c', code)
     values: dict[str, object] = {'stop_steps': QUICK, 'ready_timeout': PATIENCE, **options}
     return ProcessSpec(name or kind, argv, **values)  # type: ignore[arg-type]
+
+
+@contextmanager
+def service_manager() -> Iterator[tuple[str, socket.socket]]:
+    """Open a socket as systemd has it; its address is for NOTIFY_SOCKET."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
+        manager.bind('')  # the kernel chooses a name
+        manager.settimeout(PATIENCE)
+        yield f'@{manager.getsockname()[1:].decode()}', manager
 
 
 def wait_for_end(pids: Iterable[int]) -> list[int]:

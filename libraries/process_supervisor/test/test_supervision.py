@@ -93,6 +93,17 @@ def test_not_ready_in_time_stops_all_and_names_the_process_and_its_last_lines() 
     assert bench.outcome.last_lines == ('waiting for panda_joint3',)
 
 
+def test_one_that_is_not_required_and_late_is_no_longer_waited_for() -> None:
+    """All is ready without it, and a warning names it."""
+    bench = Bench(MASTER, spec('viewer', required=False))
+    bench.supervision.ready('master', 1.0)
+    assert bench.supervision.waiting == ('viewer',)
+    bench.supervision.advance(10.0)
+    assert bench.supervision.phase is Phase.RUNNING
+    late = 'viewer did not get ready within 10 s; going on without it'
+    assert Notice(Severity.WARNING, late) in bench.notices
+
+
 def test_an_infinite_timeout_waits_for_ever() -> None:
     """ready_timeout=inf has no deadline."""
     bench = Bench(spec('master', ready_timeout=float('inf')))

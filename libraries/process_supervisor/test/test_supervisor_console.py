@@ -9,7 +9,7 @@ import signal
 import threading
 
 import pytest
-from small_processes import PATIENCE, program
+from small_processes import PATIENCE, program, service_manager
 
 from process_supervisor import LineWriter, Outcome, Shutdown, supervise
 
@@ -45,6 +45,35 @@ class CtrlC:
         if self._words in line and self._left:
             self._left -= 1
             ctrl_c()
+
+
+def test_systemd_hears_when_all_are_ready_and_when_they_are_stopped(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Before the shutdown; each once, and none of its processes reports to systemd itself."""
+
+    def shutdown(say: Say, given_up: GivenUp) -> None:
+        heard.extend(manager.recv(100) for _ in range(2))
+
+    heard: list[bytes] = []
+    CtrlC(monkeypatch, 'all is ready')
+    with service_manager() as (address, manager):
+        monkeypatch.setenv('NOTIFY_SOCKET', address)
+        run_until(capsys, 'good', shutdown=shutdown)
+        assert heard == [b'READY=1', b'STOPPING=1']
+        manager.setblocking(False)
+        with pytest.raises(BlockingIOError):
+            manager.recv(100)
+
+
+def test_systemd_hears_of_no_readiness_when_one_is_missing(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Only that everything is stopped."""
+    with service_manager() as (address, manager):
+        monkeypatch.setenv('NOTIFY_SOCKET', address)
+        run_until(capsys, 'good', 'dies', shutdown=None)
+        assert manager.recv(100) == b'STOPPING=1'
 
 
 def test_a_shutdown_is_done_before_anybody_is_stopped(

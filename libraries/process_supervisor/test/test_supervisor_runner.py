@@ -8,6 +8,7 @@ from collections.abc import Callable
 import contextlib
 import os
 from pathlib import Path
+import select
 import signal
 import subprocess
 import sys
@@ -122,6 +123,28 @@ def test_a_last_line_without_an_end_is_a_line() -> None:
     watch = Watch(program('unfinished'), when_ready=nothing)
     watch.run()
     assert watch.said('unfinished') == ['no end']
+
+
+def test_lines_come_before_the_end_of_their_process() -> None:
+    """However late they are read: the end is handled after the last line."""
+    heard: list[str] = []
+
+    def write_slowly(_: str, line: str) -> None:
+        heard.append(line)
+        select.select([runner._children['dies'].pidfd], [], [], PATIENCE)
+
+    with Runner([program('dies')], write_slowly, lambda note: heard.append(note.text)) as runner:
+        outcome = runner.run()
+    end = 'dies ended with exit code 7'
+    assert heard[-3:] == ['first words', 'last words', end]
+    assert outcome == Outcome(1, end, 'dies', ('first words', 'last words'))
+
+
+def test_a_pipe_that_somebody_else_holds_open_keeps_nobody_waiting() -> None:
+    """A daemon that a process leaves behind writes on; the process has ended all the same."""
+    watch = Watch(program('daemon'), when_ready=nothing)
+    assert watch.run().reason == 'daemon ended with exit code 7'
+    assert {'first words', 'last words'} <= set(watch.said('daemon'))
 
 
 def test_what_a_process_leaves_behind_is_killed() -> None:

@@ -21,7 +21,7 @@ from std_msgs.msg import String
 from tf2_msgs.msg import TFMessage
 from urdf_reader import DescriptionError, JointKind, read_urdf
 
-from node_runner import destroyed_when_refused, ParameterError, run_node
+from node_runner import destroyed_when_refused, notify_ready, ParameterError, run_node
 
 from ..joint_watch import JointWatch
 from ..state_publisher import FrameTransform, Remark, StatePublisher
@@ -148,10 +148,16 @@ def _read_argument(argv: Sequence[str]) -> str:
         raise DescriptionError(f'{files[0]}: {error}') from error
 
 
+def _start() -> RobotStatePublisher:
+    node = RobotStatePublisher(_read_argument(sys.argv))
+    notify_ready()
+    return node
+
+
 def main() -> int:
     """Run until Ctrl-C.
 
     Returns:
         0, or 1 when it could not begin.
     """
-    return run_node(NAME, lambda: RobotStatePublisher(_read_argument(sys.argv)), DescriptionError)
+    return run_node(NAME, _start, DescriptionError)
