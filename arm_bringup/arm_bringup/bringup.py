@@ -22,7 +22,7 @@ from process_supervisor import (
 )
 from process_supervisor.arguments import apply_network
 
-from .description import expand_xacro
+from .description import read_description
 from .enabling import enabling
 from .exceptions import BringupError, RobotError
 from .motion import choose_master, motion_files
@@ -106,7 +106,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _arm(arguments: argparse.Namespace, ros: RosOptions) -> int:
     master, no_motion = MASTER, '--drives-only'
     if not arguments.drives_only:
-        master, no_motion = choose_master(locate(arguments.robot), find_executable)
+        master, no_motion = choose_master(locate(arguments), find_executable)
     files = no_files if no_motion else motion_files
     with session(
         arguments, ros, simulate=arguments.simulate, master=master, master_files=files
@@ -124,7 +124,7 @@ def _arm(arguments: argparse.Namespace, ros: RosOptions) -> int:
 
 def _controllers(arguments: argparse.Namespace, ros: RosOptions) -> int:
     apply_network(arguments)
-    robot = locate(arguments.robot)
+    robot = locate(arguments)
     ros = in_namespace_of_bus(ros, read_drives(robot))
     if robot.lacking:
         raise RobotError(
@@ -133,7 +133,7 @@ def _controllers(arguments: argparse.Namespace, ros: RosOptions) -> int:
         )
     with tempfile.TemporaryDirectory(prefix='arm_bringup-') as folder:
         parameters = Path(folder) / 'robot_description.yaml'
-        write_parameters(parameters, expand_xacro(robot.description))
+        write_parameters(parameters, read_description(robot))
         files = motion_files(robot, Path(folder), ros)
         _say(f'{robot.name}: trajectories and jogging for drives of another process')
         process = controller_process(files, parameters, arguments.timeout, find_executable, ros)

@@ -11,12 +11,12 @@ import sys
 
 from process_supervisor import USAGE_ERROR
 
-from .description import expand_xacro, joint_limits
+from .description import joint_limits, read_description
 from .exceptions import BringupError, DescriptionError, RobotError
 from .findings import error, Finding, Severity, warning
 from .motion_check import check_motion
 from .robots import Robot
-from .session import locate, read_drives, robots_epilog
+from .session import add_robot, locate, read_drives, robots_epilog
 
 
 def check_robot(robot: Robot) -> list[Finding]:
@@ -36,7 +36,7 @@ def check_robot(robot: Robot) -> list[Finding]:
         tool = 'ros2 run canopen_tools canopen check'
         findings.append(error('bus.yml', str(problem), f'{tool} {robot.bus_config} tells more'))
     try:
-        urdf = expand_xacro(robot.description)
+        urdf = read_description(robot)
         joints = list(joint_limits(urdf))
     except DescriptionError as problem:
         findings.append(error(robot.description.name, str(problem), 'mend the description'))
@@ -97,10 +97,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         'bus.yml, description, SRDF and limits; a start that is singular or in collision.',
         epilog=robots_epilog(),
     )
-    parser.add_argument('robot', help='name of a robot, or path of a robot folder (with a slash)')
-    wanted = parser.parse_args(argv).robot
+    add_robot(parser)
     try:
-        robot = locate(wanted)
+        robot = locate(parser.parse_args(argv))
     except BringupError as problem:
         sys.stderr.write(f'{problem}\n')
         return USAGE_ERROR

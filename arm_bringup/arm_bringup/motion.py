@@ -24,6 +24,7 @@ from process_supervisor import (
     StartError,
 )
 
+from .description import read_semantic
 from .exceptions import RobotError
 from .robots import Robot
 from .stack import MASTER, MOTION_MASTER
@@ -43,8 +44,10 @@ def motion_files(robot: Robot, folder: Path, ros: RosOptions) -> Sequence[Path]:
         The files to hand over.
     """
     values = {
-        'robot_description_semantic': robot.semantic.read_text(encoding='utf-8'),
+        'robot_description_semantic': read_semantic(robot),
         'joint_limits': str(robot.limits),
+        'group': robot.group,
+        'tip_link': robot.tip_link,
     }
     moveit_servo = {'frame_prefix': ros.frame_prefix}
     path = folder / 'motion.yaml'  # JSON is YAML, whatever characters are in it
@@ -66,20 +69,20 @@ def controller_name(robot: Robot) -> str:
     """Return the name of a robot's trajectory controller.
 
     Args:
-        robot: A robot with an SRDF; without a name in controllers.yaml, that of its first group
-            is used.
+        robot: A robot with an SRDF; without a name in controllers.yaml, that of its group is
+            used.
 
     Raises:
         RobotError: A file cannot be read as what it should be.
     """
     try:
         table = parameters_by_node(robot.controllers) if robot.controllers.is_file() else {}
-        groups = parse_srdf(robot.semantic.read_text(encoding='utf-8')).groups
+        groups = parse_srdf(read_semantic(robot)).groups
     except (StartError, DescriptionError) as error:
         raise RobotError(f'{robot.folder}: {error}') from error
     manager = table.get('controller_manager', {}).get('ros__parameters', {})
-    first = next(iter(groups), '')
-    return str(manager.get('controller_name', f'{first}_controller'))
+    group = robot.group or next(iter(groups), '')
+    return str(manager.get('controller_name', f'{group}_controller'))
 
 
 def choose_master(robot: Robot, find: FindExecutable) -> tuple[Executable, str]:

@@ -9,6 +9,8 @@ from typing import Any, TYPE_CHECKING
 
 from process_supervisor import parameters_by_node, StartError
 
+from .description import read_semantic
+from .exceptions import DescriptionError
 from .findings import error, Finding, warning
 from .robots import Robot
 
@@ -43,12 +45,16 @@ def check_motion(robot: Robot, urdf: str, joints: Sequence[str]) -> list[Finding
             )
         ]
     try:
+        semantic = read_semantic(robot)
+    except DescriptionError as problem:
+        return [error(robot.semantic.name, str(problem), 'mend it: the arm has no group without')]
+    try:
         limits = load_limits(robot.limits)
     except LimitsError as problem:
         return [error(robot.limits.name, str(problem), 'write it as robots/gp110/limits.yaml is')]
     findings = list(_limits(robot, limits, joints))
     try:
-        model = RobotModel(urdf, robot.semantic.read_text(encoding='utf-8'), limits)
+        model = RobotModel(urdf, semantic, limits, robot.group or None, robot.tip_link or None)
         check_arm(model)
     except LimitsError as problem:
         remedy = (

@@ -7,11 +7,12 @@
     <robot>/
       bus.yml               the CANopen bus, in ros2_canopen's format
       *.eds                 what bus.yml names
-      <robot>.urdf.xacro    the description; its joints have the names of the devices in bus.yml
-      <robot>.srdf          for motion: the group that is moved, and its poses; "ready" is where
-                            to start from
-      limits.yaml           for motion: speeds, accelerations and jerks, in MoveIt's format
+      <robot>.urdf.xacro    the description (or .xacro, .urdf); its joints have the names of the
+                            devices in bus.yml
+      <robot>.srdf          for motion (or .srdf.xacro): groups, named poses, collision pairs
+      limits.yaml           for motion (or joint_limits.yaml): MoveIt's format
       controllers.yaml      for motion, optional: parameters of the nodes that move the arm
+      robot.yaml            optional: files of other names, xacro arguments, packages, group
 
 A robot is asked for by name, which means a folder that this package installs, or by a path, which
 means a folder of the user's own.
@@ -19,14 +20,29 @@ means a folder of the user's own.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 import os
 from pathlib import Path
+from typing import Any
+
+import yaml
 
 from .exceptions import RobotError
 
 BUS_CONFIG = 'bus.yml'
 """Name of the bus configuration in a robot folder."""
+SETTINGS = 'robot.yaml'
+"""Name of the file with what the names of files do not say."""
+FILES: Mapping[str, Sequence[str]] = {
+    'description': ('{name}.urdf.xacro', '{name}.xacro', '{name}.urdf'),
+    'semantic': ('{name}.srdf', '{name}.srdf.xacro'),
+    'limits': ('limits.yaml', 'joint_limits.yaml'),
+    'controllers': ('controllers.yaml',),
+}
+"""Names of each file of a robot folder; the first that exists is taken."""
+TABLES, WORDS = ('xacro_args', 'packages'), ('group', 'tip_link')
+"""Keys of :data:`SETTINGS` beside those of :data:`FILES`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,32 +52,31 @@ class Robot:
     Attributes:
         name: Name of the folder.
         bus_config: Its bus.yml.
-        description: Its xacro file.
+        description: Its URDF or xacro file.
+        semantic: Its SRDF, if it is there.
+        limits: Its limits of motion, if they are there.
+        controllers: Parameters of the nodes that move it, if they are there.
+        xacro_args: Values for the xacro arguments of description and SRDF.
+        packages: Folders of packages that are not in AMENT_PREFIX_PATH, by name.
+        group: Group of the SRDF that is moved; empty takes the only one.
+        tip_link: Link that is moved; empty takes the end of the group.
     """
 
     name: str
     bus_config: Path
     description: Path
+    semantic: Path = Path()
+    limits: Path = Path()
+    controllers: Path = Path()
+    xacro_args: Mapping[str, str] = field(default_factory=dict)
+    packages: Mapping[str, Path] = field(default_factory=dict)
+    group: str = ''
+    tip_link: str = ''
 
     @property
     def folder(self) -> Path:
         """The folder."""
         return self.bus_config.parent
-
-    @property
-    def semantic(self) -> Path:
-        """Its SRDF, if it is there."""
-        return self.folder / f'{self.name}.srdf'
-
-    @property
-    def limits(self) -> Path:
-        """Its limits of motion, if they are there."""
-        return self.folder / 'limits.yaml'
-
-    @property
-    def controllers(self) -> Path:
-        """Parameters of the nodes that move it, if they are there."""
-        return self.folder / 'controllers.yaml'
 
     @property
     def lacking(self) -> str:
@@ -107,7 +122,7 @@ def find_robot(wanted: str, folder: Path) -> Robot:
         The robot, its files checked to be there.
 
     Raises:
-        RobotError: There is no such robot, or a file is missing.
+        RobotError: There is no such robot, a file is missing, or robot.yaml cannot be used.
     """
     if os.sep in wanted:
         return _robot(Path(wanted).expanduser().resolve())
@@ -123,8 +138,68 @@ def find_robot(wanted: str, folder: Path) -> Robot:
 def _robot(folder: Path) -> Robot:
     if not folder.is_dir():
         raise RobotError(f'the robot folder {folder} does not exist')
-    robot = Robot(folder.name, folder / BUS_CONFIG, folder / f'{folder.name}.urdf.xacro')
-    missing = [path.name for path in (robot.bus_config, robot.description) if not path.is_file()]
+    settings = _settings(folder / SETTINGS)
+    files = {key: _file(folder, key, settings.pop(key, '')) for key in FILES}
+    config = folder / BUS_CONFIG
+    missing = [path.name for path in (config, files['description']) if not path.is_file()]
     if missing:
         raise RobotError(f'the robot folder {folder} lacks {" and ".join(missing)}')
-    return robot
+    packages = {
+        name: (folder / Path(place).expanduser()).resolve()
+        for name, place in settings.pop('packages', {}).items()
+    }
+    for name, place in packages.items():
+        if not place.is_dir():
+            raise RobotError(f'{folder / SETTINGS}: packages: {name}: there is no folder {place}')
+    return Robot(
+        folder.name,
+        config,
+        files['description'],
+        files['semantic'],
+        files['limits'],
+        files['controllers'],
+        packages=packages,
+        **settings,
+    )
+
+
+def _file(folder: Path, key: str, named: str) -> Path:
+    """Return the file of a key: that which robot.yaml names, or the first that exists."""
+    if named:
+        path = (folder / Path(named).expanduser()).resolve()
+        if not path.is_file():
+            raise RobotError(f'{folder / SETTINGS}: {key}: there is no file {path}')
+        return path
+    paths = [folder / name.format(name=folder.name) for name in FILES[key]]
+    return next((path for path in paths if path.is_file()), paths[0])
+
+
+def _settings(path: Path) -> dict[str, Any]:
+    """Read robot.yaml: words by key, and tables of words."""
+    try:
+        document = yaml.safe_load(path.read_text(encoding='utf-8')) if path.is_file() else None
+    except (OSError, yaml.YAMLError) as error:
+        raise RobotError(f'{path}: {error}') from error
+    if document is not None and not isinstance(document, dict):
+        raise RobotError(f'{path}: it is no table of keys')
+    settings: dict[str, Any] = {}
+    for key, value in (document or {}).items():
+        if key not in (*FILES, *TABLES, *WORDS):
+            known = ', '.join((*FILES, *TABLES, *WORDS))
+            raise RobotError(f'{path}: unknown key {key!r}; keys: {known}')
+        if key in TABLES and isinstance(value, dict):
+            settings[key] = {str(name): _word(path, key, word) for name, word in value.items()}
+        elif key in TABLES:
+            raise RobotError(f'{path}: {key}: a table of names and values is needed')
+        else:
+            settings[key] = _word(path, key, value)
+    return settings
+
+
+def _word(path: Path, key: str, value: object) -> str:
+    """Return a value as text, booleans as xacro writes them."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if not isinstance(value, (str, int, float)):
+        raise RobotError(f'{path}: {key}: {value!r} is no text or number')
+    return str(value)

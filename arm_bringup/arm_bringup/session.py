@@ -7,7 +7,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Iterator, Mapping, Sequence
 import contextlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import os
 from pathlib import Path
 import tempfile
@@ -26,7 +26,7 @@ from process_supervisor import (
 )
 from process_supervisor.arguments import add_network, add_timeout, apply_network
 
-from .description import expand_xacro
+from .description import read_description
 from .exceptions import RobotError
 from .robots import find_robot, installed_robots_folder, Robot, robot_names
 from .stack import arm_processes, Stack
@@ -76,10 +76,7 @@ def add_arguments(parser: argparse.ArgumentParser, *, default_bus: str) -> None:
         parser: Where to.
         default_bus: What the help says of the bus without --can.
     """
-    parser.add_argument(
-        'robot',
-        help='name of a robot, or path of a robot folder (with a slash, e.g. ./my_arm)',
-    )
+    add_robot(parser)
     parser.add_argument(
         '--can',
         metavar='NAME',
@@ -91,6 +88,39 @@ def add_arguments(parser: argparse.ArgumentParser, *, default_bus: str) -> None:
     add_timeout(parser)
 
 
+def add_robot(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments that say which robot; for :func:`locate`.
+
+    Args:
+        parser: Where to.
+    """
+    parser.add_argument(
+        'robot',
+        help='name of a robot, or path of a robot folder (with a slash, e.g. ./my_arm)',
+    )
+    parser.add_argument(
+        '--group',
+        metavar='NAME',
+        help='group of the SRDF to move (default: group of robot.yaml, else the only one)',
+    )
+    parser.add_argument(
+        '--xacro-arg',
+        metavar='NAME:=VALUE',
+        action='append',
+        default=[],
+        type=_xacro_arg,
+        help='value of a xacro argument of description and SRDF; may be given several times '
+        '(default: xacro_args of robot.yaml)',
+    )
+
+
+def _xacro_arg(text: str) -> tuple[str, str]:
+    name, assigned, value = text.partition(':=')
+    if not name or not assigned:
+        raise argparse.ArgumentTypeError(f'{text!r} is not NAME:=VALUE')
+    return name, value
+
+
 def robots_epilog() -> str:
     """Name the robots that are installed, for the help."""
     with contextlib.suppress(RobotError):
@@ -98,17 +128,22 @@ def robots_epilog() -> str:
     return ''
 
 
-def locate(wanted: str) -> Robot:
+def locate(arguments: argparse.Namespace) -> Robot:
     """Find a robot of this package, or by a path.
 
     Args:
-        wanted: Name or path.
+        arguments: What :func:`add_robot` parsed; it overrides the robot folder.
 
     Raises:
         RobotError: There is none; the message lists those that exist.
     """
-    folder = Path() if os.sep in wanted else installed_robots_folder()
-    return find_robot(wanted, folder)
+    folder = Path() if os.sep in arguments.robot else installed_robots_folder()
+    robot = find_robot(arguments.robot, folder)
+    return replace(
+        robot,
+        group=arguments.group or robot.group,
+        xacro_args={**robot.xacro_args, **dict(arguments.xacro_arg)},
+    )
 
 
 def read_drives(robot: Robot) -> list[NodeConfig]:
@@ -235,7 +270,7 @@ def session(
             in this namespace of the domain.
     """
     apply_network(arguments)
-    robot = locate(arguments.robot)
+    robot = locate(arguments)
     drives = read_drives(robot)
     ros = in_namespace_of_bus(ros, drives)
     domain = ros_domain(os.environ)
@@ -244,7 +279,7 @@ def session(
         stack.enter_context(exclusive(place, NAMESPACE_REMEDY))
         bus = stack.enter_context(own_bus(arguments.can, simulate=simulate))
         folder = stack.enter_context(tempfile.TemporaryDirectory(prefix='arm_bringup-'))
-        urdf = expand_xacro(robot.description)
+        urdf = read_description(robot)
         parameters = Path(folder) / 'robot_description.yaml'
         write_parameters(parameters, urdf)
         wanted = Stack(

@@ -22,6 +22,12 @@ ROBOT = Robot('panda', Path('/robots/panda/bus.yml'), Path('/robots/panda/panda.
 PARAMETERS = Path('/tmp/parameters.yaml')
 
 
+def my_robot(folder: Path) -> Robot:
+    """Return a robot whose files may not be there yet."""
+    names = ('bus.yml', 'my.urdf.xacro', 'my.srdf', 'limits.yaml', 'controllers.yaml')
+    return Robot('my', *(folder / name for name in names))
+
+
 class Underlay:
     """Executables of packages that are there."""
 
@@ -77,7 +83,7 @@ def test_what_a_person_says_counts_most(tmp_path: Path, words: tuple[str, str]) 
 @pytest.mark.parametrize('spelling', ['/**', '/**/servo_node', 'servo_node'])
 def test_rcl_takes_what_a_person_says(tmp_path: Path, spelling: str, namespace: str) -> None:
     """Whatever the robot's own file says of that node, by name or by pattern."""
-    robot = Robot('my', tmp_path / 'bus.yml', tmp_path / 'my.urdf.xacro')
+    robot = my_robot(tmp_path)
     robot.semantic.write_text('<robot name="my"/>')
     own = {'ros__parameters': {'rate': 1}}
     robot.controllers.write_text(json.dumps({'/**': own, 'servo_node': own}))
@@ -100,7 +106,7 @@ def test_rcl_takes_what_a_person_says(tmp_path: Path, spelling: str, namespace: 
 
 def test_master_without_arm_servo(tmp_path: Path) -> None:
     """Where it is not built, or the robot lacks its files, the plain master runs; it is told."""
-    robot = Robot('my', tmp_path / 'bus.yml', tmp_path / 'my.urdf.xacro')
+    robot = my_robot(tmp_path)
     bare = Underlay(tmp_path, 'arm_canopen').find
     full = Underlay(tmp_path, 'arm_canopen', 'arm_servo').find
     assert choose_master(robot, bare) == (MASTER, MAKE_MOVE)

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-import math
 
 import coal
 import numpy as np
@@ -72,8 +71,7 @@ class Description:
         self.joints: Mapping[str, Joint] = {joint.name: joint for joint in self.tree.joints}
         self.ranges = self.tree.ranges()
         for each in self.ranges.values():
-            turns_freely = math.isinf(each.upper)  # a wheel, whose velocity nobody gives
-            if not (each.lower < each.upper and (turns_freely or each.velocity > 0)):
+            if not (each.lower < each.upper and each.velocity >= 0.0):  # 0: nobody gives it
                 raise DescriptionError(
                     f'joint {each.name}: <limit> {each.lower:g}..{each.upper:g} at'
                     f' {each.velocity:g} is empty'

@@ -15,6 +15,9 @@ The file has MoveIt's format (joint_limits.yaml)::
 
 Position limits (``has_position_limits``, ``min_position``, ``max_position``) and velocities may be
 narrower than those of the description, never wider. Metres stand for radians at a sliding joint.
+
+What neither file says has a default, which is noted: MoveIt's files have no jerk and often no
+acceleration, and some descriptions write velocity 0.
 """
 
 from __future__ import annotations
@@ -26,7 +29,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from urdf_reader import JointRange
+from urdf_reader import Joint, JointKind, JointRange
 import yaml
 
 from .arrays import Array, frozen, Mask
@@ -39,6 +42,13 @@ KEYS = {
     'position': ('min_position', 'max_position'),
 }
 """Names of the numbers behind each ``has_..._limits`` of MoveIt's format."""
+
+DEFAULT_VELOCITY, DEFAULT_SLIDING_VELOCITY = 1.0, 0.1
+"""Velocity where description and limits file have none, or 0, in [rad/s] and in [m/s]."""
+DEFAULT_ACCELERATION = 1.0
+"""Acceleration where the limits file has none in [rad/s2], as in MoveIt."""
+DEFAULT_JERK_RATIO = 10.0
+"""Jerk over acceleration where the limits file has no jerk in [1/s]: 0.1 s to the full one."""
 
 TURN = 2.0 * math.pi
 """A whole turn in [rad]."""
@@ -121,20 +131,23 @@ def load_limits(path: Path | str) -> Mapping[str, Any]:
 
 
 def merge_limits(
-    names: Sequence[str], ranges: Mapping[str, JointRange], table: Mapping[str, Any]
+    names: Sequence[str], joints: Mapping[str, Joint], table: Mapping[str, Any], notes: list[str]
 ) -> JointLimits:
     """Join a description's ranges with the table of a limits file.
 
     Args:
         names: The joints of the group, in its order.
-        ranges: The description's ranges by joint.
+        joints: The description's joints by name.
         table: The limits file's entries by joint; others than the group's are passed over.
+        notes: Gets a line for each kind of limit that has a default, with the joints.
 
     Raises:
-        LimitsError: A joint is missing, a number is missing, not positive, misspelt or wider than
-            the description's.
+        LimitsError: A joint is missing, a number is not positive, misspelt or wider than the
+            description's.
     """
-    rows = [_row(name, ranges[name], table) for name in names]
+    defaults: dict[str, list[str]] = {}
+    rows = [_row(joints[name], table, defaults) for name in names]
+    notes += [f'{default}: {", ".join(found)}' for default, found in defaults.items()]
     lower, upper, velocity, acceleration, jerk = (
         frozen(column) for column in zip(*rows, strict=True)
     )
@@ -142,36 +155,52 @@ def merge_limits(
 
 
 def _row(
-    name: str, span: JointRange, table: Mapping[str, Any]
+    joint: Joint, table: Mapping[str, Any], defaults: dict[str, list[str]]
 ) -> tuple[float, float, float, float, float]:
+    name, span = joint.name, joint.range
     entry = table.get(name)
     if not isinstance(entry, dict):
         known = ', '.join(table) or 'none'
         raise LimitsError(f'joint {name} is missing in the limits file, which has: {known}')
     if unknown := sorted(set(entry) - KNOWN_KEYS):
         raise LimitsError(f'joint {name}: unknown key {unknown[0]!r} in the limits file')
-    velocity = _positive(name, entry, 'velocity', span.velocity)
-    if velocity > span.velocity * (1 + ROUNDING_TOLERANCE):
+
+    def default(words: str, value: float) -> float:
+        defaults.setdefault(words, []).append(name)
+        return value
+
+    velocity = _velocity(name, entry) or span.velocity
+    if not velocity:
+        sliding = joint.kind is JointKind.PRISMATIC
+        value, unit = (DEFAULT_SLIDING_VELOCITY, 'm/s') if sliding else (DEFAULT_VELOCITY, 'rad/s')
+        velocity = default(f'no max_velocity in any file, so {value:g} {unit}', value)
+    elif span.velocity and velocity > span.velocity * (1 + ROUNDING_TOLERANCE):
         raise LimitsError(
             f'joint {name}: max_velocity {velocity:g} is wider than the description'
             f' ({span.velocity:g}); a limits file may only narrow'
         )
     lower, upper = _span(name, entry, span)
-    return (
-        lower,
-        upper,
-        velocity,
-        _positive(name, entry, 'acceleration', None),
-        _positive(name, entry, 'jerk', None),
+    acceleration = _positive(name, entry, 'acceleration') or default(
+        f'no max_acceleration in the limits file, so {DEFAULT_ACCELERATION:g} per s2',
+        DEFAULT_ACCELERATION,
     )
+    jerk = _positive(name, entry, 'jerk') or default(
+        f'no max_jerk in the limits file, so {DEFAULT_JERK_RATIO:g}/s of max_acceleration',
+        DEFAULT_JERK_RATIO * acceleration,
+    )
+    return lower, upper, velocity, acceleration, jerk
 
 
-def _positive(name: str, entry: Mapping[str, Any], kind: str, default: float | None) -> float:
+def _velocity(name: str, entry: Mapping[str, Any]) -> float:
+    """Return the velocity of a limits file; 0 where it has none, as MoveIt's wizard writes it."""
+    return 0.0 if entry.get('max_velocity') == 0.0 else _positive(name, entry, 'velocity')
+
+
+def _positive(name: str, entry: Mapping[str, Any], kind: str) -> float:
+    """Return a number of the limits file; 0 where it has none."""
     key = KEYS[kind][0]
     if not entry.get(f'has_{kind}_limits', key in entry):
-        if default is not None:
-            return default
-        raise LimitsError(f'joint {name}: the limits file lacks {key}; motion is limited in it')
+        return 0.0
     return _number(name, entry, key, least=0.0)
 
 

@@ -68,8 +68,8 @@ class RobotModel:
         self._model = _reduced(description, names)
         self.base, self.tip = _ends(description, chosen, semantic, names, tip)
         ordered = list(self._model.names)[1:]  # after the universe; of a chain, from the base out
-        self.limits: JointLimits = merge_limits(ordered, description.ranges, limits)
         notes = list(description.notes)
+        self.limits: JointLimits = merge_limits(ordered, description.joints, limits, notes)
         self.poses = _poses(self.limits, semantic.poses.get(chosen.name, {}), notes)
         self.notes = tuple(notes)
         self._data = self._model.createData()

@@ -144,10 +144,6 @@ BROKEN: dict[str, tuple[Broken, str]] = {
         lambda u, s, t: (u, s, {k: v for k, v in t.items() if k != 'j2'}),
         'joint j2 is missing',
     ),
-    'no acceleration': (
-        lambda u, s, t: (u, s, {**t, 'j2': {'max_velocity': 1.0, 'max_jerk': 9.0}}),
-        'lacks max_acceleration',
-    ),
     'negative jerk': (
         lambda u, s, t: (u, s, {**t, 'j2': {**t['j2'], 'max_jerk': -1.0}}),
         'max_jerk is -1',
@@ -188,6 +184,25 @@ def test_broken_files_are_told(broken: Broken, words: str) -> None:
     """What does not make an arm is refused in words that name it."""
     with pytest.raises(ModelError, match=words):
         RobotModel(*broken(*chain_texts('zyy')))
+
+
+def test_what_no_file_says_has_a_default_that_is_noted_once() -> None:
+    """MoveIt's wizard writes no jerk, often no acceleration, and the description's velocity 0."""
+    urdf, srdf, _ = chain_texts('zyp')
+    wizard = {
+        'has_velocity_limits': True,
+        'max_velocity': 0,
+        'has_acceleration_limits': False,
+        'max_acceleration': 0,
+    }
+    table: dict[str, Any] = dict.fromkeys(('j1', 'j2', 'j3'), wizard)
+    table['j2'] = {'has_acceleration_limits': True, 'max_acceleration': 5}
+    model = RobotModel(urdf.replace('velocity="2"', 'velocity="0"'), srdf, table)
+    assert model.limits.velocity.tolist() == [1.0, 1.0, 0.1]
+    assert model.limits.acceleration.tolist() == [1.0, 5.0, 1.0]
+    assert model.limits.jerk.tolist() == [10.0, 50.0, 10.0]
+    joints = [note.rpartition(': ')[2] for note in model.notes]
+    assert joints == ['j1, j2', 'j1, j3', 'j1, j2, j3', 'j3']
 
 
 def test_unknown_names_are_told_with_the_known_ones() -> None:

@@ -60,7 +60,7 @@ class JointRange:
         name: Name of the joint.
         lower: Least position in [rad]; minus infinity for a continuous joint.
         upper: Greatest position in [rad]; infinity for a continuous joint.
-        velocity: Greatest speed in [rad/s].
+        velocity: Greatest speed in [rad/s]; 0 where the description gives none.
     """
 
     name: str
@@ -100,11 +100,14 @@ class Joint:
 
     @property
     def range(self) -> JointRange:
-        """How far and how fast it moves.
+        """How far and how fast it moves; velocity 0 where the description gives none.
 
         Raises:
-            DescriptionError: It has no ``<limit>``, or that has no usable numbers.
+            DescriptionError: It has no ``<limit>`` although it is neither continuous nor fixed,
+                or that has no usable numbers.
         """
+        if self.limit is None and self.kind is JointKind.CONTINUOUS:
+            return JointRange(self.name, -math.inf, math.inf, 0.0)
         if self.limit is None:
             raise DescriptionError(
                 f'joint {self.name}: a {self.kind.value} joint needs <limit .../>'

@@ -21,7 +21,7 @@ from process_supervisor import (
 )
 from process_supervisor.arguments import seconds_from
 
-from ...description import joint_limits
+from ...description import joint_limits, read_semantic
 from ...exceptions import BringupError, RobotError
 from ...motion import controller_name, motion_files
 from ...robots import Robot
@@ -107,8 +107,13 @@ def build_model(robot: Robot, urdf: str) -> RobotModel:
         RobotError: It has no pose to start from.
         ModelError: Its files do not make an arm.
     """
-    semantic = robot.semantic.read_text(encoding='utf-8')
-    model = RobotModel(urdf, semantic, load_limits(robot.limits))
+    model = RobotModel(
+        urdf,
+        read_semantic(robot),
+        load_limits(robot.limits),
+        robot.group or None,
+        robot.tip_link or None,
+    )
     if START not in model.poses:
         raise RobotError(f'{robot.semantic} has no pose {START!r} to start from')
     return model
@@ -176,7 +181,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     arguments, ros = parse(sys.argv[1:] if argv is None else argv)
     try:
-        robot = locate(arguments.robot)
+        robot = locate(arguments)
         if robot.lacking:
             raise RobotError(
                 f'{robot.name} lacks {robot.lacking}: '

@@ -1,0 +1,163 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Descriptions, SRDF and limits that others wrote, as robot folders without editing."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from arm_bringup.bringup import parse
+from arm_bringup.description import expand_xacro, read_description, read_semantic
+from arm_bringup.exceptions import DescriptionError, RobotError
+from arm_bringup.robots import find_robot, Robot
+from arm_bringup.session import locate
+
+XACRO = 'xmlns:xacro="http://wiki.ros.org/xacro"'
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Make a robot folder with a bus and a plain URDF."""
+    folder = tmp_path / 'arm'
+    folder.mkdir()
+    (folder / 'bus.yml').touch()
+    (folder / 'arm.urdf').write_text('<robot name="arm"><link name="base"/></robot>')
+    return folder
+
+
+def found(folder: Path) -> Robot:
+    """Read a robot folder."""
+    return find_robot(f'{folder}{os.sep}', folder)
+
+
+def test_names_that_moveit_and_vendors_give_their_files(folder: Path) -> None:
+    """A plain URDF, a SRDF of xacro, and joint_limits.yaml."""
+    (folder / 'arm.srdf.xacro').write_text(f'<robot name="arm" {XACRO}/>')
+    (folder / 'joint_limits.yaml').touch()
+    robot = found(folder)
+    assert robot.lacking == ''
+    assert '<link name="base"/>' in read_description(robot)
+    assert '<robot name="arm"/>' in read_semantic(robot)
+
+
+def test_robot_yaml_names_files_elsewhere(folder: Path, tmp_path: Path) -> None:
+    """The package of a vendor stays where it is; paths count from the robot folder."""
+    config = tmp_path / 'vendor_moveit_config' / 'config'
+    config.mkdir(parents=True)
+    (config / 'vendor.srdf').write_text('<robot name="vendor"/>')
+    (folder / 'robot.yaml').write_text(
+        'semantic: ../vendor_moveit_config/config/vendor.srdf\ngroup: manipulator\n'
+        'tip_link: tool0\n'
+    )
+    robot = found(folder)
+    assert 'vendor' in read_semantic(robot)
+    assert (robot.group, robot.tip_link) == ('manipulator', 'tool0')
+
+
+@pytest.mark.parametrize(
+    ('text', 'words'),
+    [
+        ('groop: arm', r"unknown key 'groop'; keys: description.*group"),
+        ('[arm]', 'no table'),
+        ('semantic: lost.srdf', r'semantic: there is no file .*lost.srdf'),
+        ('packages: {vendor: lost}', 'packages: vendor: there is no folder'),
+        ('xacro_args: [name]', 'xacro_args: a table'),
+        ('group: [left, right]', 'no text'),
+        ('group: {', 'robot.yaml'),
+    ],
+)
+def test_a_robot_yaml_that_cannot_be_used_says_what(folder: Path, text: str, words: str) -> None:
+    """The key, and those that there are."""
+    (folder / 'robot.yaml').write_text(text)
+    with pytest.raises(RobotError, match=words):
+        found(folder)
+
+
+def test_xacro_arguments_of_the_folder_and_of_the_command_line(folder: Path) -> None:
+    """The command line has the last word; both reach description and SRDF."""
+    text = f'<robot name="$(arg name)" {XACRO}><link name="$(arg kind)_$(arg big)"/></robot>'
+    (folder / 'arm.urdf').unlink()
+    (folder / 'arm.urdf.xacro').write_text(text)
+    (folder / 'arm.srdf.xacro').write_text(text)
+    (folder / 'robot.yaml').write_text('xacro_args: {name: arm, kind: ur5, big: true}')
+    argv = [f'{folder}{os.sep}', '--xacro-arg', 'kind:=ur10e', '--group', 'left']
+    robot = locate(parse(argv)[0])
+    for read in (read_description, read_semantic):
+        assert '<robot name="arm">' in read(robot)
+        assert '<link name="ur10e_true"/>' in read(robot)
+    assert robot.group == 'left'
+    with pytest.raises(SystemExit):
+        parse([f'{folder}{os.sep}', '--xacro-arg', 'kind=ur10e'])
+
+
+def test_a_package_that_is_not_installed_is_given_a_folder(folder: Path, tmp_path: Path) -> None:
+    """For ``$(find ...)`` in xacro files, and for the meshes of the description."""
+    shared = tmp_path / 'share' / 'vendor_description'
+    shared.mkdir(parents=True)
+    (shared / 'arm.xacro').write_text(
+        f'<robot {XACRO}><link name="base"><visual><geometry>'
+        '<mesh filename="package://vendor_description/base.stl"/></geometry></visual></link>'
+        '<link name="$(find arm_model)"/></robot>'
+    )
+    (folder / 'arm.urdf').unlink()
+    (folder / 'arm.xacro').write_text(
+        f'<robot name="arm" {XACRO}>'
+        '<xacro:include filename="$(find vendor_description)/arm.xacro"/></robot>'
+    )
+    before = os.environ['AMENT_PREFIX_PATH']
+    with pytest.raises(
+        DescriptionError, match=r"arm.xacro: package 'vendor_description' .*packages: \{vendor_d"
+    ) as refused:
+        read_description(found(folder))
+    assert len(str(refused.value)) < 400  # not every folder that was searched
+    (folder / 'robot.yaml').write_text(
+        'packages:\n  vendor_description: ../share/vendor_description\n'
+    )
+    urdf = read_description(found(folder))
+    assert f'"{shared.as_uri()}/base.stl"' in urdf
+    assert os.environ['AMENT_PREFIX_PATH'] == before
+
+
+def test_an_argument_without_a_value_says_how_to_give_it(tmp_path: Path) -> None:
+    """Xacro's own words have no remedy."""
+    file = tmp_path / 'arm.urdf.xacro'
+    file.write_text(f'<robot name="$(arg name)" {XACRO}/>')
+    with pytest.raises(DescriptionError, match=r"'name' has no value.*--xacro-arg name:=VALUE"):
+        expand_xacro(file)
+
+
+def test_drivers_of_ros2_control_and_gazebo_need_not_be_there(tmp_path: Path) -> None:
+    """Their includes are left out with the calls of their macros; the rest stays."""
+    file = tmp_path / 'arm.urdf.xacro'
+    file.write_text(
+        f'<robot name="arm" {XACRO}>'
+        '<xacro:include filename="$(find vendor_driver)/urdf/arm.ros2_control.xacro"/>'
+        '<xacro:include filename="gazebo.xacro"/>'
+        '<link name="base"/>'
+        '<xacro:arm_ros2_control name="arm" ip="1"><origin/></xacro:arm_ros2_control>'
+        '<xacro:macro name="tool" params="n"><link name="${n}"/>'
+        '<xacro:arm_gazebo/></xacro:macro><xacro:tool n="tool0"/></robot>'
+    )
+    urdf = expand_xacro(file)
+    assert '<link name="base"/>' in urdf
+    assert '<link name="tool0"/>' in urdf
+    assert 'xacro:' not in urdf
+    file.write_text(file.read_text().replace('xacro:arm_gazebo', 'xacro:arm_gripper'))
+    with pytest.raises(DescriptionError, match='unknown macro name: xacro:arm_gripper'):
+        expand_xacro(file)
+
+
+def test_one_that_is_there_and_wrong_is_told(tmp_path: Path) -> None:
+    """Only what is missing is left out."""
+    (tmp_path / 'arm.ros2_control.xacro').write_text(
+        f'<robot {XACRO}><link name="${{1/0}}"/></robot>'
+    )
+    file = tmp_path / 'arm.urdf.xacro'
+    file.write_text(
+        f'<robot name="arm" {XACRO}><xacro:include filename="arm.ros2_control.xacro"/></robot>'
+    )
+    with pytest.raises(DescriptionError, match='division by zero'):
+        expand_xacro(file)
