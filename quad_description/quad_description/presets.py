@@ -7,7 +7,6 @@ from __future__ import annotations
 from functools import lru_cache
 import math
 from typing import Final
-from xml.etree import ElementTree as ET
 
 from .exceptions import DescriptionError, PresetError
 from .figures import MODEL, robot_numbers
@@ -36,7 +35,7 @@ def robot_urdf(preset: str = 'lite', arm: bool = False, trunk_mass: float | None
         DescriptionError: The mass of the trunk is none.
     """
     if preset not in PRESETS:
-        raise PresetError(f'there is no preset {preset!r}; choose one of {", ".join(PRESETS)}')
+        raise PresetError(f'unknown preset {preset!r}; choose one of {", ".join(PRESETS)}')
     lowest, highest = TRUNK_MASS_RANGE
     if trunk_mass is not None and not (
         math.isfinite(trunk_mass) and lowest <= trunk_mass <= highest
@@ -58,8 +57,7 @@ def _expand(arguments: dict[str, str]) -> str:
     import xacro
 
     path = MODEL / 'quadruped.urdf.xacro'
-    document = xacro.process_file(str(path), mappings=arguments).toxml()
-    # parsing drops the comments, and with them the path on this machine
-    root = ET.fromstring(document)  # noqa: S314  made a line above, from our own files
-    ET.indent(root)
-    return ET.tostring(root, encoding='unicode')
+    document = xacro.process_file(str(path), mappings=arguments)
+    # the root without the comment before it, which names the path on this machine
+    urdf: str = document.documentElement.toprettyxml(indent='  ')
+    return urdf.rstrip()

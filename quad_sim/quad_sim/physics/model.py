@@ -9,12 +9,12 @@ the shapes of the links are only drawings.
 from __future__ import annotations
 
 from typing import Final
-from xml.etree import ElementTree as ET
 
 import mujoco
 import numpy as np
 
 from quad_description import Joint, LEGS, movable_joints
+from quad_description.urdf import JointKind, parse
 
 from ..exceptions import SetupError
 from ..plant.servo import JAW, ServoParameters
@@ -53,7 +53,7 @@ def build_model(
     if mujoco.get_mju_user_warning() is None:  # else it writes a MUJOCO_LOG.TXT where it runs
         mujoco.set_mju_user_warning(_pass_over)
     try:
-        spec = mujoco.MjSpec.from_string(_loadable(urdf))
+        spec = _load(urdf)
         _set_options(spec, timestep)
         _add_base(spec)
         _add_floor(spec, terrain)
@@ -61,22 +61,18 @@ def build_model(
             _add_servo(spec, joint, servo)
         _add_sensors(spec)
         return spec.compile()
-    except (ValueError, ET.ParseError) as error:
+    except ValueError as error:
         raise SetupError(f'the robot description cannot be simulated: {error}') from error
 
 
-def _loadable(urdf: str) -> str:
-    """Take out what MuJoCo has no place for: frames on floating joints."""
-    root = ET.fromstring(urdf)  # noqa: S314  a robot's own description, not from the network
-    for joint in root.findall("joint[@type='floating']"):
-        child = joint.find('child')
-        name = '' if child is None else child.get('link', '')
-        root.remove(joint)
-        for link in root.findall(f"link[@name='{name}']"):
-            root.remove(link)
-    extension = ET.SubElement(root, 'mujoco')
-    ET.SubElement(extension, 'compiler', fusestatic='false', discardvisual='true')
-    return ET.tostring(root, encoding='unicode')
+def _load(urdf: str) -> mujoco.MjSpec:
+    """Read the robot, but for frames on floating joints, for which MuJoCo has no place."""
+    spec = mujoco.MjSpec.from_string(urdf)
+    spec.compiler.fusestatic = False  # feet and IMU stay links of their own
+    for joint in parse(urdf).joints:
+        if joint.kind is JointKind.FLOATING:
+            spec.delete(_body(spec, joint.child))
+    return spec
 
 
 def _set_options(spec: mujoco.MjSpec, timestep: float) -> None:
