@@ -28,10 +28,10 @@ setup(
             'canopen_joint_state_publisher = arm_canopen.nodes.joint_state_publisher:main',
             'master = arm_canopen.nodes.master:main',
             # names of before that keep working; the programs are those of canopen_tools and _sim
-            'candump = canopen_tools.candump:main',
-            'canopen = canopen_tools.cli.main:main',
-            'fake_slave = canopen_sim.nodes.fake_slave:main',
-            'fake_slaves = canopen_sim.nodes.fake_slaves:main',
+            'candump = arm_canopen.aliases:candump',
+            'canopen = arm_canopen.aliases:canopen',
+            'fake_slave = arm_canopen.aliases:fake_slave',
+            'fake_slaves = arm_canopen.aliases:fake_slaves',
         ],
     },
 )

@@ -22,7 +22,7 @@ setup(
     entry_points={
         'console_scripts': [
             # the simulated robot's, under the name that it is printed by; quad_sim has it
-            'fake_xgo = quad_sim.fake_xgo:main',
+            'fake_xgo = quad_hardware.aliases:fake_xgo',
             'calibrate = quad_hardware.calibration.main:main',
             'doctor = quad_hardware.doctor.main:main',
             'hardware_node = quad_hardware.nodes.hardware_node:main',

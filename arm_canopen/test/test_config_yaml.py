@@ -141,11 +141,11 @@ def test_bytes_that_are_no_text(tmp_path: Path, content: bytes) -> None:
 
 
 def test_a_missing_bus_file(tmp_path: Path) -> None:
-    """A missing file or a folder is one problem that names the parameter."""
+    """A missing file or a folder is one problem, whatever gave the path."""
     for path in (tmp_path / 'none.yml', tmp_path):
         (problem,) = errors_of(path)
         assert problem.file == path
-        assert 'bus_config' in problem.remedy
+        assert problem.remedy == 'correct the path of the bus.yml'
 
 
 def test_the_error_is_what_callers_catch(tmp_path: Path) -> None:

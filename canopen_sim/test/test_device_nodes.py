@@ -5,8 +5,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+import importlib
 import os
 from pathlib import Path
+import re
 import shutil
 import signal
 import subprocess
@@ -139,3 +141,47 @@ def test_errors_are_one_message(processes: list[subprocess.Popen[str]], case: st
     assert culprit in text
     assert text.count('[FATAL]') == 1
     assert 'Traceback' not in text
+
+
+@pytest.mark.parametrize(
+    ('module', 'sources'),
+    [
+        ('canopen_sim.nodes.fake_slave', ('fake_slave', 'slave_process')),
+        ('canopen_sim.nodes.fake_slaves', ('fake_slaves', 'slave_process')),
+        ('arm_canopen.nodes.master', ('master',)),
+    ],
+)
+def test_help_names_every_parameter(module: str, sources: tuple[str, ...]) -> None:
+    """What a program does, an example, and each parameter that it declares; nothing is started."""
+    done = subprocess.run(
+        [sys.executable, '-m', module, '--help'],
+        capture_output=True,
+        text=True,
+        timeout=ARRIVAL,
+        check=True,
+    )
+    assert 'example:' in done.stdout
+    package = Path(str(importlib.import_module(module).__file__)).parent
+    declared = {
+        name
+        for source in sources
+        for name in re.findall(
+            r"\.(?:text|whole|number|flag)\(\s*'(\w+)'", (package / f'{source}.py').read_text()
+        )
+    }
+    assert declared | {'can_interface_name', 'thread_priority'} == {
+        name
+        for row in re.findall(r'^  ([a-z_]+(?:, [a-z_]+)*)(?:  |$)', done.stdout, re.MULTILINE)
+        for name in row.split(', ')
+    }
+
+
+def test_a_single_device_takes_the_bus_that_all_programs_take(
+    processes: list[subprocess.Popen[str]],
+) -> None:
+    """Without a name the bus is `auto`: one command does on any host."""
+    process = start('fake_slave', node_id=9)
+    processes.append(process)
+    assert process.stdout is not None
+    line = next(line for line in process.stdout if 'simulated drive 9' in line)
+    assert ' on vcan0' in line or ' on udp_multicast:' in line

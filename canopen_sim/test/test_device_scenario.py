@@ -254,8 +254,8 @@ def test_all_errors_at_once(tmp_path: Path) -> None:
 
 
 def test_missing_file_is_a_scenario(tmp_path: Path) -> None:
-    """The remedy for a missing file names the parameter that gave its path."""
-    with pytest.raises(ConfigError, match='parameter scenario'):
+    """The remedy for a missing file says of what kind it is."""
+    with pytest.raises(ConfigError, match='correct the path of the scenario'):
         load_scenario(tmp_path / 'nothing.yaml', DEVICES, frozenset())
 
 

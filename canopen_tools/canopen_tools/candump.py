@@ -30,6 +30,13 @@ from .monitor import FrameDescriber, FrameFilter
 from .monitor.line_format import LineFormat, TimeStyle
 from .ros_arguments import split_ros_arguments
 
+EXAMPLES = """\
+examples:
+  candump can0 --bus-config bus.yml                   all frames, with the names of bus.yml
+  candump can0 --filter emcy,node:joint1              EMCY of all devices, all of joint1
+  candump can0 --log today.log --quiet --timeout 60   record a minute
+  candump --read today.log --bus-config bus.yml       show what was recorded
+"""
 _NODE_WIDTH = len('all nodes')
 
 
@@ -209,15 +216,31 @@ def _print_note(text: str) -> None:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog='candump', description='Show the frames of a CAN bus with their CANopen meaning.'
+        prog='candump',
+        description='Show the frames of a CAN bus, or of a log, with their CANopen meaning:\n'
+        'PDO objects by name, SDO with abort texts, NMT, EMCY and heartbeats in words.\n'
+        'It listens only, also beside a running master.',
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add = parser.add_argument
-    add('bus', nargs='?', help='can0, vcan0, udp_multicast:239.x.y.z, ... (default: auto)')
+    add(
+        'bus',
+        nargs='?',
+        help='can0, vcan0, udp_multicast:239.x.y.z[:port], auto (default: vcan0 where it exists, '
+        'otherwise multicast on this host), or INTERFACE:CHANNEL[@BITRATE] of python-can',
+    )
     add('--bus-config', metavar='FILE', help='bus.yml that names devices and objects')
     add('--log', metavar='FILE', help="write all frames in can-utils' log format, shown or not")
     add('--read', metavar='FILE', help='show such a log instead of a bus')
     add('-n', '--count', type=_positive_int, help='end after so many frames shown')
-    add('--timeout', type=_positive_float, default=math.inf, metavar='S', help='end after S s')
+    add(
+        '--timeout',
+        type=_positive_float,
+        default=math.inf,
+        metavar='S',
+        help='end after S seconds',
+    )
     add(
         '--filter',
         action='append',

@@ -86,18 +86,15 @@ class DocumentKind:
 
     Attributes:
         name: What it is called.
-        parameter: Where its path is given.
         beginning: What its top level is to look like.
     """
 
     name: str
-    parameter: str
     beginning: str
 
 
 BUS_YML = DocumentKind(
     'bus.yml',
-    'parameter bus_config',
     "begin with the sections 'options:', 'master:', 'defaults:' and 'nodes:'",
 )
 
@@ -135,7 +132,7 @@ def _read(file: Path, findings: Findings, kind: DocumentKind) -> Item | None:
         if root is not None:
             item = _Converter(file, findings).convert(root, Place(file))
     except OSError as error:
-        remedy = f'correct the path of the {kind.name} ({kind.parameter})'
+        remedy = f'correct the path of the {kind.name}'
         findings.error(Place(file), f'cannot be read: {error.strerror or error}', remedy)
     except RecursionError:
         findings.error(Place(file), 'nested too deeply', f'a {kind.name} needs five levels')

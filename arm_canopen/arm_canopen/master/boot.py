@@ -111,9 +111,9 @@ class BootProcess:
         self._enter(BootPhase.WAITING)
         while not await self._answers():
             self._report_once(
-                f'{BootFault.NO_ANSWER.value}: no answer yet: neither a boot-up message nor an '
-                'answer to 0x1000; is it powered, wired, terminated, on this bit rate and on node '
-                f'id {self._node.config.node_id}?'
+                'no boot-up message and no answer yet; the boot begins when it answers. Check '
+                f'power, wiring, termination, bit rate and node id {self._node.config.node_id} '
+                f'({BootFault.NO_ANSWER})'
             )
 
     async def _answers(self) -> bool:
@@ -215,8 +215,8 @@ class BootProcess:
                 'have it configured'
             )
         await preset_outputs(node)
-        letter = f'{BootFault.RUNNING.value}: ' if node.nmt_state is NmtState.OPERATIONAL else ''
-        self._go_online(f'{letter}taken over as it runs, nothing was reset', taken_over=True)
+        reason = f' ({BootFault.RUNNING})' if node.nmt_state is NmtState.OPERATIONAL else ''
+        self._go_online(f'taken over as it runs, nothing was reset{reason}', taken_over=True)
 
     def _go_online(self, text: str, *, taken_over: bool = False) -> None:
         self._node.go_online(self._scheduler.now, taken_over=taken_over)
@@ -274,11 +274,11 @@ class BootProcess:
 
     def _fail(self, reason: str) -> None:
         step, fault = self._node.phase.value, self._fault
-        self._enter(BootPhase.FAILED, f'{fault.value}, {step}: {reason}')
-        self._report_once(f'boot failed ({fault.value}, {fault.text}) while {step}: {reason}')
+        self._enter(BootPhase.FAILED, f'{step}: {reason} ({fault})')
+        self._report_once(f'boot failed while {step}: {reason} ({fault})')
 
     def _report_once(self, text: str) -> None:
-        """Say a reason when it is new; it is tried again without end, but not reported again."""
+        """Report a reason when it is new; further attempts that end alike are not reported."""
         if text != self._reported:
             self._reported = text
             self._node.report(EventKind.BOOT_FAILED, Severity.WARNING, text)

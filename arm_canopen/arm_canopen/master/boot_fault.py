@@ -26,6 +26,10 @@ class BootFault(Enum):
         """The reason in words."""
         return BOOT_FAULT_TEXTS[self]
 
+    def __str__(self) -> str:
+        """Return the letter with where it is from, as manuals of masters list it."""
+        return f'CiA 302-2 boot error {self.value}: {self.text}'
+
 
 BOOT_FAULT_TEXTS: dict[BootFault, str] = {
     BootFault.NO_ANSWER: 'no answer to the read of 0x1000',

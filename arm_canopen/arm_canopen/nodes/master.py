@@ -35,6 +35,26 @@ from .master_process import MasterProcess
 
 THREAD_PRIORITY = 50  # SCHED_FIFO, as ros2_control has it
 SWITCH_INTERVAL = 0.0005  # [s] how long a busy callback may keep the interpreter from the cycle
+HELP = f"""\
+Run the CANopen master and the drives of a bus.yml until Ctrl-C, then stop and disable the drives.
+
+usage: ros2 run arm_canopen master --ros-args -p bus_config:=FILE [-p NAME:=VALUE ...]
+
+example:
+  ros2 run arm_canopen master --ros-args -p bus_config:=bus.yml -p can_interface_name:=can0
+
+parameters:
+  bus_config          bus.yml with the master and its devices (required); several with commas
+  can_interface_name  can0, vcan0, udp_multicast:239.x.y.z[:port], auto, or
+                      INTERFACE:CHANNEL[@BITRATE]; one for each bus.yml, with commas
+                      (default auto: vcan0 where it exists, otherwise multicast on this host)
+  diagnostics_period  time between two /diagnostics messages in [s] (default 1.0)
+  thread_priority     SCHED_FIFO priority of the thread of the cycle, 0 for none
+                      (default {THREAD_PRIORITY})
+  beside_master       start although another master is on the bus (default false)
+  master_config, master_bin
+                      accepted for ros2_canopen; not needed
+"""
 
 Extend = Callable[[MasterProcess], Sequence[Node]]
 
@@ -57,7 +77,14 @@ def run_master(
         Exit code: 0, or 1 when the bus could not be configured or opened, or has a master.
     """
     sys.setswitchinterval(SWITCH_INTERVAL)
-    return run_program('master', lambda stop: _run(stop, extend), CanopenError, *errors, args=args)
+    return run_program(
+        'master',
+        lambda stop: _run(stop, extend),
+        CanopenError,
+        *errors,
+        args=args,
+        help_text=HELP,
+    )
 
 
 def main() -> None:

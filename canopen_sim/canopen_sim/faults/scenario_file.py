@@ -48,7 +48,7 @@ from .faults import Fault, FaultInjection, SETTINGS
 from .scenario import Event, Step
 from .text import FAULTS, parse_fault
 
-KIND = DocumentKind('scenario', 'parameter scenario', "begin with 'steps:' and a list below it")
+KIND = DocumentKind('scenario', "begin with 'steps:' and a list below it")
 TOP_KEYS = ('seed', 'steps')
 STEP_KEYS = ('after', 'when', 'device', 'fault', 'end')
 EVENT_KEYS = ('device', 'nmt', 'drive', 'position_above', 'position_below')

@@ -21,11 +21,23 @@ from ..host import DeviceHost
 from .slave_process import memories, run_slaves, SimulatedDevices
 
 DEFAULT_NODE_ID = 2
+HELP = f"""\
+Simulate one CANopen device, made from an EDS, until Ctrl-C.
+
+usage: ros2 run canopen_sim fake_slave [--ros-args -p NAME:=VALUE ...]
+
+example:
+  ros2 run canopen_sim fake_slave --ros-args -p node_id:=3 -p slave_config:=drive.eds
+
+parameters:
+  node_id             CANopen node id, 1 to 127; 255: LSS gives it one (default {DEFAULT_NODE_ID})
+  slave_config        EDS of the device (default: the drive of arm_canopen/eds/cia402_drive.eds)
+"""
 
 
 def run_fake_slave(args: Sequence[str] | None = None) -> int:
     """Simulate one device in this process; return the exit code."""
-    return run_slaves('fake_slave', _populate, default_bus='vcan0', args=args)
+    return run_slaves('fake_slave', _populate, help_text=HELP, args=args)
 
 
 def main() -> None:

@@ -16,10 +16,22 @@ from node_runner import ParameterReader
 from ..host import DeviceHost
 from .slave_process import memories, run_slaves, SimulatedDevices
 
+HELP = """\
+Simulate every device of a bus.yml, each made from its EDS, until Ctrl-C.
+
+usage: ros2 run canopen_sim fake_slaves --ros-args -p bus_config:=FILE [-p NAME:=VALUE ...]
+
+example:
+  ros2 run canopen_sim fake_slaves --ros-args -p bus_config:=bus.yml
+
+parameters:
+  bus_config          bus.yml whose devices are simulated (required)
+"""
+
 
 def run_fake_slaves(args: Sequence[str] | None = None) -> int:
     """Simulate every device of a bus.yml in this process; return the exit code."""
-    return run_slaves('fake_slaves', _populate, default_bus='auto', args=args)
+    return run_slaves('fake_slaves', _populate, help_text=HELP, args=args)
 
 
 def main() -> None:

@@ -39,6 +39,18 @@ CAN_INTERFACES = (
 THREAD_PRIORITY = 30  # SCHED_FIFO: devices answer SYNC in time, and leave the master the way
 STORE_DIRECTORY = 'folder of what the devices store (0x1010, LSS); empty: until they end'
 SCENARIO = 'YAML file with faults and their times; empty for none'
+COMMON_HELP = f"""\
+  can_interface_name  {CAN_INTERFACES}
+                      (default auto: vcan0 where it exists, otherwise multicast on this host)
+  scenario            {SCENARIO}
+  store_directory     {STORE_DIRECTORY}
+  thread_priority     SCHED_FIFO priority of the loop of the devices, 0 for none
+                      (default {THREAD_PRIORITY})
+
+services of the node, of all devices and below ~/<device>/ of each:
+  ~/fault (arm_msgs/srv/InjectFault), ~/power_cycle (std_srvs/srv/Trigger),
+  ~/sto (std_srvs/srv/SetBool)
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,14 +82,14 @@ def memories(node: Node) -> Callable[[int], ParameterMemory]:
 
 
 def run_slaves(
-    name: str, populate: Populate, *, default_bus: str, args: Sequence[str] | None = None
+    name: str, populate: Populate, *, help_text: str, args: Sequence[str] | None = None
 ) -> int:
     """Run simulated slaves until Ctrl-C or SIGTERM.
 
     Args:
         name: Name of the node.
         populate: Reads the node's parameters, adds the devices and returns what they are.
-        default_bus: Default of ``can_interface_name``.
+        help_text: What ``--help`` prints, before the parameters that all of them have.
         args: Command line; None for the process's own.
 
     Returns:
@@ -88,15 +100,15 @@ def run_slaves(
         node = Node(name)
         log_as(node)
         try:
-            _run(node, populate, default_bus, stop)
+            _run(node, populate, stop)
         finally:
             node.destroy_node()
 
-    return run_program(name, body, CanopenError, args=args)
+    return run_program(name, body, CanopenError, args=args, help_text=help_text + COMMON_HELP)
 
 
-def _run(node: Node, populate: Populate, default_bus: str, stop: threading.Event) -> None:
-    interface = ParameterReader(node).text('can_interface_name', default_bus, CAN_INTERFACES)
+def _run(node: Node, populate: Populate, stop: threading.Event) -> None:
+    interface = ParameterReader(node).text('can_interface_name', 'auto', CAN_INTERFACES)
     with open_bus(interface) as bus:
         runner = DeviceRunner(bus)
         population = populate(node, runner.host)

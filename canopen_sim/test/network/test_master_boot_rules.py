@@ -100,7 +100,7 @@ def test_a_device_in_operation_is_taken_over_without_a_word() -> None:
     assert network.net.frames(0x205) == []
     network.net.network.publish_object(node, 0x6060, 0, 9)
     assert network.net.frames(0x205) == [b'\x0f\x00\x09']
-    assert any('L: taken over' in text for text in network.net.told())
+    assert any('taken over' in text and 'error L' in text for text in network.net.told())
 
 
 def test_a_device_with_other_pdos_is_left_alone() -> None:
@@ -126,7 +126,8 @@ def test_a_device_that_does_not_tell_its_state_is_left_alone() -> None:
     network.start(5.0)
     assert device.commands == []
     (told,) = network.net.told(Severity.WARNING)
-    assert 'boot failed (K, no heartbeat)' in told
+    assert 'boot failed while' in told
+    assert 'boot error K: no heartbeat' in told
     assert 'does not tell its NMT state' in told
 
 

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+import sys
 import threading
 
 from rclpy.exceptions import NameValidationException, ParameterException
@@ -24,6 +25,8 @@ from .spinning import spin
 REFUSED = 1
 """Exit code of a program that could not begin."""
 
+HELP_OPTIONS = frozenset({'-h', '--help'})
+
 Body = Callable[[threading.Event], int | None]
 
 
@@ -33,6 +36,7 @@ def run_program(
     *errors: type[Exception],
     args: Sequence[str] | None = None,
     patient: bool = False,
+    help_text: str | None = None,
 ) -> int:
     """Run a program until it returns; signals end it, and never tear it in the middle.
 
@@ -47,10 +51,14 @@ def run_program(
         *errors: What else is told in a line.
         args: Command line; None for the process's own.
         patient: As in :func:`.stop_on_signals`.
+        help_text: Printed for ``--help``, which starts nothing.
 
     Returns:
         Exit code: that of the body, or 1 when it raised one of the errors.
     """
+    if help_text is not None and HELP_OPTIONS.intersection(sys.argv[1:] if args is None else args):
+        sys.stdout.write(help_text)
+        return 0
     stop = stop_on_signals(patient=patient)
     try:
         init_ros(args)

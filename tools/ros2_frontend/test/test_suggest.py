@@ -41,6 +41,7 @@ def test_the_name_itself_is_nearest(name: str, known: list[str]) -> None:
             ['/joint_states', '/arm/joint_states'],
         ),
         ('fake_slave', ['fake_slaves', 'master', 'candump'], ['fake_slaves']),
+        ('/fake_slaves/fault', ['/fake_slaves/panda_joint1/sto', '/fake_slaves/sto'], []),
         ('zzz', ['/chatter', '/rosout'], []),
         ('anything', [], []),
     ],

@@ -26,6 +26,8 @@ def likeness(wanted: str, known: str) -> float:
     """
     one, other = wanted.strip('/').lower(), known.strip('/').lower()
     ends = _ratio(one.rpartition('/')[2], other.rpartition('/')[2])
+    if '/' in one and ends < _CUTOFF:
+        return 0.0  # two services of one node are alike in their beginning only
     inside = _INSIDE if one and one in other else 0.0
     alike = ends * _SAME_END if '/' not in one else 0.0
     return max(_ratio(one, other), inside, alike)

@@ -1,0 +1,41 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Programs of canopen_sim and canopen_tools by the names that they have in arm_canopen, too."""
+
+from __future__ import annotations
+
+from importlib import import_module
+import sys
+
+
+def fake_slave() -> None:
+    """Run canopen_sim's fake_slave."""
+    _run('canopen_sim', 'nodes.fake_slave')
+
+
+def fake_slaves() -> None:
+    """Run canopen_sim's fake_slaves."""
+    _run('canopen_sim', 'nodes.fake_slaves')
+
+
+def candump() -> None:
+    """Run canopen_tools' candump."""
+    _run('canopen_tools', 'candump')
+
+
+def canopen() -> None:
+    """Run canopen_tools' canopen."""
+    _run('canopen_tools', 'cli.main')
+
+
+def _run(package: str, module: str) -> None:
+    try:
+        program = import_module(f'{package}.{module}')
+    except ModuleNotFoundError as error:
+        if error.name != package:
+            raise
+        sys.exit(
+            f'this program belongs to {package}, which is not installed; build it with '
+            f'`colcon build --packages-up-to {package}`, or `pip install ./{package}`'
+        )
+    sys.exit(program.main())
