@@ -4,7 +4,9 @@
 
 from __future__ import annotations
 
-from argparse import ArgumentParser, ArgumentTypeError
+from argparse import ArgumentTypeError
+
+from .verb import Argument, argument, exclusive, flag
 
 
 def unsigned_int(text: str) -> int:
@@ -62,21 +64,27 @@ def positive_float(text: str) -> float:
     return value
 
 
-def add_graph_arguments(parser: ArgumentParser) -> None:
-    """Add the options of every command that looks at the ROS graph.
-
-    Args:
-        parser: The command's parser.
-    """
-    parser.add_argument(
+GRAPH_ARGUMENTS = (
+    argument(
         '--spin-time',
         type=positive_float,
         metavar='SPIN_TIME',
         help='Longest time [s] to wait for discovery (default: until the graph is complete)',
-    )
-    parser.add_argument(
-        '-s', '--use-sim-time', action='store_true', help='Enable ROS simulation time'
-    )
-    parser.add_argument(
-        '--no-daemon', action='store_true', help='Accepted and without effect: there is no daemon'
+    ),
+    flag('-s', '--use-sim-time', help='Enable ROS simulation time'),
+    flag('--no-daemon', help='Accepted and without effect: there is no daemon'),
+)
+"""The options of every verb that looks at the ROS graph."""
+
+
+def content(name: str, help_: str, stdin_help: str) -> Argument:
+    """Declare the values of a message, given as an argument or on standard input.
+
+    Args:
+        name: Name of the argument.
+        help_: Its help.
+        stdin_help: Help of `--stdin`.
+    """
+    return exclusive(
+        argument(name, nargs='?', default='{}', help=help_), flag('--stdin', help=stdin_help)
     )

@@ -8,7 +8,8 @@ from argparse import ArgumentParser, RawDescriptionHelpFormatter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from .commands import Command, Group, Verb
+from .commands import Command, Group
+from .verb import Verb
 
 PROGRAM = 'ros2'
 

@@ -18,6 +18,7 @@ import importlib
 from ..aliases import Message, Slot, Value
 from ..cli.errors import FieldValueError
 from ..cli.suggest import hint
+from .from_text import parse_mapping
 from .primitive import to_primitive
 
 _HEADER = ('std_msgs', 'msg', 'Header')
@@ -121,3 +122,28 @@ def _fields(message: Message) -> str:
 
 def _at(path: str) -> str:
     return f'{path}: ' if path else ''
+
+
+def filled(
+    message: Message, text: str, filler: Filler | None = None, *, what: str = 'field'
+) -> Message:
+    """Fill a message with values that a user typed.
+
+    Args:
+        message: The message; it is changed.
+        text: The values as YAML.
+        filler: Fills it; None for a plain one.
+        what: What could not be populated, in ros2cli's words for the error.
+
+    Returns:
+        The same message.
+
+    Raises:
+        FieldValueError: The values do not fit the message.
+    """
+    values = parse_mapping(text)
+    try:
+        (filler or Filler()).fill(message, values)
+    except FieldValueError as error:
+        raise FieldValueError(f'Failed to populate {what}: {error}') from None
+    return message

@@ -12,6 +12,8 @@ import time
 from typing import TypeVar
 
 from ..aliases import Endpoint, NamesAndTypes
+from ..cli.arguments import GRAPH_ARGUMENTS
+from ..cli.verb import Argument, Verb
 from .discovery import Patience, wait
 from .names import is_hidden, NodeName
 from .session import open_session, Session
@@ -152,19 +154,34 @@ class Graph:
 
 
 @contextlib.contextmanager
-def open_graph(args: Namespace, spin_time: float | None = None) -> Iterator[Graph]:
+def open_graph(args: Namespace) -> Iterator[Graph]:
     """Join the ROS graph for one command, and look at it.
 
     Args:
-        args: Parsed arguments; `use_sim_time` and `spin_time` are looked at.
-        spin_time: Longest time [s] to wait for discovery when the arguments name none.
+        args: Parsed `GRAPH_ARGUMENTS`.
 
     Yields:
         The graph; the node that looks at it is gone afterwards.
     """
     with open_session(args) as session:
-        asked: float | None = args.spin_time
-        yield Graph(session, asked if spin_time is None else asked or spin_time)
+        yield Graph(session, args.spin_time)
+
+
+def graph_verb(*arguments: Argument) -> Callable[[Callable[[Graph, Namespace], int | None]], Verb]:
+    """Make a verb of a function that looks at the ROS graph.
+
+    Args:
+        *arguments: Its arguments behind those of the graph.
+    """
+
+    def declare(run: Callable[[Graph, Namespace], int | None]) -> Verb:
+        def main(args: Namespace) -> int | None:
+            with open_graph(args) as graph:
+                return run(graph, args)
+
+        return Verb((*GRAPH_ARGUMENTS, *arguments), main)
+
+    return declare
 
 
 def _visible(pairs: NamesAndTypes, hidden: bool) -> NamesAndTypes:

@@ -4,11 +4,13 @@
 
 from __future__ import annotations
 
-from argparse import ArgumentParser, Namespace
+from argparse import Namespace
 from collections.abc import Callable
+from functools import partial
 
 from ..aliases import Handle, QosProfile
 from ..cli.arguments import positive_float, unsigned_int
+from ..cli.verb import Arguments
 from .graph import Graph
 
 _OVERRIDES = (
@@ -25,7 +27,7 @@ _FALL_BACK = (
 )
 
 
-def add_qos_arguments(parser: ArgumentParser, verb: str, preset: str) -> None:
+def add_qos_arguments(parser: Arguments, verb: str, preset: str) -> None:
     """Add the QoS options.
 
     Args:
@@ -69,6 +71,10 @@ def add_qos_arguments(parser: ArgumentParser, verb: str, preset: str) -> None:
             default.liveliness_lease_duration,
         ),
     )
+
+
+SUBSCRIPTION_QOS = partial(add_qos_arguments, verb='subscribe', preset='sensor_data')
+PUBLISHER_QOS = partial(add_qos_arguments, verb='publish', preset='default')
 
 
 def _help(what: str, verb: str, value: str, default: object) -> str:

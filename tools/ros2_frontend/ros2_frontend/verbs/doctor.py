@@ -4,12 +4,12 @@
 
 from __future__ import annotations
 
-from argparse import ArgumentParser, Namespace
+from argparse import Namespace
 from collections.abc import Mapping
 import os
 import sys
 
-from ..cli.arguments import add_graph_arguments
+from ..cli.verb import flag
 from ..health.environment import check_environment, report_environment, report_platform
 from ..health.findings import error, Finding, Report, Severity
 from ..health.network import check_network, read_interfaces, report_network
@@ -22,51 +22,36 @@ from ..health.topics import (
     Topic,
 )
 from ..ros.discovery import take_census
-from ..ros.graph import Graph, open_graph
+from ..ros.graph import Graph, graph_verb
 from ..ros.participants import read_ports
 
 
-class Doctor:
-    """Check ROS setup and other potential issues."""
-
-    def add_arguments(self, parser: ArgumentParser) -> None:
-        """Add the command's own arguments."""
-        add_graph_arguments(parser)
-        parser.add_argument('--report', '-r', action='store_true', help='Print all reports.')
-        parser.add_argument(
-            '--report-failed',
-            '-rf',
-            action='store_true',
-            help='Print reports of failed checks only.',
-        )
-        parser.add_argument(
-            '--include-warnings',
-            '-iw',
-            action='store_true',
-            help='Include warnings as failed checks. Warnings are ignored by default.',
-        )
-        parser.add_argument(
-            '--exclude-packages',
-            '-ep',
-            action='store_true',
-            help='Accepted and without effect: package versions are not checked',
-        )
-
-    def main(self, args: Namespace) -> None:
-        """Look at everything and print what may be wrong; exit code 0, as ros2cli."""
-        with open_graph(args) as graph:
-            graph.settle()
-            topics = read_topics(graph)
-            discovery = _check_discovery(graph)
-            reports = _reports(graph, topics)
-        if args.report:
-            for report in reports.values():
-                print(report.text())
-            return
-        failed = _check(topics, discovery, args.include_warnings)
-        if args.report_failed:
-            for name in failed:
-                print(reports[name].text())
+@graph_verb(
+    flag('--report', '-r', help='Print all reports.'),
+    flag('--report-failed', '-rf', help='Print reports of failed checks only.'),
+    flag(
+        '--include-warnings',
+        '-iw',
+        help='Include warnings as failed checks. Warnings are ignored by default.',
+    ),
+    flag(
+        '--exclude-packages',
+        '-ep',
+        help='Accepted and without effect: package versions are not checked',
+    ),
+)
+def doctor(graph: Graph, args: Namespace) -> None:
+    """Look at everything and print what may be wrong; exit code 0, as ros2cli."""
+    graph.settle()
+    topics = read_topics(graph)
+    reports = _reports(graph, topics)
+    if args.report:
+        wanted = list(reports)
+    else:
+        failed = _check(topics, _check_discovery(graph), args.include_warnings)
+        wanted = failed if args.report_failed else []
+    for name in wanted:
+        print(reports[name].text())
 
 
 def _check(topics: list[Topic], discovery: list[Finding], include_warnings: bool) -> list[str]:

@@ -4,10 +4,11 @@
 
 from __future__ import annotations
 
-from argparse import ArgumentParser, Namespace
+from argparse import Namespace
 import sys
 
 from ..cli.errors import FrontendError
+from ..cli.verb import Argument, argument, exclusive, flag, verb
 from ..index.definition import Comments, expand
 from ..index.interfaces import (
     all_interfaces,
@@ -25,9 +26,9 @@ _FLAGS = {
 }
 
 
-def _add_kind_flags(parser: ArgumentParser, help_: str) -> None:
-    for kind, (short, noun) in _FLAGS.items():
-        parser.add_argument(
+def _kind_flags(help_: str) -> tuple[Argument, ...]:
+    return tuple(
+        argument(
             short,
             f'--only-{noun}',
             dest='kinds',
@@ -35,120 +36,88 @@ def _add_kind_flags(parser: ArgumentParser, help_: str) -> None:
             const=kind,
             help=help_.format(kind.name.lower()),
         )
+        for kind, (short, noun) in _FLAGS.items()
+    )
 
 
-class List:
-    """List all interface types available."""
-
-    def add_arguments(self, parser: ArgumentParser) -> None:
-        """Add the command's own arguments."""
-        _add_kind_flags(parser, 'Print out only the {} types')
-
-    def main(self, args: Namespace) -> None:
-        """Print the types, grouped by kind."""
-        for kind, title in _TITLES.items():
-            if args.kinds and kind not in args.kinds:
-                continue
-            print(f'{title}:')
-            for names in all_interfaces([kind]).values():
-                for name in names:
-                    print(f'    {name}')
+@verb(*_kind_flags('Print out only the {} types'))
+def list_all(args: Namespace) -> None:
+    """Print the types, grouped by kind."""
+    for kind, title in _TITLES.items():
+        if args.kinds and kind not in args.kinds:
+            continue
+        print(f'{title}:')
+        for names in all_interfaces([kind]).values():
+            for name in names:
+                print(f'    {name}')
 
 
-class Packages:
-    """Output a list of packages that provide interfaces."""
-
-    def add_arguments(self, parser: ArgumentParser) -> None:
-        """Add the command's own arguments."""
-        _add_kind_flags(parser, 'Only list packages that generate {}s')
-
-    def main(self, args: Namespace) -> None:
-        """Print the packages."""
-        for name in all_interfaces(args.kinds or Kind):
-            print(name)
+@verb(*_kind_flags('Only list packages that generate {}s'))
+def packages(args: Namespace) -> None:
+    """Print the packages that define types."""
+    for name in all_interfaces(args.kinds or Kind):
+        print(name)
 
 
-class Package:
-    """Output a list of available interface types within one package."""
+@verb(argument('package_name', help="Name of the ROS package (e.g. 'example_interfaces')"))
+def package(args: Namespace) -> None:
+    """Print the types of one package.
 
-    def add_arguments(self, parser: ArgumentParser) -> None:
-        """Add the command's own arguments."""
-        parser.add_argument(
-            'package_name', help="Name of the ROS package (e.g. 'example_interfaces')"
-        )
-
-    def main(self, args: Namespace) -> None:
-        """Print the types.
-
-        Raises:
-            UnknownNameError: When the package defines none.
-        """
-        for name in interfaces_of(args.package_name):
-            print(name)
+    Raises:
+        UnknownNameError: When the package defines none.
+    """
+    for name in interfaces_of(args.package_name):
+        print(name)
 
 
-class Proto:
-    """Output an interface prototype."""
+@verb(
+    argument('type', help="Show an interface definition (e.g. 'example_interfaces/msg/String')"),
+    flag('--no-quotes', help='if true output has no outer quotes.'),
+)
+def proto(args: Namespace) -> None:
+    """Print the defaults of a message, request or goal as YAML.
 
-    def add_arguments(self, parser: ArgumentParser) -> None:
-        """Add the command's own arguments."""
-        parser.add_argument(
-            'type', help="Show an interface definition (e.g. 'example_interfaces/msg/String')"
-        )
-        parser.add_argument(
-            '--no-quotes', action='store_true', help='if true output has no outer quotes.'
-        )
+    Raises:
+        UnknownNameError: When there is no such interface.
+    """
+    from ..messages.document import to_document
+    from ..messages.yaml_text import to_yaml
 
-    def main(self, args: Namespace) -> None:
-        """Print the defaults of a message, request or goal as YAML.
-
-        Raises:
-            UnknownNameError: When there is no such interface.
-        """
-        from ..messages.document import to_document
-        from ..messages.yaml_text import to_yaml
-
-        kind = Kind(definition_path(args.type).parent.name)
-        found = class_of(args.type, kind, 'The passed interface type is invalid')
-        part = {Kind.SERVICE: 'Request', Kind.ACTION: 'Goal'}.get(kind)
-        message = getattr(found, part)() if part else found()
-        text = to_yaml(to_document(message))
-        print(text if args.no_quotes else f'"{text}"')
+    kind = Kind(definition_path(args.type).parent.name)
+    found = class_of(args.type, kind, 'The passed interface type is invalid')
+    part = {Kind.SERVICE: 'Request', Kind.ACTION: 'Goal'}.get(kind)
+    message = getattr(found, part)() if part else found()
+    text = to_yaml(to_document(message))
+    print(text if args.no_quotes else f'"{text}"')
 
 
-class Show:
-    """Output the interface definition."""
-
-    def add_arguments(self, parser: ArgumentParser) -> None:
-        """Add the command's own arguments."""
-        comments = parser.add_mutually_exclusive_group()
-        comments.add_argument(
+@verb(
+    exclusive(
+        flag(
             '--all-comments',
-            action='store_true',
             help='Show all comments, including for nested interface definitions',
-        )
-        comments.add_argument(
-            '--no-comments', action='store_true', help='Show no comments or whitespace'
-        )
-        parser.add_argument(
-            'type',
-            help="Show an interface definition (e.g. 'example_interfaces/msg/String'). "
-            "Passing '-' reads the argument from stdin (e.g. "
-            "'ros2 topic type /chatter | ros2 interface show -').",
-        )
+        ),
+        flag('--no-comments', help='Show no comments or whitespace'),
+    ),
+    argument(
+        'type',
+        help="Show an interface definition (e.g. 'example_interfaces/msg/String'). "
+        "Passing '-' reads the argument from stdin (e.g. "
+        "'ros2 topic type /chatter | ros2 interface show -').",
+    ),
+)
+def show(args: Namespace) -> None:
+    """Print the definition with those of its fields' types.
 
-    def main(self, args: Namespace) -> None:
-        """Print the definition with those of its fields' types.
-
-        Raises:
-            FrontendError: When no type is given on stdin.
-            UnknownNameError: When there is no such interface.
-        """
-        name = sys.stdin.readline().strip() if args.type == '-' else args.type
-        if not name:
-            raise FrontendError('the passed value is empty')
-        for line in expand(name, _read, Comments(not args.no_comments, args.all_comments)):
-            print(line)
+    Raises:
+        FrontendError: When no type is given on stdin.
+        UnknownNameError: When there is no such interface.
+    """
+    name = sys.stdin.readline().strip() if args.type == '-' else args.type
+    if not name:
+        raise FrontendError('the passed value is empty')
+    for line in expand(name, _read, Comments(not args.no_comments, args.all_comments)):
+        print(line)
 
 
 def _read(name: str) -> str:

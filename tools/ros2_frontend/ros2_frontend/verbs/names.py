@@ -1,155 +1,127 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What listing, typing and finding have in common for topics, services and actions."""
+"""What the verbs of topics, services and actions share: they list, find and type names."""
 
 from __future__ import annotations
 
-from argparse import ArgumentParser, Namespace, SUPPRESS
+from argparse import Namespace, SUPPRESS
 from collections.abc import Callable
+from dataclasses import dataclass
 import sys
 
 from ..aliases import NamesAndTypes
-from ..cli.arguments import add_graph_arguments
 from ..cli.errors import UnknownNameError
 from ..cli.suggest import hint
+from ..cli.verb import Argument, argument, flag
 from ..ros.graph import Graph
 from ..ros.names import absolute, is_hidden
 
-Read = Callable[[bool], NamesAndTypes]
-"""Gives names and types; the argument says whether to include hidden ones."""
 
+@dataclass(frozen=True, slots=True)
+class Names:
+    """One kind of names in the ROS graph: topics, services or actions.
 
-def add_hidden_flag(parser: ArgumentParser, noun: str) -> None:
-    """Add the switch that shows hidden names.
-
-    Args:
-        parser: The command's parser.
-        noun: What is listed: topics or services.
+    Attributes:
+        kind: What they name, in the singular.
+        read: Returns names and types; hidden ones, too, when the second argument is true.
     """
-    parser.add_argument(
-        f'--include-hidden-{noun}',
-        dest=f'include_hidden_{noun}',
-        action='store_true',
-        default=SUPPRESS,  # the group has the same switch before its verb
-        help=f'Consider hidden {noun} as well',
-    )
+
+    kind: str
+    read: Callable[[Graph, bool], NamesAndTypes]
+
+    @property
+    def count_flag(self) -> Argument:
+        """The switch that prints only how many there are."""
+        text = f'Only display the number of {self.kind}s discovered'
+        return flag('-c', f'--count-{self.kind}s', dest='count', help=text)
+
+    @property
+    def hidden_flag(self) -> Argument:
+        """The switch that shows hidden names; the group has the same before its verb."""
+        return flag(
+            f'--include-hidden-{self.kind}s',
+            default=SUPPRESS,
+            help=f'Consider hidden {self.kind}s as well',
+        )
+
+    @property
+    def types_flag(self) -> Argument:
+        """The switch that shows types, too."""
+        return flag('-t', '--show-types', help=f'Additionally show the {self.kind} type')
+
+    def name_argument(self, purpose: str, example: str) -> Argument:
+        """The name that the verb is about, with an example for the help."""
+        text = f"Name of the ROS {self.kind} to {purpose} (e.g. '{example}')"
+        return argument(f'{self.kind}_name', help=text)
+
+    def type_argument(self, example: str) -> Argument:
+        """The type that is looked for, with an example for the help."""
+        text = f"Name of the ROS {self.kind} type to filter for (e.g. '{example}')"
+        return argument(f'{self.kind}_type', help=text)
+
+    def shown(self, graph: Graph, args: Namespace) -> NamesAndTypes:
+        """Wait for the whole graph, and return the names that the options let pass."""
+        graph.settle()
+        return self.read(graph, self._hidden(args))
+
+    def print_list(self, graph: Graph, args: Namespace) -> None:
+        """Do `list`."""
+        pairs = self.shown(graph, args)
+        _print(
+            [f'{name} [{", ".join(types)}]' if args.show_types else name for name, types in pairs],
+            args,
+        )
+
+    def print_found(self, graph: Graph, args: Namespace) -> None:
+        """Do `find`."""
+        wanted = getattr(args, f'{self.kind}_type')
+        _print([name for name, types in self.shown(graph, args) if wanted in types], args)
+
+    def print_type(self, graph: Graph, args: Namespace) -> int:
+        """Do `type`: one per line.
+
+        Returns:
+            The exit code: 1, and nothing on stdout, when there is no such name (as ros2cli does).
+        """
+        name = getattr(args, f'{self.kind}_name')
+        try:
+            types = self._types_of(name, graph, f"Unknown name '{name}'", self._hidden(args))
+        except UnknownNameError as error:
+            print(error, file=sys.stderr)
+            return 1
+        print(*types, sep='\n')
+        return 0
+
+    def print_info_type(self, graph: Graph, args: Namespace, end: str = '\n') -> str:
+        """Do the first line of `info`, when the whole graph is there.
+
+        Returns:
+            The absolute name.
+
+        Raises:
+            UnknownNameError: It does not appear; the message names the nearest.
+        """
+        name = getattr(args, f'{self.kind}_name')
+        types = self._types_of(name, graph, f"Unknown {self.kind} '{name}'")
+        graph.settle()
+        print(f'Type: {types[0] if len(types) == 1 else types}', end=end)
+        return absolute(name)
+
+    def _hidden(self, args: Namespace) -> bool:
+        return getattr(args, f'include_hidden_{self.kind}s', True)
+
+    def _types_of(
+        self, name: str, graph: Graph, unknown: str, hidden: bool | None = None
+    ) -> list[str]:
+        """Wait for a name; `hidden` as for `read`, None lets its own spelling decide."""
+        wanted = absolute(name)
+        types = graph.wait_for(lambda: dict(self.read(graph, hidden is not False)).get(wanted))
+        if types is None:
+            near = is_hidden(wanted) if hidden is None else hidden
+            raise UnknownNameError(unknown + hint(wanted, dict(self.read(graph, near))))
+        return types
 
 
-def add_list_arguments(parser: ArgumentParser, noun: str) -> None:
-    """Add the arguments of a `list` verb.
-
-    Args:
-        parser: The command's parser.
-        noun: What is listed: topics, services or actions.
-    """
-    add_graph_arguments(parser)
-    parser.add_argument(
-        '-t',
-        '--show-types',
-        action='store_true',
-        help=f'Additionally show the {noun.removesuffix("s")} type',
-    )
-    _add_count(parser, noun)
-
-
-def add_find_arguments(parser: ArgumentParser, noun: str, example: str) -> None:
-    """Add the arguments of a `find` verb.
-
-    Args:
-        parser: The command's parser.
-        noun: What is listed: topics or services.
-        example: A type, for the help text.
-    """
-    add_graph_arguments(parser)
-    kind = noun.removesuffix('s')
-    parser.add_argument(
-        f'{kind}_type',
-        metavar=f'{kind}_type',
-        help=f"Name of the ROS {kind} type to filter for (e.g. '{example}')",
-    )
-    _add_count(parser, noun)
-
-
-def _add_count(parser: ArgumentParser, noun: str) -> None:
-    parser.add_argument(
-        '-c',
-        f'--count-{noun}',
-        dest='count',
-        action='store_true',
-        help=f'Only display the number of {noun} discovered',
-    )
-
-
-def print_names(pairs: NamesAndTypes, args: Namespace) -> None:
-    """Print what a `list` verb found.
-
-    Args:
-        pairs: Names and types.
-        args: The parsed arguments of `add_list_arguments`.
-    """
-    if args.count:
-        print(len(pairs))
-        return
-    for name, types in pairs:
-        print(f'{name} [{", ".join(types)}]' if args.show_types else name)
-
-
-def print_found(pairs: NamesAndTypes, wanted: str, count: bool) -> None:
-    """Print the names that have a type.
-
-    Args:
-        pairs: Names and types.
-        wanted: The type.
-        count: Whether to print only how many there are.
-    """
-    found = [name for name, types in pairs if wanted in types]
-    if count:
-        print(len(found))
-        return
-    for name in found:
-        print(name)
-
-
-def types_of(name: str, graph: Graph, read: Read, message: str) -> list[str]:
-    """Wait for a name and answer its types.
-
-    Args:
-        name: The name as typed; a missing leading slash is added.
-        graph: The graph to wait in.
-        read: Gives the names that count.
-        message: What ros2cli says when it is not there.
-
-    Returns:
-        Its types.
-
-    Raises:
-        UnknownNameError: When it does not appear; it names the nearest.
-    """
-    full_name = absolute(name)
-    types = graph.wait_for(lambda: dict(read(True)).get(full_name))
-    if types is None:
-        known = [other for other, _ in read(is_hidden(full_name))]
-        raise UnknownNameError(message + hint(full_name, known))
-    return types
-
-
-def print_types(name: str, graph: Graph, read: Read, hidden: bool) -> int:
-    """Print the types of a name, one per line.
-
-    Args:
-        name: The name as typed.
-        graph: The graph to wait in.
-        read: Gives the names that count.
-        hidden: Whether hidden names count.
-
-    Returns:
-        The exit code: 1, and nothing on stdout, when there is no such name (as ros2cli does).
-    """
-    try:
-        types = types_of(name, graph, lambda _: read(hidden), f"Unknown name '{name}'")
-    except UnknownNameError as error:
-        print(error, file=sys.stderr)
-        return 1
-    for type_ in types:
-        print(type_)
-    return 0
+def _print(lines: list[str], args: Namespace) -> None:
+    for line in [len(lines)] if args.count else lines:
+        print(line)

@@ -4,86 +4,65 @@
 
 from __future__ import annotations
 
-from argparse import ArgumentParser, Namespace
+from argparse import Namespace
 from collections.abc import Callable, Iterable
 import sys
 
 from ..aliases import NamesAndTypes, Node
-from ..cli.arguments import add_graph_arguments
-from ..ros.graph import open_graph
+from ..cli.verb import argument, flag
+from ..ros.graph import Graph, graph_verb
 from ..ros.names import is_hidden
 from .node_argument import find_node
 
+LIST_ARGUMENTS = (
+    flag('-a', '--all', help='Display all nodes even hidden ones'),
+    flag('-c', '--count-nodes', help='Only display the number of nodes discovered'),
+)
 
-class List:
-    """Output a list of available nodes."""
 
-    def add_arguments(self, parser: ArgumentParser) -> None:
-        """Add the command's own arguments."""
-        add_graph_arguments(parser)
-        parser.add_argument(
-            '-a', '--all', action='store_true', help='Display all nodes even hidden ones'
+@graph_verb(*LIST_ARGUMENTS)
+def list_names(graph: Graph, args: Namespace) -> None:
+    """Print the names, sorted."""
+    graph.settle()
+    names = sorted(node.full_name for node in graph.nodes(hidden=args.all))
+    if args.count_nodes:
+        print(len(names))
+        return
+    if len(set(names)) < len(names):
+        print(
+            'WARNING: Be aware that there are nodes in the graph that share an exact name, '
+            'which can have unintended side effects.',
+            file=sys.stderr,
         )
-        parser.add_argument(
-            '-c',
-            '--count-nodes',
-            action='store_true',
-            help='Only display the number of nodes discovered',
+    for name in names:
+        print(name)
+
+
+@graph_verb(
+    argument('node_name', help='Node name to request information about'),
+    flag('--include-hidden', help='Display hidden topics, services, and actions as well'),
+)
+def info(graph: Graph, args: Namespace) -> None:
+    """Print what the node offers and uses.
+
+    Raises:
+        UnknownNameError: When there is no such node.
+    """
+    unknown = f"Unable to find node '{args.node_name}'"
+    wanted = find_node(args.node_name, graph, args.include_hidden, unknown)
+    graph.settle()
+    count = graph.nodes(hidden=True).count(wanted)
+    if count > 1:
+        print(
+            f'There are {count} nodes in the graph with the exact name '
+            f'"{wanted.full_name}". You are seeing information about only one of them.',
+            file=sys.stderr,
         )
-
-    def main(self, args: Namespace) -> None:
-        """Print the names, sorted."""
-        with open_graph(args) as graph:
-            graph.settle()
-            names = sorted(node.full_name for node in graph.nodes(hidden=args.all))
-        if args.count_nodes:
-            print(len(names))
-            return
-        if len(set(names)) < len(names):
-            print(
-                'WARNING: Be aware that there are nodes in the graph that share an exact name, '
-                'which can have unintended side effects.',
-                file=sys.stderr,
-            )
-        for name in names:
-            print(name)
-
-
-class Info:
-    """Output information about a node."""
-
-    def add_arguments(self, parser: ArgumentParser) -> None:
-        """Add the command's own arguments."""
-        add_graph_arguments(parser)
-        parser.add_argument('node_name', help='Node name to request information about')
-        parser.add_argument(
-            '--include-hidden',
-            action='store_true',
-            help='Display hidden topics, services, and actions as well',
-        )
-
-    def main(self, args: Namespace) -> None:
-        """Print what the node offers and uses.
-
-        Raises:
-            UnknownNameError: When there is no such node.
-        """
-        unknown = f"Unable to find node '{args.node_name}'"
-        with open_graph(args) as graph:
-            wanted = find_node(args.node_name, graph, args.include_hidden, unknown)
-            graph.settle()
-            count = graph.nodes(hidden=True).count(wanted)
-            if count > 1:
-                print(
-                    f'There are {count} nodes in the graph with the exact name '
-                    f'"{wanted.full_name}". You are seeing information about only one of them.',
-                    file=sys.stderr,
-                )
-            print(wanted.full_name)
-            for title, query in _queries():
-                entries = query(graph.session.node, wanted.name, wanted.namespace)
-                print(f'  {title}:')
-                _print_entries(entries, args.include_hidden)
+    print(wanted.full_name)
+    for title, query in _queries():
+        entries = query(graph.session.node, wanted.name, wanted.namespace)
+        print(f'  {title}:')
+        _print_entries(entries, args.include_hidden)
 
 
 Query = Callable[[Node, str, str], NamesAndTypes]

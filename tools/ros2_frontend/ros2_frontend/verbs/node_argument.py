@@ -4,29 +4,43 @@
 
 from __future__ import annotations
 
-from argparse import ArgumentParser
+from argparse import Namespace
+from collections.abc import Callable
 
-from ..cli.arguments import add_graph_arguments
 from ..cli.errors import UnknownNameError
 from ..cli.suggest import hint
-from ..ros.graph import Graph
+from ..cli.verb import Argument, argument, flag, Verb
+from ..ros.graph import Graph, graph_verb
 from ..ros.names import NodeName
+from ..ros.session import Session
 
 _NOT_FOUND = 'Node not found'
 
 
-def add_node_argument(parser: ArgumentParser, *, optional: bool = False) -> None:
-    """Add the node's name and the switch that lets it be a hidden one.
+HIDDEN_NODES = flag('--include-hidden-nodes', help='Consider hidden nodes as well')
+NODE = (argument('node_name', help='Name of the ROS node'), HIDDEN_NODES)
+OPTIONAL_NODE = (argument('node_name', nargs='?', help='Name of the ROS node'), HIDDEN_NODES)
+"""Without a name, all nodes are meant."""
+
+NodeMain = Callable[[Session, NodeName, Namespace], 'int | None']
+
+
+def node_verb(*arguments: Argument) -> Callable[[NodeMain], Verb]:
+    """Make a verb of a function that talks to one node.
 
     Args:
-        parser: The command's parser.
-        optional: Whether all nodes are meant when none is named.
+        *arguments: Its arguments behind the node's name.
     """
-    add_graph_arguments(parser)
-    parser.add_argument('node_name', nargs='?' if optional else None, help='Name of the ROS node')
-    parser.add_argument(
-        '--include-hidden-nodes', action='store_true', help='Consider hidden nodes as well'
-    )
+
+    def declare(run: NodeMain) -> Verb:
+        @graph_verb(*NODE, *arguments)
+        def on_node(graph: Graph, args: Namespace) -> int | None:
+            node = find_node(args.node_name, graph, args.include_hidden_nodes)
+            return run(graph.session, node, args)
+
+        return on_node
+
+    return declare
 
 
 def find_node(name: str, graph: Graph, hidden: bool, message: str = _NOT_FOUND) -> NodeName:

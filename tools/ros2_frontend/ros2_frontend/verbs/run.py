@@ -9,7 +9,7 @@ which leaves the node running when only the parent is killed.)
 
 from __future__ import annotations
 
-from argparse import ArgumentParser, Namespace, REMAINDER
+from argparse import Namespace, REMAINDER
 import os
 from pathlib import Path
 import shlex
@@ -19,36 +19,30 @@ from typing import NoReturn
 
 from ..cli.errors import FrontendError, UnknownNameError
 from ..cli.suggest import hint
+from ..cli.verb import argument, verb
 from ..index.packages import executables
 
 
-class Run:
-    """Run a package specific executable."""
+@verb(
+    argument(
+        '--prefix',
+        help='Prefix command, which should go before the executable. '
+        'Command must be wrapped in quotes if it contains spaces '
+        "(e.g. --prefix 'gdb -ex run --args').",
+    ),
+    argument('package_name', help='Name of the ROS package'),
+    argument('executable_name', help='Name of the executable'),
+    argument('argv', nargs=REMAINDER, help='Pass arbitrary arguments to the executable'),
+)
+def run(args: Namespace) -> NoReturn:
+    """Replace this process by the executable.
 
-    def add_arguments(self, parser: ArgumentParser) -> None:
-        """Add the command's own arguments."""
-        parser.add_argument(
-            '--prefix',
-            help='Prefix command, which should go before the executable. '
-            'Command must be wrapped in quotes if it contains spaces '
-            "(e.g. --prefix 'gdb -ex run --args').",
-        )
-        parser.add_argument('package_name', help='Name of the ROS package')
-        parser.add_argument('executable_name', help='Name of the executable')
-        parser.add_argument(
-            'argv', nargs=REMAINDER, help='Pass arbitrary arguments to the executable'
-        )
-
-    def main(self, args: Namespace) -> NoReturn:
-        """Replace this process by the executable.
-
-        Raises:
-            UnknownNameError: When there is no such package or executable.
-            FrontendError: When several have the name, or it cannot be started.
-        """
-        path = find_executable(args.package_name, args.executable_name)
-        prefix = shlex.split(args.prefix) if args.prefix else []
-        become([*prefix, str(path), *args.argv])
+    Raises:
+        UnknownNameError: When there is no such package or executable.
+    """
+    path = find_executable(args.package_name, args.executable_name)
+    prefix = shlex.split(args.prefix) if args.prefix else []
+    become([*prefix, str(path), *args.argv])
 
 
 def find_executable(package: str, name: str) -> Path:

@@ -4,22 +4,22 @@
 
 from __future__ import annotations
 
-from argparse import ArgumentParser, Namespace
+from argparse import Namespace
 import sys
 
 from ..aliases import Handle, Message
-from ..cli.arguments import add_graph_arguments
-from ..cli.errors import FieldValueError, FrontendError
+from ..cli.arguments import content, GRAPH_ARGUMENTS
+from ..cli.errors import FrontendError
 from ..cli.suggest import hint
+from ..cli.verb import argument, flag, verb
 from ..index.interfaces import class_of, Kind
 from ..messages.document import to_document
-from ..messages.fill import Filler
-from ..messages.from_text import parse_mapping
+from ..messages.fill import filled
 from ..messages.yaml_text import to_yaml
 from ..ros.actions import offered_actions
-from ..ros.graph import Graph
+from ..ros.graph import Graph, open_graph
 from ..ros.names import absolute
-from ..ros.session import open_session, Session
+from ..ros.session import Session
 
 _CANCEL_TIMEOUT = 5.0  # [s]
 
@@ -34,52 +34,38 @@ _STATUS = {
 }
 
 
-class SendGoal:
-    """Send an action goal."""
+@verb(
+    *GRAPH_ARGUMENTS,
+    argument('action_name', help="Name of the ROS action (e.g. '/fibonacci')"),
+    argument(
+        'action_type', help="Type of the ROS action (e.g. 'example_interfaces/action/Fibonacci')"
+    ),
+    content(
+        'goal',
+        "Goal request values in YAML format (e.g. '{order: 10}')",
+        'Read goal from standard input',
+    ),
+    flag('-f', '--feedback', help='Echo feedback messages for the goal'),
+)
+def send_goal(args: Namespace) -> None:
+    """Send the goal and wait for its result; Ctrl-C cancels it.
 
-    def add_arguments(self, parser: ArgumentParser) -> None:
-        """Add the command's own arguments."""
-        add_graph_arguments(parser)
-        parser.add_argument('action_name', help="Name of the ROS action (e.g. '/fibonacci')")
-        parser.add_argument(
-            'action_type',
-            help="Type of the ROS action (e.g. 'example_interfaces/action/Fibonacci')",
-        )
-        content = parser.add_mutually_exclusive_group()
-        content.add_argument(
-            'goal',
-            nargs='?',
-            default='{}',
-            help="Goal request values in YAML format (e.g. '{order: 10}')",
-        )
-        content.add_argument('--stdin', action='store_true', help='Read goal from standard input')
-        parser.add_argument(
-            '-f', '--feedback', action='store_true', help='Echo feedback messages for the goal'
-        )
+    Raises:
+        BadTypeError: When the type is not installed or no action.
+        FieldValueError: When the values do not fit the goal.
+    """
+    type_ = class_of(args.action_type, Kind.ACTION, 'The passed action type is invalid')
+    text = sys.stdin.read() if args.stdin else args.goal
+    goal = filled(type_.Goal(), text, what='message fields')
+    from rclpy.action.client import ActionClient
 
-    def main(self, args: Namespace) -> None:
-        """Send the goal and wait for its result; Ctrl-C cancels it.
-
-        Raises:
-            BadTypeError: When the type is not installed or no action.
-            FieldValueError: When the values do not fit the goal.
-        """
-        action_type = class_of(args.action_type, Kind.ACTION, 'The passed action type is invalid')
-        goal = action_type.Goal()
-        values = parse_mapping(sys.stdin.read() if args.stdin else args.goal)
+    with open_graph(args) as graph:
+        client = ActionClient(graph.session.node, type_, absolute(args.action_name))
         try:
-            Filler().fill(goal, values)
-        except FieldValueError as error:
-            raise FieldValueError(f'Failed to populate message fields: {error}') from None
-        from rclpy.action.client import ActionClient
-
-        with open_session(args) as session:
-            client = ActionClient(session.node, action_type, absolute(args.action_name))
-            try:
-                _await_server(client, session, args)
-                _Goal(session, client).run(goal, args.feedback)
-            finally:
-                client.destroy()
+            _await_server(client, graph, args)
+            _Goal(graph.session, client).run(goal, args.feedback)
+        finally:
+            client.destroy()
 
 
 class _Goal:
@@ -130,9 +116,8 @@ class _Goal:
         return future.result()
 
 
-def _await_server(client: Handle, session: Session, args: Namespace) -> None:
+def _await_server(client: Handle, graph: Graph, args: Namespace) -> None:
     print('Waiting for an action server to become available...')
-    graph = Graph(session, args.spin_time)
     if graph.wait_for(lambda: client.server_is_ready() or None):
         return
     name = absolute(args.action_name)

@@ -4,105 +4,79 @@
 
 from __future__ import annotations
 
-from argparse import ArgumentParser, Namespace
+from argparse import Namespace
 import math
 import sys
 import time
 
-from ..aliases import InterfaceClass, Message
-from ..cli.arguments import add_graph_arguments, positive_float
-from ..cli.errors import FieldValueError, NoAnswerError
+from ..cli.arguments import content, GRAPH_ARGUMENTS, positive_float
+from ..cli.errors import NoAnswerError
 from ..cli.suggest import hint
+from ..cli.verb import argument, verb
 from ..index.interfaces import class_of, Kind
-from ..messages.fill import Filler
-from ..messages.from_text import parse_mapping
+from ..messages.fill import filled
 from ..ros.calls import Client
-from ..ros.graph import Graph
+from ..ros.graph import Graph, open_graph
 from ..ros.names import absolute, is_hidden
-from ..ros.session import open_session, Session
+from .service import SERVICES
 
 _GRACE = 0.02  # [s]; ros2cli, too, says nothing when the service is there at once
 
 
-class Call:
-    """Call a service."""
+@verb(
+    *GRAPH_ARGUMENTS,
+    SERVICES.name_argument('call to', '/add_two_ints'),
+    argument('service_type', help="Type of the ROS service (e.g. 'std_srvs/srv/Empty')"),
+    content(
+        'values',
+        "Values to fill the service request with in YAML format (e.g. '{a: 1, b: 2}'), "
+        'otherwise the service request will be published with default values',
+        'Read values from standard input',
+    ),
+    argument(
+        '-r',
+        '--rate',
+        metavar='N',
+        type=positive_float,
+        help='Repeat the call at a specific rate in Hz',
+    ),
+    argument(
+        '--timeout',
+        metavar='N',
+        type=positive_float,
+        help='Longest time [s] to wait for the service, and then for its answer '
+        '(default: for ever)',
+    ),
+)
+def call(args: Namespace) -> None:
+    """Call once, or at a rate until Ctrl-C.
 
-    def add_arguments(self, parser: ArgumentParser) -> None:
-        """Add the command's own arguments."""
-        add_graph_arguments(parser)
-        parser.add_argument(
-            'service_name', help="Name of the ROS service to call to (e.g. '/add_two_ints')"
-        )
-        parser.add_argument(
-            'service_type', help="Type of the ROS service (e.g. 'std_srvs/srv/Empty')"
-        )
-        content = parser.add_mutually_exclusive_group()
-        content.add_argument(
-            'values',
-            nargs='?',
-            default='{}',
-            help="Values to fill the service request with in YAML format (e.g. '{a: 1, b: 2}'), "
-            'otherwise the service request will be published with default values',
-        )
-        content.add_argument(
-            '--stdin', action='store_true', help='Read values from standard input'
-        )
-        parser.add_argument(
-            '-r',
-            '--rate',
-            metavar='N',
-            type=positive_float,
-            help='Repeat the call at a specific rate in Hz',
-        )
-        parser.add_argument(
-            '--timeout',
-            metavar='N',
-            type=positive_float,
-            help='Longest time [s] to wait for the service, and then for its answer '
-            '(default: for ever)',
-        )
-
-    def main(self, args: Namespace) -> None:
-        """Call once, or at a rate until Ctrl-C.
-
-        Raises:
-            BadTypeError: When the type is not installed or no service.
-            FieldValueError: When the values do not fit the request.
-            NoAnswerError: When `--timeout` passed.
-        """
-        service_type = class_of(
-            args.service_type, Kind.SERVICE, 'The passed service type is invalid'
-        )
-        request = _request(service_type, sys.stdin.read() if args.stdin else args.values)
-        with open_session(args) as session:
-            client = Client(session, service_type, absolute(args.service_name))
-            _await(client, session, args)
-            while True:
-                start = time.monotonic()
-                print(f'requester: making request: {request!r}\n')
-                print(f'response:\n{client.call(request, args.timeout)!r}\n')
-                if args.rate is None:
-                    return
-                left = start + 1.0 / args.rate - time.monotonic()
-                session.spin_until(lambda: False, left)
+    Raises:
+        BadTypeError: When the type is not installed or no service.
+        FieldValueError: When the values do not fit the request.
+        NoAnswerError: When `--timeout` passed.
+    """
+    type_ = class_of(args.service_type, Kind.SERVICE, 'The passed service type is invalid')
+    request = filled(type_.Request(), sys.stdin.read() if args.stdin else args.values)
+    with open_graph(args) as graph:
+        client = Client(graph.session, type_, absolute(args.service_name))
+        _await(client, graph, args)
+        while True:
+            start = time.monotonic()
+            print(f'requester: making request: {request!r}\n')
+            print(f'response:\n{client.call(request, args.timeout)!r}\n')
+            if args.rate is None:
+                return
+            left = start + 1.0 / args.rate - time.monotonic()
+            graph.session.spin_until(lambda: False, left)
 
 
-def _request(service_type: InterfaceClass, text: str) -> Message:
-    request, values = service_type.Request(), parse_mapping(text)
-    try:
-        Filler().fill(request, values)
-    except FieldValueError as error:
-        raise FieldValueError(f'Failed to populate field: {error}') from None
-    return request
-
-
-def _await(client: Client, session: Session, args: Namespace) -> None:
+def _await(client: Client, graph: Graph, args: Namespace) -> None:
     """Wait for the service; say so when it is not there at once, and what else is."""
     if client.wait(_GRACE):
         return
     print('waiting for service to become available...')
     start = time.monotonic()
-    graph = Graph(session, args.spin_time)
     if graph.wait_for(lambda: client.is_ready() or None, args.timeout or math.inf):
         return
     name = client.name

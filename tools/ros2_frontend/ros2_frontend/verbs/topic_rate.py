@@ -4,17 +4,18 @@
 
 from __future__ import annotations
 
-from argparse import ArgumentParser, Namespace
+from argparse import Namespace
 from collections.abc import Callable
 import time
 
 from ..aliases import Message
-from ..cli.arguments import add_graph_arguments, positive_int
+from ..cli.arguments import positive_int
 from ..cli.errors import FrontendError
-from ..ros.graph import Graph
+from ..cli.verb import Argument, argument, flag
+from ..ros.graph import Graph, graph_verb
 from ..ros.names import absolute
-from ..ros.qos import add_qos_arguments, matching_profile
-from ..ros.session import open_session, Session
+from ..ros.qos import matching_profile, SUBSCRIPTION_QOS
+from ..ros.session import Session
 from .expression import compile_filter
 from .statistics import Delays, NANOSECONDS, Periods, Sizes
 from .topic_types import await_class_of_topic
@@ -24,117 +25,98 @@ _LONG_WINDOW = 10_000
 _SHORT_WINDOW = 100
 
 
-def _add_common(parser: ArgumentParser, help_: str, window: int) -> None:
-    add_graph_arguments(parser)
-    parser.add_argument('topic_name', help=help_)
-    parser.add_argument(
-        '--window',
-        '-w',
-        metavar='WINDOW',
-        type=positive_int,
-        default=window,
-        help=f'window size, in # of messages, for calculating rate (default: {window})',
+_Take = Callable[[Message], None]
+
+
+def _arguments(topic_help: str, window: int) -> tuple[Argument, ...]:
+    return (
+        argument('topic_name', help=topic_help),
+        argument(
+            '--window',
+            '-w',
+            metavar='WINDOW',
+            type=positive_int,
+            default=window,
+            help=f'window size, in # of messages, for calculating rate (default: {window})',
+        ),
+        SUBSCRIPTION_QOS,
     )
-    add_qos_arguments(parser, 'subscribe', 'sensor_data')
 
 
-def _subscribe(
-    session: Session, args: Namespace, take: Callable[[Message], None], raw: bool
-) -> None:
-    graph = Graph(session, args.spin_time)
+def _subscribe(graph: Graph, args: Namespace, take: _Take, raw: bool) -> None:
     topic = absolute(args.topic_name)
     message_type = await_class_of_topic(args.topic_name, graph)
     graph.wait_for(lambda: graph.publishers(topic) or None)
     profile = matching_profile(args, graph, topic, print)
-    session.node.create_subscription(message_type, topic, take, profile, raw=raw)
+    graph.session.node.create_subscription(message_type, topic, take, profile, raw=raw)
 
 
-class Hz:
-    """Print the average receiving rate to screen."""
+@graph_verb(
+    *_arguments("Name of the ROS topic to listen to (e.g. '/chatter')", _LONG_WINDOW),
+    argument(
+        '--filter',
+        dest='filter_expr',
+        metavar='EXPR',
+        help='only measure messages matching the specified Python expression',
+    ),
+    flag(
+        '--wall-time',
+        dest='use_wtime',
+        help='calculates rate using wall time which can be helpful when clock is not '
+        'published during simulation',
+    ),
+)
+def hz(graph: Graph, args: Namespace) -> None:
+    """Print the rate once a second until Ctrl-C."""
+    periods = Periods(args.window)
+    accepts = compile_filter(args.filter_expr)
+    clock = graph.session.node.get_clock()
 
-    def add_arguments(self, parser: ArgumentParser) -> None:
-        """Add the command's own arguments."""
-        _add_common(parser, "Name of the ROS topic to listen to (e.g. '/chatter')", _LONG_WINDOW)
-        parser.add_argument(
-            '--filter',
-            dest='filter_expr',
-            metavar='EXPR',
-            help='only measure messages matching the specified Python expression',
-        )
-        parser.add_argument(
-            '--wall-time',
-            dest='use_wtime',
-            action='store_true',
-            help='calculates rate using wall time which can be helpful when clock is not '
-            'published during simulation',
-        )
+    def take(message: Message) -> None:
+        now = time.time_ns() if args.use_wtime else clock.now().nanoseconds
+        if now and accepts(message) and not periods.add(now):
+            print('time has reset, resetting counters')
+        report = periods.report()
+        if report:
+            print(report)
 
-    def main(self, args: Namespace) -> None:
-        """Print the rate once a second until Ctrl-C."""
-        periods = Periods(args.window)
-        accepts = compile_filter(args.filter_expr)
-        with open_session(args) as session:
-            clock = session.node.get_clock()
-
-            def take(message: Message) -> None:
-                now = time.time_ns() if args.use_wtime else clock.now().nanoseconds
-                if now and accepts(message) and not periods.add(now):
-                    print('time has reset, resetting counters')
-                report = periods.report()
-                if report:
-                    print(report)
-
-            _subscribe(session, args, take, raw=not args.filter_expr)
-            session.spin()
+    _subscribe(graph, args, take, raw=not args.filter_expr)
+    graph.session.spin()
 
 
-class Bw:
-    """Display bandwidth used by topic."""
+@graph_verb(*_arguments('Topic name to monitor for bandwidth utilization', _SHORT_WINDOW))
+def bw(graph: Graph, args: Namespace) -> None:
+    """Print the bandwidth once a second until Ctrl-C."""
+    sizes = Sizes(args.window)
 
-    def add_arguments(self, parser: ArgumentParser) -> None:
-        """Add the command's own arguments."""
-        _add_common(parser, 'Topic name to monitor for bandwidth utilization', _SHORT_WINDOW)
+    def take(message: bytes) -> None:
+        sizes.add(time.monotonic(), len(message))
 
-    def main(self, args: Namespace) -> None:
-        """Print the bandwidth once a second until Ctrl-C."""
-        sizes = Sizes(args.window)
-        with open_session(args) as session:
-
-            def take(message: bytes) -> None:
-                sizes.add(time.monotonic(), len(message))
-
-            _subscribe(session, args, take, raw=True)
-            print(f'Subscribed to [{args.topic_name}]')
-            _report(session, lambda: sizes.report(time.monotonic()))
+    _subscribe(graph, args, take, raw=True)
+    print(f'Subscribed to [{args.topic_name}]')
+    _report(graph.session, lambda: sizes.report(time.monotonic()))
 
 
-class Delay:
-    """Display delay of topic from timestamp in header."""
+@graph_verb(*_arguments('Topic name to calculate the delay for', _LONG_WINDOW))
+def delay(graph: Graph, args: Namespace) -> None:
+    """Print the delay once a second until Ctrl-C.
 
-    def add_arguments(self, parser: ArgumentParser) -> None:
-        """Add the command's own arguments."""
-        _add_common(parser, 'Topic name to calculate the delay for', _LONG_WINDOW)
+    Raises:
+        FrontendError: When the messages have no header.
+    """
+    delays = Delays(args.window)
+    clock = graph.session.node.get_clock()
 
-    def main(self, args: Namespace) -> None:
-        """Print the delay once a second until Ctrl-C.
+    def take(message: Message) -> None:
+        if not hasattr(message, 'header'):
+            raise FrontendError('msg does not have header')
+        stamp = message.header.stamp
+        now = clock.now().nanoseconds
+        if now:
+            delays.add(now - (stamp.sec * NANOSECONDS + stamp.nanosec))
 
-        Raises:
-            FrontendError: When the messages have no header.
-        """
-        delays = Delays(args.window)
-        with open_session(args) as session:
-            clock = session.node.get_clock()
-
-            def take(message: Message) -> None:
-                if not hasattr(message, 'header'):
-                    raise FrontendError('msg does not have header')
-                stamp = message.header.stamp
-                now = clock.now().nanoseconds
-                if now:
-                    delays.add(now - (stamp.sec * NANOSECONDS + stamp.nanosec))
-
-            _subscribe(session, args, take, raw=False)
-            _report(session, delays.report)
+    _subscribe(graph, args, take, raw=False)
+    _report(graph.session, delays.report)
 
 
 def _report(session: Session, report: Callable[[], str | None]) -> None:
