@@ -40,6 +40,18 @@ def from_roll_pitch_yaw(roll: float, pitch: float, yaw: float) -> Quaternion:
     )
 
 
+def axes_from_roll_pitch_yaw(roll: float, pitch: float, yaw: float) -> tuple[Vector, ...]:
+    """Return the body's axes in the world; quicker than :func:`rotate` for several vectors."""
+    sr, cr = math.sin(roll), math.cos(roll)
+    sp, cp = math.sin(pitch), math.cos(pitch)
+    sy, cy = math.sin(yaw), math.cos(yaw)
+    return (
+        (cy * cp, sy * cp, -sp),
+        (cy * sp * sr - sy * cr, sy * sp * sr + cy * cr, cp * sr),
+        (cy * sp * cr + sy * sr, sy * sp * cr - cy * sr, cp * cr),
+    )
+
+
 def roll_pitch_yaw(rotation: Quaternion) -> Vector:
     """Return the angles of a rotation; the pitch is within a quarter turn."""
     x, y, z, w = rotation

@@ -13,6 +13,7 @@ import pytest
 from quad_description.rotations import (
     about,
     about_z,
+    axes_from_roll_pitch_yaw,
     conjugate,
     down_in_body,
     from_roll_pitch_yaw,
@@ -47,6 +48,10 @@ def test_angles_turn_about_fixed_axes(roll: float, pitch: float, yaw: float, v: 
     step = rotate(from_roll_pitch_yaw(0, pitch, 0), step)
     assert rotate(rotation, v) == pytest.approx(rotate(about_z(yaw), step), abs=1e-9)
     assert math.remainder(yaw_of(rotation) - yaw, math.tau) == pytest.approx(0, abs=1e-9)
+    axes = axes_from_roll_pitch_yaw(roll, pitch, yaw)
+    units = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+    for axis, unit in zip(axes, units, strict=True):
+        assert axis == pytest.approx(rotate(rotation, unit), abs=1e-9)
 
 
 @given(st.tuples(*[st.floats(-1, 1)] * 3))

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 import math
 
-from quad_description.rotations import conjugate, from_roll_pitch_yaw, rotate, Vector
+from quad_description.rotations import axes_from_roll_pitch_yaw, Vector
 
 from .velocity import approach
 
@@ -99,16 +99,20 @@ def feet_in_body(feet: Sequence[Vector], pose: BodyPose, centre: Vector) -> list
         pose: Where the body is instead.
         centre: Point that the body turns about in [m].
     """
-    to_body = conjugate(from_roll_pitch_yaw(pose.roll, pose.pitch, pose.yaw))
+    axes = axes_from_roll_pitch_yaw(pose.roll, pose.pitch, pose.yaw)
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = axes
+    cx, cy, cz = centre
+    moved_x, moved_y, moved_z = cx + pose.x, cy + pose.y, cz + pose.z
     moved = []
-    for foot in feet:
-        way = (
-            foot[0] - centre[0] - pose.x,
-            foot[1] - centre[1] - pose.y,
-            foot[2] - centre[2] - pose.z,
+    for foot_x, foot_y, foot_z in feet:
+        x, y, z = foot_x - moved_x, foot_y - moved_y, foot_z - moved_z
+        moved.append(
+            (
+                cx + xx * x + xy * y + xz * z,
+                cy + yx * x + yy * y + yz * z,
+                cz + zx * x + zy * y + zz * z,
+            )
         )
-        x, y, z = rotate(to_body, way)
-        moved.append((centre[0] + x, centre[1] + y, centre[2] + z))
     return moved
 
 
