@@ -13,9 +13,9 @@ from ..master.scheduler import completed, Promise, Scheduler, Task
 from ..standard.drive import DriveState, OperationMode
 from ..standard.target_objects import TARGET_OBJECTS
 from .drive import Drive
+from .drive_control import NOT_TAKEN
 from .halt import RESUME_TIMEOUT
-from .homing import home, HomingProgress
-from .moded_drive import NOT_TAKEN
+from .homing import home, HomingProgress, method_at_init
 from .modes import Mode, NoMode
 from .position_modes import Move, ProfilePosition
 from .recovery import Recovery
@@ -102,8 +102,8 @@ class DriveCommands:
         return self._scheduler.spawn(self._given(command))
 
     async def _given(self, command: Callable[[], str]) -> str:
-        drive, mode = self.drive, self.drive.mode
-        answer = command()
+        control = self.drive.control
+        mode, answer = control.mode, command()
         delivery = self._delivery
         try:
             await self._taken(mode, delivery)
@@ -112,27 +112,28 @@ class DriveCommands:
                 raise
             if mode.withdraw(delivery, error):
                 raise DriveError(f'{error}; it is withdrawn') from error
-            if drive.accepts_targets:
-                drive.hold()
+            if control.accepts_targets:
+                control.hold()
             raise
         return answer
 
     async def _taken(self, mode: Mode, delivery: Promise[None]) -> None:
         """Wait until the drive has what was commanded in a mode, and no halt keeps it."""
         drive, steps = self.drive, self._steps
+        control, halt = drive.control, drive.control.halt
 
         def stopped() -> bool:
-            halted = drive.halted and not drive.halt.leaving
-            return halted or not drive.stays_enabled or drive.mode is not mode
+            halted = halt.held and not halt.leaving
+            return halted or not control.stays_enabled or control.mode is not mode
 
         await steps.until(
-            lambda: stopped() or (delivery.done and not drive.halt.leaving),
+            lambda: stopped() or (delivery.done and not halt.leaving),
             TAKEN_TIMEOUT + drive.node.config.sdo_timeout,
             'its target',
         )
         if delivery.error is not None:
             raise steps.refused(f'has not taken its target ({delivery.error})')
-        if drive.halt.unanswered:
+        if halt.unanswered:
             raise DriveError(f'{drive.name} stays halted: {NOT_TAKEN}')
         if stopped():
             raise steps.refused('was stopped before it had taken the target')
@@ -153,14 +154,14 @@ class DriveCommands:
         Raises:
             DriveError: Another mode is selected, or the drive cannot take it.
         """
-        drive, mode = self.drive, self.drive.mode
+        drive, mode = self.drive, self.drive.control.mode
         if not isinstance(mode, ProfilePosition):
             raise self._steps.refused('moves only in mode 1; call ~/position_mode first')
         self._require_obedience()
-        if drive.halted and not drive.halt.leaving:
+        if drive.control.halted and not drive.control.halt.leaving:
             move = replace(move, immediate=True)  # the halt has ended the moves before it
         destination = self._named(lambda: mode.destination(move))
-        drive.check_target(destination)
+        drive.control.check_target(destination)
         delivery = self._named(lambda: mode.move(move))
         self._stream.end('a single move')
         self._resume(delivery)
@@ -179,13 +180,13 @@ class DriveCommands:
         await steps.come_to_rest()
         homed = ''
         try:
-            if drive.parameters.supports(OperationMode.HOMING):
+            if drive.view.parameters.supports(OperationMode.HOMING):
                 homed = await self._home_at_init()
         finally:
             if drive.node.online and not steps.quirks.no_mode_zero:
-                drive.select(drive.modes[OperationMode.NO_MODE])
-                drive.halt.end_in(OperationMode.NO_MODE)
-        return f'{drive.state.title}{homed}; select a mode before the first target'
+                drive.control.select(drive.control.modes[OperationMode.NO_MODE])
+                drive.control.halt.end_in(OperationMode.NO_MODE)
+        return f'{drive.view.state.title}{homed}; select a mode before the first target'
 
     async def enable(self) -> str:
         """Lead to Operation Enabled, without homing and without resetting a fault."""
@@ -215,16 +216,16 @@ class DriveCommands:
         drive, steps = self.drive, self._steps
         await steps.ready()
         steps.require_no_fault()
-        before = drive.mode
+        before = drive.control.mode
         if on_progress is not None:
             on_progress(HomingProgress.ENABLING)
         await steps.reach(DriveState.OPERATION_ENABLED)
         try:
             answer = await home(steps, method, on_progress)
         except BaseException:  # also when it is cancelled, and there is no time to wait
-            drive.select_back(before)
+            drive.control.select_back(before)
             raise
-        if before is not drive.mode and not steps.quirks.no_mode_zero:
+        if before is not drive.control.mode and not steps.quirks.no_mode_zero:
             await steps.switch(before)
         return f'{answer}; {drive.describe()}'
 
@@ -237,22 +238,22 @@ class DriveCommands:
         drive = self.drive
         await self._steps.ready()
         self._steps.require_no_fault()
-        mode = drive.modes.get(number)
-        if mode is None or not drive.parameters.supports(number):
+        mode = drive.control.modes.get(number)
+        if mode is None or not drive.view.parameters.supports(number):
             raise DriveError(self._missing_mode(number))
-        if drive.objects.mode_display == number and drive.mode is mode:
+        if drive.objects.mode_display == number and drive.control.mode is mode:
             return f'already in mode {number.title}; {drive.describe()}'
         await self._steps.switch(mode)
-        enabled = drive.state is DriveState.OPERATION_ENABLED
+        enabled = drive.view.state is DriveState.OPERATION_ENABLED
         hint = '' if enabled else f'; not enabled, call {self._steps.way_to_enable()}'
         return f'{drive.describe()}{hint}'
 
     async def _home_at_init(self) -> str:
         """Home where bus.yml asks for it; return what was done, or what could be."""
         drive = self.drive
-        if drive.homing_at_init:
-            return f', {await home(self._steps, drive.homing_at_init)}'
-        stored = drive.parameters.homing_method
+        if method := method_at_init(drive):
+            return f', {await home(self._steps, method)}'
+        stored = drive.view.parameters.homing_method
         if not stored:
             return ''
         return (
@@ -263,9 +264,9 @@ class DriveCommands:
     def _set(self, target: float) -> str:
         drive = self.drive
         self._require_obedience()
-        drive.check_target(target)
-        self._resume(self._named(lambda: drive.mode.set_target(target)))
-        return f'target {target:g} in mode {drive.mode.number.title}'
+        drive.control.check_target(target)
+        self._resume(self._named(lambda: drive.control.mode.set_target(target)))
+        return f'target {target:g} in mode {drive.control.mode.number.title}'
 
     def _named(self, ask: Callable[[], T]) -> T:
         """Ask the mode for something; what it refuses gets the name of the drive."""
@@ -278,18 +279,18 @@ class DriveCommands:
         drive, steps = self.drive, self._steps
         if self._busy:
             raise steps.refused(f'takes no target while {self._running} is running')
-        refusal = drive.refusal
+        refusal = drive.control.refusal
         if refusal is None:
             return
         if refusal.cause in (RefusalCause.FAULT, RefusalCause.NOT_ENABLED):
             raise steps.refused(f'takes no target; call {steps.way_to_enable()}')
-        if refusal.cause is RefusalCause.MODE_CHANGE and isinstance(drive.mode, NoMode):
+        if refusal.cause is RefusalCause.MODE_CHANGE and isinstance(drive.control.mode, NoMode):
             return  # which says itself that it has no target
         raise steps.refused(f'takes no target: it {refusal}')
 
     def _resume(self, delivery: Promise[None]) -> None:
         self._delivery = delivery
-        self.drive.resume(delivery)
+        self.drive.control.halt.leave(self._scheduler.now, delivery)  # so that no old one revives
         self.drive.released(Refusal(RefusalCause.SINGLE_TARGET))
 
     async def _enable_in(self, mode: OperationMode) -> str:
@@ -301,9 +302,9 @@ class DriveCommands:
 
     def _missing_mode(self, number: OperationMode) -> str:
         drive = self.drive
-        parameters = drive.parameters
+        parameters = drive.view.parameters
         offered = ', '.join(
-            mode.title for mode in drive.modes if mode and parameters.supports(mode)
+            mode.title for mode in drive.control.modes if mode and parameters.supports(mode)
         )
         if not parameters.supports(number):
             why = f'the drive does not have it (0x6502 is 0x{parameters.supported_modes:X})'

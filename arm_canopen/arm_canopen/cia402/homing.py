@@ -12,6 +12,7 @@ from ..master.events import EventKind, Severity
 from ..master.scheduler import Promise
 from ..standard.drive import OperationMode, Statusword
 from ..standard.objects import Index
+from .drive import Drive
 from .modes import Homing
 from .sequences import DriveSequences
 
@@ -68,12 +69,18 @@ async def home(
     return f'homed by method {method}'
 
 
+def method_at_init(drive: Drive) -> int:
+    """Return the homing method that bus.yml writes to 0x6098; 0 where it asks for no homing."""
+    write = drive.node.config.write_of(drive.objects.at(Index.HOMING_METHOD), 0)
+    return int.from_bytes(write.data, 'little', signed=True) if write is not None else 0
+
+
 def _homing_mode(steps: DriveSequences) -> Homing:
     drive = steps.drive
-    homing = drive.modes[OperationMode.HOMING]
+    homing = drive.control.modes[OperationMode.HOMING]
     if not isinstance(homing, Homing):
         raise TypeError('mode 6 is no homing mode')
-    if not drive.parameters.supports(OperationMode.HOMING):
+    if not drive.view.parameters.supports(OperationMode.HOMING):
         raise steps.refused('has no homing (mode 6 is not in 0x6502)')
     return homing
 
@@ -97,8 +104,8 @@ async def _stored_method(steps: DriveSequences) -> int:
     try:
         stored = await drive.node.objects.read_object(drive.objects.at(Index.HOMING_METHOD))
     except (SdoError, CodecError):
-        return drive.parameters.homing_method
-    return stored if isinstance(stored, int) else drive.parameters.homing_method
+        return drive.view.parameters.homing_method
+    return stored if isinstance(stored, int) else drive.view.parameters.homing_method
 
 
 def _put_back(steps: DriveSequences, method: int) -> None:

@@ -130,18 +130,18 @@ class MotionGroup:
     def _stream(
         self, attachment: Attachment, drive: Drive, setpoint: Setpoint, period: float
     ) -> None:
-        position = setpoint.position
+        position, before = setpoint.position, drive.control.setpoint
         if drive.name not in attachment.streaming:
-            margin = HAND_OVER_MARGIN * drive.parameters.profile.velocity * period
-            if abs(position - drive.setpoint) > margin:
+            margin = HAND_OVER_MARGIN * drive.view.parameters.profile.velocity * period
+            if abs(position - before) > margin:
                 raise DriveError(
-                    f'the stream starts at {position:g}, but the set-point is {drive.setpoint:g}; '
+                    f'the stream starts at {position:g}, but the set-point is {before:g}; '
                     'a stream must start where the drive is'
                 )
             attachment.streaming.add(drive.name)
-        elif abs(position - drive.setpoint) > _greatest_speed(drive) * period:
+        elif abs(position - before) > _greatest_speed(drive) * period:
             raise DriveError(
-                f'the stream jumps from {drive.setpoint:g} to {position:g} within a cycle; the '
+                f'the stream jumps from {before:g} to {position:g} within a cycle; the '
                 f'axis takes up to {_greatest_speed(drive):g} per second'
             )
         drive.stream(setpoint)
@@ -185,7 +185,7 @@ def _feedback(drive: Drive) -> AxisFeedback:
 
 def _greatest_speed(drive: Drive) -> float:
     """Return the speed in user units per second above which a stream is no motion any more."""
-    parameters = drive.parameters
+    parameters = drive.view.parameters
     if parameters.speed_limit is not None:
         return SPEED_MARGIN * parameters.speed_limit
     return DEFAULT_SPEED_MARGIN * parameters.profile.velocity

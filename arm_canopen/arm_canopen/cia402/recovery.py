@@ -12,7 +12,7 @@ from ..master.events import Severity
 from ..master.scheduler import Promise, Scheduler
 from ..standard.drive import OperationMode
 from .drive import Drive
-from .observed_drive import FAULTY
+from .drive_view import FAULTY
 
 
 class Recovery:
@@ -45,8 +45,8 @@ class Recovery:
 
     async def _recover(self, mode: OperationMode) -> None:
         drive = self._drive
-        if drive.state in FAULTY:
-            await drive.read_error_code()
+        if drive.view.state in FAULTY:
+            await drive.view.read_error_code()
             drive.report(
                 Severity.WARNING, f'not enabled again: {drive.describe()}; call ~/recover'
             )

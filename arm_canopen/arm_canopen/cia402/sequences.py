@@ -12,8 +12,8 @@ from ..master.scheduler import Scheduler
 from ..standard.drive import DriveState, OperationMode, Statusword
 from ..standard.objects import Index
 from .drive import Drive
+from .drive_view import FAULTY
 from .modes import Mode
-from .observed_drive import FAULTY
 from .quirks import quirks_of
 from .refusal import Refusal, RefusalCause
 from .stop_sequence import STOP_TIMEOUT
@@ -61,8 +61,8 @@ class DriveSequences:
         drive.objects.unmute_controlword()  # what is commanded next goes by RPDO again
 
         def ready() -> bool:
-            known = to_stop and drive.state is not DriveState.UNKNOWN
-            return known or drive.ready or not drive.node.operational
+            known = to_stop and drive.view.state is not DriveState.UNKNOWN
+            return known or drive.view.ready or not drive.node.operational
 
         try:
             await self._scheduler.until(ready, READY_TIMEOUT)
@@ -78,13 +78,15 @@ class DriveSequences:
                 enabled where it does not take the value that holds it.
         """
         drive = self.drive
-        if goal is DriveState.OPERATION_ENABLED and not drive.stays_enabled:
+        if goal is DriveState.OPERATION_ENABLED and not drive.control.stays_enabled:
             await self._begin_enabling()
-        drive.goal = goal
+        drive.control.goal = goal
         try:
-            await self.until(lambda: drive.state is goal, self.quirks.state_timeout, goal.title)
+            await self.until(
+                lambda: drive.view.state is goal, self.quirks.state_timeout, goal.title
+            )
         except BaseException:  # also when it is cancelled: nobody waits for the rest of the way
-            drive.goal = DriveState.SWITCH_ON_DISABLED
+            drive.control.goal = DriveState.SWITCH_ON_DISABLED
             raise
 
     async def _begin_enabling(self) -> None:
@@ -97,9 +99,10 @@ class DriveSequences:
         if drive.stop.running:
             raise self.refused('is being stopped')
         drive.failure = ''
-        await self._preload(drive.mode, 'is not enabled')
-        if drive.shown_mode is not drive.mode:  # in which it may stay
-            await self._preload(drive.shown_mode, 'is not enabled')
+        mode, shown = drive.control.mode, drive.control.shown_mode
+        await self._preload(mode, 'is not enabled')
+        if shown is not mode:  # in which it may stay
+            await self._preload(shown, 'is not enabled')
         if drive.failure:
             raise self.refused('is not enabled')
 
@@ -112,7 +115,7 @@ class DriveSequences:
         if mode is None or not mode.by_sdo:
             return
         try:
-            await self.drive.preload(mode)
+            await self.drive.control.preload(mode)
         except (SdoError, CodecError) as error:
             raise self.refused(
                 f'{consequence}: it does not take the target that holds it in mode '
@@ -124,8 +127,9 @@ class DriveSequences:
 
         A torque is left alone: taking it away would drop a load.
         """
-        drive, acting = self.drive, self.drive.holding_mode
-        enabled = drive.goal is drive.state is DriveState.OPERATION_ENABLED
+        control = self.drive.control
+        acting = control.holding_mode
+        enabled = control.goal is self.drive.view.state is DriveState.OPERATION_ENABLED
         if not enabled or acting is None:
             return
         if acting.number in (*TORQUE_MODES, OperationMode.NO_MODE):
@@ -141,27 +145,27 @@ class DriveSequences:
         Raises:
             DriveError: It does not come to rest; it stays halted.
         """
-        drive = self.drive
-        ramp = drive.speed / drive.parameters.profile.deceleration  # [s]
-        drive.hold()
+        view, control = self.drive.view, self.drive.control
+        ramp = view.speed / view.parameters.profile.deceleration  # [s]
+        control.hold()
         await self.settle()
-        await self.until(lambda: drive.mode.braked and drive.stands, timeout + ramp, 'standstill')
+        await self.until(lambda: control.mode.braked and view.stands, timeout + ramp, 'standstill')
 
     async def reset_fault(self) -> None:
         """Reset a fault if there is one."""
         drive = self.drive
-        if drive.state not in FAULTY:
+        if drive.view.state not in FAULTY:
             return
         drive.resetting = True
         try:
             await self.until(
-                lambda: drive.state not in FAULTY,
+                lambda: drive.view.state not in FAULTY,
                 self.quirks.state_timeout,
                 'the end of the fault',
             )
         finally:
             drive.resetting = False
-        drive.error = ''
+        drive.view.error = ''
 
     async def switch(self, mode: Mode) -> None:
         """Switch in the state that bus.yml wants, then return to the state of before.
@@ -169,9 +173,9 @@ class DriveSequences:
         Raises:
             DriveError: 0x6061 does not show the mode in time; the one before is selected again.
         """
-        drive = self.drive
-        before = drive.mode
-        enabled = drive.state is DriveState.OPERATION_ENABLED
+        drive, control = self.drive, self.drive.control
+        before = control.mode
+        enabled = drive.view.state is DriveState.OPERATION_ENABLED
         switching_state = drive.config.switching_state
         leave = enabled and switching_state is not DriveState.OPERATION_ENABLED
         drive.released(Refusal(RefusalCause.MODE_SELECTED, mode.number.title))
@@ -181,7 +185,7 @@ class DriveSequences:
             await self.reach(switching_state)
         if mode.number is OperationMode.INTERPOLATED_POSITION:
             await self._clear_buffer()
-        drive.select(mode)
+        control.select(mode)
         try:
             await self.until(
                 lambda: drive.objects.mode_display == mode.number,
@@ -189,9 +193,9 @@ class DriveSequences:
                 f'mode {mode.number.title} in 0x6061',
             )
         except BaseException:  # also when it is cancelled: it stays halted in either mode
-            drive.select_back(before)
+            control.select_back(before)
             raise
-        drive.halt.release()
+        control.halt.release()
         if leave:
             await self.reach(DriveState.OPERATION_ENABLED)
 
@@ -243,7 +247,7 @@ class DriveSequences:
         drive = self.drive
 
         def hopeless() -> bool:
-            faulted = drive.state in FAULTY and not drive.resetting
+            faulted = drive.view.state in FAULTY and not drive.resetting
             return not drive.node.online or faulted or drive.stop.running
 
         try:
@@ -251,12 +255,12 @@ class DriveSequences:
         except TimeoutError:
             raise self.refused(f'did not reach {what} within {timeout:g} s{self._why()}') from None
         if not condition():
-            await drive.read_error_code()
+            await drive.view.read_error_code()
             raise self.refused(f'did not reach {what}')
 
     def require_no_fault(self) -> None:
         """Refuse to go on with a drive that is faulted."""
-        if self.drive.state in FAULTY:
+        if self.drive.view.state in FAULTY:
             raise self.refused('is faulted; call ~/recover first')
 
     def refused(self, what: str) -> DriveError:
@@ -265,7 +269,7 @@ class DriveSequences:
 
     def way_to_enable(self) -> str:
         """Name the service that enables the drive."""
-        return '~/recover' if self.drive.state in FAULTY else '~/init or ~/enable'
+        return '~/recover' if self.drive.view.state in FAULTY else '~/init or ~/enable'
 
     def _why(self) -> str:
         """Say which condition outside of the bus keeps the drive from being enabled."""
@@ -284,9 +288,10 @@ class DriveSequences:
 
     def _why_not_ready(self) -> str:
         drive = self.drive
-        if drive.state is not DriveState.UNKNOWN and not drive.fresh:
+        known = drive.view.state is not DriveState.UNKNOWN
+        if known and not drive.view.fresh:
             return f'{drive.name} does not send its TPDOs any more: {drive.describe()}'
-        if drive.state is DriveState.UNKNOWN:
+        if not known:
             return (
                 f'{drive.name} is operational, but its statusword, mode and position have not '
                 'come; do its TPDOs follow SYNC, and does the bus.yml have a sync_period?'

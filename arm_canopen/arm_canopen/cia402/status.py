@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from ..master.status import node_status, NodeStatus
 from ..standard.drive import DriveState, mode_title, Statusword, statusword_text
 from .drive import Drive
-from .observed_drive import FAULTY
+from .drive_view import FAULTY
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,20 +66,20 @@ def drive_status(drive: Drive, now: float) -> DriveStatus:
         drive: The drive.
         now: Steady time in [s].
     """
-    word = drive.statusword
+    word = drive.view.statusword
     return DriveStatus(
         name=drive.name,
         node=node_status(drive.node, now),
-        state=drive.state,
+        state=drive.view.state,
         mode=mode_title(drive.objects.mode_display),
         statusword=statusword_text(word),
         warning=bool(word & (Statusword.WARNING | Statusword.INTERNAL_LIMIT)),
-        error=drive.error,
+        error=drive.view.error,
         failure=drive.failure,
-        fresh=drive.fresh,
-        age=drive.age,
-        position=drive.position,
-        velocity=drive.velocity,
-        setpoint=drive.setpoint,
+        fresh=drive.view.fresh,
+        age=drive.view.age,
+        position=drive.view.position,
+        velocity=drive.view.velocity,
+        setpoint=drive.control.setpoint,
         summary=drive.describe(),
     )

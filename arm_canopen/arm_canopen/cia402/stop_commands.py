@@ -25,7 +25,7 @@ class StopCommands:
         """Lead to Switched On, as ros2_canopen's service does; the motor is without torque."""
         drive = self._drive
         await self._ready_to_stop('disabled')
-        if drive.state is DriveState.OPERATION_ENABLED:
+        if drive.view.state is DriveState.OPERATION_ENABLED:
             await self._steps.reach(DriveState.SWITCHED_ON)
         else:
             await self._stay_disabled()
@@ -37,10 +37,11 @@ class StopCommands:
         await self._ready_to_stop('halted')
         if self._is_quick_stopped():
             return f'nothing to halt: {drive.describe()}'
-        if not drive.stays_enabled:
+        if not drive.control.stays_enabled:
             await self._stay_disabled()
             return f'nothing to halt: {drive.describe()}'
-        drive.goal = DriveState.OPERATION_ENABLED  # whatever was about to lead it elsewhere
+        # whatever was about to lead it elsewhere
+        drive.control.goal = DriveState.OPERATION_ENABLED
         await self._steps.halt(BRAKED_TIMEOUT)
         return drive.describe()
 
@@ -48,10 +49,10 @@ class StopCommands:
         """Quick stop; what follows depends on the drive's option code 0x605A."""
         drive, steps = self._drive, self._steps
         await self._ready_to_stop('quick stop')
-        if drive.state is DriveState.OPERATION_ENABLED:
-            drive.goal = DriveState.QUICK_STOP_ACTIVE
+        if drive.view.state is DriveState.OPERATION_ENABLED:
+            drive.control.goal = DriveState.QUICK_STOP_ACTIVE
             await steps.until(
-                lambda: drive.state is not DriveState.OPERATION_ENABLED,
+                lambda: drive.view.state is not DriveState.OPERATION_ENABLED,
                 steps.quirks.state_timeout,
                 'the quick stop',
             )
@@ -69,7 +70,7 @@ class StopCommands:
         drive = self._drive
         drive.interrupted = None
         drive.released(Refusal(RefusalCause.SHUTDOWN))
-        drive.goal = DriveState.SWITCH_ON_DISABLED
+        drive.control.goal = DriveState.SWITCH_ON_DISABLED
         await drive.stop.run()
         if not drive.stop.disabled:
             raise self._steps.refused('is not disabled; cut its power')
@@ -96,19 +97,19 @@ class StopCommands:
     async def _stay_disabled(self) -> None:
         """Have it enabled no more, also where the command for that is on its way already."""
         drive, steps = self._drive, self._steps
-        drive.goal = DriveState.SWITCH_ON_DISABLED
+        drive.control.goal = DriveState.SWITCH_ON_DISABLED
         await steps.settle()
         await steps.until(
-            lambda: drive.state is not DriveState.OPERATION_ENABLED,
+            lambda: drive.view.state is not DriveState.OPERATION_ENABLED,
             steps.quirks.state_timeout,
-            drive.goal.title,
+            drive.control.goal.title,
         )
 
     def _is_quick_stopped(self) -> bool:
         """Whether a quick stop runs or has ended; then no lesser stop takes its place."""
         drive = self._drive
         quick_stop = DriveState.QUICK_STOP_ACTIVE
-        if drive.state is not quick_stop and drive.goal is not quick_stop:
+        if drive.view.state is not quick_stop and drive.control.goal is not quick_stop:
             return False
-        drive.goal = quick_stop
+        drive.control.goal = quick_stop
         return True

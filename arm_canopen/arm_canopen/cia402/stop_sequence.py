@@ -11,7 +11,7 @@ from ..master.events import Severity
 from ..master.scheduler import Scheduler, Task
 from ..standard.drive import DriveState, statusword_text
 from ..standard.objects import Index
-from .observed_drive import FAULTY, ObservedDrive
+from .drive_view import DriveView, FAULTY
 from .state_machine import Command
 
 REACTION_TIME = 0.5  # [s] in which a drive shows that it has got a command by RPDO
@@ -39,10 +39,19 @@ class StopSequence:
             run.
     """
 
-    def __init__(self, drive: ObservedDrive, scheduler: Scheduler) -> None:
-        """Take the drive and the time; nothing runs before :meth:`begin`."""
+    def __init__(
+        self, view: DriveView, scheduler: Scheduler, report: Callable[[Severity, str], None]
+    ) -> None:
+        """Take the state of the drive and the time; nothing runs before :meth:`begin`.
+
+        Args:
+            view: The state of the drive.
+            scheduler: Time.
+            report: Takes what goes wrong.
+        """
         self.goal: DriveState | None = None
-        self._drive = drive
+        self._view = view
+        self._log = report
         self._scheduler = scheduler
         self._task: Task[None] | None = None
         self._sdo_error = ''
@@ -56,7 +65,7 @@ class StopSequence:
     @property
     def disabled(self) -> bool:
         """Whether the drive shows that its power is away, or shows nothing at all."""
-        return self._drive.objects.state in DISABLED
+        return self._view.objects.state in DISABLED
 
     def begin(self, *, quiet: bool = False) -> None:
         """Begin, unless it runs already; what kept the RPDO from the drive before may be over.
@@ -66,7 +75,7 @@ class StopSequence:
         """
         if not self.running:
             self._quiet = quiet
-            self._drive.objects.unmute_controlword()
+            self._view.objects.unmute_controlword()
             self.goal = DriveState.QUICK_STOP_ACTIVE
             self._task = self._scheduler.background(self._run())
 
@@ -89,7 +98,7 @@ class StopSequence:
 
     def use_sdo(self) -> None:
         """Command the drive by SDO from now on, because its RPDO does not reach it."""
-        objects = self._drive.objects
+        objects = self._view.objects
         if objects.mutes_controlword:
             return
         objects.mute_controlword()
@@ -98,9 +107,9 @@ class StopSequence:
 
     async def _run(self) -> None:
         """Lead through the steps; what holds already ends a step at once."""
-        drive, objects = self._drive, self._drive.objects
+        objects = self._view.objects
         self._sdo_error = ''
-        deadline = self._scheduler.now + STOP_TIMEOUT + drive.ramp_time(RAMP_MAX)
+        deadline = self._scheduler.now + STOP_TIMEOUT + self._ramp_time()
         try:
             await self._lead(
                 DriveState.QUICK_STOP_ACTIVE,
@@ -117,12 +126,12 @@ class StopSequence:
 
     def _report(self, what: str, remedy: str = '') -> None:
         if not self._quiet:
-            self._drive.report(Severity.ERROR, f'{what}: {self._shown()}{remedy}')
+            self._log(Severity.ERROR, f'{what}: {self._shown()}{remedy}')
 
     async def _lead(self, goal: DriveState, reacts: Callable[[], bool]) -> None:
         """Command a state, by SDO where the drive does not react to its RPDO."""
         self.goal = goal
-        if self._drive.objects.controlword_muted:
+        if self._view.objects.controlword_muted:
             self._write()
         elif not await self._within(REACTION_TIME, reacts):
             self.use_sdo()
@@ -134,23 +143,29 @@ class StopSequence:
         self._scheduler.background(self._written(command))
 
     async def _written(self, command: Command) -> None:
-        objects = self._drive.objects
+        objects = self._view.objects
         place = objects.at(Index.CONTROLWORD)
         try:
-            await self._drive.node.objects.write_object(place, 0, int(command), urgent=True)
+            await self._view.node.objects.write_object(place, 0, int(command), urgent=True)
         except (SdoError, CodecError) as error:
             self._sdo_error = str(error)
             if objects.mutes_controlword and objects.can_send(int(command)):
                 objects.unmute_controlword()
 
+    def _ramp_time(self) -> float:
+        """Return how long it brakes in [s], by the slower of its ramps."""
+        parameters = self._view.parameters
+        ramp = min(parameters.quick_stop_deceleration, parameters.profile.deceleration)
+        return min(RAMP_MAX, self._view.speed / ramp)
+
     def _shown(self) -> str:
-        drive = self._drive
-        return f'{statusword_text(drive.objects.statusword)}; {drive.speed:.3g} per second'
+        view = self._view
+        return f'{statusword_text(view.objects.statusword)}; {view.speed:.3g} per second'
 
     def _rests(self) -> bool:
-        state = self._drive.objects.state
+        state = self._view.objects.state
         if state is DriveState.QUICK_STOP_ACTIVE:  # option codes 5 to 8 hold there
-            return self._drive.stands
+            return self._view.stands
         return state is not DriveState.OPERATION_ENABLED
 
     async def _within(self, timeout: float, condition: Callable[[], bool]) -> bool:

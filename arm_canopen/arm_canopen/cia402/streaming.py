@@ -68,35 +68,35 @@ class TargetStream:
 
     def _note_delivery(self, delivery: Promise[None]) -> None:
         drive = self._drive
-        if delivery.error is None or self._ended_by or not drive.accepts_targets:
+        if delivery.error is None or self._ended_by or not drive.control.accepts_targets:
             return
         self.end('a target that the drive did not take')
-        drive.hold()
+        drive.control.hold()
         drive.warn(f'stopped: it has not taken a target of the stream ({delivery.error})')
 
     async def _watch_for_pause(self) -> None:
         while self._scheduler.now < self._goes_on_until:
             await self._scheduler.timer(self._goes_on_until - self._scheduler.now)
         drive = self._drive
-        if not drive.accepts_targets:
+        if not drive.control.accepts_targets:
             return  # what has taken it away has said so
         paused = f'the stream of targets has paused for {drive.config.target_timeout * 1000:g} ms'
-        if drive.mode.setpoint is not None and not drive.mode.cyclic:
+        if drive.control.mode.setpoint is not None and not drive.control.mode.cyclic:
             drive.warn(f'{paused}: it goes on to the last target, and rests there')
             return
-        speed = drive.speed
-        drive.hold()
+        speed = drive.view.speed
+        drive.control.hold()
         self._scheduler.background(self._report_rest(paused, speed))
 
     async def _report_rest(self, paused: str, speed: float) -> None:
         """Report the stop when the axis stands, not when it is asked to."""
         drive, steps = self._drive, self._steps
-        patience = STOP_TIMEOUT + speed / drive.parameters.profile.deceleration
-        halted = drive.halt
+        patience = STOP_TIMEOUT + speed / drive.view.parameters.profile.deceleration
+        halted = drive.control.halt
 
         def ended() -> bool:
-            stands = drive.mode.braked and drive.stands
-            return stands or not drive.accepts_targets or not halted.held or halted.leaving
+            stands = drive.control.mode.braked and drive.view.stands
+            return stands or not drive.control.accepts_targets or not halted.held or halted.leaving
 
         await steps.settle()
         try:
@@ -105,8 +105,8 @@ class TargetStream:
             drive.report(
                 Severity.ERROR,
                 f'{paused}: it was halted, but has not come to rest within {patience:.1f} s and '
-                f'moves at {drive.velocity:g} per second',
+                f'moves at {drive.view.velocity:g} per second',
             )
             return
-        if halted.held and not halted.leaving and drive.accepts_targets:
+        if halted.held and not halted.leaving and drive.control.accepts_targets:
             drive.warn(f'{paused}: stopped; the next target goes on')

@@ -73,9 +73,9 @@ class DriveNode(DeviceNode):
 
     def sample(self) -> list[tuple[float, float, float]] | None:
         """Return position, velocity and effort of each axis; None while one is not fresh."""
-        if not all(axis.fresh for axis in self.axes):
+        if not all(axis.view.fresh for axis in self.axes):
             return None
-        return [(axis.position, axis.velocity, axis.effort) for axis in self.axes]
+        return [(axis.view.position, axis.view.velocity, axis.view.effort) for axis in self.axes]
 
     def publish_joint_state(self, stamp: Time, sample: list[tuple[float, float, float]]) -> None:
         """Publish the state of the joints at the time of a SYNC."""

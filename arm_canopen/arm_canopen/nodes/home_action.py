@@ -111,7 +111,7 @@ class HomeAction:
 
     def _position(self) -> float:
         drive = self._commands.drive
-        return drive.position if drive.fresh else math.nan
+        return drive.view.position if drive.view.fresh else math.nan
 
     def _finish(self, goal: Any, homing: _Homing, future: Future[str]) -> None:  # noqa: ANN401
         error = future.exception()

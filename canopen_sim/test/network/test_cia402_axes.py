@@ -58,7 +58,7 @@ def test_the_axes_move_apart(net: VirtualNetwork) -> None:
     """Each has its own state, mode and target."""
     assert list(net.drives) == [X, Y]
     net.do(X, 'init')
-    assert net.drives[Y].state is DriveState.SWITCH_ON_DISABLED
+    assert net.drives[Y].view.state is DriveState.SWITCH_ON_DISABLED
     net.do(Y, 'init')
     net.select(X, OperationMode.PROFILE_POSITION)
     net.select(Y, OperationMode.CYCLIC_POSITION)
@@ -77,8 +77,8 @@ def test_a_fault_stops_its_axis_and_is_said_by_name(net: VirtualNetwork) -> None
         net.select(axis, OperationMode.PROFILE_POSITION)
     net.devices['table'].drives[1].raise_fault(0x2310, net.now)
     net.run(0.5)
-    assert net.drives[Y].state is DriveState.FAULT
-    assert net.drives[X].state is DriveState.OPERATION_ENABLED
+    assert net.drives[Y].view.state is DriveState.FAULT
+    assert net.drives[X].view.state is DriveState.OPERATION_ENABLED
     assert any('table_y: FAULT' in text for text in net.told())
     with pytest.raises(DriveError, match='table_y takes no target; call ~/recover'):
         net.commands[Y].set_target(0.1)
@@ -86,4 +86,4 @@ def test_a_fault_stops_its_axis_and_is_said_by_name(net: VirtualNetwork) -> None
     net.run(2.0)
     assert motors(net)[0] == pytest.approx(0.3, abs=2e-3)
     net.do(Y, 'recover')
-    assert net.drives[Y].state is DriveState.OPERATION_ENABLED
+    assert net.drives[Y].view.state is DriveState.OPERATION_ENABLED

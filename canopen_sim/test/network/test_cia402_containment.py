@@ -104,9 +104,14 @@ def break_count(arm: Arm, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(arm.net.network.nodes[name], 'count_missed', broken)
 
 
+def break_view(arm: Arm, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let the state be out of reach."""
+    monkeypatch.setattr(arm.net.drives[name].view, 'observe', broken)
+
+
 def break_mode(arm: Arm, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Let the mode fail."""
-    monkeypatch.setattr(arm.net.drives[name].mode, 'step', broken)
+    monkeypatch.setattr(arm.net.drives[name].control.mode, 'step', broken)
 
 
 def break_controlword(arm: Arm, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -127,7 +132,7 @@ def break_rpdo(number: int) -> Callable[[Arm, str, pytest.MonkeyPatch], None]:
 
 STEPS: dict[str, Callable[[Arm, str, pytest.MonkeyPatch], None]] = {
     'read': break_drive('read'),
-    'observe': break_drive('_observe'),
+    'observe': break_view,
     'feedback': break_drive('feedback'),
     'stream': break_drive('stream'),
     'write': break_drive('write'),

@@ -79,7 +79,7 @@ def test_feed_forward_goes_with_the_set_points() -> None:
     """In device units, each cycle, and in the drive."""
     net = follow(Ramp())
     assert offsets(net) == (round(SPEED * SCALE), round(EFFORT))
-    assert net.drives[JOINT].velocity == pytest.approx(SPEED, rel=0.05)
+    assert net.drives[JOINT].view.velocity == pytest.approx(SPEED, rel=0.05)
     node = net.network.nodes[JOINT]
     told = net.result(net.network.scheduler.spawn(node.objects.read_object(0x60B1)))
     assert told == round(SPEED * SCALE)
@@ -116,7 +116,7 @@ def test_a_switch_to_velocity_begins_without_it() -> None:
     net.select(JOINT, OperationMode.CYCLIC_VELOCITY)
     net.run(1.0)
     assert offsets(net) == (0, 0)
-    assert net.drives[JOINT].velocity == pytest.approx(0.0, abs=0.005)
+    assert net.drives[JOINT].view.velocity == pytest.approx(0.0, abs=0.005)
 
 
 def test_it_does_not_come_back_with_the_device() -> None:
@@ -139,7 +139,7 @@ def test_without_the_objects_in_an_rpdo_the_position_is_followed_alone(
     """Nothing is refused, and no SDO is sent for it."""
     source = Ramp()
     net = follow(source, mapped=False, mode=mode)
-    assert net.drives[JOINT].velocity == pytest.approx(SPEED, rel=0.05)
+    assert net.drives[JOINT].view.velocity == pytest.approx(SPEED, rel=0.05)
     assert not source.losses
     assert not [data for data in net.frames(0x600 + NODE_ID) if data[1:3] == b'\xb1\x60']
 
@@ -154,7 +154,7 @@ def test_a_feed_forward_that_cannot_be_is_refused(velocity: float, effort: float
     net = follow(source)
     assert len(source.losses) == 1
     assert source.losses[0].cause is RefusalCause.SETPOINT_REFUSED
-    assert net.drives[JOINT].velocity == pytest.approx(0.0, abs=0.005)
+    assert net.drives[JOINT].view.velocity == pytest.approx(0.0, abs=0.005)
     assert {data[:6] for data in net.frames(OFFSET_PDO)} == {bytes(6)}
 
 
@@ -171,5 +171,5 @@ def test_an_offset_of_somebody_else_stays() -> None:
     net.select(JOINT, MODE)
     net.group.attach(Ramp(0.0, 0.0))
     net.run(0.5)
-    assert net.drives[JOINT].velocity == pytest.approx(SPEED, rel=0.05)
+    assert net.drives[JOINT].view.velocity == pytest.approx(SPEED, rel=0.05)
     assert offsets(net) == (0, 17)

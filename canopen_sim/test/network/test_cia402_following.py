@@ -143,7 +143,7 @@ def test_the_following_error_of_the_drive_counts(duration: float, *, stops: bool
     loaded.net.wire.alters = show
     loaded.net.run(3.0)
     assert (loaded.state is DriveState.SWITCH_ON_DISABLED) is stops
-    refusal = loaded.net.drives[JOINT].refusal
+    refusal = loaded.net.drives[JOINT].control.refusal
     assert (refusal is not None and refusal.cause is RefusalCause.NOT_ENABLED) is stops
     assert len(loaded.errors) == stops
 

@@ -138,7 +138,7 @@ def test_the_smallest_number_of_an_object_fits(
 def test_a_drive_whose_cycle_fails_is_stopped_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     """It is stopped by a quick stop and named once; enabled again, it gets another chance."""
     net = pair(OperationMode.CYCLIC_POSITION)
-    mode = net.drives[ODD].modes[OperationMode.CYCLIC_POSITION]
+    mode = net.drives[ODD].control.modes[OperationMode.CYCLIC_POSITION]
     net.commands[ODD].set_target(2.0)
     net.run(0.5)
 
@@ -148,8 +148,8 @@ def test_a_drive_whose_cycle_fails_is_stopped_alone(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(mode, 'step', refuse)
     net.run(1.0)
     assert_served(net)
-    assert net.drives[ODD].state is DriveState.SWITCH_ON_DISABLED
-    assert net.drives[ODD].velocity == 0.0
+    assert net.drives[ODD].view.state is DriveState.SWITCH_ON_DISABLED
+    assert net.drives[ODD].view.velocity == 0.0
     told = [text for text in net.told(Severity.ERROR) if '1e9 does not fit' in text]
     assert len(told) == 1
     assert ODD in told[0]

@@ -90,10 +90,10 @@ def test_a_halt_right_after_a_target_holds(
     net.run(delay)
     assert 'halted' in net.do(JOINT, 'halt', preempt=True)
     assert_rests(net)
-    assert net.drives[JOINT].halted
+    assert net.drives[JOINT].control.halted
     net.commands[JOINT].set_target(-0.2)
     go(net, 4.0 if mode is not OperationMode.PROFILE_VELOCITY else 0.5)
-    assert not net.drives[JOINT].halted
+    assert not net.drives[JOINT].control.halted
     if mode is not OperationMode.PROFILE_VELOCITY:
         assert motor(net) == pytest.approx(-0.2, abs=2e-3)
 
@@ -122,7 +122,7 @@ def full(net: VirtualNetwork) -> None:
         net.commands[JOINT].move(Move(target, immediate=False))
     net.run(0.3)
     assert motor(net) > 0.05
-    assert net.drives[JOINT].statusword & Statusword.SET_POINT_ACKNOWLEDGE
+    assert net.drives[JOINT].view.statusword & Statusword.SET_POINT_ACKNOWLEDGE
 
 
 def test_an_immediate_move_does_not_wait_for_a_full_drive() -> None:
@@ -217,7 +217,7 @@ def test_a_target_that_is_not_taken_does_not_end_the_halt() -> None:
     net.run(0.2)
     assert abs(motor(net) - begin) < BRAKING_MAX / 5
     assert_rests(net, 4.0)
-    assert net.drives[JOINT].halted
+    assert net.drives[JOINT].control.halted
     assert any('stays halted' in text for text in net.told(Severity.WARNING))
 
 
@@ -241,7 +241,7 @@ def test_a_drive_without_acknowledge_moves_after_a_halt(before: float) -> None:
     highest = go(net, 4.0)
     assert highest < rest + 5e-3
     assert motor(net) == pytest.approx(rest - 0.2, abs=2e-3)
-    assert not net.drives[JOINT].halted
+    assert not net.drives[JOINT].control.halted
 
 
 def test_a_drive_without_acknowledge_is_reported_once() -> None:
@@ -277,7 +277,7 @@ def test_relative_moves_count_from_what_the_drive_has_or_gets() -> None:
         assert f'to {destination},' in commands.move(Move(0.1, relative=True))
     go(net, 3.0)
     assert motor(net) == pytest.approx(1.8, abs=2e-3)
-    assert net.drives[JOINT].setpoint == pytest.approx(1.8)
+    assert net.drives[JOINT].control.setpoint == pytest.approx(1.8)
     commands.move(Move(0.1, relative=True))
     commands.move(Move(0.5))
     assert 'to 0.4,' in commands.move(Move(-0.1, relative=True))
@@ -341,7 +341,7 @@ def test_a_refused_mode_switch_does_not_let_the_old_move_go_on(
     assert 'halted' in net.drives[JOINT].describe()
     net.commands[JOINT].set_target(-0.5)
     net.run(1.0)
-    assert net.drives[JOINT].velocity < -0.3
+    assert net.drives[JOINT].view.velocity < -0.3
 
 
 def test_a_mode_that_goes_by_sdo_and_gets_lost_does_not_let_the_old_move_go_on() -> None:
@@ -391,10 +391,10 @@ def test_homing_that_is_cancelled_leaves_the_axis_at_rest(cycles: int) -> None:
     net.run(0.5)
     assert abs(motor(net) - begin) < BRAKING_MAX
     assert_rests(net)
-    net.run_until(lambda: net.drives[JOINT].accepts_targets)
+    net.run_until(lambda: net.drives[JOINT].control.accepts_targets)
     net.commands[JOINT].set_target(begin)
     go(net, 2.0)
-    assert net.drives[JOINT].position == pytest.approx(begin, abs=2e-3)
+    assert net.drives[JOINT].view.position == pytest.approx(begin, abs=2e-3)
 
 
 def test_a_switch_that_is_cancelled_stays_halted() -> None:
@@ -409,7 +409,7 @@ def test_a_switch_that_is_cancelled_stays_halted() -> None:
     assert not running.done
     assert 'halted' in net.do(JOINT, 'halt', preempt=True)
     assert_rests(net)
-    assert net.drives[JOINT].mode.number is OperationMode.PROFILE_POSITION
+    assert net.drives[JOINT].control.mode.number is OperationMode.PROFILE_POSITION
 
 
 @pytest.mark.parametrize('verb', ['halt', 'quick_stop', 'disable'])
@@ -424,8 +424,8 @@ def test_a_stop_at_any_moment_of_init_is_answered_truly(verb: str) -> None:
         net.run(0.1)
         drive = net.drives[JOINT]
         told = 'Operation enabled' in answer
-        assert told == (drive.state is DriveState.OPERATION_ENABLED), (millisecond, answer)
-        assert told == (verb == 'halt' and drive.halted), (millisecond, answer)
+        assert told == (drive.view.state is DriveState.OPERATION_ENABLED), (millisecond, answer)
+        assert told == (verb == 'halt' and drive.control.halted), (millisecond, answer)
 
 
 @pytest.mark.parametrize('cycles', range(16))
@@ -439,7 +439,7 @@ def test_a_halt_in_a_mode_switch_is_answered_truly(cycles: int) -> None:
     net.run(cycles * PERIOD)
     answer = net.do(JOINT, 'halt', preempt=True)
     net.run(0.2)
-    enabled = net.drives[JOINT].state is DriveState.OPERATION_ENABLED
+    enabled = net.drives[JOINT].view.state is DriveState.OPERATION_ENABLED
     assert ('Operation enabled' in answer) == enabled, answer
     assert not net.told(Severity.ERROR)
 
@@ -455,7 +455,7 @@ def test_a_lesser_stop_does_not_end_a_quick_stop(verb: str) -> None:
     net.run(0.1)
     assert 'nothing to' in net.do(JOINT, verb, preempt=True)
     net.run(3.0)
-    assert net.drives[JOINT].state is DriveState.QUICK_STOP_ACTIVE
+    assert net.drives[JOINT].view.state is DriveState.QUICK_STOP_ACTIVE
 
 
 @pytest.mark.parametrize('verb', ['', 'disable', 'quick_stop', 'halt', 'shutdown'])
@@ -473,5 +473,5 @@ def test_recovery_does_not_undo_a_stop(verb: str) -> None:
             net.do(JOINT, verb, preempt=True)
     net.power_on(JOINT)
     net.run(3.0)
-    enabled = net.drives[JOINT].state is DriveState.OPERATION_ENABLED
+    enabled = net.drives[JOINT].view.state is DriveState.OPERATION_ENABLED
     assert enabled is not bool(verb)

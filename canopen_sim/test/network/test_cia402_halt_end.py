@@ -142,12 +142,12 @@ def test_a_halt_ends_with_the_new_target_or_with_an_error(
         if told:
             assert motor(net) == pytest.approx(target, abs=ACCURACY)
             assert beyond < ACCURACY
-            assert not net.drives[JOINT].halted
+            assert not net.drives[JOINT].control.halted
         else:
             assert kind is Kind.WORD_AFTER_HALT
             assert beyond < BRAKING
-            assert net.drives[JOINT].halted
-            assert abs(net.drives[JOINT].velocity) < ACCURACY
+            assert net.drives[JOINT].control.halted
+            assert abs(net.drives[JOINT].view.velocity) < ACCURACY
         net.commands[JOINT].set_target(OLD)
         net.run(0.5)
         net.do(JOINT, 'halt', preempt=True)

@@ -56,12 +56,12 @@ def test_a_target_is_reached_exactly(net: VirtualNetwork, mode: OperationMode) -
     enabled(net, mode)
     net.commands[JOINT].set_target(0.5)
     net.run(3.0)
-    assert net.drives[JOINT].position == pytest.approx(0.5, abs=2 / SCALE)
+    assert net.drives[JOINT].view.position == pytest.approx(0.5, abs=2 / SCALE)
     net.commands[JOINT].set_target(-0.25)
     net.run(0.2)
     net.commands[JOINT].set_target(0.1)
     net.run(3.0)
-    assert net.drives[JOINT].position == pytest.approx(0.1, abs=2 / SCALE)
+    assert net.drives[JOINT].view.position == pytest.approx(0.1, abs=2 / SCALE)
 
 
 def test_a_velocity_is_reached_and_stopped(net: VirtualNetwork) -> None:
@@ -69,10 +69,10 @@ def test_a_velocity_is_reached_and_stopped(net: VirtualNetwork) -> None:
     enabled(net, OperationMode.PROFILE_VELOCITY)
     net.commands[JOINT].set_target(0.2)
     net.run(1.0)
-    assert net.drives[JOINT].velocity == pytest.approx(0.2, rel=0.02)
+    assert net.drives[JOINT].view.velocity == pytest.approx(0.2, rel=0.02)
     net.commands[JOINT].set_target(0.0)
     net.run(1.0)
-    assert net.drives[JOINT].velocity == 0.0
+    assert net.drives[JOINT].view.velocity == 0.0
 
 
 def test_nothing_moves_unasked(net: VirtualNetwork) -> None:
@@ -102,7 +102,7 @@ def test_targets_are_preloaded_before_the_drive_obeys(net: VirtualNetwork) -> No
     net.run(0.2)
     net.do(JOINT, 'enable')
     net.run(0.1)
-    actual = round(net.drives[JOINT].position * SCALE)
+    actual = round(net.drives[JOINT].view.position * SCALE)
     assert all(abs(target - actual) <= 1 for target in net.targets(JOINT, since=since + PERIOD))
 
 
@@ -131,7 +131,7 @@ def test_a_fault_latches_and_speaks(net: VirtualNetwork, mode: OperationMode) ->
     assert 'Operation enabled' in net.do(JOINT, 'recover')
     net.run(0.5)
     assert position_inc(net) == pytest.approx(rest, abs=2), 'moved by being recovered'
-    assert not net.drives[JOINT].error
+    assert not net.drives[JOINT].view.error
 
 
 def test_a_position_that_is_not_known_is_never_told() -> None:
@@ -164,10 +164,10 @@ def test_a_lost_enable_stays_lost(net: VirtualNetwork) -> None:
     assert drive is not None
     drive.set_voltage(False, net.now)
     net.run(0.3)
-    assert net.drives[JOINT].state is not DriveState.OPERATION_ENABLED
+    assert net.drives[JOINT].view.state is not DriveState.OPERATION_ENABLED
     drive.set_voltage(True, net.now)
     net.run(1.0)
-    assert net.drives[JOINT].state is not DriveState.OPERATION_ENABLED
+    assert net.drives[JOINT].view.state is not DriveState.OPERATION_ENABLED
     assert any(JOINT in text for text in net.told(Severity.ERROR))
 
 
@@ -218,8 +218,8 @@ def test_quick_stop_ends_what_runs_and_stops(net: VirtualNetwork) -> None:
     net.run(1.0)
     net.do(JOINT, 'quick_stop', preempt=True)
     net.run(1.0)
-    assert net.drives[JOINT].velocity == 0.0
-    assert net.drives[JOINT].state is DriveState.SWITCH_ON_DISABLED
+    assert net.drives[JOINT].view.velocity == 0.0
+    assert net.drives[JOINT].view.state is DriveState.SWITCH_ON_DISABLED
 
 
 def test_busy_is_said_and_halt_preempts(net: VirtualNetwork) -> None:
@@ -240,7 +240,7 @@ def test_init_homes_by_the_method_of_the_drive(method: int) -> None:
     net.boot()
     assert f'homed by method {method}' in net.do(JOINT, 'init')
     net.run(0.1)
-    assert net.drives[JOINT].position == pytest.approx(1_000 / SCALE)
+    assert net.drives[JOINT].view.position == pytest.approx(1_000 / SCALE)
 
 
 def test_a_device_that_restarts_in_motion_is_booted_and_left_disabled(
@@ -256,8 +256,8 @@ def test_a_device_that_restarts_in_motion_is_booted_and_left_disabled(
     net.run_until(net.all_ready)
     net.run(1.0)
     assert any('restarted' in text for text in net.told(Severity.ERROR))
-    assert net.drives[JOINT].state is DriveState.SWITCH_ON_DISABLED
-    assert net.drives[JOINT].velocity == 0.0
+    assert net.drives[JOINT].view.state is DriveState.SWITCH_ON_DISABLED
+    assert net.drives[JOINT].view.velocity == 0.0
 
 
 def test_loss_ends_a_command_with_the_reason(net: VirtualNetwork) -> None:
@@ -286,8 +286,8 @@ def test_shutdown_leaves_the_drive_without_power(net: VirtualNetwork, mode: Oper
     net.run(0.3)
     net.do(JOINT, 'shutdown', preempt=True)
     net.run(0.1)
-    assert net.drives[JOINT].state is DriveState.SWITCH_ON_DISABLED
-    assert net.drives[JOINT].velocity == 0.0
+    assert net.drives[JOINT].view.state is DriveState.SWITCH_ON_DISABLED
+    assert net.drives[JOINT].view.velocity == 0.0
 
 
 def test_a_dead_master_is_noticed() -> None:
@@ -346,13 +346,13 @@ def test_a_stream_is_followed_and_braked_at_its_end(net: VirtualNetwork) -> None
     net.group.attach(source)
     begin = net.now
     net.run(1.0)
-    assert net.drives[JOINT].velocity == pytest.approx(0.4, rel=0.05)
+    assert net.drives[JOINT].view.velocity == pytest.approx(0.4, rel=0.05)
     net.group.detach(source)
     net.run(1.0)
-    assert net.drives[JOINT].velocity == 0.0
+    assert net.drives[JOINT].view.velocity == 0.0
     targets = [target / SCALE for target in net.targets(JOINT, since=begin)]
     speeds = [(b - a) / PERIOD for a, b in pairwise(targets)]
-    limit = net.drives[JOINT].parameters.profile.deceleration
+    limit = net.drives[JOINT].view.parameters.profile.deceleration
     # the source starts at speed, which is its own affair; the end is ours
     steps = [abs(b - a) for a, b in pairwise(speeds[2:])]
     assert max(steps) <= limit * PERIOD + 2 / SCALE / PERIOD
@@ -378,7 +378,7 @@ def test_a_single_target_takes_the_axis_from_its_source(net: VirtualNetwork) -> 
     net.commands[JOINT].set_target(0.0)
     net.run(3.0)
     assert [loss.cause for loss in source.losses] == [RefusalCause.SINGLE_TARGET]
-    assert net.drives[JOINT].position == pytest.approx(0.0, abs=2 / SCALE)
+    assert net.drives[JOINT].view.position == pytest.approx(0.0, abs=2 / SCALE)
 
 
 def test_a_source_attached_again_goes_on(net: VirtualNetwork) -> None:

@@ -49,21 +49,21 @@ def test_limits_that_are_written_through_the_master_hold_at_once() -> None:
     fastest = 0.0
     for _ in range(200):
         net.run(PERIOD)
-        fastest = max(fastest, net.drives[JOINT].velocity)
+        fastest = max(fastest, net.drives[JOINT].view.velocity)
     assert fastest == pytest.approx(0.2, rel=0.05)
 
 
 def test_a_write_that_the_drive_refuses_changes_nothing() -> None:
     """And one of an object that is no limit asks the drive nothing."""
     net = enabled(drive_config(JOINT, NODE_ID), OperationMode.CYCLIC_POSITION)
-    before = net.drives[JOINT].parameters
+    before = net.drives[JOINT].view.parameters
     begin = net.now
     promise = net.network.nodes[JOINT].sdo.write(0x6081, 0, b'\x01', 0.5)  # too short
     net.run(0.2)
     assert promise.error is not None
     net.result(net.network.nodes[JOINT].objects.write_object(0x6067, 0, 12))
     net.run(0.2)
-    assert net.drives[JOINT].parameters == before
+    assert net.drives[JOINT].view.parameters == before
     assert len(net.frames(0x600 + NODE_ID, since=begin)) <= 3
 
 
@@ -73,7 +73,7 @@ def test_limits_are_in_the_units_of_targets() -> None:
     scales = {'scale_pos_from_dev': 2 / SCALE, 'scale_vel_from_dev': 3 / SCALE}
     config = drive_config(JOINT, NODE_ID, sdo_writes=writes, scales=scales)
     net = enabled(config, OperationMode.PROFILE_POSITION)
-    told = net.drives[JOINT].parameters
+    told = net.drives[JOINT].view.parameters
     assert told.position_limits == pytest.approx((-0.5, 0.5))
     assert told.profile.velocity == pytest.approx(1.0)
     with pytest.raises(DriveError, match='software limits'):
@@ -116,7 +116,7 @@ def test_a_quick_stop_at_rest_ends_where_its_option_says(option: int, state: Dri
     net = enabled(with_writes((0x605A, 0, option)), OperationMode.PROFILE_POSITION)
     net.do(JOINT, 'quick_stop', preempt=True)
     net.run(1.0)
-    assert net.drives[JOINT].state is state
+    assert net.drives[JOINT].view.state is state
     drive = net.devices[JOINT].drive
     assert drive is not None
     assert drive.state is state
@@ -131,5 +131,5 @@ def test_a_stop_without_end_is_not_waited_for_for_ever() -> None:
     begin = net.now
     net.do(JOINT, 'shutdown', preempt=True)
     assert net.now - begin <= SHUTDOWN_MAX
-    assert net.drives[JOINT].state is DriveState.SWITCH_ON_DISABLED
+    assert net.drives[JOINT].view.state is DriveState.SWITCH_ON_DISABLED
     assert [text for text in net.told() if 'did not come to rest' in text]

@@ -80,7 +80,7 @@ def motor(net: VirtualNetwork) -> float:
 
 def speed(net: VirtualNetwork) -> float:
     """Return how fast the drive says that it turns in [rad/s]."""
-    return net.drives[JOINT].velocity
+    return net.drives[JOINT].view.velocity
 
 
 def target_of(mode: OperationMode) -> float:
@@ -167,7 +167,7 @@ def test_quick_stop_stops_and_disables(mode: OperationMode) -> None:
     assert speed(net) > 0.05
     net.do(JOINT, 'quick_stop', preempt=True)
     net.run(2.0)
-    assert net.drives[JOINT].state is DriveState.SWITCH_ON_DISABLED
+    assert net.drives[JOINT].view.state is DriveState.SWITCH_ON_DISABLED
     assert speed(net) == pytest.approx(0.0, abs=0.01)
 
 
@@ -322,10 +322,10 @@ def test_home_is_a_command_of_its_own() -> None:
     answer = net.result(commands.run('home', commands.home(35, phases.append)))
     assert 'homed by method 35' in answer
     assert phases == list(HomingProgress)
-    assert net.drives[JOINT].state is DriveState.OPERATION_ENABLED
-    assert net.drives[JOINT].mode.number is OperationMode.NO_MODE
+    assert net.drives[JOINT].view.state is DriveState.OPERATION_ENABLED
+    assert net.drives[JOINT].control.mode.number is OperationMode.NO_MODE
     net.run(0.1)
-    assert net.drives[JOINT].position == pytest.approx(0.2, abs=1e-3)
+    assert net.drives[JOINT].view.position == pytest.approx(0.2, abs=1e-3)
 
 
 def test_a_second_homing_is_a_new_one() -> None:
@@ -411,11 +411,11 @@ def test_recovery_after_a_power_cut_is_by_policy(policy: RecoveryPolicy) -> None
     rest = motor(net)
     net.run(3.0)
     again = policy is RecoveryPolicy.AUTO
-    assert (net.drives[JOINT].state is DriveState.OPERATION_ENABLED) is again
+    assert (net.drives[JOINT].view.state is DriveState.OPERATION_ENABLED) is again
     assert motor(net) == pytest.approx(rest, abs=1e-3)
     assert any('enabled again (recovery: auto)' in text for text in net.told()) is again
     if again:
-        assert net.drives[JOINT].mode.number is OperationMode.CYCLIC_POSITION
+        assert net.drives[JOINT].control.mode.number is OperationMode.CYCLIC_POSITION
 
 
 def test_recovery_does_not_reset_a_fault() -> None:
@@ -432,7 +432,7 @@ def test_recovery_does_not_reset_a_fault() -> None:
     device.drive.raise_fault(0x4310, net.now)
     net.run_until(net.all_ready)
     net.run(1.0)
-    assert net.drives[JOINT].state is DriveState.FAULT
+    assert net.drives[JOINT].view.state is DriveState.FAULT
     assert any('not enabled again' in text for text in net.told())
 
 
@@ -447,7 +447,7 @@ def test_without_voltage_the_answer_names_the_safety_circuit() -> None:
         net.do(JOINT, 'init')
     drive.set_voltage(True, net.now)
     net.run(0.5)
-    assert net.drives[JOINT].state is not DriveState.OPERATION_ENABLED
+    assert net.drives[JOINT].view.state is not DriveState.OPERATION_ENABLED
     net.do(JOINT, 'init')
 
 
@@ -466,9 +466,9 @@ def test_units_come_from_the_drive_when_bus_yml_has_none() -> None:
     config = replace(full_drive(), axes=(axis,), dictionary=dictionary)
     net = VirtualNetwork(bus_config(config))
     net.boot()
-    assert net.drives[JOINT].units.position_to_device(2 * math.pi) == 360_000
-    assert net.drives[JOINT].units.velocity_to_device(2 * math.pi) == 360_000
-    assert '0x608F' in net.drives[JOINT].parameters.units
+    assert net.drives[JOINT].view.units.position_to_device(2 * math.pi) == 360_000
+    assert net.drives[JOINT].view.units.velocity_to_device(2 * math.pi) == 360_000
+    assert '0x608F' in net.drives[JOINT].view.parameters.units
 
 
 def test_unknown_quirks_are_refused_with_those_that_exist() -> None:
@@ -548,7 +548,7 @@ def test_a_fault_reset_reaches_a_drive_that_looks_less_often(every: int) -> None
     drive.raise_fault(0x3210, net.now)
     net.run(0.3)
     net.do(JOINT, 'recover')
-    assert net.drives[JOINT].state is DriveState.OPERATION_ENABLED
+    assert net.drives[JOINT].view.state is DriveState.OPERATION_ENABLED
 
 
 def test_a_drive_that_interpolates_only_in_motion_is_no_warning() -> None:

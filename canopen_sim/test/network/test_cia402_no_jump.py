@@ -77,7 +77,7 @@ class Loaded:
         self.enable(mode)
         self.net.commands[JOINT].set_target(0.8)
         self.net.run(0.4)
-        assert self.net.drives[JOINT].velocity > 0.5
+        assert self.net.drives[JOINT].view.velocity > 0.5
 
     def setpoints(self, since: float) -> list[int]:
         """Return what the master commanded to the streamed mode that the drive was in, in [inc].
@@ -166,7 +166,7 @@ def test_a_switch_in_motion_brakes_first(mode: OperationMode, other: OperationMo
         loaded.net.select(JOINT, other)
     loaded.net.run(0.5)
     assert_smooth(loaded.setpoints(begin - 0.1), 50_000)
-    assert loaded.net.drives[JOINT].velocity == 0.0
+    assert loaded.net.drives[JOINT].view.velocity == 0.0
     assert loaded.mode == (other or OperationMode.NO_MODE)
 
 
@@ -204,7 +204,9 @@ def test_a_drive_that_keeps_its_mode_does_not_jump_when_it_is_enabled() -> None:
     loaded.net.wire.alters = keep_mode_8
     drive = loaded.net.devices[JOINT].drive
     assert drive is not None
-    loaded.net.drives[JOINT].select(loaded.net.drives[JOINT].modes[OperationMode.NO_MODE])
+    loaded.net.drives[JOINT].control.select(
+        loaded.net.drives[JOINT].control.modes[OperationMode.NO_MODE]
+    )
     drive._axis.shift(-1234)
     drive._publish(loaded.net.now)
     loaded.net.run(0.1)
@@ -241,7 +243,7 @@ def test_halt_while_it_is_being_enabled_leaves_it_disabled(cycles: int) -> None:
         return
     net.do(JOINT, 'halt', preempt=True)
     net.run(2.0)
-    assert net.drives[JOINT].state is DriveState.SWITCH_ON_DISABLED
+    assert net.drives[JOINT].view.state is DriveState.SWITCH_ON_DISABLED
 
 
 @pytest.mark.parametrize('option', [1, 2, 5, 6])
@@ -257,7 +259,7 @@ def test_shutdown_never_lets_a_moving_axis_go(
     if halted:
         loaded.net.do(JOINT, 'quick_stop', preempt=True)
         loaded.net.run(0.05)
-        assert loaded.net.drives[JOINT].velocity > 0.1
+        assert loaded.net.drives[JOINT].view.velocity > 0.1
     drive = loaded.net.devices[JOINT].drive
     assert drive is not None
     fastest = 0.0

@@ -133,7 +133,7 @@ def test_a_refused_holding_value_keeps_the_drive_disabled(mode: OperationMode) -
     with pytest.raises(DriveError, match=f'0x{TARGETS[mode]:04X}.*present device state'):
         net.do(JOINT, 'enable')
     net.run(0.5)
-    assert net.drives[JOINT].state is not DriveState.OPERATION_ENABLED
+    assert net.drives[JOINT].view.state is not DriveState.OPERATION_ENABLED
     accept(net)
     assert 'Operation enabled' in net.do(JOINT, 'enable')
 
@@ -152,7 +152,7 @@ def test_the_mode_that_a_drive_stays_in_is_held_at_enable() -> None:
     leave_behind(net, VELOCITY, 3_000)
     before = motor(net)
     net.do(JOINT, 'enable')
-    assert net.drives[JOINT].mode.number is OperationMode.NO_MODE
+    assert net.drives[JOINT].control.mode.number is OperationMode.NO_MODE
     assert net.drives[JOINT].objects.mode_display == OperationMode.PROFILE_VELOCITY
     net.run(1.0)
     assert motor(net) == pytest.approx(before, abs=1e-3)
@@ -208,12 +208,12 @@ def test_a_target_that_is_refused_at_the_end_of_a_halt_leaves_it_halted() -> Non
     with pytest.raises(DriveError, match='present device state'):
         net.result(give(net, -0.3))
     net.run(1.0)
-    assert net.drives[JOINT].halted
-    assert abs(net.drives[JOINT].rate) < 0.01
+    assert net.drives[JOINT].control.halted
+    assert abs(net.drives[JOINT].view.rate) < 0.01
     accept(net)
     net.result(give(net, -0.3))
     net.run(1.0)
-    assert net.drives[JOINT].rate == pytest.approx(-0.3, abs=0.02)
+    assert net.drives[JOINT].view.rate == pytest.approx(-0.3, abs=0.02)
 
 
 def test_moves_of_which_the_first_is_refused_leave_a_halted_axis_halted_at_once() -> None:
@@ -227,8 +227,8 @@ def test_moves_of_which_the_first_is_refused_leave_a_halted_axis_halted_at_once(
     net.run(0.5)
     assert isinstance(first.error, DriveError)
     assert second.done
-    assert net.drives[JOINT].halted
-    assert not net.drives[JOINT].halt.leaving
+    assert net.drives[JOINT].control.halted
+    assert not net.drives[JOINT].control.halt.leaving
 
 
 @pytest.mark.parametrize('mode', [OperationMode.PROFILE_POSITION, OperationMode.PROFILE_VELOCITY])
@@ -298,12 +298,12 @@ def test_a_target_whose_answer_is_lost_does_not_go_on_moving(mode: OperationMode
     with pytest.raises(DriveError, match='did not answer'):
         net.result(give(net, 0.4 if mode is not OperationMode.PROFILE_TORQUE else 200.0))
     net.run(1.0)
-    assert abs(net.drives[JOINT].rate) < 0.01
+    assert abs(net.drives[JOINT].view.rate) < 0.01
     net.wire.loses = lambda sender, frame: False
     net.run(0.5)
     net.result(give(net, 0.2 if mode is not OperationMode.PROFILE_TORQUE else 200.0))
     net.run(1.0)
-    assert net.drives[JOINT].rate > 0.1
+    assert net.drives[JOINT].view.rate > 0.1
 
 
 @pytest.mark.parametrize('verb', ['halt', 'disable', 'quick_stop'])
@@ -341,7 +341,7 @@ def test_of_targets_that_come_faster_than_they_are_written_the_newest_counts() -
     net.run(1.0)
     assert all('target' in answered.result() for answered in answers)
     assert len(downloads(net, since=begin)) <= 2
-    assert net.drives[JOINT].rate == pytest.approx(0.29, abs=0.02)
+    assert net.drives[JOINT].view.rate == pytest.approx(0.29, abs=0.02)
 
 
 @pytest.mark.parametrize('mode', [OperationMode.PROFILE_POSITION, OperationMode.PROFILE_VELOCITY])
@@ -375,7 +375,7 @@ def test_a_stream_whose_targets_are_refused_stops_the_axis() -> None:
     assert 'was ended by a target that the drive did not take' in refused
     assert len(downloads(net, since=begin)) < 5
     net.run(1.0)
-    assert abs(net.drives[JOINT].rate) < 0.01
+    assert abs(net.drives[JOINT].view.rate) < 0.01
 
 
 def test_a_target_after_a_stream_is_not_stopped_by_what_was_under_way() -> None:
@@ -395,8 +395,8 @@ def test_a_target_after_a_stream_is_not_stopped_by_what_was_under_way() -> None:
     under_way.reject(SdoAbortError('0x60FF refused', 0x08000022))
     assert 'target' in net.result(answered)
     net.run(1.0)
-    assert not net.drives[JOINT].halted
-    assert net.drives[JOINT].rate == pytest.approx(0.3, abs=0.02)
+    assert not net.drives[JOINT].control.halted
+    assert net.drives[JOINT].view.rate == pytest.approx(0.3, abs=0.02)
 
 
 # ------------------------------------------------------------------ nothing unasked
@@ -445,7 +445,7 @@ def test_a_controlword_that_is_refused_is_written_seldom() -> None:
     assert len([text for text in net.told(Severity.WARNING) if '0x6040' in text]) == 1
     accept(net)
     net.run_until(lambda: promise.done, 10.0)
-    net.run_until(lambda: net.drives[JOINT].state is not DriveState.OPERATION_ENABLED, 10.0)
+    net.run_until(lambda: net.drives[JOINT].view.state is not DriveState.OPERATION_ENABLED, 10.0)
 
 
 def test_of_values_behind_one_that_failed_only_the_newest_is_sent() -> None:
@@ -527,7 +527,7 @@ class Client:
     def _leave_behind(self) -> None:
         drive = self.net.drives[JOINT]
         acting = TARGETS.get(OperationMode(drive.objects.mode_display))
-        idle = [index for index in TARGETS.values() if index != acting or not drive.acts]
+        idle = [index for index in TARGETS.values() if index != acting or not drive.control.acts]
         leave_behind(self.net, self._random.choice(idle), self._random.randint(-3_000, 3_000))
 
     def _disturb(self) -> None:

@@ -141,14 +141,14 @@ def test_a_fault_while_a_drive_cannot_be_seen_is_known_when_it_can(mode: Operati
     device.raise_fault(0x2310, arm.net.now)
     arm.net.run(1.0)
     drive = arm.net.drives[BLIND]
-    assert not drive.accepts_targets
-    assert not drive.fresh
-    assert drive.age > 1.5
+    assert not drive.control.accepts_targets
+    assert not drive.view.fresh
+    assert drive.view.age > 1.5
     rest = arm.motors()
     arm.net.wire.loses = lambda sender, frame: False
     arm.net.run(1.0)
-    assert drive.fresh
-    assert drive.state is DriveState.FAULT
+    assert drive.view.fresh
+    assert drive.view.state is DriveState.FAULT
     assert arm.motors() == pytest.approx(rest, abs=2e-3)
 
 
@@ -225,7 +225,7 @@ def test_feedback_is_that_of_the_sync_it_is_stamped_with() -> None:
     net, told, sent = arm.net, [], []
 
     def note(sync_time: float) -> None:
-        told.append(net.drives['joint1'].position)
+        told.append(net.drives['joint1'].view.position)
         (data,) = net.frames(0x282, since=sync_time)
         sent.append(struct.unpack_from('<i', data)[0] / SCALE)
 

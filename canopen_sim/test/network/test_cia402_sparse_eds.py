@@ -39,7 +39,7 @@ def booted(dictionary: ObjectDictionary, **changes: object) -> VirtualNetwork:
 def test_a_simulated_drive_has_the_modes_that_its_objects_allow() -> None:
     """0x6502 of EPOS, Kollmorgen and Elmo has no default; the drive is of use all the same."""
     net = booted(without_default(0x6502))
-    told = net.drives[JOINT].parameters.supported_modes
+    told = net.drives[JOINT].view.parameters.supported_modes
     wanted = (OperationMode.PROFILE_POSITION, OperationMode.HOMING, OperationMode.CYCLIC_TORQUE)
     assert told
     assert all(told & mode.support_bit for mode in wanted)
@@ -47,7 +47,7 @@ def test_a_simulated_drive_has_the_modes_that_its_objects_allow() -> None:
     net.select(JOINT, OperationMode.PROFILE_POSITION)
     net.commands[JOINT].set_target(0.3)
     net.run(5.0)
-    assert net.drives[JOINT].position == pytest.approx(0.3, abs=1e-3)
+    assert net.drives[JOINT].view.position == pytest.approx(0.3, abs=1e-3)
 
 
 def test_it_has_no_mode_whose_object_is_missing() -> None:
@@ -55,7 +55,7 @@ def test_it_has_no_mode_whose_object_is_missing() -> None:
     dictionary = ObjectDictionary(
         entry for entry in without_default(0x6502) if entry.index not in (0x6071, 0x6042)
     )
-    told = booted(dictionary).drives[JOINT].parameters.supported_modes
+    told = booted(dictionary).drives[JOINT].view.parameters.supported_modes
     assert told
     missing = (OperationMode.PROFILE_TORQUE, OperationMode.CYCLIC_TORQUE, OperationMode.VELOCITY)
     assert not any(told & mode.support_bit for mode in missing)
@@ -78,7 +78,7 @@ def test_a_target_without_an_rpdo_goes_by_sdo() -> None:
     for target in (0.5, -0.2, 0.9):
         net.commands[JOINT].set_target(target)
         net.run(5.0)
-        assert net.drives[JOINT].position == pytest.approx(target, abs=1e-3)
+        assert net.drives[JOINT].view.position == pytest.approx(target, abs=1e-3)
     assert net.told(Severity.WARNING) == []
 
 
@@ -88,10 +88,10 @@ def test_a_velocity_without_an_rpdo_goes_by_sdo() -> None:
     net.select(JOINT, OperationMode.PROFILE_VELOCITY)
     net.commands[JOINT].set_target(0.4)
     net.run(1.0)
-    assert net.drives[JOINT].rate == pytest.approx(0.4, abs=0.02)
+    assert net.drives[JOINT].view.rate == pytest.approx(0.4, abs=0.02)
     net.do(JOINT, 'halt')
     net.run(1.0)
-    assert net.drives[JOINT].rate == pytest.approx(0.0, abs=0.01)
+    assert net.drives[JOINT].view.rate == pytest.approx(0.0, abs=0.01)
 
 
 def test_an_idle_drive_fills_no_bus_with_its_targets() -> None:
@@ -120,5 +120,5 @@ def test_a_drive_moves_by_the_default_dictionary() -> None:
     net.select('a', OperationMode.PROFILE_POSITION)
     net.commands['a'].set_target(0.5)
     net.run(10.0)
-    assert net.drives['a'].position == pytest.approx(0.5, abs=1e-3)
+    assert net.drives['a'].view.position == pytest.approx(0.5, abs=1e-3)
     assert net.told(Severity.ERROR) == []

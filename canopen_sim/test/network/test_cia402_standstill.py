@@ -107,7 +107,7 @@ def test_halt_and_switch_wait_for_the_standstill(
 def test_the_velocity_is_that_of_the_position_where_no_pdo_carries_it() -> None:
     """Shown to motion sources and in /joint_states, a few cycles late."""
     net = running(without_velocity(), OperationMode.PROFILE_VELOCITY, 0.5)
-    assert net.drives[JOINT].velocity == pytest.approx(0.5, rel=0.02)
+    assert net.drives[JOINT].view.velocity == pytest.approx(0.5, rel=0.02)
 
 
 def test_noise_is_standstill() -> None:

@@ -104,7 +104,7 @@ def owner_of(failing: Failing, place: str) -> tuple[object, str]:
     drive = failing.net.drives[JOINT]
     rpdo = failing.net.network.nodes[JOINT].image.rpdos[-1]
     return {
-        'mode': (drive.mode, 'step'),
+        'mode': (drive.control.mode, 'step'),
         'write': (drive, 'write'),
         'read': (drive, 'read'),
         'controlword': (drive.objects.controlword, 'write'),
@@ -319,7 +319,7 @@ def test_a_failure_while_it_is_enabled_stays_named_until_the_next_enabling(
     failing.net.do(JOINT, 'shutdown', preempt=True)
     enabling = failing.net.begin(JOINT, 'enable')
     drive = failing.net.drives[JOINT]
-    failing.net.run_until(lambda: bool(drive._controlword & 0x8))
+    failing.net.run_until(lambda: bool(drive.control._controlword & 0x8))
     failing.net.run(PERIOD * (cycles - 1))
     drive.fail(ZeroDivisionError('injected'))
     failing.run(RAMP + 1.0)
@@ -345,7 +345,7 @@ def test_nothing_enables_a_drive_while_it_is_stopped(monkeypatch: pytest.MonkeyP
     assert failing.device.state == DriveState.SWITCH_ON_DISABLED
     assert abs(failing.device.velocity) / SCALE < STANDING
     failing.net.do(JOINT, 'enable')
-    assert failing.net.drives[JOINT].state is DriveState.OPERATION_ENABLED
+    assert failing.net.drives[JOINT].view.state is DriveState.OPERATION_ENABLED
     assert not drive_status(failing.net.drives[JOINT], failing.net.now).failure
 
 

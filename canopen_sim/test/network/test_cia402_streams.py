@@ -73,7 +73,7 @@ def test_a_command_wins_over_a_stream(mode: OperationMode, name: str) -> None:
     client = Publisher(mode)
     client.publish(1.0)
     begin = client.motor
-    assert client.net.drives[JOINT].velocity > 0.3
+    assert client.net.drives[JOINT].view.velocity > 0.3
     client.result(COMMANDS[name](client))
     assert client.motor - begin < 0.15
     rest = client.motor
@@ -95,8 +95,8 @@ def test_after_a_pause_a_new_stream_is_followed(mode: OperationMode) -> None:
     client.publish(1.0)
     assert client.refusals == []
     assert client.motor == pytest.approx(client.value, abs=0.6)
-    assert client.net.drives[JOINT].velocity > 0.3
-    assert not client.net.drives[JOINT].halted
+    assert client.net.drives[JOINT].view.velocity > 0.3
+    assert not client.net.drives[JOINT].control.halted
 
 
 def test_a_drive_that_is_enabled_again_waits_for_a_new_stream() -> None:
@@ -152,10 +152,10 @@ def test_nothing_is_called_stopped_that_moves(mode: OperationMode) -> None:
         client.commands.stream_target(3.0 if position else 0.8)
         client.net.run(PERIOD)
     drive = client.net.drives[JOINT]
-    assert drive.velocity > 0.5
+    assert drive.view.velocity > 0.5
     while not (said := [text for text in client.net.told() if 'has paused' in text]):
         client.net.run(PERIOD)
-    moves = abs(drive.velocity) > 0.02
+    moves = abs(drive.view.velocity) > 0.02
     assert ('stopped' in said[0]) is not moves
     assert moves is (mode is OperationMode.PROFILE_POSITION)
     client.net.run(5.0)

@@ -54,14 +54,14 @@ def test_a_drive_that_holds_goes_on_holding(mode: OperationMode) -> None:
     seen = positions(net, 1.0)
     drive = net.drives['a']
     assert net.network.nodes['a'].taken_over
-    assert drive.state is DriveState.OPERATION_ENABLED
-    assert drive.accepts_targets
+    assert drive.view.state is DriveState.OPERATION_ENABLED
+    assert drive.control.accepts_targets
     assert max(abs(position - at_rest) for position in seen) <= 1
     assert all(word & 0x0F == 0x0F for word in net.controlwords('a', since=begin))
     assert any('taken over enabled' in text for text in net.told())
     net.commands['a'].set_target(0.5)
     net.run(3.0)
-    assert drive.position == pytest.approx(0.5, abs=1e-3)
+    assert drive.view.position == pytest.approx(0.5, abs=1e-3)
 
 
 def test_a_move_on_its_way_is_brought_to_its_end() -> None:
@@ -75,7 +75,7 @@ def test_a_move_on_its_way_is_brought_to_its_end() -> None:
     seen = positions(net, 4.0)
     steps = [later - before for before, later in itertools.pairwise(seen)]
     assert min(steps) >= -1
-    assert net.drives['a'].position == pytest.approx(2.0, abs=1e-3)
+    assert net.drives['a'].view.position == pytest.approx(2.0, abs=1e-3)
 
 
 def test_a_drive_that_is_not_enabled_is_not_enabled() -> None:
@@ -85,8 +85,8 @@ def test_a_drive_that_is_not_enabled_is_not_enabled() -> None:
     net.replace_master()
     net.start()
     net.run(1.0)
-    assert net.drives['a'].state is not DriveState.OPERATION_ENABLED
-    assert net.drives['a'].goal is None
+    assert net.drives['a'].view.state is not DriveState.OPERATION_ENABLED
+    assert net.drives['a'].control.goal is None
 
 
 def test_what_was_taken_over_is_led_anew_after_a_stop() -> None:
@@ -100,5 +100,5 @@ def test_what_was_taken_over_is_led_anew_after_a_stop() -> None:
     net.run(0.5)
     net.network.send_nmt(NmtCommand.START, 2)
     net.run(1.0)
-    assert net.drives['a'].state is not DriveState.OPERATION_ENABLED
+    assert net.drives['a'].view.state is not DriveState.OPERATION_ENABLED
     assert net.told(Severity.ERROR) == []

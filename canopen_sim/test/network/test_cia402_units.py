@@ -36,7 +36,7 @@ def test_a_drive_without_scales_moves_as_far_as_with_ros2_canopen() -> None:
     keys = ('scale_pos_to_dev', 'scale_pos_from_dev', 'scale_vel_to_dev', 'scale_vel_from_dev')
     net = moved({key: getattr(defaults, key) for key in keys}, 1.5)
     assert net.targets(JOINT)[-1] == 1500
-    assert net.drives[JOINT].position == pytest.approx(1.5, abs=1e-3)
+    assert net.drives[JOINT].view.position == pytest.approx(1.5, abs=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -77,7 +77,7 @@ def test_a_drive_with_profile_velocity_0_refuses_targets() -> None:
     net.run(0.5)
     net.commands[JOINT].set_target(0.5)
     net.run(5.0)
-    assert net.drives[JOINT].position == pytest.approx(0.5, abs=1e-3)
+    assert net.drives[JOINT].view.position == pytest.approx(0.5, abs=1e-3)
 
 
 def test_a_factor_group_that_the_drive_does_not_have_is_said() -> None:
@@ -91,5 +91,5 @@ def test_a_factor_group_that_the_drive_does_not_have_is_said() -> None:
     )
     net.start()
     net.run(3.0)
-    assert not net.drives[JOINT].ready
+    assert not net.drives[JOINT].view.ready
     assert any('scale_from_factor_group' in text for text in net.told(Severity.WARNING))

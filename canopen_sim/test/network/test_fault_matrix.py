@@ -341,7 +341,7 @@ def test_fault_in_motion(fault: Fault, mode: OperationMode) -> None:
         )
         codes = [emcy.code for _, emcy in arm.net.network.nodes[name].emergencies.history]
         assert fault.emcy is None or fault.emcy in codes
-        refusal = arm.net.drives[name].refusal
+        refusal = arm.net.drives[name].control.refusal
         assert refusal is not None
         assert refusal.cause is fault.cause
         with pytest.raises(DriveError):
@@ -387,7 +387,7 @@ def assert_obeys(arm: Arm, mode: OperationMode) -> None:
     """Check that the drive goes where it is sent now."""
     if mode not in POSITION_MODES:
         arm.net.commands[FAULTY].set_target(-target_of(mode))
-        arm.net.run_until(lambda: arm.net.drives[FAULTY].velocity < -0.1, 1.0)
+        arm.net.run_until(lambda: arm.net.drives[FAULTY].view.velocity < -0.1, 1.0)
         return
     arm.net.commands[FAULTY].set_target(-0.2)
     arm.net.run(2.0)
@@ -422,8 +422,10 @@ def test_lost_pdos_in_motion(
     for name in names:
         drive = arm.net.drives[name]
         causes = {text for text in arm.net.told(Severity.ERROR) if f'{name}: stopped' in text}
-        assert drive.accepts_targets is not silent
-        assert drive.halted is bool(causes) is (silent or mode in STREAMED), arm.net.story()
+        assert drive.control.accepts_targets is not silent
+        assert drive.control.halted is bool(causes) is (silent or mode in STREAMED), (
+            arm.net.story()
+        )
         if silent:
             with pytest.raises(DriveError, match='TPDOs'):
                 arm.net.commands[name].set_target(0.1)
@@ -438,7 +440,7 @@ def test_lost_pdos_in_motion(
     arm.stands(FAULTY, WITNESS)
     for name in (FAULTY, WITNESS):
         assert arm.state(name) is DriveState.OPERATION_ENABLED
-        assert arm.net.drives[name].accepts_targets
+        assert arm.net.drives[name].control.accepts_targets
     assert_obeys(arm, mode)
 
 
@@ -487,7 +489,7 @@ def test_another_device_than_expected_is_not_driven() -> None:
     )
     net = VirtualNetwork(config, dictionaries={FAULTY: other})
     net.start()
-    net.run_until(lambda: net.drives[WITNESS].ready)
+    net.run_until(lambda: net.drives[WITNESS].view.ready)
     net.run(2.0)
     assert any('another device: vendor id 0x00001234' in text for text in net.told())
     with pytest.raises(DriveError, match='vendor id'):

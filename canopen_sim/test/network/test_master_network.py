@@ -569,12 +569,12 @@ def test_a_device_that_does_not_answer_sync_is_told_before_its_heartbeat_is_miss
     for count in (1, 2):
         net.wire.loses = lambda sender, frame: frame.can_id in (0x182, 0x282)
         net.run(1.0)
-        assert not net.drives['a'].fresh
+        assert not net.drives['a'].view.fresh
         told = [text for text in net.told(Severity.WARNING) if 'has not answered SYNC' in text]
         assert len(told) == count
         net.wire.loses = lambda sender, frame: False
         net.run(0.2)
-        assert net.drives['a'].fresh
+        assert net.drives['a'].view.fresh
 
 
 def test_a_pause_of_the_cycle_is_told_with_its_consequence() -> None:

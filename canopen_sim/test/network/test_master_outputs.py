@@ -169,7 +169,7 @@ def test_the_first_targets_of_a_drive_are_where_it_is() -> None:
     net.run_until(lambda: not net.drives['a'].node.online, 1.0)
     net.run_until(net.all_ready, 5.0)
     (at,) = {round(0.3 * SCALE), *net.targets('a', since=begin)}
-    assert at == round(net.drives['a'].position * SCALE)
+    assert at == round(net.drives['a'].view.position * SCALE)
 
 
 def test_the_position_of_a_drive_is_read_once_for_all_its_targets() -> None:

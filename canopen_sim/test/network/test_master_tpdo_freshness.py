@@ -88,12 +88,12 @@ def test_a_drive_whose_tpdos_stop_to_come_on_change_is_not_fresh(mode: Operation
     velocities = blind.lose_tpdos()
     assert min(velocities) > -0.02  # it is not thrown back to where it was seen last
     assert velocities[-1] == pytest.approx(0.0, abs=1e-3)
-    refusal = blind.net.drives[JOINT].refusal
+    refusal = blind.net.drives[JOINT].control.refusal
     assert refusal is not None
     assert refusal.cause is RefusalCause.SILENT
     blind.net.wire.loses = lambda sender, frame: False
     blind.net.run(3.0)
-    assert blind.net.drives[JOINT].accepts_targets
+    assert blind.net.drives[JOINT].control.accepts_targets
     assert not [text for text in blind.net.told(Severity.WARNING) if 'nobody notices' in text]
 
 
@@ -122,7 +122,7 @@ def test_a_device_that_refuses_its_event_timer_is_named() -> None:
     net = VirtualNetwork(config, dictionaries={JOINT: without})
     net.boot()
     net.run(2.0)
-    assert net.drives[JOINT].fresh
+    assert net.drives[JOINT].view.fresh
     warnings = [text for text in net.told(Severity.WARNING) if 'nobody notices' in text]
     assert len(warnings) == 1
     net.power_off(JOINT)
@@ -148,10 +148,10 @@ def test_a_timer_that_is_taken_at_the_next_boot_counts_again() -> None:
         told = net.told(Severity.WARNING)[begin:]
         assert any('TPDO 1: nobody notices' in text for text in told) is refuses
         net.run(2.0)
-        assert net.drives[JOINT].fresh
+        assert net.drives[JOINT].view.fresh
         net.wire.loses = lambda sender, frame: frame.can_id == 0x180 + NODE_ID
         net.run(1.0)
-        assert net.drives[JOINT].fresh is refuses
+        assert net.drives[JOINT].view.fresh is refuses
         net.wire.loses = lambda sender, frame: False
 
 
@@ -181,10 +181,10 @@ def test_a_drive_in_operation_is_taken_over_and_gets_its_event_timer() -> None:
     net.start()
     net.run(2.0)
     assert net.network.nodes[JOINT].taken_over
-    assert net.drives[JOINT].fresh
+    assert net.drives[JOINT].view.fresh
     net.wire.loses = lambda sender, frame: frame.can_id in TPDOS
     net.run(1.0)
-    assert not net.drives[JOINT].fresh
+    assert not net.drives[JOINT].view.fresh
 
 
 def loaded(

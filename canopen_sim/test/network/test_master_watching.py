@@ -146,15 +146,15 @@ def test_a_pdo_with_an_event_time_that_stops_is_told() -> None:
     net.boot()
     net.run(0.5)
     node = net.network.nodes['a']
-    assert net.drives['a'].fresh
+    assert net.drives['a'].view.fresh
     for handler in (0x382,):
         net.network._handlers[handler] = lambda frame: None
     net.run(0.2)
-    assert not net.drives['a'].fresh
+    assert not net.drives['a'].view.fresh
     assert any('TPDO 3 (0x382) has stopped: none for 60 ms' in text for text in net.told())
     node.image.tpdos[-1].receive(Frame(0x382, bytes(2), net.now))
     net.run(0.01)
-    assert net.drives['a'].fresh
+    assert net.drives['a'].view.fresh
 
 
 def test_pdos_that_come_after_the_window_are_counted() -> None:

@@ -84,9 +84,9 @@ def test_anything_on_the_bus(seed: int) -> None:
     assert network.all_ready()
     assert motors(network) == positions
     for name, drive in network.drives.items():
-        assert drive.fresh
-        assert drive.state is not DriveState.OPERATION_ENABLED
-        assert not drive.accepts_targets
+        assert drive.view.fresh
+        assert drive.view.state is not DriveState.OPERATION_ENABLED
+        assert not drive.control.accepts_targets
         network.do(name, 'recover')  # what the noise has left behind faults no drive for good
         network.do(name, 'disable')
     network.network.send_nmt(NmtCommand.RESET_NODE, ALL_NODES)

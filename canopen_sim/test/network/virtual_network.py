@@ -231,7 +231,7 @@ class VirtualNetwork:
     def all_ready(self) -> bool:
         """Tell whether every device is booted and every drive knows its drive's state."""
         online = all(node.online for node in self.network.nodes.values())
-        return online and all(drive.ready for drive in self.drives.values())
+        return online and all(drive.view.ready for drive in self.drives.values())
 
     def begin(self, name: str, verb: str, *, preempt: bool = False) -> Promise[str]:
         """Begin a command of a drive by the name of its coroutine, without waiting."""

@@ -1,19 +1,22 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""One axis with its modes: which is commanded, which one acts, and what each would do next."""
+"""What is commanded to one axis: goal, mode and target, halt, and from them the controlword."""
 
 from __future__ import annotations
 
-from ..config.drive_model import DriveConfig
-from ..master.remote_node import RemoteNode
-from ..master.scheduler import Promise, Scheduler
+from collections.abc import Callable
+
+from ..master.scheduler import Promise
 from ..standard.drive import DriveState, mode_title, OperationMode
 from .cyclic_position import CyclicPosition
+from .drive_view import DriveView, FAULTY
+from .halt import Halt
 from .mode_table import build_modes
 from .modes import Mode, NO_BITS
-from .observed_drive import FAULTY, ObservedDrive
 from .position_modes import NEW_SET_POINT
+from .quirks import quirks_of
 from .refusal import Refusal, RefusalCause
+from .state_machine import Command
 from .target_limits import check_target
 
 NOT_TAKEN = (
@@ -22,21 +25,57 @@ NOT_TAKEN = (
 )
 
 
-class ModedDrive(ObservedDrive):
-    """An axis and its modes of operation.
+class DriveControl:
+    """The goal, the modes and the controlword of an axis.
 
     Attributes:
+        goal: State that the cycle leads to, None while nobody asked for one.
         modes: The modes that this bus.yml makes possible.
         mode: The mode that is commanded.
-        goal: State that the cycle leads to, None while nobody asked for one.
+        halt: What keeps it halted.
     """
 
-    def __init__(self, node: RemoteNode, scheduler: Scheduler, config: DriveConfig) -> None:
-        """Build the modes; arguments as of :class:`ObservedDrive`."""
-        super().__init__(node, scheduler, config)
+    def __init__(self, view: DriveView, warn: Callable[[str], None]) -> None:
+        """Build the modes.
+
+        Args:
+            view: The state of the axis.
+            warn: Takes a warning in words.
+        """
+        self._view = view
+        self._objects = view.objects
+        self._warn = warn
         self.goal: DriveState | None = None
-        self.modes = build_modes(self.objects, self.units, lambda: self.parameters, self.warn)
+        self.halt = Halt()
+        self.modes = build_modes(view.objects, view.units, lambda: view.parameters, warn)
         self.mode: Mode = self.modes[OperationMode.NO_MODE]
+        self._mode_shown = self._mode_led = self.mode
+        self._controlword = 0
+        self._quirks = quirks_of(view.config.quirks)
+
+    @property
+    def setpoint(self) -> float:
+        """Position last commanded, the actual one where none is."""
+        commanded = self.mode.setpoint
+        if commanded is None or self._view.state is not DriveState.OPERATION_ENABLED:
+            return self._view.position
+        return commanded
+
+    @property
+    def halted(self) -> bool:
+        """Whether it is stopped by a halt; the next target ends it."""
+        return self.halt.held
+
+    @property
+    def enables(self) -> bool:
+        """Whether the last controlword commands Operation Enabled."""
+        enable = int(Command.ENABLE_OPERATION)
+        return self._controlword & enable == enable
+
+    @property
+    def stays_enabled(self) -> bool:
+        """Whether it is enabled, and no command is on its way that changes that."""
+        return self._view.state is DriveState.OPERATION_ENABLED and self.enables
 
     @property
     def acts(self) -> bool:
@@ -47,8 +86,8 @@ class ModedDrive(ObservedDrive):
         """
         return (
             self.goal is DriveState.OPERATION_ENABLED
-            and self.state is DriveState.OPERATION_ENABLED
-            and self.objects.mode_display == self.mode.number
+            and self._view.state is DriveState.OPERATION_ENABLED
+            and self._objects.mode_display == self.mode.number
         )
 
     @property
@@ -59,21 +98,21 @@ class ModedDrive(ObservedDrive):
     @property
     def refusal(self) -> Refusal | None:
         """Why it accepts no targets of the selected mode now; None when it does."""
-        node = self.node
+        view, node = self._view, self._view.node
         if not node.online:
             return Refusal(RefusalCause.OFFLINE, node.loss or node.phase_text)
         if node.left_operational:
             return Refusal(RefusalCause.NOT_OPERATIONAL)
-        if self.state is DriveState.UNKNOWN:
+        if view.state is DriveState.UNKNOWN:
             return Refusal(RefusalCause.STATE_UNKNOWN)
-        if not self.fresh:
-            return Refusal(RefusalCause.SILENT, f'the last is {self.age:.1f} s old')
-        if self.state in FAULTY:
-            return Refusal(RefusalCause.FAULT, self.error)
-        if not self.goal is self.state is DriveState.OPERATION_ENABLED:
-            return Refusal(RefusalCause.NOT_ENABLED, self.state.title)
-        if self.objects.mode_display != self.mode.number:
-            return Refusal(RefusalCause.MODE_CHANGE, mode_title(self.objects.mode_display))
+        if not view.fresh:
+            return Refusal(RefusalCause.SILENT, f'the last is {view.age:.1f} s old')
+        if view.state in FAULTY:
+            return Refusal(RefusalCause.FAULT, view.error)
+        if not self.goal is view.state is DriveState.OPERATION_ENABLED:
+            return Refusal(RefusalCause.NOT_ENABLED, view.state.title)
+        if self._objects.mode_display != self.mode.number:
+            return Refusal(RefusalCause.MODE_CHANGE, mode_title(self._objects.mode_display))
         return None
 
     @property
@@ -93,12 +132,12 @@ class ModedDrive(ObservedDrive):
     @property
     def holding_mode(self) -> Mode | None:
         """Mode whose target acts on the drive: it is powered and displays that mode."""
-        return self.shown_mode if self.state is DriveState.OPERATION_ENABLED else None
+        return self.shown_mode if self._view.state is DriveState.OPERATION_ENABLED else None
 
     @property
     def shown_mode(self) -> Mode | None:
         """Mode that the drive displays; None where it is none of :attr:`modes`."""
-        shown = self.objects.mode_display
+        shown = self._objects.mode_display
         return next((mode for mode in self.modes.values() if mode.number == shown), None)
 
     @property
@@ -115,15 +154,22 @@ class ModedDrive(ObservedDrive):
         """
         held = self.holding_mode
         if held is None:
+            self._mode_shown = self._mode_led = self.mode
             return False
-        actual = self._actual()
-        target = self.objects.held_position(held.number)
+        actual = self._view.actual()
+        target = self._objects.held_position(held.number)
         if isinstance(held, CyclicPosition) and target is not None:
             actual = actual._replace(position_inc=target)
         held.preload(actual)
-        self.mode = held
+        self.mode = self._mode_shown = self._mode_led = held
         self.goal = DriveState.OPERATION_ENABLED
         return True
+
+    def forget(self) -> None:
+        """The device is lost: nothing is commanded any more, and no mode selected."""
+        self.goal = None
+        self.halt.release()
+        self.mode = self._mode_shown = self._mode_led = self.modes[OperationMode.NO_MODE]
 
     def select(self, mode: Mode) -> None:
         """Command another mode, preloaded with where the drive is, or where it is held.
@@ -131,7 +177,7 @@ class ModedDrive(ObservedDrive):
         A target that goes by SDO is in the drive before (``sequences.py``).
         A halt goes on: until the drive shows the new mode, it may still have a target of the old.
         """
-        known = self.state is not DriveState.UNKNOWN  # else its first position preloads it
+        known = self._view.state is not DriveState.UNKNOWN  # else its first position preloads it
         if known and self.holding_mode is not mode and not mode.by_sdo:
             self.preload(mode)
         self.mode = mode
@@ -142,18 +188,18 @@ class ModedDrive(ObservedDrive):
         Returns:
             Done when the drive has it.
         """
-        held, actual = self.holding_mode, self._actual()
+        held, actual = self.holding_mode, self._view.actual()
         if isinstance(held, CyclicPosition):
             # under load the drive is not quite where it is held, and would sag to where it is
-            position_inc = self.units.position_to_device(held.setpoint)
+            position_inc = self._view.units.position_to_device(held.setpoint)
             actual = actual._replace(position_inc=position_inc, velocity=held.velocity)
         return mode.preload(actual)
 
     def select_back(self, mode: Mode) -> None:
         """Command the mode of before after a switch that failed; the drive is halted in it."""
-        if not self.node.online or self.mode is mode:
+        if not self._view.node.online or self.mode is mode:
             return
-        if self.state is DriveState.OPERATION_ENABLED:
+        if self._view.state is DriveState.OPERATION_ENABLED:
             self.hold()
         self.select(mode)
 
@@ -168,23 +214,68 @@ class ModedDrive(ObservedDrive):
         Raises:
             DriveError: It is beyond; the message names the limits.
         """
-        check_target(self.name, self.mode, self.parameters, self.units, target)
+        check_target(self._view.name, self.mode, self._view.parameters, self._view.units, target)
+
+    def step(self, command: Command, now: float, period: float) -> tuple[Command, int]:
+        """Advance the mode by a cycle, and let targets leave before what makes them act.
+
+        Args:
+            command: What leads to the goal.
+            now: Steady time in [s].
+            period: Time to the next cycle in [s].
+
+        Returns:
+            The command of this cycle, and the bits of mode and halt in its controlword.
+        """
+        command, edge = self._lead_targets(command)
+        if command is Command.ENABLE_OPERATION and self.acts:
+            return command, self._step_mode(now, period)
+        return command, self._hold_without_target(edge=edge)
+
+    def send(self, command: Command, bits: int = NO_BITS) -> None:
+        """Write controlword and mode."""
+        self._controlword = int(command) | bits
+        self._objects.controlword.write(self._controlword)
+        number = int(self._mode_shown.number)
+        if number or not self._quirks.no_mode_zero:
+            self._objects.mode.write(number)
+        elif self._objects.mode_display and not self._objects.mode.by_sdo:
+            self._objects.mode.write(self._objects.mode_display)  # keeps the mode that it has
 
     def _step_mode(self, now: float, period: float) -> int:
         """Advance the mode by a cycle, and the halt; return their bits of the controlword."""
-        bits = self.mode.step(now, period, self.statusword)
+        bits = self.mode.step(now, period, self._view.statusword)
         halt = self.halt.bits(self.mode)  # at its end bit 8 goes a cycle after the new target
         if not self.halt.advance(now, period, self.mode):
             self.mode.brake()
-            self.warn(f'stays halted: {NOT_TAKEN}')
+            self._warn(f'stays halted: {NOT_TAKEN}')
             return self.halt.bits(self.mode)
         if bits & NEW_SET_POINT:
-            halt = self.halt.bits(
-                self.mode
-            )  # ends with the edge where no acknowledge comes before
+            # ends with the edge where no acknowledge comes before
+            halt = self.halt.bits(self.mode)
         if self.halt.bits(self.mode) and self.mode.cyclic:
-            self.mode.preload(self._actual())  # from there it goes on
+            self.mode.preload(self._view.actual())  # from there it goes on
         return bits | halt
+
+    def _lead_targets(self, command: Command) -> tuple[Command, bool]:
+        """Let targets leave a cycle before the mode and the command that make them act.
+
+        RPDOs carry objects in any distribution, so that of one cycle a drive may see the edge
+        before the target.
+
+        Returns:
+            The command of this cycle, and whether it, or the mode, makes targets act that have
+            left before.
+        """
+        if self._mode_led is not self.mode:
+            self._mode_led = self.mode
+            if command is Command.ENABLE_OPERATION and not self.enables:
+                return Command.SWITCH_ON, False
+            return command, False
+        switching = self._mode_shown is not self.mode
+        self._mode_shown = self.mode
+        enabling = command is Command.ENABLE_OPERATION and not self.enables
+        return command, switching or enabling
 
     def _hold_without_target(self, *, edge: bool) -> int:
         """Preload what may act on the drive later, and keep up a halt while modes change.
@@ -206,7 +297,7 @@ class ModedDrive(ObservedDrive):
         A drive may stay in the mode that it had, whatever was selected; of two modes with one
         target object the selected one writes last.
         """
-        actual = self._actual()
+        actual = self._view.actual()
         for mode in (*self.modes.values(), self.mode):
             if not mode.by_sdo:
                 mode.preload(actual)

@@ -1,21 +1,20 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""One axis of a CiA 402 drive as it shows itself: state, position, parameters, and in words."""
+"""The state of one axis of a CiA 402 drive, as its TPDOs and SDOs show it, and how old that is."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 import math
 
 from ..config.drive_model import DriveConfig
 from ..exceptions import CodecError, DriveError, SdoError
-from ..master.events import EventKind, Severity
 from ..master.remote_node import RemoteNode
 from ..master.scheduler import Scheduler
-from ..standard.drive import drive_state, DriveState, mode_title, statusword_text
+from ..standard.drive import drive_state, DriveState
 from ..standard.emcy import error_code_text
 from ..standard.objects import Index
 from .drive_objects import DriveObjects
-from .halt import Halt
 from .modes import Actual
 from .parameter_cache import ParameterCache
 from .parameters import DriveParameters
@@ -27,8 +26,8 @@ REST_SHARE = 0.01  # share of the profile velocity below which an axis counts as
 REST_MIN, REST_MAX = 0.002, 0.02  # [unit/s] between which that lies: noise, and what still moves
 
 
-class ObservedDrive:
-    """What the master knows of an axis.
+class DriveView:
+    """What the master knows of an axis; everybody who needs its state asks here.
 
     Attributes:
         node: The device.
@@ -39,18 +38,24 @@ class ObservedDrive:
         state: State shown in the last cycle.
         statusword: 0x6041 as it was then.
         fresh: Its state was known in the last cycle, and young enough to act on.
-        halt: What keeps it halted.
         error: 0x603F in words when it was faulted last, else empty.
-        failure: Why the master stopped it, until it is enabled again; else empty.
+        cache: Reads its parameters.
     """
 
-    def __init__(self, node: RemoteNode, scheduler: Scheduler, config: DriveConfig) -> None:
+    def __init__(
+        self,
+        node: RemoteNode,
+        scheduler: Scheduler,
+        config: DriveConfig,
+        warn: Callable[[str], None],
+    ) -> None:
         """Bind the axis to its device.
 
         Args:
             node: The device.
             scheduler: Time.
             config: Settings of the axis.
+            warn: Takes a warning in words.
         """
         self.node = node
         self.config = config
@@ -60,19 +65,17 @@ class ObservedDrive:
         self.state = DriveState.UNKNOWN
         self.statusword = 0
         self.fresh = False
-        self.halt = Halt()
         self.error = ''
-        self.failure = ''
         self._position = math.nan
         self._scheduler = scheduler
-        self._cache = ParameterCache(node, config, self.units, scheduler, self.warn)
+        self.cache = ParameterCache(node, config, self.units, scheduler, warn)
         polled = self.objects.position_is_polled
         self._estimate = VelocityEstimate(node.config.poll_period if polled else 0.0)
 
     @property
     def parameters(self) -> DriveParameters:
-        """What it told about itself."""
-        return self._cache.parameters
+        """What it reported about itself."""
+        return self.cache.parameters
 
     @property
     def age(self) -> float:
@@ -80,6 +83,11 @@ class ObservedDrive:
         if self.state is DriveState.UNKNOWN:
             return math.inf
         return self._scheduler.now - self.objects.timestamp
+
+    @property
+    def position_age(self) -> float:
+        """Age of 0x6064 in [s]."""
+        return self._scheduler.now - self.objects.position_timestamp
 
     @property
     def position(self) -> float:
@@ -91,9 +99,9 @@ class ObservedDrive:
 
     @property
     def velocity(self) -> float:
-        """Actual velocity in user units per second; from the positions where no PDO tells it."""
-        told = self.objects.velocity
-        return self.rate if told is None else self.units.velocity_from_device(told)
+        """Actual velocity in user units per second; from the positions where no PDO has it."""
+        reported = self.objects.velocity
+        return self.rate if reported is None else self.units.velocity_from_device(reported)
 
     @property
     def rate(self) -> float:
@@ -109,16 +117,10 @@ class ObservedDrive:
     def stands(self) -> bool:
         """Whether the axis stands; a real encoder is never quite still.
 
-        Both what 0x606C tells and what the position shows have to be slow, and fresh.
+        Both what 0x606C says and what the position shows have to be slow, and fresh.
         """
         rest = max(REST_MIN, min(REST_MAX, REST_SHARE * self.parameters.profile.velocity))
         return self.fresh and self.speed <= rest
-
-    def ramp_time(self, longest: float) -> float:
-        """Return how long it brakes on its way out in [s], by the slower of its ramps."""
-        parameters = self.parameters
-        ramp = min(parameters.quick_stop_deceleration, parameters.profile.deceleration)
-        return min(longest, self.speed / ramp)
 
     @property
     def effort(self) -> float:
@@ -126,47 +128,9 @@ class ObservedDrive:
         return self.units.effort_from_device(self.objects.torque)
 
     @property
-    def halted(self) -> bool:
-        """Whether it is stopped by a halt; the next target ends it."""
-        return self.halt.held
-
-    @property
     def ready(self) -> bool:
         """Whether its state and its parameters are known."""
-        return self.state is not DriveState.UNKNOWN and self._cache.known and self.fresh
-
-    @property
-    def homing_at_init(self) -> int:
-        """Homing method that bus.yml writes to 0x6098; 0 where it asks for no homing."""
-        write = self.node.config.write_of(self.objects.at(Index.HOMING_METHOD), 0)
-        return int.from_bytes(write.data, 'little', signed=True) if write is not None else 0
-
-    def describe(self) -> str:
-        """Say in a sentence how the drive is."""
-        if not self.node.online:
-            phase = self.node.phase.value
-            detail = f' ({self.node.phase_detail})' if self.node.phase_detail else ''
-            loss = f'; lost before: {self.node.loss}' if self.node.loss else ''
-            return f'offline: {phase}{detail}{loss}'
-        parts = ['no statusword yet']
-        if self.state is not DriveState.UNKNOWN:
-            parts = [
-                statusword_text(self.statusword),
-                f'mode {mode_title(self.objects.mode_display)}',
-            ]
-        if self.state is not DriveState.UNKNOWN and not self.fresh:
-            parts.append(f'no TPDOs for {self.age:.1f} s')
-        if self.halted:
-            parts.append('halted')
-        if self.error:
-            parts.append(f'error {self.error}')
-        if self.failure:
-            parts.append(f'the master stopped it: {self.failure}')
-        if self.node.emergencies.last is not None:
-            parts.append(f'EMCY {self.node.emergencies.last}')
-        if self.node.left_operational and self.node.nmt_state is not None:
-            parts.append(f'NMT state {self.node.nmt_state.name}: call ~/nmt_start_node')
-        return '; '.join(parts)
+        return self.state is not DriveState.UNKNOWN and self.cache.known and self.fresh
 
     async def read_error_code(self) -> None:
         """Read 0x603F, so that the answer can say what is wrong."""
@@ -179,20 +143,11 @@ class ObservedDrive:
             return  # the statusword says that there is a fault, only its code stays unknown
         self.error = error_code_text(int(code)) if isinstance(code, int) else ''
 
-    def report(self, severity: Severity, text: str) -> None:
-        """Tell the owner of the network something about this drive."""
-        about = text if self.name == self.node.name else f'{self.name}: {text}'
-        self.node.report(EventKind.DRIVE, severity, about)
-
-    def warn(self, text: str) -> None:
-        """Tell the owner of the network what goes wrong with this drive."""
-        self.report(Severity.WARNING, text)
-
-    def _observe(self) -> None:
+    def observe(self) -> None:
         """Take state and position from the process image."""
         seen = self.objects.observe() if self.node.operational else None
         if seen is None:
-            self._lose_sight()
+            self.lose_sight()
             return
         word, position_inc = seen
         self._position = self.units.position_from_device(position_inc)
@@ -204,34 +159,35 @@ class ObservedDrive:
         if word != self.statusword or self.state is DriveState.UNKNOWN:
             self.state, self.statusword = drive_state(word), word
 
-    def _lose_sight(self) -> None:
+    def lose_sight(self) -> None:
+        """Forget the state; the position stays the last one."""
         self.state, self.statusword, self.fresh = DriveState.UNKNOWN, 0, False
         self._estimate.clear()
 
-    def _actual(self) -> Actual:
+    def actual(self) -> Actual:
         """Return where the drive is, and the velocity from which it has to be braked.
 
-        The velocity is the lesser of what 0x606C tells and what 0x6064 shows: one that is told
-        wrong must not set an axis in motion that stands.
+        The velocity is the lesser of what 0x606C says and what 0x6064 shows: a wrong one must not
+        set an axis in motion that stands.
 
         Raises:
             DriveError: The position is not known.
         """
         objects = self.objects
-        velocity, told = self.rate, objects.velocity
+        velocity, reported = self.rate, objects.velocity
         velocity_dev = self.units.velocity_raw(velocity)
-        if told is not None:
-            shown = self.units.velocity_from_device(told)
+        if reported is not None:
+            shown = self.units.velocity_from_device(reported)
             share = 0.0 if shown * velocity <= 0.0 else min(1.0, velocity / shown)
-            velocity, velocity_dev = share * shown, share * told
+            velocity, velocity_dev = share * shown, share * reported
         return Actual(
-            clamp(self._position_inc(), INT32_MAX),
+            clamp(self.position_inc(), INT32_MAX),
             velocity,
             clamp(velocity_dev, INT32_MAX),
             clamp(objects.torque, INT16_MAX),
         )
 
-    def _position_inc(self) -> float:
+    def position_inc(self) -> float:
         """Return 0x6064 in [inc]; an unknown position is no position 0."""
         position_inc = self.objects.position
         if position_inc is None:
