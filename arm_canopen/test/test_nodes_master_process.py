@@ -25,6 +25,7 @@ from arm_canopen.can.virtual import VirtualBus, VirtualWire
 from arm_canopen.config.master_model import MasterConfig
 from arm_canopen.config.model import BusConfig
 from arm_canopen.exceptions import BusError
+from arm_canopen.master.events import Event, EventKind, Severity
 from arm_canopen.nodes.drive_node import DriveNode
 from arm_canopen.nodes.master_process import MasterProcess
 
@@ -99,6 +100,24 @@ def test_each_channel_has_the_joint_states_of_a_drive(node: Node, tmp_path: Path
     assert [*heard['elbow'].name] == ['elbow']
     assert [heard['elbow'].position[0], heard['elbow'].velocity[0]] == [0.4, 0.5]
     assert [*heard['shoulder'].effort] == [0.3]
+    bus.close()
+
+
+def test_all_are_operational_after_the_last_of_them(
+    node: Node, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """The log has the line of each device before the one of all."""
+    config = load_text(tmp_path, added('joint1', ''))
+    bus = VirtualBus('here', VirtualWire())
+    process = MasterProcess(node, config, bus, diagnostics_period=60.0)
+    for device in config.nodes:
+        process._report(Event(EventKind.BOOT, Severity.INFO, device.name, 'operational'))
+    process._output.start()
+    process._output.stop()
+    lines = capfd.readouterr().err.splitlines()
+    count = len(config.nodes)
+    assert ['operational' in line for line in lines[-count - 1 :]] == [True] * (count + 1)
+    assert f'all {count} devices operational' in lines[-1]
     bus.close()
 
 

@@ -15,9 +15,12 @@ import pytest
 from workspace.layout import this_checkout
 from workspace.packages import find_packages
 
-PAGE = (this_checkout().root / 'docs' / 'ARCHITECTURE.md').read_text(encoding='utf-8')
-PACKAGES = find_packages(this_checkout().root)
+ROOT = this_checkout().root
+PAGE = (ROOT / 'docs' / 'ARCHITECTURE.md').read_text(encoding='utf-8')
+PACKAGES = find_packages(ROOT)
 STEPS = re.findall(r'^\d+\. .*$', PAGE, re.MULTILINE)
+WHERE = re.findall(r'^\| .* \|$', PAGE.partition('## Where is')[2], re.MULTILINE)[1:]
+FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
 NAME = re.compile(r'[A-Z]\w+(\.\w+)?|\w+\(\)')
 
 
@@ -27,10 +30,10 @@ def definitions(folder: Path) -> frozenset[str]:
 
     def in_module(tree: ast.Module) -> Iterator[str]:
         for node in tree.body:
-            if isinstance(node, (ast.ClassDef, ast.FunctionDef)):
+            if isinstance(node, (ast.ClassDef, *FUNCTIONS)):
                 yield node.name
             if isinstance(node, ast.ClassDef):
-                methods = (each for each in node.body if isinstance(each, ast.FunctionDef))
+                methods = (each for each in node.body if isinstance(each, FUNCTIONS))
                 yield from (f'{node.name}.{method.name}' for method in methods)
 
     files = folder.rglob('*.py')
@@ -59,8 +62,16 @@ def test_every_name_is_where_the_page_says(step: str) -> None:
 
 
 def test_each_way_has_ten_steps() -> None:
-    """No more, no less, of each of four."""
-    assert len(STEPS) == 40
+    """No more, no less, of each of five."""
+    assert len(STEPS) == 50
+
+
+@pytest.mark.parametrize('row', WHERE)
+def test_what_is_looked_for_is_there(row: str) -> None:
+    """Each file and folder of the table exists."""
+    places = re.findall(r'`([^`]+/[^`]+)`', row)
+    assert places
+    assert [place for place in places if not (ROOT / place).exists()] == []
 
 
 def test_the_picture_shows_every_package() -> None:

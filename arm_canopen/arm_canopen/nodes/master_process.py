@@ -219,8 +219,8 @@ class MasterProcess:
         self._load.count(frame)
 
     def _report(self, event: Event) -> None:
-        self._count_operational(event)
         self._output.post_stream((event.kind, event.node), partial(self._tell, event))
+        self._count_operational(event)
 
     def _feedback(self, sync_time: float) -> None:
         if self._feedback_posted:
@@ -288,10 +288,11 @@ class MasterProcess:
         elif event.kind is EventKind.BOOT:
             self._operational.add(event.node)
             if len(self._operational) == len(self.bus.nodes):
-                count = len(self.bus.nodes)
-                text = f'all {count} devices operational'
-                self._output.post(lambda: self._node.get_logger().info(text) and None)
-                notify_ready()
+                self._output.post(self._report_ready)
+
+    def _report_ready(self) -> None:
+        self._node.get_logger().info(f'all {len(self.bus.nodes)} devices operational')
+        notify_ready()
 
     def _ask_diagnostics(self) -> Future[list[DiagnosticStatus]]:
         future = self._thread.call(self._collect)

@@ -53,6 +53,21 @@ def env(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Mapping[str, str]:
     return with_frontend(os.environ)
 
 
+def test_launch_names_what_to_run_instead(env: Mapping[str, str]) -> None:
+    """The executable with the name of the launch file, or all of the package."""
+    for words, expected in (
+        (['demo', 'twice.launch.py', 'a:=1'], 'ros2 run demo twice --help'),
+        (['demo', 'other.launch.xml'], f'Executables of demo (ros2 run demo NAME): {EVERYTHING}'),
+        (['empty'], 'empty has no executables'),
+        (['dem', 'x.launch.py'], "Did you mean 'demo'?"),
+    ):
+        done = subprocess.run(
+            [*PROGRAM, 'launch', *words], env=env, capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 1
+        assert expected in done.stderr
+
+
 def run(env: Mapping[str, str], *words: str) -> subprocess.CompletedProcess[str]:
     """Run a command line as a process."""
     return subprocess.run(

@@ -78,6 +78,7 @@ COMMANDS: Mapping[str, Command | Group] = {
             'show': Command('Output the interface definition', 'interface:show'),
         },
     ),
+    'launch': Command('Not among the wheels of ROS: names what to run instead', 'launch:launch'),
     'lifecycle': Group(
         'Various lifecycle related sub-commands',
         {
