@@ -31,7 +31,7 @@ from .session import (
     in_namespace_of_bus,
     locate,
     no_files,
-    read_drives,
+    read_bus,
     REAL_BUS,
     robots_epilog,
     session,
@@ -125,7 +125,7 @@ def _arm(arguments: argparse.Namespace, ros: RosOptions) -> int:
 def _controllers(arguments: argparse.Namespace, ros: RosOptions) -> int:
     apply_network(arguments)
     robot = locate(arguments)
-    ros = in_namespace_of_bus(ros, read_drives(robot))
+    ros = in_namespace_of_bus(ros, read_bus(robot))
     if robot.lacking:
         raise RobotError(
             f'{robot.name} lacks {robot.lacking}: '

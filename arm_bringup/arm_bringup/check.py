@@ -5,18 +5,22 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 import difflib
 import sys
 
-from process_supervisor import USAGE_ERROR
+import urdf_reader
+from urdf_reader import KinematicTree, read_urdf
 
-from .description import joint_limits, read_description
+from process_supervisor import RosOptions, USAGE_ERROR
+
+from .description import read_description
 from .exceptions import BringupError, DescriptionError, RobotError
 from .findings import error, Finding, Severity, warning
 from .motion_check import check_motion
 from .robots import Robot
-from .session import add_robot, locate, read_drives, robots_epilog
+from .semantic_check import check_semantic
+from .session import add_robot, in_namespace_of_bus, locate, read_bus, robots_epilog
 
 
 def check_robot(robot: Robot) -> list[Finding]:
@@ -28,57 +32,89 @@ def check_robot(robot: Robot) -> list[Finding]:
     Returns:
         What is wrong; empty when all is well.
     """
-    findings: list[Finding] = []
-    drives, joints, urdf = [], [], ''
-    try:
-        drives = [joint for drive in read_drives(robot) for joint in drive.joints]
-    except RobotError as problem:
-        tool = 'ros2 run canopen_tools canopen check'
-        findings.append(error('bus.yml', str(problem), f'{tool} {robot.bus_config} tells more'))
+    findings, drives = _bus(robot)
     try:
         urdf = read_description(robot)
-        joints = list(joint_limits(urdf))
-    except DescriptionError as problem:
-        findings.append(error(robot.description.name, str(problem), 'mend the description'))
-    if drives and joints:
-        findings += _names(robot, drives, joints)
-    if urdf and joints:
-        findings += _motion(robot, urdf, joints)
-    return findings
-
-
-def _names(robot: Robot, drives: Sequence[str], joints: Sequence[str]) -> Iterable[Finding]:
-    for drive in drives:
-        if drive not in joints:
-            yield error(
-                f'bus.yml, node {drive}',
-                f'{robot.description.name} has no joint of this name',
-                f'name the node as its joint{_meant(drive, joints)}; joints: {", ".join(joints)}',
-            )
-    for joint in joints:
-        if joint not in drives:
-            yield warning(
-                f'{robot.description.name}, joint {joint}',
-                'no drive of bus.yml has this name, so it never moves',
-                f'name its node {joint!r}{_meant(joint, drives)}, or make the joint fixed',
-            )
-
-
-def _meant(name: str, names: Sequence[str]) -> str:
-    close = difflib.get_close_matches(name, names, n=1)
-    return f' (is {close[0]!r} meant?)' if close else ''
-
-
-def _motion(robot: Robot, urdf: str, joints: Sequence[str]) -> list[Finding]:
+        tree = read_urdf(urdf)
+    except (DescriptionError, urdf_reader.DescriptionError) as problem:
+        return [*findings, error(robot.description.name, str(problem), 'mend the description')]
+    if drives:
+        findings += _names(robot, drives, tree)
     if robot.lacking:
         return [
+            *findings,
             warning(
                 f'{robot.name}/',
                 f'lacks {robot.lacking} for trajectories and jogging',
                 'write them as in robots/gp110/: the group to move, and the limits of its joints',
-            )
+            ),
         ]
-    return check_motion(robot, urdf, joints)
+    found, semantic = check_semantic(robot, tree)
+    if semantic is None:
+        return [*findings, *found]
+    return [*findings, *found, *check_motion(robot, urdf, tree, semantic)]
+
+
+def _bus(robot: Robot) -> tuple[list[Finding], list[str]]:
+    """Return what is wrong with bus.yml, and the joints of its drives."""
+    from arm_canopen.config.checks import check_file
+
+    report = check_file(robot.bus_config)
+    findings = [
+        make(f'{problem.file.name}:{problem.line}, {problem.key}', problem.message, problem.remedy)
+        for make, problems in ((error, report.errors), (warning, report.warnings))
+        for problem in problems
+    ]
+    if report.errors:
+        return findings, []
+    try:
+        bus = read_bus(robot)
+        in_namespace_of_bus(RosOptions(), bus)
+    except RobotError as problem:
+        return [*findings, error('bus.yml', str(problem), 'see README of arm_bringup')], []
+    return findings, list(bus.joints)
+
+
+def _names(robot: Robot, drives: Sequence[str], tree: KinematicTree) -> Iterable[Finding]:
+    joints = {joint.name: joint for joint in tree.joints}
+    moving = [joint.name for joint in tree.joints if joint.independent]
+    idle = [name for name in moving if name not in drives]
+    lost = [name for name in drives if name not in joints]
+    for drive in lost:
+        yield error(
+            f'bus.yml, node {drive}',
+            f'{robot.description.name} has no joint of this name',
+            f'name the node as its joint{_meant(drive, idle)}; '
+            f'joints without a drive: {", ".join(idle) or "none"}',
+        )
+    for drive in drives:
+        if drive in joints and drive not in moving:
+            mimic = joints[drive].mimic
+            why = f'follows {mimic.source}' if mimic else f'is {joints[drive].kind.value}'
+            yield error(
+                f'bus.yml, node {drive}',
+                f'joint {drive} of {robot.description.name} {why}, so it has no drive of its own',
+                'take the node out, or the <mimic> of the joint',
+            )
+    if idle and not lost:
+        yield warning(
+            robot.description.name,
+            f'bus.yml has no drive for {", ".join(idle)}: never moved, no position in'
+            ' /joint_states, links behind without /tf',
+            'fine where something else moves it; else add its node, or make the joint fixed',
+        )
+    elif idle:
+        meant = [name + _meant(name, lost) for name in idle]
+        yield warning(
+            robot.description.name,
+            f'bus.yml has no drive for {", ".join(meant)}',
+            'name the node as the joint',
+        )
+
+
+def _meant(name: str, free: Collection[str]) -> str:
+    close = difflib.get_close_matches(name, free, n=1)
+    return f' (is {close[0]!r} meant?)' if close else ''
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -93,8 +129,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     parser = argparse.ArgumentParser(
         prog='ros2 run arm_bringup check',
-        description='Tell what is missing or inconsistent in a robot folder: joint names in '
-        'bus.yml, description, SRDF and limits; a start that is singular or in collision.',
+        description='Tell what is missing or inconsistent in a robot folder: bus.yml, joint names '
+        'in it, description, SRDF and limits; a start that is singular or in collision.',
         epilog=robots_epilog(),
     )
     add_robot(parser)

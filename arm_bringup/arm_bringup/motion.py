@@ -12,8 +12,6 @@ from collections.abc import Sequence
 import json
 from pathlib import Path
 
-from urdf_reader import DescriptionError, parse_srdf
-
 from process_supervisor import (
     EVERY_NODE,
     Executable,
@@ -26,6 +24,7 @@ from process_supervisor import (
 
 from .description import read_semantic
 from .exceptions import RobotError
+from .groups import moved_groups
 from .robots import Robot
 from .stack import MASTER, MOTION_MASTER
 
@@ -46,7 +45,7 @@ def motion_files(robot: Robot, folder: Path, ros: RosOptions) -> Sequence[Path]:
     values = {
         'robot_description_semantic': read_semantic(robot),
         'joint_limits': str(robot.limits),
-        'group': robot.group,
+        'group': moved_groups(robot).arms[0],
         'tip_link': robot.tip_link,
     }
     moveit_servo = {'frame_prefix': ros.frame_prefix}
@@ -77,12 +76,11 @@ def controller_name(robot: Robot) -> str:
     """
     try:
         table = parameters_by_node(robot.controllers) if robot.controllers.is_file() else {}
-        groups = parse_srdf(read_semantic(robot)).groups
-    except (StartError, DescriptionError) as error:
+    except StartError as error:
         raise RobotError(f'{robot.folder}: {error}') from error
     manager = table.get('controller_manager', {}).get('ros__parameters', {})
-    group = robot.group or next(iter(groups), '')
-    return str(manager.get('controller_name', f'{group}_controller'))
+    named = manager.get('controller_name')
+    return str(named or f'{moved_groups(robot).arms[0]}_controller')
 
 
 def choose_master(robot: Robot, find: FindExecutable) -> tuple[Executable, str]:

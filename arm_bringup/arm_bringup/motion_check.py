@@ -1,18 +1,21 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The part of the check that needs kinematics: group, limits, and the pose to start from."""
+"""The part of the check that needs kinematics: limits, and the pose that an arm starts from."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping
 from typing import Any, TYPE_CHECKING
+
+from urdf_reader import KinematicTree, SemanticDescription
 
 from process_supervisor import parameters_by_node, StartError
 
 from .description import read_semantic
-from .exceptions import DescriptionError
+from .exceptions import RobotError
 from .findings import error, Finding, warning
-from .robots import Robot
+from .groups import choose_groups
+from .robots import Robot, SETTINGS
 
 if TYPE_CHECKING:
     from arm_model import RobotModel
@@ -23,15 +26,20 @@ SINGULAR = 0.05
 """Least singular value of the Jacobian, lengths divided by the reach, of a good start."""
 CLEARANCE = 0.01
 """Least distance between links at the start in [m]."""
+MARGIN = 0.02
+"""Share of the range of a joint that a good start leaves on either side."""
 
 
-def check_motion(robot: Robot, urdf: str, joints: Sequence[str]) -> list[Finding]:
+def check_motion(
+    robot: Robot, urdf: str, tree: KinematicTree, semantic: SemanticDescription
+) -> list[Finding]:
     """Look at the files that trajectories and jogging need.
 
     Args:
         robot: The robot; its SRDF and its limits exist.
-        urdf: Its description.
-        joints: Names of the movable joints in it.
+        urdf: Its description as XML text.
+        tree: The same.
+        semantic: Its SRDF.
     """
     try:
         from arm_model import LimitsError, load_limits, ModelError, RobotModel
@@ -45,48 +53,64 @@ def check_motion(robot: Robot, urdf: str, joints: Sequence[str]) -> list[Finding
             )
         ]
     try:
-        semantic = read_semantic(robot)
-    except DescriptionError as problem:
-        return [error(robot.semantic.name, str(problem), 'mend it: the arm has no group without')]
-    try:
         limits = load_limits(robot.limits)
+        groups = choose_groups(robot, semantic)
     except LimitsError as problem:
         return [error(robot.limits.name, str(problem), 'write it as robots/gp110/limits.yaml is')]
-    findings = list(_limits(robot, limits, joints))
-    try:
-        model = RobotModel(urdf, semantic, limits, robot.group or None, robot.tip_link or None)
-        check_arm(model)
-    except LimitsError as problem:
-        remedy = (
-            'give each joint of the group max_velocity, max_acceleration and max_jerk, none wider'
-            f' than in {robot.description.name}'
+    except RobotError as problem:
+        return [error(robot.semantic.name, str(problem), f'see {SETTINGS} in README')]
+    findings = list(_limits(robot, limits, tree))
+    text, notes, models = read_semantic(robot), {}, {}
+    for group in groups.arms:
+        try:
+            model = RobotModel(urdf, text, limits, group, robot.tip_link or None)
+            check_arm(model)
+        except LimitsError as problem:
+            findings.append(error(robot.limits.name, str(problem), _limits_remedy(robot)))
+            continue
+        except ModelError as problem:
+            remedy = 'choose another group or tip_link, or mend the file'
+            place = f'{robot.semantic.name} with {robot.description.name}'
+            findings.append(error(place, str(problem), remedy))
+            continue
+        notes.update(dict.fromkeys(model.notes))
+        models[group] = model
+        findings += _start(robot, model)
+    findings += [warning(*_note(robot, note)) for note in notes]
+    return findings + list(_controllers(robot, models))
+
+
+def _limits_remedy(robot: Robot) -> str:
+    return (
+        f'give each joint of the group numbers above 0, none wider than in'
+        f' {robot.description.name}: max_velocity, max_acceleration and max_jerk'
+    )
+
+
+def _note(robot: Robot, note: str) -> tuple[str, str, str]:
+    """Return place, problem and remedy of what the model passed over or took a default for."""
+    if 'limits file' in note or 'any file' in note:
+        return robot.limits.name, note, 'write the limits where you know them'
+    if 'SRDF' in note:
+        return robot.semantic.name, note, 'mend the pose, or leave it out'
+    return robot.description.name, note, 'see README of arm_model: what it reads'
+
+
+def _limits(robot: Robot, limits: Mapping[str, Any], tree: KinematicTree) -> Iterable[Finding]:
+    joints = {joint.name for joint in tree.joints}
+    if lost := [name for name in limits if name not in joints]:
+        known = ', '.join(joint.name for joint in tree.movable())
+        yield error(
+            robot.limits.name,
+            f'{robot.description.name} has no joint {", ".join(map(repr, lost))}',
+            f'take it out, or name it as the joint; joints: {known}',
         )
-        return [*findings, error(robot.limits.name, str(problem), remedy)]
-    except ModelError as problem:
-        remedy = f'name links and joints as {robot.description.name} does; see robots/gp110/'
-        return [*findings, error(robot.semantic.name, str(problem), remedy)]
-    findings += [
-        warning(robot.semantic.name, note, 'mend it, or leave it') for note in model.notes
-    ]
-    findings += _start(robot, model)
-    findings += _controllers(robot, model)
-    return findings
-
-
-def _limits(robot: Robot, limits: Any, joints: Sequence[str]) -> Iterable[Finding]:  # noqa: ANN401  # YAML
-    for name in limits:
-        if name not in joints:
-            yield error(
-                f'{robot.limits.name}, {name}',
-                f'{robot.description.name} has no such joint',
-                f'take it out, or name it as the joint; joints: {", ".join(joints)}',
-            )
 
 
 def _start(robot: Robot, model: RobotModel) -> Iterable[Finding]:
     import numpy as np
 
-    place = f'{robot.semantic.name}, pose {START!r}'
+    place = f'{robot.semantic.name}, group {model.group}, pose {START!r}'
     if START not in model.poses:
         known = ', '.join(model.poses) or 'none'
         yield error(
@@ -105,6 +129,14 @@ def _start(robot: Robot, model: RobotModel) -> Iterable[Finding]:
             f'it is singular (least singular value {least:.4f}): some directions cannot be jogged',
             'bend the elbow and the wrist, by 90 degrees for instance',
         )
+    room = np.minimum(start - model.limits.lower, model.limits.upper - start)
+    tight = room < MARGIN * (model.limits.upper - model.limits.lower)
+    if at_end := [name for name, each in zip(model.joints, tight, strict=True) if each]:
+        yield warning(
+            place,
+            f'{", ".join(at_end)} at the end of the range: can be jogged in one direction only',
+            'start from further inside',
+        )
     clearance = model.clearance(start)
     if clearance < CLEARANCE:
         pair = model.nearest(start, CLEARANCE, 1)[0].links
@@ -117,12 +149,12 @@ def _start(robot: Robot, model: RobotModel) -> Iterable[Finding]:
         )
 
 
-def _controllers(robot: Robot, model: RobotModel) -> Iterable[Finding]:
+def _controllers(robot: Robot, models: Mapping[str, RobotModel]) -> Iterable[Finding]:
     from arm_servo import check_parameters
 
-    if not robot.controllers.is_file():
+    if not robot.controllers.is_file() or not models:
         return
-    place = robot.controllers.name
+    place, model = robot.controllers.name, next(iter(models.values()))
     try:
         table = parameters_by_node(robot.controllers)
         manager = table.get('controller_manager', {}).get('ros__parameters', {})

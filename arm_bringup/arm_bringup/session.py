@@ -32,7 +32,7 @@ from .robots import find_robot, installed_robots_folder, Robot, robot_names
 from .stack import arm_processes, Stack
 
 if TYPE_CHECKING:
-    from arm_canopen import NodeConfig
+    from arm_canopen import BusConfig, NodeConfig
 
 REAL_BUS = 'can0'
 """Bus without --can on hardware: never one on which only simulated drives could be."""
@@ -146,14 +146,14 @@ def locate(arguments: argparse.Namespace) -> Robot:
     )
 
 
-def read_drives(robot: Robot) -> list[NodeConfig]:
+def read_bus(robot: Robot) -> BusConfig:
     """Read the bus.yml of a robot, and so find its mistakes before anything is started.
 
     Args:
         robot: The robot.
 
     Returns:
-        Its drives, in the order of the file.
+        Its bus, with one drive at least.
 
     Raises:
         RobotError: The file, or an EDS that it names, is wrong; the message says where and what.
@@ -161,39 +161,41 @@ def read_drives(robot: Robot) -> list[NodeConfig]:
     from arm_canopen import CanopenError, load_bus
 
     try:
-        drives = [node for node in load_bus(robot.bus_config).nodes if node.is_drive]
+        bus = load_bus(robot.bus_config)
     except CanopenError as error:
         raise RobotError(str(error)) from error
-    if not drives:
+    if not bus.joints:
         raise RobotError(f'{robot.bus_config} has no drive (a node with a Cia402 driver)')
-    return drives
+    return bus
 
 
-def in_namespace_of_bus(ros: RosOptions, drives: Sequence[NodeConfig]) -> RosOptions:
+def in_namespace_of_bus(ros: RosOptions, bus: BusConfig) -> RosOptions:
     """Take over the namespace of bus.yml, unless the command line has one: all nodes share it.
 
     Args:
         ros: Options of all nodes.
-        drives: The drives of the robot.
+        bus: The bus of the robot.
 
     Raises:
-        RobotError: Its drives are in several.
+        RobotError: Its nodes are in several.
     """
-    named = {drive.namespace.strip('/') for drive in drives}
-    if len(named) > 1 and not ros.namespace:
+    named = [bus.master.namespace, *(node.namespace for node in bus.nodes)]
+    given = {namespace.strip('/') for namespace in named} - {''}
+    if len(given) > 1 and not ros.namespace:
         raise RobotError(
-            f'bus.yml puts the drives into several namespaces ({", ".join(sorted(named))}); '
+            f'bus.yml puts its nodes into several namespaces ({", ".join(sorted(given))}); '
             'choose one for all with --namespace'
         )
-    return ros.within(next(iter(named)))
+    return ros.within(next(iter(given), ''))
 
 
-def stream_mode_service(drives: Sequence[NodeConfig]) -> str:
+def stream_mode_service(bus: BusConfig) -> str:
     """Name the service for the mode of streams: what bus.yml asks for, else cyclic position.
 
     Args:
-        drives: The drives of the robot.
+        bus: The bus of the robot.
     """
+    drives: list[NodeConfig] = [node for node in bus.nodes if node.is_drive]
     if all(drive.drive.position_mode == INTERPOLATED_POSITION for drive in drives):
         return 'interpolated_position_mode'
     return 'cyclic_position_mode'
@@ -271,8 +273,8 @@ def session(
     """
     apply_network(arguments)
     robot = locate(arguments)
-    drives = read_drives(robot)
-    ros = in_namespace_of_bus(ros, drives)
+    config = read_bus(robot)
+    ros = in_namespace_of_bus(ros, config)
     domain = ros_domain(os.environ)
     with contextlib.ExitStack() as stack:
         place = f'namespace /{ros.namespace} of ROS domain {domain}'
@@ -293,5 +295,5 @@ def session(
             ros,
         )
         processes = arm_processes(wanted, parameters, find_executable)
-        names = [joint for drive in drives for joint in drive.joints]
-        yield Session(robot, bus, names, ros, stream_mode_service(drives), urdf, processes)
+        mode_service = stream_mode_service(config)
+        yield Session(robot, bus, list(config.joints), ros, mode_service, urdf, processes)

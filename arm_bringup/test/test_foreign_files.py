@@ -12,6 +12,7 @@ import pytest
 from arm_bringup.bringup import parse
 from arm_bringup.description import expand_xacro, read_description, read_semantic
 from arm_bringup.exceptions import DescriptionError, RobotError
+from arm_bringup.groups import moved_groups, MovedGroups
 from arm_bringup.robots import find_robot, Robot
 from arm_bringup.session import locate
 
@@ -161,3 +162,23 @@ def test_one_that_is_there_and_wrong_is_told(tmp_path: Path) -> None:
     )
     with pytest.raises(DescriptionError, match='division by zero'):
         expand_xacro(file)
+
+
+TWO_ARMS = (
+    '<robot name="arm"><group name="left"><joint name="a"/></group>'
+    '<group name="right"><joint name="b"/></group>'
+    '<group name="both"><group name="left"/><group name="right"/></group>'
+    '<group name="hand"><link name="c"/></group>'
+    '<end_effector name="hand" parent_link="a" group="hand" parent_group="left"/></robot>'
+)
+
+
+def test_arms_and_tools_of_an_srdf(folder: Path) -> None:
+    """All arms are moved unless one is named; groups of groups only by name."""
+    (folder / 'arm.srdf').write_text(TWO_ARMS)
+    assert moved_groups(found(folder)) == MovedGroups(('left', 'right'), ('hand',))
+    (folder / 'robot.yaml').write_text('group: both')
+    assert moved_groups(found(folder)) == MovedGroups(('both',), ('hand',))
+    (folder / 'robot.yaml').write_text('group: bath')
+    with pytest.raises(RobotError, match=r'group bath; groups: left, .*robot.yaml, or --group'):
+        moved_groups(found(folder))

@@ -13,7 +13,7 @@ import pytest
 
 from arm_bringup.exceptions import RobotError
 from arm_bringup.robots import find_robot, robot_names
-from arm_bringup.session import read_drives, stream_mode_service
+from arm_bringup.session import read_bus, stream_mode_service
 from arm_canopen import load_bus
 
 ROBOTS = Path(__file__).parents[1] / 'robots'
@@ -92,8 +92,7 @@ def test_the_bus_of_the_prbt_has_its_six_joints() -> None:
 def test_the_mode_of_streams_is_the_one_that_bus_yml_asks_for() -> None:
     """Interpolated position on the PRBT; the Panda asks for profile position, so cyclic."""
     services = {
-        name: stream_mode_service(read_drives(find_robot(name, ROBOTS)))
-        for name in ('panda', 'prbt')
+        name: stream_mode_service(read_bus(find_robot(name, ROBOTS))) for name in ('panda', 'prbt')
     }
     assert services == {'panda': 'cyclic_position_mode', 'prbt': 'interpolated_position_mode'}
 

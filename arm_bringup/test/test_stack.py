@@ -24,8 +24,14 @@ PARAMETERS = Path('/tmp/parameters.yaml')
 
 def my_robot(folder: Path) -> Robot:
     """Return a robot whose files may not be there yet."""
-    names = ('bus.yml', 'my.urdf.xacro', 'my.srdf', 'limits.yaml', 'controllers.yaml')
-    return Robot('my', *(folder / name for name in names))
+    return Robot(
+        'my',
+        folder / 'bus.yml',
+        folder / 'my.urdf.xacro',
+        folder / 'my.srdf',
+        folder / 'limits.yaml',
+        folder / 'controllers.yaml',
+    )
 
 
 class Underlay:
@@ -84,7 +90,7 @@ def test_what_a_person_says_counts_most(tmp_path: Path, words: tuple[str, str]) 
 def test_rcl_takes_what_a_person_says(tmp_path: Path, spelling: str, namespace: str) -> None:
     """Whatever the robot's own file says of that node, by name or by pattern."""
     robot = my_robot(tmp_path)
-    robot.semantic.write_text('<robot name="my"/>')
+    robot.semantic.write_text('<robot name="my"><group name="arm"/></robot>')
     own = {'ros__parameters': {'rate': 1}}
     robot.controllers.write_text(json.dumps({'/**': own, 'servo_node': own}))
     user = tmp_path / 'user.yaml'
@@ -114,11 +120,12 @@ def test_master_without_arm_servo(tmp_path: Path) -> None:
     assert 'lacks my.srdf and limits.yaml' in choose_master(robot, full)[1]
     robot.limits.touch()
     assert 'my lacks my.srdf for' in choose_master(robot, full)[1]
-    robot.semantic.write_text('<robot name="my"/>')
+    srdf = '<robot name="my"><group name="arm"/></robot>'
+    robot.semantic.write_text(srdf)
     assert choose_master(robot, full) == (MOTION_MASTER, '')
     (file,) = motion_files(robot, tmp_path, RosOptions())
     values = yaml.safe_load(file.read_text())[EVERY_NODE]['ros__parameters']
-    assert values['robot_description_semantic'] == '<robot name="my"/>'
+    assert (values['robot_description_semantic'], values['group']) == (srdf, 'arm')
 
 
 def test_hardware_has_no_slaves_and_simulation_has(tmp_path: Path) -> None:

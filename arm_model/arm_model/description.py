@@ -106,6 +106,10 @@ class Description:
                     f'group {group.name}: joint {name!r} is not in the description'
                 )
             names += [name] if self.joints[name].independent else []
+        moved = {joint.child: joint for joint in self.tree.joints}
+        for link in group.links:
+            names += [moved[link].name] if link in moved and moved[link].independent else []
+        names = [name for name in names if name not in semantic.passive]
         if not names:
             raise DescriptionError(f'group {group.name}: it has no joint that moves')
         return sorted(dict.fromkeys(names), key=self._depth)

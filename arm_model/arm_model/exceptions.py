@@ -35,9 +35,16 @@ class ModelError(ArmError, ValueError):
 class LimitsError(ModelError):
     """The limits file cannot be read, or does not have what it must.
 
-    Scenarios: a joint without max_jerk, a speed that is wider than the description's, a number
-    that is none.
+    Scenarios: a joint is missing, a speed is wider than the description's, a number is none.
+
+    Attributes:
+        problems: What is wrong, one sentence each.
     """
+
+    def __init__(self, *problems: str) -> None:
+        """Keep all that is wrong beside the message."""
+        super().__init__('; '.join(problems))
+        self.problems = problems
 
 
 class CommandError(ArmError, ValueError):

@@ -22,7 +22,8 @@ acceleration, and some descriptions write velocity 0.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 import math
 from pathlib import Path
@@ -55,6 +56,9 @@ TURN = 2.0 * math.pi
 
 ROUNDING_TOLERANCE = 1e-3
 """How much a limit may exceed the description's for rounding, as a share."""
+
+_Row = tuple[float, float, float, float, float]
+"""Lower, upper, velocity, acceleration and jerk of a joint."""
 
 KNOWN_KEYS = frozenset(
     {
@@ -146,7 +150,13 @@ def merge_limits(
             description's.
     """
     defaults: dict[str, list[str]] = {}
-    rows = [_row(joints[name], table, defaults) for name in names]
+    rows: list[_Row] = []
+    problems: list[str] = []
+    for name in names:
+        with _collected(problems):
+            rows.append(_row(joints[name], table, defaults))
+    if problems:
+        raise LimitsError(*problems)
     notes += [f'{default}: {", ".join(found)}' for default, found in defaults.items()]
     lower, upper, velocity, acceleration, jerk = (
         frozen(column) for column in zip(*rows, strict=True)
@@ -154,9 +164,16 @@ def merge_limits(
     return JointLimits(tuple(names), lower, upper, velocity, acceleration, jerk)
 
 
-def _row(
-    joint: Joint, table: Mapping[str, Any], defaults: dict[str, list[str]]
-) -> tuple[float, float, float, float, float]:
+@contextmanager
+def _collected(problems: list[str]) -> Iterator[None]:
+    """Keep what is wrong with one joint, to tell it with that of the others."""
+    try:
+        yield
+    except LimitsError as error:
+        problems += error.problems
+
+
+def _row(joint: Joint, table: Mapping[str, Any], defaults: dict[str, list[str]]) -> _Row:
     name, span = joint.name, joint.range
     entry = table.get(name)
     if not isinstance(entry, dict):

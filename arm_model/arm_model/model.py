@@ -258,6 +258,8 @@ def _ends(
     inward = {tree.root, *(joint.parent for joint in tree.chain(tree.root, end))}
     bases = [base for base, _ in chains] or [description.joints[joints[0]].parent]
     base = next((link for link in bases if link in inward), bases[0])
+    moving = [joint for joint in tree.chain(tree.root, base) if joint.name in joints]
+    base = moving[0].parent if moving else base  # a lift below the chain of the arm
     tree.chain(base, end)  # or says why not
     return base, end
 

@@ -249,6 +249,27 @@ def test_joints_go_from_the_base_out() -> None:
         RobotModel(urdf, apart, limits, tip='base')
 
 
+def test_a_lift_below_the_chain_of_an_arm_is_part_of_it() -> None:
+    """A group of a joint and a group, as MoveIt's users write an arm on a lift."""
+    urdf, srdf, limits = chain_texts('pyy')
+    arm = srdf.replace('base_link="base"', 'base_link="link_1"').replace(
+        '</robot>', '<group name="all"><joint name="j1"/><group name="arm"/></group></robot>'
+    )
+    model = RobotModel(urdf, arm, limits, 'all')
+    assert model.joints == ('j1', 'j2', 'j3')
+    assert (model.base, model.tip, model.serial) == ('base', 'tip', True)
+
+
+def test_links_of_a_group_stand_for_the_joints_that_move_them() -> None:
+    """As in MoveIt; passive joints have no actuator."""
+    urdf, srdf, limits = chain_texts('zyy')
+    links = '<link name="link_1"/><link name="link_2"/><link name="link_3"/>'
+    listed = srdf.replace('<chain base_link="base" tip_link="tip"/>', links)
+    assert RobotModel(urdf, listed, limits).joints == ('j1', 'j2', 'j3')
+    passive = listed.replace('</robot>', '<passive_joint name="j3"/></robot>')
+    assert RobotModel(urdf, passive, limits).joints == ('j1', 'j2')
+
+
 def test_a_limits_file_that_is_none(tmp_path: Any) -> None:
     """A file without the table, or no file at all, is told with its path."""
     path = tmp_path / 'limits.yaml'

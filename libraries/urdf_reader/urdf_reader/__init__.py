@@ -7,7 +7,7 @@ model of an arm, publishers of joint states and of /tf, bring-ups.
 """
 
 from .exceptions import DescriptionError
-from .srdf import Group, Pair, parse_srdf, SemanticDescription
+from .srdf import EndEffector, Group, Pair, parse_srdf, SemanticDescription
 from .transforms import about, from_rpy, multiply, Quaternion, rotate, Transform, Vector
 from .urdf import Collision, Joint, JointKind, JointRange, KinematicTree, Mimic, MOVABLE, read_urdf
 
@@ -15,6 +15,7 @@ __all__ = [
     'MOVABLE',
     'Collision',
     'DescriptionError',
+    'EndEffector',
     'Group',
     'Joint',
     'JointKind',

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Semantic description (SRDF): groups, named poses, pairs of links without collision check."""
+"""Semantic description (SRDF): groups, named poses, end effectors, pairs that are not checked."""
 
 from __future__ import annotations
 
@@ -23,12 +23,31 @@ class Group:
         chains: Base and tip link of each chain in it.
         joints: Joints that it lists one by one.
         subgroups: Groups that it contains.
+        links: Links that it lists one by one; each stands for the joint that moves it.
     """
 
     name: str
     chains: tuple[tuple[str, str], ...]
     joints: tuple[str, ...]
     subgroups: tuple[str, ...]
+    links: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class EndEffector:
+    """A tool at the end of an arm.
+
+    Attributes:
+        name: Its name.
+        group: Group of its joints and links.
+        parent_link: Link of the arm to which it is fixed.
+        parent_group: Group of that arm, if it says so.
+    """
+
+    name: str
+    group: str
+    parent_link: str
+    parent_group: str = ''
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +60,8 @@ class SemanticDescription:
         disabled: Pairs of links that need no collision check.
         unchecked: Links that need none with any other (``disable_default_collisions``).
         enabled: Pairs of them that are checked all the same (``enable_collisions``).
+        end_effectors: Tools at the ends of arms.
+        passive: Joints without an actuator (``passive_joint``).
     """
 
     groups: Mapping[str, Group]
@@ -48,6 +69,25 @@ class SemanticDescription:
     disabled: frozenset[Pair]
     unchecked: frozenset[str] = frozenset()
     enabled: frozenset[Pair] = frozenset()
+    end_effectors: tuple[EndEffector, ...] = ()
+    passive: frozenset[str] = frozenset()
+
+    @property
+    def tools(self) -> tuple[str, ...]:
+        """Names of the groups of end effectors that have a group of their own."""
+        named = {each.group for each in self.end_effectors}
+        arms = {each.parent_group for each in self.end_effectors}
+        return tuple(name for name in self.groups if name in named - arms)
+
+    @property
+    def arms(self) -> tuple[str, ...]:
+        """Names of the groups that are neither end effectors nor made of other groups."""
+        tools = self.tools
+        return tuple(
+            name
+            for name, group in self.groups.items()
+            if name not in tools and not group.subgroups
+        )
 
     def checks(self, first: str, second: str) -> bool:
         """Tell whether two links are checked for collision with each other."""
@@ -92,7 +132,14 @@ def parse_srdf(text: str) -> SemanticDescription:
         each.get('link', '') for each in root.findall('disable_default_collisions')
     )
     disabled, enabled = _pairs(root, 'disable_collisions'), _pairs(root, 'enable_collisions')
-    return SemanticDescription(groups, poses, disabled, unchecked, enabled)
+    passive = frozenset(each.get('name', '') for each in root.iter('passive_joint'))
+    effectors = tuple(map(_end_effector, root.findall('end_effector')))
+    return SemanticDescription(groups, poses, disabled, unchecked, enabled, effectors, passive)
+
+
+def _end_effector(element: ET.Element) -> EndEffector:
+    keys = ('name', 'group', 'parent_link', 'parent_group')
+    return EndEffector(*(element.get(key, '') for key in keys))
 
 
 def _pairs(root: ET.Element, tag: str) -> frozenset[Pair]:
@@ -110,6 +157,7 @@ def _group(element: ET.Element) -> Group:
         ),
         tuple(joint.get('name', '') for joint in element.findall('joint')),
         tuple(group.get('name', '') for group in element.findall('group')),
+        tuple(link.get('name', '') for link in element.findall('link')),
     )
 
 

@@ -23,6 +23,7 @@ from process_supervisor.arguments import seconds_from
 
 from ...description import joint_limits, read_semantic
 from ...exceptions import BringupError, RobotError
+from ...groups import moved_groups
 from ...motion import controller_name, motion_files
 from ...robots import Robot
 from ...session import (
@@ -111,7 +112,7 @@ def build_model(robot: Robot, urdf: str) -> RobotModel:
         urdf,
         read_semantic(robot),
         load_limits(robot.limits),
-        robot.group or None,
+        moved_groups(robot).arms[0],
         robot.tip_link or None,
     )
     if START not in model.poses:
