@@ -82,7 +82,7 @@ pins: system
 	@$(WORKSPACE) pins
 
 clean:
-	rm -rf build install log .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	rm -rf build install log */build libraries/*/build */*.egg-info libraries/*/*.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis
 
 distclean: clean
 	rm -rf .venv .workspace.lock

@@ -3,8 +3,29 @@
 """Build description of arm_bringup."""
 
 from pathlib import Path
+import sys
 
 from setuptools import find_packages, setup
+
+# colcon runs one of these commands; pip asks for a wheel, and what needs `ros2 run` is not in it
+FOR_ROS = not {'develop', 'install'}.isdisjoint(sys.argv)
+
+EXECUTABLES = [
+    'bringup = arm_bringup.bringup:main',
+    'check = arm_bringup.check:main',
+    'demo = arm_bringup.demos.wave.main:main',
+    'motion_demo = arm_bringup.demos.motion:main',
+    'wave_master = arm_bringup.demos.wave.master:main',
+]
+
+CHECKOUT = Path(__file__).resolve().parents[1]
+
+
+def sibling(folder: str) -> str:
+    """Require a package of this checkout as it stands here, and never one of that name on PyPI."""
+    path = CHECKOUT / folder
+    return f'{path.name} @ {path.as_uri()}' if path.is_dir() else path.name
+
 
 # installed as they are; a robot folder is found by its name in share/arm_bringup/robots
 FOLDERS = [Path('macros'), *sorted(Path('robots').iterdir())]
@@ -26,19 +47,29 @@ setup(
         ('share/arm_bringup', ['package.xml']),
         *((f'share/arm_bringup/{folder}', files(folder)) for folder in FOLDERS),
     ],
-    install_requires=['setuptools'],
+    install_requires=[
+        'PyYAML>=6',
+        'rich>=13',
+        'xacro>=2',
+        sibling('arm_canopen'),
+        sibling('libraries/demo_runner'),
+        sibling('libraries/process_supervisor'),
+        sibling('libraries/urdf_reader'),
+    ],
+    extras_require={
+        'motion': ['numpy>=1.26', sibling('arm_model'), sibling('arm_servo')],
+        'ros': [
+            sibling('canopen_sim'),
+            sibling('libraries/node_runner'),
+            sibling('robot_viewer'),
+        ],
+    },
     zip_safe=True,
     maintainer='The arm and quad developers',
     maintainer_email='developers@example.org',
     description='Robots on CANopen buses, their bring-up with one command, and the demo',
     license='Apache-2.0',
     entry_points={
-        'console_scripts': [
-            'bringup = arm_bringup.bringup:main',
-            'check = arm_bringup.check:main',
-            'demo = arm_bringup.demos.wave.main:main',
-            'motion_demo = arm_bringup.demos.motion:main',
-            'wave_master = arm_bringup.demos.wave.master:main',
-        ],
+        'console_scripts': EXECUTABLES if FOR_ROS else [],
     },
 )

@@ -2,7 +2,31 @@
 # SPDX-License-Identifier: Apache-2.0
 """Build description of arm_servo."""
 
+from pathlib import Path
+import sys
+
 from setuptools import find_packages, setup
+
+# colcon runs one of these commands; pip asks for a wheel, and what needs `ros2 run` is not in it
+FOR_ROS = not {'develop', 'install'}.isdisjoint(sys.argv)
+
+EXECUTABLES = [
+    'motion_controller = arm_servo.ros.motion_controller:main',
+    'motion_master = arm_servo.ros.motion_master:main',
+    'servo_node = arm_servo.ros.servo_node:main',
+    'trajectory_controller = arm_servo.ros.trajectory_program:main',
+    'servo_gamepad = arm_servo.teleop.servo_gamepad:main',
+    'servo_keyboard_input = arm_servo.teleop.servo_keyboard_input:main',
+]
+
+CHECKOUT = Path(__file__).resolve().parents[1]
+
+
+def sibling(folder: str) -> str:
+    """Require a package of this checkout as it stands here, and never one of that name on PyPI."""
+    path = CHECKOUT / folder
+    return f'{path.name} @ {path.as_uri()}' if path.is_dir() else path.name
+
 
 setup(
     name='arm_servo',
@@ -13,20 +37,24 @@ setup(
         ('share/ament_index/resource_index/packages', ['resource/arm_servo']),
         ('share/arm_servo', ['package.xml']),
     ],
-    install_requires=['setuptools'],
+    install_requires=[
+        'daqp>=0.5',
+        'numpy>=1.26',
+        'pin>=3.3',
+        sibling('arm_canopen'),
+        sibling('arm_model'),
+        sibling('arm_trajectory'),
+        sibling('libraries/realtime_loop'),
+    ],
+    extras_require={
+        'ros': [sibling('libraries/node_runner'), sibling('libraries/operator_input')]
+    },
     zip_safe=True,
     maintainer='The arm and quad developers',
     maintainer_email='developers@example.org',
     description='Jogging and trajectories of an arm on one motion core',
     license='Apache-2.0',
     entry_points={
-        'console_scripts': [
-            'motion_controller = arm_servo.ros.motion_controller:main',
-            'motion_master = arm_servo.ros.motion_master:main',
-            'servo_node = arm_servo.ros.servo_node:main',
-            'trajectory_controller = arm_servo.ros.trajectory_program:main',
-            'servo_gamepad = arm_servo.teleop.servo_gamepad:main',
-            'servo_keyboard_input = arm_servo.teleop.servo_keyboard_input:main',
-        ],
+        'console_scripts': EXECUTABLES if FOR_ROS else [],
     },
 )

@@ -2,7 +2,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """Build description of arm_trajectory."""
 
+from pathlib import Path
+
 from setuptools import find_packages, setup
+
+CHECKOUT = Path(__file__).resolve().parents[1]
+
+
+def sibling(folder: str) -> str:
+    """Require a package of this checkout as it stands here, and never one of that name on PyPI."""
+    path = CHECKOUT / folder
+    return f'{path.name} @ {path.as_uri()}' if path.is_dir() else path.name
+
 
 setup(
     name='arm_trajectory',
@@ -13,7 +24,7 @@ setup(
         ('share/ament_index/resource_index/packages', ['resource/arm_trajectory']),
         ('share/arm_trajectory', ['package.xml']),
     ],
-    install_requires=['setuptools'],
+    install_requires=['numpy>=1.26', 'ruckig>=0.19', sibling('arm_model')],
     zip_safe=True,
     maintainer='The arm and quad developers',
     maintainer_email='developers@example.org',

@@ -3,8 +3,26 @@
 """Build description of canopen_sim."""
 
 from pathlib import Path
+import sys
 
 from setuptools import find_packages, setup
+
+# colcon runs one of these commands; pip asks for a wheel, and what needs `ros2 run` is not in it
+FOR_ROS = not {'develop', 'install'}.isdisjoint(sys.argv)
+
+EXECUTABLES = [
+    'fake_slave = canopen_sim.nodes.fake_slave:main',
+    'fake_slaves = canopen_sim.nodes.fake_slaves:main',
+]
+
+CHECKOUT = Path(__file__).resolve().parents[1]
+
+
+def sibling(folder: str) -> str:
+    """Require a package of this checkout as it stands here, and never one of that name on PyPI."""
+    path = CHECKOUT / folder
+    return f'{path.name} @ {path.as_uri()}' if path.is_dir() else path.name
+
 
 setup(
     name='canopen_sim',
@@ -19,16 +37,14 @@ setup(
             sorted(str(path) for path in Path('scenarios').iterdir()),
         ),
     ],
-    install_requires=['setuptools'],
+    install_requires=[sibling('arm_canopen')],
+    extras_require={'ros': [sibling('libraries/node_runner')]},
     zip_safe=True,
     maintainer='The arm and quad developers',
     maintainer_email='developers@example.org',
     description='Simulated CANopen devices and CiA 402 drives, with faults',
     license='Apache-2.0',
     entry_points={
-        'console_scripts': [
-            'fake_slave = canopen_sim.nodes.fake_slave:main',
-            'fake_slaves = canopen_sim.nodes.fake_slaves:main',
-        ],
+        'console_scripts': EXECUTABLES if FOR_ROS else [],
     },
 )

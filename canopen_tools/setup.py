@@ -2,7 +2,31 @@
 # SPDX-License-Identifier: Apache-2.0
 """Build description of canopen_tools."""
 
+from pathlib import Path
+import sys
+
 from setuptools import find_packages, setup
+
+# colcon runs one of these commands; pip asks for a wheel, and what needs `ros2 run` is not in it
+FOR_ROS = not {'develop', 'install'}.isdisjoint(sys.argv)
+
+EXECUTABLES = [
+    'candump = canopen_tools.candump:main',
+    'canopen = canopen_tools.cli.main:main',
+]
+COMMANDS = [
+    'canopen = canopen_tools.cli.main:main',
+    'canopen-candump = canopen_tools.candump:main',
+]
+
+CHECKOUT = Path(__file__).resolve().parents[1]
+
+
+def sibling(folder: str) -> str:
+    """Require a package of this checkout as it stands here, and never one of that name on PyPI."""
+    path = CHECKOUT / folder
+    return f'{path.name} @ {path.as_uri()}' if path.is_dir() else path.name
+
 
 setup(
     name='canopen_tools',
@@ -13,16 +37,13 @@ setup(
         ('share/ament_index/resource_index/packages', ['resource/canopen_tools']),
         ('share/canopen_tools', ['package.xml']),
     ],
-    install_requires=['setuptools'],
+    install_requires=[sibling('arm_canopen')],
     zip_safe=True,
     maintainer='The arm and quad developers',
     maintainer_email='developers@example.org',
     description='CANopen on the command line: check, scan, read, write, compare, candump in words',
     license='Apache-2.0',
     entry_points={
-        'console_scripts': [
-            'candump = canopen_tools.candump:main',
-            'canopen = canopen_tools.cli.main:main',
-        ],
+        'console_scripts': EXECUTABLES if FOR_ROS else COMMANDS,
     },
 )

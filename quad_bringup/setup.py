@@ -2,7 +2,27 @@
 # SPDX-License-Identifier: Apache-2.0
 """Build description of quad_bringup."""
 
+from pathlib import Path
+import sys
+
 from setuptools import find_packages, setup
+
+# colcon runs one of these commands; pip asks for a wheel, and what needs `ros2 run` is not in it
+FOR_ROS = not {'develop', 'install'}.isdisjoint(sys.argv)
+
+EXECUTABLES = [
+    'bringup = quad_bringup.bringup:main',
+    'demo = quad_bringup.demo.main:main',
+]
+
+CHECKOUT = Path(__file__).resolve().parents[1]
+
+
+def sibling(folder: str) -> str:
+    """Require a package of this checkout as it stands here, and never one of that name on PyPI."""
+    path = CHECKOUT / folder
+    return f'{path.name} @ {path.as_uri()}' if path.is_dir() else path.name
+
 
 setup(
     name='quad_bringup',
@@ -14,16 +34,27 @@ setup(
         ('share/quad_bringup', ['package.xml']),
         ('share/quad_bringup/launch', ['launch/bringup.launch.py']),
     ],
-    install_requires=['setuptools'],
+    install_requires=[
+        'rich>=13',
+        sibling('libraries/demo_runner'),
+        sibling('libraries/process_supervisor'),
+        sibling('quad_controller'),
+        sibling('quad_description'),
+    ],
+    extras_require={
+        'ros': [
+            sibling('quad_hardware'),
+            sibling('quad_sim'),
+            sibling('quad_teleop'),
+            sibling('robot_viewer'),
+        ]
+    },
     zip_safe=True,
     maintainer='The arm and quad developers',
     maintainer_email='developers@example.org',
     description='The quadruped brought up with one command, and the demo',
     license='Apache-2.0',
     entry_points={
-        'console_scripts': [
-            'bringup = quad_bringup.bringup:main',
-            'demo = quad_bringup.demo.main:main',
-        ],
+        'console_scripts': EXECUTABLES if FOR_ROS else [],
     },
 )

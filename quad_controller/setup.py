@@ -3,31 +3,50 @@
 """Build description of quad_controller."""
 
 from pathlib import Path
+import sys
 
 from setuptools import find_packages, setup
 
-POLICIES = sorted(str(path) for path in Path('policies').glob('*.onnx'))
+# colcon runs one of these commands; pip asks for a wheel, and what needs `ros2 run` is not in it
+FOR_ROS = not {'develop', 'install'}.isdisjoint(sys.argv)
+
+EXECUTABLES = [
+    'check_policy = quad_controller.policy_check.main:main',
+    'controller_node = quad_controller.nodes.controller_node:main',
+]
+COMMANDS = [
+    'quad-check-policy = quad_controller.policy_check.main:main',
+]
+
+CHECKOUT = Path(__file__).resolve().parents[1]
+
+
+def sibling(folder: str) -> str:
+    """Require a package of this checkout as it stands here, and never one of that name on PyPI."""
+    path = CHECKOUT / folder
+    return f'{path.name} @ {path.as_uri()}' if path.is_dir() else path.name
+
 
 setup(
     name='quad_controller',
     version='0.1.0',
     packages=find_packages(include=['quad_controller', 'quad_controller.*']),
-    package_data={'quad_controller': ['py.typed']},
+    package_data={'quad_controller': ['py.typed', 'policies/*.onnx']},
     data_files=[
         ('share/ament_index/resource_index/packages', ['resource/quad_controller']),
         ('share/quad_controller', ['package.xml']),
-        ('share/quad_controller/policies', POLICIES),
     ],
-    install_requires=['setuptools'],
-    zip_safe=True,
+    install_requires=['numpy>=1.26', 'onnxruntime>=1.19', sibling('quad_description')],
+    extras_require={
+        'ros': [sibling('libraries/message_templates'), sibling('libraries/node_runner')],
+        'physics': [sibling('quad_sim')],
+    },
+    zip_safe=False,  # onnxruntime reads policies from their files
     maintainer='The arm and quad developers',
     maintainer_email='developers@example.org',
     description='Makes a quadruped walk: gait, ONNX policies, states and watchdogs',
     license='Apache-2.0',
     entry_points={
-        'console_scripts': [
-            'check_policy = quad_controller.policy_check.main:main',
-            'controller_node = quad_controller.nodes.controller_node:main',
-        ],
+        'console_scripts': EXECUTABLES if FOR_ROS else COMMANDS,
     },
 )

@@ -3,8 +3,29 @@
 """Build description of quad_description."""
 
 from pathlib import Path
+import sys
 
 from setuptools import find_packages, setup
+
+# colcon runs one of these commands; pip asks for a wheel, and what needs `ros2 run` is not in it
+FOR_ROS = not {'develop', 'install'}.isdisjoint(sys.argv)
+
+EXECUTABLES = [
+    'display = quad_description.display:main',
+    'urdf = quad_description.urdf_command:main',
+]
+COMMANDS = [
+    'quad-urdf = quad_description.urdf_command:main',
+]
+
+CHECKOUT = Path(__file__).resolve().parents[1]
+
+
+def sibling(folder: str) -> str:
+    """Require a package of this checkout as it stands here, and never one of that name on PyPI."""
+    path = CHECKOUT / folder
+    return f'{path.name} @ {path.as_uri()}' if path.is_dir() else path.name
+
 
 MODEL = Path('quad_description/model')
 
@@ -26,16 +47,14 @@ setup(
         # the same files again, where xacro and other robots' files look for them
         ('share/quad_description/model', model_files()),
     ],
-    install_requires=['setuptools'],
+    install_requires=['PyYAML>=6', 'xacro>=2'],
+    extras_require={'ros': [sibling('libraries/node_runner')]},
     zip_safe=False,
     maintainer='The arm and quad developers',
     maintainer_email='developers@example.org',
     description='The model of the XGO quadruped: URDF, legs, limits, poses, kinematics',
     license='Apache-2.0',
     entry_points={
-        'console_scripts': [
-            'display = quad_description.display:main',
-            'urdf = quad_description.urdf_command:main',
-        ],
+        'console_scripts': EXECUTABLES if FOR_ROS else COMMANDS,
     },
 )

@@ -2,7 +2,36 @@
 # SPDX-License-Identifier: Apache-2.0
 """Build description of quad_hardware."""
 
+from pathlib import Path
+import sys
+
 from setuptools import find_packages, setup
+
+# colcon runs one of these commands; pip asks for a wheel, and what needs `ros2 run` is not in it
+FOR_ROS = not {'develop', 'install'}.isdisjoint(sys.argv)
+
+EXECUTABLES = [
+    # the simulated robot's, under the name that it is printed by; quad_sim has it
+    'fake_xgo = quad_hardware.aliases:fake_xgo',
+    'calibrate = quad_hardware.calibration.main:main',
+    'doctor = quad_hardware.doctor.main:main',
+    'hardware_node = quad_hardware.nodes.hardware_node:main',
+    'protocol = quad_hardware.protocol.page:main',
+]
+COMMANDS = [
+    'xgo-calibrate = quad_hardware.calibration.main:main',
+    'xgo-doctor = quad_hardware.doctor.main:main',
+    'xgo-protocol = quad_hardware.protocol.page:main',
+]
+
+CHECKOUT = Path(__file__).resolve().parents[1]
+
+
+def sibling(folder: str) -> str:
+    """Require a package of this checkout as it stands here, and never one of that name on PyPI."""
+    path = CHECKOUT / folder
+    return f'{path.name} @ {path.as_uri()}' if path.is_dir() else path.name
+
 
 setup(
     name='quad_hardware',
@@ -13,20 +42,21 @@ setup(
         ('share/ament_index/resource_index/packages', ['resource/quad_hardware']),
         ('share/quad_hardware', ['package.xml']),
     ],
-    install_requires=['setuptools'],
+    install_requires=[
+        'pyserial>=3.5',
+        'PyYAML>=6',
+        sibling('libraries/dds_network'),
+        sibling('quad_description'),
+    ],
+    extras_require={
+        'ros': [sibling('libraries/message_templates'), sibling('libraries/node_runner')]
+    },
     zip_safe=True,
     maintainer='The arm and quad developers',
     maintainer_email='developers@example.org',
     description='Serial bridge of the XGO quadruped: both protocols, driver, node and tools',
     license='Apache-2.0',
     entry_points={
-        'console_scripts': [
-            # the simulated robot's, under the name that it is printed by; quad_sim has it
-            'fake_xgo = quad_hardware.aliases:fake_xgo',
-            'calibrate = quad_hardware.calibration.main:main',
-            'doctor = quad_hardware.doctor.main:main',
-            'hardware_node = quad_hardware.nodes.hardware_node:main',
-            'protocol = quad_hardware.protocol.page:main',
-        ],
+        'console_scripts': EXECUTABLES if FOR_ROS else COMMANDS,
     },
 )

@@ -2,7 +2,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """Build description of quad_sim."""
 
+from pathlib import Path
+
 from setuptools import find_packages, setup
+
+CHECKOUT = Path(__file__).resolve().parents[1]
+
+
+def sibling(folder: str) -> str:
+    """Require a package of this checkout as it stands here, and never one of that name on PyPI."""
+    path = CHECKOUT / folder
+    return f'{path.name} @ {path.as_uri()}' if path.is_dir() else path.name
+
 
 setup(
     name='quad_sim',
@@ -13,7 +24,14 @@ setup(
         ('share/ament_index/resource_index/packages', ['resource/quad_sim']),
         ('share/quad_sim', ['package.xml']),
     ],
-    install_requires=['setuptools'],
+    install_requires=[
+        "mujoco-core; python_version >= '3.11'",
+        "mujoco<4; python_version < '3.11'",
+        'numpy>=1.26',
+        sibling('quad_description'),
+        sibling('quad_hardware'),
+    ],
+    extras_require={'ros': [sibling('libraries/node_runner')]},
     zip_safe=True,
     maintainer='The arm and quad developers',
     maintainer_email='developers@example.org',

@@ -2,7 +2,28 @@
 # SPDX-License-Identifier: Apache-2.0
 """Build description of quad_teleop."""
 
+from pathlib import Path
+import sys
+
 from setuptools import find_packages, setup
+
+# colcon runs one of these commands; pip asks for a wheel, and what needs `ros2 run` is not in it
+FOR_ROS = not {'develop', 'install'}.isdisjoint(sys.argv)
+
+EXECUTABLES = [
+    'teleop_keyboard = quad_teleop.nodes.teleop_keyboard:main',
+    'teleop_gamepad = quad_teleop.nodes.teleop_gamepad:main',
+    'twist_mux = quad_teleop.nodes.twist_mux:main',
+]
+
+CHECKOUT = Path(__file__).resolve().parents[1]
+
+
+def sibling(folder: str) -> str:
+    """Require a package of this checkout as it stands here, and never one of that name on PyPI."""
+    path = CHECKOUT / folder
+    return f'{path.name} @ {path.as_uri()}' if path.is_dir() else path.name
+
 
 setup(
     name='quad_teleop',
@@ -14,17 +35,14 @@ setup(
         ('share/quad_teleop', ['package.xml']),
         ('share/quad_teleop/config', ['config/twist_mux.yaml']),
     ],
-    install_requires=['setuptools'],
+    install_requires=[sibling('libraries/operator_input'), sibling('quad_description')],
+    extras_require={'ros': [sibling('libraries/node_runner')]},
     zip_safe=True,
     maintainer='The arm and quad developers',
     maintainer_email='developers@example.org',
     description='Keyboard and gamepad for a walking robot, and a multiplexer of velocity commands',
     license='Apache-2.0',
     entry_points={
-        'console_scripts': [
-            'teleop_keyboard = quad_teleop.nodes.teleop_keyboard:main',
-            'teleop_gamepad = quad_teleop.nodes.teleop_gamepad:main',
-            'twist_mux = quad_teleop.nodes.twist_mux:main',
-        ],
+        'console_scripts': EXECUTABLES if FOR_ROS else [],
     },
 )

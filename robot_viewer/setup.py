@@ -2,7 +2,26 @@
 # SPDX-License-Identifier: Apache-2.0
 """Build description of robot_viewer."""
 
+from pathlib import Path
+import sys
+
 from setuptools import find_packages, setup
+
+# colcon runs one of these commands; pip asks for a wheel, and what needs `ros2 run` is not in it
+FOR_ROS = not {'develop', 'install'}.isdisjoint(sys.argv)
+
+EXECUTABLES = [
+    'robot_state_publisher = robot_viewer.nodes.robot_state_publisher:main',
+]
+
+CHECKOUT = Path(__file__).resolve().parents[1]
+
+
+def sibling(folder: str) -> str:
+    """Require a package of this checkout as it stands here, and never one of that name on PyPI."""
+    path = CHECKOUT / folder
+    return f'{path.name} @ {path.as_uri()}' if path.is_dir() else path.name
+
 
 setup(
     name='robot_viewer',
@@ -13,15 +32,14 @@ setup(
         ('share/ament_index/resource_index/packages', ['resource/robot_viewer']),
         ('share/robot_viewer', ['package.xml']),
     ],
-    install_requires=['setuptools'],
+    install_requires=[sibling('libraries/urdf_reader')],
+    extras_require={'ros': [sibling('libraries/node_runner')]},
     zip_safe=True,
     maintainer='The arm and quad developers',
     maintainer_email='developers@example.org',
     description='What a viewer needs of a robot: robot_state_publisher',
     license='Apache-2.0',
     entry_points={
-        'console_scripts': [
-            'robot_state_publisher = robot_viewer.nodes.robot_state_publisher:main',
-        ],
+        'console_scripts': EXECUTABLES if FOR_ROS else [],
     },
 )

@@ -216,7 +216,6 @@ def _print_note(text: str) -> None:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog='candump',
         description='Show the frames of a CAN bus, or of a log, with their CANopen meaning:\n'
         'PDO objects by name, SDO with abort texts, NMT, EMCY and heartbeats in words.\n'
         'It listens only, also beside a running master.',

@@ -13,7 +13,6 @@ setup(
         ('share/ament_index/resource_index/packages', ['resource/dds_network']),
         ('share/dds_network', ['package.xml']),
     ],
-    install_requires=['setuptools'],
     zip_safe=False,  # Fast DDS reads the profile from its file
     maintainer='The arm and quad developers',
     maintainer_email='developers@example.org',

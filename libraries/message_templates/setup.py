@@ -13,7 +13,6 @@ setup(
         ('share/ament_index/resource_index/packages', ['resource/message_templates']),
         ('share/message_templates', ['package.xml']),
     ],
-    install_requires=['setuptools'],
     zip_safe=True,
     maintainer='The arm and quad developers',
     maintainer_email='developers@example.org',

@@ -2,7 +2,31 @@
 # SPDX-License-Identifier: Apache-2.0
 """Build description of operator_input."""
 
+from pathlib import Path
+import sys
+
 from setuptools import find_packages, setup
+
+# colcon runs one of these commands; pip asks for a wheel, and what needs `ros2 run` is not in it
+FOR_ROS = not {'develop', 'install'}.isdisjoint(sys.argv)
+
+EXECUTABLES = [
+    'show_keys = operator_input.show_keys:main',
+    'show_gamepad = operator_input.show_gamepad:main',
+]
+COMMANDS = [
+    'operator-show-gamepad = operator_input.show_gamepad:main',
+    'operator-show-keys = operator_input.show_keys:main',
+]
+
+CHECKOUT = Path(__file__).resolve().parents[2]
+
+
+def sibling(folder: str) -> str:
+    """Require a package of this checkout as it stands here, and never one of that name on PyPI."""
+    path = CHECKOUT / folder
+    return f'{path.name} @ {path.as_uri()}' if path.is_dir() else path.name
+
 
 setup(
     name='operator_input',
@@ -13,16 +37,14 @@ setup(
         ('share/ament_index/resource_index/packages', ['resource/operator_input']),
         ('share/operator_input', ['package.xml']),
     ],
-    install_requires=['setuptools'],
+    install_requires=['evdev>=1.6'],
+    extras_require={'ros': [sibling('libraries/node_runner')]},
     zip_safe=True,
     maintainer='The arm and quad developers',
     maintainer_email='developers@example.org',
     description='What a person moves a robot with: keys and their releases, gamepads',
     license='Apache-2.0',
     entry_points={
-        'console_scripts': [
-            'show_keys = operator_input.show_keys:main',
-            'show_gamepad = operator_input.show_gamepad:main',
-        ],
+        'console_scripts': EXECUTABLES if FOR_ROS else COMMANDS,
     },
 )

@@ -2,7 +2,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """Build description of process_supervisor."""
 
+from pathlib import Path
+
 from setuptools import find_packages, setup
+
+CHECKOUT = Path(__file__).resolve().parents[2]
+
+
+def sibling(folder: str) -> str:
+    """Require a package of this checkout as it stands here, and never one of that name on PyPI."""
+    path = CHECKOUT / folder
+    return f'{path.name} @ {path.as_uri()}' if path.is_dir() else path.name
+
 
 setup(
     name='process_supervisor',
@@ -13,7 +24,8 @@ setup(
         ('share/ament_index/resource_index/packages', ['resource/process_supervisor']),
         ('share/process_supervisor', ['package.xml']),
     ],
-    install_requires=['setuptools'],
+    install_requires=['PyYAML>=6', sibling('libraries/dds_network')],
+    extras_require={'ros': [sibling('libraries/node_runner')]},
     zip_safe=True,
     maintainer='The arm and quad developers',
     maintainer_email='developers@example.org',

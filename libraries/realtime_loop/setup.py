@@ -13,7 +13,6 @@ setup(
         ('share/ament_index/resource_index/packages', ['resource/realtime_loop']),
         ('share/realtime_loop', ['package.xml']),
     ],
-    install_requires=['setuptools'],
     zip_safe=True,
     maintainer='The arm and quad developers',
     maintainer_email='developers@example.org',

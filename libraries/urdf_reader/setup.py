@@ -13,7 +13,6 @@ setup(
         ('share/ament_index/resource_index/packages', ['resource/urdf_reader']),
         ('share/urdf_reader', ['package.xml']),
     ],
-    install_requires=['setuptools'],
     zip_safe=True,
     maintainer='The arm and quad developers',
     maintainer_email='developers@example.org',

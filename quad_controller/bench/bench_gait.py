@@ -11,9 +11,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 import math
-from pathlib import Path
 from time import perf_counter
 
+from quad_controller import find_policy
 from quad_controller.gait.body import UPRIGHT
 from quad_controller.gait.generator import GaitGenerator
 from quad_controller.gait.parameters import GaitParameters
@@ -28,7 +28,7 @@ from quad_description import ImuSample, JointSample, quadruped, robot_urdf, Robo
 STEPS = 5000
 PERIOD = 0.02  # [s]
 VELOCITY = Velocity(0.2, 0.05, 0.3)
-POLICY = Path(__file__).parents[1] / 'policies' / 'trot_imitation.onnx'
+POLICY = find_policy('trot_imitation')
 IMU = ImuSample((0.01, 0.0, 0.0, 1.0), (0.1, 0.0, 0.2), (0.0, 0.0, 9.81))
 
 

@@ -9,11 +9,12 @@ from pathlib import Path
 from policy_export import joined
 import pytest
 
+from quad_controller import find_policy
 from quad_controller.policy_check.main import run
 from quad_gait_policies import metadata, write_policy
 from quad_gait_rig import ROBOT
 
-SHIPPED = str(Path(__file__).parents[1] / 'policies' / 'trot_imitation.onnx')
+SHIPPED = str(find_policy('trot_imitation'))
 
 
 def test_the_shipped_policy_passes_and_walks(capsys: pytest.CaptureFixture[str]) -> None:

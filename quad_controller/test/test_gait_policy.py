@@ -15,6 +15,7 @@ from policy_export import export, joined
 from policy_mlp import Mlp
 import pytest
 
+from quad_controller import find_policy
 from quad_controller.exceptions import ParameterError, PolicyError
 from quad_controller.gait.generator import GaitGenerator
 from quad_controller.gait.parameters import GaitParameters
@@ -30,7 +31,7 @@ from quad_gait_rig import ARM_ROBOT, ROBOT, tilted, UPRIGHT
 
 pytestmark = pytest.mark.slow
 
-SHIPPED = Path(__file__).parents[1] / 'policies' / 'trot_imitation.onnx'
+SHIPPED = find_policy('trot_imitation')
 PERIOD = 0.02  # [s]
 STILL = JointSample(STAND, (0.0,) * 12)
 JOINTS = list(ROBOT.names)

@@ -6,7 +6,7 @@ The network walks a robot in physics, with noise on its sensors, pushes and chan
 teacher says at every step what it would have done, and the network is trained on all of that
 (Ross, Gordon and Bagnell, 2011). Needs MuJoCo and onnx, a few minutes and one core::
 
-    python train_imitation.py ../policies/trot_imitation.onnx
+    python train_imitation.py ../quad_controller/policies/trot_imitation.onnx
 """
 
 from __future__ import annotations

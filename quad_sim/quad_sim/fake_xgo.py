@@ -7,6 +7,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from importlib.util import find_spec
 import signal
 import sys
 from types import FrameType
@@ -29,7 +30,7 @@ def run(argv: Sequence[str] | None = None) -> int:
             description = _describe(options, terminal)
             server = Server(simulation.plant, simulation.line, terminal)
             with _stopped_by_signals(server):
-                if options.no_ros:
+                if options.no_ros or find_spec('rclpy') is None:
                     sys.stdout.write(f'fake_xgo: {description}\n')
                     sys.stdout.flush()
                     server.run()

@@ -6,15 +6,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ament_index_python.packages import get_package_share_directory
-
 from ..exceptions import PolicyError
+
+FOLDER = Path(__file__).parents[1] / 'policies'
 
 
 def shipped_policies() -> dict[str, Path]:
     """Return the files of all shipped policies by their names."""
-    folder = Path(get_package_share_directory('quad_controller')) / 'policies'
-    return {path.stem: path for path in sorted(folder.glob('*.onnx'))}
+    return {path.stem: path for path in sorted(FOLDER.glob('*.onnx'))}
 
 
 def find_policy(text: str) -> Path:

@@ -91,7 +91,6 @@ def _physics(urdf: str, servo: str) -> Backend:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog='check_policy',
         description='Compare an ONNX policy with the robot, and let it walk in physics.',
     )
     parser.add_argument('policy', help='ONNX file, or the name of one that is shipped')

@@ -109,7 +109,7 @@ _PARTS = {'joints': _joints, 'imu': _imu, 'odometry': _odometry}
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog='calibrate', description=__doc__)
+    parser = argparse.ArgumentParser(description=__doc__)
     kinds = parser.add_subparsers(dest='what', required=True)
     joints = kinds.add_parser('joints', help='signs, offsets and limits; moves joints by hand')
     imu = kinds.add_parser('imu', help='how the IMU is mounted; tilts the robot by hand')

@@ -6,12 +6,13 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator, Sequence
+from importlib.util import find_spec
 import os
 from pathlib import Path
 import signal
 import sys
 
-from .finding import error, Finding, Severity
+from .finding import error, Finding, note, Severity
 from .host_checks import check_environment, check_library, check_memory
 from .port_checks import check_port
 
@@ -37,7 +38,7 @@ def main() -> None:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog='doctor', description=__doc__)
+    parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--port', default=DEFAULT_PORT, help='of the robot (%(default)s)')
     parser.add_argument(
         '--duration', type=float, default=3.0, help='of listening to topics [s] (%(default)s)'
@@ -46,12 +47,19 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _findings(port: str, duration: float) -> Iterator[Finding]:
-    yield from check_environment(os.environ)
+    has_ros = find_spec('rclpy') is not None
+    if has_ros:
+        yield from check_environment(os.environ)
+    else:
+        remedy = 'source env.sh first, if nodes are to be checked, too'
+        yield note('ROS', 'not there for this Python: robot and machine are checked alone', remedy)
     meminfo = Path('/proc/meminfo')
     if meminfo.exists():
         yield from check_memory(meminfo.read_text(encoding='ascii'))
     yield check_library()
     yield from check_port(port)
+    if not has_ros:
+        return
     try:
         from .graph_checks import check_graph
         from .listening import observe

@@ -1,0 +1,248 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The cores as libraries: installed from the checkout into an environment that has no ROS."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+import os
+from pathlib import Path
+import shutil
+import subprocess
+import sys
+import time
+
+from isolation import Isolation
+import pytest
+
+from arm_canopen import open_bus
+from arm_canopen.can.frame import Frame
+
+pytestmark = [pytest.mark.slow, pytest.mark.xdist_group('without-ros')]
+
+CHECKOUT = Path(__file__).parents[1]
+INSTALLED = (
+    'arm_servo',
+    'canopen_sim',
+    'canopen_tools',
+    'quad_bringup',
+    'quad_controller[physics]',
+    'quad_teleop',
+    'robot_viewer',
+    'arm_bringup[motion]',
+)
+"""Packages that nothing else requires; they bring all others."""
+IMPORTED = [
+    'arm_bringup',
+    'arm_canopen',
+    'arm_model',
+    'arm_servo',
+    'arm_trajectory',
+    'canopen_sim',
+    'canopen_tools',
+    'demo_runner',
+    'operator_input',
+    'process_supervisor',
+    'quad_bringup',
+    'quad_controller',
+    'quad_description',
+    'quad_hardware',
+    'quad_sim',
+    'quad_sim.physics',
+    'quad_teleop',
+    'realtime_loop',
+    'robot_viewer',
+    'urdf_reader',
+    'xgo_lib2',
+]
+COMMANDS = [
+    'canopen',
+    'canopen-candump',
+    'fake_xgo',
+    'operator-show-gamepad',
+    'quad-check-policy',
+    'quad-urdf',
+    'xgo-calibrate',
+    'xgo-doctor',
+]
+"""What has an option --help; operator-show-keys and xgo-protocol have no options at all."""
+FOR_ROS = [
+    'bringup',
+    'calibrate',
+    'candump',
+    'check',
+    'check_policy',
+    'controller_node',
+    'demo',
+    'display',
+    'doctor',
+    'fake_slave',
+    'fake_slaves',
+    'hardware_node',
+    'master',
+    'motion_master',
+    'protocol',
+    'robot_state_publisher',
+    'servo_node',
+    'teleop_keyboard',
+    'twist_mux',
+    'urdf',
+]
+"""Executables of `ros2 run`, which would die on rclpy or have somebody else's name."""
+PATIENCE = 120.0  # [s] for a program on a busy machine
+NO_NETWORK = ('dns error', 'Failed to fetch', 'connect error', 'client error')
+NOT_SOURCE = shutil.ignore_patterns('__pycache__', '*.egg-info', 'build', 'test', 'bench')
+
+
+@dataclass(frozen=True)
+class Environment:
+    """A virtual environment without ROS.
+
+    Attributes:
+        folder: Where it is.
+        variables: Environment of its programs.
+    """
+
+    folder: Path
+    variables: Mapping[str, str]
+
+    def run(self, *argv: str | Path) -> subprocess.CompletedProcess[str]:
+        """Run one of its commands to its end, nothing on its standard input."""
+        command = [str(self.folder / 'bin' / argv[0]), *map(str, argv[1:])]
+        return subprocess.run(
+            command,
+            env=self.variables,
+            cwd=self.folder,
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            timeout=PATIENCE,
+            check=False,
+        )
+
+    @contextmanager
+    def running(self, *argv: str | Path) -> Iterator[subprocess.Popen[str]]:
+        """Run one of its commands meanwhile."""
+        command = [str(self.folder / 'bin' / argv[0]), *map(str, argv[1:])]
+        with subprocess.Popen(
+            command, env=self.variables, cwd=self.folder, stdout=subprocess.PIPE, text=True
+        ) as process:
+            try:
+                yield process
+            finally:
+                process.terminate()
+                process.wait(PATIENCE)
+
+
+@pytest.fixture(scope='module')
+def environment(tmp_path_factory: pytest.TempPathFactory) -> Environment:
+    """Install the packages from a copy of the checkout, what they need from PyPI."""
+    source = tmp_path_factory.mktemp('checkout')
+    packages = [CHECKOUT / 'libraries', *(path.parent for path in CHECKOUT.glob('*/setup.py'))]
+    for package in packages:
+        shutil.copytree(package, source / package.name, ignore=NOT_SOURCE)
+    folder = tmp_path_factory.mktemp('environment')
+    subprocess.run([sys.executable, '-m', 'venv', '--without-pip', folder], check=True)
+    kept = {'HOME', 'LANG', 'TMPDIR', 'UV_CACHE_DIR', 'SSL_CERT_FILE', 'XDG_CACHE_HOME'}
+    kept |= {name for name in os.environ if name.lower().endswith('_proxy')}
+    variables = {name: os.environ[name] for name in kept & os.environ.keys()}
+    variables['PATH'] = f'{folder / "bin"}:/usr/bin:/bin'
+    variables['PYTHONUNBUFFERED'] = '1'
+    made = Environment(folder, variables)
+    _install(made, ['setuptools>=70'])
+    # an environment for each of twenty builds would take half a minute
+    _install(made, ['--no-build-isolation', *(f'{source}/{name}' for name in INSTALLED)])
+    return made
+
+
+def _install(environment: Environment, arguments: Sequence[str]) -> None:
+    uv = Path(sys.prefix) / 'bin' / 'uv'
+    python = environment.folder / 'bin' / 'python'
+    done = subprocess.run(
+        [uv, 'pip', 'install', '--quiet', '--python', python, *arguments],
+        env={**os.environ, **environment.variables},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if done.returncode and any(words in done.stderr for words in NO_NETWORK):
+        pytest.skip(f'PyPI cannot be reached for what the packages need: {done.stderr[-300:]}')
+    assert done.returncode == 0, done.stderr
+
+
+def test_there_is_no_ros(environment: Environment) -> None:
+    """What passes here does not pass because ROS is there after all."""
+    for module in ('rclpy', 'ament_index_python', 'std_msgs'):
+        assert environment.run('python', '-c', f'import {module}').returncode
+
+
+def test_packages_are_imported(environment: Environment) -> None:
+    """No core asks for rclpy or the index of ament, and all that it needs was installed."""
+    code = '\n'.join(f'import {name}' for name in IMPORTED)
+    done = environment.run(
+        'python', '-c', f'{code}\nimport sys; assert "rclpy" not in sys.modules'
+    )
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize('command', COMMANDS)
+def test_commands_work(environment: Environment, command: str) -> None:
+    """Each that is installed explains itself under its own name."""
+    done = environment.run(command, '--help')
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith(f'usage: {command}')
+
+
+def test_what_needs_ros_is_no_command(environment: Environment) -> None:
+    """Nothing in bin dies on rclpy, or stands in the way of can-utils' candump."""
+    commands = {path.name for path in (environment.folder / 'bin').iterdir()}
+    assert not commands & set(FOR_ROS)
+
+
+def test_a_bus_is_checked(environment: Environment) -> None:
+    """`canopen check` reads the bus.yml and the EDS of a shipped robot."""
+    bus_config = CHECKOUT / 'arm_bringup' / 'robots' / 'panda' / 'bus.yml'
+    done = environment.run('canopen', 'check', bus_config)
+    assert done.returncode == 0, done.stderr
+    assert 'bus.yml: 0 errors' in done.stdout
+
+
+def test_frames_are_shown(environment: Environment, isolation: Isolation) -> None:
+    """`canopen-candump` shows a frame of a multicast bus with its meaning."""
+    deadline = time.monotonic() + PATIENCE
+    with (
+        open_bus(isolation.bus) as bus,
+        environment.running('canopen-candump', isolation.bus, '-n', '1') as dump,
+    ):
+        while dump.poll() is None and time.monotonic() < deadline:
+            bus.send(Frame(0x702, b'\x05'))  # until it has joined the group
+            bus.receive(0.05)
+        assert dump.stdout is not None
+        assert 'heartbeat' in dump.stdout.read().lower()
+
+
+def test_a_robot_answers_the_doctor(environment: Environment, tmp_path: Path) -> None:
+    """`xgo-doctor` speaks the serial protocol with the simulated board; ROS is no error."""
+    port = tmp_path / 'xgo'
+    with environment.running('fake_xgo', '--link', port) as board:
+        assert board.stdout is not None
+        assert board.stdout.readline()  # it is there
+        done = environment.run('xgo-doctor', '--port', port)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert 'protocol' in done.stdout
+
+
+def test_a_policy_walks(environment: Environment) -> None:
+    """The shipped policy is found without the index of ament, and walks in physics."""
+    argv = ('trot_imitation', '--walk', '0.2', '0', '0', '--duration', '1')
+    done = environment.run('quad-check-policy', *argv)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_a_model_is_printed(environment: Environment) -> None:
+    """The URDF comes from files that are installed with the package."""
+    done = environment.run('quad-urdf')
+    assert done.returncode == 0, done.stderr
+    assert '<robot' in done.stdout

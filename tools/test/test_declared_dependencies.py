@@ -1,0 +1,111 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What setup.py of each package declares is what its modules import, and what is pinned."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+import re
+import runpy
+import sys
+from typing import Any
+
+import pytest
+
+from workspace.layout import this_checkout
+from workspace.packages import find_packages
+
+LAYOUT = this_checkout()
+PACKAGES = {
+    name: package
+    for name, package in find_packages(LAYOUT.root).items()
+    if package.build_type == 'ament_python'
+}
+DISTRIBUTIONS = {'can': 'python-can', 'pinocchio': 'pin', 'serial': 'pyserial', 'yaml': 'PyYAML'}
+DISTRIBUTIONS |= {'mujoco': 'mujoco-core'}
+"""Names on PyPI of what is imported under another one."""
+ON_PYPI = {*DISTRIBUTIONS, 'coal', 'daqp', 'evdev', 'msgpack', 'numpy', 'onnxruntime', 'psutil'}
+ON_PYPI |= {'rich', 'ruckig', 'xacro'}
+STARTED = {'arm_bringup': {'canopen_sim', 'robot_viewer'}}
+STARTED |= {'quad_bringup': {'quad_hardware', 'quad_sim', 'quad_teleop', 'robot_viewer'}}
+"""Packages whose executables a bring-up starts; it imports nothing of them."""
+OPTIONAL = {'arm_bringup': {'arm_model', 'arm_servo'}}
+"""Packages that are used where they are built, and that colcon need not build for this one."""
+PHYSICS = {'mujoco'}  # mujoco-core, or below Python 3.11 mujoco
+
+
+def declared(name: str, monkeypatch: pytest.MonkeyPatch) -> dict[str, str]:
+    """Return the requirements of a package, extras included: name and what is asked of it."""
+    keywords: dict[str, Any] = {}
+    monkeypatch.setattr('setuptools.setup', keywords.update)
+    monkeypatch.chdir(PACKAGES[name].folder)
+    monkeypatch.setattr(sys, 'argv', ['setup.py', 'bdist_wheel'])
+    runpy.run_path('setup.py')
+    extras = keywords.get('extras_require', {}).values()
+    lines = [*keywords.get('install_requires', []), *(line for lines in extras for line in lines)]
+    split = (re.match(r'([\w-]+)\s*(.*)', line) for line in lines)
+    return {match[1]: match[2] for match in split if match is not None}
+
+
+def imported(folder: Path) -> Iterator[str]:
+    """Yield the packages that modules import, but for those that only type checkers do."""
+    for path in folder.rglob('*.py'):
+        todo: list[ast.AST] = [ast.parse(path.read_text(encoding='utf-8'))]
+        while todo:
+            node = todo.pop()
+            if isinstance(node, ast.If) and getattr(node.test, 'id', '') == 'TYPE_CHECKING':
+                todo += node.orelse
+                continue
+            if isinstance(node, ast.Import):
+                yield from (alias.name.partition('.')[0] for alias in node.names)
+            elif isinstance(node, ast.ImportFrom) and not node.level:
+                yield (node.module or '').partition('.')[0]
+            todo += ast.iter_child_nodes(node)
+
+
+@pytest.mark.parametrize('name', PACKAGES)
+def test_what_is_imported_is_declared(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing is missing after `pip install`, and nothing is installed for no use."""
+    used = {each for each in imported(PACKAGES[name].folder / name) if each != name}
+    needed = {DISTRIBUTIONS.get(each, each) for each in used & {*ON_PYPI, *PACKAGES}}
+    assert {*declared(name, monkeypatch)} - PHYSICS == needed | STARTED.get(name, set())
+
+
+@pytest.mark.parametrize('name', PACKAGES)
+def test_packages_of_the_checkout_are_declared_for_colcon(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What setup.py names of them package.xml names, too, but for what is optional."""
+    siblings = {*declared(name, monkeypatch)} & PACKAGES.keys()
+    assert siblings - PACKAGES[name].dependencies == OPTIONAL.get(name, set())
+
+
+@pytest.mark.parametrize('name', PACKAGES)
+def test_packages_of_the_checkout_are_taken_from_it(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nobody gets a package of the same name from PyPI."""
+    for other, where in declared(name, monkeypatch).items():
+        if other in PACKAGES:
+            assert where == f'@ {PACKAGES[other].folder.as_uri()}'
+
+
+@pytest.mark.parametrize('name', PACKAGES)
+def test_what_is_pinned_is_new_enough(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The environment in which all is tested has versions that setup.py takes."""
+    text = ''.join(path.read_text() for path in LAYOUT.requirements.glob('*.txt'))
+    for other, asked in declared(name, monkeypatch).items():
+        if other in PACKAGES:
+            continue
+        pinned = re.findall(rf'^{other}==([\d.]+)', text, re.MULTILINE | re.IGNORECASE)
+        assert pinned, f'{other} is in no file of tools/requirements'
+        oldest = re.match(r'>=([\d.]+)$', asked)
+        if oldest is not None:
+            assert all(number(version) >= number(oldest[1]) for version in pinned)
+
+
+def number(version: str) -> tuple[int, ...]:
+    """Return a version as numbers that compare."""
+    return tuple(map(int, version.split('.')))
