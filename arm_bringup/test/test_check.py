@@ -67,7 +67,7 @@ def test_nothing_is_wrong_with_our_robots(name: str, warnings: list[str]) -> Non
             'gp110.srdf',
             '<disable_collisions link1="link_4_r" link2="link_5_b" reason="Adjacent"/>',
             '',
-            [(ERROR, 'collide')],
+            [(WARNING, 'link_4_r and link_5_b')],
         ),
         ('gp110.srdf', 'name="joint_5_b" v', 'name="joint_5" v', [(WARNING, 'has joint_5,')]),
         ('controllers.yaml', 'joint_6_t:', 'joint_6:', [(ERROR, "no joint 'joint_6'")]),

@@ -10,35 +10,55 @@ move; a :class:`PlanningScene` holds what may collide, :class:`Clearances` measu
 from __future__ import annotations
 
 from .arrays import Array, checked, frozen, Mask, Native, Places
-from .clearances import Clearances, LeastClearance, Proximity
-from .exceptions import ArmError, CommandError, LimitsError, ModelError
+from .exceptions import ArmError, CommandError, LimitsError, ModelError, SceneError
 from .frame_tree import FrameTree
+from .kinematics import Kinematics
 from .limits import JointLimits, load_limits
 from .model import RobotModel
 from .names import ArmNames, names_of
-from .pose import combined, inverse, Pose, rotation_of, turned_twists
-from .scene import PlanningScene
+from .pose import combined, inverse, ORIGIN, Pose, rotation_of, turned_twists
+from .scene.allowed_collisions import AllowedCollisionMatrix
+from .scene.clearances import Clearances, Contact, LeastClearance, Proximity
+from .scene.objects import AttachedBody, CollisionObject
+from .scene.planning_scene import PlanningScene
+from .scene.shapes import Box, Capsule, Cone, Cylinder, Mesh, PlacedShape, Plane, Shape, Sphere
 from .state import RobotState
 
 __all__ = [
+    'ORIGIN',
+    'AllowedCollisionMatrix',
     'ArmError',
     'ArmNames',
     'Array',
+    'AttachedBody',
+    'Box',
+    'Capsule',
     'Clearances',
+    'CollisionObject',
     'CommandError',
+    'Cone',
+    'Contact',
+    'Cylinder',
     'FrameTree',
     'JointLimits',
+    'Kinematics',
     'LeastClearance',
     'LimitsError',
     'Mask',
+    'Mesh',
     'ModelError',
     'Native',
+    'PlacedShape',
     'Places',
+    'Plane',
     'PlanningScene',
     'Pose',
     'Proximity',
     'RobotModel',
     'RobotState',
+    'SceneError',
+    'Shape',
+    'Sphere',
     'checked',
     'combined',
     'frozen',

@@ -7,6 +7,7 @@
     ArmError
     ├── ModelError (ValueError)     description, SRDF and limits do not make an arm
     │   └── LimitsError             the limits file is the matter
+    ├── SceneError (ValueError)     an object does not fit into a planning scene
     └── CommandError (ValueError)   a request is refused before anything moves
 
 Arguments of the wrong kind from a *programmer* stay ``ValueError``/``TypeError``.
@@ -45,6 +46,14 @@ class LimitsError(ModelError):
         """Keep all that is wrong beside the message."""
         super().__init__('; '.join(problems))
         self.problems = problems
+
+
+class SceneError(ArmError, ValueError):
+    """An object does not fit into a planning scene.
+
+    Scenarios: a box with a negative edge, an unknown object or link, an object that is attached
+    already.
+    """
 
 
 class CommandError(ArmError, ValueError):

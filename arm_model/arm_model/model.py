@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,12 +14,15 @@ import pinocchio as pin
 from urdf_reader import Group, parse_srdf, SemanticDescription
 
 from .arrays import Array, frozen, Native
-from .clearances import Clearances, LeastClearance, Proximity
 from .description import Description
 from .exceptions import CommandError, description_refused, ModelError
+from .kinematics import Kinematics
 from .limits import JointLimits, merge_limits
 from .pose import Pose, turned_twists
-from .scene import PlanningScene
+from .scene.allowed_collisions import AllowedCollisionMatrix
+from .scene.clearances import Clearances, LeastClearance, Proximity
+from .scene.default_collisions import with_default_collisions
+from .scene.planning_scene import PlanningScene
 
 
 class RobotModel:
@@ -36,6 +40,7 @@ class RobotModel:
         limits: Limits of the joints, with their names.
         poses: Named poses of the SRDF, in the order of the joints.
         notes: What was passed over in description and SRDF, in words.
+        kinematics: The joints of the group, and those that follow them; for any thread.
         scene: The shapes and the pairs of them that are checked; for any thread.
         reach: Greatest distance of the tip from the first joint's axis frame in [m].
     """
@@ -48,6 +53,8 @@ class RobotModel:
         limits: Mapping[str, Any],
         group: str | None = None,
         tip: str | None = None,
+        *,
+        folder: Path | None = None,
     ) -> None:
         """Build and check the arm.
 
@@ -57,28 +64,38 @@ class RobotModel:
             limits: The table ``joint_limits`` of a limits file.
             group: The group; by default the only one of the SRDF.
             tip: The tip link; by default the end of the group's chain.
+            folder: Folder of the URDF, where names of mesh files are relative.
 
         Raises:
             ModelError: The three do not fit together; the message names what to mend.
         """
-        description, semantic = Description(urdf), parse_srdf(srdf)
+        description, semantic = Description(urdf, folder), parse_srdf(srdf)
         chosen = semantic.group(group if group is not None else _only(semantic))
         names = description.group_joints(chosen, semantic)
         self.name, self.group = description.name, chosen.name
-        self._model = _reduced(description, names)
+        self._tree = description.tree
+        self.kinematics = Kinematics(self._tree, names)
+        self._model = self.kinematics.native
         self.base, self.tip = _ends(description, chosen, semantic, names, tip)
-        ordered = list(self._model.names)[1:]  # after the universe; of a chain, from the base out
         notes = list(description.notes)
-        self.limits: JointLimits = merge_limits(ordered, description.joints, limits, notes)
+        self.limits: JointLimits = merge_limits(
+            self.kinematics.joints, description.joints, limits, notes
+        )
         self.poses = _poses(self.limits, semantic.poses.get(chosen.name, {}), notes)
-        self.notes = tuple(notes)
         self._data = self._model.createData()
-        self._tip_frame = self._model.getFrameId(self.tip)
-        self._base_frame = self._model.getFrameId(self.base)
+        self._tip_frame = self.kinematics.frames[self.tip]
+        self._base_frame = self.kinematics.frames[self.base]
         if self._model.frames[self._base_frame].parentJoint:
             raise ModelError(f'group {self.group}: its base link {self.base!r} is moved by it')
         self._at = b''  # positions of the kinematics that are cached
-        self.scene = PlanningScene(self._model, description.shapes, semantic.checks)
+        allowed = AllowedCollisionMatrix.of_srdf(semantic)
+        self.scene = with_default_collisions(
+            PlanningScene(self.kinematics, description.shapes, allowed),
+            description.tree,
+            self.limits,
+            notes,
+        )
+        self.notes = tuple(notes)
         self._clearances = Clearances(self.scene)
         self.reach = self._reach()
 
@@ -104,7 +121,7 @@ class RobotModel:
     @property
     def frames(self) -> Sequence[str]:
         """Names of the links that can be asked for."""
-        return [f.name for f in self._model.frames if f.type == pin.FrameType.BODY]
+        return tuple(self.kinematics.frames)
 
     def pose(self, positions: Array, link: str | None = None) -> Pose:
         """Return the pose of a link in the base link.
@@ -132,7 +149,7 @@ class RobotModel:
             self._model, self._data, self._tip_frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
         )
         rotation = self._placement(self._base_frame).rotation
-        return turned_twists(rotation, world)
+        return turned_twists(rotation, self.kinematics.projected(world))
 
     def nearest(self, positions: Array, within: float, count: int) -> list[Proximity]:
         """Return the nearest pairs of shapes with the gradients of their distances.
@@ -179,9 +196,27 @@ class RobotModel:
         """
         return self._clearances.apart(lower, upper, within)
 
-    def clearances(self) -> Clearances:
-        """Return what measures distances for another thread than the owner's."""
-        return Clearances(self.scene)
+    def clearances(self, scene: PlanningScene | None = None) -> Clearances:
+        """Return what measures distances for another thread than the owner's.
+
+        Args:
+            scene: What to measure; by default the robot alone.
+        """
+        return Clearances(self.scene if scene is None else scene)
+
+    def kinematics_at(self, others: Mapping[str, float]) -> Kinematics:
+        """Return the kinematics with joints beside the group at other places, for a scene.
+
+        Args:
+            others: Positions of joints beside the group in [rad]; of the group's have no effect.
+
+        Raises:
+            CommandError: There is no such joint.
+        """
+        known = [joint.name for joint in self._tree.joints if joint.independent]
+        if unknown := sorted(set(others) - set(known)):
+            raise CommandError(f'no joint {unknown[0]!r} in {self.name}; joints: {known}')
+        return Kinematics(self._tree, self.joints, others)
 
     def check_link(self, link: str | None) -> None:
         """Make sure that a link can be asked for.
@@ -192,7 +227,7 @@ class RobotModel:
         Raises:
             CommandError: There is no such link.
         """
-        if link is not None and not self._model.existFrame(link, pin.FrameType.BODY):
+        if link is not None and link not in self.kinematics.frames:
             known = ', '.join(self.frames)
             raise CommandError(f'there is no link {link!r} in {self.name}; links: {known}')
 
@@ -211,7 +246,8 @@ class RobotModel:
         at = positions.tobytes()
         if at == self._at:
             return
-        pin.computeJointJacobians(self._model, self._data, positions)
+        expanded = self.kinematics.expanded(positions)
+        pin.computeJointJacobians(self._model, self._data, expanded)
         self._at = at
 
     def _placement(self, frame: int) -> Native:
@@ -219,7 +255,7 @@ class RobotModel:
 
     def _frame(self, link: str | None) -> int:
         self.check_link(link)
-        return int(self._tip_frame if link is None else self._model.getFrameId(link))
+        return self._tip_frame if link is None else self.kinematics.frames[link]
 
     def _trunk(self) -> list[int]:
         """Return the joints that move the tip, from the base out."""
@@ -283,15 +319,3 @@ def _poses(
             continue
         found[name] = values
     return found
-
-
-def _reduced(description: Description, joints: Sequence[str]) -> Native:
-    """Build the kinematics, all joints but the group's locked at the middle or zero."""
-    try:
-        model = pin.buildModelFromXML(description.xml)
-    except (RuntimeError, ValueError, ArithmeticError) as error:
-        raise ModelError(f'the robot description makes no kinematic tree: {error}') from error
-    rest = pin.neutral(model)
-    rest = np.clip(rest, model.lowerPositionLimit, model.upperPositionLimit)
-    locked = [number for number in range(1, model.njoints) if model.names[number] not in joints]
-    return pin.buildReducedModel(model, locked, rest)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from .arrays import Array
+from .arrays import Array, frozen
 from .exceptions import CommandError
 
 UNIT_LENGTH_TOLERANCE = 1e-3
@@ -28,6 +28,10 @@ class Pose:
 
     rotation: Array
     position: Array
+
+
+ORIGIN = Pose(frozen(np.eye(3)), frozen(np.zeros(3)))
+"""Where a frame is in itself."""
 
 
 def combined(outer: Pose, inner: Pose) -> Pose:

@@ -139,3 +139,36 @@ def _joint(name: str, kind: str, parent: str, xyz: str) -> str:
         f'<child link="{name}_link"/><axis xyz="{axis}"/>'
         '<limit lower="-1.5" upper="1.5" velocity="2" effort="1"/></joint>'
     )
+
+
+@cache
+def gripper(group: str = 'all') -> RobotModel:
+    """Return an arm of one joint with a gripper, whose right finger mimics the left one.
+
+    Args:
+        group: all, arm or hand.
+    """
+    finger = '<collision><geometry><sphere radius="0.005"/></geometry></collision>'
+    limit = '<limit lower="{}" upper="{}" velocity="1" effort="1"/>'
+    urdf = (
+        f'<robot name="gripper"><link name="base"/><link name="palm"/>'
+        f'<link name="left_link">{finger}</link><link name="right_link">{finger}</link>'
+        '<joint name="j1" type="revolute"><parent link="base"/><child link="palm"/>'
+        f'<axis xyz="0 0 1"/>{limit.format(-2, 2)}</joint>'
+        '<joint name="finger" type="prismatic"><parent link="palm"/><child link="left_link"/>'
+        f'<origin xyz="0.4 0.01 0"/><axis xyz="0 1 0"/>{limit.format(0, 0.04)}</joint>'
+        '<joint name="follower" type="prismatic"><parent link="palm"/><child link="right_link"/>'
+        f'<origin xyz="0.4 -0.01 0"/><axis xyz="0 -1 0"/>{limit.format(0, 0.05)}'
+        '<mimic joint="finger" multiplier="1" offset="0.01"/></joint></robot>'
+    )
+    srdf = (
+        '<robot name="gripper"><group name="arm"><joint name="j1"/></group>'
+        '<group name="hand"><joint name="finger"/></group>'
+        '<group name="all"><chain base_link="base" tip_link="right_link"/>'
+        '<group name="arm"/><group name="hand"/></group>'
+        '<end_effector name="tool" parent_link="palm" group="hand" parent_group="arm"/>'
+        '<group_state name="open" group="hand"><joint name="finger" value="0.04"/></group_state>'
+        '<disable_collisions link1="base" link2="palm"/></robot>'
+    )
+    limits = {name: {'max_acceleration': 5.0, 'max_jerk': 50.0} for name in ('j1', 'finger')}
+    return RobotModel(urdf, srdf, limits, group)

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import combinations
 import math
 from typing import Any
 
@@ -201,7 +202,8 @@ def test_what_no_file_says_has_a_default_that_is_noted_once() -> None:
     assert model.limits.velocity.tolist() == [1.0, 1.0, 0.1]
     assert model.limits.acceleration.tolist() == [1.0, 5.0, 1.0]
     assert model.limits.jerk.tolist() == [10.0, 50.0, 10.0]
-    joints = [note.rpartition(': ')[2] for note in model.notes]
+    defaults = [note for note in model.notes if note.startswith('no max_')]
+    joints = [note.rpartition(': ')[2] for note in defaults]
     assert joints == ['j1, j2', 'j1, j3', 'j1, j2, j3', 'j3']
 
 
@@ -227,7 +229,8 @@ def test_poses_that_cannot_be_taken_are_noted() -> None:
     )
     model = RobotModel(urdf, srdf.replace('</robot>', poses), limits)
     assert list(model.poses) == ['zero']
-    assert [("'far'" in note, "'half'" in note) for note in model.notes] == [
+    left_out = [note for note in model.notes if note.startswith('pose')]
+    assert [("'far'" in note, "'half'" in note) for note in left_out] == [
         (True, False),
         (False, True),
     ]
@@ -283,7 +286,8 @@ def test_a_limits_file_that_is_none(tmp_path: Any) -> None:
 def test_links_may_be_checked_by_name_only() -> None:
     """A link without default checks is checked in the pairs that are enabled, and no others."""
     urdf, srdf, limits = chain_texts('zyyy')
-    everything = set(map(frozenset, RobotModel(urdf, srdf, limits).pairs))
+    links = [f'link_{number}' for number in range(1, 5)]
+    everything = set(map(frozenset, combinations(links, 2)))
     words = (
         '<disable_default_collisions link="link_1"/>'
         '<enable_collisions link1="link_4" link2="link_1"/>'
@@ -293,7 +297,6 @@ def test_links_may_be_checked_by_name_only() -> None:
     model = RobotModel(urdf, srdf.replace('</robot>', words), limits)
     left = {pair for pair in everything if 'link_1' not in pair}
     assert set(map(frozenset, model.pairs)) == left | {frozenset(('link_1', 'link_4'))}
-    assert left < everything
 
 
 @pytest.mark.parametrize(

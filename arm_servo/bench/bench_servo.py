@@ -168,7 +168,7 @@ def time_of_check(model: RobotModel) -> tuple[float, int]:
     """
     rng, free = np.random.default_rng(4), 0
     times: list[float] = []
-    check, limits = PathCheck(model), model.limits
+    check, limits = PathCheck(model.scene), model.limits
     lower, upper = np.maximum(limits.lower, -2.5), np.minimum(limits.upper, 2.5)
     while len(times) < CHECKS:
         at, time_of, points = np.array(ready(model.name)), 0.0, []

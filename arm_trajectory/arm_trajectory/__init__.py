@@ -17,13 +17,12 @@ from .goal import GoalPoint, GoalRules, JointTolerance, TrajectoryGoal
 from .goal_path import build_path
 from .otg import brakeable, brakeable_velocity, hard_brake, OnlineTrajectoryGenerator, Plan
 from .path import Path
-from .path_check import Contact, PathCheck
+from .path_check import PathCheck, PathContact
 from .tolerances import merge_tolerances, Tolerances
 from .trajectory_timer import TimerState, TrajectoryTimer
 
 __all__ = [
     'CatchUpInterpolator',
-    'Contact',
     'GoalCode',
     'GoalError',
     'GoalPoint',
@@ -32,6 +31,7 @@ __all__ = [
     'OnlineTrajectoryGenerator',
     'Path',
     'PathCheck',
+    'PathContact',
     'Plan',
     'StateMovedError',
     'TimerState',

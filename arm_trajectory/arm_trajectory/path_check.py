@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Whether links of the arm meet on a way, found before anything moves.
+"""Whether links of the arm meet each other or an object on a way, found before anything moves.
 
 A way is looked at in steps in which no link moves by more than :data:`MAX_STEP` against another,
 so a contact that is passed over is shallower than that. Distances are measured only where the
@@ -15,7 +15,7 @@ import math
 
 import numpy as np
 
-from arm_model import Array, RobotModel
+from arm_model import Array, Clearances, PlanningScene
 
 MAX_STEP = 0.005
 """Greatest motion of a link against another from one look to the next in [m]."""
@@ -34,8 +34,8 @@ CONTACT_TOLERANCE = 1e-4
 
 
 @dataclass(frozen=True, slots=True)
-class Contact:
-    """Two links that meet on a way.
+class PathContact:
+    """Two links, or a link and an object, that meet on a way.
 
     Attributes:
         links: Their names.
@@ -49,15 +49,17 @@ class Contact:
 class PathCheck:
     """Looks for contact of links on ways; for one thread."""
 
-    def __init__(self, model: RobotModel) -> None:
+    def __init__(self, scene: PlanningScene) -> None:
         """Prepare.
 
         Args:
-            model: The arm; its cached kinematics are not touched.
+            scene: What may collide: ``model.scene`` is the arm alone.
         """
-        self._clearances = model.clearances()
+        self._clearances = Clearances(scene)
 
-    def contact(self, positions_at: Callable[[Array], Array], duration: float) -> Contact | None:
+    def contact(
+        self, positions_at: Callable[[Array], Array], duration: float
+    ) -> PathContact | None:
         """Return the first contact on a way.
 
         An arm that begins in contact may part, and may not come nearer.
@@ -82,7 +84,7 @@ class PathCheck:
             deeper = distances < floor
             if deeper.any():
                 links = self._clearances.pairs[int(deeper.argmax())]
-                return Contact(links, float(times[place]))
+                return PathContact(links, float(times[place]))
             floor = np.maximum(floor, np.minimum(distances, 0.0) - CONTACT_TOLERANCE)
             place, ahead = place + 1, 1
         return None

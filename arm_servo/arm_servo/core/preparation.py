@@ -105,7 +105,7 @@ class Preparation:
         self._generator = OnlineTrajectoryGenerator(
             model.limits
         )  # that of the cycle is for the cycle
-        self._check = PathCheck(model) if settings.check_self_collision else None
+        self._check = PathCheck(model.scene) if settings.check_self_collision else None
 
     def prepare(self, request: MotionRequest, basis: CommandBasis) -> Prepared:
         """Plan a request and check its path.

@@ -89,13 +89,6 @@ class SemanticDescription:
             if name not in tools and not group.subgroups
         )
 
-    def checks(self, first: str, second: str) -> bool:
-        """Tell whether two links are checked for collision with each other."""
-        pair = frozenset((first, second))
-        if pair in self.disabled:  # which has the last word, as in MoveIt
-            return False
-        return pair in self.enabled or not pair & self.unchecked
-
     def group(self, name: str) -> Group:
         """Return a group.
 

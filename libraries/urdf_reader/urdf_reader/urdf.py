@@ -226,20 +226,25 @@ class KinematicTree:
                     _origin(element, f'link {name}, <collision>'),
                 )
 
-    def without_continuous_joints(self, bound: float) -> str:
-        """Return the URDF with continuous joints as revolute ones, whose position is one number.
+    def bare_urdf(self, bound: float) -> str:
+        """Return a URDF of links and joints only, for readers of kinematics.
 
         Args:
-            bound: Where they end to either side in [rad].
+            bound: Where continuous joints, as revolute ones whose position is one number, end to
+                either side in [rad].
         """
-        robot = deepcopy(self._robot)
-        for joint in robot.findall('joint'):
-            limit = joint.find('limit')
-            if joint.get('type') == JointKind.CONTINUOUS.value and limit is not None:
+        bare = ET.Element('robot', name=self.name or 'robot')
+        for link in self.links:
+            ET.SubElement(bare, 'link', name=link)
+        for joint in map(deepcopy, self._robot.findall('joint')):
+            bare.append(joint)
+            if joint.get('type') == JointKind.CONTINUOUS.value:
                 joint.set('type', JointKind.REVOLUTE.value)
-                limit.set('lower', str(-bound))
-                limit.set('upper', str(bound))
-        return ET.tostring(robot, encoding='unicode')
+                limit = joint.find('limit')
+                limit = ET.SubElement(joint, 'limit') if limit is None else limit
+                end = {'lower': str(-bound), 'upper': str(bound)}
+                limit.attrib.update({'effort': '0', 'velocity': '0', **limit.attrib, **end})
+        return ET.tostring(bare, encoding='unicode')
 
 
 def read_urdf(text: str) -> KinematicTree:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Distances between the links of an arm, and how fast its joints change them."""
+"""Distances and contacts in a scene, and how fast the joints change them."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from .arrays import Array
-from .scene import PlanningScene
+from ..arrays import Array
+from .planning_scene import PlanningScene
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -20,7 +20,7 @@ class Proximity:
 
     Attributes:
         pair: Number of the pair, a place in :attr:`PlanningScene.pairs`.
-        links: Names of their links.
+        links: Names of their links or objects.
         distance: Between their surfaces in [m]; negative when they overlap.
         gradient: Change of the distance with each joint in [m/rad].
     """
@@ -37,11 +37,28 @@ class LeastClearance:
 
     Attributes:
         distance: Between their surfaces in [m], or a lower bound where it is more than asked for.
-        links: Their names; empty where nothing is as near.
+        links: Their names, or those of objects; empty where nothing is as near.
     """
 
     distance: float
     links: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Contact:
+    """Two shapes that overlap.
+
+    Attributes:
+        bodies: Names of their links or objects.
+        position: A point between their surfaces, in the root link in [m].
+        normal: Unit vector from the first body to the second, in the root link.
+        depth: How far they overlap in [m].
+    """
+
+    bodies: tuple[str, str]
+    position: Array
+    normal: Array
+    depth: float
 
 
 class Clearances:
@@ -59,15 +76,21 @@ class Clearances:
             scene: The shapes and their pairs.
         """
         self._scene = scene
-        self._data = scene.model.createData()
+        self._kinematics = scene.kinematics
+        self._data = scene.kinematics.native.createData()
         self._results = scene.geometry.createData()
         self._found = self._results.distanceResults
         self._distances: Array = np.full(len(scene.pairs), -np.inf)
         self._places: Array = np.zeros_like(scene.distance_rate_bounds)
 
     @property
+    def scene(self) -> PlanningScene:
+        """The scene that is measured."""
+        return self._scene
+
+    @property
     def pairs(self) -> Sequence[tuple[str, str]]:
-        """Links of each pair of shapes."""
+        """Links or objects of each pair of shapes."""
         return self._scene.pairs
 
     @property
@@ -92,8 +115,9 @@ class Clearances:
         if not doubtful.size:
             return bounds
         scene, results = self._scene, self._results
-        pin.forwardKinematics(scene.model, self._data, positions)
-        pin.updateGeometryPlacements(scene.model, self._data, scene.geometry, results)
+        native = self._kinematics.native
+        pin.forwardKinematics(native, self._data, self._kinematics.expanded(positions))
+        pin.updateGeometryPlacements(native, self._data, scene.geometry, results)
         for pair in doubtful.tolist():
             result = pin.computeDistance(scene.geometry, results, pair)
             bounds[pair] = result.min_distance
@@ -148,13 +172,30 @@ class Clearances:
             for (distance, pair), gradient in zip(near, gradients, strict=True)
         ]
 
+    def contacts(self, positions: Array) -> list[Contact]:
+        """Return all pairs of shapes that overlap, the deepest first.
+
+        Args:
+            positions: Joint positions in [rad].
+        """
+        distances = self.least(positions, 0.0)
+        touching = (distances < 0.0).nonzero()[0].tolist()
+        found = []
+        for pair in sorted(touching, key=distances.__getitem__):
+            result = self._found[pair]
+            middle = 0.5 * (result.getNearestPoint1() + result.getNearestPoint2())
+            names, depth = self._scene.pairs[pair], -float(distances[pair])
+            found.append(Contact(names, middle, result.normal.copy(), depth))
+        return found
+
     def _gradients(self, positions: Array, pairs: Sequence[int]) -> Array:
         """Return the change of distance of pairs that were measured here with each joint (m, n).
 
         A joint with the twist v, w about the base's origin moves a point p at v + w x p; along
         the normal n, which points from the first shape to the second, that is n v + (p x n) w.
         """
-        pin.computeJointJacobians(self._scene.model, self._data, positions)
+        kinematics = self._kinematics
+        pin.computeJointJacobians(kinematics.native, self._data, kinematics.expanded(positions))
         wrenches = []
         for pair in pairs:
             result = self._found[pair]
@@ -163,5 +204,4 @@ class Clearances:
             # crossed by hand: numpy's own takes ten times as long
             wrenches.append((x, y, z, b * z - c * y, c * x - a * z, a * y - b * x))
         signs = self._scene.relative_motion_sign[pairs]
-        gradients: Array = (np.array(wrenches) @ self._data.J) * signs
-        return gradients
+        return kinematics.projected((np.array(wrenches) @ self._data.J) * signs)

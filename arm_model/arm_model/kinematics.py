@@ -1,0 +1,184 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The kinematic tree that a group moves: its joints, and the mimic joints that follow them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+import pinocchio as pin
+from urdf_reader import KinematicTree, Mimic
+
+from .arrays import Array, frozen, Mask, Native
+from .exceptions import ModelError
+from .pose import Pose
+
+CONTINUOUS_BOUND = 1e9
+"""Range that a continuous joint is given in [rad], so that its position is one plain angle."""
+
+LINK = 'link '
+"""What the frame of a link is called in pinocchio, before the name of the link."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RelativeMotion:
+    """How the joints between two bodies move them against each other.
+
+    Attributes:
+        sign: Sense in which each joint moves the second body against the first: 1, -1, or 0 for
+            a joint that is not between them.
+        rate: How far each joint moves a point of the first at most in [m/rad], less the extent
+            of the first where the joint turns.
+        turning: The joints between them that turn.
+    """
+
+    sign: Array
+    rate: Array
+    turning: Mask
+
+
+class Kinematics:
+    """Joints of a group with the mimic joints that follow them; all other joints stand still.
+
+    It is not changed once it is made, so any thread may read it. Columns are in the order of
+    ``native``: joints of the group and followers. ``expanded`` and ``projected`` lead from the
+    group's joints to columns and back.
+
+    Attributes:
+        native: The pinocchio model; links are frames of it.
+        joints: Joints of the group, in the order of ``native``; of a chain, from the base out.
+        root: The link that stands still, in which the poses of ``native`` are.
+        frames: Number of each link's frame in ``native``, by link.
+    """
+
+    def __init__(
+        self, tree: KinematicTree, group: Sequence[str], rest: Mapping[str, float] | None = None
+    ) -> None:
+        """Build.
+
+        Args:
+            tree: The description.
+            group: Joints that move.
+            rest: Positions of other joints in [rad]; by default 0, or the limit next to it.
+
+        Raises:
+            ModelError: The description makes no kinematic tree.
+        """
+        full = _full(tree)
+        mimics = {joint.name: joint.mimic for joint in tree.joints if joint.mimic is not None}
+        moving = {*group, *(name for name, mimic in mimics.items() if mimic.source in group)}
+        at = np.clip(pin.neutral(full), full.lowerPositionLimit, full.upperPositionLimit)
+        for name, position in (rest or {}).items():
+            at[full.idx_qs[full.getJointId(name)]] = position
+        for name, mimic in mimics.items():
+            source = at[full.idx_qs[full.getJointId(mimic.source)]]
+            at[full.idx_qs[full.getJointId(name)]] = mimic.multiplier * source + mimic.offset
+        locked = [number for number in range(1, full.njoints) if full.names[number] not in moving]
+        self.native: Native = pin.buildReducedModel(full, locked, at)
+        self.root = tree.root
+        self.frames: Mapping[str, int] = {
+            frame.name.removeprefix(LINK): number
+            for number, frame in enumerate(self.native.frames)
+            if frame.type == pin.FrameType.BODY
+        }
+        columns = list(self.native.names)[1:]  # after the universe
+        self.joints = tuple(name for name in columns if name in group)
+        self._factors = np.zeros((len(columns), len(self.joints)))
+        self._offsets = np.zeros(len(columns))
+        for row, name in enumerate(columns):
+            followed = mimics.get(name, Mimic(name))
+            self._factors[row, self.joints.index(followed.source)] = followed.multiplier
+            self._offsets[row] = followed.offset
+        self._plain = len(columns) == len(self.joints)
+        self.relative_motion = lru_cache(maxsize=None)(self._relative_motion)
+
+    def expanded(self, positions: Array) -> Array:
+        """Return the positions of all columns.
+
+        Args:
+            positions: Positions of the joints of the group in [rad].
+        """
+        if self._plain:
+            return positions
+        expanded: Array = self._factors @ positions + self._offsets
+        return expanded
+
+    def projected(self, columns: Array) -> Array:
+        """Return derivatives with the joints of the group from those with all columns (..., n)."""
+        return columns if self._plain else columns @ self._factors
+
+    def bounded(self, columns: Array) -> Array:
+        """Return bounds of derivatives from those with all columns (..., n), none negative."""
+        return columns if self._plain else columns @ np.abs(self._factors)
+
+    def link_pose(self, link: str, positions: Array) -> Pose:
+        """Return the pose of a link in the root link; not for a cycle.
+
+        Args:
+            link: The link.
+            positions: Joint positions in [rad].
+        """
+        data = self.native.createData()
+        pin.forwardKinematics(self.native, data, self.expanded(np.asarray(positions, dtype=float)))
+        placement = pin.updateFramePlacement(self.native, data, self.frames[link])
+        return Pose(frozen(placement.rotation), frozen(placement.translation))
+
+    def parent_joint(self, link: str) -> int:
+        """Return the number of the joint that moves a link; 0 for a link that stands still."""
+        return int(self.native.frames[self.frames[link]].parentJoint)
+
+    def _relative_motion(self, body: int, other: int) -> RelativeMotion:
+        """Return how the joints between two bodies move them, by the joints that move these.
+
+        Seen from a joint, nothing of a body is farther away than the lengths that lead there.
+        """
+        model = self.native
+        inward, outward = _between(model, body, other)
+        sign, rate = np.zeros(model.nv), np.zeros(model.nv)
+        turning = np.zeros(model.nv, dtype=bool)
+        sign[[joint - 1 for joint in outward]] = 1.0
+        sign[[joint - 1 for joint in inward]] = -1.0
+        reach = 0.0
+        # from the body joint by joint towards the other one
+        for joint in (*inward, *outward):
+            length = float(np.linalg.norm(model.jointPlacements[joint].translation))
+            slides = _slides(model, joint)
+            reach += length * (joint in outward) + (self._travel(joint) if slides else 0.0)
+            rate[joint - 1] = 1.0 if slides else reach
+            turning[joint - 1] = not slides
+            reach += length * (joint in inward)
+        return RelativeMotion(sign, rate, turning)
+
+    def _travel(self, joint: int) -> float:
+        """Return how far a sliding joint moves from its zero at most in [m]."""
+        model = self.native
+        extremes = np.maximum(np.abs(model.lowerPositionLimit), np.abs(model.upperPositionLimit))
+        columns = list(model.names)[1:]
+        sources = extremes[[columns.index(name) for name in self.joints]]
+        followed = np.abs(self._factors[joint - 1]) @ sources + abs(self._offsets[joint - 1])
+        return float(followed)
+
+
+def _full(tree: KinematicTree) -> Native:
+    try:
+        model = pin.buildModelFromXML(tree.bare_urdf(CONTINUOUS_BOUND))
+    except (RuntimeError, ValueError, ArithmeticError) as error:
+        raise ModelError(f'the robot description makes no kinematic tree: {error}') from error
+    for frame in model.frames:  # pinocchio confuses a link and a joint of one name
+        if frame.type == pin.FrameType.BODY:
+            frame.name = LINK + frame.name
+    return model
+
+
+def _between(model: Native, first: int, second: int) -> tuple[list[int], list[int]]:
+    """Return the joints from a body in to the common trunk, and from there out to another."""
+    above, below = list(model.supports[first]), list(model.supports[second])
+    inward = [joint for joint in above if joint not in below]
+    return inward[::-1], [joint for joint in below if joint not in above]
+
+
+def _slides(model: Native, joint: int) -> bool:
+    return str(model.joints[joint].shortname()).startswith('JointModelP')

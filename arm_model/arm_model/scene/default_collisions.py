@@ -1,0 +1,107 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Pairs of links that cannot help touching, as MoveIt's setup assistant finds them.
+
+It writes ``disable_collisions`` for links that are adjacent, or in contact nearly always. Here
+that is made up for where an SRDF does not say it. Links that it finds never in contact are checked
+all the same: a sample is no proof, and distances that are great cost nothing.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+from urdf_reader import KinematicTree, Pair
+
+from ..limits import JointLimits
+from .clearances import Clearances
+from .planning_scene import PlanningScene
+
+SAMPLES = 200
+"""Poses that are tried."""
+
+MIN_SHARE = 0.95
+"""Share of the poses in which links touch that touch always; the setup assistant's."""
+
+SEED = 0
+"""Of the poses: the same robot has the same pairs each time."""
+
+HALF_TURN = np.pi
+
+
+def with_default_collisions(
+    scene: PlanningScene, tree: KinematicTree, limits: JointLimits, notes: list[str]
+) -> PlanningScene:
+    """Return the scene in which links may touch that cannot help it.
+
+    Adjacent links count only where nobody said a word about any pair: who made a matrix, left
+    them in it with a purpose.
+
+    Args:
+        scene: The scene.
+        tree: The description.
+        limits: Limits of the joints.
+        notes: Where pairs are named that were not in the SRDF.
+    """
+    allowed = scene.allowed
+    if not allowed.entries and not allowed.defaults:
+        checked = set(map(frozenset, scene.pairs))
+        adjacent = sorted(sorted(pair) for pair in adjacent_links(tree, scene) & checked)
+        scene = scene.with_allowed(allowed.with_entries(map(frozenset, adjacent), True))
+        if adjacent:
+            notes.append(
+                'the SRDF has no disable_collisions: adjacent links are not checked for collision'
+                f' with each other ({_words(adjacent)})'
+            )
+    always = sorted(sorted(pair) for pair in always_in_contact(scene, limits))
+    if always:
+        notes.append(
+            f'links that touch wherever the arm is are not checked with each other:'
+            f' {_words(always)}; give the SRDF a disable_collisions for each, or smaller shapes'
+        )
+        scene = scene.with_allowed(scene.allowed.with_entries(map(frozenset, always), True))
+    return scene
+
+
+def adjacent_links(tree: KinematicTree, scene: PlanningScene) -> frozenset[Pair]:
+    """Return pairs of links that a joint connects; links without a shape do not part them.
+
+    Args:
+        tree: The description.
+        scene: What has shapes.
+    """
+    above = {joint.child: joint.parent for joint in tree.joints}
+
+    def solid(link: str) -> str:
+        while link in above and link not in scene.link_shapes:
+            link = above[link]
+        return link
+
+    pairs = {frozenset((solid(parent), link)) for link, parent in above.items()}
+    return frozenset(pair for pair in pairs if pair <= set(scene.link_shapes))
+
+
+def always_in_contact(scene: PlanningScene, limits: JointLimits) -> frozenset[Pair]:
+    """Return pairs of links that touch in nearly all poses.
+
+    Args:
+        scene: The scene.
+        limits: Limits of the joints; a continuous one turns once.
+    """
+    draw = np.random.default_rng(SEED)
+    lower = np.where(limits.continuous, -HALF_TURN, limits.lower)
+    upper = np.where(limits.continuous, HALF_TURN, limits.upper)
+    clearances, apart = Clearances(scene), Counter[Pair]()
+    candidates = set(map(frozenset, scene.pairs))
+    for _ in range(SAMPLES):
+        touching = clearances.contacts(draw.uniform(lower, upper))
+        apart.update(candidates.difference(frozenset(each.bodies) for each in touching))
+        candidates = {pair for pair in candidates if apart[pair] <= (1 - MIN_SHARE) * SAMPLES}
+        if not candidates:
+            break
+    return frozenset(candidates)
+
+
+def _words(pairs: list[list[str]]) -> str:
+    return ', '.join(f'{first} and {second}' for first, second in pairs)

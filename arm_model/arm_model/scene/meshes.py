@@ -1,0 +1,199 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Meshes as convex hulls: found by their name in a URDF, made once, cached by their content.
+
+STL, DAE, OBJ and what else assimp reads. A raw mesh is only read to make its hull. The points of a
+hull are kept in ``$XDG_CACHE_HOME/arm_model/hulls`` (``~/.cache/arm_model/hulls``), one small file
+for each content of a mesh file; the folder may be deleted at any time.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from dataclasses import dataclass
+from functools import lru_cache
+import hashlib
+import os
+from pathlib import Path
+import re
+import tempfile
+from urllib.parse import unquote
+import zipfile
+
+import coal
+import numpy as np
+
+from ..arrays import Array, frozen, Native
+
+MIN_THICKNESS = 1e-3
+"""Thickness that a flat mesh is given in [m]: a hull needs a volume."""
+
+FORMAT = 'v1'
+"""Version of the files in the cache: part of their names."""
+
+COLLADA_UNIT = re.compile(rb'<unit\b[^>]*\bmeter\s*=\s*["\']([^"\']+)["\']')
+"""Where a COLLADA file says how many metres its unit has."""
+
+
+class MeshError(ValueError):
+    """A mesh cannot be used; the message says why, and what to do."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Hull:
+    """The convex hull of a mesh.
+
+    Attributes:
+        points: Its corners (m, 3), in the unit of the mesh.
+        fullness: Volume of the mesh as a share of the hull's; 1 where the mesh has no inside.
+    """
+
+    points: Array
+    fullness: float
+
+
+def find_mesh(name: str, folder: Path | None = None) -> Path:
+    """Find the file of a mesh.
+
+    Args:
+        name: How the URDF names it: ``package://``, ``file://``, an absolute or a relative path.
+        folder: Folder of the description: relative paths begin here, and a package may lie in it.
+
+    Raises:
+        MeshError: There is no such package or file, or a relative name without a folder.
+    """
+    scheme, separator, rest = name.partition('://')
+    if separator and scheme not in {'package', 'file'}:
+        raise MeshError(f'{name}: no file; use package:// or file://')
+    rest = unquote(rest) if separator else name
+    if scheme == 'package' and separator:
+        package, _, inside = rest.partition('/')
+        path = _package(package, folder) / inside
+    elif Path(rest).is_absolute():
+        path = Path(rest)
+    elif folder is None:
+        raise MeshError(f'{name}: the folder of a relative path is unknown; use package://')
+    else:
+        path = folder / rest
+    if not path.is_file():
+        raise MeshError(f'{name}: no file {path}')
+    return path
+
+
+def _package(name: str, folder: Path | None) -> Path:
+    """Find the folder of a package: beside the description, or installed."""
+    for above in (folder, *folder.parents) if folder else ():
+        if above.name == name:
+            return above
+        if (above / name / 'package.xml').is_file():
+            return above / name
+    installed = [Path(prefix, 'share', name) for prefix in _folders('AMENT_PREFIX_PATH')]
+    sources = [Path(each, name) for each in _folders('ROS_PACKAGE_PATH')]
+    found = next((path for path in (*installed, *sources) if path.is_dir()), None)
+    if found is None:
+        raise MeshError(
+            f'package {name} is not installed; install it, or lay it beside the description'
+        )
+    return found
+
+
+def _folders(variable: str) -> list[str]:
+    return [folder for folder in os.environ.get(variable, '').split(os.pathsep) if folder]
+
+
+def load_hull(path: Path) -> Hull:
+    """Return the convex hull of a mesh file, from the cache if it is there.
+
+    Args:
+        path: The file.
+
+    Raises:
+        MeshError: The file cannot be read, or is no mesh.
+    """
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise MeshError(f'{path}: {error.strerror}') from error
+    return _hull(hashlib.sha256(path.suffix.lower().encode() + content).hexdigest(), path)
+
+
+@lru_cache(maxsize=256)
+def _hull(digest: str, path: Path) -> Hull:
+    cached = cache_folder() / f'{digest}-{FORMAT}.npz'
+    # what is damaged, or was never written, is made again
+    damage = contextlib.suppress(OSError, KeyError, ValueError, zipfile.BadZipFile)
+    with damage, np.load(cached) as stored:
+        return Hull(frozen(stored['points']), float(stored['fullness']))
+    hull = hull_of_file(path)
+    with contextlib.suppress(OSError):  # no home, or a full disk: it is made the next time, too
+        _store(cached, hull)
+    return hull
+
+
+def cache_folder() -> Path:
+    """Return the folder of the hulls."""
+    home = os.environ.get('XDG_CACHE_HOME') or Path.home() / '.cache'
+    return Path(home) / 'arm_model' / 'hulls'
+
+
+def _store(path: Path, hull: Hull) -> None:
+    """Write a file of the cache whole or not at all: several programs start at once."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.NamedTemporaryFile(dir=path.parent, suffix='.tmp', delete=False) as file:
+        np.savez(file, points=hull.points, fullness=hull.fullness)
+    Path(file.name).replace(path)
+
+
+def hull_of_file(path: Path) -> Hull:
+    """Read a mesh file and make its convex hull.
+
+    Raises:
+        MeshError: The file is no mesh.
+    """
+    try:
+        mesh = coal.MeshLoader().load(str(path), np.full(3, _unit(path)))
+    except ValueError as error:  # the last line is assimp's
+        reason = str(error).strip().splitlines()[-1]
+        raise MeshError(f'{path}: no mesh that can be read: {reason}') from error
+    hull = convex(mesh.vertices())
+    whole, solid = hull.computeVolume(), abs(mesh.computeVolume())
+    return Hull(frozen(hull.points()), min(solid / whole, 1.0) if solid else 1.0)
+
+
+def _unit(path: Path) -> float:
+    """Return the unit of a mesh in [m]: COLLADA names it, the others are in [m] by convention."""
+    if path.suffix.lower() != '.dae':
+        return 1.0
+    found = COLLADA_UNIT.search(path.read_bytes())
+    try:
+        return float(found[1]) if found else 1.0
+    except ValueError:
+        return 1.0
+
+
+def convex(points: Array) -> Native:
+    """Return the convex hull of points as a shape of coal.
+
+    Args:
+        points: The points in [m] (m, 3); flat ones are made a little thick.
+
+    Raises:
+        MeshError: There is no point, or one is not finite.
+    """
+    if not len(points) or not np.isfinite(points).all():
+        raise MeshError('a mesh needs corners, and finite ones')
+    corners = coal.StdVec_Vec3s()
+    for point in _with_volume(np.asarray(points, dtype=np.float64)):
+        corners.append(point)
+    return coal.Convex.convexHull(corners, True, 'Qt')
+
+
+def _with_volume(points: Array) -> Array:
+    """Make points that are flat, in a line or at one place a little thick (qhull would crash)."""
+    centered = points - points.mean(axis=0)
+    _, axes = np.linalg.eigh(centered.T @ centered)
+    for axis in axes.T:
+        if np.ptp(points @ axis) < MIN_THICKNESS:
+            half = 0.5 * MIN_THICKNESS * axis
+            points = np.concatenate((points - half, points + half))
+    return points

@@ -1,0 +1,71 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Objects of a planning scene: in the world, or attached to a link."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from ..exceptions import SceneError
+from ..pose import ORIGIN, Pose
+from .shapes import native, PlacedShape, Shape
+
+
+@dataclass(frozen=True, slots=True, init=False)
+class CollisionObject:
+    """A thing that the robot must not touch.
+
+    Attributes:
+        name: Its name, which no link has.
+        shapes: Its shapes, in its own frame.
+        pose: Where it is: in the root link, or in the link that it is attached to.
+    """
+
+    name: str
+    shapes: tuple[PlacedShape, ...]
+    pose: Pose = field(default=ORIGIN, compare=False)
+
+    def __init__(self, name: str, *shapes: Shape | PlacedShape, pose: Pose = ORIGIN) -> None:
+        """Put an object together.
+
+        Args:
+            name: Its name.
+            shapes: Its shapes; without a pose of their own they are at its origin.
+            pose: Where it is.
+
+        Raises:
+            SceneError: It has no name or no shape, or a shape is not usable.
+        """
+        if not name or not shapes:
+            raise SceneError(f'object {name!r}: it needs a name and a shape at least')
+        placed = tuple(
+            shape if isinstance(shape, PlacedShape) else PlacedShape(shape) for shape in shapes
+        )
+        for each in placed:
+            native(each.shape)  # or says why not
+        object.__setattr__(self, 'name', name)
+        object.__setattr__(self, 'shapes', placed)
+        object.__setattr__(self, 'pose', pose)
+
+    def at(self, pose: Pose) -> CollisionObject:
+        """Return the object at another place.
+
+        Args:
+            pose: Where it is.
+        """
+        return CollisionObject(self.name, *self.shapes, pose=pose)
+
+
+@dataclass(frozen=True, slots=True)
+class AttachedBody:
+    """An object that moves with a link.
+
+    Attributes:
+        object: The object; its pose is in the link.
+        link: The link.
+        touch_links: Links that it may touch; the link itself always.
+    """
+
+    object: CollisionObject
+    link: str
+    touch_links: frozenset[str] = frozenset()

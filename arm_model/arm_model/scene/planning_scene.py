@@ -1,0 +1,368 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What may collide: links, objects, attached bodies, and the pairs of them that are checked."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from itertools import combinations
+from types import MappingProxyType
+
+import numpy as np
+import pinocchio as pin
+
+from ..arrays import Array, Native
+from ..exceptions import SceneError
+from ..kinematics import Kinematics
+from ..pose import combined, inverse, Pose
+from .allowed_collisions import AllowedCollisionMatrix
+from .objects import AttachedBody, CollisionObject
+from .shapes import native, PlacedShape
+
+
+@dataclass(frozen=True, slots=True)
+class _Body:
+    """A shape that may collide.
+
+    Attributes:
+        name: Its link or object.
+        link: The link that carries it; empty for an object of the world.
+        joint: Number of the joint that moves it; 0 for what stands still.
+        attached: The attached body that it is part of.
+    """
+
+    name: str
+    link: str
+    joint: int
+    attached: AttachedBody | None = None
+
+    def may_touch(self, other: _Body) -> bool:
+        """Whether an attached body may touch the other because of its links."""
+        if self.attached is None:
+            return False
+        if other.attached is not None:
+            return self.link == other.link
+        return other.name in self.attached.touch_links or other.name == self.link
+
+
+class PlanningScene:
+    """The robot's shapes, objects of the world, attached bodies, and what may touch; immutable.
+
+    ``with_...``, ``without`` and their like return another scene. Poses of objects are in the root
+    link. Any thread may read a scene; distances are measured by a :class:`Clearances` of it, one
+    for each thread. What no joint of the group moves against each other is not checked.
+
+    Attributes:
+        kinematics: The joints that move the links.
+        link_shapes: Shapes of the links.
+        allowed: Pairs that may touch.
+        objects: Objects of the world by name.
+        attached_bodies: Attached bodies by name.
+        geometry: All shapes and their pairs, for pinocchio.
+        pairs: Names of the link or object of each pair of shapes that is checked (k).
+        relative_motion_sign: Sense in which each column of the kinematics moves the second shape
+            of a pair against the first (k, columns): 1, -1, or 0.
+        distance_rate_bounds: How fast each joint changes a pair's distance at most (k, n) in
+            [m/rad], wherever the arm is.
+    """
+
+    def __init__(
+        self,
+        kinematics: Kinematics,
+        link_shapes: Mapping[str, Sequence[PlacedShape]],
+        allowed: AllowedCollisionMatrix,
+        objects: Iterable[CollisionObject] = (),
+        attached_bodies: Iterable[AttachedBody] = (),
+    ) -> None:
+        """Put a scene together; :attr:`RobotModel.scene` is the first one.
+
+        Args:
+            kinematics: The joints that move the links.
+            link_shapes: Shapes of each link.
+            allowed: Pairs that may touch.
+            objects: Objects of the world.
+            attached_bodies: Objects that move with a link.
+
+        Raises:
+            SceneError: Two things have one name, or a link is unknown.
+        """
+        self.kinematics, self.link_shapes, self.allowed = kinematics, link_shapes, allowed
+        self.objects = MappingProxyType({each.name: each for each in objects})
+        self.attached_bodies = MappingProxyType(
+            {each.object.name: each for each in attached_bodies}
+        )
+        self._refuse_names()
+        self.geometry = pin.GeometryModel()
+        bodies = self._bodies()
+        extents = np.array([_extent(each) for each in self.geometry.geometryObjects])
+        pairs = [
+            (first, second)
+            for first, second in combinations(range(len(bodies)), 2)
+            if self._checks(bodies[first], bodies[second])
+        ]
+        for pair in pairs:
+            self.geometry.addCollisionPair(pin.CollisionPair(*pair))
+        self.pairs: Sequence[tuple[str, str]] = tuple(
+            (bodies[first].name, bodies[second].name) for first, second in pairs
+        )
+        self.relative_motion_sign, self.distance_rate_bounds = self._bounds(bodies, extents, pairs)
+        for array in (self.relative_motion_sign, self.distance_rate_bounds):
+            array.setflags(write=False)
+
+    @property
+    def names(self) -> Sequence[str]:
+        """Names of all links with shapes, objects and attached bodies."""
+        return (*self.link_shapes, *self.objects, *self.attached_bodies)
+
+    def with_object(self, thing: CollisionObject) -> PlanningScene:
+        """Return the scene with an object in the world, in the place of one with its name.
+
+        Args:
+            thing: The object; its pose is in the root link.
+
+        Raises:
+            SceneError: A link or an attached body has its name.
+        """
+        return self._with(objects={**self.objects, thing.name: thing})
+
+    def without(self, name: str) -> PlanningScene:
+        """Return the scene without an object or an attached body.
+
+        Args:
+            name: Its name.
+
+        Raises:
+            SceneError: There is none of this name.
+        """
+        self._thing(name)
+        return self._with(
+            {each: thing for each, thing in self.objects.items() if each != name},
+            {each: body for each, body in self.attached_bodies.items() if each != name},
+        )
+
+    def without_objects(self) -> PlanningScene:
+        """Return the robot alone: self-collision."""
+        return self._with({}, {})
+
+    def attached(
+        self, name: str, link: str, positions: Array, touch_links: Iterable[str] = ()
+    ) -> PlanningScene:
+        """Return the scene with an object of the world taken up by a link, where both are.
+
+        Args:
+            name: The object.
+            link: The link.
+            positions: Joint positions in [rad].
+            touch_links: Links that it may touch besides.
+
+        Raises:
+            SceneError: There is no such object in the world, or no such link.
+        """
+        if name not in self.objects:
+            raise SceneError(f'no object {name!r} in the world; {self._known()}')
+        self._check_links(name, link)
+        place = inverse(self.kinematics.link_pose(link, positions))
+        thing = self.objects[name].at(combined(place, self.objects[name].pose))
+        return self.without(name).with_attached(AttachedBody(thing, link, frozenset(touch_links)))
+
+    def with_attached(self, body: AttachedBody) -> PlanningScene:
+        """Return the scene with an attached body, in the place of one with its name.
+
+        Args:
+            body: The body; the pose of its object is in the link.
+
+        Raises:
+            SceneError: A link or an object of the world has its name, or a link is unknown.
+        """
+        return self._with(attached={**self.attached_bodies, body.object.name: body})
+
+    def detached(self, name: str, positions: Array) -> PlanningScene:
+        """Return the scene with an attached body laid down in the world, where it is.
+
+        Args:
+            name: The body.
+            positions: Joint positions in [rad].
+
+        Raises:
+            SceneError: No such body is attached.
+        """
+        if name not in self.attached_bodies:
+            raise SceneError(f'no attached body {name!r}; {self._known()}')
+        body = self.attached_bodies[name]
+        place = self.kinematics.link_pose(body.link, positions)
+        return self.without(name).with_object(body.object.at(combined(place, body.object.pose)))
+
+    def pose(self, name: str, positions: Array) -> Pose:
+        """Return where an object or an attached body is, in the root link.
+
+        Args:
+            name: Its name.
+            positions: Joint positions in [rad].
+
+        Raises:
+            SceneError: There is none of this name.
+        """
+        thing = self._thing(name)
+        if name in self.objects:
+            return thing.pose
+        link = self.attached_bodies[name].link
+        return combined(self.kinematics.link_pose(link, positions), thing.pose)
+
+    def with_allowed(self, allowed: AllowedCollisionMatrix) -> PlanningScene:
+        """Return the scene with another matrix of what may touch.
+
+        Args:
+            allowed: The matrix; names in it may be unknown.
+        """
+        return self._with(allowed=allowed)
+
+    def allowing(self, first: str, second: str, allowed: bool = True) -> PlanningScene:
+        """Return the scene with an entry for all pairs of names that fit two patterns.
+
+        Args:
+            first: Name of a link or object; ``*``, ``?`` and ``[...]`` as in file names.
+            second: The same.
+            allowed: Whether they may touch; False for pairs that are to be checked.
+
+        Raises:
+            SceneError: No name fits one of the patterns.
+        """
+        ones, others = (self._fitting(pattern) for pattern in (first, second))
+        pairs = [frozenset((one, other)) for one in ones for other in others if one != other]
+        return self.with_allowed(self.allowed.with_entries(pairs, allowed))
+
+    def with_positions(self, kinematics: Kinematics) -> PlanningScene:
+        """Return the scene with the joints beside the group at other places.
+
+        Args:
+            kinematics: The same links and group, see :meth:`RobotModel.kinematics_at`.
+        """
+        return PlanningScene(
+            kinematics,
+            self.link_shapes,
+            self.allowed,
+            self.objects.values(),
+            self.attached_bodies.values(),
+        )
+
+    def _with(
+        self,
+        objects: Mapping[str, CollisionObject] | None = None,
+        attached: Mapping[str, AttachedBody] | None = None,
+        allowed: AllowedCollisionMatrix | None = None,
+    ) -> PlanningScene:
+        return PlanningScene(
+            self.kinematics,
+            self.link_shapes,
+            self.allowed if allowed is None else allowed,
+            (self.objects if objects is None else objects).values(),
+            (self.attached_bodies if attached is None else attached).values(),
+        )
+
+    def _thing(self, name: str) -> CollisionObject:
+        if name in self.objects:
+            return self.objects[name]
+        if name in self.attached_bodies:
+            return self.attached_bodies[name].object
+        raise SceneError(f'no object {name!r}; {self._known()}')
+
+    def _known(self) -> str:
+        world, attached = (
+            ', '.join(names) or 'none' for names in (self.objects, self.attached_bodies)
+        )
+        return f'objects: {world}; attached bodies: {attached}'
+
+    def _fitting(self, pattern: str) -> Sequence[str]:
+        found = [name for name in self.names if fnmatchcase(name, pattern)]
+        if not found:
+            raise SceneError(f'no link or object {pattern!r}; there are: {", ".join(self.names)}')
+        return found
+
+    def _refuse_names(self) -> None:
+        for name in (*self.objects, *self.attached_bodies):
+            if name in self.kinematics.frames:
+                raise SceneError(f'object {name!r}: a link has this name')
+        for name, body in self.attached_bodies.items():
+            if name in self.objects:
+                raise SceneError(f'object {name!r} is in the world and attached to {body.link}')
+            self._check_links(name, body.link, *body.touch_links)
+
+    def _check_links(self, name: str, *links: str) -> None:
+        for link in links:
+            if link not in self.kinematics.frames:
+                raise SceneError(f'object {name!r}: no link {link!r} to attach it to or to touch')
+
+    def _bodies(self) -> Sequence[_Body]:
+        """Put all shapes into the geometry, and return what they belong to."""
+        bodies: list[_Body] = []
+        for link, shapes in self.link_shapes.items():
+            body = _Body(link, link, self.kinematics.parent_joint(link))
+            bodies += [self._placed(body, shape, pin.SE3.Identity()) for shape in shapes]
+        for name, thing in self.objects.items():
+            body = _Body(name, '', 0)
+            bodies += [self._placed(body, shape, _se3(thing.pose)) for shape in thing.shapes]
+        for name, attached in self.attached_bodies.items():
+            thing = attached.object
+            body = _Body(
+                name, attached.link, self.kinematics.parent_joint(attached.link), attached
+            )
+            bodies += [self._placed(body, shape, _se3(thing.pose)) for shape in thing.shapes]
+        return bodies
+
+    def _placed(self, body: _Body, placed: PlacedShape, place: Native) -> _Body:
+        """Put a shape of a body into the geometry, at a place in its link or in the world."""
+        model = self.kinematics.native
+        frame_id = self.kinematics.frames[body.link] if body.link else 0
+        in_joint = model.frames[frame_id].placement * place * _se3(placed.pose)
+        name = f'{body.name}_{self.geometry.ngeoms}'
+        solid = native(placed.shape)
+        self.geometry.addGeometryObject(
+            pin.GeometryObject(name, body.joint, frame_id, in_joint, solid)
+        )
+        return body
+
+    def _checks(self, first: _Body, second: _Body) -> bool:
+        if first.may_touch(second) or second.may_touch(first):
+            return False
+        sign = self.kinematics.relative_motion(first.joint, second.joint).sign
+        if not self.kinematics.bounded(np.abs(sign)).any():
+            return False
+        return not self.allowed.allows(first.name, second.name)
+
+    def _bounds(
+        self, bodies: Sequence[_Body], extents: Array, pairs: Sequence[tuple[int, int]]
+    ) -> tuple[Array, Array]:
+        """Return signs of relative motion and bounds of distance rates of pairs.
+
+        A joint moves either shape against the other; the smaller bound holds.
+        """
+        kinematics = self.kinematics
+        columns = kinematics.native.nv
+        if not pairs:
+            return np.zeros((0, columns)), np.zeros((0, len(kinematics.joints)))
+        bounds = []
+        for one, other in (np.array(pairs).T, np.array(pairs).T[::-1]):
+            motions = [
+                kinematics.relative_motion(bodies[a].joint, bodies[b].joint)
+                for a, b in zip(one.tolist(), other.tolist(), strict=True)
+            ]
+            rate = np.array([motion.rate for motion in motions])
+            turning = np.array([motion.turning for motion in motions])
+            bounds.append(np.where(turning, rate + extents[one][:, None], rate))
+        ends = ((bodies[first].joint, bodies[second].joint) for first, second in pairs)
+        signs = np.array([kinematics.relative_motion(*joints).sign for joints in ends])
+        return signs, kinematics.bounded(np.minimum(*bounds))
+
+
+def _se3(pose: Pose) -> Native:
+    return pin.SE3(pose.rotation, pose.position)
+
+
+def _extent(shape: Native) -> float:
+    """Return the distance of the farthest point of a shape from its joint in [m]."""
+    if not np.isfinite(shape.geometry.aabb_radius):
+        return float('inf')
+    center = shape.placement.act(shape.geometry.aabb_center)
+    return float(np.linalg.norm(center)) + float(shape.geometry.aabb_radius)

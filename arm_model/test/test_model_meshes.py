@@ -1,0 +1,254 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Collision meshes: found, made convex hulls, cached; and what cannot be used is named."""
+
+from __future__ import annotations
+
+from itertools import product
+import math
+from pathlib import Path
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from model_robots import chain_texts
+import numpy as np
+import pytest
+
+from arm_model import ModelError, RobotModel
+from arm_model.scene import meshes
+
+CORNERS = list(product((-0.5, 0.5), repeat=3))
+"""Of a cube with edges of one, in the order of their coordinates."""
+
+FACES = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+TRIANGLES = [(a, b, c) for a, b, c, _ in FACES] + [(a, c, d) for a, _, c, d in FACES]
+
+SHAPE = '<geometry><sphere radius="0.03"/></geometry>'
+"""What :func:`chain_texts` makes links of."""
+
+
+def obj() -> str:
+    """Return the cube as Wavefront OBJ."""
+    lines = [f'v {x} {y} {z}' for x, y, z in CORNERS]
+    return '\n'.join(lines + [f'f {a + 1} {b + 1} {c + 1}' for a, b, c in TRIANGLES])
+
+
+def stl() -> str:
+    """Return the cube as STL."""
+    facets = ''.join(
+        'facet normal 0 0 0\nouter loop\n'
+        + ''.join('vertex {} {} {}\n'.format(*CORNERS[corner]) for corner in triangle)
+        + 'endloop\nendfacet\n'
+        for triangle in TRIANGLES
+    )
+    return f'solid cube\n{facets}endsolid cube\n'
+
+
+def dae(meter: str = '1') -> str:
+    """Return the cube as COLLADA with a unit of its own."""
+    numbers = ' '.join(str(number) for corner in CORNERS for number in corner)
+    indices = ' '.join(str(corner) for triangle in TRIANGLES for corner in triangle)
+    accessor = ''.join(f'<param name="{axis}" type="float"/>' for axis in 'XYZ')
+    return (
+        '<?xml version="1.0"?><COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema"'
+        f' version="1.4.1"><asset><unit name="u" meter="{meter}"/><up_axis>Z_UP</up_axis></asset>'
+        '<library_geometries><geometry id="g"><mesh><source id="p"><float_array id="a" count="24">'
+        f'{numbers}</float_array><technique_common><accessor source="#a" count="8" stride="3">'
+        f'{accessor}</accessor></technique_common></source><vertices id="v"><input'
+        ' semantic="POSITION" source="#p"/></vertices><triangles count="12"><input'
+        f' semantic="VERTEX" source="#v" offset="0"/><p>{indices}</p></triangles></mesh>'
+        '</geometry></library_geometries><library_visual_scenes><visual_scene id="s"><node id="n">'
+        '<instance_geometry url="#g"/></node></visual_scene></library_visual_scenes><scene>'
+        '<instance_visual_scene url="#s"/></scene></COLLADA>'
+    )
+
+
+@pytest.fixture(autouse=True)
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Give each test an empty cache of its own, and the packages of nobody else."""
+    monkeypatch.setenv('XDG_CACHE_HOME', str(tmp_path / 'cache'))
+    monkeypatch.setenv('AMENT_PREFIX_PATH', str(tmp_path / 'prefix'))
+    monkeypatch.setenv('ROS_PACKAGE_PATH', '')
+    meshes._hull.cache_clear()
+    return tmp_path / 'cache' / 'arm_model' / 'hulls'
+
+
+def arm(geometry: str, folder: Path | None = None, srdf: str = '') -> RobotModel:
+    """Return a chain of four joints with links of a geometry."""
+    urdf, semantic, limits = chain_texts('zyyy')
+    semantic = semantic.replace('</robot>', f'{srdf}</robot>')
+    urdf = urdf.replace(SHAPE, f'<geometry>{geometry}</geometry>')
+    return RobotModel(urdf, semantic, limits, folder=folder)
+
+
+@pytest.mark.parametrize(
+    ('name', 'text', 'scale'),
+    [
+        ('cube.obj', obj(), '0.1 0.06 0.04'),
+        ('cube.stl', stl(), '0.1 0.06 0.04'),
+        ('cube.STL', stl(), '0.1 -0.06 0.04'),
+        ('cube.dae', dae(), '0.1 0.06 0.04'),
+        ('cube.dae', dae('0.01'), '10 6 4'),
+    ],
+)
+def test_a_mesh_is_the_shape_that_it_shows(
+    name: str, text: str, scale: str, tmp_path: Path
+) -> None:
+    """A cube of each format, scaled and mirrored, has the distances of a box."""
+    (tmp_path / name).write_text(text, encoding='utf-8')
+    mesh = arm(f'<mesh filename="{name}" scale="{scale}"/>', tmp_path)
+    box = arm('<box size="0.1 0.06 0.04"/>')
+    assert mesh.pairs == box.pairs != ()
+    rng = np.random.default_rng(1)
+    for _ in range(20):
+        at = rng.uniform(-2.0, 2.0, 4)
+        exact = box.clearances().least(at, math.inf)
+        assert mesh.clearances().least(at, math.inf) == pytest.approx(exact, abs=1e-5)
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.lists(st.tuples(*[st.floats(-1.0, 1.0)] * 3), min_size=1, max_size=20))
+def test_a_hull_is_around_all_points(points: list[tuple[float, float, float]]) -> None:
+    """Also where they are flat, in a line, or all at one place: then it is a little thicker."""
+    hull = np.array(meshes.convex(np.array(points)).points())
+    slack = 1e-9
+    assert (hull.min(axis=0) <= np.min(points, axis=0) + slack).all()
+    assert (hull.max(axis=0) >= np.max(points, axis=0) - slack).all()
+    assert (np.ptp(hull, axis=0) <= np.ptp(points, axis=0) + 2.1 * meshes.MIN_THICKNESS).all()
+
+
+def test_meshes_are_found_as_ros_finds_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By package, installed or as a source, beside the description, as a file, by its path."""
+    folder = tmp_path / 'robots' / 'my_arm' / 'urdf'
+    folder.mkdir(parents=True)
+    for place in ('prefix/share/installed', 'src/source', 'robots/beside', 'robots/my_arm'):
+        (tmp_path / place / 'meshes').mkdir(parents=True)
+        (tmp_path / place / 'meshes' / 'a b.stl').write_text('', encoding='utf-8')
+        (tmp_path / place / 'package.xml').write_text('', encoding='utf-8')
+    monkeypatch.setenv('ROS_PACKAGE_PATH', str(tmp_path / 'src'))
+    wanted = {
+        'package://installed/meshes/a%20b.stl': 'prefix/share/installed',
+        'package://source/meshes/a b.stl': 'src/source',
+        'package://beside/meshes/a b.stl': 'robots/beside',
+        'package://my_arm/meshes/a b.stl': 'robots/my_arm',
+        '../meshes/a b.stl': 'robots/my_arm',
+        f'file://{tmp_path}/src/source/meshes/a%20b.stl': 'src/source',
+        f'{tmp_path}/src/source/meshes/a b.stl': 'src/source',
+    }
+    for name, place in wanted.items():
+        found = meshes.find_mesh(name, folder)
+        assert found.resolve() == (tmp_path / place / 'meshes' / 'a b.stl').resolve()
+
+
+def test_a_hull_is_made_once(tmp_path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Another start, another name and another folder find it in the cache; a new content not."""
+    path, copy = tmp_path / 'cube.obj', tmp_path / 'copy.obj'
+    for file in (path, copy):
+        file.write_text(obj(), encoding='utf-8')
+    made: list[Path] = []
+    make = meshes.hull_of_file
+
+    def counted(file: Path) -> meshes.Hull:
+        made.append(file)
+        return make(file)
+
+    monkeypatch.setattr(meshes, 'hull_of_file', counted)
+    first = meshes.load_hull(path)
+    meshes._hull.cache_clear()
+    assert sorted(meshes.load_hull(copy).points.tolist()) == sorted(first.points.tolist())
+    assert made == [path]
+    meshes._hull.cache_clear()
+    for file in cache.iterdir():
+        file.write_bytes(b'damaged')
+    meshes.load_hull(path)
+    path.write_text(obj().replace('0.5', '0.7'), encoding='utf-8')
+    meshes.load_hull(path)
+    assert made == [path, path, path]
+
+
+def test_without_a_cache_hulls_are_made_all_the_same(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A home that cannot be written is no reason to leave a shape out."""
+    (tmp_path / 'cube.stl').write_text(stl(), encoding='utf-8')
+    (tmp_path / 'file').write_text('', encoding='utf-8')
+    monkeypatch.setenv('XDG_CACHE_HOME', str(tmp_path / 'file'))
+    assert len(meshes.load_hull(tmp_path / 'cube.stl').points) == len(CORNERS)
+
+
+@pytest.mark.parametrize(
+    ('mesh', 'words'),
+    [
+        ('package://other_arm/link.stl', 'package other_arm is not installed; install it'),
+        ('link.stl', 'the folder of a relative path is unknown'),
+        ('/nowhere/link.stl', 'no file /nowhere/link.stl'),
+        ('http://x/link.stl', 'use package:// or file://'),
+    ],
+)
+def test_what_cannot_be_used_is_one_note(mesh: str, words: str) -> None:
+    """It names all links that are not checked for this reason, and what to do."""
+    model = arm(f'<mesh filename="{mesh}"/>')
+    (note,) = model.notes
+    assert 'self-collision is not checked' in note
+    assert words in note
+    assert 'link_1, link_2, link_3, link_4: ' in note
+    assert model.pairs == ()
+
+
+@pytest.mark.parametrize('content', ['', 'solid', 'no mesh at all, but words'])
+def test_a_damaged_mesh_is_one_note(content: str, tmp_path: Path) -> None:
+    """With the file, and what its reader says."""
+    (tmp_path / 'link.stl').write_text(content, encoding='utf-8')
+    (note,) = arm('<mesh filename="link.stl"/>', tmp_path).notes
+    assert str(tmp_path / 'link.stl') in note
+    (tmp_path / 'link.stl').write_text(stl(), encoding='utf-8')
+    with pytest.raises(ModelError, match='scale'):
+        arm('<mesh filename="link.stl" scale="1 1"/>', tmp_path)
+
+
+def test_the_other_links_are_checked_all_the_same() -> None:
+    """One link of four has no usable shape."""
+    urdf, srdf, limits = chain_texts('zyyyy')
+    model = RobotModel(urdf.replace(SHAPE, '<geometry/>', 1), srdf, limits)
+    checked = {link for pair in model.pairs for link in pair}
+    assert checked == {'link_2', 'link_3', 'link_4', 'link_5'}
+    assert 'link_1: an empty <geometry>' in model.notes[0]
+
+
+def test_a_hull_that_is_far_too_large_is_named(tmp_path: Path) -> None:
+    """A shell is filled by its hull: who cares can give convex parts."""
+    ring = '\n'.join(f'v {x} {y} {z}' for scale in (1, 0.9) for x, y, z in _scaled(scale))
+    outside = [f'f {a + 1} {b + 1} {c + 1}' for a, b, c in TRIANGLES]
+    inside = [f'f {c + 9} {b + 9} {a + 9}' for a, b, c in TRIANGLES]
+    (tmp_path / 'hollow.obj').write_text('\n'.join([ring, *outside, *inside]), encoding='utf-8')
+    model = arm('<mesh filename="hollow.obj" scale="0.1 0.1 0.1"/>', tmp_path)
+    assert any('link_1 (27 %)' in note and 'convex parts' in note for note in model.notes)
+
+
+def _scaled(scale: float) -> list[tuple[float, float, float]]:
+    return [(scale * x, scale * y, scale * z) for x, y, z in CORNERS]
+
+
+def test_links_that_always_touch_are_not_checked_and_named() -> None:
+    """Adjacent ones where the SRDF has no word about pairs; always touching ones in any case."""
+    chained = {('link_1', 'link_2'), ('link_2', 'link_3'), ('link_3', 'link_4')}
+    small = arm('<sphere radius="0.03"/>')
+    assert set(small.pairs) == {('link_1', 'link_3'), ('link_1', 'link_4'), ('link_2', 'link_4')}
+    assert 'link_1 and link_2' in small.notes[0]
+    word = '<disable_collisions link1="base" link2="tip"/>'
+    assert chained < set(arm('<sphere radius="0.03"/>', srdf=word).pairs)
+    large = arm('<sphere radius="0.15"/>', srdf=word)
+    assert not chained & set(large.pairs)
+    assert len(large.pairs) == len(small.pairs)
+    assert 'disable_collisions' in large.notes[0]
+
+
+def test_an_elbow_that_folds_the_arm_onto_itself_is_in_contact(tmp_path: Path) -> None:
+    """As the public UR5e does at shoulder_lift=-1.57, elbow=3.1: with meshes, nothing was said."""
+    (tmp_path / 'cube.stl').write_text(stl(), encoding='utf-8')
+    model = arm('<mesh filename="cube.stl" scale="0.16 0.1 0.2"/>', tmp_path)
+    straight, folded = np.zeros(4), np.array([0.0, 0.0, 2.0, 2.0])
+    assert model.clearance(straight) > 0.0
+    assert model.clearance(folded) < -0.005

@@ -1,0 +1,334 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Laws of the planning scene: objects, attached bodies, what may touch; nothing ever changes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import product
+import math
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from model_robots import chain, gripper, two_arms
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from arm_model import (
+    AllowedCollisionMatrix,
+    Array,
+    AttachedBody,
+    Box,
+    Capsule,
+    Clearances,
+    CollisionObject,
+    Cone,
+    Cylinder,
+    Mesh,
+    PlacedShape,
+    Plane,
+    PlanningScene,
+    Pose,
+    SceneError,
+    Shape,
+    Sphere,
+)
+
+STEP = 1e-6
+LENGTHS = st.floats(0.02, 0.2)
+SHAPES = st.one_of(
+    st.builds(Box, LENGTHS, LENGTHS, LENGTHS),
+    st.builds(Sphere, LENGTHS),
+    st.builds(Cylinder, LENGTHS, LENGTHS),
+    st.builds(Capsule, LENGTHS, LENGTHS),
+    st.builds(Cone, LENGTHS, LENGTHS),
+    st.builds(lambda a, b: Mesh(list(product((-a, a), (-b, b), (-a, b)))), LENGTHS, LENGTHS),
+)
+POSES = st.builds(
+    lambda numbers: Pose(pin.exp3(np.array(numbers[3:])), np.array(numbers[:3])),
+    st.tuples(*[st.floats(-0.8, 0.8)] * 3, *[st.floats(-1.5, 1.5)] * 3),
+)
+POSITIONS = st.tuples(*[st.floats(-1.9, 1.9)] * 4).map(np.array)
+
+MODEL = chain('zyyp')
+TABLE = CollisionObject('table', Plane(offset=-0.1))
+CUP = CollisionObject('cup', Cylinder(0.04, 0.1), Sphere(0.05))
+
+
+def distances(scene: PlanningScene, positions: Array) -> dict[tuple[str, str, int], float]:
+    """Return the distance of each pair of shapes."""
+    least = Clearances(scene).least(positions, math.inf).tolist()
+    pairs = list(scene.pairs)
+    return {
+        (*pair, pairs[:number].count(pair)): least[number] for number, pair in enumerate(pairs)
+    }
+
+
+Change = Callable[[PlanningScene], PlanningScene]
+CHANGES: dict[str, Change] = {
+    'with_object': lambda scene: scene.with_object(CollisionObject('new', Box(0.1, 0.1, 0.1))),
+    'replace': lambda scene: scene.with_object(CollisionObject('cup', Sphere(0.2))),
+    'without': lambda scene: scene.without('cup'),
+    'without_objects': PlanningScene.without_objects,
+    'attached': lambda scene: scene.attached('cup', 'link_4', np.zeros(4), ['link_3']),
+    'detached': lambda scene: scene.detached('tool', np.zeros(4)),
+    'allowing': lambda scene: scene.allowing('link_*', 'cup'),
+    'with_allowed': lambda scene: scene.with_allowed(AllowedCollisionMatrix()),
+}
+
+
+@pytest.mark.parametrize('change', CHANGES.values(), ids=CHANGES.keys())
+def test_a_scene_never_changes(change: Change) -> None:
+    """What is made of it is another one; its tables and arrays refuse to be written."""
+    scene = MODEL.scene.with_object(TABLE).with_object(CUP)
+    scene = scene.with_attached(
+        AttachedBody(CollisionObject('tool', Box(0.1, 0.1, 0.1)), 'link_4')
+    )
+    at = np.array([0.1, 0.2, 0.3, 0.0])
+    before = (dict(scene.objects), dict(scene.attached_bodies), scene.allowed, scene.pairs)
+    measured = distances(scene, at)
+    other = change(scene)
+    assert other is not scene
+    after = (dict(scene.objects), dict(scene.attached_bodies), scene.allowed, scene.pairs)
+    assert before == after
+    assert distances(scene, at) == measured
+    for table in (scene.objects, scene.attached_bodies, scene.allowed.entries):
+        with pytest.raises(TypeError):
+            table['x'] = None  # type: ignore[index]
+    for array in (scene.distance_rate_bounds, scene.relative_motion_sign):
+        with pytest.raises(ValueError, match='read-only'):
+            array[0, 0] = 1.0
+
+
+@settings(max_examples=30, deadline=None)
+@given(SHAPES, POSES, POSITIONS)
+def test_an_object_that_goes_again_leaves_nothing(shape: Shape, pose: Pose, at: Array) -> None:
+    """With and without it, and without all objects, there is the arm alone."""
+    scene = MODEL.scene.with_object(CollisionObject('thing', shape, pose=pose))
+    assert {pair for pair in scene.pairs if 'thing' in pair}
+    for alone in (scene.without('thing'), scene.without_objects()):
+        assert distances(alone, at) == distances(MODEL.scene, at)
+
+
+@settings(max_examples=30, deadline=None)
+@given(SHAPES, POSES, POSITIONS, POSITIONS)
+def test_attached_bodies_move_with_their_link(
+    shape: Shape, pose: Pose, at: Array, later: Array
+) -> None:
+    """Taken up and laid down at one place, nothing has moved; elsewhere it came along."""
+    scene = MODEL.scene.with_object(CollisionObject('thing', shape, pose=pose))
+    carried = scene.attached('thing', 'link_3', at)
+    assert not carried.objects
+    back = carried.detached('thing', at)
+    assert not back.attached_bodies
+    assert back.objects['thing'].pose.position == pytest.approx(pose.position, abs=1e-9)
+    assert back.objects['thing'].pose.rotation == pytest.approx(pose.rotation, abs=1e-9)
+    assert distances(back, at) == pytest.approx(distances(scene, at), abs=1e-4)
+    moved = carried.detached('thing', later).attached('thing', 'link_3', later)
+    in_link = carried.attached_bodies['thing'].object.pose
+    assert moved.attached_bodies['thing'].object.pose.position == pytest.approx(in_link.position)
+    assert carried.pose('thing', later).position == pytest.approx(
+        carried.detached('thing', later).objects['thing'].pose.position
+    )
+
+
+@settings(max_examples=40, deadline=None)
+@given(SHAPES, SHAPES, POSES, POSES, POSITIONS)
+def test_distances_are_symmetric(
+    one: Shape, other: Shape, one_pose: Pose, other_pose: Pose, at: Array
+) -> None:
+    """Whichever of two things stands still, and whichever is carried."""
+    things = [
+        CollisionObject('one', one, pose=one_pose),
+        CollisionObject('other', other, pose=other_pose),
+    ]
+    scene = MODEL.scene.with_object(things[0]).with_object(things[1])
+    found = [
+        next(
+            distance
+            for pair, distance in distances(scene.attached(name, 'link_4', at), at).items()
+            if set(pair[:2]) == {'one', 'other'}
+        )
+        for name in ('one', 'other')
+    ]
+    # of shapes deep in each other, two ways out may be found
+    if min(found) > 0.0:
+        assert found[0] == pytest.approx(found[1], abs=2e-4)
+    assert (found[0] < -1e-3) == (found[1] < -1e-3) or max(found) < 1e-3
+
+
+@settings(max_examples=25, deadline=None)
+@given(SHAPES, POSES, POSITIONS, st.booleans())
+def test_gradients_of_distances_to_objects_are_differences(
+    shape: Shape, pose: Pose, at: Array, carried: bool
+) -> None:
+    """Objects that stand still, that are carried, and a table."""
+    scene = MODEL.scene.with_object(TABLE).with_object(CollisionObject('it', shape, pose=pose))
+    scene = scene.attached('it', 'link_2', at) if carried else scene
+    steps = 1e-4 * np.eye(len(at))
+    ahead, behind = (
+        np.array([Clearances(scene).least(at + sign * step, math.inf) for step in steps])
+        for sign in (1.0, -1.0)
+    )
+    for near in Clearances(scene).nearest(at, math.inf, len(scene.pairs)):
+        if near.distance < 0.01:
+            continue  # the normal turns about at the touch
+        difference = ahead[:, near.pair] - behind[:, near.pair]
+        smooth = np.abs(ahead[:, near.pair] + behind[:, near.pair] - 2 * near.distance) < 2e-7
+        assert near.gradient[smooth] == pytest.approx(difference[smooth] / 2e-4, abs=0.02)
+        assert (np.abs(near.gradient) <= scene.distance_rate_bounds[near.pair] + 1e-9).all()
+
+
+@pytest.mark.parametrize('stride', [0.01, 0.2])
+def test_what_is_known_is_a_lower_bound_with_objects_too(stride: float) -> None:
+    """On a random walk between a table, an object and a carried one."""
+    cup = CUP.at(Pose(np.eye(3), np.array([0.4, 0.0, 0.5])))
+    at, rng = np.zeros(4), np.random.default_rng(2)
+    tool = AttachedBody(CollisionObject('tool', Cone(0.05, 0.2)), 'link_4')
+    scene = MODEL.scene.with_object(TABLE).with_object(cup).with_attached(tool)
+    known = Clearances(scene)
+    for _ in range(200):
+        at = np.clip(at + stride * rng.uniform(-1.0, 1.0, 4), -1.9, 1.9)
+        exact, told = Clearances(scene).least(at, math.inf), known.least(at, 0.05)
+        assert (told <= exact + 1e-4).all()
+        assert told[exact < 0.05] == pytest.approx(exact[exact < 0.05], abs=1e-4)
+
+
+def test_contacts_are_named_with_their_place_and_depth() -> None:
+    """The deepest first; the normal leads from the first body to the second."""
+    scene = MODEL.scene.with_object(
+        CollisionObject('wall', Box(0.3, 1.0, 1.0)).at(Pose(np.eye(3), np.array([0.0, 0.0, 0.5])))
+    )
+    at = np.zeros(4)
+    contacts = Clearances(scene).contacts(at)
+    assert contacts
+    assert [each.depth for each in contacts] == sorted((e.depth for e in contacts), reverse=True)
+    for each in contacts:
+        assert each.bodies[1] == 'wall'
+        assert each.depth > 0.0
+        assert np.linalg.norm(each.normal) == pytest.approx(1.0)
+    assert not Clearances(scene.allowing('link_?', 'wall')).contacts(at)
+    assert len(Clearances(scene.allowing('link_?', 'wall')).pairs) == len(MODEL.pairs)
+
+
+def test_touch_links_may_be_touched_and_no_others() -> None:
+    """The link that carries, always; two things in one hand, too."""
+    thing = CollisionObject('thing', Box(0.1, 0.1, 0.1))
+    scene = MODEL.scene.with_attached(AttachedBody(thing, 'link_4'))
+    assert {pair for pair in scene.pairs if 'thing' in pair} == {
+        (f'link_{number}', 'thing') for number in (1, 2, 3)
+    }
+    scene = MODEL.scene.with_attached(AttachedBody(thing, 'link_4', frozenset({'link_3'})))
+    assert ('link_3', 'thing') not in scene.pairs
+    other = AttachedBody(CollisionObject('other', Sphere(0.1)), 'link_4')
+    assert ('thing', 'other') not in scene.with_attached(other).pairs
+    far = AttachedBody(CollisionObject('other', Sphere(0.1)), 'link_1')
+    assert ('thing', 'other') in scene.with_attached(far).pairs
+
+
+NAMES = ('link_1', 'link_2', 'cup')
+
+
+@given(
+    st.dictionaries(st.sampled_from([frozenset(p) for p in product(NAMES, NAMES)]), st.booleans()),
+    st.dictionaries(st.sampled_from(NAMES), st.booleans()),
+)
+def test_what_may_touch_follows_the_rules_of_moveit(
+    entries: dict[frozenset[str], bool], defaults: dict[str, bool]
+) -> None:
+    """The entry of the pair, else its defaults, which both must allow; else it is checked."""
+    matrix = AllowedCollisionMatrix(entries, defaults)
+    for first, second in product(NAMES, NAMES):
+        pair, known = frozenset((first, second)), [defaults.get(first), defaults.get(second)]
+        given_defaults = [each for each in known if each is not None]
+        wanted = entries.get(pair, bool(given_defaults) and all(given_defaults))
+        assert matrix.allows(first, second) is matrix.allows(second, first) is wanted
+        assert matrix.with_entry(first, second, True).allows(second, first)
+    assert not matrix.without('cup').allows('cup', 'cup')
+    assert matrix.with_default('new', True).allows('new', 'newer')
+
+
+@pytest.mark.parametrize(
+    ('refused', 'words'),
+    [
+        (lambda scene: scene.without('glass'), "no object 'glass'; objects: cup"),
+        (lambda scene: scene.detached('cup', np.zeros(4)), "no attached body 'cup'"),
+        (lambda scene: scene.attached('cup', 'hand', np.zeros(4)), "no link 'hand'"),
+        (lambda scene: scene.attached('glass', 'link_4', np.zeros(4)), "no object 'glass'"),
+        (lambda scene: scene.allowing('hand_*', 'cup'), "no link or object 'hand_"),
+        (
+            lambda scene: scene.with_object(CollisionObject('link_1', Sphere(0.1))),
+            'a link has this name',
+        ),
+        (
+            lambda scene: scene.with_attached(AttachedBody(CUP, 'link_4')),
+            'in the world and attached to link_4',
+        ),
+        (
+            lambda scene: scene.without('cup').with_attached(
+                AttachedBody(CUP, 'link_4', frozenset({'finger'}))
+            ),
+            "no link 'finger'",
+        ),
+        (lambda _: CollisionObject('', Sphere(0.1)), 'needs a name'),
+        (lambda _: CollisionObject('x', Box(0.1, -0.1, 0.1)), 'must be positive'),
+        (lambda _: CollisionObject('x', Sphere(math.nan)), 'must be positive'),
+        (lambda _: CollisionObject('x', Plane((0.0, 0.0, 0.0))), 'no direction'),
+        (lambda _: Mesh([[0.0, 0.0]]), 'points of three numbers'),
+        (lambda _: Mesh([[0.0, 0.0, math.inf]]), 'finite'),
+    ],
+)
+def test_what_does_not_fit_is_refused(
+    refused: Callable[[PlanningScene], object], words: str
+) -> None:
+    """With the name, and the names that there are."""
+    with pytest.raises(SceneError, match=words):
+        refused(MODEL.scene.with_object(CUP))
+
+
+def test_an_object_of_several_shapes_is_one_thing() -> None:
+    """Each shape is where its pose says; links are paired with all of them."""
+    raised = PlacedShape(Sphere(0.1), Pose(np.eye(3), np.array([0.0, 0.0, 3.0])))
+    scene = MODEL.scene.with_object(CollisionObject('lamp', Sphere(0.1), raised))
+    near, far = (distances(scene, np.zeros(4))['link_1', 'lamp', number] for number in (0, 1))
+    assert far - near > 2.0
+
+
+def test_an_arm_beside_the_group_is_an_obstacle_where_it_is() -> None:
+    """The other arm of two counts, at the position that it is given."""
+    left = two_arms('left')
+    pairs = [pair for pair in left.pairs if 'right_2_link' in pair]
+    assert pairs
+    at = np.zeros(len(left))
+    turned = left.scene.with_positions(left.kinematics_at({'right_1': 1.0}))
+    assert turned.pairs == left.pairs
+    pair = ('left_3_link', 'right_2_link', 0)
+    assert distances(turned, at)[pair] != pytest.approx(distances(left.scene, at)[pair], abs=1e-3)
+
+
+def test_a_mimic_joint_follows() -> None:
+    """In poses, Jacobians, distances and their gradients."""
+    model = gripper()
+    assert model.joints == ('j1', 'finger')
+    at = np.array([0.3, 0.02])
+    pose, jacobian = model.pose(at), model.jacobian(at)
+    assert model.tip == 'right_link'
+    for number, unit in enumerate(np.eye(2)):
+        moved = (model.pose(at + STEP * unit).position - pose.position) / STEP
+        assert jacobian[:3, number] == pytest.approx(moved, abs=1e-5)
+    y = model.pose(at, 'right_link').position - model.pose(at, 'left_link').position
+    assert np.linalg.norm(y) == pytest.approx(0.02 + 2.0 * 0.02 + 0.01)
+    scene = model.scene.with_object(
+        CollisionObject('cup', Sphere(0.02)).at(Pose(np.eye(3), np.array([0.5, 0.4, 0.0])))
+    )
+    for near in Clearances(scene).nearest(at, math.inf, len(scene.pairs)):
+        ahead, behind = (
+            np.array(
+                [Clearances(scene).least(at + sign * step, math.inf) for step in STEP * np.eye(2)]
+            )
+            for sign in (1.0, -1.0)
+        )
+        quotient = (ahead - behind)[:, near.pair] / (2.0 * STEP)
+        assert near.gradient == pytest.approx(quotient, abs=1e-3)
+        assert (np.abs(near.gradient) <= scene.distance_rate_bounds[near.pair] + 1e-9).all()
