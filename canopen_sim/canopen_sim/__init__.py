@@ -8,7 +8,16 @@ The names here are the public API.
 from .device import Device
 from .drive.drive import Drive
 from .drive.servo import ServoModel
+from .fault import Fault, FaultInjection
 from .host import DeviceHost
 from .runner import DeviceRunner
 
-__all__ = ['Device', 'DeviceHost', 'DeviceRunner', 'Drive', 'ServoModel']
+__all__ = [
+    'Device',
+    'DeviceHost',
+    'DeviceRunner',
+    'Drive',
+    'Fault',
+    'FaultInjection',
+    'ServoModel',
+]

@@ -16,8 +16,8 @@ from arm_canopen.standard.objects import AXES_MAX, AXIS_OFFSET, Index
 from arm_canopen.standard.sdo import Abort
 
 from .drive.drive import Drive
-from .drive.fault import SharedErrors
 from .drive.servo import ServoModel
+from .drive.shared_errors import SharedErrors
 from .faults.injector import FaultInjector
 from .faults.line import FaultLine, Traffic
 from .objects.object_store import ObjectStore

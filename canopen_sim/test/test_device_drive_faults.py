@@ -9,14 +9,14 @@ import pytest
 
 from arm_canopen.config import load_eds
 from arm_canopen.standard.drive import DriveState
-from canopen_sim.drive.fault import DriveFault
+from canopen_sim.fault import Fault
 
-FAULTS = [fault for fault in DriveFault if fault.code]
+FAULTS = [fault for fault in Fault if fault.value.code]
 
 
 @pytest.mark.parametrize('mode', [1, 2, 3, 4, 6, 7, 8, 9, 10])
 @pytest.mark.parametrize('fault', FAULTS)
-def test_fault_has_its_code_and_stays_while_its_cause_does(fault: DriveFault, mode: int) -> None:
+def test_fault_has_its_code_and_stays_while_its_cause_does(fault: Fault, mode: int) -> None:
     """In each mode: EMCY and 0x603F tell the code; a reset helps after the cause is gone only."""
     rig = Rig()
     rig.enable(mode)
@@ -24,9 +24,9 @@ def test_fault_has_its_code_and_stays_while_its_cause_does(fault: DriveFault, mo
     rig.drive.inject(fault, rig.now)
     rig.run(0.5)
     assert rig.state is DriveState.FAULT
-    assert rig.get(0x603F) == fault.code
+    assert rig.get(0x603F) == fault.value.code
     assert [data[:2] for data in rig.take(0x080 + rig.node_id)] == [
-        fault.code.to_bytes(2, 'little')
+        fault.value.code.to_bytes(2, 'little')
     ]
     rig.command(FAULT_RESET, 0)
     assert rig.state is DriveState.FAULT
@@ -39,8 +39,8 @@ def test_fault_has_its_code_and_stays_while_its_cause_does(fault: DriveFault, mo
 def test_lost_encoder_leaves_no_ramp() -> None:
     """A fault without torque passes the fault reaction by; one with torque ramps down first."""
     for fault, expected in (
-        (DriveFault.ENCODER_LOSS, DriveState.FAULT),
-        (DriveFault.OVER_TEMPERATURE, DriveState.FAULT_REACTION_ACTIVE),
+        (Fault.ENCODER_LOSS, DriveState.FAULT),
+        (Fault.OVER_TEMPERATURE, DriveState.FAULT_REACTION_ACTIVE),
     ):
         rig = Rig()
         rig.put(0x60FF, 2000)
@@ -56,7 +56,7 @@ def test_safe_torque_off_is_no_fault() -> None:
     rig.put(0x60FF, 2000)
     rig.enable(3)
     rig.run(1.0)
-    rig.drive.inject(DriveFault.STO, rig.now)
+    rig.drive.inject(Fault.STO, rig.now)
     assert rig.state is DriveState.SWITCH_ON_DISABLED
     assert not rig.statusword & 0x10
     assert rig.get(0x6079) == 0
@@ -64,7 +64,7 @@ def test_safe_torque_off_is_no_fault() -> None:
     assert rig.velocity == 0.0
     rig.command(SHUTDOWN, SWITCH_ON, ENABLE)
     assert rig.get(0x6041) & 0x6F == 0x21
-    rig.drive.clear(DriveFault.STO, rig.now)
+    rig.drive.clear(Fault.STO, rig.now)
     assert rig.get(0x6041) & 0x6F == 0x27
 
 
@@ -138,7 +138,7 @@ def test_axes_are_apart_and_share_their_errors() -> None:
     first, second = rig.device.drives
     rig.take()
     for drive in (first, second):
-        drive.inject(DriveFault.OVER_TEMPERATURE, rig.now, lasting=False)
+        drive.inject(Fault.OVER_TEMPERATURE, rig.now, lasting=False)
     rig.run(0.5)
     assert (rig.get(0x603F), rig.get(0x683F)) == (0x4310, 0x4310)
     rig.command(FAULT_RESET, 0)

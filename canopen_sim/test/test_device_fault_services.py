@@ -5,6 +5,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
+import re
 import time
 from typing import Any
 
@@ -16,7 +18,7 @@ import pytest
 from arm_canopen.can import Bus, open_bus
 from arm_canopen.standard.drive import Statusword
 from canopen_sim import DeviceRunner
-from canopen_sim.faults.faults import BusFault, Fault
+from canopen_sim.fault import Fault, FAULTS
 
 rclpy = pytest.importorskip('rclpy')
 pytest.importorskip('arm_msgs')
@@ -112,9 +114,9 @@ def test_faults_by_hand(services: Services) -> None:
     assert services.call(InjectFault, 'fault', device='3', fault='disconnect').success
     assert services.call(InjectFault, 'no_name/fault', fault='heartbeat_stop').success
     assert services.faults() == {
-        2: [BusFault.SDO_DELAY],
-        3: [BusFault.DISCONNECT],
-        4: [BusFault.HEARTBEAT_STOP],
+        2: [Fault.SDO_DELAY],
+        3: [Fault.DISCONNECT],
+        4: [Fault.HEARTBEAT_STOP],
     }
     answer = services.call(InjectFault, 'fault', fault='none')
     assert answer.success
@@ -131,7 +133,7 @@ def test_wrong_requests_say_what_there_is(services: Services) -> None:
         ({'device': 'joint9', 'fault': 'reboot'}, "unknown device 'joint9'; did you mean 'joint"),
         ({'fault': 'explode'}, '\n  power_off: has no power (position_kept, duration)'),
         ({'fault': 'sdo_delay', 'settings': ['delay=long']}, 'a time in [s]'),
-        ({'fault': 'sdo_delay', 'settings': ['pdo=1']}, 'there are: duration, delay'),
+        ({'fault': 'sdo_delay', 'settings': ['pdo=1']}, 'choose one of duration, delay'),
         ({'fault': 'sdo_delay', 'duration': -1.0}, 'duration -1.0'),
         ({'fault': 'sdo_delay', 'duration': float('nan')}, 'duration nan'),
     ]
@@ -186,3 +188,16 @@ def test_services_of_devices_that_have_ended(services: Services) -> None:
     answer = services.call(Trigger, 'power_cycle')
     assert not answer.success
     assert 'do not run' in answer.message
+
+
+def test_the_readme_lists_every_fault_with_its_settings() -> None:
+    """The table of README.md and that of the program are one."""
+    text = (Path(__file__).parents[1] / 'README.md').read_text('utf-8')
+    listed = {
+        name: set(re.findall(r'`(\w+)`', row[2]))
+        for row in re.findall(r'^\| (`[^|]*) \|([^|]*)\|([^|]*)\|$', text, re.MULTILINE)
+        for name in re.findall(r'`(\w+)`', row[0])
+    }
+    assert {name: listed.get(name) for name in FAULTS} == {
+        fault.label: set(fault.value.settings) for fault in Fault
+    }

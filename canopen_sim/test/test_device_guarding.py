@@ -12,7 +12,7 @@ from arm_canopen.standard.datatypes import DataType
 from arm_canopen.standard.dictionary import ObjectDictionary, ObjectEntry
 from arm_canopen.standard.drive import DriveState
 from arm_canopen.standard.nmt import NmtCommand, NmtState
-from canopen_sim.faults.faults import BusFault, FaultInjection
+from canopen_sim.fault import Fault, FaultInjection
 
 GUARD = 0x700 + NODE_ID
 EMCY = 0x080 + NODE_ID
@@ -116,7 +116,7 @@ def test_device_without_the_object_is_silent() -> None:
 
 def test_heartbeat_fault_silences_guarding_too(rig: Rig) -> None:
     """A device that is to send no heartbeat does not answer its guard either."""
-    rig.device.faults.inject(FaultInjection(BusFault.HEARTBEAT_STOP, duration=1.0), rig.now)
+    rig.device.faults.inject(FaultInjection(Fault.HEARTBEAT_STOP, duration=1.0), rig.now)
     assert guard(rig) == []
     rig.run(1.1)
     assert len(guard(rig)) == 1

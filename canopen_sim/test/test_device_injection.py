@@ -13,8 +13,7 @@ from arm_canopen.standard.nmt import NmtCommand, NmtState
 from arm_canopen.standard.sdo import Abort, decode_response, UploadRequest
 from arm_canopen.standard.sdo_abort import AbortCode
 from canopen_sim.device import Device
-from canopen_sim.drive.fault import DriveFault
-from canopen_sim.faults.faults import BusFault, Fault, FaultInjection, SETTINGS
+from canopen_sim.fault import Fault, FaultInjection
 from canopen_sim.host import DeviceHost
 
 SDO_ANSWER = 0x580 + NODE_ID
@@ -45,7 +44,7 @@ def synchronous(rig: Rig) -> None:
 
 def test_slow_sdo_answers_late_and_right(rig: Rig) -> None:
     """The answer comes exactly so much later, then the device is quick again."""
-    inject(rig, BusFault.SDO_DELAY, delay=0.25, duration=1.0)
+    inject(rig, Fault.SDO_DELAY, delay=0.25, duration=1.0)
     start = rig.now
     assert rig.raw_sdo(READ_DEVICE_TYPE) is None
     rig.run(0.5)
@@ -57,16 +56,16 @@ def test_slow_sdo_answers_late_and_right(rig: Rig) -> None:
 
 def test_silence_about_one_object(rig: Rig) -> None:
     """Requests for that object are not answered, others are."""
-    inject(rig, BusFault.SDO_SILENCE, object=(0x6064, 0))
+    inject(rig, Fault.SDO_SILENCE, object=(0x6064, 0))
     assert rig.raw_sdo(UploadRequest(0x6064, 0).encode()) is None
     assert rig.get(0x1000) == 0x20192
-    rig.device.faults.end(rig.now, BusFault.SDO_SILENCE)
+    rig.device.faults.end(rig.now, Fault.SDO_SILENCE)
     assert rig.get(0x6064) == 0
 
 
 def test_silence_for_a_number_of_requests(rig: Rig) -> None:
     """Two requests are lost, as a retrying master needs it; the third one is answered."""
-    inject(rig, BusFault.SDO_SILENCE, count=2)
+    inject(rig, Fault.SDO_SILENCE, count=2)
     answers = [rig.raw_sdo(READ_DEVICE_TYPE) for _ in range(3)]
     assert [answer is None for answer in answers] == [True, True, False]
     assert rig.device.faults.active == ()
@@ -74,7 +73,7 @@ def test_silence_for_a_number_of_requests(rig: Rig) -> None:
 
 def test_abort_names_object_and_code(rig: Rig) -> None:
     """The abort that was asked for comes, at the first frame of a transfer."""
-    inject(rig, BusFault.SDO_ABORT, object=(0x6098, 0), abort=AbortCode.HARDWARE)
+    inject(rig, Fault.SDO_ABORT, object=(0x6098, 0), abort=AbortCode.HARDWARE)
     with pytest.raises(RefusedError) as refused:
         rig.put(0x6098, 35)
     assert refused.value.code == AbortCode.HARDWARE
@@ -89,7 +88,7 @@ def test_lost_tpdos_are_the_same_with_the_same_seed() -> None:
     def arrivals(seed: int) -> list[int]:
         rig = Rig()
         synchronous(rig)
-        inject(rig, BusFault.TPDO_LOSS, probability=0.2, seed=seed)
+        inject(rig, Fault.TPDO_LOSS, probability=0.2, seed=seed)
         arrived = []
         for number in range(500):
             rig.sync()
@@ -107,7 +106,7 @@ def test_only_the_named_pdo_is_late(rig: Rig) -> None:
     """A late PDO carries what was true when it was sent."""
     rig.put(0x1801, 1, 2)
     synchronous(rig)
-    inject(rig, BusFault.TPDO_DELAY, pdo=1, delay=0.02)
+    inject(rig, Fault.TPDO_DELAY, pdo=1, delay=0.02)
     rig.sync()
     start = rig.now
     rig.run(0.1)
@@ -119,10 +118,10 @@ def test_missed_rpdo_and_late_rpdo(rig: Rig) -> None:
     """A controlword that is lost has no effect, one that is late acts later."""
     rig.put(0x1400, 255, 2)
     rig.nmt(NmtCommand.START)
-    inject(rig, BusFault.RPDO_LOSS, count=1)
+    inject(rig, Fault.RPDO_LOSS, count=1)
     rig.send(0x200 + NODE_ID, b'\x06\x00')
     assert rig.get(0x6040) == 0
-    inject(rig, BusFault.RPDO_DELAY, delay=0.05)
+    inject(rig, Fault.RPDO_DELAY, delay=0.05)
     rig.send(0x200 + NODE_ID, b'\x06\x00')
     assert rig.get(0x6040) == 0
     rig.run(0.051)
@@ -132,7 +131,7 @@ def test_missed_rpdo_and_late_rpdo(rig: Rig) -> None:
 def test_heartbeat_stops_and_returns(rig: Rig) -> None:
     """No heartbeat for a while, everything else goes on; a boot-up message still comes."""
     rig.put(0x1017, 100)
-    inject(rig, BusFault.HEARTBEAT_STOP, duration=1.0)
+    inject(rig, Fault.HEARTBEAT_STOP, duration=1.0)
     start = rig.now
     rig.run(0.9)
     assert rig.times(HEARTBEAT) == []
@@ -147,13 +146,13 @@ def test_heartbeat_stops_and_returns(rig: Rig) -> None:
 def test_wrong_identity_survives_resets_and_ends(rig: Rig) -> None:
     """0x1018 shows other values by SDO until the fault ends."""
     vendor, product = rig.get(0x1018, 1), rig.get(0x1018, 2)
-    inject(rig, BusFault.WRONG_IDENTITY, product=0x1234, device_type=0x191)
+    inject(rig, Fault.WRONG_IDENTITY, product=0x1234, device_type=0x191)
     rig.nmt(NmtCommand.RESET_NODE)
     assert (rig.get(0x1018, 1), rig.get(0x1018, 2)) == (vendor, 0x1234)
     assert rig.get(0x1000) == 0x191
     rig.device.faults.end(rig.now)
     assert rig.get(0x1018, 2) == product
-    inject(rig, BusFault.WRONG_IDENTITY)
+    inject(rig, Fault.WRONG_IDENTITY)
     assert rig.get(0x1018, 1) != vendor
 
 
@@ -161,7 +160,7 @@ def test_device_without_power_is_silent_and_starts_anew(rig: Rig) -> None:
     """No frame while it is off; then boot-up, and objects with their defaults."""
     rig.put(0x1017, 100)
     rig.put(0x6081, 4711)
-    inject(rig, BusFault.POWER_OFF, duration=2.0)
+    inject(rig, Fault.POWER_OFF, duration=2.0)
     start = rig.now
     rig.take()
     assert rig.raw_sdo(READ_DEVICE_TYPE) is None
@@ -182,7 +181,7 @@ def test_reboot_in_motion(rig: Rig, kept: bool) -> None:
     rig.run(1.0)
     where = rig.position
     assert rig.velocity > 9_000
-    inject(rig, BusFault.REBOOT, position_kept=kept, duration=0.5)
+    inject(rig, Fault.REBOOT, position_kept=kept, duration=0.5)
     rig.run(0.6)
     assert rig.nmt_state is NmtState.PRE_OPERATIONAL
     assert rig.state is DriveState.SWITCH_ON_DISABLED
@@ -194,7 +193,7 @@ def test_reboot_in_motion(rig: Rig, kept: bool) -> None:
 
 def test_reboot_at_once(rig: Rig) -> None:
     """Without a duration the boot-up message comes immediately."""
-    inject(rig, BusFault.REBOOT)
+    inject(rig, Fault.REBOOT)
     rig.run(0.01)
     assert rig.take(HEARTBEAT) == [b'\x00']
 
@@ -204,7 +203,7 @@ def test_cut_off_device_goes_on_by_itself(rig: Rig) -> None:
     rig.enable(3)
     rig.put(0x60FF, 1000)
     rig.take()
-    inject(rig, BusFault.DISCONNECT, duration=1.0)
+    inject(rig, Fault.DISCONNECT, duration=1.0)
     assert rig.raw_sdo(READ_DEVICE_TYPE) is None
     rig.send(0, b'\x81\x00')
     rig.run(1.1)
@@ -215,8 +214,8 @@ def test_cut_off_device_goes_on_by_itself(rig: Rig) -> None:
 
 def test_ending_all_switches_on(rig: Rig) -> None:
     """Ending every fault gives power again, and a good line."""
-    inject(rig, BusFault.FRAME_LOSS, probability=1.0)
-    inject(rig, BusFault.POWER_OFF)
+    inject(rig, Fault.FRAME_LOSS, probability=1.0)
+    inject(rig, Fault.POWER_OFF)
     rig.run(5.0)
     assert not rig.device.powered
     rig.device.faults.end(rig.now)
@@ -227,7 +226,7 @@ def test_ending_all_switches_on(rig: Rig) -> None:
 def test_faults_of_different_objects_go_on_together(rig: Rig) -> None:
     """A fault of another object does not replace the first one; the same one does."""
     for index in (0x6064, 0x606C, 0x6064):
-        inject(rig, BusFault.SDO_SILENCE, object=(index, 0))
+        inject(rig, Fault.SDO_SILENCE, object=(index, 0))
     assert len(rig.device.faults.active) == 2
 
 
@@ -239,44 +238,44 @@ def test_other_devices_of_the_process_are_not_touched() -> None:
     host.add(3, drive_dictionary())
     host.advance(1.0)
     sent.clear()
-    first.faults.inject(FaultInjection(BusFault.DISCONNECT), 1.0)
+    first.faults.inject(FaultInjection(Fault.DISCONNECT), 1.0)
     for node_id in (2, 3):
         host.receive(Frame(0x600 + node_id, READ_DEVICE_TYPE), 1.0)
     assert [frame.can_id for frame in sent] == [0x583]
 
 
-@pytest.mark.parametrize('fault', [*BusFault, *DriveFault])
+@pytest.mark.parametrize('fault', list(Fault))
 def test_every_fault_says_itself(fault: Fault) -> None:
     """A fault with its defaults is valid, and its text begins with its name."""
-    assert str(FaultInjection(fault)).startswith(f'{fault.value}: ')
-    assert 'seed' not in SETTINGS[fault] or FaultInjection(fault, seed=3).seed == 3
+    assert str(FaultInjection(fault)).startswith(f'{fault.label}: ')
+    assert 'seed' not in fault.value.settings or FaultInjection(fault, seed=3).seed == 3
 
 
 @pytest.mark.parametrize(
     ('fault', 'settings'),
     [
-        (BusFault.TPDO_LOSS, {'probability': 1.5}),
-        (BusFault.TPDO_LOSS, {'delay': 1.0}),
-        (BusFault.SDO_DELAY, {'delay': -1.0}),
-        (BusFault.SDO_DELAY, {'duration': float('nan')}),
-        (BusFault.DISCONNECT, {'pdo': 1}),
-        (BusFault.TPDO_LOSS, {'count': -1}),
+        (Fault.TPDO_LOSS, {'probability': 1.5}),
+        (Fault.TPDO_LOSS, {'delay': 1.0}),
+        (Fault.SDO_DELAY, {'delay': -1.0}),
+        (Fault.SDO_DELAY, {'duration': float('nan')}),
+        (Fault.DISCONNECT, {'pdo': 1}),
+        (Fault.TPDO_LOSS, {'count': -1}),
     ],
 )
-def test_nonsense_is_refused(fault: BusFault, settings: dict[str, float]) -> None:
+def test_nonsense_is_refused(fault: Fault, settings: dict[str, float]) -> None:
     """Values out of range and settings of other faults are arguments of the wrong kind."""
     with pytest.raises(ValueError, match=next(iter(settings))):
         FaultInjection(fault, **settings)  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize('fault', [fault for fault in DriveFault if fault.code])
-def test_faults_of_a_drive_that_last(rig: Rig, fault: DriveFault) -> None:
+@pytest.mark.parametrize('fault', [fault for fault in Fault if fault.value.code])
+def test_faults_of_a_drive_that_last(rig: Rig, fault: Fault) -> None:
     """While the cause is there a fault reset does not help; after its duration it does."""
     rig.enable(3)
     inject(rig, fault, duration=2.0)
     rig.run(1.0)
     assert rig.state == DriveState.FAULT.value
-    assert rig.get(0x603F) == fault.code
+    assert rig.get(0x603F) == fault.value.code
     rig.command(0, 0x80, 0)
     assert rig.state == DriveState.FAULT.value
     rig.run(1.5)
@@ -287,7 +286,7 @@ def test_faults_of_a_drive_that_last(rig: Rig, fault: DriveFault) -> None:
 
 def test_fault_of_a_moment(rig: Rig) -> None:
     """Without a duration a fault reset ends what happened once."""
-    inject(rig, DriveFault.OVER_CURRENT)
+    inject(rig, Fault.OVER_CURRENT)
     assert rig.device.faults.active == ()
     rig.command(0, 0x80, 0)
     assert rig.state is DriveState.SWITCH_ON_DISABLED
@@ -295,16 +294,16 @@ def test_fault_of_a_moment(rig: Rig) -> None:
 
 def test_safe_torque_off_until_it_is_released(rig: Rig) -> None:
     """STO takes the voltage, is no fault, and lasts."""
-    inject(rig, DriveFault.STO)
+    inject(rig, Fault.STO)
     assert not rig.statusword & 0x10
     rig.command(0x06, 0x07, 0x0F)
     assert rig.state < DriveState.SWITCHED_ON
     assert rig.get(0x603F) == 0
-    rig.device.faults.end(rig.now, DriveFault.STO)
+    rig.device.faults.end(rig.now, Fault.STO)
     rig.enable(3)
 
 
 def test_axis_that_there_is_not(rig: Rig) -> None:
     """A fault of an axis needs that axis."""
     with pytest.raises(ValueError, match='has 1 axes'):
-        inject(rig, DriveFault.OVER_CURRENT, axis=2)
+        inject(rig, Fault.OVER_CURRENT, axis=2)

@@ -14,7 +14,7 @@ import pytest
 
 from arm_canopen.can.frame import Frame
 from arm_canopen.standard.nmt import NmtCommand, NmtState
-from canopen_sim.faults.faults import BusFault, FaultInjection
+from canopen_sim.fault import Fault, FaultInjection
 from canopen_sim.host import DeviceHost
 
 REQUEST, RESPONSE = 0x7E5, 0x7E4
@@ -95,7 +95,7 @@ def test_id_after_a_power_cut(stored: bool) -> None:
     if stored:
         assert ask(rig, 0x17) == b'\x17' + bytes(7)
     rig.nmt(NmtCommand.RESET_COMMUNICATION)
-    rig.device.faults.inject(FaultInjection(BusFault.REBOOT), rig.now)
+    rig.device.faults.inject(FaultInjection(Fault.REBOOT), rig.now)
     rig.take()
     rig.run(0.1)
     assert [frame.can_id for _, frame in rig.sent] == [0x72A if stored else 0x700 + NODE_ID]

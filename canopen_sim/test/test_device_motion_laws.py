@@ -8,7 +8,7 @@ from device_rig import ENABLE, FAULT_RESET, Rig, SHUTDOWN, SWITCH_ON
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from canopen_sim.drive.fault import DriveFault
+from canopen_sim.fault import Fault
 
 SPEED = 3000.0  # [inc/s] 0x607F, the highest of all
 STEP = 0.005  # [s]
@@ -33,7 +33,9 @@ ACTIONS = st.one_of(
     st.tuples(st.just('word'), WORDS),
     st.tuples(st.just('word'), st.just(ENABLE)),
     st.tuples(st.just('target'), TARGETS),
-    st.tuples(st.just('fault'), st.sampled_from(DriveFault)),
+    st.tuples(
+        st.just('fault'), st.sampled_from([fault for fault in Fault if fault.value.of_drive])
+    ),
     st.tuples(st.just('block'), STOPS),
     st.tuples(st.just('load'), st.floats(-500.0, 500.0)),
     st.tuples(st.just('method'), st.sampled_from([1, 8, 17, 24, 33, 35])),
@@ -50,7 +52,7 @@ def perform(rig: Rig, kind: str, value: object) -> None:
             rig.command(word)
         case 'target', ((int(index), int(subindex)), int(target)):
             rig.put(index, target, subindex)
-        case 'fault', DriveFault() as fault:
+        case 'fault', Fault() as fault:
             rig.drive.inject(fault, rig.now)
             rig.drive.clear(fault, rig.now)
         case 'block', float(place):

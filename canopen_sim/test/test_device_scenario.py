@@ -14,7 +14,7 @@ from arm_canopen.can.frame import Frame
 from arm_canopen.exceptions import ConfigError
 from arm_canopen.standard.sdo import DownloadRequest
 from arm_canopen.standard.sdo_abort import AbortCode
-from canopen_sim.faults.faults import BusFault, Fault, FaultInjection
+from canopen_sim.fault import Fault, FaultInjection
 from canopen_sim.faults.scenario import ScenarioPlayer, Step
 from canopen_sim.faults.scenario_file import load_scenario
 from canopen_sim.faults.text import parse_fault, split_settings
@@ -87,9 +87,9 @@ def test_times_begin_with_the_devices(tmp_path: Path) -> None:
         )
     )
     stage.run(1.5)
-    assert (stage.active(2), stage.active(3)) == ([], [BusFault.SDO_SILENCE])
+    assert (stage.active(2), stage.active(3)) == ([], [Fault.SDO_SILENCE])
     stage.run(1.0)
-    assert stage.active(2) == [BusFault.DISCONNECT]
+    assert stage.active(2) == [Fault.DISCONNECT]
     stage.run(1.0)
     assert stage.active(2) == []
     stage.run(1.0)
@@ -158,26 +158,26 @@ def test_seed_of_the_file_is_that_of_every_fault(tmp_path: Path) -> None:
         """,
     )
     assert steps == (
-        Step((2,), FaultInjection(BusFault.TPDO_LOSS, probability=0.05, seed=7)),
-        Step((3,), FaultInjection(BusFault.RPDO_LOSS, count=3, seed=1)),
+        Step((2,), FaultInjection(Fault.TPDO_LOSS, probability=0.05, seed=7)),
+        Step((3,), FaultInjection(Fault.RPDO_LOSS, count=3, seed=1)),
     )
 
 
 WRONG: dict[str, tuple[str, str, str]] = {
     'unknown device': (
         'steps:\n  - {device: jiont1, fault: reboot}',
-        ":2: steps[0].device: there is no device 'jiont1'",
+        ":2: steps[0].device: unknown device 'jiont1'",
         "did you mean 'joint1'?",
     ),
     'unknown fault': (
         'steps:\n  - device: joint1\n    fault: tpdo_los',
-        ":3: steps[0].fault: there is no fault 'tpdo_los'",
+        ":3: steps[0].fault: unknown fault 'tpdo_los'",
         "did you mean 'tpdo_loss'?",
     ),
     'setting of another fault': (
         'steps:\n  - {device: joint1, fault: tpdo_loss, delya: 3}',
         "unknown key 'delya'",
-        'there are: ',
+        'choose one of ',
     ),
     'fault of a drive without that axis number': (
         'steps:\n  - {device: joint1, fault: over_current, axis: first}',
@@ -225,7 +225,7 @@ WRONG: dict[str, tuple[str, str, str]] = {
     ),
     'event of no known state': (
         'steps:\n  - {device: joint1, fault: reboot, when: {device: joint1, nmt: operationl}}',
-        "'operationl' is none",
+        "unknown name 'operationl'",
         "'operational'",
     ),
     'no YAML': ('steps: [', 'not YAML', 'brackets'),
@@ -289,7 +289,7 @@ def test_settings_as_text() -> None:
     """A service's texts become typed values."""
     settings = split_settings(['object=0x607D:02', 'abort=hardware', ' count = 2'])
     assert parse_fault('sdo_abort', settings) == FaultInjection(
-        BusFault.SDO_ABORT, object=(0x607D, 2), abort=AbortCode.HARDWARE, count=2
+        Fault.SDO_ABORT, object=(0x607D, 2), abort=AbortCode.HARDWARE, count=2
     )
     assert not parse_fault('reboot', {'position_kept': 'lost'}).position_kept
 

@@ -16,7 +16,7 @@ from arm_canopen.standard.dictionary import ObjectDictionary, ObjectEntry
 from arm_canopen.standard.nmt import NmtCommand
 from arm_canopen.standard.sdo_abort import AbortCode
 from canopen_sim.device import Device
-from canopen_sim.faults.faults import BusFault, FaultInjection
+from canopen_sim.fault import Fault, FaultInjection
 from canopen_sim.objects.parameter_memory import ParameterFile, ParameterMemory
 from canopen_sim.objects.parameter_storage import LOAD, SAVE
 
@@ -55,7 +55,7 @@ class StoringRig(Rig):
 
     def power_cycle(self) -> None:
         """Cut the power, and give it back."""
-        self.device.faults.inject(FaultInjection(BusFault.REBOOT), self.now)
+        self.device.faults.inject(FaultInjection(Fault.REBOOT), self.now)
         self.run(0.01)
 
 

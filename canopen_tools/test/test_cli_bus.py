@@ -16,7 +16,7 @@ import pytest
 
 from arm_canopen.can import Bus, Frame, open_bus
 from arm_canopen.config import load_eds
-from canopen_sim.faults.faults import BusFault, FaultInjection
+from canopen_sim.fault import Fault, FaultInjection
 from canopen_sim.runner import DeviceRunner
 from canopen_tools.cli.main import main
 
@@ -122,8 +122,8 @@ def test_scan_compares_with_bus_yml(
 
     def misbehave() -> None:
         now = time.monotonic()
-        left.faults.inject(FaultInjection(BusFault.WRONG_IDENTITY, product=0x403), now)
-        right.faults.inject(FaultInjection(BusFault.DISCONNECT), now)
+        left.faults.inject(FaultInjection(Fault.WRONG_IDENTITY, product=0x403), now)
+        right.faults.inject(FaultInjection(Fault.DISCONNECT), now)
 
     runner.call(misbehave).result(DEADLINE)
     assert main(['scan', '--can', name, '--bus-config', bus_yml, *LISTEN]) == 1
@@ -297,7 +297,7 @@ def test_diff_takes_the_entry_of_the_heartbeat_consumer_that_boot_takes(
     """Boot writes to the first one where a device lets nobody read it, and not behind it."""
 
     def refuse() -> None:
-        fault = FaultInjection(BusFault.SDO_ABORT, object=(0x1016, 1))
+        fault = FaultInjection(Fault.SDO_ABORT, object=(0x1016, 1))
         runner.host.devices[0].faults.inject(fault, time.monotonic())
 
     runner.call(refuse).result(DEADLINE)

@@ -14,14 +14,15 @@ import math
 from arm_canopen.standard.drive import Controlword, STATE_WORDS, Statusword
 from arm_canopen.standard.drive import DriveState as State
 
+from ..fault import Fault
 from ..objects.object_store import ObjectStore
 from ..timed import NEVER
 from .axis import Axis
-from .fault import DriveFault, SharedErrors
 from .modes.mode import Dwell, Mode, SyncClock, TARGET_REACHED
 from .modes.selection import ModeSelection
 from .objects import DriveObjects, MILLISECOND, NO_WINDOW
 from .servo import ServoModel
+from .shared_errors import SharedErrors
 from .state_machine import chosen, POWERED_STATES, StateMachine, VOLTAGE_STATES
 from .states import AbortConnectionOption, FAULT_RESET_BIT, StopOption
 from .switches import INTERLOCK_BIT, Switches
@@ -71,7 +72,7 @@ class Drive:
         """
         self.deadline = NEVER
         self.faults: set[int] = set()
-        self.causes: set[DriveFault] = set()
+        self.causes: set[Fault] = set()
         self._number = number
         self._objects = objects = DriveObjects(store, number)
         self._errors = errors
@@ -140,9 +141,9 @@ class Drive:
     def start(self, now: float) -> None:
         """Become ready for commands; the device has started."""
         self._machine.start()
-        for fault in sorted(self.causes, key=lambda fault: fault.code):
-            if fault.code:
-                self._fail(fault.code, now, at_once=fault.at_once)
+        for fault in sorted(self.causes, key=lambda fault: fault.value.code):
+            if fault.value.code:
+                self._fail(fault.value.code, now, at_once=fault.value.at_once)
         self._publish(now)
 
     def advance(self, now: float) -> None:
@@ -169,7 +170,7 @@ class Drive:
         self._fail(code, now, at_once=at_once)
         self._publish(now)
 
-    def inject(self, fault: DriveFault, now: float | None = None, *, lasting: bool = True) -> None:
+    def inject(self, fault: Fault, now: float | None = None, *, lasting: bool = True) -> None:
         """Let something go wrong.
 
         Args:
@@ -180,20 +181,20 @@ class Drive:
         now = self._axis.time if now is None else now
         if lasting:
             self.causes.add(fault)
-        if fault is DriveFault.BLOCKED_MOTOR:
+        if fault is Fault.BLOCKED_MOTOR:
             self.block(now=now)
-        if fault is DriveFault.STO:
+        if fault is Fault.STO:
             self.set_voltage(False, now, fault=False)
         else:
-            self.raise_fault(fault.code, now, at_once=fault.at_once)
+            self.raise_fault(fault.value.code, now, at_once=fault.value.at_once)
 
-    def clear(self, fault: DriveFault, now: float | None = None) -> None:
+    def clear(self, fault: Fault, now: float | None = None) -> None:
         """Take the cause of a fault away; the drive then still waits for a fault reset."""
         now = self._axis.time if now is None else now
         self.causes.discard(fault)
-        if fault is DriveFault.BLOCKED_MOTOR:
+        if fault is Fault.BLOCKED_MOTOR:
             self.release(now)
-        if fault is DriveFault.STO:
+        if fault is Fault.STO:
             self.set_voltage(True, now)
 
     def block(self, at: float | None = None, now: float | None = None) -> None:
@@ -304,7 +305,7 @@ class Drive:
         self._errors.report(self._number, code, now)
 
     def _reset_fault(self, now: float) -> None:
-        if any(fault.code for fault in self.causes):
+        if any(fault.value.code for fault in self.causes):
             return
         for code in sorted(self.faults):
             self._errors.clear(self._number, code, now)

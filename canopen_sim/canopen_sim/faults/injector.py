@@ -10,11 +10,10 @@ from typing import Protocol
 from arm_canopen.standard.objects import Index
 
 from ..drive.drive import Drive
-from ..drive.fault import DriveFault
+from ..fault import Fault, FaultInjection
 from ..objects.object_store import ObjectStore
 from ..timed import NEVER
-from .faults import BusFault, Fault, FaultInjection
-from .line import AFFECTED, FaultLine, LineFault
+from .line import FaultLine, LineFault
 
 IDENTITY_OBJECTS: dict[str, tuple[int, int]] = {
     'device_type': (Index.DEVICE_TYPE, 0),
@@ -25,7 +24,7 @@ IDENTITY_OBJECTS: dict[str, tuple[int, int]] = {
 }
 """Where a device says who it is, by the field of the injection (CiA 301, 7.5.2.2 and 7.5.2.18)."""
 
-POWER_FAULTS = frozenset({BusFault.POWER_OFF, BusFault.REBOOT})
+POWER_FAULTS = frozenset({Fault.POWER_OFF, Fault.REBOOT})
 REBOOT_TIME_MIN = 1e-6  # [s] so that off comes before on
 OTHER_VENDOR = 0x7FFF_FFFF  # what a wrong identity shows when no value is given
 
@@ -100,23 +99,23 @@ class FaultInjector:
             ValueError: It is a fault of a drive, and the device is none or lacks the axis.
         """
         self._line.now = now
-        if isinstance(injection.fault, DriveFault) and not self._axes(injection):
+        if injection.fault.value.of_drive and not self._axes(injection):
             raise ValueError(
                 f'device {self._device.node_id} has {len(self._device.drives)} axes; '
-                f'{injection.fault.value} needs one'
+                f'{injection.fault.label} needs one'
             )
         if injection.fault in POWER_FAULTS:
             self._cut_power(injection, now)
             return
-        if isinstance(injection.fault, DriveFault):
+        if injection.fault.value.of_drive:
             for drive in self._axes(injection):
                 drive.inject(injection.fault, now, lasting=injection.lasting)
             if not injection.lasting:
                 return
-        elif injection.fault is BusFault.WRONG_IDENTITY:
+        elif injection.fault is Fault.WRONG_IDENTITY:
             self._disguise(injection)
         line = None
-        if injection.fault in AFFECTED:
+        if injection.fault.value.frames:
             line = LineFault(injection, self._device.node_id)
         end = now + injection.duration if injection.duration else NEVER
         self._active[injection.key] = ActiveFault(injection, end, line)
@@ -148,10 +147,10 @@ class FaultInjector:
             self._update_line()
 
     def _ended(self, injection: FaultInjection, now: float) -> None:
-        if isinstance(injection.fault, DriveFault):
+        if injection.fault.value.of_drive:
             for drive in self._axes(injection):
                 drive.clear(injection.fault, now)
-        elif injection.fault is BusFault.WRONG_IDENTITY:
+        elif injection.fault is Fault.WRONG_IDENTITY:
             for address in IDENTITY_OBJECTS.values():
                 self._device.store.overlay.pop(address, None)
         elif injection.fault in POWER_FAULTS:
@@ -163,7 +162,7 @@ class FaultInjector:
 
     def _cut_power(self, injection: FaultInjection, now: float) -> None:
         duration = injection.duration
-        if injection.fault is BusFault.REBOOT:
+        if injection.fault is Fault.REBOOT:
             duration = max(duration, REBOOT_TIME_MIN)
         for fault in POWER_FAULTS:  # off is off, however often it is asked for
             self._active.pop(replace(injection, fault=fault).key, None)

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from enum import Enum
 import heapq
 import itertools
 import random
@@ -15,22 +14,13 @@ from typing import NamedTuple
 from arm_canopen.can.frame import Frame
 from arm_canopen.standard.sdo import Abort
 
+from ..fault import Fault, FaultInjection, Service
 from ..timed import NEVER
-from .faults import BusFault, Fault, FaultInjection
 
 Deliver = Callable[[Frame, float], None]
 
 SDO_INITIATIONS = (1, 2, 5, 6)  # client command specifiers that name an object (CiA 301, 7.2.4.3)
 FRAME_BYTES = 8  # [byte] of an SDO
-
-
-class Service(Enum):
-    """What a frame is for."""
-
-    SDO = 'SDO'
-    PDO = 'PDO'
-    HEARTBEAT = 'heartbeat'
-    OTHER = 'other'
 
 
 class Traffic(NamedTuple):
@@ -47,23 +37,7 @@ class Traffic(NamedTuple):
     number: int = 0
 
 
-AFFECTED: dict[Fault, tuple[tuple[Service, bool], ...]] = {
-    BusFault.SDO_DELAY: ((Service.SDO, True),),
-    BusFault.SDO_SILENCE: ((Service.SDO, False),),
-    BusFault.SDO_ABORT: ((Service.SDO, False),),
-    BusFault.TPDO_LOSS: ((Service.PDO, True),),
-    BusFault.TPDO_DELAY: ((Service.PDO, True),),
-    BusFault.RPDO_LOSS: ((Service.PDO, False),),
-    BusFault.RPDO_DELAY: ((Service.PDO, False),),
-    BusFault.FRAME_LOSS: tuple((service, way) for service in Service for way in (True, False)),
-    BusFault.HEARTBEAT_STOP: ((Service.HEARTBEAT, True),),
-    BusFault.DISCONNECT: tuple((service, way) for service in Service for way in (True, False)),
-}
-"""Which frames each fault hits: their service, and whether the device sends them."""
-
-DELAYS: frozenset[Fault] = frozenset(
-    {BusFault.SDO_DELAY, BusFault.TPDO_DELAY, BusFault.RPDO_DELAY}
-)
+DELAYS = frozenset({Fault.SDO_DELAY, Fault.TPDO_DELAY, Fault.RPDO_DELAY})
 
 
 class LineFault:
@@ -78,7 +52,7 @@ class LineFault:
         """Begin; each device and fault has random numbers of its own."""
         self.injection = injection
         self._left = injection.count or None
-        seed = f'{injection.seed}/{node_id}/{injection.fault.value}/{injection.pdo}'
+        seed = f'{injection.seed}/{node_id}/{injection.fault.label}/{injection.pdo}'
         self._random = random.Random(seed)  # noqa: S311  # repeatable noise, no secret
 
     @property
@@ -99,9 +73,9 @@ class LineFault:
 
     def _concerns(self, frame: Frame, traffic: Traffic) -> bool:
         injection = self.injection
-        if (traffic.service, traffic.outgoing) not in AFFECTED[injection.fault]:
+        if (traffic.service, traffic.outgoing) not in injection.fault.value.frames:
             return False
-        if injection.fault is BusFault.SDO_ABORT or injection.object is not None:
+        if injection.fault is Fault.SDO_ABORT or injection.object is not None:
             named = sdo_object(frame.data)
             return named is not None and injection.object in (None, named)
         return injection.pdo in (0, traffic.number)
@@ -197,7 +171,7 @@ class FaultLine:
             if fault.injection.fault in DELAYS:
                 delay += fault.injection.delay
                 continue
-            if fault.injection.fault is BusFault.SDO_ABORT:
+            if fault.injection.fault is Fault.SDO_ABORT:
                 index, subindex = sdo_object(frame.data) or (0, 0)
                 self._abort(Abort(index, subindex, fault.injection.abort))
             return None

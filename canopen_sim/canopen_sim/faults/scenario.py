@@ -11,9 +11,9 @@ from arm_canopen.standard.drive import DriveState
 from arm_canopen.standard.nmt import NmtState
 
 from ..device import Device
+from ..fault import Fault, FaultInjection
 from ..host import DeviceHost
 from ..timed import NEVER
-from .faults import Fault, FaultInjection
 
 LOOK_PERIOD = 0.005  # [s] how often positions are compared while an event waits for one
 
@@ -78,11 +78,11 @@ class Step:
     event: Event | None = None
 
     def __str__(self) -> str:
-        """Say it in words."""
+        """Return it in words."""
         devices = ', '.join(str(node_id) for node_id in self.node_ids)
         if self.injection is not None:
             return f'device {devices}: {self.injection}'
-        what = self.ends.value if self.ends is not None else 'all faults'
+        what = self.ends.label if self.ends is not None else 'all faults'
         return f'device {devices}: {what} ended'
 
 

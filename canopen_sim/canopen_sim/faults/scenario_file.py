@@ -25,8 +25,7 @@ Every error names file, line, key and remedy; nothing begins when there is one.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
-import difflib
+from collections.abc import Callable, Mapping
 import os
 from typing import TypeVar
 
@@ -43,10 +42,9 @@ from arm_canopen.config.scalars import describe, integer, number, scalar
 from arm_canopen.standard.drive import DriveState
 from arm_canopen.standard.nmt import NmtState
 
-from ..drive.fault import DriveFault
-from .faults import Fault, FaultInjection, SETTINGS
+from ..fault import Fault, FaultInjection, FAULTS
 from .scenario import Event, Step
-from .text import FAULTS, parse_fault
+from .text import parse_fault, suggestion
 
 KIND = DocumentKind('scenario', "begin with 'steps:' and a list below it")
 TOP_KEYS = ('seed', 'steps')
@@ -122,7 +120,7 @@ class _Reader:
             ends = self._read(entries['end'], _ended)
             return Step(node_ids, ends=ends, after=after, event=event)
         injection = self._injection(item)
-        if injection is not None and isinstance(injection.fault, DriveFault):
+        if injection is not None and injection.fault.value.of_drive:
             self._check_drives(item, node_ids)
         return Step(node_ids, injection, after=after, event=event) if injection else None
 
@@ -184,12 +182,12 @@ class _Reader:
         numbers = {str(node_id): node_id for node_id in self._devices.values()}
         if name in numbers:
             return (numbers[name],)
-        raise RefusedError(f'there is no device {name!r}', _advice(name, self._devices))
+        raise RefusedError(f'unknown device {name!r}', suggestion(name, self._devices))
 
     def _check_keys(self, mapping: YamlMap, known: tuple[str, ...]) -> None:
         for name, item in mapping.entries.items():
             if name not in known:
-                self._findings.error(item.place, f'unknown key {name!r}', _advice(name, known))
+                self._findings.error(item.place, f'unknown key {name!r}', suggestion(name, known))
 
     def _read(self, item: Item | None, reader: Callable[[Item], Value]) -> Value | None:
         """Read a value; what is wrong with it becomes a finding."""
@@ -205,13 +203,13 @@ class _Reader:
 def _settings_of(step: YamlMap) -> tuple[str, ...]:
     item = step.entries.get('fault')
     fault = FAULTS.get(item.text) if isinstance(item, Scalar) else None
-    return ('duration', *SETTINGS[fault]) if fault else ('duration',)
+    return ('duration', *fault.value.settings) if fault else ('duration',)
 
 
 def _fault(item: Item, settings: dict[str, str]) -> FaultInjection:
     name = scalar(item, 'the name of a fault').text
     if name not in FAULTS:
-        raise RefusedError(f'there is no fault {name!r}', _advice(name, FAULTS))
+        raise RefusedError(f'unknown fault {name!r}', suggestion(name, FAULTS))
     try:
         return parse_fault(name, settings)
     except ValueError as error:
@@ -228,7 +226,7 @@ def _ended(item: Item) -> Fault | None:
 def _member(item: Item, members: Mapping[str, Value]) -> Value:
     name = scalar(item, 'a name').text.lower().replace('-', '_').replace(' ', '_')
     if name not in members:
-        raise RefusedError(f'{name!r} is none of the names here', _advice(name, members))
+        raise RefusedError(f'unknown name {name!r}', suggestion(name, members))
     return members[name]
 
 
@@ -241,9 +239,3 @@ def _time(item: Item) -> float:
     if seconds < 0.0:
         raise RefusedError(f'{seconds:g} s is in the past', 'write 0 or more')
     return seconds
-
-
-def _advice(name: str, known: Iterable[str]) -> str:
-    names = list(known)
-    close = difflib.get_close_matches(name, names, n=1)
-    return f'did you mean {close[0]!r}?' if close else f'there are: {", ".join(names)}'

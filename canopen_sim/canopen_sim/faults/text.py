@@ -10,21 +10,22 @@ import re
 
 from arm_canopen.standard.sdo_abort import AbortCode
 
-from ..drive.fault import DriveFault
-from .faults import BusFault, Fault, FaultInjection, SETTINGS
+from ..fault import Fault, FaultInjection, FAULTS
 
 OBJECT = re.compile(r'(?:0x)?([0-9a-f]{4})(?:[:/]([0-9a-f]{1,2}))?', re.IGNORECASE)
 KEPT_WORDS = {'true': True, 'yes': True, 'kept': True, 'false': False, 'no': False, 'lost': False}
-FAULTS: dict[str, Fault] = {fault.value: fault for fault in (*BusFault, *DriveFault)}
-"""Faults by name."""
+
+
+def suggestion(name: str, known: Iterable[str]) -> str:
+    """Return the known name that is nearest to a wrong one, or all when none is near."""
+    names = list(known)
+    close = difflib.get_close_matches(name, names, n=1)
+    return f'did you mean {close[0]!r}?' if close else f'choose one of {", ".join(names)}'
 
 
 def unknown(what: str, name: str, known: Iterable[str]) -> str:
-    """Say that a name is unknown, with the nearest one, or with all when none is near."""
-    names = list(known)
-    close = difflib.get_close_matches(name, names, n=1)
-    hint = f'did you mean {close[0]!r}?' if close else f'there are: {", ".join(names)}'
-    return f'unknown {what} {name!r}; {hint}'
+    """Return that a name is unknown, with a suggestion."""
+    return f'unknown {what} {name!r}; {suggestion(name, known)}'
 
 
 def fault_named(name: str) -> Fault:
@@ -51,7 +52,7 @@ def parse_fault(name: str, settings: Mapping[str, str], **values: float) -> Faul
         ValueError: A name is unknown, or a value has no meaning.
     """
     fault = fault_named(name)
-    known = ('duration', *SETTINGS[fault])
+    known = ('duration', *fault.value.settings)
     fields: dict[str, object] = dict(values)
     for setting, text in settings.items():
         if setting not in known:

@@ -18,9 +18,8 @@ from std_srvs.srv import SetBool, Trigger
 from arm_msgs.srv import InjectFault
 
 from ..device import Device
-from ..drive.fault import DriveFault
-from ..faults.faults import BusFault, FAULT_TEXTS, FaultInjection, SETTINGS
-from ..faults.text import FAULTS, parse_fault, split_settings, unknown
+from ..fault import Fault, FaultInjection, FAULTS
+from ..faults.text import parse_fault, split_settings, unknown
 from ..runner import DeviceRunner
 
 ANSWER_TIMEOUT = 5.0  # [s] the thread of the devices answers within milliseconds
@@ -34,7 +33,7 @@ Work = Callable[[Device, float], str]
 def fault_list() -> str:
     """Return every fault with what it does and its settings, one per line."""
     return '\n'.join(
-        f'  {name}: {FAULT_TEXTS[fault]} ({", ".join((*SETTINGS[fault], "duration"))})'
+        f'  {name}: {fault.value.text} ({", ".join((*fault.value.settings, "duration"))})'
         for name, fault in FAULTS.items()
     )
 
@@ -72,7 +71,7 @@ class FaultServices:
         return self._answer(response, begin)
 
     def _on_power_cycle(self, name: str, _request: Any, response: Any) -> Any:  # noqa: ANN401
-        injection = FaultInjection(BusFault.POWER_OFF, duration=POWER_CYCLE_TIME)
+        injection = FaultInjection(Fault.POWER_OFF, duration=POWER_CYCLE_TIME)
         return self._answer(response, lambda: self._do(name, injecting(injection)))
 
     def _on_sto(self, name: str, request: Any, response: Any) -> Any:  # noqa: ANN401
@@ -156,7 +155,7 @@ def injecting(injection: FaultInjection) -> Work:
 
 def end_faults(device: Device, now: float) -> str:
     """End all faults of a device."""
-    ended = [injection.fault.value for injection in device.faults.active]
+    ended = [injection.fault.label for injection in device.faults.active]
     device.faults.end(now)
     return f'ended: {", ".join(ended)}' if ended else 'no fault went on'
 
@@ -168,9 +167,9 @@ def switch_sto(active: bool, device: Device, now: float) -> str:
         ValueError: The device is no drive.
     """
     if active:
-        device.faults.inject(FaultInjection(DriveFault.STO), now)
+        device.faults.inject(FaultInjection(Fault.STO), now)
         return 'STO is active, the motor has no torque'
     if not device.drives:
         raise ValueError(f'device {device.node_id} is no drive')
-    device.faults.end(now, DriveFault.STO)
+    device.faults.end(now, Fault.STO)
     return 'STO is released'

@@ -11,7 +11,8 @@ from arm_canopen.standard.cob_id import CobId
 from arm_canopen.standard.lss import LSS_REQUEST
 from arm_canopen.standard.nmt import NmtState
 
-from ..faults.line import Service, Traffic
+from ..fault import Service
+from ..faults.line import Traffic
 from .error_control import ErrorControl
 from .lss_slave import LssSlave
 from .nmt_slave import NmtSlave

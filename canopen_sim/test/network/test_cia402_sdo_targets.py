@@ -20,7 +20,7 @@ from arm_canopen.exceptions import DriveError, SdoAbortError, SdoTimeoutError
 from arm_canopen.master.events import Severity
 from arm_canopen.master.scheduler import Promise
 from arm_canopen.standard.drive import DriveState, OperationMode
-from canopen_sim.faults.faults import BusFault, FaultInjection
+from canopen_sim.fault import Fault, FaultInjection
 
 JOINT, NODE_ID = 'joint1', 2
 REQUEST, ANSWER = 0x600 + NODE_ID, 0x580 + NODE_ID
@@ -71,7 +71,7 @@ def leave_behind(net: VirtualNetwork, index: int, value: int) -> None:
 
 def refuse(net: VirtualNetwork, index: int) -> None:
     """Let the drive abort all transfers of an object."""
-    fault = FaultInjection(BusFault.SDO_ABORT, object=(index, 0), abort=0x08000022)
+    fault = FaultInjection(Fault.SDO_ABORT, object=(index, 0), abort=0x08000022)
     net.devices[JOINT].faults.inject(fault, net.now)
 
 
@@ -189,7 +189,7 @@ def test_the_end_of_a_halt_does_not_overtake_its_target(
     net.do(JOINT, 'halt')
     net.run(0.2)
     begin = net.now
-    fault = FaultInjection(BusFault.SDO_DELAY, delay=0.15)  # within the SDO time-out
+    fault = FaultInjection(Fault.SDO_DELAY, delay=0.15)  # within the SDO time-out
     net.devices[JOINT].faults.inject(fault, begin)
     net.result(give(net, target))
     assert net.now - begin > 0.15
@@ -310,7 +310,7 @@ def test_a_target_whose_answer_is_lost_does_not_go_on_moving(mode: OperationMode
 def test_a_stop_before_the_target_is_in_the_drive_is_no_success(verb: str) -> None:
     """Whatever the drive answers later: the target moves nothing any more."""
     net = running_in(OperationMode.PROFILE_VELOCITY)
-    net.devices[JOINT].faults.inject(FaultInjection(BusFault.SDO_DELAY, delay=0.15), net.now)
+    net.devices[JOINT].faults.inject(FaultInjection(Fault.SDO_DELAY, delay=0.15), net.now)
     answered = give(net, 0.4)
     net.do(JOINT, verb, preempt=True)
     with pytest.raises(DriveError, match='stopped before'):
@@ -348,7 +348,7 @@ def test_of_targets_that_come_faster_than_they_are_written_the_newest_counts() -
 def test_any_number_of_targets_may_come_while_one_is_written(mode: OperationMode) -> None:
     """A client that does not wait for its answers gets all of them."""
     net = running_in(mode)
-    net.devices[JOINT].faults.inject(FaultInjection(BusFault.SDO_DELAY, delay=0.1), net.now)
+    net.devices[JOINT].faults.inject(FaultInjection(Fault.SDO_DELAY, delay=0.1), net.now)
     answers = []
     for n in range(2_000):
         answers.append(give(net, 1e-4 * n))

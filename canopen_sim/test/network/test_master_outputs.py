@@ -26,7 +26,7 @@ from arm_canopen.config.model import NodeConfig
 from arm_canopen.exceptions import CanopenError, CodecError
 from arm_canopen.standard.drive import OperationMode
 from arm_canopen.standard.nmt import NmtCommand
-from canopen_sim.faults.faults import BusFault, FaultInjection
+from canopen_sim.fault import Fault, FaultInjection
 
 MODULE = 'module'
 NODE_ID = 5
@@ -150,7 +150,7 @@ def speeds(net: VirtualNetwork, since: float) -> list[int]:
     return [struct.unpack('<I', data)[0] for data in net.frames(SPEEDS, since=since)]
 
 
-def inject(net: VirtualNetwork, fault: BusFault, **settings: float) -> None:
+def inject(net: VirtualNetwork, fault: Fault, **settings: float) -> None:
     """Let the drive answer the SDO for its profile velocity so."""
     injection = FaultInjection(fault, object=(0x6081, 0), **settings)  # type: ignore[arg-type]
     net.devices[JOINT].faults.inject(injection, net.now)
@@ -165,7 +165,7 @@ def test_the_first_targets_of_a_drive_are_where_it_is() -> None:
     net.commands['a'].set_target(0.3)
     net.run(3.0)
     begin = net.now
-    net.devices['a'].faults.inject(FaultInjection(BusFault.DISCONNECT, duration=1.0), begin)
+    net.devices['a'].faults.inject(FaultInjection(Fault.DISCONNECT, duration=1.0), begin)
     net.run_until(lambda: not net.drives['a'].node.online, 1.0)
     net.run_until(net.all_ready, 5.0)
     (at,) = {round(0.3 * SCALE), *net.targets('a', since=begin)}
@@ -190,7 +190,7 @@ def test_a_boot_write_that_fits_no_type_is_refused() -> None:
 def test_an_sdo_write_is_not_undone_while_its_answer_is_awaited() -> None:
     """The device may have taken it at once, so the RPDO carries it from when the request left."""
     net = drive_with_speed_mapped()
-    net.devices[JOINT].faults.inject(FaultInjection(BusFault.SDO_DELAY, delay=0.1), net.now)
+    net.devices[JOINT].faults.inject(FaultInjection(Fault.SDO_DELAY, delay=0.1), net.now)
     begin = net.now
     net.result(net.network.nodes[JOINT].objects.write_object(0x6081, 0, 2_000))
     assert net.now - begin > 0.1
@@ -200,7 +200,7 @@ def test_an_sdo_write_is_not_undone_while_its_answer_is_awaited() -> None:
 def test_an_sdo_write_that_is_refused_leaves_the_rpdo_as_it_was() -> None:
     """The device keeps its value, so the RPDO must not bring another one."""
     net = drive_with_speed_mapped()
-    inject(net, BusFault.SDO_ABORT)
+    inject(net, Fault.SDO_ABORT)
     promise = net.network.nodes[JOINT].objects.write_object(0x6081, 0, 2_000)
     net.run_until(lambda: promise.done)
     assert promise.error is not None
@@ -213,7 +213,7 @@ def test_a_value_published_meanwhile_outlives_a_write_that_is_refused() -> None:
     """Set back is only what the request has set."""
     net = drive_with_speed_mapped()
     node = net.network.nodes[JOINT]
-    inject(net, BusFault.SDO_SILENCE)
+    inject(net, Fault.SDO_SILENCE)
     promise = node.objects.write_object(0x6081, 0, 2_000)
     net.run(0.05)
     net.network.publish_object(node, 0x6081, 0, 3_000)
@@ -228,7 +228,7 @@ def test_a_write_that_waits_in_the_queue_changes_no_rpdo_yet() -> None:
     """Of two writes the first one's value leaves until the second one is on its way."""
     net = drive_with_speed_mapped()
     node = net.network.nodes[JOINT]
-    net.devices[JOINT].faults.inject(FaultInjection(BusFault.SDO_DELAY, delay=0.1), net.now)
+    net.devices[JOINT].faults.inject(FaultInjection(Fault.SDO_DELAY, delay=0.1), net.now)
     node.objects.write_object(0x6081, 0, 2_000)
     promise = node.objects.write_object(0x6081, 0, 4_000)
     begin = net.now + 1e-6

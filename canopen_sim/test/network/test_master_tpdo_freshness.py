@@ -24,7 +24,7 @@ from arm_canopen.master.process_image import ReceivedTpdo, SyncRound
 from arm_canopen.standard.dictionary import ObjectDictionary
 from arm_canopen.standard.drive import DriveState, OperationMode
 from canopen_sim.drive.drive import Drive as SimulatedDrive
-from canopen_sim.faults.faults import BusFault, FaultInjection
+from canopen_sim.fault import Fault, FaultInjection
 
 JOINT, NODE_ID = 'joint1', 2
 TPDOS = {0x180 + NODE_ID, 0x280 + NODE_ID}
@@ -135,7 +135,7 @@ def test_a_device_that_refuses_its_event_timer_is_named() -> None:
 def test_a_timer_that_is_taken_at_the_next_boot_counts_again() -> None:
     """The loss is noticed from then on, and a device that refuses it once more is named again."""
     net = VirtualNetwork(replace(bus_config(on_change()), locations={(JOINT,): SourceLocation()}))
-    refused = FaultInjection(BusFault.SDO_ABORT, object=(0x1800, 5), abort=0x06090030)
+    refused = FaultInjection(Fault.SDO_ABORT, object=(0x1800, 5), abort=0x06090030)
     net.start()
     for refuses in (True, False, True):
         begin = len(net.told(Severity.WARNING))
