@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
 import math
 
@@ -12,12 +13,13 @@ import numpy as np
 
 from arm_model import JointLimits, RobotState
 
+from .approach import approach_path, stop_path
 from .exceptions import GoalError
 from .goal import GoalRules, TrajectoryGoal
 from .goal_points import Points, refuse, upcoming_points
 from .path import cubic, linear, Path, PathPoint, quintic, Segment
 from .path_bounds import farthest_beyond
-from .path_rounding import rounded, with_run_out
+from .path_rounding import rounded, run_out
 from .path_timing import Demand, Timing
 
 MAX_SPEED_EXCESS = 1.02
@@ -29,6 +31,9 @@ MAX_DELAY = (1.1, 0.5)
 As much as MoveIt waits for by default: allowed_execution_duration_scaling,
 allowed_goal_duration_margin.
 """
+
+NEGLIGIBLE_DELAY = 0.01
+"""Time by which a path may take longer without a word in [s]."""
 
 STRAIGHT_TOLERANCE = 1e-3
 """Bulge of a segment that counts as straight where its ends do not fit together in [rad]."""
@@ -64,11 +69,12 @@ class GoalPath:
 
 @dataclass(frozen=True, slots=True)
 class _Haste:
-    """Why there is too little time, at what time, and how many times the time may suffice."""
+    """What needs more time, in a sentence and in short, when, and how many times the time."""
 
     reason: str
+    cause: str
     time: float
-    factor: float
+    factor: float = 1.0
 
 
 def build_path(
@@ -101,46 +107,114 @@ def build_path(
 
 def _tried(points: Points, limits: JointLimits, state: RobotState) -> GoalPath | _Haste:
     """Return the path through points, or why there is too little time for it."""
-    answer = _walkable(points, limits, state)
+    if state.moving:
+        return _from_motion(points, limits, state)
     approach = float(points.times[0])
+    answer = _from_rest(points, limits, state)
     if (
         isinstance(answer, GoalPath)
         or approach == 0.0
         or answer.time > 2.0 * approach + MIN_APPROACH_MARGIN
     ):
         return answer
-    # only the way from the present motion to the first point is longer
+    # only the way to the first point is longer
     for share in APPROACH_FACTORS:
         more = share * (approach + MIN_APPROACH_MARGIN)
-        try:
-            later = _walkable(points.delayed(more), limits, state)
-        except GoalError:  # it would swing out beyond a limit
-            return answer
+        later = _from_rest(points.delayed(more), limits, state)
         if isinstance(later, GoalPath):
             return later
     return answer
 
 
-def _walkable(points: Points, limits: JointLimits, state: RobotState) -> GoalPath | _Haste:
-    """Return the path through points, or why there is too little time."""
-    path = _given(points, limits, state)
+def _from_rest(points: Points, limits: JointLimits, state: RobotState) -> GoalPath | _Haste:
+    """Return the path through points from a state of rest, or why there is too little time."""
+    segments = [*_first(points, state), *_between(points, limits)]
+    if not segments:  # one point, at once, where the arm is
+        segments.append(linear(0.0, 1e-3, points.positions[0], points.positions[0]))
+    path = Path([*segments, *_run_out(points, segments, limits)])
+    beyond = _beyond(path, limits, state)
+    if beyond is not None:
+        if points.velocities is not None or points.times[0] == 0.0:
+            raise beyond
+        straight = linear(0.0, segments[0].duration, state.position, points.positions[0])
+        path = Path([straight, *segments[1:]])
+    scaled, haste = _time_scaled(path, limits)
+    return haste if scaled is None else _in_time(scaled, points, haste)
+
+
+def _from_motion(points: Points, limits: JointLimits, state: RobotState) -> GoalPath | _Haste:
+    """Return the path through points of an arm in motion, or why there is too little time.
+
+    From the first point on it is the same wherever the arm comes from.
+    """
+    lead, begin = float(points.times[0]), points.at(0)
+    shifted, haste = points.delayed(-lead), _Haste('', '', lead)
+    segments = _between(shifted, limits)
+    onward: Sequence[Segment] = [*segments, *_run_out(shifted, segments, limits)]
+    if onward:
+        path = Path(onward)
+        if (beyond := _beyond(path, limits, state)) is not None:
+            raise beyond
+        scaled, haste = _time_scaled(path, limits, from_rest=False)
+        haste = replace(haste, time=lead + haste.time)
+        if scaled is None:
+            return haste
+        begin, onward = scaled.at(0.0), scaled.segments
+    approach = approach_path(state, begin, lead, limits)
+    if approach is None:
+        return _after_stop(points, limits, state)
+    if approach.duration > lead + NEGLIGIBLE_DELAY or not onward:
+        haste = _Haste(
+            f'from its motion the arm needs {approach.duration:.3f} s to the first point, which'
+            f' is at {lead:.3f} s',
+            'way from the motion to the first point',
+            lead,
+        )
+    return _in_time(approach.followed_by(onward), points, haste)
+
+
+def _after_stop(points: Points, limits: JointLimits, state: RobotState) -> GoalPath | _Haste:
+    """Return the path through points of an arm that comes to rest first.
+
+    For a first point to which no way leads from the motion within the limits of position.
+    """
+    stop = stop_path(state, limits)
+    if stop is None:
+        raise refuse('the arm cannot come to rest in front of the trajectory; stop it first')
+    saved = stop.duration if points.times[0] > 2.0 * stop.duration else 0.0
+    rest = RobotState.at_rest(stop.end.position)
+    answer = _tried(points.delayed(-saved), limits, rest)
+    if isinstance(answer, _Haste):
+        return replace(answer, time=answer.time + saved)
+    haste = _Haste(
+        f'the arm needs {stop.duration:.3f} s to come to rest first',
+        'stop in front of it',
+        stop.duration,
+    )
+    return _in_time(stop.followed_by(answer.path.segments), points, haste)
+
+
+def _time_scaled(
+    path: Path, limits: JointLimits, *, from_rest: bool = True
+) -> tuple[Path | None, _Haste]:
+    """Return a path with its corners rounded, as quick as can be, and what asks most of it."""
     demand = Timing(path, limits).fastest
     if demand.share > MAX_SPEED_EXCESS:
-        return _Haste(_words(demand, limits), demand.time, demand.share)
-    path = rounded(path, limits)
-    timing = Timing(path, limits)
-    scaled, demand = timing.time_scaled(), timing.plainest
-    if scaled is None:
-        return _Haste(_words(demand, limits), demand.time, timing.demand.share)
+        return None, _haste(demand, limits, demand.share)
+    timing = Timing(rounded(path, limits, from_rest=from_rest), limits)
+    return timing.time_scaled(), _haste(timing.plainest, limits, timing.demand.share)
+
+
+def _in_time(path: Path, points: Points, haste: _Haste) -> GoalPath | _Haste:
+    """Return a path that does not take much longer than asked, or why it does."""
     most = MAX_DELAY[0] * points.asked + MAX_DELAY[1]
-    if scaled.duration > most:
-        enough = (scaled.duration - MAX_DELAY[1]) / MAX_DELAY[0]
-        return _Haste(_words(demand, limits), demand.time, enough / max(points.asked, 1e-9))
-    late = scaled.duration - points.asked
-    if late < 0.01:
-        return GoalPath(scaled, '')
-    cause = f'{QUANTITIES[demand.quantity][1]} of {limits.names[demand.joint]}'
-    return GoalPath(scaled, f'{late:.2f} s later than asked, for the {cause}')
+    if path.duration > most:
+        enough = (path.duration - MAX_DELAY[1]) / MAX_DELAY[0]
+        return replace(haste, factor=enough / max(points.asked, 1e-9))
+    late = path.duration - points.asked
+    if late < NEGLIGIBLE_DELAY:
+        return GoalPath(path, '')
+    return GoalPath(path, f'{late:.2f} s later than asked, for the {haste.cause}')
 
 
 def _sufficient(points: Points, limits: JointLimits, state: RobotState, guess: float) -> float:
@@ -161,35 +235,38 @@ def _hundredths(factor: float) -> float:
     return math.ceil(factor * 100.0) / 100.0
 
 
-def _words(demand: Demand, limits: JointLimits) -> str:
-    unit, name = QUANTITIES[demand.quantity]
+def _haste(demand: Demand, limits: JointLimits, factor: float) -> _Haste:
+    unit, quantity = QUANTITIES[demand.quantity]
     limit = (limits.velocity, limits.acceleration, limits.jerk)[demand.quantity][demand.joint]
-    return (
-        f'{limits.names[demand.joint]} would need {demand.value:.3f} {unit} at'
-        f' {demand.time:.3f} s, its limit of {name} is {limit:.3f}'
+    name = limits.names[demand.joint]
+    return _Haste(
+        f'{name} would need {demand.value:.3f} {unit} at {demand.time:.3f} s, its limit of'
+        f' {quantity} is {limit:.3f}',
+        f'{quantity} of {name}',
+        demand.time,
+        factor,
     )
 
 
-def _given(points: Points, limits: JointLimits, state: RobotState) -> Path:
-    """Return the path as it is given, with its corners, once it keeps within the limits."""
-    joined = bool(points.times[0] > 0.0) and state.moving
-    segments = [*_first(points, state), *_between(points, limits)]
-    if not segments:  # one point, at once, where the arm is
-        segments.append(linear(0.0, 1e-3, points.positions[0], points.positions[0]))
-    path = Path(segments, joined)
-    if points.velocities is not None:
-        path = with_run_out(path, limits)
+def _run_out(points: Points, segments: list[Segment], limits: JointLimits) -> list[Segment]:
+    """Return how the arm comes to rest behind the last point, where that has a velocity."""
+    if points.velocities is None:
+        return []
+    last = segments[-1] if segments else None
+    end = float(points.times[-1])
+    return run_out(end, points.at(-1) if last is None else last.at(end), limits)
+
+
+def _beyond(path: Path, limits: JointLimits, state: RobotState) -> GoalError | None:
+    """Return the refusal of a path that leads beyond a limit of position."""
     # an arm that is beyond a limit may come back
     lower = np.minimum(limits.lower, state.position)
     upper = np.maximum(limits.upper, state.position)
     beyond = farthest_beyond(path, lower, upper)
     if beyond is None:
-        return path
-    if points.velocities is None and segments[0].start == 0.0 < points.times[0] and not joined:
-        straight = linear(0.0, segments[0].duration, state.position, points.positions[0])
-        return Path([straight, *segments[1:]])
+        return None
     joint = beyond.joint
-    raise refuse(
+    return refuse(
         f'{limits.names[joint]} would be at {beyond.position:.4f} at {beyond.time:.3f} s, beyond'
         f' its limits {limits.lower[joint]:.4f}..{limits.upper[joint]:.4f}: speeds lead there'
         ' between the points; set points farther from the limit, or lower speeds'
@@ -197,22 +274,26 @@ def _given(points: Points, limits: JointLimits, state: RobotState) -> Path:
 
 
 def _from_here(points: Points, limits: JointLimits, state: RobotState, rules: GoalRules) -> Points:
-    """Give a first point without time the time to get there, where the arm is beside it."""
+    """Give a first point without time the time to get there, or leave it out in motion."""
     off = np.abs(points.positions[0] - state.position)
-    if points.times[0] > 0.0 or float(off.max()) < START_TOLERANCE:
+    if points.times[0] > 0.0:
         return points
     if float(off.max()) > rules.start:
         raise refuse(
             f'the first point is {off.max():.3f} rad away from where the arm is and has no'
             ' time_from_start; give it time, or plan from the present state'
         )
+    if state.moving:  # it has passed already, and the next one can be met
+        return points.since(1) if len(points.times) > 1 else points
+    if float(off.max()) < START_TOLERANCE:
+        return points
     # as a part of the path it heeds the speed override; peaks of a quintic from rest to rest
     needed = (
         1.875 * off / limits.velocity,
         np.sqrt(5.774 * off / limits.acceleration),
         np.cbrt(60.0 * off / limits.jerk),
     )
-    return points if state.moving else points.delayed(float(np.max(needed)))
+    return points.delayed(float(np.max(needed)))
 
 
 def _first(points: Points, state: RobotState) -> list[Segment]:

@@ -69,6 +69,20 @@ class Points:
         """
         return replace(self, times=self.times + by)
 
+    def since(self, place: int) -> Points:
+        """Return the points from one on.
+
+        Args:
+            place: The number of the first that is kept.
+        """
+        return Points(
+            self.times[place:],
+            self.positions[place:],
+            None if self.velocities is None else self.velocities[place:],
+            None if self.accelerations is None else self.accelerations[place:],
+            self.asked,
+        )
+
 
 def upcoming_points(
     goal: TrajectoryGoal, limits: JointLimits, state: RobotState, rules: GoalRules
@@ -208,14 +222,8 @@ def _upcoming(points: Points, age: float) -> Points:
         )
     # a point that passes in a moment cannot be met; the next one can, and the last one is the goal
     soonest = MIN_JOIN_TIME if age > 0.0 else 0.0
-    left = slice(min(int(np.searchsorted(times, soonest)), len(times) - 1), None)
-    return Points(
-        times[left],
-        points.positions[left],
-        None if points.velocities is None else points.velocities[left],
-        None if points.accelerations is None else points.accelerations[left],
-        float(times[-1]),
-    )
+    left = min(int(np.searchsorted(times, soonest)), len(times) - 1)
+    return replace(points, times=times, asked=float(times[-1])).since(left)
 
 
 def _by_the_short_way(points: Points, limits: JointLimits, state: RobotState) -> Points:

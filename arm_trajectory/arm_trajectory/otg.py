@@ -56,6 +56,15 @@ class Plan:
         return RobotState(places, np.array(velocity), np.array(acceleration))
 
     @property
+    def switches(self) -> Array:
+        """Times at which the jerk of a joint changes, to the end, in [s]."""
+        ends = [np.array([self.duration])]
+        for profile in self._trajectory.profiles[0]:
+            phases = (*profile.brake.t, *profile.t)
+            ends.append(np.minimum(np.cumsum(phases), self.duration))
+        return np.unique(np.concatenate(ends))
+
+    @property
     def extremes(self) -> tuple[Array, Array]:
         """Least and greatest position of each joint on the way in [rad]."""
         if self._lower is None or self._upper is None:

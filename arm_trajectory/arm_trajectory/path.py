@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 
 import numpy as np
@@ -156,17 +156,14 @@ class Path:
         coefficients: Their coefficients (k, 6, n).
         duration: How long all of it lasts in [s].
         end: Its last place; beyond it the arm rests there.
-        joined: Whether it begins with the velocity and acceleration that the arm has.
     """
 
-    def __init__(self, segments: Sequence[Segment], joined: bool = False) -> None:
+    def __init__(self, segments: Sequence[Segment]) -> None:
         """Join segments.
 
         Args:
             segments: At least one; each begins where and when the one before ends.
-            joined: Whether it begins with the velocity and acceleration that the arm has.
         """
-        self.joined = joined
         self.segments = tuple(segments)
         self._starts = [segment.start for segment in self.segments]  # bisect is quicker on a list
         self.starts: Array = np.array(self._starts)
@@ -174,6 +171,11 @@ class Path:
         last = self.segments[-1]
         self.duration = last.start + last.duration
         self.end = last.at(self.duration)
+
+    def followed_by(self, segments: Sequence[Segment]) -> Path:
+        """Return it with the segments of another path, which begins at 0, behind its end."""
+        later = (replace(each, start=self.duration + each.start) for each in segments)
+        return Path([*self.segments, *later])
 
     def at(self, time: float) -> PathPoint:
         """Return the place at a time of the path in [s]; beyond its end it rests there."""

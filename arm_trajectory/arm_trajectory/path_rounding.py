@@ -45,7 +45,7 @@ class _Corners:
     rooms: Array
 
 
-def rounded(path: Path, limits: JointLimits) -> Path:
+def rounded(path: Path, limits: JointLimits, *, from_rest: bool = True) -> Path:
     """Round the corners of a path, its begin and its end among them.
 
     Where velocity or acceleration jump by D or E, the path goes over smoothly within a time 2 d
@@ -58,12 +58,15 @@ def rounded(path: Path, limits: JointLimits) -> Path:
     Args:
         path: Segments, of which neighbours may meet in a corner.
         limits: Limits of the joints.
+        from_rest: Whether the arm rests at its begin; else that stays as it is.
     """
-    corners = _corners(path)
-    halves = _halves(corners, path, limits)
+    corners = _corners(path, from_rest=from_rest)
+    halves = _halves(corners, limits)
+    if not from_rest:
+        halves = np.minimum(halves, corners.times)
     if not halves.any():
         return path
-    lead = 0.0 if path.joined else max(float(np.max(halves - corners.times)), 0.0)
+    lead = max(float(np.max(halves - corners.times)), 0.0)
     tail = max(float(np.max(corners.times + halves)) - path.duration, 0.0)
     base = _between_rests(path, lead, tail)
     starts = _breaks(base, corners.times, halves)
@@ -74,29 +77,27 @@ def rounded(path: Path, limits: JointLimits) -> Path:
         [
             Segment(float(start) + lead, float(end - start), piece)
             for start, end, piece in zip(starts[:-1], starts[1:], pieces, strict=True)
-        ],
-        joined=path.joined,
+        ]
     )
 
 
-def with_run_out(path: Path, limits: JointLimits) -> Path:
-    """Let a path that ends with a velocity come to rest behind its end.
+def run_out(start: float, end: PathPoint, limits: JointLimits) -> list[Segment]:
+    """Return how a path that ends with a velocity comes to rest behind its end.
 
     Args:
-        path: The path.
+        start: When the path ends in [s].
+        end: Its last place.
         limits: Limits of the joints.
     """
-    end = path.end
     still = np.zeros_like(end.velocity)
     duration = 2.0 * float(_needed(end.velocity[None], still[None], limits)[0])
     if duration == 0.0:
-        return path
+        return []
     behind = PathPoint(end.position + 0.5 * duration * end.velocity, still, still)
-    out = quintic(path.duration, duration, PathPoint(end.position, end.velocity, still), behind)
-    return Path([*path.segments, out], path.joined)
+    return [quintic(start, duration, PathPoint(end.position, end.velocity, still), behind)]
 
 
-def _corners(path: Path) -> _Corners:
+def _corners(path: Path, *, from_rest: bool) -> _Corners:
     """Return the joints of the segments, and begin and end against rest."""
     places, lasts = np.arange(len(path.segments)), path.durations
     at_rest = np.zeros((1, path.coefficients.shape[2]))
@@ -105,7 +106,7 @@ def _corners(path: Path) -> _Corners:
         - np.concatenate((at_rest, path.derived(order, places, lasts)))
         for order in (1, 2)
     )
-    if path.joined:
+    if not from_rest:
         jumps[0], bends[0] = 0.0, 0.0
     rooms = 0.5 * np.minimum(np.append(lasts, np.inf), np.insert(lasts, 0, np.inf))
     return _Corners(np.append(path.starts, path.duration), jumps, bends, rooms)
@@ -123,7 +124,7 @@ def _needed(jumps: Array, bends: Array, limits: JointLimits) -> Array:
     return halves
 
 
-def _halves(corners: _Corners, path: Path, limits: JointLimits) -> Array:
+def _halves(corners: _Corners, limits: JointLimits) -> Array:
     """Return half the time of each rounding in [s]; 0 without a corner."""
     jump = np.maximum(np.abs(corners.jumps).max(axis=1), 1e-12)
     bend = np.maximum(np.abs(corners.bends).max(axis=1), 1e-12)
@@ -131,13 +132,10 @@ def _halves(corners: _Corners, path: Path, limits: JointLimits) -> Array:
         OVERLAP_TOLERANCE / (3.0 / 16.0 * jump),
         np.sqrt(OVERLAP_TOLERANCE / (DEVIATION_FACTOR * bend)),
     )
-    halves = np.minimum(
+    halves: Array = np.minimum(
         _needed(corners.jumps, corners.bends, limits), np.maximum(corners.rooms, harmless)
     )
-    if path.joined:  # the begin stays as it is
-        halves = np.minimum(halves, corners.times)
-    rounds: Array = halves
-    return rounds
+    return halves
 
 
 def _between_rests(path: Path, lead: float, tail: float) -> Path:
@@ -147,7 +145,7 @@ def _between_rests(path: Path, lead: float, tail: float) -> Path:
         segments.insert(0, _rest(-lead, lead, path.at(0.0).position))
     if tail > 0.0:
         segments.append(_rest(path.duration, tail, path.end.position))
-    return Path(segments, path.joined)
+    return Path(segments)
 
 
 def _rest(start: float, duration: float, position: Array) -> Segment:

@@ -110,10 +110,7 @@ class Timing:
         )
 
     def time_scaled(self) -> Path | None:
-        """Return the path within the limits, as quick as a spline makes it; None for no way.
-
-        A path that joins a motion begins with its speed; what is asked there cannot be changed.
-        """
+        """Return the path within the limits, as quick as a spline makes it; None for no way."""
         if self.demand.share <= 1.0:
             return self._path
         for full in LIMIT_FACTORS:
@@ -131,7 +128,6 @@ class Timing:
         """Return the scaling with knots about a distance apart, if there is one."""
         count = max(math.ceil(self._path.duration / knots), 1)
         scaling = TimeScaling(np.ones(count + 3), self._path.duration)
-        pinned = 3 if self._path.joined else 0
         cells, basis = scaling.basis(self._times)
         for _ in range(MAX_ITERATIONS):
             r, slope, bend = (scaling.derived(cells, row) for row in basis)
@@ -142,7 +138,6 @@ class Timing:
             np.maximum.at(most, cells, needed)
             wide = np.concatenate((np.ones(3), most, np.ones(3)))
             growth = np.max([wide[shift : shift + count + 3] for shift in range(4)], axis=0)
-            growth[:pinned] = 1.0
             scaling = TimeScaling(scaling.coefficients * growth, scaling.length)
         return None
 
@@ -253,6 +248,5 @@ def _scaled_path(path: Path, scaling: TimeScaling) -> Path:
         [
             Segment(*each)
             for each in zip(times[:-1].tolist(), lengths.tolist(), pieces, strict=True)
-        ],
-        path.joined,
+        ]
     )
