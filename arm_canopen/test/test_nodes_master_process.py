@@ -111,7 +111,7 @@ def test_all_are_operational_after_the_last_of_them(
     bus = VirtualBus('here', VirtualWire())
     process = MasterProcess(node, config, bus, diagnostics_period=60.0)
     for device in config.nodes:
-        process._report(Event(EventKind.BOOT, Severity.INFO, device.name, 'operational'))
+        process._master._report(Event(EventKind.BOOT, Severity.INFO, device.name, 'operational'))
     process._output.start()
     process._output.stop()
     lines = capfd.readouterr().err.splitlines()

@@ -30,10 +30,10 @@ from ..config import load_bus
 from ..config.checks import check_bus
 from ..config.model import BusConfig
 from ..exceptions import CanopenError
+from ..library.bus_master import THREAD_PRIORITY
 from .managed_bus import MANAGER
 from .master_process import MasterProcess
 
-THREAD_PRIORITY = 50  # SCHED_FIFO, as ros2_control has it
 SWITCH_INTERVAL = 0.0005  # [s] how long a busy callback may keep the interpreter from the cycle
 HELP = f"""\
 Run the CANopen master and the drives of a bus.yml until Ctrl-C, then stop and disable the drives.

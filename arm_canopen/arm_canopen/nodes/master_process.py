@@ -4,9 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from concurrent.futures import Future, wait
-from concurrent.futures import TimeoutError as FutureTimeoutError
 from functools import partial
 import time
 
@@ -17,22 +15,12 @@ from rclpy.time import Time
 from node_runner import notify_ready, raise_thread_priority
 
 from ..can.bus import Bus
-from ..can.frame import Frame
-from ..can.load import BusLoad
-from ..cia402.drive import Drive
-from ..cia402.drive_commands import DriveCommands
 from ..cia402.motion import MotionSource
-from ..cia402.motion_group import MotionGroup
 from ..cia402.status import drive_status
-from ..cia402.stop_sequence import SHUTDOWN_MAX
 from ..config.model import BusConfig
 from ..exceptions import CanopenError
+from ..library.bus_master import BusMaster
 from ..master.events import Event, EventKind, Severity
-from ..master.network import Network
-from ..master.other_master import describe, listen, refuse_other_master
-from ..master.remote_node import RemoteNode
-from ..master.runner import NetworkThread
-from ..master.scheduler import Scheduler
 from ..master.status import node_status
 from .device_node import DeviceNode
 from .diagnostics import bus_diagnostic, BusStatus, device_diagnostic, drive_diagnostic
@@ -43,23 +31,8 @@ from .output_thread import OutputThread
 
 LISTENER_PERIOD = 0.1  # [s] how soon a new subscriber hears something
 LAST_WORD_TIMEOUT = 0.5  # [s] for the last /diagnostics
-STOP_TIMEOUT = SHUTDOWN_MAX + 2.0  # [s] for all drives to stop; each has its own shorter limits
 
 JointSample = tuple[DriveNode, list[tuple[float, float, float]]]
-
-
-async def leave_device(
-    device: RemoteNode, axes: Sequence[DriveCommands], scheduler: Scheduler
-) -> None:
-    """Stop the axes of a device, then let the master end without a reaction of the device.
-
-    Raises:
-        DriveError: An axis keeps its power; the device goes on to watch the master, and stops it.
-    """
-    await scheduler.gather(
-        [axis.run('shutdown', axis.stops.shutdown(), preempt=True) for axis in axes]
-    )
-    await device.unwatch()
 
 
 class MasterProcess:
@@ -92,27 +65,20 @@ class MasterProcess:
         """
         self.bus = config
         self._node = node
-        self._can = can
         self._output = OutputThread(node.get_logger())
-        self._load = BusLoad(config.master.bitrate, time.monotonic())
         self._thread_priority = thread_priority
-        self._beside_master = beside_master
-        self._network = Network(config, self._send, self._report, beside_master=beside_master)
-        self._network.on_frame = self._load.count
-        self._thread = NetworkThread(can, self._network)
-        self._group = self._build_drives()
-        self._network.on_cycle = self._group.cycle
+        self._master = BusMaster(config, can, self._report, beside_master=beside_master)
+        self._master.on_operational = lambda: self._output.post(self._report_ready)
+        self._network, self._thread = self._master.network, self._master.thread
         self._network.on_feedback = self._feedback
-        self._started = False
         self._feedback_posted = False
-        self._operational: set[str] = set()
         self._devices = {
             device.name: DeviceNode(device, self._thread, self._output)
             for device in self._network.nodes.values()
             if not device.config.is_drive
         }
         self._drives = {
-            device.name: DriveNode(device, self._axes(device), self._thread, self._output)
+            device.name: DriveNode(device, self._master.axes(device), self._thread, self._output)
             for device in self._network.nodes.values()
             if device.config.is_drive
         }
@@ -124,7 +90,7 @@ class MasterProcess:
         devices = {**self._devices, **self._drives}
         self.nodes: list[Node] = [node, *devices.values()]
         if config.master.is_lifecycle:
-            managed = ManagedBus(node, devices, self._axes, self._thread, self._output)
+            managed = ManagedBus(node, devices, self._master.axes, self._thread, self._output)
             services.admit = managed.admit
             self.nodes.append(managed.manager)
 
@@ -134,44 +100,25 @@ class MasterProcess:
         Raises:
             OtherMasterError: There is one, and nobody said to go on beside it.
         """
-        if not self._beside_master:
-            refuse_other_master(self._can, self.bus)
-        elif heard := listen(self._can, self.bus):
+        if heard := self._master.listen():
             self._node.get_logger().warning(
-                f'going on beside another master, as beside_master says: {describe(heard)}'
+                f'going on beside another master, as beside_master says: {heard}'
             )
 
     def start(self) -> None:
         """Boot the devices and start the cycle."""
-        self._started = True
         self._output.start()
         what, priority = 'the CANopen cycle', self._thread_priority
-        self._thread.start(lambda: raise_thread_priority(self._node, priority, what))
+        self._master.start(lambda: raise_thread_priority(self._node, priority, what))
 
     def stop(self) -> None:
         """Bring every drive to quick stop and disable it, then end the cycle."""
-        if not self._started:
+        if not self._master.started:
             return  # the devices are not ours
-        scheduler = self._network.scheduler
-
-        async def leave() -> None:
-            devices = self._network.nodes.values()
-            await scheduler.gather(
-                [
-                    scheduler.spawn(leave_device(each, self._axes(each), scheduler))
-                    for each in devices
-                ]
-            )
-
         try:
-            self._thread.run_coroutine(leave).result(STOP_TIMEOUT)
-        except FutureTimeoutError:
-            self._node.get_logger().error('the drives did not all stop in time')
+            self._master.stop_drives()
         except CanopenError as error:
-            self._node.get_logger().error(
-                f'the drives could not be stopped: {error}; those that watch the heartbeat of the '
-                'master stop by themselves'
-            )
+            self._node.get_logger().error(str(error))
         finally:
             last = self._ask_diagnostics()  # in which states the drives are left
             wait([last], LAST_WORD_TIMEOUT)
@@ -185,7 +132,7 @@ class MasterProcess:
             Done before the next cycle; or KeyError: an axis is no drive of this bus, BusError: the
             cycle has ended.
         """
-        return self._thread.call(lambda: self._group.attach(source))
+        return self._master.attach(source)
 
     def detach(self, source: MotionSource) -> Future[None]:
         """End a motion source, from any thread; drives that it moved are braked.
@@ -193,34 +140,15 @@ class MasterProcess:
         Returns:
             Done before the next cycle.
         """
-        return self._thread.call(lambda: self._group.detach(source))
-
-    def _build_drives(self) -> MotionGroup:
-        scheduler = self._network.scheduler
-        drives = [
-            Drive(device, scheduler, axis)
-            for device in self._network.nodes.values()
-            if device.config.is_drive
-            for axis in device.config.axes
-        ]
-        self._commands = {drive.name: DriveCommands(drive, scheduler) for drive in drives}
-        return MotionGroup(drives, self._report)
+        return self._master.detach(source)
 
     def _check_owner(self, node_id: int, index: int) -> None:
         for node in self._drives.values():
             if node.device.config.node_id == node_id:
                 node.check_owner(index)
 
-    def _axes(self, device: RemoteNode) -> list[DriveCommands]:
-        return [entry for entry in self._commands.values() if entry.drive.node is device]
-
-    def _send(self, frame: Frame) -> None:
-        self._can.send(frame)
-        self._load.count(frame)
-
     def _report(self, event: Event) -> None:
         self._output.post_stream((event.kind, event.node), partial(self._tell, event))
-        self._count_operational(event)
 
     def _feedback(self, sync_time: float) -> None:
         if self._feedback_posted:
@@ -238,9 +166,9 @@ class MasterProcess:
         now = time.monotonic()
         controller = self._network.controller
         status = BusStatus(
-            self._can.name,
-            self._can.counters,
-            self._load.figures(now),
+            self._master.can.name,
+            self._master.can.counters,
+            self._master.load.figures(now),
             self._thread.figures(),
             self._network.missed_pdos,
             self._network.late_pdos,
@@ -255,10 +183,10 @@ class MasterProcess:
         for device in self._network.nodes.values():
             node = self._drives.get(device.name)
             if node is None:
-                statuses.append(device_diagnostic(self._can.name, node_status(device, now)))
+                statuses.append(device_diagnostic(self._master.can.name, node_status(device, now)))
                 continue
             drives = [drive_status(axis, now) for axis in node.axes]
-            statuses += [drive_diagnostic(self._can.name, drive) for drive in drives]
+            statuses += [drive_diagnostic(self._master.can.name, drive) for drive in drives]
         return statuses
 
     def _publish_joints(self, sync_time: float, samples: list[JointSample]) -> None:
@@ -281,14 +209,6 @@ class MasterProcess:
         node = self._drives.get(event.node) or self._devices.get(event.node)
         if node is not None and event.kind in (EventKind.NMT_STATE, EventKind.HEARTBEAT_LOST):
             node.publish_nmt_state()
-
-    def _count_operational(self, event: Event) -> None:
-        if event.kind is EventKind.HEARTBEAT_LOST:
-            self._operational.discard(event.node)
-        elif event.kind is EventKind.BOOT:
-            self._operational.add(event.node)
-            if len(self._operational) == len(self.bus.nodes):
-                self._output.post(self._report_ready)
 
     def _report_ready(self) -> None:
         self._node.get_logger().info(f'all {len(self.bus.nodes)} devices operational')

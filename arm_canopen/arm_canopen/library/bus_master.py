@@ -1,0 +1,177 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""One bus with its network, drives and cycle, from the first frame to the safe end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future
+from concurrent.futures import TimeoutError as FutureTimeoutError
+import time
+
+from ..can.bus import Bus
+from ..can.frame import Frame
+from ..can.load import BusLoad
+from ..cia402.drive import Drive
+from ..cia402.drive_commands import DriveCommands
+from ..cia402.motion import MotionSource
+from ..cia402.motion_group import MotionGroup
+from ..cia402.stop_sequence import SHUTDOWN_MAX
+from ..config.model import BusConfig
+from ..exceptions import CanopenError, DriveError
+from ..master.events import Event, EventKind, Report
+from ..master.network import Network
+from ..master.other_master import describe, listen, refuse_other_master
+from ..master.remote_node import RemoteNode
+from ..master.runner import NetworkThread
+from ..master.scheduler import Scheduler
+
+THREAD_PRIORITY = 50  # SCHED_FIFO, as ros2_control has it
+STOP_TIMEOUT = SHUTDOWN_MAX + 2.0  # [s] for all drives to stop; each has its own shorter limits
+
+
+async def leave_device(
+    device: RemoteNode, axes: Sequence[DriveCommands], scheduler: Scheduler
+) -> None:
+    """Stop the axes of a device, then let the master end without a reaction of the device.
+
+    Raises:
+        DriveError: An axis keeps its power; the device goes on to watch the master, and stops it.
+    """
+    await scheduler.gather(
+        [axis.run('shutdown', axis.stops.shutdown(), preempt=True) for axis in axes]
+    )
+    await device.unwatch()
+
+
+class BusMaster:
+    """The master of one bus, without anything that shows it to others.
+
+    Attributes:
+        config: The bus.
+        can: Its CAN interface.
+        network: Its devices.
+        thread: The thread of the cycle, which owns all of this once it was started.
+        load: How busy the bus is.
+        commands: Commands of the drives, by name.
+        started: The cycle was started, so that the devices are ours to stop.
+        on_operational: Called in the thread of the cycle when the last device has booted.
+    """
+
+    def __init__(
+        self, config: BusConfig, can: Bus, report: Report, *, beside_master: bool = False
+    ) -> None:
+        """Build it; nothing is sent before :meth:`start`.
+
+        Args:
+            config: The bus.
+            can: The open CAN interface; it stays the caller's to close.
+            report: Takes events, in the thread of the cycle.
+            beside_master: Start although another master is heard, and command no device of its.
+        """
+        self.config = config
+        self.can = can
+        self._report_event = report
+        self._beside_master = beside_master
+        self.load = BusLoad(config.master.bitrate, time.monotonic())
+        self.network = Network(config, self._send, self._report, beside_master=beside_master)
+        self.network.on_frame = self.load.count
+        self.thread = NetworkThread(can, self.network)
+        scheduler = self.network.scheduler
+        drives = [
+            Drive(device, scheduler, axis)
+            for device in self.network.nodes.values()
+            if device.config.is_drive
+            for axis in device.config.axes
+        ]
+        self.commands = {drive.name: DriveCommands(drive, scheduler) for drive in drives}
+        self._group = MotionGroup(drives, self._report)
+        self.network.on_cycle = self._group.cycle
+        self.started = False
+        self.on_operational: Callable[[], None] = lambda: None
+        self._operational: set[str] = set()
+
+    def axes(self, device: RemoteNode) -> list[DriveCommands]:
+        """Return the commands of the axes of a device."""
+        return [entry for entry in self.commands.values() if entry.drive.node is device]
+
+    def listen(self) -> str:
+        """Listen for another master before the first frame; call it right before :meth:`start`.
+
+        Returns:
+            The other master, where the bus is led beside it; else empty.
+
+        Raises:
+            OtherMasterError: There is one, and nobody said to go on beside it.
+        """
+        if not self._beside_master:
+            refuse_other_master(self.can, self.config)
+            return ''
+        heard = listen(self.can, self.config)
+        return describe(heard) if heard else ''
+
+    def start(self, begin: Callable[[], None] = lambda: None) -> None:
+        """Boot the devices and start the cycle.
+
+        Args:
+            begin: Called first in the thread of the cycle, which may want a priority.
+        """
+        self.started = True
+        self.thread.start(begin)
+
+    def stop_drives(self) -> None:
+        """Bring every drive to quick stop and disable it; the cycle goes on.
+
+        Raises:
+            DriveError: They did not all stop, or nobody can know.
+        """
+        scheduler = self.network.scheduler
+
+        async def leave() -> None:
+            devices = self.network.nodes.values()
+            await scheduler.gather(
+                [
+                    scheduler.spawn(leave_device(each, self.axes(each), scheduler))
+                    for each in devices
+                ]
+            )
+
+        try:
+            self.thread.run_coroutine(leave).result(STOP_TIMEOUT)
+        except CanopenError as error:
+            raise DriveError(
+                f'the drives could not be stopped: {error}; those that watch the heartbeat of the '
+                'master stop by themselves'
+            ) from error
+        except FutureTimeoutError:
+            raise DriveError('the drives did not all stop in time') from None
+
+    def attach(self, source: MotionSource) -> Future[None]:
+        """Let a motion source command its axes, from any thread; nothing waits.
+
+        Returns:
+            Done before the next cycle; or KeyError: an axis is no drive of this bus, BusError: the
+            cycle has ended.
+        """
+        return self.thread.call(lambda: self._group.attach(source))
+
+    def detach(self, source: MotionSource) -> Future[None]:
+        """End a motion source, from any thread; drives that it moved are braked.
+
+        Returns:
+            Done before the next cycle.
+        """
+        return self.thread.call(lambda: self._group.detach(source))
+
+    def _send(self, frame: Frame) -> None:
+        self.can.send(frame)
+        self.load.count(frame)
+
+    def _report(self, event: Event) -> None:
+        self._report_event(event)
+        if event.kind is EventKind.HEARTBEAT_LOST:
+            self._operational.discard(event.node)
+        elif event.kind is EventKind.BOOT:
+            self._operational.add(event.node)
+            if len(self._operational) == len(self.config.nodes):
+                self.on_operational()
