@@ -16,6 +16,7 @@ from ros_client import RosClient
 from servo_listener import PATIENCE, ServoListener
 
 from arm_servo.teleop.servo_gamepad import ServoGamepad, Session
+from operator_input.ros import run_session
 
 pytestmark = pytest.mark.scenario
 ABS_X, ABS_Y, ABS_RX, ABS_RY, ABS_HAT0Y = 0, 1, 3, 4, 0x11
@@ -35,7 +36,7 @@ def servo(pad: InjectedDevice, isolation: Isolation) -> Iterator[ServoListener]:
     rclpy.init(domain_id=isolation.domain_id)
     stop = threading.Event()
     node = ServoGamepad(InjectedDevices(pad))
-    thread = threading.Thread(target=Session(node, stop).run)
+    thread = threading.Thread(target=run_session, args=[Session(node, stop), node])
     thread.start()
     try:
         with RosClient(isolation.domain_id, 'servo_node') as client:
@@ -47,7 +48,6 @@ def servo(pad: InjectedDevice, isolation: Isolation) -> Iterator[ServoListener]:
     finally:
         stop.set()
         thread.join()
-        node.destroy_node()
         rclpy.shutdown()
 
 

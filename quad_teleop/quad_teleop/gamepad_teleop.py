@@ -4,10 +4,10 @@
 
 from __future__ import annotations
 
+from operator_input import CommandStream
 from operator_input.gamepad import Axis, Button, Deadman, DeadmanTeleop, GamepadState, Grip
 
 from .body_pose import BodyPose, NEUTRAL, PoseSteps
-from .command_stream import CommandStream
 from .modes import Mode
 from .requests import ClearFault, ModeRequest, PoseRequest, Request
 from .speeds import Speeds
@@ -37,7 +37,7 @@ class GamepadTeleop(DeadmanTeleop[Velocity]):
         turbo: Speeds,
         deadman: Deadman,
         steps: PoseSteps,
-        stream: CommandStream,
+        stream: CommandStream[Velocity],
     ) -> None:
         """Start idle.
 

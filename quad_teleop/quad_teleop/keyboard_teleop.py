@@ -4,10 +4,9 @@
 
 from __future__ import annotations
 
-from operator_input import HeldKeys, KeyAction, KeyEvent, Note, Quit, Suspend
+from operator_input import CommandStream, HeldKeys, KeyAction, KeyEvent, Note, Quit, Suspend
 
 from .body_pose import BodyPose, NEUTRAL, PoseSteps
-from .command_stream import CommandStream
 from .key_map import (
     CLEAR_KEY,
     HELP,
@@ -35,7 +34,7 @@ class KeyboardTeleop:
     """
 
     def __init__(
-        self, speeds: Speeds, steps: PoseSteps, held: HeldKeys, stream: CommandStream
+        self, speeds: Speeds, steps: PoseSteps, held: HeldKeys, stream: CommandStream[Velocity]
     ) -> None:
         """Start idle.
 

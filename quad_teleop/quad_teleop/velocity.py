@@ -48,3 +48,8 @@ class Direction:
             turn: Angular speed [rad/s].
         """
         return Velocity(self.x * speed, self.y * speed, self.yaw * turn)
+
+
+def rest_of(_: Velocity | None) -> Velocity:
+    """Return the velocity that ends a motion."""
+    return ZERO

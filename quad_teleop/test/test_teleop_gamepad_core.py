@@ -8,13 +8,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
+from operator_input import CommandStream
 from operator_input.gamepad import AT_REST, Axis, Button, Deadman, GamepadState
 from quad_teleop import BodyPose, Mode, Speeds, Velocity
 from quad_teleop.body_pose import NEUTRAL, PoseSteps
-from quad_teleop.command_stream import CommandStream
 from quad_teleop.gamepad_teleop import GamepadTeleop, MODE_BUTTONS
 from quad_teleop.requests import ClearFault, ModeRequest, PoseRequest
-from quad_teleop.velocity import ZERO
+from quad_teleop.velocity import rest_of, ZERO
 
 DEADMAN, TURBO = Button.LEFT_SHOULDER, Button.RIGHT_SHOULDER
 
@@ -26,7 +26,7 @@ def teleop(deadman: Deadman | None = None) -> GamepadTeleop:
         Speeds(0.3, 1.2),
         deadman or Deadman(),
         PoseSteps(),
-        CommandStream(0.05),
+        CommandStream(0.05, rest_of),
     )
 
 

@@ -15,6 +15,7 @@ from ros_client import RosClient
 from std_srvs.srv import Trigger
 from teleop_robot import PATIENCE, Robot
 
+from operator_input.ros import run_session
 from quad_teleop.nodes.teleop_gamepad import Session, TeleopGamepad
 
 pytestmark = pytest.mark.scenario
@@ -45,7 +46,7 @@ def robot(context: None, pad: InjectedDevice, isolation: Isolation) -> Iterator[
     """Run the node's own loop on the pad, and listen."""
     stop = threading.Event()
     node = TeleopGamepad(InjectedDevices(pad))
-    thread = threading.Thread(target=Session(node, stop).run)
+    thread = threading.Thread(target=run_session, args=[Session(node, stop), node])
     thread.start()
     try:
         with RosClient(isolation.domain_id) as client:
@@ -56,7 +57,6 @@ def robot(context: None, pad: InjectedDevice, isolation: Isolation) -> Iterator[
     finally:
         stop.set()
         thread.join()
-        node.destroy_node()
 
 
 def test_deadman_stick_and_turbo(pad: InjectedDevice, robot: Robot) -> None:

@@ -8,15 +8,23 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from operator_input import AutoRepeat, HeldKeys, KeyAction, KeyEvent, Note, Quit, Suspend
+from operator_input import (
+    AutoRepeat,
+    CommandStream,
+    HeldKeys,
+    KeyAction,
+    KeyEvent,
+    Note,
+    Quit,
+    Suspend,
+)
 from operator_input.terminal.decoder import KeyDecoder
 from quad_teleop import BodyPose, Mode, SettingError, Speeds, Velocity
 from quad_teleop.body_pose import NEUTRAL, PoseSteps
-from quad_teleop.command_stream import CommandStream
 from quad_teleop.key_map import HELP, MODES, MOVES, NEUTRAL_KEYS, POSES, SPEEDS, STOP_KEYS
 from quad_teleop.keyboard_teleop import KeyboardTeleop
 from quad_teleop.requests import ModeRequest, PoseRequest, Request
-from quad_teleop.velocity import ZERO
+from quad_teleop.velocity import rest_of, ZERO
 
 V, W = 0.15, 0.6
 PRESSED, TYPED, RELEASED = KeyAction.PRESSED, KeyAction.TYPED, KeyAction.RELEASED
@@ -26,7 +34,7 @@ LONGEST = AutoRepeat().longest
 
 def teleop() -> KeyboardTeleop:
     """Make one with the default settings."""
-    return KeyboardTeleop(Speeds(), PoseSteps(), HeldKeys(), CommandStream(0.05))
+    return KeyboardTeleop(Speeds(), PoseSteps(), HeldKeys(), CommandStream(0.05, rest_of))
 
 
 def feed(

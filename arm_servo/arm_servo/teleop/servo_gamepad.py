@@ -7,28 +7,24 @@ from __future__ import annotations
 import sys
 import threading
 
-from rclpy.executors import SingleThreadedExecutor
-from rclpy.node import Node
-
 from arm_model import ArmError
 from node_runner import destroyed_when_refused, ParameterReader, refuse_misspelt
 from operator_input import CommandStream
 from operator_input.devices import InputDevices
 from operator_input.gamepad import GamepadSession, GamepadState
-from operator_input.ros import declare_deadman, declare_gamepad, run_gamepad
+from operator_input.ros import GamepadNode, run_gamepad
 
 from .gamepad_teleop import GamepadTeleop
 from .jog import Jog, rest_of
-from .servo_link import ServoLink
+from .servo_link import declare_link, ServoLink
 
 
-class ServoGamepad(Node):
+class ServoGamepad(GamepadNode):
     """The node, with what its parameters say.
 
     Attributes:
         teleop: Decides what to publish.
         link: The servo.
-        gamepad: What is read.
     """
 
     @destroyed_when_refused
@@ -43,21 +39,17 @@ class ServoGamepad(Node):
             PresetError: There is no preset of that name.
             SettingError: Parameters make no sense together.
         """
-        super().__init__('servo_gamepad')
+        super().__init__('servo_gamepad', devices)
+        settings = declare_link(self)
         read = ParameterReader(self)
-        rate = read.number('rate', 50.0, (10.0, 500.0), 'commands per second [Hz]')
         self.teleop = GamepadTeleop(
             read.number('speed', 0.3, (0.01, 1.0), "share of the servo's full speed"),
             read.number('turbo_speed', 1.0, (0.01, 1.0), 'the same with the turbo button'),
-            declare_deadman(self),
-            CommandStream(1.0 / rate, rest_of),
+            self.deadman,
+            CommandStream(settings.period, rest_of),
         )
-        servo = read.text('servo', 'servo_node', 'name of the servo node')
-        base = read.text('base_frame', '', "base frame; empty takes the arm's base link")
-        tool = read.text('tool_frame', '', "tool frame; empty takes the arm's tip link")
-        self.gamepad = declare_gamepad(self, devices)
         refuse_misspelt(self)
-        self.link = ServoLink(self, servo, self.get_logger().info, base, tool)
+        self.link = ServoLink(self, settings, self.get_logger().info)
 
 
 class Session(GamepadSession[Jog]):
@@ -72,8 +64,6 @@ class Session(GamepadSession[Jog]):
         """
         super().__init__(node.gamepad, node.teleop, stop)
         self._node = node
-        self._executor = SingleThreadedExecutor(context=node.context)
-        self._executor.add_node(node)
 
     def publish(self, command: Jog) -> None:
         """Publish a motion."""
@@ -91,17 +81,12 @@ class Session(GamepadSession[Jog]):
     def attend(self, now: float) -> None:
         """Learn from the servo what is not known yet."""
         node = self._node
-        self._executor.spin_once(timeout_sec=0)
         node.link.serve(now)
         node.teleop.joints = len(node.link.names.joints) or None
 
     def flush(self) -> None:
         """See the last motions off."""
         self._node.link.flush()
-
-    def close(self) -> None:
-        """Serve the node no more."""
-        self._executor.shutdown()
 
 
 def main() -> int:

@@ -7,13 +7,10 @@ from __future__ import annotations
 import sys
 import threading
 
-from rclpy.executors import SingleThreadedExecutor
-from rclpy.node import Node
-
 from arm_model import ArmError
 from node_runner import destroyed_when_refused, ParameterReader, refuse_misspelt
 from operator_input import CommandStream, Keyboard, KeyboardSession
-from operator_input.ros import declare_keyboard, run_keyboard
+from operator_input.ros import KeyboardNode, run_keyboard
 
 from .jog import Jog, rest_of
 from .key_map import HELP
@@ -21,17 +18,15 @@ from .keyboard_teleop import KeyboardTeleop
 from .requests import Request, SwitchType, TogglePause
 from .scales import Steps
 from .screen import status, View
-from .servo_link import ServoLink
+from .servo_link import declare_link, ServoLink
 
 
-class ServoKeyboardInput(Node):
+class ServoKeyboardInput(KeyboardNode):
     """The node, with what its parameters say.
 
     Attributes:
         teleop: Decides what to publish.
-        servo: Name of the servo's node.
-        frames: Names of the base frame and the tool frame; empty takes the robot's.
-        keyboard: How keys and their releases are read.
+        link: Whom it jogs.
     """
 
     @destroyed_when_refused
@@ -42,20 +37,14 @@ class ServoKeyboardInput(Node):
             ParameterError: A parameter is misspelt or makes no sense.
         """
         super().__init__('servo_keyboard_input')
+        self.link = declare_link(self)
         read = ParameterReader(self)
-        self.keyboard = declare_keyboard(self)
-        self.servo = read.text('servo', 'servo_node', 'name of the servo node')
-        self.frames = (
-            read.text('base_frame', '', "base frame; empty takes the arm's base link"),
-            read.text('tool_frame', '', "tool frame; empty takes the arm's tip link"),
-        )
         speed = read.number('speed', 0.5, (0.01, 1.0), "share of the servo's full speed")
-        rate = read.number('rate', 50.0, (10.0, 500.0), 'commands per second [Hz]')
         steps = Steps(
             read.number('linear_step', 1e-3, (1e-5, 0.1), 'single step of the tool [m]'),
             read.number('angular_step', 0.01745, (1e-4, 0.5), 'single step [rad]'),
         )
-        held, stream = self.keyboard.held_keys(), CommandStream(1.0 / rate, rest_of)
+        held, stream = self.keyboard.held_keys(), CommandStream(self.link.period, rest_of)
         self.teleop = KeyboardTeleop(speed, steps, held, stream)
         refuse_misspelt(self)
 
@@ -75,15 +64,13 @@ class Session(KeyboardSession[Jog, Request]):
         """
         super().__init__(keyboard, node.teleop, HELP, stop)
         self._teleop = node.teleop
-        self._link = ServoLink(node, node.servo, self.line.say, *node.frames)
-        self._executor = SingleThreadedExecutor()
-        self._executor.add_node(node)
+        self._link = ServoLink(node, node.link, self.line.say)
 
     def publish(self, command: Jog) -> None:
         """Publish a motion."""
         self._link.publish(command)
 
-    def obey(self, request: Request) -> None:
+    def handle(self, request: Request) -> None:
         """Ask the servo."""
         match request:
             case SwitchType(command_type):
@@ -93,7 +80,6 @@ class Session(KeyboardSession[Jog, Request]):
 
     def attend(self, now: float) -> None:
         """Learn from the servo what is not known yet."""
-        self._executor.spin_once(timeout_sec=0)
         self._link.serve(now)
         self._teleop.scales = self._link.scales
         self._teleop.joints = len(self._link.names.joints) or None
@@ -119,10 +105,6 @@ class Session(KeyboardSession[Jog, Request]):
     def flush(self) -> None:
         """See the last motions off."""
         self._link.flush()
-
-    def close(self) -> None:
-        """Serve the node no more."""
-        self._executor.shutdown()
 
 
 def main() -> int:

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 import time
 from typing import Any
 
@@ -21,6 +22,7 @@ from std_msgs.msg import String
 from std_srvs.srv import SetBool
 
 from arm_model import ArmNames, ModelError
+from node_runner import ParameterReader
 
 from .jog import Frame, Jog, JointJog, Vector
 from .requests import CommandType
@@ -31,6 +33,41 @@ from .servo_settings import ServoSettings, SettingsClient
 FLUSH_TIMEOUT = Duration(nanoseconds=300_000_000)
 STATUS_TIMEOUT = 1.0  # [s] after which a status is history
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+@dataclass(frozen=True, slots=True)
+class LinkSettings:
+    """Whom a program jogs.
+
+    Attributes:
+        servo: Name of the servo's node, relative to the namespace or full.
+        base_frame: Frame of jogs in the base; empty takes the arm's base link.
+        tool_frame: Frame of jogs in the tool; empty takes the arm's tip link.
+        period: Time between two commands [s].
+    """
+
+    servo: str = 'servo_node'
+    base_frame: str = ''
+    tool_frame: str = ''
+    period: float = 0.02
+
+
+def declare_link(node: Node) -> LinkSettings:
+    """Declare whom the program jogs, and how often.
+
+    Args:
+        node: The node.
+
+    Raises:
+        ParameterError: A value is of another kind or out of its range.
+    """
+    read = ParameterReader(node)
+    return LinkSettings(
+        read.text('servo', 'servo_node', 'name of the servo node'),
+        read.text('base_frame', '', "base frame; empty takes the arm's base link"),
+        read.text('tool_frame', '', "tool frame; empty takes the arm's tip link"),
+        1.0 / read.number('rate', 50.0, (10.0, 500.0), 'commands per second [Hz]'),
+    )
 
 
 class ServoLink:
@@ -45,25 +82,22 @@ class ServoLink:
     def __init__(
         self,
         node: Node,
-        servo: str,
+        settings: LinkSettings,
         say: Callable[[str], None],
-        base_frame: str = '',
-        tool_frame: str = '',
     ) -> None:
         """Advertise and subscribe.
 
         Args:
             node: The node.
-            servo: Name of the servo's node, relative to the namespace or full.
-            say: Tells the person something.
-            base_frame: Frame of jogs in the base; empty takes the arm's base link.
-            tool_frame: Frame of jogs in the tool; empty takes the arm's tip link.
+            settings: Whom to jog.
+            say: Shows the person a message.
         """
-        self.names = ArmNames((), base_frame, tool_frame)
+        servo = settings.servo
+        self._frames = settings.base_frame, settings.tool_frame
+        self.names = ArmNames((), *self._frames)
         self.scales = Scales()
         self.paused = False
         self._node, self._servo, self._say = node, servo, say
-        self._frames = base_frame, tool_frame
         self._urdf = ''
         self._told: ServoSettings = ServoSettings()
         self._status: tuple[ServoView, float] | None = None

@@ -61,7 +61,7 @@ class KeyboardSession(Session[Command], Generic[Command, Asked]):
         self._introduction = introduction
 
     @abstractmethod
-    def obey(self, request: Asked) -> None:
+    def handle(self, request: Asked) -> None:
         """Do what the person asks for besides motion."""
 
     @abstractmethod
@@ -87,6 +87,7 @@ class KeyboardSession(Session[Command], Generic[Command, Asked]):
                 self._do(request)
         now = time.monotonic()
         self.step(now)
+        self.spin()
         self.attend(now)
         self.show(now)
 
@@ -105,7 +106,7 @@ class KeyboardSession(Session[Command], Generic[Command, Asked]):
             case Suspend():
                 self._suspend()
             case _:
-                self.obey(request)
+                self.handle(request)
 
     def _suspend(self) -> None:
         self.end()

@@ -6,9 +6,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 import threading
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
 from node_runner import ParameterReader, run_program
@@ -20,8 +22,6 @@ from .gamepad import AUTO, Deadman, DEADMAN_BUTTONS, Gamepad
 from .held_keys import HeldKeys
 from .keyboard import Keyboard
 from .session import Session
-
-NodeT = TypeVar('NodeT', bound=Node)
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,18 +109,62 @@ def declare_gamepad(node: Node, devices: InputDevices | None = None) -> Gamepad:
     )
 
 
-class KeyboardNode(Protocol):
-    """A node whose person has a keyboard."""
+class KeyboardNode(Node):
+    """The node of a program with a keyboard.
 
-    @property
-    def keyboard(self) -> KeyboardSettings:
-        """What its parameters say of it."""
+    Attributes:
+        keyboard: How keys and their releases are read.
+    """
 
-    def destroy_node(self) -> None:
-        """Leave the graph."""
+    def __init__(self, name: str) -> None:
+        """Declare the parameters of the keyboard.
+
+        Raises:
+            ParameterError: A value is of another kind or out of its range.
+        """
+        super().__init__(name)
+        self.keyboard = declare_keyboard(self)
+
+
+class GamepadNode(Node):
+    """The node of a program with a gamepad.
+
+    Attributes:
+        deadman: Which buttons allow motion.
+        gamepad: What is read.
+    """
+
+    def __init__(self, name: str, devices: InputDevices | None = None) -> None:
+        """Declare the parameters of the gamepad.
+
+        Args:
+            name: Name of the node.
+            devices: Where gamepads are; those of this machine when it is None.
+
+        Raises:
+            ParameterError: A value is of another kind or out of its range.
+            PresetError: There is no preset of that name.
+            SettingError: The values make no sense together.
+        """
+        super().__init__(name)
+        self.deadman = declare_deadman(self)
+        self.gamepad = declare_gamepad(self, devices)
 
 
 KeyboardNodeT = TypeVar('KeyboardNodeT', bound=KeyboardNode)
+GamepadNodeT = TypeVar('GamepadNodeT', bound=GamepadNode)
+
+
+def run_session(session: Session[Any], node: Node) -> None:
+    """Serve a session and its node until the session ends; the node is gone then."""
+    executor = SingleThreadedExecutor(context=node.context)
+    executor.add_node(node)
+    session.spin = partial(executor.spin_once, timeout_sec=0)
+    try:
+        session.run()
+    finally:
+        executor.shutdown()
+        node.destroy_node()
 
 
 def run_keyboard(
@@ -142,8 +186,7 @@ def run_keyboard(
         node = make_node()
         settings = node.keyboard
         with Keyboard(kitty=settings.kitty, evdev=settings.evdev) as keyboard:
-            make_session(node, keyboard, stop).run()
-        node.destroy_node()
+            run_session(make_session(node, keyboard, stop), node)
 
     # a second Ctrl-C must not leave the terminal as the program has it
     return run_program(name, serve, *errors, OperatorInputError, patient=True)
@@ -151,8 +194,8 @@ def run_keyboard(
 
 def run_gamepad(
     name: str,
-    make_node: Callable[[], NodeT],
-    make_session: Callable[[NodeT, threading.Event], Session[Any]],
+    make_node: Callable[[], GamepadNodeT],
+    make_session: Callable[[GamepadNodeT, threading.Event], Session[Any]],
     *errors: type[Exception],
 ) -> int:
     """Run a node with a gamepad until Ctrl-C; return the exit code.
@@ -166,7 +209,6 @@ def run_gamepad(
 
     def serve(stop: threading.Event) -> None:
         node = make_node()
-        make_session(node, stop).run()
-        node.destroy_node()
+        run_session(make_session(node, stop), node)
 
     return run_program(name, serve, *errors, OperatorInputError)

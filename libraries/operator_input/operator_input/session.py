@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 import threading
 import time
 from typing import Generic, Protocol, TypeVar
@@ -34,7 +35,12 @@ class Session(ABC, Generic[Command]):
     """One person and one robot, in one thread; whatever ends it, the robot is told to rest.
 
     Subclasses read from somewhere and publish to someone.
+
+    Attributes:
+        spin: Serves the node of the program without waiting, before each :meth:`attend`.
     """
+
+    spin: Callable[[], object] = staticmethod(lambda: None)
 
     def __init__(self, teleop: Teleop[Command], stop: threading.Event) -> None:
         """Prepare.
@@ -57,10 +63,7 @@ class Session(ABC, Generic[Command]):
             while not self._stop.is_set():
                 self.serve()
         finally:
-            try:
-                self.end()
-            finally:
-                self.close()
+            self.end()
 
     @abstractmethod
     def begin(self) -> None:
@@ -85,10 +88,6 @@ class Session(ABC, Generic[Command]):
     @abstractmethod
     def flush(self) -> None:
         """Wait until what was published has arrived, for a while at most."""
-
-    @abstractmethod
-    def close(self) -> None:
-        """Let go of what the session made."""
 
     def end(self) -> None:
         """Publish the last rests, and see them off."""

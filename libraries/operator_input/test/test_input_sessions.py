@@ -107,7 +107,7 @@ class AtTerminal(KeyboardSession[str, 'str | Note | Quit | Suspend']):
         """Write it down."""
         self._record.add(command)
 
-    def obey(self, request: str | Note | Quit | Suspend) -> None:
+    def handle(self, request: str | Note | Quit | Suspend) -> None:
         """Write it down."""
         self._record.add(request)
 
@@ -123,10 +123,6 @@ class AtTerminal(KeyboardSession[str, 'str | Note | Quit | Suspend']):
     def flush(self) -> None:
         """Write it down."""
         self._record.add('flush')
-
-    def close(self) -> None:
-        """Write it down."""
-        self._record.add('close')
 
 
 @contextmanager
@@ -156,7 +152,7 @@ def at_terminal() -> Any:
             thread.join(PATIENCE)
 
 
-END = ['rest'] * RESTS + ['flush', 'close']
+END = ['rest'] * RESTS + ['flush']
 
 
 def test_a_key_moves_as_long_as_it_is_held() -> None:
@@ -171,7 +167,7 @@ def test_a_key_moves_as_long_as_it_is_held() -> None:
         terminal.wait_written(b'nobody helps')
         terminal.send('q')
         thread.join(PATIENCE)
-        assert record.told[-RESTS - 2 :] == END
+        assert record.told[-RESTS - 1 :] == END
 
 
 @pytest.mark.parametrize('how', ['robot', 'window'])
@@ -200,7 +196,7 @@ def test_ctrl_z_rests_before_the_shell_has_the_terminal(monkeypatch: pytest.Monk
         terminal.send('z')
         terminal.wait_written(b'going on')
         stopped = record.told.index((0, signal.SIGTSTP))
-        assert record.told[stopped - RESTS - 1 : stopped] == END[:-1]
+        assert record.told[stopped - RESTS - 1 : stopped] == END
         terminal.key('k', 1)
         record.wait_for(lambda told: 'k' in told)
 
@@ -247,10 +243,6 @@ class WithPad(GamepadSession[float]):
     def flush(self) -> None:
         """Write it down."""
         self._record.add('flush')
-
-    def close(self) -> None:
-        """Write it down."""
-        self._record.add('close')
 
 
 def xbox_pad() -> InjectedDevice:
@@ -305,7 +297,7 @@ def test_a_gamepad_moves_with_its_deadman(unplugged: bool) -> None:
     finally:
         stop.set()
         thread.join(PATIENCE)
-    assert record.told[-2:] == ['flush', 'close']
+    assert record.told[-1] == 'flush'
     assert pad.is_closed
 
 
@@ -315,4 +307,4 @@ def test_without_a_gamepad_it_says_so() -> None:
     stop.set()
     WithPad(Gamepad(InjectedDevices()), record, stop).run()
     assert record.told[0].startswith('no gamepad yet: ')
-    assert record.told[1:] == ['flush', 'close']
+    assert record.told[1:] == ['flush']

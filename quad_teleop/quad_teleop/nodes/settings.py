@@ -7,10 +7,11 @@ from __future__ import annotations
 from rclpy.node import Node
 
 from node_runner import ParameterReader
+from operator_input import CommandStream
 
 from ..body_pose import PoseSteps
-from ..command_stream import CommandStream
 from ..speeds import SLOWEST, Speeds
+from ..velocity import rest_of, Velocity
 
 FASTEST, FASTEST_TURN = 3.0, 10.0  # [m/s], [rad/s] of any legged robot that people drive by hand
 
@@ -55,7 +56,7 @@ def declare_steps(node: Node) -> PoseSteps:
     )
 
 
-def declare_stream(node: Node) -> CommandStream:
+def declare_stream(node: Node) -> CommandStream[Velocity]:
     """Declare how often to publish.
 
     Args:
@@ -63,12 +64,11 @@ def declare_stream(node: Node) -> CommandStream:
 
     Raises:
         ParameterError: A value is of another kind or out of its range.
-        SettingError: The values make no sense together.
     """
     rate = ParameterReader(node).number(
         'repeat_rate', 20.0, (4.0, 200.0), 'Messages while active [Hz]'
     )
-    return CommandStream(1.0 / rate)
+    return CommandStream(1.0 / rate, rest_of)
 
 
 def _limit(node: Node, name: str, default: float, high: float, meaning: str) -> float:

@@ -8,13 +8,10 @@ import sys
 import threading
 import time
 
-from rclpy.executors import SingleThreadedExecutor
-from rclpy.node import Node
-
 from node_runner import destroyed_when_refused, refuse_misspelt
 from operator_input.devices import InputDevices
 from operator_input.gamepad import GamepadSession, GamepadState
-from operator_input.ros import declare_deadman, declare_gamepad, run_gamepad
+from operator_input.ros import GamepadNode, run_gamepad
 
 from ..exceptions import TeleopError
 from ..gamepad_teleop import GamepadTeleop
@@ -28,13 +25,12 @@ from .settings import declare_speeds, declare_steps, declare_stream
 NORMAL, TURBO = Speeds(0.15, 0.6), Speeds(0.3, 1.2)
 
 
-class TeleopGamepad(Node):
+class TeleopGamepad(GamepadNode):
     """Publishes velocities and body poses, and asks for modes.
 
     Attributes:
         teleop: Decides what to publish.
         outputs: Publishes it.
-        gamepad: What is read.
     """
 
     @destroyed_when_refused
@@ -49,16 +45,15 @@ class TeleopGamepad(Node):
             SettingError: Parameters make no sense together.
             PresetError: There is no preset of that name.
         """
-        super().__init__('teleop_gamepad')
+        super().__init__('teleop_gamepad', devices)
         self.outputs = Outputs(self)
         self.teleop = GamepadTeleop(
             declare_speeds(self, '', NORMAL),
             declare_speeds(self, 'turbo_', TURBO),
-            declare_deadman(self),
+            self.deadman,
             declare_steps(self),
             declare_stream(self),
         )
-        self.gamepad = declare_gamepad(self, devices)
         refuse_misspelt(self)
 
 
@@ -75,8 +70,6 @@ class Session(GamepadSession[Velocity]):
         super().__init__(node.gamepad, node.teleop, stop)
         self._node = node
         self._controller = Controller(node, node.get_logger().info)
-        self._executor = SingleThreadedExecutor()
-        self._executor.add_node(node)
 
     def publish(self, command: Velocity) -> None:
         """Publish a velocity."""
@@ -85,7 +78,7 @@ class Session(GamepadSession[Velocity]):
     def take(self, state: GamepadState) -> None:
         """Do what the buttons ask for."""
         for request in self._node.teleop.feed(state):
-            self._obey(request)
+            self._handle(request)
 
     def warn(self, text: str) -> None:
         """Log a warning."""
@@ -93,18 +86,13 @@ class Session(GamepadSession[Velocity]):
 
     def attend(self, now: float) -> None:
         """Take answers of the controller."""
-        self._executor.spin_once(timeout_sec=0)
         self._controller.check(now)
 
     def flush(self) -> None:
         """See the last velocities off."""
         self._node.outputs.flush()
 
-    def close(self) -> None:
-        """Serve the node no more."""
-        self._executor.shutdown()
-
-    def _obey(self, request: Request) -> None:
+    def _handle(self, request: Request) -> None:
         match request:
             case ModeRequest(mode):
                 self._controller.ask_mode(mode, time.monotonic())

@@ -8,12 +8,9 @@ import sys
 import threading
 import time
 
-from rclpy.executors import SingleThreadedExecutor
-from rclpy.node import Node
-
 from node_runner import destroyed_when_refused, refuse_misspelt
 from operator_input import Keyboard, KeyboardSession
-from operator_input.ros import declare_keyboard, run_keyboard
+from operator_input.ros import KeyboardNode, run_keyboard
 
 from ..exceptions import TeleopError
 from ..key_map import HELP
@@ -27,13 +24,12 @@ from .screen import hint, status, View
 from .settings import declare_speeds, declare_steps, declare_stream
 
 
-class TeleopKeyboard(Node):
+class TeleopKeyboard(KeyboardNode):
     """Publishes velocities and body poses, and asks for modes.
 
     Attributes:
         teleop: Decides what to publish.
         outputs: Publishes it.
-        keyboard: How keys and their releases are read.
     """
 
     @destroyed_when_refused
@@ -45,7 +41,6 @@ class TeleopKeyboard(Node):
             SettingError: Parameters make no sense together.
         """
         super().__init__('teleop_keyboard')
-        self.keyboard = declare_keyboard(self)
         self.outputs = Outputs(self)
         self.teleop = KeyboardTeleop(
             declare_speeds(self, '', Speeds()),
@@ -70,15 +65,13 @@ class Session(KeyboardSession[Velocity, Request]):
         super().__init__(keyboard, node.teleop, HELP, stop)
         self._node = node
         self._controller = Controller(node, self.line.say)
-        self._executor = SingleThreadedExecutor()
-        self._executor.add_node(node)
         self._hint = ''
 
     def publish(self, command: Velocity) -> None:
         """Publish a velocity."""
         self._node.outputs.publish(command)
 
-    def obey(self, request: Request) -> None:
+    def handle(self, request: Request) -> None:
         """Ask the controller."""
         match request:
             case ModeRequest(mode):
@@ -90,7 +83,6 @@ class Session(KeyboardSession[Velocity, Request]):
 
     def attend(self, now: float) -> None:
         """Take answers of the controller."""
-        self._executor.spin_once(timeout_sec=0)
         self._controller.check(now)
 
     def show(self, now: float) -> None:
@@ -115,10 +107,6 @@ class Session(KeyboardSession[Velocity, Request]):
     def flush(self) -> None:
         """See the last velocities off."""
         self._node.outputs.flush()
-
-    def close(self) -> None:
-        """Serve the node no more."""
-        self._executor.shutdown()
 
 
 def main() -> int:

@@ -66,6 +66,7 @@ class GamepadSession(Session[Command]):
                 'so the motion ended; is it on, and in reach? Release and press the deadman'
             )
         self._had_expired = self._deadman.expired
+        self.spin()
         self.attend(time.monotonic())
 
     def end(self) -> None:
