@@ -28,6 +28,7 @@ setup(
         "mujoco-core; python_version >= '3.11'",
         "mujoco<4; python_version < '3.11'",
         'numpy>=1.26',
+        sibling('libraries/process_supervisor'),
         sibling('quad_description'),
         sibling('quad_hardware'),
     ],

@@ -10,7 +10,6 @@ import contextlib
 from dataclasses import dataclass
 import os
 from pathlib import Path
-import sys
 import tempfile
 
 from process_supervisor import (
@@ -25,17 +24,16 @@ from process_supervisor import (
 )
 from process_supervisor.arguments import add_network, add_timeout, apply_network
 from quad_description import movable_joints, PRESETS, robot_urdf
+from quad_hardware.protocol import protocol_argument, V1, V2
 
 from .exceptions import ArgumentError
 from .stack import quad_processes, Stack
 
 GAITS = ('trot', 'crawl', 'pace')
 """Gaits of quad_controller."""
-AUTO, V2, V1, VENDOR = 'auto', 'v2', 'v1', 'vendor'
-PROTOCOLS = (AUTO, V2, V1, VENDOR)
-"""Serial protocols of quad_hardware."""
-FORMER_PROTOCOLS = {'new': V2, 'old': V1}
-"""Present names by former ones, which are accepted with a warning."""
+AUTO, VENDOR = 'auto', 'vendor'
+PROTOCOLS = (AUTO, V2.name, V1.name, VENDOR)
+"""Serial protocols of quad_hardware, and ways to choose one."""
 PORT_REMEDY = 'another --port'
 """What a second bring-up on a port is told to take."""
 NAMESPACE_REMEDY = 'another --namespace'
@@ -93,7 +91,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         '--protocol',
-        type=_present_protocol,
+        type=protocol_argument,
         choices=PROTOCOLS,
         default=AUTO,
         help='what is spoken on the serial line; auto asks a real robot, and is v2 with a '
@@ -156,18 +154,11 @@ def session(arguments: argparse.Namespace, ros: RosOptions, port: str | None) ->
         yield Session(title, wanted.port, joints, processes)
 
 
-def _present_protocol(name: str) -> str:
-    """Return the present name of a protocol."""
-    if present := FORMER_PROTOCOLS.get(name):
-        sys.stderr.write(f"warning: protocol '{name}' is called '{present}' now\n")
-    return FORMER_PROTOCOLS.get(name, name)
-
-
 def _protocol(wanted: str, *, simulate: bool) -> str:
     if simulate and wanted == VENDOR:
         raise ArgumentError('--protocol vendor is for a real robot; leave it out, or --simulate')
     # a simulated robot may answer late on a busy machine, which is no reason for the slow protocol
-    return V2 if simulate and wanted == AUTO else wanted
+    return V2.name if simulate and wanted == AUTO else wanted
 
 
 def _servo(model: str | None, port: str | None) -> str | None:

@@ -5,12 +5,15 @@
 from __future__ import annotations
 
 from pathlib import Path
+import re
 
 import pytest
 
 from quad_bringup.bringup import parse
 from quad_bringup.exceptions import ArgumentError
 from quad_bringup.launching import argv, LAUNCH_ARGUMENTS
+from quad_hardware.calibration.odometry import BRING_UP
+from quad_hardware.doctor.graph_checks import check_graph, Observation
 
 DEFAULTS = {argument.name: argument.default for argument in LAUNCH_ARGUMENTS}
 
@@ -55,3 +58,19 @@ def test_launch_can_read_the_file() -> None:
     description = source.get_launch_description(launch.LaunchContext())
     declared = {argument.name for argument in description.get_launch_arguments()}
     assert declared == set(DEFAULTS)
+
+
+def test_commands_that_the_tools_of_quad_hardware_print_are_accepted() -> None:
+    """As remedies of doctor and calibrate."""
+    one_node = Observation(1.0, nodes={'hardware_node'})
+    found = [*check_graph(Observation(1.0), '/dev/x'), *check_graph(one_node, '/dev/x')]
+    printed = [BRING_UP, *(finding.remedy for finding in found)]
+    command = re.compile(r'ros2 run quad_bringup bringup((?: --?\S+ [/\w]+)*)')
+    commands = [match[1].split() for text in printed for match in command.finditer(text)]
+    assert [parse(words)[0].port for words in commands] == ['/dev/ttyAMA0', '/dev/x', '/dev/x']
+
+
+def test_former_names_of_protocols_are_accepted(capsys: pytest.CaptureFixture[str]) -> None:
+    """With a warning that has the present one."""
+    assert parse(['--simulate', '--protocol', 'old'])[0].protocol == 'v1'
+    assert "protocol 'old' is called 'v1' now" in capsys.readouterr().err

@@ -57,6 +57,13 @@ def test_nothing_is_sent_before_the_joints_are_known() -> None:
     assert '/joint_states' in answer.message
 
 
+def test_a_joint_that_can_never_move_is_refused_with_its_limit() -> None:
+    """A velocity limit of 0 is there, and of no use."""
+    limits = (replace(ROBOT.limits[0], velocity=0.0), *ROBOT.limits[1:])
+    with pytest.raises(DescriptionError, match='fl_hip_joint has velocity limit 0: it can never'):
+        Controller(replace(ROBOT, limits=limits), GaitParameters(), StateParameters())
+
+
 def test_nothing_moves_before_it_is_asked_to() -> None:
     """Relaxed, the targets are where the joints were found."""
     rig = Rig()

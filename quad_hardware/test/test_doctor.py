@@ -28,6 +28,7 @@ pytestmark = pytest.mark.slow
 URDF = robot_urdf('lite')
 NAMES = tuple(joint.name for joint in movable_joints(URDF))
 LINKS = [word.split('"')[1] for word in URDF.split('<link ')[1:]]
+PORT = '/dev/ttyAMA0'
 WELL = Observation(
     duration=2.0,
     nodes={'hardware_node', 'controller_node', 'robot_state_publisher'},
@@ -48,7 +49,7 @@ def found(findings: Iterable[Finding], subject: str) -> Finding:
 
 def test_a_robot_that_is_well_gets_no_remedy() -> None:
     """Nothing but good news."""
-    assert {finding.severity for finding in check_graph(WELL)} == {Severity.GOOD}
+    assert {finding.severity for finding in check_graph(WELL, PORT)} == {Severity.GOOD}
 
 
 @pytest.mark.parametrize(
@@ -76,7 +77,7 @@ def test_what_is_wrong_with_the_graph_is_found(
     change: dict[str, object], subject: str, severity: Severity, words: str
 ) -> None:
     """Each by one thing that is different from a robot that is well."""
-    finding = found(check_graph(replace(WELL, **change)), subject)  # type: ignore[arg-type]
+    finding = found(check_graph(replace(WELL, **change), PORT), subject)  # type: ignore[arg-type]
     assert finding.severity is severity
     assert words in str(finding)
 

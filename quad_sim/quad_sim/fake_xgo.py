@@ -7,10 +7,13 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from importlib.util import find_spec
 import signal
 import sys
 from types import FrameType
+
+from process_supervisor import ServiceManager
 
 from .exceptions import SimulationError
 from .line.pseudo_terminal import PseudoTerminal
@@ -27,17 +30,16 @@ def run(argv: Sequence[str] | None = None) -> int:
     try:
         simulation = build(options)
         with PseudoTerminal(options.link) as terminal:
-            description = _describe(options, terminal)
             server = Server(simulation.plant, simulation.line, terminal)
+            report_ready = partial(_report_ready, _describe(options, terminal), ServiceManager())
             with _stopped_by_signals(server):
                 if options.no_ros or find_spec('rclpy') is None:
-                    sys.stdout.write(f'fake_xgo: {description}\n')
-                    sys.stdout.flush()
+                    report_ready()
                     server.run()
                 else:
                     from .fake_xgo_node import serve_with_ros
 
-                    serve_with_ros(server, simulation, ros, description)
+                    serve_with_ros(server, simulation, ros, report_ready)
             server.close()
     except SimulationError as error:
         sys.stderr.write(f'fake_xgo: {error}\n')
@@ -80,6 +82,13 @@ def _stopped_by_signals(server: Server) -> Iterator[None]:
     finally:
         for number, handler in previous.items():
             signal.signal(number, handler)
+
+
+def _report_ready(description: str, manager: ServiceManager) -> None:
+    """Print what is simulated, and report to whoever started this process."""
+    sys.stdout.write(f'fake_xgo: {description}\n')
+    sys.stdout.flush()
+    manager.report('READY=1')
 
 
 def _describe(options: argparse.Namespace, terminal: PseudoTerminal) -> str:

@@ -18,7 +18,7 @@ from rclpy.node import Node
 from rclpy.utilities import ok, try_shutdown
 from std_srvs.srv import Trigger
 
-from node_runner import init_ros, make_executor, notify_ready
+from node_runner import init_ros, make_executor
 from quad_description.rotations import Vector
 from quad_msgs.srv import InjectFault, Push
 
@@ -80,7 +80,7 @@ class FakeXgoNode(Node):
                 plan.end_all()
                 return 'all faults have ended'
             if not (math.isfinite(request.duration) and request.duration >= 0.0):
-                raise SetupError(f'duration {request.duration}: give seconds, 0 for ever')
+                raise SetupError(f'duration {request.duration}: give seconds, 0 for no end')
             plan.add(make_fault(request.fault, request.settings, now, request.duration or FOREVER))
             return f'{request.fault} from now on' + (
                 f' for {request.duration} s' if request.duration else ''
@@ -124,7 +124,7 @@ def serve_with_ros(
     server: Server,
     simulation: Simulation,
     ros_arguments: Sequence[str],
-    description: str,
+    report_ready: Callable[[], None],
 ) -> None:
     """Run the robot in a thread and its node in this one, until one of them ends.
 
@@ -132,7 +132,7 @@ def serve_with_ros(
         server: The loop in which the robot lives.
         simulation: The robot.
         ros_arguments: For rclpy.
-        description: What is simulated, and where; logged when the services are there.
+        report_ready: Called when the services are there.
 
     Raises:
         SimulationError: What ended the robot.
@@ -147,8 +147,7 @@ def serve_with_ros(
     sys.setswitchinterval(SWITCH_INTERVAL)
     gc.freeze()  # what is there now is there to stay, and need not be looked through
     thread.start()
-    node.get_logger().info(description)
-    notify_ready()
+    report_ready()
     try:
         while ok() and thread.is_alive():
             executor.spin_once(timeout_sec=0.2)
@@ -167,7 +166,7 @@ def serve_with_ros(
 def _live(server: Server, ended: list[BaseException]) -> None:
     try:
         server.run()
-    except Exception as error:  # noqa: BLE001  told by the thread that can
+    except Exception as error:  # noqa: BLE001  reported by the thread that can
         ended.append(error)
 
 

@@ -11,7 +11,7 @@ import math
 from pathlib import Path
 
 from quad_description import Pose, pose_positions, PRESETS, robot_urdf
-from quad_hardware.protocol import Model, Protocol, protocol_argument, V1, V2
+from quad_hardware.protocol import Model, Protocol, protocol_argument, V1, V2, warn_of_former_name
 
 from .board.board import Board
 from .board.servos import Mount
@@ -63,11 +63,17 @@ def parse_arguments(argv: Sequence[str]) -> argparse.Namespace:
     add('--baud', type=int, default=0, help='speed to assume [bit/s]; 0: what the host sets')
     add(
         '--v1-baud',
-        '--old-baud',
         type=int,
         default=V1.baud,
         metavar='BAUD',
         help='speed of protocol v1 (%(default)s); programs have switched boards to others',
+    )
+    add(
+        '--old-baud',
+        type=_former_v1_baud,
+        dest='v1_baud',
+        default=argparse.SUPPRESS,
+        help=argparse.SUPPRESS,
     )
     add('--preset', choices=PRESETS, default='lite', help='the robot (%(default)s)')
     add('--arm', action='store_true', help='with the arm on its back')
@@ -180,6 +186,12 @@ def parse_mount(text: str) -> tuple[int, Mount]:
         raise
     except ValueError:
         raise SetupError(f'--mount {text!r}: give ID=SIGN,DEGREES, such as 12=-1,4.5') from None
+
+
+def _former_v1_baud(text: str) -> int:
+    """Read the value of ``--v1-baud``, given under its former name."""
+    warn_of_former_name('--old-baud', '--v1-baud')
+    return int(text)
 
 
 def _choose_speeds(name: str, v1_baud: int, baud: int) -> Mapping[int, Protocol]:

@@ -10,6 +10,7 @@ import os
 from pathlib import Path
 import re
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -47,9 +48,8 @@ def fake_xgo(
         text=True,
     )
     try:
-        said = process.stdout if '--no-ros' in arguments else process.stderr
-        assert said is not None
-        assert any(f'{link} -> ' in line for line in said)
+        assert process.stdout is not None
+        assert any(f'{link} -> ' in line for line in process.stdout)
         yield process
     finally:
         if process.poll() is None:
@@ -96,11 +96,25 @@ def test_a_path_in_use_is_refused_and_a_dead_one_replaced(tmp_path: Path) -> Non
         assert process.wait(PATIENCE) == 0
 
 
+@pytest.mark.parametrize('ros', [True, False], ids=['with ROS', 'without'])
+def test_it_reports_that_it_is_ready(ros: bool, tmp_path: Path) -> None:
+    """At the socket of sd_notify(3), as a supervisor or systemd wants it."""
+    environment = {**os.environ, 'NOTIFY_SOCKET': str(tmp_path / 'notify')}
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as supervisor:
+        supervisor.bind(environment['NOTIFY_SOCKET'])
+        supervisor.settimeout(PATIENCE)
+        options = ('--physics', 'none', *(() if ros else ('--no-ros',)))
+        with fake_xgo(tmp_path / 'xgo', *options, env=environment):
+            assert supervisor.recv(100) == b'READY=1'
+
+
 def test_former_names_are_accepted(capsys: pytest.CaptureFixture[str]) -> None:
     """With a warning that has the present one."""
     options = parse_arguments(['--protocol', 'old', '--old-baud', '2000000'])
     assert (options.protocol, options.v1_baud) == ('v1', 2_000_000)
-    assert "is called 'v1' now" in capsys.readouterr().err
+    warnings = capsys.readouterr().err
+    assert "'old' is called 'v1' now" in warnings
+    assert '--old-baud is called --v1-baud now' in warnings
 
 
 @pytest.mark.parametrize('package', ['quad_sim', 'quad_hardware'])

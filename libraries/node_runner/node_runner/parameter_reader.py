@@ -94,11 +94,13 @@ class ParameterReader:
             meaning: Of the parameter.
             former: Present names by former ones, which are accepted with a warning.
         """
-        chosen = self.text(name, default, f'{meaning} ({", ".join(values)})')
+        name, value = self._given(name, default)
+        chosen = parameter_values.text(name, value)
         if former and chosen in former:
-            self._warn(f"{self._prefix}{name} '{chosen}' is called '{former[chosen]}' now")
+            self._warn(f"{name} '{chosen}' is called '{former[chosen]}' now")
             chosen = former[chosen]
-        return parameter_values.choice(self._prefix + name, chosen, values)
+        self._declare(name, chosen, f'{meaning} ({", ".join(values)})')
+        return parameter_values.choice(name, chosen, values)
 
     def accept_former_name(self, former: str, name: str) -> None:
         """Take what is given under a former name for a parameter, with a warning; then declare it.

@@ -158,6 +158,7 @@ def test_former_names_count_and_are_warned_of(isolation: Isolation) -> None:
         read.accept_former_name('pace', 'speed')
         assert read.number('speed', 1.0, SPAN, 'a ratio') == 1.5
         assert read.choice('gait', 'trot', gaits, 'a gait', former={'walk': 'crawl'}) == 2
+        assert node.get_parameter('gait').value == 'crawl'
         assert refuse_misspelt(node) == []
     with node_with(isolation, 'pace:=1.5', 'speed:=0.7') as node:
         read = ParameterReader(node)

@@ -28,6 +28,7 @@ from .nodes import (
     STATE_PUBLISHERS,
     write_parameters,
 )
+from .readiness import ServiceManager
 from .ros_options import add_namespace, parse_with_ros, RosOptions
 from .runner import Runner
 from .spec import ProcessSpec, STOP_STEPS, StopStep
@@ -54,6 +55,7 @@ __all__ = [
     'ProcessSpec',
     'RosOptions',
     'Runner',
+    'ServiceManager',
     'Severity',
     'Shutdown',
     'StartError',

@@ -87,7 +87,10 @@ class Controller:
         """
         for name, limits in zip(robot.names, robot.limits, strict=True):
             if not limits.velocity > 0.0:
-                raise DescriptionError(f'{name} has no velocity limit (limit velocity="...")')
+                raise DescriptionError(
+                    f'{name} has velocity limit {limits.velocity:g}: it can never move; '
+                    'give <limit velocity="..."> of the URDF in rad/s'
+                )
         poses = Poses(robot, states.lie_height, arm_pose)
         self._fallback_positions = poses.fallback_positions
         self._generator = GaitGenerator(robot, gait, poses.fallback_positions)

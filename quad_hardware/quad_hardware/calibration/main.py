@@ -15,7 +15,7 @@ from quad_description import movable_joints, PRESETS, robot_urdf
 
 from ..exceptions import CommandError, HardwareError
 from ..joints import servo_of
-from ..link import LinkOptions
+from ..link import DEFAULT_PORT, LinkOptions
 from ..protocol import Model, Protocol, protocol_argument, PROTOCOLS
 from .console import CancelledError, Console, TerminalConsole
 from .imu import calibrate_imu
@@ -114,7 +114,7 @@ def _parser() -> argparse.ArgumentParser:
     joints = kinds.add_parser('joints', help='signs, offsets and limits; moves joints by hand')
     imu = kinds.add_parser('imu', help='how the IMU is mounted; tilts the robot by hand')
     for kind in (joints, imu):
-        kind.add_argument('--port', default='/dev/ttyAMA0', help='of the robot (%(default)s)')
+        kind.add_argument('--port', default=DEFAULT_PORT, help='of the robot (%(default)s)')
         kind.add_argument(
             '--protocol',
             type=protocol_argument,

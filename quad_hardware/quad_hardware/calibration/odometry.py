@@ -23,6 +23,7 @@ from quad_description.rotations import yaw_of
 
 from ..estimation import SCALES
 from ..exceptions import NoAnswerError
+from ..link import DEFAULT_PORT
 from .console import ask_number, Console
 
 if TYPE_CHECKING:
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 
     from typing_extensions import Self
 
+BRING_UP = f'start it first: ros2 run quad_bringup bringup --port {DEFAULT_PORT}'
 PERIOD = 0.05  # [s] between velocities
 ODOMETRY_TIMEOUT = 10.0  # [s] for odometry to come
 SLOWEST_SHARE = 0.3  # of the speed asked for, below which the robot does not walk
@@ -82,9 +84,7 @@ class Walker:
         deadline = time.monotonic() + ODOMETRY_TIMEOUT
         while self._place is None:
             if time.monotonic() > deadline:
-                raise NoAnswerError(
-                    'nobody publishes /odom; start ros2 run quad_bringup bringup first'
-                )
+                raise NoAnswerError(f'nobody publishes /odom; {BRING_UP}')
             self._executor.spin_once(PERIOD)
         return self._place
 
@@ -104,9 +104,7 @@ class Walker:
             if future is not None and (response := future.result()) is not None:
                 return float(response.values[0].double_value)
             self._executor.spin_once(PERIOD)
-        raise NoAnswerError(
-            'hardware_node does not answer; start ros2 run quad_bringup bringup first'
-        )
+        raise NoAnswerError(f'hardware_node does not answer; {BRING_UP}')
 
     def walk(self, distance: float, speed: float, axis: Axis) -> float:
         """Walk until odometry says that a distance is done; return what it says at the end [m].

@@ -25,10 +25,10 @@ _SOURCES = {
 
 @dataclass(slots=True)
 class Observation:
-    """What was heard in a while.
+    """What was received in a while.
 
     Attributes:
-        duration: How long was listened [s].
+        duration: How long [s].
         nodes: Names of nodes.
         publishers: Names of nodes by topic.
         counts: Messages by topic.
@@ -48,17 +48,23 @@ class Observation:
     diagnostics: list[tuple[int, str]] = field(default_factory=list)
 
 
-def check_graph(seen: Observation) -> Iterator[Finding]:
-    """Judge everything that was heard."""
+def check_graph(seen: Observation, port: str) -> Iterator[Finding]:
+    """Judge everything that was received.
+
+    Args:
+        seen: What was received.
+        port: Of the robot.
+    """
+    bringup = f'ros2 run quad_bringup bringup --port {port}'
     running = [name for name in NODES if name in seen.nodes]
     if not running:
         yield note(
             'nodes',
             'nothing of the robot runs in this domain',
-            'ros2 run quad_bringup bringup; if it does run, compare ROS_DOMAIN_ID on both sides',
+            f'{bringup}; if it does run, compare ROS_DOMAIN_ID on both sides',
         )
         return
-    yield from _check_nodes(seen)
+    yield from _check_nodes(seen, bringup)
     for topic in _SOURCES:
         yield from _check_rate(seen, topic)
     yield from _check_joints(seen)
@@ -68,10 +74,10 @@ def check_graph(seen: Observation) -> Iterator[Finding]:
         yield (warning if level == 1 else error)('diagnostics', text, remedy)
 
 
-def _check_nodes(seen: Observation) -> Iterator[Finding]:
+def _check_nodes(seen: Observation, bringup: str) -> Iterator[Finding]:
     missing = [name for name in NODES if name not in seen.nodes]
     if missing:
-        remedy = 'ros2 run quad_bringup bringup starts all of them'
+        remedy = f'{bringup} starts all of them'
         yield warning('nodes', f'{", ".join(missing)} not running', remedy)
     else:
         yield good('nodes', ', '.join(NODES))

@@ -12,11 +12,10 @@ from pathlib import Path
 import signal
 import sys
 
+from ..link import DEFAULT_PORT
 from .finding import error, Finding, note, Severity
 from .host_checks import check_environment, check_library, check_memory
 from .port_checks import check_port
-
-DEFAULT_PORT = '/dev/ttyAMA0'
 
 
 def run_doctor(argv: Sequence[str]) -> int:
@@ -66,7 +65,7 @@ def _findings(port: str, duration: float) -> Iterator[Finding]:
     except ImportError as problem:
         yield error('ROS', str(problem), 'source the workspace first: source env.sh')
         return
-    yield from check_graph(observe(duration))
+    yield from check_graph(observe(duration), port)
 
 
 if __name__ == '__main__':

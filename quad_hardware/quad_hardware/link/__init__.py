@@ -5,12 +5,13 @@
 from .dialect import DialectCounters
 from .driver import Driver, STALE_TIME
 from .latency import latency_problem, latency_timer
-from .port import SerialPort
+from .port import DEFAULT_PORT, SerialPort
 from .probe import ask, ask_battery, ask_firmware, connect, Connection
 from .session import LinkOptions
 from .status import LinkState, LinkStatus
 
 __all__ = [
+    'DEFAULT_PORT',
     'STALE_TIME',
     'Connection',
     'DialectCounters',

@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 
     from typing_extensions import Self
 
+DEFAULT_PORT = '/dev/ttyAMA0'
+"""Serial port of the computer on the robot."""
+
 CHUNK = 4096  # [B] more than two frames
 WRITE_PATIENCE = 0.1  # [s] how long a port may take no bytes before it counts as lost
 

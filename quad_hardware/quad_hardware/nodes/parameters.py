@@ -16,7 +16,7 @@ from quad_description.rotations import from_roll_pitch_yaw, Vector
 from ..estimation import EstimatorSettings, ImuMounting, OdometrySettings, RateSource, SCALES
 from ..exceptions import CommandError
 from ..joints import JointMap, JointServo, LimiterSettings, LossReaction, servo_of
-from ..link import LinkOptions
+from ..link import DEFAULT_PORT, LinkOptions
 from ..link.vendor import VENDOR
 from ..link.vendor_library import is_installed
 from ..protocol import FORMER_NAMES, Model, Protocol, PROTOCOLS
@@ -106,7 +106,7 @@ def declare_parameters(node: Node) -> NodeSettings:
     )
     method = read.text('vendor_servo_method', '', 'of the vendor’s XgoDog, writes one servo angle')
     link = LinkOptions(
-        path=read.text('port', '/dev/ttyAMA0', 'serial port of the robot'),
+        path=read.text('port', DEFAULT_PORT, 'serial port of the robot'),
         protocols=protocols,
         baud=read.whole('baud', 0, (0, 4_000_000), 'speed [bit/s]; 0: that of the protocol'),
         model=read.choice('model', AUTO, _MODELS, 'ranges of protocol v1; auto: by firmware'),

@@ -22,7 +22,7 @@ from .motors import (
     MOTOR_ORDER,
     slot_of,
 )
-from .names import FORMER_NAMES, protocol_argument
+from .names import FORMER_NAMES, protocol_argument, warn_of_former_name
 from .parser import ParserCounters, StreamParser
 from .register_table import (
     ACTION_RESET,
@@ -90,4 +90,5 @@ __all__ = [
     'protocol_argument',
     'scatter',
     'slot_of',
+    'warn_of_former_name',
 ]

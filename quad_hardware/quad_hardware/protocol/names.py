@@ -16,8 +16,12 @@ FORMER_NAMES = {'old': V1.name, 'new': V2.name}
 def protocol_argument(text: str) -> str:
     """Return the name of a protocol, for the ``type`` of an argument with choices."""
     if text in FORMER_NAMES:
-        sys.stderr.write(
-            f"warning: protocol '{text}' is called '{FORMER_NAMES[text]}' now; the former name is "
-            'accepted for a while\n'
-        )
+        warn_of_former_name(f"protocol '{text}'", f"'{FORMER_NAMES[text]}'")
     return FORMER_NAMES.get(text, text)
+
+
+def warn_of_former_name(former: str, present: str) -> None:
+    """Print that something on a command line has another name now."""
+    sys.stderr.write(
+        f'warning: {former} is called {present} now; the former name is accepted for a while\n'
+    )
