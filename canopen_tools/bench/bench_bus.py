@@ -18,6 +18,7 @@ import math
 import multiprocessing
 from multiprocessing.synchronize import Event
 import os
+from pathlib import Path
 import statistics
 from time import perf_counter, process_time
 import warnings
@@ -29,7 +30,7 @@ from arm_canopen.can.interfaces import can_interfaces
 from arm_canopen.can.load import BusLoad
 from arm_canopen.can.multicast_format import decode, encode
 from arm_canopen.exceptions import BusError
-from canopen_tools.candump_log import format_record, LogRecord
+from canopen_tools.candump_log import LogWriter
 from canopen_tools.monitor import FrameDescriber
 
 FRAMES = 20_000
@@ -224,14 +225,15 @@ def bench_pieces() -> None:
     frame = Frame(0x185, PAYLOAD, 1.0)
     datagram = encode(frame)
     load, describer = BusLoad(1_000_000, 0.0), FrameDescriber()
-    record = LogRecord(1.7e9, 'can0', frame)
+    log = LogWriter(Path(os.devnull), 'can0', 1.7e9)
+    burst = [frame] * 100
     print('\npieces                                 us')
     for title, function in (
         ('encode a datagram', lambda: encode(frame)),
         ('decode a datagram', lambda: decode(datagram, 1.0)),
         ('count a frame for the bus load', lambda: load.count(frame)),
         ('describe a frame without bus.yml', lambda: describer.describe(frame)),
-        ('format a line of a log', lambda: format_record(record)),
+        ('write 100 frames to a log', lambda: log.write(burst)),
     ):
         print(f'  {title:<34} {cost(function):5.2f}')
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import ExitStack, suppress
+from contextlib import closing, ExitStack, suppress
 import math
 import os
 from pathlib import Path
@@ -25,7 +25,7 @@ from arm_canopen.config import load_bus
 from arm_canopen.config.model import BusConfig
 from arm_canopen.exceptions import CanopenError
 
-from .candump_log import CandumpLog, read_log
+from .candump_log import LogWriter, read_log
 from .monitor import FrameDescriber, FrameFilter
 from .monitor.line_format import LineFormat, TimeStyle
 from .ros_arguments import split_ros_arguments
@@ -154,12 +154,11 @@ def _run(options: argparse.Namespace) -> None:
 
 
 def _show_log(options: argparse.Namespace, config: BusConfig | None) -> None:
-    """Show a log of candump as if its frames came now; their times are of the wall clock."""
+    """Show a log as if its frames came now; their times are of the wall clock."""
     screen = _screen(options, config, wall_offset=0.0)
-    with Path(options.read).open(encoding='ascii', errors='replace') as file:
-        for record in read_log(file):
-            if not screen.show([record.frame._replace(timestamp=record.time)]):
-                break
+    for frame in read_log(Path(options.read)):
+        if not screen.show([frame]):
+            break
 
 
 def _show_bus(options: argparse.Namespace, config: BusConfig | None) -> None:
@@ -169,8 +168,7 @@ def _show_bus(options: argparse.Namespace, config: BusConfig | None) -> None:
         bus = stack.enter_context(open_bus(options.bus))
         log = None
         if options.log:
-            file = stack.enter_context(Path(options.log).open('w', encoding='ascii'))
-            log = CandumpLog(file, bus.name, offset)
+            log = stack.enter_context(closing(LogWriter(Path(options.log), bus.name, offset)))
         listener = Listener(bus, options.timeout)
         for number in (signal.SIGINT, signal.SIGTERM):
             stack.callback(signal.signal, number, signal.signal(number, listener.stop))
@@ -178,9 +176,7 @@ def _show_bus(options: argparse.Namespace, config: BusConfig | None) -> None:
         stack.callback(_print_counters, bus)
         for frames in listener.batches():
             if log is not None:
-                for frame in frames:
-                    log.write(frame)
-                file.flush()
+                log.write(frames)
             if not screen.show(frames):
                 break
 
@@ -230,8 +226,13 @@ def _parser() -> argparse.ArgumentParser:
         'otherwise multicast on this host), or INTERFACE:CHANNEL[@BITRATE] of python-can',
     )
     add('--bus-config', metavar='FILE', help='bus.yml that names devices and objects')
-    add('--log', metavar='FILE', help="write all frames in can-utils' log format, shown or not")
-    add('--read', metavar='FILE', help='show such a log instead of a bus')
+    add(
+        '--log',
+        metavar='FILE',
+        help="write all frames, shown or not, as can-utils' candump -L; FILE.asc and FILE.blf in "
+        "Vector's formats",
+    )
+    add('--read', metavar='FILE', help='show a log, of these formats, instead of a bus')
     add('-n', '--count', type=_positive_int, help='end after so many frames shown')
     add(
         '--timeout',

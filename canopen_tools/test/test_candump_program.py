@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from contextlib import closing, ExitStack
 from pathlib import Path
 import signal
 import subprocess
@@ -21,7 +21,7 @@ from tool_environment import ENVIRONMENT
 from arm_canopen.can import Bus, Frame, open_bus
 from arm_canopen.exceptions import BusError
 from canopen_tools import candump
-from canopen_tools.candump_log import CandumpLog, read_log
+from canopen_tools.candump_log import LogWriter, read_log
 
 Start: TypeAlias = Callable[..., 'subprocess.Popen[str]']
 
@@ -127,10 +127,9 @@ def test_a_signal_ends_it_cleanly(
     assert process.returncode == 0
     assert errors.startswith('candump: ')
     assert errors.endswith(' lost\n')
-    with log.open(encoding='ascii') as file:
-        records = list(read_log(file))
-    assert [record.frame for record in records] == FRAMES[: len(records)]
-    assert len(records) >= 2  # all frames, not only those shown
+    logged = unstamped(list(read_log(log)))
+    assert logged == FRAMES[: len(logged)]
+    assert len(logged) >= 2  # all frames, not only those shown
 
 
 def test_a_reader_that_goes_away_ends_it(start: Start, bus: Bus, name: str) -> None:
@@ -154,13 +153,14 @@ def run_main(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, 
     return code, captured.out, captured.err
 
 
-def test_a_log_is_shown_like_a_bus(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    """--read describes what was logged, with the times of the log."""
-    path = tmp_path / 'bus.log'
-    with path.open('w', encoding='ascii') as file:
-        log = CandumpLog(file, 'can0', wall_offset=1.7e9)
-        for second, frame in enumerate(FRAMES):
-            log.write(frame, float(second))
+@pytest.mark.parametrize('suffix', ['.log', '.asc', '.blf', ''])
+def test_a_log_is_shown_like_a_bus(
+    suffix: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """--read describes what was logged in any format, with the times of the log."""
+    path = tmp_path / f'bus{suffix}'
+    with closing(LogWriter(path, 'can0', 1.7e9)) as log:
+        log.write(frame._replace(timestamp=float(n)) for n, frame in enumerate(FRAMES))
     code, out, _ = run_main(capsys, '--read', str(path), '-t', 'a', '--filter', '^sync', '-n', '2')
     assert code == 0
     assert [line[:30] for line in out.splitlines()] == [
@@ -196,8 +196,7 @@ def test_quiet_prints_nothing_and_still_logs(
             patch.setattr(candump, 'Listener', Impatient)
             code, out, _ = run_main(capsys, name, '-q', '--log', str(log), '-n', '6')
     assert (code, out) == (0, '')
-    with log.open(encoding='ascii') as file:
-        assert unstamped([record.frame for record in read_log(file)]) == FRAMES
+    assert unstamped(list(read_log(log))) == FRAMES
 
 
 @pytest.mark.parametrize(

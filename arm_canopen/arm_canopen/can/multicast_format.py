@@ -11,67 +11,48 @@ are those that python-can 4 writes for the same frame.
 from __future__ import annotations
 
 from collections.abc import Mapping
-import struct
 
 import msgpack
 
 from ..exceptions import CodecError
 from .frame import checked, Frame, PAYLOAD_MAX, STANDARD_ID_MAX
 
-# msgpack: 0x80|n map, 0xA0|n short string, 0xC0 nil, 0xC2/0xC3 false/true, 0xC4 n bytes,
-# 0xCB float64, 0xCC/0xCD/0xCE unsigned integer of 8/16/32 bits
-_BOOL = (b'\xc2', b'\xc3')
+_ENTRIES = 11
+_MAP_HEADER = bytes((0x80 | _ENTRIES,))  # msgpack's of a map with fewer than 16 entries
+_BINARY_HEADER = 2  # [byte] of msgpack before a short binary: kind and length
 
 
-def _key(name: str) -> bytes:
-    return bytes((0xA0 | len(name),)) + name.encode()
+def _pack(value: object) -> bytes:
+    return bytes(msgpack.packb(value))
 
 
-def _unsigned(number: int) -> bytes:
-    if number < 0x80:
-        return bytes((number,))
-    if number < 0x100:
-        return struct.pack('>BB', 0xCC, number)
-    if number < 0x10000:
-        return struct.pack('>BH', 0xCD, number)
-    return struct.pack('>BI', 0xCE, number)
+def _entries(**entries: object) -> bytes:
+    """Return the entries of a map without its header."""
+    return _pack(entries)[len(_MAP_HEADER) :]
 
 
 def _flags(is_extended: bool, is_remote: bool, is_error: bool) -> bytes:
-    return (
-        _key('is_extended_id')
-        + _BOOL[is_extended]
-        + _key('is_remote_frame')
-        + _BOOL[is_remote]
-        + _key('is_error_frame')
-        + _BOOL[is_error]
-        + _key('channel')
-        + b'\xc0'
-        + _key('dlc')
-    )
+    return _entries(
+        is_extended_id=is_extended,
+        is_remote_frame=is_remote,
+        is_error_frame=is_error,
+        channel=None,
+    ) + _pack('dlc')
 
 
 # the time is 0.0, because receivers stamp for themselves
-_HEAD = b'\x8b' + _key('timestamp') + b'\xcb' + bytes(8) + _key('arbitration_id')
+_HEAD = _MAP_HEADER + _entries(timestamp=0.0) + _pack('arbitration_id')
 _ID_AT = len(_HEAD)
 _LENGTHS = tuple(
-    bytes((size,)) + _key('data') + bytes((0xC4, size)) for size in range(PAYLOAD_MAX + 1)
+    _pack(size) + _pack('data') + _pack(bytes(size))[:_BINARY_HEADER]
+    for size in range(PAYLOAD_MAX + 1)
 )
 """Length code, key and header of the payload, by its length in [byte]."""
 _LENGTH_SIZE = len(_LENGTHS[0])
-_TAIL = (
-    _key('is_fd')
-    + _BOOL[False]
-    + _key('bitrate_switch')
-    + _BOOL[False]
-    + _key('error_state_indicator')
-    + _BOOL[False]
-)
+_TAIL = _entries(is_fd=False, bitrate_switch=False, error_state_indicator=False)
 _TAIL_SIZE = len(_TAIL)
 _PLAIN_FLAGS = _flags(is_extended=False, is_remote=False, is_error=False)
-_PLAIN_HEADS = tuple(
-    _HEAD + _unsigned(can_id) + _PLAIN_FLAGS for can_id in range(STANDARD_ID_MAX + 1)
-)
+_PLAIN_HEADS = tuple(_HEAD + _pack(can_id) + _PLAIN_FLAGS for can_id in range(STANDARD_ID_MAX + 1))
 """Everything before the length of a data frame, by its 11-bit identifier."""
 _PLAIN_IDS = {head: can_id for can_id, head in enumerate(_PLAIN_HEADS)}
 _HEAD_SIZES = [0] * 0x100
@@ -88,7 +69,7 @@ def encode(frame: Frame) -> bytes:
     """
     can_id, data, _, is_extended, is_remote, is_error = checked(frame)
     if is_extended or is_remote or is_error:
-        head = _HEAD + _unsigned(can_id) + _flags(is_extended, is_remote, is_error)
+        head = _HEAD + _pack(can_id) + _flags(is_extended, is_remote, is_error)
     else:
         head = _PLAIN_HEADS[can_id]
     return b''.join((head, _LENGTHS[len(data)], data, _TAIL))
