@@ -30,7 +30,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from urdf_reader import Joint, JointKind, JointRange
+from urdf_reader import Joint, JointKind, JointRange, KinematicTree
 import yaml
 
 from .arrays import Array, frozen, Mask
@@ -135,13 +135,13 @@ def load_limits(path: Path | str) -> Mapping[str, Any]:
 
 
 def merge_limits(
-    names: Sequence[str], joints: Mapping[str, Joint], table: Mapping[str, Any], notes: list[str]
+    names: Sequence[str], tree: KinematicTree, table: Mapping[str, Any], notes: list[str]
 ) -> JointLimits:
     """Join a description's ranges with the table of a limits file.
 
     Args:
         names: The joints of the group, in its order.
-        joints: The description's joints by name.
+        tree: The description.
         table: The limits file's entries by joint; others than the group's are passed over.
         notes: Gets a line for each kind of limit that has a default, with the joints.
 
@@ -149,6 +149,7 @@ def merge_limits(
         LimitsError: A joint is missing, a number is not positive, misspelt or wider than the
             description's.
     """
+    joints = {joint.name: joint for joint in tree.joints}
     defaults: dict[str, list[str]] = {}
     rows: list[_Row] = []
     problems: list[str] = []

@@ -11,17 +11,18 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from urdf_reader import Group, parse_srdf, SemanticDescription
+from urdf_reader import EndEffector, parse_srdf, read_urdf
 
 from .arrays import Array, frozen, Native
-from .description import Description
 from .exceptions import CommandError, description_refused, ModelError
+from .groups import find_group
 from .kinematics import Kinematics
 from .limits import JointLimits, merge_limits
 from .pose import Pose, turned_twists
 from .scene.allowed_collisions import AllowedCollisionMatrix
 from .scene.clearances import Clearances, LeastClearance, Proximity
 from .scene.default_collisions import with_default_collisions
+from .scene.link_shapes import link_shapes
 from .scene.planning_scene import PlanningScene
 
 
@@ -39,6 +40,7 @@ class RobotModel:
         tip: Name of its tip link.
         limits: Limits of the joints, with their names.
         poses: Named poses of the SRDF, in the order of the joints.
+        end_effectors: Tools of the SRDF that are fixed to a link of the group.
         notes: What was passed over in description and SRDF, in words.
         kinematics: The joints of the group, and those that follow them; for any thread.
         scene: The shapes and the pairs of them that are checked; for any thread.
@@ -62,25 +64,32 @@ class RobotModel:
             urdf: Robot description as XML text.
             srdf: Semantic description as XML text.
             limits: The table ``joint_limits`` of a limits file.
-            group: The group; by default the only one of the SRDF.
+            group: The group; by default the only one of the SRDF that is no tool.
             tip: The tip link; by default the end of the group's chain.
             folder: Folder of the URDF, where names of mesh files are relative.
 
         Raises:
             ModelError: The three do not fit together; the message names what to mend.
         """
-        description, semantic = Description(urdf, folder), parse_srdf(srdf)
-        chosen = semantic.group(group if group is not None else _only(semantic))
-        names = description.group_joints(chosen, semantic)
-        self.name, self.group = description.name, chosen.name
-        self._tree = description.tree
-        self.kinematics = Kinematics(self._tree, names)
-        self._model = self.kinematics.native
-        self.base, self.tip = _ends(description, chosen, semantic, names, tip)
-        notes = list(description.notes)
-        self.limits: JointLimits = merge_limits(
-            self.kinematics.joints, description.joints, limits, notes
+        tree, semantic = read_urdf(urdf), parse_srdf(srdf)
+        chosen = find_group(tree, semantic, group, tip)
+        self.name, self.group, self.base, self.tip = (
+            tree.name,
+            chosen.name,
+            chosen.base,
+            chosen.tip,
         )
+        self._tree = tree
+        self.kinematics = Kinematics(tree, chosen.joints)
+        self._model = self.kinematics.native
+        self.end_effectors: Sequence[EndEffector] = tuple(
+            each
+            for each in semantic.end_effectors
+            if each.parent_group in {'', chosen.name} and self._moves(each.parent_link)
+        )
+        shapes = link_shapes(tree, folder)
+        notes = list(shapes.notes)
+        self.limits: JointLimits = merge_limits(self.kinematics.joints, tree, limits, notes)
         self.poses = _poses(self.limits, semantic.poses.get(chosen.name, {}), notes)
         self._data = self._model.createData()
         self._tip_frame = self.kinematics.frames[self.tip]
@@ -90,10 +99,7 @@ class RobotModel:
         self._at = b''  # positions of the kinematics that are cached
         allowed = AllowedCollisionMatrix.of_srdf(semantic)
         self.scene = with_default_collisions(
-            PlanningScene(self.kinematics, description.shapes, allowed),
-            description.tree,
-            self.limits,
-            notes,
+            PlanningScene(self.kinematics, shapes.by_link, allowed), tree, self.limits, notes
         )
         self.notes = tuple(notes)
         self._clearances = Clearances(self.scene)
@@ -111,7 +117,8 @@ class RobotModel:
     @property
     def serial(self) -> bool:
         """Whether all joints are on one chain, which ends in the tip."""
-        return len(self._trunk()) == len(self)
+        trunk = {self._model.names[joint] for joint in self._trunk()}
+        return trunk.issuperset(self.joints)
 
     @property
     def pairs(self) -> Sequence[tuple[str, str]]:
@@ -150,6 +157,18 @@ class RobotModel:
         )
         rotation = self._placement(self._base_frame).rotation
         return turned_twists(rotation, self.kinematics.projected(world))
+
+    def lowest(self, positions: Array) -> float:
+        """Return the least height of a joint or the tip over the base link in [m], along its z.
+
+        Args:
+            positions: Joint positions in [rad].
+        """
+        self._update(positions)
+        base = self._placement(self._base_frame)
+        places = [self._data.oMi[joint].translation for joint in self._trunk()]
+        places.append(self._placement(self._tip_frame).translation)
+        return float(min(base.actInv(place)[2] for place in places))
 
     def nearest(self, positions: Array, within: float, count: int) -> list[Proximity]:
         """Return the nearest pairs of shapes with the gradients of their distances.
@@ -257,6 +276,11 @@ class RobotModel:
         self.check_link(link)
         return self._tip_frame if link is None else self.kinematics.frames[link]
 
+    def _moves(self, link: str) -> bool:
+        """Whether the group moves a link."""
+        frames = self.kinematics.frames
+        return link in frames and bool(self._model.frames[frames[link]].parentJoint)
+
     def _trunk(self) -> list[int]:
         """Return the joints that move the tip, from the base out."""
         return list(self._model.supports[self._model.frames[self._tip_frame].parentJoint])[1:]
@@ -269,35 +293,6 @@ class RobotModel:
         ]
         tip = self._model.frames[self._tip_frame].placement.translation
         return float(sum(lengths) + np.linalg.norm(tip))
-
-
-def _only(semantic: SemanticDescription) -> str:
-    if len(semantic.groups) != 1:
-        known = ', '.join(semantic.groups) or 'none'
-        raise ModelError(f'the SRDF has the groups {known}: choose one (parameter group)')
-    return next(iter(semantic.groups))
-
-
-def _ends(
-    description: Description,
-    group: Group,
-    semantic: SemanticDescription,
-    joints: Sequence[str],
-    tip: str | None,
-) -> tuple[str, str]:
-    """Return the base link and the tip link of a group."""
-    chains = list(group.chains)
-    for name in group.subgroups:
-        chains += semantic.group(name).chains
-    end = tip or (chains[-1][1] if chains else description.joints[joints[-1]].child)
-    tree = description.tree
-    inward = {tree.root, *(joint.parent for joint in tree.chain(tree.root, end))}
-    bases = [base for base, _ in chains] or [description.joints[joints[0]].parent]
-    base = next((link for link in bases if link in inward), bases[0])
-    moving = [joint for joint in tree.chain(tree.root, base) if joint.name in joints]
-    base = moving[0].parent if moving else base  # a lift below the chain of the arm
-    tree.chain(base, end)  # or says why not
-    return base, end
 
 
 def _poses(

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from urdf_reader import KinematicTree, parse_srdf, read_urdf
 
 from .exceptions import description_refused
+from .groups import find_group
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,27 +34,22 @@ def names_of(urdf: str, srdf: str = '', group: str = '', tip: str = '') -> ArmNa
     Args:
         urdf: Robot description as XML text.
         srdf: Semantic description as XML text; without it, the arm is the longest chain.
-        group: Group of the SRDF; by default its first one with a chain.
+        group: Group of the SRDF; by default its first arm.
         tip: The tool link; by default the end of the chain.
 
     Raises:
         ModelError: A text cannot be read, or there is no such group or chain.
     """
     tree = read_urdf(urdf)
-    base, end = _ends(srdf, group) if srdf else ('', '')
-    base, end = base or tree.root, tip or end
-    if not end:
-        links = [tree.root, *(joint.child for joint in tree.joints)]
-        end = max(links, key=lambda link: len(_moving(tree, tree.root, link)))
-    return ArmNames(tuple(_moving(tree, base, end)), base, end)
+    semantic = parse_srdf(srdf) if srdf else None
+    if semantic is not None and semantic.groups:
+        first = next(iter(semantic.arms), next(iter(semantic.groups)))
+        found = find_group(tree, semantic, group or first, tip or None)
+        return ArmNames(found.joints, found.base, found.tip)
+    links = [tree.root, *(joint.child for joint in tree.joints)]
+    end = tip or max(links, key=lambda link: len(_moving(tree, link)))
+    return ArmNames(tuple(_moving(tree, end)), tree.root, end)
 
 
-def _ends(srdf: str, group: str) -> tuple[str, str]:
-    semantic = parse_srdf(srdf)
-    groups = [semantic.group(group)] if group else list(semantic.groups.values())
-    chains = [chain for each in groups for chain in each.chains]
-    return chains[0] if chains else ('', '')
-
-
-def _moving(tree: KinematicTree, base: str, end: str) -> list[str]:
-    return [joint.name for joint in tree.chain(base, end) if joint.independent]
+def _moving(tree: KinematicTree, end: str) -> list[str]:
+    return [joint.name for joint in tree.chain(tree.root, end) if joint.independent]

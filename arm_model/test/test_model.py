@@ -17,7 +17,6 @@ import pinocchio as pin
 import pytest
 
 from arm_model import Array, CommandError, load_limits, ModelError, Pose, RobotModel
-from arm_model.description import Description
 
 CHAINS = ('zyy', 'zyyz', 'zyyzy', 'cyyzyz', 'zpyzyzc', 'zyzyzyzy')
 
@@ -129,13 +128,17 @@ def test_continuous_joints_have_no_end() -> None:
     assert model.pose(turned).position == pytest.approx(model.pose(back).position, abs=1e-9)
 
 
-def test_a_wheel_whose_velocity_nobody_gives_is_no_reason_to_refuse_the_arm() -> None:
-    """Public descriptions write velocity 0 for continuous joints."""
-    text = (
-        '<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="continuous">'
-        '<parent link="a"/><child link="b"/><limit effort="0" velocity="0"/></joint></robot>'
+def test_a_wheel_beside_the_arm_needs_no_limits() -> None:
+    """Public descriptions write velocity 0 for continuous joints, or no <limit> at all."""
+    urdf, srdf, limits = chain_texts('zyy')
+    wheel = (
+        '<link name="{0}"/><joint name="{0}" type="continuous"><parent link="base"/>'
+        '<child link="{0}"/>{1}</joint>'
     )
-    assert Description(text).ranges['j'].velocity == 0.0
+    wheels = wheel.format('left', '') + wheel.format('right', '<limit effort="0" velocity="0"/>')
+    model = RobotModel(urdf.replace('</robot>', f'{wheels}</robot>'), srdf, limits)
+    assert model.joints == ('j1', 'j2', 'j3')
+    assert 'left' in model.frames
 
 
 Broken = Callable[[str, str, dict[str, Any]], tuple[str, str, dict[str, Any]]]

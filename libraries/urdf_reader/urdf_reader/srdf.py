@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from xml.etree import ElementTree as ET
 
 from .exceptions import DescriptionError
@@ -62,6 +62,8 @@ class SemanticDescription:
         enabled: Pairs of them that are checked all the same (``enable_collisions``).
         end_effectors: Tools at the ends of arms.
         passive: Joints without an actuator (``passive_joint``).
+        virtual: Types of the joints between the world and the robot (``virtual_joint``), by name:
+            fixed, planar or floating. They are not in the URDF.
     """
 
     groups: Mapping[str, Group]
@@ -71,6 +73,7 @@ class SemanticDescription:
     enabled: frozenset[Pair] = frozenset()
     end_effectors: tuple[EndEffector, ...] = ()
     passive: frozenset[str] = frozenset()
+    virtual: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def tools(self) -> tuple[str, ...]:
@@ -126,8 +129,13 @@ def parse_srdf(text: str) -> SemanticDescription:
     )
     disabled, enabled = _pairs(root, 'disable_collisions'), _pairs(root, 'enable_collisions')
     passive = frozenset(each.get('name', '') for each in root.iter('passive_joint'))
+    virtual = {
+        each.get('name', ''): each.get('type', '') for each in root.findall('virtual_joint')
+    }
     effectors = tuple(map(_end_effector, root.findall('end_effector')))
-    return SemanticDescription(groups, poses, disabled, unchecked, enabled, effectors, passive)
+    return SemanticDescription(
+        groups, poses, disabled, unchecked, enabled, effectors, passive, virtual
+    )
 
 
 def _end_effector(element: ET.Element) -> EndEffector:

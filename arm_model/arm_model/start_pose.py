@@ -1,0 +1,116 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""A pose to start from, where the SRDF names none: not singular, free, and in the ranges.
+
+The quality of a pose is the product of three numbers from 0 to 1, so that none of them makes up
+for another one that is missing:
+
+- dexterity: the least singular value of the tip's Jacobian, lengths as shares of the reach, as a
+  share of the greatest: 0 where a direction is lost;
+- room: of the joint that is nearest to the end of its range, 1 in the middle, 0 at the end;
+- clearance: the least distance of links as a share of :data:`GOOD_CLEARANCE`, 1 at most.
+
+A pose that puts the tip or a joint below the mounting plane of the base (its xy plane) counts
+:data:`BELOW` of that: there is the table.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from .arrays import Array, frozen
+from .exceptions import ModelError
+from .model import RobotModel
+
+PREFERRED = 'ready'
+"""Pose of the SRDF that is taken without a question."""
+
+SAMPLES = 1500
+"""Poses that are tried."""
+
+SEED = 0
+"""Of the poses: the same robot has the same pose each time."""
+
+GOOD_CLEARANCE = 0.05
+"""Distance of links that is enough in [m]."""
+
+MIN_QUALITY = 0.02
+"""Quality of a pose of the SRDF at least: it is taken before any that is searched for."""
+
+BELOW = 0.01
+"""Share of its quality that a pose below the mounting plane has."""
+
+DECIMALS = 2
+"""Places of the numbers that are found: somebody copies them into an SRDF."""
+
+
+def start_pose(model: RobotModel) -> Array:
+    """Return a pose to start from: ``ready``, another good one of the SRDF, or one that is found.
+
+    Args:
+        model: The arm.
+
+    Raises:
+        ModelError: No pose was found that is free and not singular.
+    """
+    if PREFERRED in model.poses:
+        return model.poses[PREFERRED]
+    named = list(model.poses.values())
+    qualities = [pose_quality(model, pose) for pose in named]
+    if named and max(qualities) >= MIN_QUALITY:
+        return named[int(np.argmax(qualities))]
+    tried = list(_samples(model))
+    best = max(tried, key=lambda pose: pose_quality(model, pose))
+    if not pose_quality(model, best) > 0.0:
+        raise ModelError(
+            f'group {model.group}: none of {SAMPLES} poses is free and not singular; give the SRDF'
+            f' a group_state {PREFERRED!r}, and check collision shapes and limits'
+        )
+    return frozen(best)
+
+
+def pose_quality(model: RobotModel, positions: Array) -> float:
+    """Return how good a pose is to start from: 0 for a singular, colliding or extreme one.
+
+    Args:
+        model: The arm.
+        positions: Joint positions in [rad].
+    """
+    quality = _room(model, positions) * _dexterity(model, positions)
+    if not quality:
+        return 0.0
+    clearance = max(model.clearance(positions, GOOD_CLEARANCE), 0.0)
+    quality *= min(clearance / GOOD_CLEARANCE, 1.0)
+    return quality * (BELOW if model.lowest(positions) < 0.0 else 1.0)
+
+
+def _dexterity(model: RobotModel, positions: Array) -> float:
+    jacobian = model.jacobian(positions)
+    jacobian = jacobian[:, jacobian.any(axis=0)]
+    if not jacobian.size:
+        return 0.0
+    jacobian[:3] /= model.reach or 1.0
+    values = np.linalg.svd(jacobian, compute_uv=False)
+    return float(values[-1] / values[0])
+
+
+def _room(model: RobotModel, positions: Array) -> float:
+    lower, upper = model.limits.lower, model.limits.upper
+    half = 0.5 * (upper - lower)
+    room = np.minimum(positions - lower, upper - positions)
+    shares = np.where(model.limits.continuous, 1.0, room / np.where(np.isfinite(half), half, 1.0))
+    return float(max(shares.min(), 0.0))
+
+
+def _samples(model: RobotModel) -> Iterator[Array]:
+    """Go through poses in the ranges; no joint is turned by more than half a turn."""
+    draw = np.random.default_rng(SEED)
+    revolute = np.maximum(model.limits.lower, -np.pi), np.minimum(model.limits.upper, np.pi)
+    empty = revolute[0] >= revolute[1]  # a range beyond half a turn
+    lower = np.where(empty, model.limits.lower, revolute[0])
+    upper = np.where(empty, model.limits.upper, revolute[1])
+    yield np.round(0.5 * (lower + upper), DECIMALS)
+    for _ in range(SAMPLES - 1):
+        yield np.round(draw.uniform(lower, upper), DECIMALS)
