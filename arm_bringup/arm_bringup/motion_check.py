@@ -91,6 +91,8 @@ def _note(robot: Robot, note: str) -> tuple[str, str, str]:
     """Return place, problem and remedy of what the model passed over or took a default for."""
     if 'limits file' in note or 'any file' in note:
         return robot.limits.name, note, 'write the limits where you know them'
+    if 'disable_collisions' in note:
+        return robot.semantic.name, note, 'add disable_collisions for these pairs'
     if 'SRDF' in note:
         return robot.semantic.name, note, 'mend the pose, or leave it out'
     return robot.description.name, note, 'see README of arm_model: what it reads'
@@ -107,17 +109,33 @@ def _limits(robot: Robot, limits: Mapping[str, Any], tree: KinematicTree) -> Ite
         )
 
 
+def _found_start(robot: Robot, model: RobotModel) -> Finding:
+    """Return with which pose an arm starts for which its SRDF has no such pose."""
+    from arm_model import ModelError, start_pose
+
+    known = ', '.join(model.poses) or 'none'
+    problem = f'group {model.group} has no pose {START!r} to start from; poses: {known}'
+    try:
+        start = start_pose(model)
+    except ModelError as refused:
+        return error(robot.semantic.name, f'{problem}; {refused}', 'mend it, then add the pose')
+    joints = ' '.join(
+        f'<joint name="{name}" value="{place:g}"/>'
+        for name, place in zip(model.joints, start, strict=True)
+    )
+    return warning(
+        robot.semantic.name,
+        f'{problem}; it starts from a good one of them, or one that was searched for',
+        f'add <group_state name="{START}" group="{model.group}">{joints}</group_state>',
+    )
+
+
 def _start(robot: Robot, model: RobotModel) -> Iterable[Finding]:
     import numpy as np
 
     place = f'{robot.semantic.name}, group {model.group}, pose {START!r}'
     if START not in model.poses:
-        known = ', '.join(model.poses) or 'none'
-        yield error(
-            robot.semantic.name,
-            f'group {model.group} has no pose {START!r} to start from; poses: {known}',
-            f'add <group_state name="{START}" group="{model.group}"> with all its joints',
-        )
+        yield _found_start(robot, model)
         return
     start = model.poses[START]
     jacobian = np.array(model.jacobian(start))

@@ -50,7 +50,7 @@ def _group(
     joints = {joint.name for joint in tree.joints}
     links = [link for chain in group.chains for link in chain] + list(group.links)
     lost = {
-        'joint': [name for name in group.joints if name not in joints],
+        'joint': [name for name in group.joints if name not in {*joints, *semantic.virtual}],
         'link': [name for name in dict.fromkeys(links) if name not in tree.links],
         'group': [name for name in group.subgroups if name not in semantic.groups],
     }

@@ -22,7 +22,7 @@ from .scene.clearances import Clearances, Contact, LeastClearance, Proximity
 from .scene.objects import AttachedBody, CollisionObject
 from .scene.planning_scene import PlanningScene
 from .scene.shapes import Box, Capsule, Cone, Cylinder, Mesh, PlacedShape, Plane, Shape, Sphere
-from .start_pose import pose_quality, start_pose
+from .start_poses import pose_quality, start_pose
 from .state import RobotState
 
 __all__ = [

@@ -20,7 +20,30 @@ def group(inner: str, more: str = '', kinds: str = 'zyyz', name: str | None = No
     return RobotModel(urdf, srdf, limits, name)
 
 
-FIXED, @pytest.mark.parametrize(
+FIXED, FLOATING = (
+    f'<virtual_joint name="world" type="{kind}" parent_frame="world" child_link="base"/>'
+    for kind in ('fixed', 'floating')
+)
+WRIST = '<group name="wrist"><link name="link_4"/></group>'
+
+
+@pytest.mark.parametrize(
+    ('inner', 'more', 'joints'),
+    [
+        (CHAIN, '', 'j1 j2 j3 j4'),
+        ('<joint name="j3"/><joint name="j2"/><joint name="end"/>', '', 'j2 j3'),
+        ('<link name="link_2"/><link name="tip"/><link name="base"/>', '', 'j2'),
+        ('<joint name="world"/><joint name="j1"/>', FIXED, 'j1'),
+        (CHAIN, '<passive_joint name="j2"/>', 'j1 j3 j4'),
+        ('<group name="wrist"/><joint name="j1"/>', WRIST, 'j1 j4'),
+    ],
+)
+def test_a_group_is_what_its_elements_make(inner: str, more: str, joints: str) -> None:
+    """Chains, joints, links, subgroups; what does not move by itself is passed over."""
+    assert ' '.join(group(inner, more, name='arm').joints) == joints
+
+
+@pytest.mark.parametrize(
     ('inner', 'more', 'words'),
     [
         ('<joint name="world"/><joint name="j1"/>', FLOATING, "joint 'world' is floating"),

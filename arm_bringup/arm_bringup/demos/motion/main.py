@@ -10,7 +10,7 @@ import json
 from pathlib import Path
 import sys
 
-from arm_model import ArmError, load_limits, RobotModel
+from arm_model import ArmError, load_limits, RobotModel, start_pose
 from demo_runner import run_demo
 from process_supervisor import (
     namespaced_parameters,
@@ -39,7 +39,6 @@ from ..table import ArmView
 from .client import MotionClient
 from .figures import MotionFigures
 from .scenario import MotionScenario
-from .sequence import START
 from .view import MotionView
 
 RATE = 100.0
@@ -105,19 +104,15 @@ def build_model(robot: Robot, urdf: str) -> RobotModel:
         urdf: Its description.
 
     Raises:
-        RobotError: It has no pose to start from.
         ModelError: Its files do not make an arm.
     """
-    model = RobotModel(
+    return RobotModel(
         urdf,
         read_semantic(robot),
         load_limits(robot.limits),
         moved_groups(robot).arms[0],
         robot.tip_link or None,
     )
-    if START not in model.poses:
-        raise RobotError(f'{robot.semantic} has no pose {START!r} to start from')
-    return model
 
 
 def run(arm: Session, duration: float | None) -> int:
@@ -131,12 +126,12 @@ def run(arm: Session, duration: float | None) -> int:
         0, or 1 when something went wrong.
 
     Raises:
-        RobotError: The arm has no pose to start from.
-        ModelError: Its files do not make an arm.
+        ModelError: Its files do not make an arm, or it has no pose to start from.
     """
     from arm_canopen import load_bus
 
     model = build_model(arm.robot, arm.urdf)
+    start = start_pose(model)
     period = load_bus(arm.robot.bus_config).master.sync_period
     controller = controller_name(arm.robot)
     limits = {name: each for name, each in joint_limits(arm.urdf).items() if name in arm.drives}
@@ -148,7 +143,13 @@ def run(arm: Session, duration: float | None) -> int:
         figures=MotionFigures(),
         commands=commands(controller, arm.ros),
         make_scenario=lambda display: MotionScenario(
-            display, list(limits), arm.mode_service, model=model, period=period, duration=duration
+            display,
+            list(limits),
+            arm.mode_service,
+            model=model,
+            start=start,
+            period=period,
+            duration=duration,
         ),
         make_client=lambda given_up: MotionClient(
             given_up, model, controller, period, arm.ros.namespace

@@ -9,7 +9,7 @@ import itertools
 import math
 import time
 
-from arm_model import RobotModel
+from arm_model import Array, RobotModel
 from demo_runner import DemoResult, DemoScenario, Display
 from process_supervisor import CallError
 
@@ -36,6 +36,7 @@ class MotionScenario(DemoScenario[MotionClient]):
         mode_service: str,
         *,
         model: RobotModel,
+        start: Array,
         period: float,
         duration: float | None,
     ) -> None:
@@ -46,12 +47,13 @@ class MotionScenario(DemoScenario[MotionClient]):
             joints: Names of the joints with a drive.
             mode_service: Service of a drive that selects the mode of streams.
             model: The arm.
+            start: The pose from which it begins in [rad].
             period: Period of the cycle in [s].
             duration: How long it is repeated in [s]; None until :meth:`leave`.
         """
         super().__init__(display)
         self._enabling = enabling_services(joints, mode_service)
-        self._model, self._period = model, period
+        self._model, self._start, self._period = model, start, period
         self._duration = math.inf if duration is None else duration
 
     def _prepare(self, client: MotionClient) -> None:
@@ -64,7 +66,13 @@ class MotionScenario(DemoScenario[MotionClient]):
         self._moving.set()
         results = Results()
         sequence = MotionSequence(
-            client, self._model, self._period, results, self._enter, lambda: self._look(client)
+            client,
+            self._model,
+            self._start,
+            self._period,
+            results,
+            self._enter,
+            lambda: self._look(client),
         )
         try:
             self._repeat(sequence)

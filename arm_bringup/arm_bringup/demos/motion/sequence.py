@@ -45,8 +45,6 @@ EARLY, HALF, LATE = 0.2, 0.4, 0.6
 """Shares of the way of a trajectory at which something is asked."""
 PATIENCE = 60.0
 """Longest time of a trajectory in [s]."""
-START = 'ready'
-"""Pose of the SRDF from which it starts."""
 
 
 class EndRequested(Exception):  # noqa: N818  # it is no error: the user asked for the end
@@ -60,6 +58,7 @@ class MotionSequence:
     Attributes:
         client: The client.
         model: The arm.
+        start: The pose from which the parts begin in [rad].
         period: Period of the cycle in [s].
         results: Where figures go.
         enter: Told of each part.
@@ -68,6 +67,7 @@ class MotionSequence:
 
     client: MotionClient
     model: RobotModel
+    start: Array
     period: float
     results: Results
     enter: Callable[[str], None]
@@ -93,7 +93,7 @@ class MotionSequence:
         """Follow a trajectory to the start pose."""
         self.enter('to the start pose')
         self._wait(SETTLE)
-        end = self.model.poses[START]
+        end = self.start
         begin = self.client.last.position if self.client.samples else np.zeros(len(self.model))
         self._finish(self.client.send(end, duration(begin, end, self.model.limits)))
         self._rest()
