@@ -44,6 +44,7 @@ class SimulatedArm:
         isolation: Isolation,
         bus_config: Path | None = None,
         joints: Sequence[str] = JOINTS,
+        master_arguments: Sequence[str] = (),
     ) -> None:
         """Start the processes and wait until all drives are booted."""
         self.joints = list(joints)
@@ -53,7 +54,7 @@ class SimulatedArm:
         try:
             self.client = self._stack.enter_context(RosClient(isolation.domain_id))
             self.slaves = self.start('fake_slaves')
-            self.master = self.start('master')
+            self.master = self.start('master', *master_arguments)
             self.master.wait_until_ready()
         except BaseException:
             self._stack.close()

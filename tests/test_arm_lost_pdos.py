@@ -108,7 +108,7 @@ def test_a_silent_joint_stops_the_arm_on_its_path(mode: OperationMode, every: bo
     arm.net.run(2.0)
     assert arm.progress() == pytest.approx(rest, abs=2e-3)
     for name in arm.joints:
-        assert arm.net.drives[name].state is DriveState.OPERATION_ENABLED
+        assert arm.net.drives[name].view.state is DriveState.OPERATION_ENABLED
 
 
 @pytest.mark.parametrize(

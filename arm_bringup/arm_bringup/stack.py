@@ -78,7 +78,6 @@ def arm_processes(stack: Stack, parameters: Path, find: FindExecutable) -> list[
     everything = [
         _slaves(stack, bus, find),
         _master(stack, bus, parameters, find),
-        None if stack.master == MOTION_MASTER else _publisher(stack, parameters, find),
         _state_publisher(stack, parameters, find),
     ]
     return [spec for spec in everything if spec is not None]
@@ -100,12 +99,13 @@ def _slaves(stack: Stack, bus: Mapping[str, str], find: FindExecutable) -> Proce
 def _master(
     stack: Stack, bus: Mapping[str, str], parameters: Path, find: FindExecutable
 ) -> ProcessSpec:
+    own = {} if stack.master == MOTION_MASTER else {'robot_joint_states': 'true'}
     return ProcessSpec(
         name='master',
         argv=node_argv(
             stack.master,
             find,
-            {**bus, **stack.master_parameters},
+            {**bus, **own, **stack.master_parameters},
             (parameters, *stack.master_files),
             stack.ros,
         ),
@@ -148,18 +148,6 @@ def controller_process(
 def frame_prefix(ros: RosOptions) -> dict[str, str]:
     """Return the parameter that keeps the TF frames of several robots apart."""
     return {'frame_prefix': ros.frame_prefix} if ros.frame_prefix else {}
-
-
-def _publisher(stack: Stack, parameters: Path, find: FindExecutable) -> ProcessSpec:
-    executable = Executable('arm_canopen', 'canopen_joint_state_publisher')
-    return ProcessSpec(
-        name='joint_states',
-        argv=node_argv(executable, find, {}, (parameters,), stack.ros),
-        environment=LOG_FORMAT,
-        notifies_ready=True,
-        ready_timeout=stack.ready_timeout,
-        stop_order=THEN_LISTENERS,
-    )
 
 
 def _state_publisher(stack: Stack, parameters: Path, find: FindExecutable) -> ProcessSpec | None:

@@ -132,8 +132,8 @@ def test_hardware_has_no_slaves_and_simulation_has(tmp_path: Path) -> None:
     """Everything else is the same."""
     real = processes(tmp_path, Stack(ROBOT, 'can0', simulate=False))
     simulated = processes(tmp_path, Stack(ROBOT, 'can0', simulate=True))
-    assert set(real) == {'master', 'joint_states'}
-    assert set(simulated) == {'slaves', 'master', 'joint_states'}
+    assert set(real) == {'master'}
+    assert set(simulated) == {'slaves', 'master'}
     assert simulated['master'] == real['master']
 
 
@@ -144,9 +144,8 @@ def test_bus_and_description_reach_the_processes(tmp_path: Path) -> None:
         argv = found[name].argv
         assert 'bus_config:=/robots/panda/bus.yml' in argv
         assert 'can_interface_name:=udp_multicast:239.1.2.3:5000' in argv
-    for name in ('master', 'joint_states'):
-        argv = found[name].argv
-        assert argv[argv.index('--params-file') + 1] == str(PARAMETERS)
+    argv = found['master'].argv
+    assert argv[argv.index('--params-file') + 1] == str(PARAMETERS)
 
 
 def test_another_master_gets_its_parameters(tmp_path: Path) -> None:
@@ -167,7 +166,7 @@ def test_the_master_stops_before_the_slaves(tmp_path: Path) -> None:
     """It disables the drives, so they must still be there; the listeners go between."""
     found = processes(tmp_path, Stack(ROBOT, 'can0', simulate=True), 'robot_state_publisher')
     orders = {name: spec.stop_order for name, spec in found.items()}
-    assert orders['master'] < orders['joint_states'] == orders['robot_state'] < orders['slaves']
+    assert orders['master'] < orders['robot_state'] < orders['slaves']
 
 
 @pytest.mark.parametrize(

@@ -5,20 +5,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import partial
 from pathlib import Path
 import threading
-import time
 
 from config_cases import added
-from config_samples import load_text, TWO_AXES_EDS
+from config_samples import load_text
 from isolation import Isolation
 import pytest
 import rclpy
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.time import Time
-from sensor_msgs.msg import JointState
 
 from arm_canopen.can.frame import Frame
 from arm_canopen.can.virtual import VirtualBus, VirtualWire
@@ -26,7 +21,6 @@ from arm_canopen.config.master_model import MasterConfig
 from arm_canopen.config.model import BusConfig
 from arm_canopen.exceptions import BusError
 from arm_canopen.master.events import Event, EventKind, Severity
-from arm_canopen.nodes.drive_node import DriveNode
 from arm_canopen.nodes.master_process import MasterProcess
 
 DEADLINE = 10.0  # [s] for what takes milliseconds
@@ -71,35 +65,6 @@ def test_stop_ends_both_threads_after_the_cycle_has_died(node: Node) -> None:
         process.attach(NoSource()).result(DEADLINE)
     process.stop()
     assert not any(thread.is_alive() for thread in started)
-    bus.close()
-
-
-def test_each_channel_has_the_joint_states_of_a_drive(node: Node, tmp_path: Path) -> None:
-    """Under its own name, which is that of a joint, beside those of the whole device."""
-    channels = 'num_channels: 2\nchannel_names: [shoulder, elbow]'
-    config = load_text(tmp_path, added('joint1', channels), eds=TWO_AXES_EDS.read_text())
-    bus = VirtualBus('here', VirtualWire())
-    process = MasterProcess(node, config, bus, diagnostics_period=60.0)
-    drive = next(each for each in process.nodes if isinstance(each, DriveNode))
-    heard: dict[str, JointState] = {}
-    for topic in ('joint1', *config.joints):
-        node.create_subscription(
-            JointState, f'{topic}/joint_states', partial(heard.__setitem__, topic), 10
-        )
-    executor = SingleThreadedExecutor()
-    executor.add_node(node)
-    deadline = time.monotonic() + DEADLINE
-    while len(heard) < 3:
-        drive.update_listeners()
-        if drive.listened:
-            drive.publish_joint_state(Time(), [(0.1, 0.2, 0.3), (0.4, 0.5, 0.6)])
-        executor.spin_once(timeout_sec=0.05)
-        assert time.monotonic() < deadline
-    assert [*heard['joint1'].name] == [*config.joints] == ['shoulder', 'elbow']
-    assert [*heard['joint1'].position] == [0.1, 0.4]
-    assert [*heard['elbow'].name] == ['elbow']
-    assert [heard['elbow'].position[0], heard['elbow'].velocity[0]] == [0.4, 0.5]
-    assert [*heard['shoulder'].effort] == [0.3]
     bus.close()
 
 

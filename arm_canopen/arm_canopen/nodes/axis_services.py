@@ -19,7 +19,6 @@ from ..master.runner import NetworkThread
 from ..master.scheduler import Promise
 from ..standard.drive import OperationMode
 from .home_action import HomeAction
-from .output_thread import OutputThread
 
 if TYPE_CHECKING:
     from .device_node import DeviceNode
@@ -48,7 +47,6 @@ class AxisServices:
         commands: DriveCommands,
         place: str,
         thread: NetworkThread,
-        output: OutputThread,
     ) -> None:
         """Offer everything.
 
@@ -57,7 +55,6 @@ class AxisServices:
             commands: Commands of the axis.
             place: What the names begin with.
             thread: The thread of the network.
-            output: The thread that publishes and answers.
         """
         self._node = node
         self._commands = commands
@@ -77,7 +74,7 @@ class AxisServices:
         node.offer(COTargetDouble, f'{place}/target', self._set_target, self._answer_target)
         node.offer(MoveService, f'{place}/move', self._move, self._answer_move)
         node.create_subscription(Float64, f'{place}/target', self._stream, 10)
-        self._home = HomeAction(node, commands, f'{place}/home', thread, output)
+        self._home = HomeAction(node, commands, f'{place}/home', thread, node.output)
 
     def _offer(self, name: str, sequence: Sequence, *, preempt: bool = False) -> None:
         def run() -> Promise[str]:

@@ -55,6 +55,7 @@ class DeviceNode(Node):
 
     Attributes:
         device: The device.
+        output: The thread that publishes and answers.
         admit: Called before every request; raises CanopenError when none is taken at the moment.
     """
 
@@ -142,17 +143,13 @@ class DeviceNode(Node):
         for entry in self.device.image.tpdos:
             entry.listener = listener
 
-    def owns_object(self, index: int) -> bool:
-        """Whether the driver of this device writes an object itself in each cycle."""
-        return False
-
     def check_owner(self, index: int) -> None:
         """Refuse to write what the driver of this device writes.
 
         Raises:
             CanopenError: It writes the object itself in each cycle.
         """
-        if self.owns_object(index):
+        if index in self.device.config.commanded_indices:
             raise CanopenError(
                 f'0x{index:04X} of {self.device.name} is written by its driver in each cycle; '
                 'use the services of the drive'

@@ -10,10 +10,7 @@ import time
 
 from rclpy.exceptions import InvalidTopicNameException
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile
-from rclpy.time import Time
 from sensor_msgs.msg import JointState
-from std_msgs.msg import String
 
 from node_runner import (
     destroyed_when_refused,
@@ -24,11 +21,12 @@ from node_runner import (
 )
 
 from ..exceptions import CanopenError
-from ..joints.aggregator import JointAggregator, JointSample, JointSet
-from ..joints.robot_joints import movable_joints
+from ..joints.aggregator import JointSample
+from ..joints.robot_joints import RobotJoint
+from ..joints.silence_watch import SilenceWatch
+from .joint_states import on_description, RobotJointStates
 
-LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-WATCH_PERIOD = 2.0  # [s] between two looks for joints that are silent
+WATCH_PERIOD = 2.0  # [s] between two looks for joints without states
 
 
 class JointStatePublisher(Node):
@@ -46,34 +44,21 @@ class JointStatePublisher(Node):
         description = ParameterReader(self).text(
             'robot_description',
             '',
-            'URDF as XML text; without it, the topic robot_description tells it',
+            'URDF as XML text; without it, the topic robot_description',
         )
         refuse_misspelt(self)
-        self._begun = False
-        self._aggregator = JointAggregator([])
-        self._silent: list[str] = []
-        self._publisher = self.create_publisher(JointState, 'joint_states', 10)
-        if description:
-            self._begin(description)
-        else:
-            self.create_subscription(String, 'robot_description', self._take_description, LATCHED)
+        if not description:
             self.get_logger().info('waiting for the URDF on the topic robot_description')
+        on_description(self, description, self._begin)
 
-    def _take_description(self, message: String) -> None:
-        if self._begun:
-            return  # a robot that changes its joints is another robot, for another process
-        try:
-            self._begin(message.data)
-        except CanopenError as error:
-            self.get_logger().error(f'robot_description: {error}')
-
-    def _begin(self, description: str) -> None:
-        joints = movable_joints(description)
-        self._begun = True
-        self._aggregator = JointAggregator(joints)
+    def _begin(self, joints: list[RobotJoint]) -> None:
+        self._robot = RobotJointStates(self, joints)
+        moved = [joint.name for joint in joints if joint.mimic is None]
+        self._watch = SilenceWatch(moved, time.monotonic())
+        self._missing: list[str] = []
         for joint in joints:
             self._listen_to(joint.name)
-        self.create_timer(WATCH_PERIOD, self._watch)
+        self.create_timer(WATCH_PERIOD, self._look)
         names = ', '.join(joint.name for joint in joints)
         self.get_logger().info(f'publishing {len(joints)} joints: {names}')
         notify_ready()
@@ -99,30 +84,22 @@ class JointStatePublisher(Node):
         velocity = message.velocity[index] if index < len(message.velocity) else 0.0
         effort = message.effort[index] if index < len(message.effort) else 0.0
         sample = JointSample(message.position[index], velocity, effort)
-        for ready in self._aggregator.update(joint, stamp, sample, time.monotonic()):
-            self._publish(ready)
+        self._watch.note(joint)
+        self._robot.update(joint, stamp, sample)
 
-    def _publish(self, ready: JointSet) -> None:
-        positions, velocities, efforts = zip(*ready.samples, strict=True)
-        message = JointState(
-            name=ready.names, position=positions, velocity=velocities, effort=efforts
-        )
-        # drivers that leave the stamp empty, as ros2_canopen does, get the time of arrival
-        clock = self.get_clock()
-        stamp = Time(nanoseconds=ready.stamp) if ready.stamp else clock.now()
-        message.header.stamp = stamp.to_msg()
-        self._publisher.publish(message)
-
-    def _watch(self) -> None:
-        silent = self._aggregator.silent(time.monotonic())
-        if silent and silent != self._silent:
+    def _look(self) -> None:
+        now = time.monotonic()
+        silent = self._robot.aggregator.silent(now)
+        published = [name for name in silent if self.count_publishers(f'{name}/joint_states')]
+        missing = self._watch.look(silent, published, now)
+        if missing and missing != self._missing:
             self.get_logger().warning(
-                f'nothing heard of {", ".join(silent)}; is there a drive of that name in bus.yml, '
-                'and is it operational? They are left out of /joint_states'
+                f'no joint states of {", ".join(missing)}; they are left out of /joint_states. Is '
+                'there a drive of that name in bus.yml, and is it operational?'
             )
-        elif self._silent and not silent:
-            self.get_logger().info('all joints are heard')
-        self._silent = silent
+        elif self._missing and not silent:
+            self.get_logger().info('joint states of all joints again')
+        self._missing = missing
 
 
 def main() -> int:

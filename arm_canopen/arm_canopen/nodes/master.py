@@ -102,6 +102,8 @@ class Parameters:
         diagnostics_period: Time between two /diagnostics messages in [s].
         thread_priority: SCHED_FIFO priority of the thread of the cycle; 0 asks for none.
         beside_master: Start although another master is heard on the bus.
+        robot_joint_states: Publish the joints of all drives as ``joint_states``.
+        robot_description: URDF as XML text; empty to take it from the topic.
     """
 
     bus_configs: list[str]
@@ -109,6 +111,8 @@ class Parameters:
     diagnostics_period: float
     thread_priority: int
     beside_master: bool
+    robot_joint_states: bool
+    robot_description: str
 
 
 def _run(stop: threading.Event, extend: Extend | None) -> None:
@@ -144,6 +148,8 @@ def _make_process(config: BusConfig, can: Bus, stack: ExitStack) -> MasterProces
         thread_priority=parameters.thread_priority,
         beside_master=parameters.beside_master,
     )
+    if parameters.robot_joint_states:
+        process.publish_robot_joint_states(parameters.robot_description)
     for other in process.nodes[1:]:
         stack.callback(other.destroy_node)
     return process
@@ -233,13 +239,31 @@ def _declare(node: Node) -> Parameters:
         'start although another master is heard, which leads other devices',
         default=False,
     )
+    robot_joint_states = read.flag(
+        'robot_joint_states',
+        'publish the joints of all drives as joint_states; for an arm with one master, in the '
+        'place of canopen_joint_state_publisher',
+        default=False,
+    )
+    description = read.text(
+        'robot_description',
+        '',
+        'URDF as XML text, for the order of joint_states and the joints that mimic others; '
+        'without it, the topic robot_description',
+    )
     refuse_misspelt(node)
     if not configs:
         raise CanopenError(
             'no bus_config: give the path of a bus.yml with --ros-args -p bus_config:=FILE'
         )
     parameters = Parameters(
-        configs.split(','), can_names.split(','), period, priority, beside_master
+        configs.split(','),
+        can_names.split(','),
+        period,
+        priority,
+        beside_master,
+        robot_joint_states,
+        description,
     )
     if len(parameters.bus_configs) != len(parameters.can_names):
         raise CanopenError(

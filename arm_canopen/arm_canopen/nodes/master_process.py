@@ -10,7 +10,6 @@ import time
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.node import Node
-from rclpy.time import Time
 
 from node_runner import notify_ready, raise_thread_priority
 
@@ -24,15 +23,14 @@ from ..master.events import Event, EventKind, Severity
 from ..master.status import node_status
 from .device_node import DeviceNode
 from .diagnostics import bus_diagnostic, BusStatus, device_diagnostic, drive_diagnostic
-from .drive_node import DriveNode
+from .drive_services import DriveServices
+from .joint_states import BusJointStates
 from .managed_bus import ManagedBus
 from .master_node import MasterServices
 from .output_thread import OutputThread
 
 LISTENER_PERIOD = 0.1  # [s] how soon a new subscriber hears something
 LAST_WORD_TIMEOUT = 0.5  # [s] for the last /diagnostics
-
-JointSample = tuple[DriveNode, list[tuple[float, float, float]]]
 
 
 class MasterProcess:
@@ -70,27 +68,28 @@ class MasterProcess:
         self._master = BusMaster(config, can, self._report, beside_master=beside_master)
         self._master.on_operational = lambda: self._output.post(self._report_ready)
         self._network, self._thread = self._master.network, self._master.thread
-        self._network.on_feedback = self._feedback
-        self._feedback_posted = False
         self._devices = {
             device.name: DeviceNode(device, self._thread, self._output)
             for device in self._network.nodes.values()
-            if not device.config.is_drive
         }
         self._drives = {
-            device.name: DriveNode(device, self._master.axes(device), self._thread, self._output)
-            for device in self._network.nodes.values()
-            if device.config.is_drive
+            name: DriveServices(each, self._master.axes(each.device), self._thread)
+            for name, each in self._devices.items()
+            if each.device.config.is_drive
         }
+        drives = [drive.joint_states for drive in self._drives.values()]
+        self._joint_states = BusJointStates(node, drives, self._output)
+        self._network.on_feedback = self._joint_states.feedback
         services = MasterServices(node, self._thread, self._output)
         services.check_owner = self._check_owner
         self._diagnostics = node.create_publisher(DiagnosticArray, 'diagnostics', 10)
         node.create_timer(diagnostics_period, self._ask_diagnostics)
         node.create_timer(LISTENER_PERIOD, self._update_listeners)
-        devices = {**self._devices, **self._drives}
-        self.nodes: list[Node] = [node, *devices.values()]
+        self.nodes: list[Node] = [node, *self._devices.values()]
         if config.master.is_lifecycle:
-            managed = ManagedBus(node, devices, self._master.axes, self._thread, self._output)
+            managed = ManagedBus(
+                node, self._devices, self._master.axes, self._thread, self._output
+            )
             services.admit = managed.admit
             self.nodes.append(managed.manager)
 
@@ -125,6 +124,18 @@ class MasterProcess:
             self._thread.stop()
             self._output.stop()
 
+    def publish_robot_joint_states(self, description: str) -> None:
+        """Publish ``joint_states`` of all drives of the bus, too; call it before :meth:`start`.
+
+        Args:
+            description: URDF as XML text, which says the order, and which joints mimic others; the
+                topic ``robot_description`` is used where it is empty.
+
+        Raises:
+            CanopenError: The text is no URDF.
+        """
+        self._joint_states.publish_robot(description)
+
     def attach(self, source: MotionSource) -> Future[None]:
         """Let a motion source command its axes, from any thread; nothing waits.
 
@@ -143,24 +154,12 @@ class MasterProcess:
         return self._master.detach(source)
 
     def _check_owner(self, node_id: int, index: int) -> None:
-        for node in self._drives.values():
+        for node in self._devices.values():
             if node.device.config.node_id == node_id:
                 node.check_owner(index)
 
     def _report(self, event: Event) -> None:
         self._output.post_stream((event.kind, event.node), partial(self._tell, event))
-
-    def _feedback(self, sync_time: float) -> None:
-        if self._feedback_posted:
-            return  # the output thread is behind; it gets the newest when it is there again
-        samples: list[JointSample] = [
-            (node, sample)
-            for node in self._drives.values()
-            if node.listened and (sample := node.sample()) is not None
-        ]
-        if samples:
-            self._feedback_posted = True
-            self._output.post(partial(self._publish_joints, sync_time, samples))
 
     def _collect(self) -> list[DiagnosticStatus]:
         now = time.monotonic()
@@ -181,20 +180,13 @@ class MasterProcess:
         )
         statuses = [bus_diagnostic(self._node.get_name(), status)]
         for device in self._network.nodes.values():
-            node = self._drives.get(device.name)
-            if node is None:
+            services = self._drives.get(device.name)
+            if services is None:
                 statuses.append(device_diagnostic(self._master.can.name, node_status(device, now)))
                 continue
-            drives = [drive_status(axis, now) for axis in node.axes]
+            drives = [drive_status(axis, now) for axis in services.axes]
             statuses += [drive_diagnostic(self._master.can.name, drive) for drive in drives]
         return statuses
-
-    def _publish_joints(self, sync_time: float, samples: list[JointSample]) -> None:
-        self._feedback_posted = False
-        age = int((time.monotonic() - sync_time) * 1e9)  # [ns]
-        stamp = Time(nanoseconds=self._node.get_clock().now().nanoseconds - age)
-        for node, sample in samples:
-            node.publish_joint_state(stamp, sample)
 
     def _tell(self, event: Event) -> None:
         logger = self._node.get_logger()
@@ -206,7 +198,7 @@ class MasterProcess:
             logger.warning(str(event))
         else:
             logger.error(str(event))
-        node = self._drives.get(event.node) or self._devices.get(event.node)
+        node = self._devices.get(event.node)
         if node is not None and event.kind in (EventKind.NMT_STATE, EventKind.HEARTBEAT_LOST):
             node.publish_nmt_state()
 
@@ -230,5 +222,6 @@ class MasterProcess:
         self._diagnostics.publish(message)
 
     def _update_listeners(self) -> None:
-        for node in (*self._devices.values(), *self._drives.values()):
+        self._joint_states.update_listeners()
+        for node in self._devices.values():
             node.update_listeners()

@@ -1,0 +1,39 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What a drive offers beside any device: services of ros2_canopen's 402 driver, joint states."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ..cia402.drive_commands import DriveCommands
+from ..master.runner import NetworkThread
+from .axis_services import AxisServices
+from .device_node import DeviceNode
+from .joint_states import DriveJointStates
+
+
+class DriveServices:
+    """Services and topics of a drive with one axis or several.
+
+    Attributes:
+        axes: Its axes.
+        joint_states: Their joint states.
+    """
+
+    def __init__(
+        self, node: DeviceNode, axes: Sequence[DriveCommands], thread: NetworkThread
+    ) -> None:
+        """Offer the services.
+
+        Args:
+            node: The node of the device.
+            axes: Commands of its axes.
+            thread: The thread of its network.
+        """
+        self.axes = [commands.drive for commands in axes]
+        self.joint_states = DriveJointStates(node, [axis.view for axis in self.axes])
+        self._services = [
+            AxisServices(node, commands, '~' if len(axes) == 1 else axis.name, thread)
+            for commands, axis in zip(axes, self.axes, strict=True)
+        ]
