@@ -27,13 +27,13 @@ from quad_description.rotations import (
 )
 from quad_hardware.estimation import Estimator, EstimatorSettings, ImuMounting, RateSource
 from quad_hardware.estimation.battery import Battery, BatteryFilter, REPORTS
+from quad_hardware.estimation.device_clock import SampleClock
 from quad_hardware.estimation.filters import AttitudeRate, JointRate
 from quad_hardware.estimation.gravity import (
     gravity_from_acceleration,
     GravityCheck,
 )
 from quad_hardware.estimation.plausibility import MAX_REFUSALS, Plausibility
-from quad_hardware.estimation.sample_clock import SampleClock
 from quad_hardware.joints import JointMap, servo_of
 from quad_hardware.protocol import LEG_MOTORS
 from quad_hardware.report import DEVICE_TIME_WRAP, Report

@@ -29,25 +29,26 @@ class Battery:
 
 
 class BatteryFilter:
-    """Takes the median of the last reports."""
+    """Takes the median of the last reports.
+
+    Attributes:
+        state: The state of the battery by now.
+    """
 
     def __init__(self) -> None:
         """Begin without a report."""
+        self.state = Battery()
         self._charges: deque[float] = deque(maxlen=REPORTS)
         self._voltages: deque[float] = deque(maxlen=REPORTS)
 
-    def take(self, state: Report) -> None:
-        """Take a report; charges that cannot be do not count."""
-        if state.battery is not None and EMPTY <= state.battery <= FULL:
-            self._charges.append(state.battery)
-        if state.voltage is not None:
-            self._voltages.append(state.voltage)
-
-    @property
-    def state(self) -> Battery:
-        """The state of the battery now; may be asked for from any thread."""
-        charges, voltages = self._charges.copy(), self._voltages.copy()
-        return Battery(
-            median(charges) if charges else None,
-            median(voltages) if voltages else None,
+    def take(self, report: Report) -> Battery:
+        """Take a report, whose charge does not count when it cannot be; return the new state."""
+        if report.battery is not None and EMPTY <= report.battery <= FULL:
+            self._charges.append(report.battery)
+        if report.voltage is not None:
+            self._voltages.append(report.voltage)
+        self.state = Battery(
+            median(self._charges) if self._charges else None,
+            median(self._voltages) if self._voltages else None,
         )
+        return self.state

@@ -21,13 +21,12 @@ from ..exceptions import CommandError
 from ..joints import JointMap
 from ..report import Report
 from .battery import Battery, BatteryFilter
-from .board_watch import BoardWatch
+from .device_clock import BoardWatch, SampleClock
 from .filters import AttitudeRate, JointRate
 from .gravity import GravityCheck
 from .imu_mounting import ImuMounting, UNCHECKED_DEVIATION
 from .odometry import LegOdometry, OdometrySettings, OdometryState
 from .plausibility import Plausibility
-from .sample_clock import SampleClock
 
 
 class RateSource(Enum):
@@ -132,8 +131,7 @@ class Estimator:
             self.refusal = reason
             return None
         time = self._clock.time(report)
-        self._battery.take(report)
-        charge = self._battery.state.charge
+        charge = self._battery.take(report).charge
         return RobotState(
             self._joint_sample(report, time - report.joints_age),
             None if self._plausibility.imu_problem else self._imu_sample(report, time),
@@ -162,7 +160,10 @@ class Estimator:
         velocities = self._joints.velocities(report.velocities)
         if not velocities:
             velocities = self._joint_rate.update(time, positions)
-        names, known = self._joints.names, {**self._sent, **positions}
+        names = self._joints.names
+        if len(positions) == len(velocities) == len(names):  # all of them, in their order
+            return JointSample(tuple(positions.values()), tuple(velocities.values()), time)
+        known = {**self._sent, **positions}
         return JointSample(
             tuple(known.get(name, 0.0) for name in names),
             tuple(velocities.get(name, 0.0) for name in names),

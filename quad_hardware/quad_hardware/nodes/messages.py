@@ -61,17 +61,19 @@ class JointStates:
         )
 
 
-def joint_states_form(names: Sequence[str], joints: JointSample) -> JointStates:
+def joint_states_form(names: tuple[str, ...], joints: JointSample) -> JointStates:
     """Return the form for the joints that are measured, of all joints by name."""
-    return JointStates(tuple(joints.measured(names)))
+    return JointStates(tuple(joints.measured(names)) if joints.unmeasured else names)
 
 
 def joint_numbers(joints: JointSample) -> Numbers:
     """Return what :class:`JointStates` takes."""
-    both = joints.positions, joints.velocities or ()
+    velocities = joints.velocities or ()
+    if not joints.unmeasured:
+        return (*joints.positions, *velocities)
     return [
         number
-        for numbers in both
+        for numbers in (joints.positions, velocities)
         for place, number in enumerate(numbers)
         if place not in joints.unmeasured
     ]

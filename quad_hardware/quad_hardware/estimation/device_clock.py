@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""When a report was made, on our clock: its arrival, without the jitter of the way."""
+"""The clock of the board: when a report was made, on ours, and whether the board began anew."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ DRIFT = 1e-4  # share by which the robot's clock may be off
 RESTART = 1.0  # [s] a difference beyond that is a robot that began anew
 LATE = 0.1  # [s] a report that is later than others by that may be right, and they wrong
 LATE_TIMEOUT = 0.5  # [s] for which all reports are late, until they are believed
+LARGEST_LAG = 1.0  # [s] by which reports of one life of the board come late, or after each other
+BOOT_TIME = 0.5  # [s] without a report is no shorter while the board boots
 
 
 class SampleClock:
@@ -51,3 +53,27 @@ class SampleClock:
             return False
         self._late_since = min(self._late_since, begun)
         return begun - self._late_since > LATE_TIMEOUT
+
+
+class BoardWatch:
+    """Finds restarts, after which the board counts its yaw from another heading than before.
+
+    Each report is compared with the one before. Where the board reports its clock, the clock
+    tells. Elsewhere each silence that is long enough for a restart counts as one: nothing was
+    sent meanwhile, so the robot did not walk.
+    """
+
+    def __init__(self) -> None:
+        """Begin without a report."""
+        self._last: Report | None = None
+
+    def restarted(self, state: Report) -> bool:
+        """Take a report; return whether the board has, or may have, begun anew before it."""
+        last, self._last = self._last, state
+        if last is None:
+            return False
+        gap = state.arrival - last.arrival
+        if last.device_time is None or state.device_time is None:
+            return gap > BOOT_TIME
+        passed = math.remainder(state.device_time - last.device_time, DEVICE_TIME_WRAP)
+        return abs(passed - gap) > LARGEST_LAG or passed < 0.0 < gap - BOOT_TIME
