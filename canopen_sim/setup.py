@@ -14,6 +14,7 @@ EXECUTABLES = [
     'fake_slave = canopen_sim.nodes.fake_slave:main',
     'fake_slaves = canopen_sim.nodes.fake_slaves:main',
 ]
+COMMANDS = ['canopen-fake-slaves = canopen_sim.fake_slaves_command:main']
 
 CHECKOUT = Path(__file__).resolve().parents[1]
 
@@ -45,6 +46,6 @@ setup(
     description='Simulated CANopen devices and CiA 402 drives, with faults',
     license='Apache-2.0',
     entry_points={
-        'console_scripts': EXECUTABLES if FOR_ROS else [],
+        'console_scripts': EXECUTABLES if FOR_ROS else COMMANDS,
     },
 )

@@ -60,6 +60,7 @@ IMPORTED = [
 COMMANDS = [
     'canopen',
     'canopen-candump',
+    'canopen-fake-slaves',
     'fake_xgo',
     'operator-show-gamepad',
     'quad-check-policy',
@@ -221,6 +222,30 @@ def test_frames_are_shown(environment: Environment, isolation: Isolation) -> Non
             bus.receive(0.05)
         assert dump.stdout is not None
         assert 'heartbeat' in dump.stdout.read().lower()
+
+
+MOVE = """
+import sys
+from arm_canopen import CanopenMaster
+with CanopenMaster.from_bus_yml(sys.argv[1], sys.argv[2]) as master:
+    master.boot(60.0)
+    drive = master.drive('panda_joint1')
+    drive.enable()
+    drive.move_to(0.1)
+    print(drive.position)
+"""
+
+
+def test_drives_are_moved(environment: Environment, isolation: Isolation) -> None:
+    """`CanopenMaster` leads the drives that `canopen-fake-slaves` simulates."""
+    bus_config = CHECKOUT / 'arm_bringup' / 'robots' / 'panda' / 'bus.yml'
+    argv = ('canopen-fake-slaves', bus_config, '--can', isolation.bus)
+    with environment.running(*argv) as devices:
+        assert devices.stdout is not None
+        assert devices.stdout.readline()  # they are there
+        done = environment.run('python', '-c', MOVE, bus_config, isolation.bus)
+    assert done.returncode == 0, done.stderr
+    assert float(done.stdout) == pytest.approx(0.1, abs=0.002)
 
 
 def test_a_robot_answers_the_doctor(environment: Environment, tmp_path: Path) -> None:

@@ -1,14 +1,15 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""CANopen master and CiA 402 drives for ROS 2.
+"""CANopen master and CiA 402 drives, for ROS 2 and, as :class:`CanopenMaster`, without it.
 
-The names here are the public API. Those that need ROS are loaded when they are asked for, so that
-the core can be used without it. Public besides, for tools and simulated devices: the modules of
-`standard`, `config` and `can`, `exceptions`, and what `master` names.
+The names here are the public API. Those that need ROS, or take long, are loaded when they are
+asked for. Public besides, for tools and simulated devices: the modules of `standard`, `config` and
+`can`, `exceptions`, and what `master` names.
 """
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import Any, TYPE_CHECKING
 
 from .can import open_bus
@@ -17,18 +18,27 @@ from .cia402.refusal import Refusal, RefusalCause
 from .config import load_bus
 from .config.model import BusConfig, NodeConfig
 from .exceptions import CanopenError
+from .standard.drive import DriveState, OperationMode
 
 if TYPE_CHECKING:
+    from .library.canopen_drive import CanopenDrive
+    from .library.canopen_master import CanopenMaster
+    from .library.device import CanopenDevice
     from .nodes.master import run_master
     from .nodes.master_process import MasterProcess
 
 __all__ = [
     'AxisFeedback',
     'BusConfig',
+    'CanopenDevice',
+    'CanopenDrive',
     'CanopenError',
+    'CanopenMaster',
+    'DriveState',
     'MasterProcess',
     'MotionSource',
     'NodeConfig',
+    'OperationMode',
     'Refusal',
     'RefusalCause',
     'Setpoint',
@@ -38,13 +48,16 @@ __all__ = [
 ]
 
 
+_LATE = {
+    'CanopenDevice': '.library.device',
+    'CanopenDrive': '.library.canopen_drive',
+    'CanopenMaster': '.library.canopen_master',
+    'MasterProcess': '.nodes.master_process',
+    'run_master': '.nodes.master',
+}
+
+
 def __getattr__(name: str) -> Any:  # noqa: ANN401
-    if name == 'run_master':
-        from .nodes.master import run_master
-
-        return run_master
-    if name == 'MasterProcess':
-        from .nodes.master_process import MasterProcess
-
-        return MasterProcess
-    raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
+    if name not in _LATE:
+        raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
+    return getattr(import_module(_LATE[name], __name__), name)

@@ -11,6 +11,7 @@ from .drive.servo import ServoModel
 from .fault import Fault, FaultInjection
 from .host import DeviceHost
 from .runner import DeviceRunner
+from .simulation import simulated_devices
 
 __all__ = [
     'Device',
@@ -20,4 +21,5 @@ __all__ = [
     'Fault',
     'FaultInjection',
     'ServoModel',
+    'simulated_devices',
 ]

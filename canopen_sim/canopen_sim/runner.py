@@ -57,6 +57,11 @@ class DeviceRunner:
         self._begin: Callable[[], None] = lambda: None
         self._thread = threading.Thread(target=self.run, name='devices', daemon=True)
 
+    @property
+    def bus_name(self) -> str:
+        """Name of the bus."""
+        return self._bus.name
+
     def start(self, begin: Callable[[], None] = lambda: None) -> None:
         """Switch the devices on, in a thread of their own.
 

@@ -46,6 +46,10 @@ class CyclicPosition(Mode):
         """Whether the profile is on the way to a single target."""
         return self._profile.target is not None and not self._profile.at_rest
 
+    def reached(self, statusword: int) -> bool:
+        """Whether the profile has ended; bit 10 is none of these modes'."""
+        return not self.goes_to_single_target
+
     def preload(self, actual: Actual) -> Promise[None]:
         """Hold the actual position."""
         self._streamed = None

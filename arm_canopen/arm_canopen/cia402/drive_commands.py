@@ -138,6 +138,35 @@ class DriveCommands:
         if stopped():
             raise steps.refused('was stopped before it had taken the target')
 
+    async def arrive(self, timeout: float) -> str:
+        """Wait until the drive stands where the last target is; one that is late is halted.
+
+        Args:
+            timeout: How long that may take in [s].
+
+        Raises:
+            DriveError: It is late, was stopped before, or got another target or mode.
+        """
+        drive, delivery, steps = self.drive, self._delivery, self._steps
+        control, mode = drive.control, drive.control.mode
+
+        def lost() -> bool:
+            halted = control.halted and not control.halt.leaving
+            replaced = self._delivery is not delivery or control.mode is not mode
+            return halted or replaced or not control.acts or not drive.view.fresh
+
+        def arrived() -> bool:
+            return mode.reached(drive.view.statusword) and drive.view.stands
+
+        try:
+            await self._scheduler.until(lambda: lost() or arrived(), timeout)
+        except TimeoutError:
+            control.hold()
+            raise steps.refused(f'has not arrived within {timeout:g} s and is halted') from None
+        if lost():
+            raise steps.refused('was stopped, or got another target, before it arrived')
+        return drive.describe()
+
     def stream_target(self, target: float) -> None:
         """Take one of a stream of targets; when the stream pauses for too long, the drive stops.
 

@@ -16,8 +16,9 @@ from typing import NamedTuple
 from ..exceptions import DriveError
 from ..master.process_image import Writer
 from ..master.scheduler import completed, Promise
-from ..standard.drive import Controlword, OperationMode
+from ..standard.drive import Controlword, OperationMode, Statusword
 
+TARGET_REACHED = int(Statusword.TARGET_REACHED)
 NO_BITS = 0  # bits are plain numbers in the cycle, where operators of IntFlag cost too much
 
 
@@ -119,6 +120,14 @@ class Mode(ABC):
     def braked(self) -> bool:
         """Whether what the mode commands stands still, as far as the mode itself leads it."""
         return True
+
+    def reached(self, statusword: int) -> bool:
+        """Whether the drive is where the last target is, as far as the mode can say so.
+
+        Args:
+            statusword: 0x6041 as the drive sent it.
+        """
+        return bool(statusword & TARGET_REACHED)
 
     @property
     def taken(self) -> bool:

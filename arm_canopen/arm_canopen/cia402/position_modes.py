@@ -14,11 +14,10 @@ from ..exceptions import DriveError
 from ..master.process_image import Writer
 from ..master.scheduler import completed, Promise
 from ..standard.drive import Controlword, OperationMode, Statusword
-from .modes import Actual, fitting, Mode
+from .modes import Actual, fitting, Mode, TARGET_REACHED
 from .units import Units
 
 ACKNOWLEDGE = int(Statusword.SET_POINT_ACKNOWLEDGE)
-TARGET_REACHED = int(Statusword.TARGET_REACHED)
 NEW_SET_POINT = int(Controlword.NEW_SET_POINT)
 CHANGE_IMMEDIATELY = int(Controlword.CHANGE_IMMEDIATELY)
 ACKNOWLEDGE_TIMEOUT = 1.0  # [s] a drive acknowledges a set-point within a few cycles
@@ -152,6 +151,11 @@ class ProfilePosition(Mode):
     def offered(self) -> bool:
         """Whether bit 4 is set and bit 12 awaited; not where it was set before (full buffer)."""
         return self.handshake is Handshake.OFFERED
+
+    def reached(self, statusword: int) -> bool:
+        """Whether the drive has taken all moves, and shows the end of the last one (bit 10)."""
+        handed_over = self.handshake is Handshake.IDLE and not self._queue
+        return handed_over and super().reached(statusword)
 
     @property
     def waiting(self) -> int:

@@ -1,0 +1,167 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""An axis of a CiA 402 drive, for callers outside of the cycle; each command waits for its end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Coroutine
+from functools import partial
+import time
+from typing import Any, TypeAlias
+
+from ..cia402.drive_commands import DriveCommands
+from ..cia402.position_modes import Move
+from ..cia402.status import drive_status, DriveStatus
+from ..master.runner import NetworkThread
+from ..master.scheduler import Promise
+from ..standard.drive import DriveState, OperationMode
+from .device import DeviceSdo
+
+MOVE_TIMEOUT = 60.0  # [s]
+POSITION_MODES = (
+    OperationMode.PROFILE_POSITION,
+    OperationMode.INTERPOLATED_POSITION,
+    OperationMode.CYCLIC_POSITION,
+)
+
+Sequence: TypeAlias = Callable[[], Coroutine[Promise[Any], None, str]]
+
+
+class CanopenDrive:
+    """A drive: its state as of the last cycle, and its commands.
+
+    Positions and velocities are in the user units of bus.yml (rad and rad/s for a revolute joint).
+    A command returns what was reached, in words. It raises a DriveError where the drive refuses,
+    does not get there in time, or another command runs, and a BusError when the master has ended.
+    Commands that stop the drive end whichever runs.
+
+    Attributes:
+        name: Its name in bus.yml; that of its channel for a device with several axes.
+        sdo: Objects of its device.
+    """
+
+    def __init__(self, commands: DriveCommands, thread: NetworkThread) -> None:
+        """Take the drive.
+
+        Args:
+            commands: Its commands.
+            thread: The thread of its network.
+        """
+        drive = commands.drive
+        self.name = drive.name
+        self.sdo = DeviceSdo(drive.node, thread)
+        self._commands = commands
+        self._drive = drive
+        self._thread = thread
+
+    def status(self) -> DriveStatus:
+        """Return how the drive was in one cycle: state, mode, position, age, error in words.
+
+        Raises:
+            BusError: The master has ended.
+        """
+        return self._thread.call(lambda: drive_status(self._drive, time.monotonic())).result()
+
+    @property
+    def state(self) -> DriveState:
+        """State of the power drive system."""
+        return self.status().state
+
+    @property
+    def position(self) -> float:
+        """Actual position; the last one of a lost drive, NaN before the first."""
+        return self.status().position
+
+    @property
+    def velocity(self) -> float:
+        """Actual velocity."""
+        return self.status().velocity
+
+    @property
+    def mode(self) -> OperationMode:
+        """Mode of operation that is commanded."""
+        return self._thread.call(lambda: self._drive.control.mode.number).result()
+
+    def init(self) -> str:
+        """Reset a fault, enable, home where bus.yml asks for it; no mode is selected then."""
+        return self._run('init', self._commands.init)
+
+    def enable(self) -> str:
+        """Lead to Operation Enabled; a fault is not reset."""
+        return self._run('enable', self._commands.enable)
+
+    def recover(self) -> str:
+        """Reset a fault and lead to Operation Enabled."""
+        return self._run('recover', self._commands.recover)
+
+    def home(self, method: int | None = None) -> str:
+        """Home, then select the mode of before again.
+
+        Args:
+            method: Homing method for 0x6098; None takes what is in the drive.
+        """
+        return self._run('home', partial(self._commands.home, method))
+
+    def select_mode(self, mode: OperationMode | int) -> str:
+        """Switch the mode of operation; return when the drive shows it.
+
+        Args:
+            mode: The mode, or its number in 0x6060.
+        """
+        return self._run('mode', partial(self._commands.select_mode, OperationMode(mode)))
+
+    def disable(self) -> str:
+        """Take the torque away (Switched On)."""
+        return self._run('disable', self._commands.stops.disable, preempt=True)
+
+    def halt(self) -> str:
+        """Brake, and stay enabled; return when it stands. The next target goes on."""
+        return self._run('halt', self._commands.stops.halt, preempt=True)
+
+    def quick_stop(self) -> str:
+        """Begin a quick stop; what follows is the drive's option code 0x605A."""
+        return self._run('quick_stop', self._commands.stops.quick_stop, preempt=True)
+
+    def shutdown(self) -> str:
+        """Bring the drive to rest, and take its power away."""
+        return self._run('shutdown', self._commands.stops.shutdown, preempt=True)
+
+    def set_target(self, target: float) -> str:
+        """Command a position, velocity or effort, by the mode; return when the drive has it.
+
+        Args:
+            target: In user units.
+        """
+        return self._give(lambda: self._commands.set_target(target))
+
+    def move_to(
+        self, position: float, *, relative: bool = False, timeout: float = MOVE_TIMEOUT
+    ) -> str:
+        """Go to a position and wait until the drive stands there.
+
+        In another mode than 1, 7 and 8 mode 1 (profile position) is selected first. A drive that
+        is late is halted.
+
+        Args:
+            position: In user units.
+            relative: From the last set-point on.
+            timeout: How long the motion may take in [s].
+        """
+        if self.mode not in POSITION_MODES:
+            self.select_mode(OperationMode.PROFILE_POSITION)
+        control, commands = self._drive.control, self._commands
+
+        def give() -> str:
+            if control.mode.number is OperationMode.PROFILE_POSITION:
+                return commands.move(Move(position, relative=relative))
+            return commands.set_target(control.setpoint + position if relative else position)
+
+        self._give(give)
+        return self._thread.run_coroutine(partial(commands.arrive, timeout)).result()
+
+    def _run(self, name: str, sequence: Sequence, *, preempt: bool = False) -> str:
+        commands = self._commands
+        return self._thread.run(lambda: commands.run(name, sequence(), preempt=preempt)).result()
+
+    def _give(self, command: Callable[[], str]) -> str:
+        return self._thread.run(lambda: self._commands.give(command)).result()

@@ -1,0 +1,324 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The master in a program without ROS, against simulated drives of another process."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+import os
+from pathlib import Path
+import subprocess
+import sys
+import threading
+import time
+
+from can_addresses import free_multicast
+import canopen
+import pytest
+
+from arm_canopen import AxisFeedback, CanopenMaster, DriveState, OperationMode, Refusal
+from arm_canopen.can.plugin import ArmCanopenBus
+from arm_canopen.exceptions import (
+    BootError,
+    BusError,
+    CodecError,
+    DriveError,
+    ObjectError,
+    OtherMasterError,
+    SdoAbortError,
+)
+
+EDS = Path(__file__).parents[2] / 'arm_canopen' / 'eds' / 'cia402_drive.eds'
+PATIENCE = 30.0  # [s]
+BUS_YML = f"""
+master:
+  node_id: 1
+  driver: ros2_canopen::MasterDriver
+  sync_period: 10000
+  heartbeat_producer: 100
+defaults:
+  dcf: {EDS}
+  driver: ros2_canopen::Cia402Driver
+  heartbeat_producer: 100
+  heartbeat_consumer: true
+  scale_pos_to_dev: 10000.0
+  scale_pos_from_dev: 0.0001
+  sdo: [{{index: 0x6081, value: 20000}}, {{index: 0x60C2, sub_index: 1, value: 10}}]
+  tpdo:
+    1: {{enabled: true, cob_id: auto, transmission: 1,
+        mapping: [{{index: 0x6041}}, {{index: 0x6061}}, {{index: 0x6064}}]}}
+  rpdo:
+    1: {{enabled: true, cob_id: auto,
+        mapping: [{{index: 0x6040}}, {{index: 0x6060}}, {{index: 0x607A}}]}}
+nodes:
+  joint1: {{node_id: 2}}
+  joint2: {{node_id: 3}}
+"""
+FORGETFUL = """
+import sys
+from arm_canopen import CanopenMaster
+master = CanopenMaster.from_bus_yml(sys.argv[1], sys.argv[2])
+master.boot(30.0)
+drive = master.drive('joint1')
+drive.enable()
+drive.select_mode(1)
+drive.set_target(3.0)
+print(drive.state.name, flush=True)
+assert 'rclpy' not in sys.modules
+"""
+
+
+@pytest.fixture
+def bus() -> str:
+    """Name a multicast bus of one's own."""
+    return free_multicast()
+
+
+@pytest.fixture
+def bus_yml(tmp_path: Path) -> Path:
+    """Write a bus.yml with two drives."""
+    path = tmp_path / 'bus.yml'
+    path.write_text(BUS_YML)
+    return path
+
+
+@contextmanager
+def program(*argv: str | Path) -> Iterator[subprocess.Popen[str]]:
+    """Run Python in another process, without ROS on its path, until it has printed a line."""
+    env = {**os.environ, 'PYTHONUNBUFFERED': '1'}
+    command = [sys.executable, *map(str, argv)]
+    with subprocess.Popen(command, env=env, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout is not None
+            assert process.stdout.readline(), 'it ended instead'
+            yield process
+        finally:
+            process.terminate()
+            process.wait(PATIENCE)
+
+
+@pytest.fixture
+def drives(bus_yml: Path, bus: str) -> Iterator[subprocess.Popen[str]]:
+    """Simulate the drives in another process."""
+    with program('-m', 'canopen_sim.fake_slaves_command', bus_yml, '--can', bus) as process:
+        yield process
+
+
+@pytest.fixture
+def master(drives: object, bus_yml: Path, bus: str) -> Iterator[CanopenMaster]:
+    """Boot the bus."""
+    with CanopenMaster.from_bus_yml(bus_yml, bus) as made:
+        made.boot(PATIENCE)
+        yield made
+
+
+@contextmanager
+def independent_client(bus: str, monkeypatch: pytest.MonkeyPatch) -> Iterator[canopen.Network]:
+    """Look at the bus with python-canopen."""
+    place = (ArmCanopenBus.__module__, 'ArmCanopenBus')
+    monkeypatch.setitem(sys.modules['can.interfaces'].BACKENDS, 'arm_canopen', place)
+    network = canopen.Network()
+    network.connect(interface='arm_canopen', channel=bus, ignore_config=True)
+    try:
+        yield network
+    finally:
+        network.disconnect()
+
+
+def statusword(network: canopen.Network, node_id: int) -> int:
+    """Read 0x6041 by SDO."""
+    node = network.add_node(node_id, str(EDS))
+    node.sdo.RESPONSE_TIMEOUT = PATIENCE
+    return int(node.sdo[0x6041].raw)
+
+
+def is_enabled(word: int) -> bool:
+    """Whether a statusword shows Operation Enabled."""
+    return word & 0x6F == 0x27
+
+
+def test_a_drive_is_enabled_moved_and_read(
+    master: CanopenMaster, bus: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What the master says is what an independent master reads from the drive."""
+    drive = master.drive('joint1')
+    drive.enable()
+    assert drive.state is DriveState.OPERATION_ENABLED
+    drive.move_to(0.5)
+    assert drive.mode is OperationMode.PROFILE_POSITION
+    assert drive.position == pytest.approx(0.5, abs=0.001)
+    drive.move_to(-0.2, relative=True)
+    assert drive.position == pytest.approx(0.3, abs=0.001)
+    assert drive.status().fresh
+    with independent_client(bus, monkeypatch) as network:
+        node = network.add_node(2, str(EDS))
+        node.sdo.RESPONSE_TIMEOUT = PATIENCE
+        assert node.sdo[0x6064].raw == pytest.approx(3000, abs=10)
+        assert not is_enabled(statusword(network, 3))  # nobody asked for joint2
+
+
+def test_cyclic_modes_move_too(master: CanopenMaster) -> None:
+    """A single target of mode 8 is led there by the master's own profile."""
+    drive = master.drive('joint2')
+    drive.enable()
+    drive.select_mode(OperationMode.CYCLIC_POSITION)
+    drive.move_to(0.2)
+    assert drive.mode is OperationMode.CYCLIC_POSITION
+    assert drive.position == pytest.approx(0.2, abs=0.001)
+
+
+def test_objects_are_read_and_written(master: CanopenMaster) -> None:
+    """By number and name, typed by the EDS; what is wrong says so, before a frame where it can."""
+    sdo = master.sdo('joint1')
+    assert master.sdo(2).read(0x1000) == 0x20192
+    sdo.write('Profile velocity', 1234)
+    assert sdo.read(0x6081) == 1234
+    sdo.write(0x607D, 5000, subindex=2)
+    assert sdo.read('0x607D:02') == 5000
+    with pytest.raises(ObjectError):
+        sdo.read(0x5FFF)
+    with pytest.raises(CodecError):
+        sdo.write('Profile velocity', 'fast')
+    with pytest.raises(DriveError, match='commands of the drive'):
+        sdo.write('Controlword', 0)
+    with pytest.raises(SdoAbortError):
+        sdo.write('Statusword', 0)
+
+
+def test_names_that_are_none_are_answered_with_those_that_are(master: CanopenMaster) -> None:
+    """Of drives and of devices, which have numbers besides."""
+    with pytest.raises(KeyError, match=r'elbow.*joint1, joint2'):
+        master.drive('elbow')
+    with pytest.raises(KeyError, match=r'9.*joint1 \(2\)'):
+        master.sdo(9)
+
+
+def test_a_late_motion_is_halted(master: CanopenMaster) -> None:
+    """It does not go on behind the back of who was told that it failed."""
+    drive = master.drive('joint1')
+    drive.enable()
+    with pytest.raises(DriveError, match=r'not arrived within 0\.1 s and is halted'):
+        drive.move_to(100.0, timeout=0.1)
+    drive.halt()  # until it stands
+    assert drive.position < 50.0
+    assert drive.state is DriveState.OPERATION_ENABLED
+
+
+def test_a_stop_ends_a_motion(master: CanopenMaster) -> None:
+    """Another thread may stop what this one waits for."""
+    drive = master.drive('joint1')
+    drive.enable()
+    drive.select_mode(OperationMode.PROFILE_POSITION)
+    with ThreadPoolExecutor(1) as pool:
+        moving = pool.submit(drive.move_to, 1000.0)
+        deadline = time.monotonic() + PATIENCE
+        while drive.velocity < 0.5:
+            assert time.monotonic() < deadline
+        drive.disable()
+        with pytest.raises(DriveError):
+            moving.result(PATIENCE)
+
+
+@pytest.mark.parametrize('failing', [False, True])
+def test_leaving_disables_the_drives(
+    drives: object, bus_yml: Path, bus: str, monkeypatch: pytest.MonkeyPatch, *, failing: bool
+) -> None:
+    """By an error, too, which is raised; no thread is left, and no call waits for ever."""
+    before = set(threading.enumerate())
+    master = CanopenMaster.from_bus_yml(bus_yml, bus)
+
+    def work() -> None:
+        with master:
+            master.boot(PATIENCE)
+            drive = master.drive('joint1')
+            drive.enable()
+            drive.select_mode(OperationMode.PROFILE_POSITION)
+            drive.set_target(100.0)
+            if failing:
+                raise ZeroDivisionError
+
+    if failing:
+        with pytest.raises(ZeroDivisionError):
+            work()
+    else:
+        work()
+    assert set(threading.enumerate()) <= before
+    with pytest.raises(BusError, match='has ended'):
+        master.drive('joint1').enable()
+    with pytest.raises(BusError, match='has ended'):
+        master.boot()
+    master.close()  # again is no error
+    with independent_client(bus, monkeypatch) as network:
+        assert not is_enabled(statusword(network, 2))
+
+
+def test_a_program_that_forgets_to_close_leaves_no_drive_enabled(
+    drives: object, bus_yml: Path, bus: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its end stops them."""
+    with program('-c', FORGETFUL, bus_yml, bus) as process:
+        assert process.wait(PATIENCE) == 0
+    with independent_client(bus, monkeypatch) as network:
+        assert not is_enabled(statusword(network, 2))
+
+
+def test_missing_devices_are_named(bus_yml: Path, bus: str) -> None:
+    """They are booted when they come, and a second boot waits for that."""
+    with CanopenMaster.from_bus_yml(bus_yml, bus) as master:
+        with pytest.raises(BootError, match=r'joint1 \(node 2\).*joint2 \(node 3\)'):
+            master.boot(0.2)
+        with pytest.raises(DriveError, match='offline'):
+            master.drive('joint1').enable()
+        with program('-m', 'canopen_sim.fake_slaves_command', bus_yml, '--can', bus):
+            master.boot(PATIENCE)
+            master.drive('joint1').enable()
+
+
+def test_a_second_master_is_refused(master: CanopenMaster, bus_yml: Path, bus: str) -> None:
+    """It says so before its first frame, and the first goes on."""
+    master.drive('joint1').enable()
+    with (
+        CanopenMaster.from_bus_yml(bus_yml, bus) as second,
+        pytest.raises(OtherMasterError),
+    ):
+        second.boot(PATIENCE)
+    assert master.drive('joint1').state is DriveState.OPERATION_ENABLED
+
+
+class Ramp:
+    """A motion source that goes up by 0.1 and stays there."""
+
+    axes = ('joint1',)
+
+    def __init__(self) -> None:
+        self.start: float | None = None
+        self.there = threading.Event()
+
+    def update(
+        self, now: float, period: float, feedback: Sequence[AxisFeedback]
+    ) -> list[float | None]:
+        """Lead the axis once it follows."""
+        axis = feedback[0]
+        if not axis.followable:
+            return [None]
+        self.start = axis.setpoint if self.start is None else self.start
+        position = min(axis.setpoint + 0.2 * period, self.start + 0.1)
+        if axis.position >= self.start + 0.0999:
+            self.there.set()
+        return [position]
+
+    def released(self, axis: str, refusal: Refusal) -> None:
+        """Lose it at the end."""
+
+
+def test_a_motion_source_leads_in_the_cycle(master: CanopenMaster) -> None:
+    """As in the process of the ROS node."""
+    drive, ramp = master.drive('joint1'), Ramp()
+    drive.enable()
+    drive.select_mode(OperationMode.CYCLIC_POSITION)
+    master.attach(ramp)
+    assert ramp.there.wait(PATIENCE)
+    master.detach(ramp)
+    assert drive.position == pytest.approx(0.1, abs=0.002)
