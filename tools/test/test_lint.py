@@ -64,11 +64,13 @@ def test_a_check_that_fails_is_told_and_the_others_run(
 def test_every_package_is_in_the_contracts() -> None:
     """import-linter looks only at packages that it is told of."""
     root = this_checkout().root
-    options = read_configuration(str(root / 'pyproject.toml'))['session_options']
-    named = options['root_packages']
+    configuration = read_configuration(str(root / 'pyproject.toml'))
+    named = configuration['session_options']['root_packages']
+    contracts = {each['type']: each for each in configuration['contracts_options']}
+    assert contracts['acyclic_siblings']['ancestors'] == named
     packages = find_packages(root).values()
     python = [package.name for package in packages if package.build_type == 'ament_python']
-    assert sorted(named) == sorted(python)
+    assert sorted(named) == sorted([*python, 'ros2_frontend', 'workspace'])
 
 
 @pytest.mark.parametrize(

@@ -65,7 +65,8 @@ def lint(layout: Layout, environ: Mapping[str, str]) -> int:
         cache = layout.root / '.mypy_cache' / name
         commands.append([bin_folder / 'mypy', '--cache-dir', cache, *folders])
     environment = clean_environment(environ)
-    environment['PYTHONPATH'] = os.pathsep.join(map(str, [*packages, tools]))  # for lint-imports
+    checked = [*packages, tools, tools / 'ros2_frontend']
+    environment['PYTHONPATH'] = os.pathsep.join(map(str, checked))  # for lint-imports
 
     def run(command: list[str | Path]) -> subprocess.CompletedProcess[str]:
         return subprocess.run(

@@ -4,28 +4,49 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from concurrent.futures import Future
-from typing import TYPE_CHECKING
+from typing import Any, Protocol
 
 from arm_msgs.srv import ReadObject, WriteObject
 
 from ..config.object_text import bytes_from_text, text_from_bytes
 from ..exceptions import CanopenError
+from ..master.remote_node import RemoteNode
 from ..master.runner import NetworkThread
 from ..standard.datatypes import DataType
 from ..standard.dictionary import ObjectEntry
 from ..standard.object_path import find_object, object_path
 
-if TYPE_CHECKING:
-    from .device_node import DeviceNode
-
 Transfer = tuple[ObjectEntry, bytes]
+
+
+class ServiceOwner(Protocol):
+    """The node that offers the services.
+
+    Attributes:
+        device: Its device.
+    """
+
+    device: RemoteNode
+
+    def check_owner(self, index: int) -> None:
+        """Refuse to write what the driver of this device writes."""
+
+    def offer(
+        self,
+        service_type: Any,  # noqa: ANN401  # service classes have no type
+        name: str,
+        handler: Callable[[Any], Future[Any]],
+        respond: Callable[[Any, Future[Any]], None],
+    ) -> None:
+        """Offer a service whose outcome is a future."""
 
 
 class ObjectServices:
     """``~/read_object`` and ``~/write_object`` of one device."""
 
-    def __init__(self, node: DeviceNode, thread: NetworkThread) -> None:
+    def __init__(self, node: ServiceOwner, thread: NetworkThread) -> None:
         """Offer them.
 
         Args:

@@ -4,12 +4,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
 from arm_canopen.standard.objects import Index
 
-from ..drive.drive import Drive
 from ..fault import Fault, FaultInjection
 from ..objects.object_store import ObjectStore
 from ..timed import NEVER
@@ -29,12 +29,25 @@ REBOOT_TIME_MIN = 1e-6  # [s] so that off comes before on
 OTHER_VENDOR = 0x7FFF_FFFF  # what a wrong identity shows when no value is given
 
 
+class Axis(Protocol):
+    """A drive with faults of its own."""
+
+    def inject(self, fault: Fault, now: float | None = None, *, lasting: bool = True) -> None:
+        """Let something go wrong."""
+
+    def clear(self, fault: Fault, now: float | None = None) -> None:
+        """Take the cause of a fault away."""
+
+
 class Powered(Protocol):
     """What the injector does with its device."""
 
     node_id: int
     store: ObjectStore
-    drives: tuple[Drive, ...]
+
+    @property
+    def drives(self) -> Sequence[Axis]:
+        """Its axes."""
 
     def switch_off(self, now: float) -> None:
         """Cut the power."""
@@ -156,7 +169,7 @@ class FaultInjector:
         elif injection.fault in POWER_FAULTS:
             self._device.switch_on(now, position_kept=injection.position_kept)
 
-    def _axes(self, injection: FaultInjection) -> tuple[Drive, ...]:
+    def _axes(self, injection: FaultInjection) -> Sequence[Axis]:
         drives = self._device.drives
         return drives[injection.axis - 1 : injection.axis] if injection.axis else drives
 

@@ -4,13 +4,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Container, Sequence
+from typing import Protocol
 
 from arm_canopen.can.frame import Frame
 from arm_canopen.standard.nmt import NmtState
 from arm_canopen.standard.objects import Index
 
-from ..drive.drive import Drive
 from ..objects.object_store import ObjectStore
 from .emcy_producer import EmcyProducer
 from .heartbeat import HeartbeatConsumer
@@ -20,6 +20,17 @@ from .node_guarding import GuardedNode
 HEARTBEAT_ERROR = 0x8130  # EMCY: life guard error or heartbeat error
 ERROR_STATES: dict[int, NmtState] = {0: NmtState.PRE_OPERATIONAL, 2: NmtState.STOPPED}
 """Where a communication error leads from Operational, by 0x1029:01; 1 leads nowhere."""
+
+
+class Axis(Protocol):
+    """What stops when a connection is lost."""
+
+    @property
+    def faults(self) -> Container[int]:
+        """Its error codes that are latched."""
+
+    def connection_lost(self, now: float) -> None:
+        """Stop as 0x6007 says."""
 
 
 class ErrorControl:
@@ -35,7 +46,7 @@ class ErrorControl:
         store: ObjectStore,
         nmt: NmtSlave,
         errors: EmcyProducer,
-        drives: Sequence[Drive],
+        drives: Sequence[Axis],
         *,
         send: Callable[[Frame], None],
         subscribe: Callable[[], None],
