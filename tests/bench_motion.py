@@ -35,12 +35,12 @@ from arm_canopen.can import Frame
 from arm_canopen.standard.cob_id import CobId
 from arm_model import Array, load_limits, RobotModel
 from arm_servo import MotionCore, SetPoint
-from arm_servo.core.commands import twist_command
 from arm_servo.core.gateway import CommandGateway, start_worker
 from arm_servo.core.requests import JogRequest
 from arm_servo.io.following import FollowingLimits, FollowingWatch
 from arm_servo.io.joint_feedback import JointFeedback
 from arm_servo.io.motion_thread import MotionCycle, MotionThread
+from arm_servo.jog.servo_source import TwistCommand
 from realtime_loop import raise_priority
 
 if TYPE_CHECKING:
@@ -313,7 +313,7 @@ def loop(period: float) -> Rows:
     thread.start()
     while time.monotonic() - begin[0] < SECONDS:
         sense = 1.0 if (time.monotonic() - begin[0]) % 2.0 < 1.0 else -1.0
-        future = gateway.jog(_jog(model, 0.1 * sense))
+        future = gateway.command(_jog(model, 0.1 * sense))
         future.add_done_callback(_raise)
         time.sleep(0.02)
     thread.stop()
@@ -329,7 +329,7 @@ def loop(period: float) -> Rows:
 
 
 def _jog(model: RobotModel, speed: float) -> JogRequest:
-    command = twist_command(model, [0.0, 0.0, speed, 0.0, 0.0, 0.0], None, None)
+    command = TwistCommand(np.array([0.0, 0.0, speed, 0.0, 0.0, 0.0]))
     return JogRequest(command, time.monotonic() + 0.1)
 
 

@@ -7,10 +7,18 @@ from __future__ import annotations
 from .core.execution import Execution, ExecutionSettings, Feedback, Phase
 from .core.motion_core import check_arm, MotionCore
 from .core.outcome import Outcome
+from .core.requests import (
+    DisplacementRequest,
+    JogRequest,
+    PauseRequest,
+    SpeedRequest,
+    StopRequest,
+    TargetRequest,
+)
 from .core.set_point import SetPoint, Source
 from .core.settings import CoreSettings
 from .exceptions import NotReadyError
-from .jog.servo_source import ServoSettings
+from .jog.servo_source import JointCommand, PoseCommand, ServoSettings, TwistCommand
 from .jog.velocity_bounds import VelocityBoundsSettings
 from .jog.velocity_ik import IkSettings
 from .report import Cause, Limiter, MotionReport
@@ -19,19 +27,28 @@ from .ros.parameter_check import check_parameters
 __all__ = [
     'Cause',
     'CoreSettings',
+    'DisplacementRequest',
     'Execution',
     'ExecutionSettings',
     'Feedback',
     'IkSettings',
+    'JogRequest',
+    'JointCommand',
     'Limiter',
     'MotionCore',
     'MotionReport',
     'NotReadyError',
     'Outcome',
+    'PauseRequest',
     'Phase',
+    'PoseCommand',
     'ServoSettings',
     'SetPoint',
     'Source',
+    'SpeedRequest',
+    'StopRequest',
+    'TargetRequest',
+    'TwistCommand',
     'VelocityBoundsSettings',
     'check_arm',
     'check_parameters',

@@ -24,7 +24,7 @@ from servo_arms import moved as moved_by
 from servo_arms import ready, robot, ROBOTS, SPEED
 
 from arm_model import Array, RobotModel
-from arm_servo import CoreSettings, MotionCore
+from arm_servo import CoreSettings, Execution, JogRequest, MotionCore, TwistCommand
 from arm_trajectory import GoalError, GoalPoint, PathCheck, TrajectoryGoal
 
 PERIOD = 0.01
@@ -55,7 +55,7 @@ def time_of_cycles(model: RobotModel) -> tuple[float, float]:
     for cycle in range(4000):
         now = cycle * 0.002
         sense = (-1) ** (cycle // 250)
-        core.twist(sense * np.array([0.05, 0.03, 0.0, 0.0, 0.0, 0.1]), now)
+        jog(core, sense * np.array([0.05, 0.03, 0.0, 0.0, 0.0, 0.1]), now, 0.1)
         begin = time.perf_counter()
         core.step(now, 0.002)
         times.append(time.perf_counter() - begin)
@@ -63,10 +63,16 @@ def time_of_cycles(model: RobotModel) -> tuple[float, float]:
     return 1e6 * float(median), 1e6 * float(late)
 
 
+def jog(core: MotionCore, twist: Array, now: float, duration: float) -> None:
+    """Move the tool at a speed for a time."""
+    request = JogRequest(TwistCommand(twist), now + duration)
+    core.commit(core.prepare(request), now)
+
+
 def ours(core: MotionCore, twist: Array) -> tuple[float, bool]:
     """Carry out a command for 1 s: the share of the asked way, and whether a cause was named."""
     model, start = core.model, core.state.position
-    core.twist(twist, 0.0, duration=1.0)
+    jog(core, twist, 0.0, 1.0)
     named = False
     for cycle in range(round(1.0 / PERIOD)):
         named |= bool(core.step(cycle * PERIOD, PERIOD).report.limiters)
@@ -148,7 +154,7 @@ def speed_error(model: RobotModel) -> tuple[float, int]:
         core = MotionCore(model)
         core.reset(ready(model.name))
         twist = 0.3 * SPEED * np.eye(6)[axis]
-        core.twist(twist, 0.0, duration=1.0)
+        jog(core, twist, 0.0, 1.0)
         point = core.step(0.0, PERIOD)
         for cycle in range(1, 60):
             point = core.step(cycle * PERIOD, PERIOD)
@@ -180,9 +186,11 @@ def time_of_check(model: RobotModel) -> tuple[float, int]:
         core = MotionCore(model, CoreSettings(check_self_collision=False))
         core.reset(ready(model.name))
         try:
-            path = core.follow(TrajectoryGoal(model.joints, points)).path
+            motion = core.prepare(TrajectoryGoal(model.joints, points), core.basis).motion
         except GoalError:
             continue  # too fast somewhere
+        assert isinstance(motion, Execution)
+        path = motion.path
         begin = time.perf_counter()
         found = check.contact(path.positions, path.duration)
         times.append((time.perf_counter() - begin) * 10.0 / (found.time if found else 10.0))

@@ -9,11 +9,13 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor, Future
 from typing import Any
 
+import numpy as np
+
 from arm_servo import Outcome
-from arm_servo.core.commands import by_joint, twist_command
+from arm_servo.core.commands import by_joint
 from arm_servo.core.gateway import CommandGateway, MotionCommand
 from arm_servo.core.requests import DisplacementRequest, JogRequest
-from arm_servo.jog.servo_source import JointCommand
+from arm_servo.jog.servo_source import JointCommand, TwistCommand
 
 
 class InlineWorker(Executor):
@@ -55,15 +57,15 @@ def jog(
 ) -> Future[None]:
     """Jog joints."""
     command = JointCommand(*by_joint(gateway.model, velocities, 'velocities'))
-    return gateway.jog(JogRequest(command, now + duration))
+    return gateway.command(JogRequest(command, now + duration))
 
 
 def twist(
     gateway: CommandGateway, numbers: Sequence[float], now: float, duration: float = 0.1
 ) -> Future[None]:
     """Jog the tool."""
-    command = twist_command(gateway.model, numbers, None, None)
-    return gateway.jog(JogRequest(command, now + duration))
+    command = TwistCommand(np.array(numbers))
+    return gateway.command(JogRequest(command, now + duration))
 
 
 def move_by(gateway: CommandGateway, displacements: Mapping[str, float]) -> MotionCommand:

@@ -22,10 +22,9 @@ from servo_elsewhere import Elsewhere
 from arm_canopen import Refusal, RefusalCause
 from arm_model import Array, combined, Pose
 from arm_servo import Source
-from arm_servo.core.commands import twist_command
 from arm_servo.core.gateway import CommandGateway, JOGGING, MotionCommand
-from arm_servo.core.requests import JogRequest
-from arm_servo.jog.servo_source import PoseCommand
+from arm_servo.core.requests import JogRequest, PauseRequest, StopRequest
+from arm_servo.jog.servo_source import PoseCommand, TwistCommand
 from arm_trajectory import GoalPoint, TrajectoryGoal
 
 pytestmark = pytest.mark.slow
@@ -49,7 +48,7 @@ def _jog(gateway: CommandGateway, now: float, _at: Array) -> None:
 
 def _pose(gateway: CommandGateway, now: float, at: Array) -> None:
     there = combined(gateway.model.pose(at), Pose(np.eye(3), np.array([0.0, 0.05, 0.05])))
-    gateway.jog(JogRequest(PoseCommand(there), now + 60.0))
+    gateway.command(JogRequest(PoseCommand(there), now + 60.0))
 
 
 def _displacement(gateway: CommandGateway, _now: float, _at: Array) -> MotionCommand:
@@ -185,12 +184,12 @@ def test_a_pause_is_never_overtaken(kind: str, steps: list[str], later: int) -> 
     arm = bench()
     command, speed, is_idle = run_to_stop(arm, kind, steps, later)
     begin = arm.where
-    arm.gateway.pause()
+    arm.gateway.command(PauseRequest())
     path = arm.settle()
     stays_at_rest(path, arm.gateway.model.limits.acceleration, speed)
     if is_idle:
         assert np.abs(path[-1] - begin).max() == 0.0
-    arm.gateway.resume()
+    arm.gateway.command(PauseRequest(is_paused=False))
     arm.take(['cycle', 'work'] * 10)
     if command is not None and kind in TRAJECTORIES:
         assert command.execution is not None, command.future.exception()
@@ -205,7 +204,7 @@ def test_a_pause_of_the_servo_is_never_overtaken(kind: str, steps: list[str], la
     arm = bench()
     command, speed, is_idle = run_to_stop(arm, kind, steps, later)
     begin = arm.where
-    arm.gateway.stop(JOGGING, 'the servo was paused')
+    arm.gateway.command(StopRequest('the servo was paused', JOGGING))
     path = arm.settle()
     stays_at_rest(path, arm.gateway.model.limits.acceleration, speed)
     if is_idle:
@@ -357,8 +356,8 @@ def test_a_command_of_nothing_changes_nothing(
             if is_disturbed and is_displaced:
                 move_by(arm.gateway, {arm.gateway.model.joints[0]: 0.0})
             elif is_disturbed:
-                still = twist_command(arm.gateway.model, [0.0] * 6, None, None)
-                arm.gateway.jog(JogRequest(still, arm.arm.now + 1.0, client='somebody else'))
+                still = TwistCommand(np.zeros(6))
+                arm.gateway.command(JogRequest(still, arm.arm.now + 1.0, client='somebody else'))
             arm.take(['work', 'work', 'cycle'])
         paths.append(np.array(arm.arm.path))
     if is_displaced and kind in {'displacement', *TRAJECTORIES}:

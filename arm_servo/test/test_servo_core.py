@@ -8,6 +8,7 @@ from collections.abc import Callable
 import contextlib
 import math
 
+import core_commands
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from model_robots import chain, ready, robot, ROBOTS, two_arms
@@ -43,45 +44,49 @@ def near(core: MotionCore, rng: np.random.Generator, far: float) -> dict[str, fl
 def twist(core: MotionCore, now: float, rng: np.random.Generator) -> None:
     """Jog the tool."""
     link = core.model.tip if rng.random() < 0.5 else None
-    core.twist(rng.normal(size=6) * [0.1, 0.1, 0.1, 0.3, 0.3, 0.3], now, link=link, duration=0.3)
+    core_commands.twist(
+        core, rng.normal(size=6) * [0.1, 0.1, 0.1, 0.3, 0.3, 0.3], now, link=link, duration=0.3
+    )
 
 
 def jog(core: MotionCore, now: float, rng: np.random.Generator) -> None:
     """Jog a joint."""
     name = rng.choice(core.model.joints)
-    core.jog({str(name): float(rng.uniform(-1, 1))}, now, duration=0.3)
+    core_commands.jog(core, {str(name): float(rng.uniform(-1, 1))}, now, duration=0.3)
 
 
 def track(core: MotionCore, now: float, rng: np.random.Generator) -> None:
     """Track a pose."""
     at = np.array(list(near(core, rng, 0.1).values()))
-    core.track(core.model.pose(at), now, duration=0.3)
+    core_commands.track(core, core.model.pose(at), now, duration=0.3)
 
 
 def follow(core: MotionCore, now: float, rng: np.random.Generator) -> None:
     """Follow a trajectory from the pose to start from."""
     model = core.model
-    core.follow(wave(model, ready(model.name), str(rng.choice(['l', 'c', 'q'])), step=2.0))
+    core_commands.follow(
+        core, wave(model, ready(model.name), str(rng.choice(['l', 'c', 'q'])), step=2.0)
+    )
 
 
 def target(core: MotionCore, now: float, rng: np.random.Generator) -> None:
     """Move to a single target."""
-    core.move_to(near(core, rng, 0.3))
+    core_commands.move_to(core, near(core, rng, 0.3))
 
 
 def speed(core: MotionCore, now: float, rng: np.random.Generator) -> None:
     """Change the speed."""
-    core.override(float(rng.choice([0.0, 0.3, 1.0])))
+    core_commands.override(core, float(rng.choice([0.0, 0.3, 1.0])))
 
 
 def pause(core: MotionCore, now: float, rng: np.random.Generator) -> None:
     """Pause, or go on."""
-    (core.resume if core.paused else core.pause)()
+    (core_commands.resume if core.paused else core_commands.pause)(core)
 
 
 def stop(core: MotionCore, now: float, rng: np.random.Generator) -> None:
     """Stop."""
-    core.stop()
+    core_commands.stop(core)
 
 
 ACTIONS: list[Action] = [twist, twist, jog, track, follow, target, speed, pause, stop]
@@ -108,7 +113,7 @@ def test_sources_hand_over_without_a_jump(
         for _ in range(cycles):
             states.append(core.step(cycle * PERIOD, PERIOD).state)
             cycle += 1
-    core.stop()
+    core_commands.stop(core)
     for _ in range(700):
         states.append(core.step(cycle * PERIOD, PERIOD).state)
         cycle += 1
@@ -122,7 +127,7 @@ def test_sources_hand_over_without_a_jump(
 def test_a_released_key_is_a_smooth_stop(name: str) -> None:
     """Without a fresh command the arm comes to rest, and lets go of the jog."""
     core = core_of(name)
-    core.twist([0.1, 0, 0, 0, 0, 0], 0.0, duration=0.5)
+    core_commands.twist(core, [0.1, 0, 0, 0, 0, 0], 0.0, duration=0.5)
     points = stream(core, 2.0)
     assert any(point.state.moving for point in points)
     assert not points[-1].state.moving
@@ -133,7 +138,7 @@ def test_a_released_key_is_a_smooth_stop(name: str) -> None:
 def test_the_time_out_counts_from_the_command() -> None:
     """A jog command counts for its time-out, and no longer."""
     core = core_of('prbt')
-    core.jog({'prbt_joint_1': 0.5}, 0.0)
+    core_commands.jog(core, {'prbt_joint_1': 0.5}, 0.0)
     moving = [point.source for point in stream(core, 1.0)]
     assert moving[0] is Source.JOG
     assert moving[-1] is Source.NONE
@@ -143,7 +148,7 @@ def test_a_stop_keeps_the_tool_on_its_line() -> None:
     """The joints stop in step: a released tool stays within 1 mm of its line."""
     core = core_of('panda')
     model = robot('panda')
-    core.twist([0.15, 0, 0, 0, 0, 0], 0.0, duration=0.6)
+    core_commands.twist(core, [0.15, 0, 0, 0, 0, 0], 0.0, duration=0.6)
     points = stream(core, 1.5)
     home = model.pose(ready('panda')).position
     away = [model.pose(point.state.position).position - home for point in points]
@@ -162,7 +167,7 @@ def test_held_axes_stay_from_any_pose(name: str, seed: int) -> None:
     core, axis = MotionCore(model), int(rng.integers(6))
     core.reset(start)
     asked = np.eye(6)[axis] * ([0.1] * 3 + [0.3] * 3)
-    core.twist(asked, 0.0, duration=1.0)
+    core_commands.twist(core, asked, 0.0, duration=1.0)
     for cycle in range(140):
         at = core.step(cycle * period, period).state.position
         aside = twist_between(model, start, at) * ([1.0] * 3 + [model.reach / 3] * 3)
@@ -175,7 +180,7 @@ def test_without_an_answer_of_the_generator_the_arm_brakes(
 ) -> None:
     """Where ruckig has no answer the joints slow down with their greatest deceleration."""
     core = core_of('prbt')
-    core.jog({'prbt_joint_1': 0.8, 'prbt_joint_4': -0.5}, 0.0, duration=1.0)
+    core_commands.jog(core, {'prbt_joint_1': 0.8, 'prbt_joint_4': -0.5}, 0.0, duration=1.0)
     stream(core, 0.6)
     monkeypatch.setattr(OnlineTrajectoryGenerator, '_plan', lambda *_: None)
     before = core.state
@@ -190,7 +195,7 @@ def test_without_an_answer_of_the_generator_the_arm_brakes(
 def test_a_reset_ends_what_moves_the_arm() -> None:
     """After a reset the set-points begin at rest at the new place, and a trajectory has ended."""
     core = core_of('prbt')
-    execution = core.follow(wave(robot('prbt'), ready('prbt'), 'q'))
+    execution = core_commands.follow(core, wave(robot('prbt'), ready('prbt'), 'q'))
     stream(core, 0.4)
     core.reset(ready('prbt') + 0.1, 'the drives were off')
     assert execution.ending is not None
@@ -201,9 +206,9 @@ def test_a_reset_ends_what_moves_the_arm() -> None:
 def test_taking_over_ends_the_trajectory_with_words() -> None:
     """A trajectory that loses the arm ends, and says to what."""
     core = core_of('prbt')
-    execution = core.follow(wave(robot('prbt'), ready('prbt'), 'q'))
+    execution = core_commands.follow(core, wave(robot('prbt'), ready('prbt'), 'q'))
     stream(core, 0.4)
-    core.jog({'prbt_joint_1': 0.2}, 0.4)
+    core_commands.jog(core, {'prbt_joint_1': 0.2}, 0.4)
     assert execution.phase is Phase.DONE
     assert execution.ending is not None
     assert execution.ending.code is GoalCode.INVALID_GOAL
@@ -215,7 +220,7 @@ def test_a_single_target_is_reached_at_rest(name: str) -> None:
     """A target is reached exactly, then the arm is free."""
     core = core_of(name)
     goal = {robot(name).joints[1]: float(ready(name)[1]) + 0.3}
-    core.move_to(goal)
+    core_commands.move_to(core, goal)
     points = stream(core, 3.0)
     expected = np.array(ready(name))
     expected[1] += 0.3
@@ -228,23 +233,23 @@ def test_nudges_add_up() -> None:
     """Ten steps of a hundredth, one after the other or at once, make a tenth."""
     core = core_of('prbt')
     for _ in range(5):
-        core.move_by({'prbt_joint_1': 0.01})
+        core_commands.move_by(core, {'prbt_joint_1': 0.01})
     stream(core, 1.0)
     for _ in range(5):
-        core.move_by({'prbt_joint_1': 0.01})
+        core_commands.move_by(core, {'prbt_joint_1': 0.01})
         stream(core, 0.02)
-    core.move_by({'prbt_joint_2': 0.02})
+    core_commands.move_by(core, {'prbt_joint_2': 0.02})
     end = stream(core, 1.0)[-1].state.position
     assert end[:2] == pytest.approx([0.1, 0.02], abs=1e-9)
     with pytest.raises(CommandError, match='beyond its limits'):
-        core.move_by({'prbt_joint_1': 9.0})
+        core_commands.move_by(core, {'prbt_joint_1': 9.0})
 
 
 def test_a_target_goes_at_the_overridden_speed() -> None:
     """At 20 % a joint moves at a fifth of its speed at most."""
     core = core_of('prbt')
-    core.override(0.2)
-    core.move_to({'prbt_joint_1': 1.0})
+    core_commands.override(core, 0.2)
+    core_commands.move_to(core, {'prbt_joint_1': 1.0})
     points = stream(core, 2.0)
     fastest = max(float(np.abs(point.state.velocity).max()) for point in points)
     assert fastest == pytest.approx(0.2 * 1.57, rel=1e-3)
@@ -254,33 +259,33 @@ def test_a_nudge_goes_at_its_own_speed() -> None:
     """As fast as it was given and no faster, also with the speed override on top."""
     for speed in (1.0, 0.5):
         core = core_of('prbt')
-        core.override(speed)
-        core.move_by({'prbt_joint_1': 0.5}, 0.25)
+        core_commands.override(core, speed)
+        core_commands.move_by(core, {'prbt_joint_1': 0.5}, 0.25)
         points = stream(core, 6.0)
         fastest = max(float(np.abs(point.state.velocity).max()) for point in points)
         assert fastest == pytest.approx(0.25 * speed, rel=1e-3)
         assert points[-1].state.position[0] - ready('prbt')[0] == pytest.approx(0.5, abs=1e-9)
     with pytest.raises(CommandError, match='above 0'):
-        core.move_by({'prbt_joint_1': 0.5}, 0.0)
+        core_commands.move_by(core, {'prbt_joint_1': 0.5}, 0.0)
 
 
 def test_a_pause_holds_everything() -> None:
     """Paused, a target waits and jogging is refused; then both go on."""
     core = core_of('prbt')
-    core.move_to({'prbt_joint_1': 1.0})
+    core_commands.move_to(core, {'prbt_joint_1': 1.0})
     stream(core, 0.3)
-    core.pause()
+    core_commands.pause(core)
     assert not stream(core, 1.0)[-1].state.moving
     with pytest.raises(CommandError, match='resume first'):
-        core.jog({'prbt_joint_1': 0.1}, 1.3)
-    core.resume()
+        core_commands.jog(core, {'prbt_joint_1': 0.1}, 1.3)
+    core_commands.resume(core)
     assert stream(core, 3.0)[-1].state.position[0] == pytest.approx(1.0)
 
 
 def test_what_limits_is_in_the_set_point() -> None:
     """The report of a cycle names joint and factor."""
     core = core_of('prbt')
-    core.twist([0.0, 0.0, 1.0, 0, 0, 0], 0.0, duration=2.0)
+    core_commands.twist(core, [0.0, 0.0, 1.0, 0, 0, 0], 0.0, duration=2.0)
     reports = [point.report for point in stream(core, 1.0)]
     causes = {limiter.cause for report in reports for limiter in report.limiters}
     assert causes & {Cause.JOINT_VELOCITY, Cause.SINGULARITY, Cause.JOINT_ACCELERATION}
@@ -293,10 +298,10 @@ def test_nothing_is_commanded_before_the_position_is_known() -> None:
     """Without a position every command is refused."""
     core = MotionCore(robot('prbt'))
     refused: list[Callable[[], object]] = [
-        lambda: core.twist([0.0] * 6, 0.0),
-        lambda: core.jog({'prbt_joint_1': 0.1}, 0.0),
-        lambda: core.follow(wave(robot('prbt'), ready('prbt'), 'q')),
-        lambda: core.move_to({'prbt_joint_1': 0.1}),
+        lambda: core_commands.twist(core, [0.0] * 6, 0.0),
+        lambda: core_commands.jog(core, {'prbt_joint_1': 0.1}, 0.0),
+        lambda: core_commands.follow(core, wave(robot('prbt'), ready('prbt'), 'q')),
+        lambda: core_commands.move_to(core, {'prbt_joint_1': 0.1}),
         lambda: core.step(0.0, PERIOD),
     ]
     for command in refused:
@@ -305,20 +310,35 @@ def test_nothing_is_commanded_before_the_position_is_known() -> None:
 
 
 BAD: dict[str, tuple[Callable[[MotionCore], object], str]] = {
-    'nan twist': (lambda c: c.twist([math.nan] * 6, 0.0), 'number 0 is nan'),
-    'short twist': (lambda c: c.twist([0.1] * 5, 0.0), '5 numbers, 6 are needed'),
-    'unknown link': (lambda c: c.twist([0.1] * 6, 0.0, link='hand'), "'hand'"),
-    'unknown joint': (lambda c: c.jog({'elbow': 0.1}, 0.0), "'elbow'"),
-    'infinite jog': (lambda c: c.jog({'prbt_joint_1': math.inf}, 0.0), 'inf'),
-    'no joint': (lambda c: c.jog({}, 0.0), 'no joint'),
-    'no rotation': (lambda c: c.track(Pose(np.ones((3, 3)), np.zeros(3)), 0.0), 'no rotation'),
-    'reflected': (lambda c: c.twist([0.1] * 6, 0.0, axes=-np.eye(3)), 'axes: it is no rotation'),
-    'nan duration': (lambda c: c.twist([0.1] * 6, 0.0, duration=math.nan), 'must be finite'),
-    'endless': (lambda c: c.jog({'prbt_joint_1': 0.1}, 0.0, math.inf), 'must be finite'),
-    'target beyond': (lambda c: c.move_to({'prbt_joint_3': 3.0}), 'beyond its limits'),
-    'target nan': (lambda c: c.move_to({'prbt_joint_3': math.nan}), 'nan'),
-    'speed': (lambda c: c.override(1.2), 'between 0 and 1'),
-    'speed nan': (lambda c: c.override(math.nan), 'between 0 and 1'),
+    'nan twist': (lambda c: core_commands.twist(c, [math.nan] * 6, 0.0), 'number 0 is nan'),
+    'short twist': (lambda c: core_commands.twist(c, [0.1] * 5, 0.0), '5 numbers, 6 are needed'),
+    'unknown link': (lambda c: core_commands.twist(c, [0.1] * 6, 0.0, link='hand'), "'hand'"),
+    'unknown joint': (lambda c: core_commands.jog(c, {'elbow': 0.1}, 0.0), "'elbow'"),
+    'infinite jog': (lambda c: core_commands.jog(c, {'prbt_joint_1': math.inf}, 0.0), 'inf'),
+    'no joint': (lambda c: core_commands.jog(c, {}, 0.0), 'no joint'),
+    'no rotation': (
+        lambda c: core_commands.track(c, Pose(np.ones((3, 3)), np.zeros(3)), 0.0),
+        'no rotation',
+    ),
+    'reflected': (
+        lambda c: core_commands.twist(c, [0.1] * 6, 0.0, axes=-np.eye(3)),
+        'axes: it is no rotation',
+    ),
+    'nan duration': (
+        lambda c: core_commands.twist(c, [0.1] * 6, 0.0, duration=math.nan),
+        'must be finite',
+    ),
+    'endless': (
+        lambda c: core_commands.jog(c, {'prbt_joint_1': 0.1}, 0.0, math.inf),
+        'must be finite',
+    ),
+    'target beyond': (
+        lambda c: core_commands.move_to(c, {'prbt_joint_3': 3.0}),
+        'beyond its limits',
+    ),
+    'target nan': (lambda c: core_commands.move_to(c, {'prbt_joint_3': math.nan}), 'nan'),
+    'speed': (lambda c: core_commands.override(c, 1.2), 'between 0 and 1'),
+    'speed nan': (lambda c: core_commands.override(c, math.nan), 'between 0 and 1'),
     'reset': (lambda c: c.reset([0.0] * 5), '5 numbers, 6 are needed'),
 }
 

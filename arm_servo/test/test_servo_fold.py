@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import math
 
+import core_commands
 from model_robots import ready, robot, ROBOTS
 import numpy as np
 import pytest
@@ -46,7 +47,7 @@ class Jogger:
 
     def jog(self, speed: float) -> float:
         """Jog for a cycle; return the speed along the line in [m/s]."""
-        self.core.twist([*(speed * self.line), 0.0, 0.0, 0.0], self.now)
+        core_commands.twist(self.core, [*(speed * self.line), 0.0, 0.0, 0.0], self.now)
         self.report = self.core.step(self.now, self.period).report
         self.now += self.period
         state = self.core.state
@@ -108,7 +109,7 @@ def test_pushing_on_at_the_border_the_arm_rests(elbow: float, twist: list[float]
     core.reset([0.0, 1.2, elbow, 0.0, -0.3, 0.0])
     places, period = [], 0.01
     for cycle in range(round(5.0 / period)):
-        core.twist(twist, cycle * period)
+        core_commands.twist(core, twist, cycle * period)
         core.step(cycle * period, period)
         if cycle * period > 3.5:
             places.append(core.state.position)

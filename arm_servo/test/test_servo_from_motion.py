@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import core_commands
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from model_robots import ready, robot, ROBOTS
@@ -32,10 +33,12 @@ def jogged(
     limits = core.model.limits
     if by == 'twist':
         twist = np.concatenate((rng.uniform(-0.6, 0.6, 3), rng.uniform(-1.0, 1.0, 3)))
-        core.twist(twist, 0.0, duration=9.0)
+        core_commands.twist(core, twist, 0.0, duration=9.0)
     else:
         speeds = rng.choice((-0.99, 0.0, 0.99), len(limits)) * limits.velocity
-        core.jog(dict(zip(limits.names, speeds.tolist(), strict=True)), 0.0, duration=9.0)
+        core_commands.jog(
+            core, dict(zip(limits.names, speeds.tolist(), strict=True)), 0.0, duration=9.0
+        )
     return core, [core.state, *(point.state for point in stream(core, duration))]
 
 
@@ -68,7 +71,7 @@ def test_a_trajectory_right_after_a_jog_is_followed(
     rng = np.random.default_rng(seed)
     core, states = jogged(name, rng, by, duration)
     wanted = goal(core, rng, kind)
-    execution = core.follow(wanted)
+    execution = core_commands.follow(core, wanted)
     states += follow_to_the_end(core, execution)[1:]
     assert execution.ending is not None
     assert execution.ending.code is GoalCode.SUCCESSFUL, execution.ending

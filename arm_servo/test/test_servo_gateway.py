@@ -21,7 +21,7 @@ from arm_model import CommandError
 from arm_servo import NotReadyError, Source
 from arm_servo.core.commands import by_joint
 from arm_servo.core.gateway import MAX_ATTEMPTS, MAX_QUEUED_MOTIONS, MotionCommand, start_worker
-from arm_servo.core.requests import JogRequest
+from arm_servo.core.requests import JogRequest, PauseRequest, SpeedRequest
 from arm_servo.core.safety_filter import SafetyFilter
 from arm_servo.core.single_target import SingleTarget
 from arm_servo.jog.servo_source import JointCommand
@@ -310,12 +310,12 @@ def test_zeros_of_another_client_do_not_touch_a_jog() -> None:
     still = JointCommand(*by_joint(drives.gateway.model, {JOINT: 0.0}, 'velocities'))
     moving = JointCommand(*by_joint(drives.gateway.model, velocities, 'velocities'))
     for _ in range(100):
-        drives.gateway.jog(JogRequest(moving, drives.now + 0.1, client='keyboard'))
-        drives.gateway.jog(JogRequest(still, drives.now + 0.1, client='gamepad'))
+        drives.gateway.command(JogRequest(moving, drives.now + 0.1, client='keyboard'))
+        drives.gateway.command(JogRequest(still, drives.now + 0.1, client='gamepad'))
         drives.run()
     speeds = np.diff(np.array(drives.path)[-20:, 0]) / PERIOD
     assert speeds == pytest.approx(0.4, abs=1e-3)
-    drives.gateway.jog(JogRequest(still, drives.now + 0.1, client='keyboard'))
+    drives.gateway.command(JogRequest(still, drives.now + 0.1, client='keyboard'))
     drives.run(40)
     assert drives.path[-1].tolist() == drives.path[-2].tolist()
 
@@ -398,9 +398,9 @@ def test_displacements_in_a_pause_are_refused_and_do_not_pile_up(is_overridden: 
     """None of them moves the arm at the resume, when nobody expects it any more."""
     drives = ready()
     if is_overridden:
-        drives.gateway.override(0.0)
+        drives.gateway.command(SpeedRequest(0.0))
     else:
-        drives.gateway.pause()
+        drives.gateway.command(PauseRequest())
     drives.run()
     commands = [move_by(drives.gateway, {JOINT: 0.02}) for _ in range(10)]
     drives.run(30)
@@ -408,8 +408,8 @@ def test_displacements_in_a_pause_are_refused_and_do_not_pile_up(is_overridden: 
         with pytest.raises(CommandError, match='override is 0' if is_overridden else 'paused'):
             command.future.result(0.0)
     begin = drives.path[-1].tolist()
-    drives.gateway.resume()
-    drives.gateway.override(1.0)
+    drives.gateway.command(PauseRequest(is_paused=False))
+    drives.gateway.command(SpeedRequest(1.0))
     drives.run(50)
     assert drives.path[-1].tolist() == begin
     move_by(drives.gateway, {JOINT: 0.02})
@@ -515,14 +515,14 @@ def test_a_trajectory_takes_over_while_the_speed_override_changes(
     """Where the first one will be is foreseen with the change of its speed."""
     worker = SteppedWorker()
     drives = ready(worker)
-    drives.gateway.override(speeds[0])
+    drives.gateway.command(SpeedRequest(speeds[0]))
     far = drives.path[-1] + np.array([2.0, 0, 0, 0, 0, 0, 0])
     swing = TrajectoryGoal(drives.gateway.model.joints, [GoalPoint(2.5, far.tolist())])
     drives.gateway.request(swing)
     drives.run(2)
     worker.run()
     drives.run(120)
-    drives.gateway.override(speeds[1])
+    drives.gateway.command(SpeedRequest(speeds[1]))
     drives.run(since)
     begin = len(drives.path) - 2
     there = GoalPoint(6.0, (drives.path[-1] + 0.1).tolist())

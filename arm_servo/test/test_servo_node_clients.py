@@ -8,11 +8,12 @@ from types import SimpleNamespace
 from typing import Any
 
 from geometry_msgs.msg import TwistStamped
+import numpy as np
 from servo_drives import Drives
 
 from arm_servo import Source
-from arm_servo.core.commands import twist_command
 from arm_servo.core.requests import JogRequest
+from arm_servo.jog.servo_source import TwistCommand
 from arm_servo.ros.refusals import Refusals
 from arm_servo.ros.servo.modes import CommandKind
 from arm_servo.ros.servo.node import NEW_MOTION_SILENCE, Servo
@@ -37,10 +38,10 @@ class Commands:
 
     def send(self, numbers: list[float], frame: str = '') -> None:
         """Let a twist come; the cycle of the test has its own time."""
-        model, expires = self.drives.gateway.model, self.drives.now + 0.1
+        expires = self.drives.now + 0.1
 
         def convert(_message: object, _sent: float) -> JogRequest:
-            return JogRequest(twist_command(model, numbers, None, None), expires)
+            return JogRequest(TwistCommand(np.array(numbers)), expires)
 
         message = TwistStamped()
         message.header.frame_id = frame

@@ -58,7 +58,8 @@ def tool_twist(made: CommandConverter, message: TwistStamped) -> tuple[Array, Ar
     core = MotionCore(robot('gp110'))
     core.reset(ready('gp110'))
     for number in range(60):
-        core.commit_jog(made.twist(message, number * PERIOD), number * PERIOD)
+        now = number * PERIOD
+        core.commit(core.prepare(made.twist(message, now)), now)
         core.step(number * PERIOD, PERIOD)
     state = core.state
     return core.model.jacobian(state.position) @ state.velocity, state.position
@@ -107,7 +108,7 @@ def test_a_joint_jog_is_cut_and_scaled() -> None:
     for number in range(60):
         request = made.jog(JointJog(joint_names=[name], velocities=[2.0]), number * PERIOD)
         assert isinstance(request, JogRequest)
-        core.commit_jog(request, 0.0)
+        core.commit(core.prepare(request), 0.0)
         core.step(number * PERIOD, PERIOD)
     assert core.state.velocity[0] == pytest.approx(0.4, abs=1e-3)
     assert 'cut' in made.capped
@@ -158,7 +159,8 @@ def test_a_pose_is_not_approached_faster_than_its_speed() -> None:
     core.reset(ready('gp110'))
     here = core.model.pose(core.state.position)
     there = Pose(here.rotation, here.position + np.array((0.0, 0.3, 0.0)))
-    core.commit_jog(JogRequest(PoseCommand(there, 0.05, 0.8), 10.0), 0.0)
+    jog = JogRequest(PoseCommand(there, 0.05, 0.8), 10.0)
+    core.commit(core.prepare(jog), 0.0)
     for number in range(200):
         core.step(number * PERIOD, PERIOD)
     speed = core.model.jacobian(core.state.position) @ core.state.velocity

@@ -50,7 +50,7 @@ class Topics:
         self.drives.attach()
         self.drives.run(2)
         gateway = self.drives.gateway
-        monkeypatch.setattr(gateway, 'jog', self._jog)
+        monkeypatch.setattr(gateway, 'command', self._jog)
         timeout = parameter('incoming_command_timeout', TIMEOUT)
         node._parameter_overrides[timeout.name] = timeout
         parameters = declare_servo(node, gateway.model)

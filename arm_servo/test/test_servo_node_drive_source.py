@@ -15,6 +15,7 @@ from servo_drives import Drives, PERIOD
 from arm_canopen import CanopenError, Refusal, RefusalCause
 from arm_servo import MotionCore, NotReadyError, Phase, Source
 from arm_servo.core.gateway import MotionCommand
+from arm_servo.core.requests import SpeedRequest
 from arm_servo.io.drive_reasons import why_not
 from arm_servo.io.drive_source import NOT_ATTACHED
 from arm_trajectory import GoalCode, GoalPoint, TrajectoryGoal
@@ -199,7 +200,7 @@ def test_a_defect_of_the_core_is_told_and_latched(monkeypatch: pytest.MonkeyPatc
 def test_settings_are_taken_while_the_arm_does_not_follow() -> None:
     """Speed and pause can be set before the drives are there."""
     drives = Drives()
-    future = drives.gateway.override(0.3)
+    future = drives.gateway.command(SpeedRequest(0.3))
     drives.run()
     future.result(0.0)
     assert drives.gateway.snapshot.speed == 0.3

@@ -15,6 +15,7 @@ from servo_drives import Drives, PERIOD
 
 from arm_model import ArmError
 from arm_servo.core.gateway import MOTIONS
+from arm_servo.core.requests import PauseRequest, SpeedRequest, StopRequest
 from arm_trajectory import GoalPoint, TrajectoryGoal
 
 pytestmark = pytest.mark.slow
@@ -49,13 +50,13 @@ def perform(drives: Drives, kind: str, numbers: list[float]) -> None:
         to = np.array([axis.setpoint for axis in drives.axes]) + numbers
         gateway.request(TrajectoryGoal(names, [GoalPoint(1.0, to.tolist())]))
     elif kind in {'slow', 'fast'}:
-        gateway.override(0.3 if kind == 'slow' else 1.0)
+        gateway.command(SpeedRequest(0.3 if kind == 'slow' else 1.0))
     elif kind == 'stop':
-        gateway.stop(MOTIONS, 'stopped')
+        gateway.command(StopRequest('stopped', MOTIONS))
     elif kind == 'pause':
-        gateway.pause()
+        gateway.command(PauseRequest())
     elif kind == 'resume':
-        gateway.resume()
+        gateway.command(PauseRequest(is_paused=False))
 
 
 BRIEFLY_LOST = [(('trajectory', [0.3] * 7), 40), (('lose', []), 4), (('find', []), 20)]

@@ -10,6 +10,7 @@ import pytest
 from servo_drives import Drives
 
 from arm_servo import Source
+from arm_servo.core.requests import PauseRequest, SpeedRequest
 from arm_servo.core.snapshot import Snapshot
 from arm_servo.ros.trajectory.pause import words_of_pause, words_of_resume
 
@@ -41,10 +42,10 @@ def test_a_pause_counts_as_speed_0() -> None:
     drives = Drives()
     drives.attach()
     drives.run(2)
-    drives.gateway.override(0.5)
-    drives.gateway.pause()
+    drives.gateway.command(SpeedRequest(0.5))
+    drives.gateway.command(PauseRequest())
     drives.run()
     assert drives.gateway.snapshot.speed_scaling == 0.0
-    drives.gateway.resume()
+    drives.gateway.command(PauseRequest(is_paused=False))
     drives.run()
     assert drives.gateway.snapshot.speed_scaling == 0.5

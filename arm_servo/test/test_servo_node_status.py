@@ -25,6 +25,7 @@ from arm_servo import (
     VelocityBoundsSettings,
 )
 from arm_servo.core.gateway import CommandGateway
+from arm_servo.core.requests import PauseRequest
 from arm_servo.ros.servo.status import code_of, status_of, StatusCode
 
 
@@ -175,7 +176,7 @@ def test_a_pause_of_the_arm_is_told(paused: bool) -> None:
     """Jogging is refused then, and the message names the service that ends it."""
     drives = attached()
     if paused:
-        drives.gateway.pause()
+        drives.gateway.command(PauseRequest())
     drives.run(2)
     words = status_of(drives.gateway.snapshot, '', '', '')[1]
     assert ('~/resume' in words) == paused

@@ -7,6 +7,7 @@ from __future__ import annotations
 from functools import cache
 import math
 
+import core_commands
 from model_robots import ready, robot, ROBOTS
 import numpy as np
 import pytest
@@ -64,13 +65,13 @@ def test_a_trajectory_through_contact_is_refused_with_pair_and_time(name: str) -
     begin, end = find_blocked(name)
     core = core_at(name, begin)
     with pytest.raises(GoalError, match=r'would collide at \d+\.\d\d s') as caught:
-        core.follow(goal_to(core, end))
+        core_commands.follow(core, goal_to(core, end))
     assert caught.value.code is GoalCode.INVALID_GOAL
     assert core.source is Source.NONE
     core.step(0.0, PERIOD)
     assert core.state.position.tolist() == begin.tolist()
     allowed = core_at(name, begin, check=False)
-    path = allowed.follow(goal_to(allowed, end)).path
+    path = core_commands.follow(allowed, goal_to(allowed, end)).path
     time = float(str(caught.value).split(' would collide at ')[1].split(' s ')[0])
     times = np.arange(0.0, path.duration, 0.01)
     places = path.positions(times)
@@ -86,16 +87,16 @@ def test_a_single_target_through_contact_is_refused(name: str) -> None:
     begin, end = find_blocked(name)
     core = core_at(name, begin)
     with pytest.raises(CommandError, match='would collide after'):
-        core.move_to(by_name(core, end))
+        core_commands.move_to(core, by_name(core, end))
     with pytest.raises(CommandError, match='would collide after'):
-        core.move_by(by_name(core, end - begin))
-    execution = core.follow(goal_to(core, begin))
+        core_commands.move_by(core, by_name(core, end - begin))
+    execution = core_commands.follow(core, goal_to(core, begin))
     with pytest.raises(CommandError, match='would collide after'):
-        core.move_to(by_name(core, end))
+        core_commands.move_to(core, by_name(core, end))
     assert core.source is Source.TRAJECTORY
     assert execution.phase is Phase.FOLLOWING
     allowed = core_at(name, begin, check=False)
-    allowed.move_to(by_name(allowed, end))
+    core_commands.move_to(allowed, by_name(allowed, end))
     assert allowed.source is Source.TARGET
 
 
@@ -109,7 +110,7 @@ def test_an_arm_in_contact_may_part_and_not_go_deeper(name: str) -> None:
     shallow = begin + shares[int(np.argmax(distances < -0.002))] * (end - begin)
     inside = begin + shares[int(np.argmin(distances))] * (end - begin)
     core = core_at(name, shallow)
-    execution = core.follow(goal_to(core, begin, 8.0))
+    execution = core_commands.follow(core, goal_to(core, begin, 8.0))
     for cycle in range(2000):
         core.step(cycle * PERIOD, PERIOD)
         if execution.phase is Phase.DONE:
@@ -117,21 +118,21 @@ def test_an_arm_in_contact_may_part_and_not_go_deeper(name: str) -> None:
     assert core.state.position == pytest.approx(begin, abs=1e-5)
     core.reset(shallow)
     with pytest.raises(GoalError, match='would collide'):
-        core.follow(goal_to(core, inside, 8.0))
+        core_commands.follow(core, goal_to(core, inside, 8.0))
 
 
 def test_a_plan_is_void_when_another_command_came() -> None:
     """What was checked does not begin behind a stop, nor behind another motion."""
     core = core_at('prbt', ready('prbt'))
-    for come_between in (MotionCore.stop, MotionCore.pause, _move_a_little):
+    for come_between in (core_commands.stop, core_commands.pause, _move_a_little):
         plan = core.prepare(DisplacementRequest({'prbt_joint_1': 0.1}), core.basis)
         come_between(core)
         with pytest.raises(CommandError, match='before this command had begun'):
-            core.commit(plan)
-        core.stop()
-        core.resume()
+            core.commit(plan, 0.0)
+        core_commands.stop(core)
+        core_commands.resume(core)
         assert core.source is Source.NONE
 
 
 def _move_a_little(core: MotionCore) -> None:
-    core.move_by({'prbt_joint_2': 0.01})
+    core_commands.move_by(core, {'prbt_joint_2': 0.01})

@@ -8,6 +8,7 @@ from dataclasses import replace
 import math
 import re
 
+import core_commands
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from model_robots import ready, robot, ROBOTS
@@ -139,14 +140,14 @@ def test_too_much_acceleration_is_refused(size: float, frequency: float) -> None
     """A swing far beyond the acceleration limit is refused with joint, amount and limit."""
     core = core_of('panda')
     with pytest.raises(GoalError, match=r'panda_joint1 would need .* times the time') as refused:
-        core.follow(swinging('panda', size, frequency))
+        core_commands.follow(core, swinging('panda', size, frequency))
     assert 'its limit of acceleration is 3.750' in str(refused.value)
 
 
 def test_a_swing_within_the_limits_is_followed_exactly() -> None:
     """Dense points without speeds are followed as the smooth curve that they are samples of."""
     core, goal = core_of('panda'), swinging('panda', 0.05, 1.0)
-    execution = core.follow(goal)
+    execution = core_commands.follow(core, goal)
     states, off = follow(core, execution)
     assert off < EXACT
     asked = {round(point.time / PERIOD): point.positions[0] for point in goal.points[:-1]}
@@ -180,14 +181,14 @@ def test_the_factor_of_a_refusal_suffices(name: str, seed: int, time: float, cou
     assume(reason)
     found = re.search(r'give the trajectory (\S+) times the time', reason)
     assert found is not None, reason
-    _, off = follow(core, core.follow(slowed(goal, float(found[1]))))
+    _, off = follow(core, core_commands.follow(core, slowed(goal, float(found[1]))))
     assert off < EXACT
 
 
 def refusal(core: MotionCore, goal: TrajectoryGoal) -> str:
     """Return why a trajectory is refused; empty when it is not."""
     try:
-        core.follow(goal)
+        core_commands.follow(core, goal)
     except GoalError as error:
         return str(error)
     return ''
@@ -197,7 +198,7 @@ def test_a_little_haste_is_late_and_says_so() -> None:
     """What takes a little longer than asked is followed, and the end says how late and why."""
     core, begin = core_of('panda'), ready('panda')
     end = begin + np.eye(7)[0] * 0.3
-    execution = core.follow(quick('panda', end, 0.5))
+    execution = core_commands.follow(core, quick('panda', end, 0.5))
     states, off = follow(core, execution)
     assert off < EXACT
     assert execution.ending is not None
@@ -215,7 +216,7 @@ def test_nothing_takes_longer_than_move_group_waits() -> None:
     for size in (0.040, 0.042, 0.044, 0.046, 0.048):
         goal = swinging('panda', size, 2.0)
         try:
-            durations.append(core_of('panda').follow(goal).duration)
+            durations.append(core_commands.follow(core_of('panda'), goal).duration)
         except GoalError:
             continue
         assert durations[-1] <= 1.1 * goal.points[-1].time + 0.5
@@ -232,7 +233,7 @@ def test_a_bulge_beyond_a_limit_is_refused() -> None:
     turn[0], speeds[0] = limits.upper[0] - 0.02, 1.0
     points = [GoalPoint(0.5, tuple(turn), tuple(speeds)), GoalPoint(2.0, tuple(begin), (0.0,) * 7)]
     with pytest.raises(GoalError, match=r'panda_joint1 would be at 3\.0\d+ at 0\.\d+ s, beyond'):
-        core.follow(TrajectoryGoal(limits.names, points))
+        core_commands.follow(core, TrajectoryGoal(limits.names, points))
 
 
 @pytest.mark.parametrize('name', ROBOTS)
@@ -243,11 +244,15 @@ def test_goals_replace_each_other_on_their_paths(name: str, seed: int) -> None:
     rng, core = np.random.default_rng(seed), core_of(name)
     limits, begin = robot(name).limits, ready(name)
     states = [core.state]
-    execution = core.follow(quick(name, begin + rng.uniform(-0.5, 0.5, len(begin)), 1.2))
+    execution = core_commands.follow(
+        core, quick(name, begin + rng.uniform(-0.5, 0.5, len(begin)), 1.2)
+    )
     count = int(rng.integers(20, 300))
     states.extend(core.step(number * PERIOD, PERIOD).state for number in range(count))
     try:
-        execution = core.follow(quick(name, begin + rng.uniform(-0.5, 0.5, len(begin)), 1.0))
+        execution = core_commands.follow(
+            core, quick(name, begin + rng.uniform(-0.5, 0.5, len(begin)), 1.0)
+        )
     except GoalError as error:
         assert re.search('times the time|beyond', str(error))  # noqa: PT017
         return

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable
 import contextlib
 
+import core_commands
 from model_robots import ready, robot, ROBOTS
 import numpy as np
 import pytest
@@ -23,24 +24,24 @@ CLEAR = 0.0045
 
 def ask_back(core: MotionCore) -> None:
     """Ask for a target where the arm is, which it has to come back to."""
-    core.move_by(dict.fromkeys(core.model.joints, 0.0))
+    core_commands.move_by(core, dict.fromkeys(core.model.joints, 0.0))
 
 
 def follow_back(core: MotionCore) -> None:
     """Ask for a trajectory to the pose where it began."""
     back = ready(core.model.name).tolist()
-    core.follow(TrajectoryGoal(core.model.joints, [GoalPoint(6.0, back)]))
+    core_commands.follow(core, TrajectoryGoal(core.model.joints, [GoalPoint(6.0, back)]))
 
 
 def follow_later(core: MotionCore) -> None:
     """Ask for the same, to begin when the arm rests."""
     back = ready(core.model.name).tolist()
-    core.follow(TrajectoryGoal(core.model.joints, [GoalPoint(6.0, back)], age=-1.5))
+    core_commands.follow(core, TrajectoryGoal(core.model.joints, [GoalPoint(6.0, back)], age=-1.5))
 
 
 ENDS: dict[str, Callable[[MotionCore], None]] = {
-    'stop': MotionCore.stop,
-    'pause': MotionCore.pause,
+    'stop': core_commands.stop,
+    'pause': core_commands.pause,
     'time-out': lambda _core: None,
     'target': ask_back,
     'trajectory': follow_back,
@@ -56,7 +57,7 @@ def jog_into_contact(name: str, rng: np.random.Generator, cycles: int) -> Motion
     senses = rng.choice([-1.0, 1.0], len(model)) * rng.uniform(0.3, 1.0, len(model))
     speeds = dict(zip(model.joints, (senses * model.limits.velocity).tolist(), strict=True))
     for cycle in range(250):
-        core.jog(speeds, cycle * PERIOD)
+        core_commands.jog(core, speeds, cycle * PERIOD)
         core.step(cycle * PERIOD, PERIOD)
         near = model.nearest(core.state.position, 0.2, 1)
         if near and near[0].gradient @ core.state.velocity < -0.1:
@@ -92,8 +93,8 @@ def test_a_long_stop_stays_clear_all_along() -> None:
     jog = dict(zip(core.model.joints, speeds, strict=True))
     for cycle in range(250):
         if cycle < 143:
-            core.jog(jog, cycle * PERIOD)
+            core_commands.jog(core, jog, cycle * PERIOD)
         elif cycle == 143:
-            core.stop()
+            core_commands.stop(core)
         state = core.step(cycle * PERIOD, PERIOD).state
         assert core.model.clearance(state.position) > 0.0

@@ -7,6 +7,7 @@ from __future__ import annotations
 from dataclasses import replace
 import math
 
+import core_commands
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from model_robots import chain, ready, robot, ROBOTS
@@ -54,7 +55,7 @@ def test_a_trajectory_is_followed_to_its_end(name: str, kind: str) -> None:
     """Every kind of segment ends at the goal, within the limits, successful."""
     core = core_of(name)
     goal = wave(robot(name), ready(name), kind)
-    execution = core.follow(goal)
+    execution = core_commands.follow(core, goal)
     states = follow_to_the_end(core, execution)
     assert execution.ending is not None
     assert execution.ending.code is GoalCode.SUCCESSFUL
@@ -68,7 +69,7 @@ def test_a_trajectory_beyond_the_limits_is_followed_within_them(kind: str) -> No
     """Where a trajectory asks more acceleration than there is, the arm is late, on its path."""
     core = core_of('panda')
     goal = wave(robot('panda'), ready('panda'), kind, step=0.7)
-    states = follow_to_the_end(core, core.follow(goal))
+    states = follow_to_the_end(core, core_commands.follow(core, goal))
     assert off_the_path(states, path_of(core)) < 1e-3
     assert states[-1].position == pytest.approx(goal.points[-1].positions, abs=1e-6)
     kept(robot('panda').limits, states)
@@ -79,7 +80,7 @@ def test_points_are_passed_at_their_times(kind: str) -> None:
     """A point with velocities is passed at its time, within the rounding of the cubic."""
     core = core_of('prbt')
     goal = wave(robot('prbt'), ready('prbt'), kind)
-    states = follow_to_the_end(core, core.follow(goal))
+    states = follow_to_the_end(core, core_commands.follow(core, goal))
     for point in goal.points[:-1]:
         there = states[round(point.time / PERIOD)]
         assert there.position == pytest.approx(point.positions, abs=2e-3)
@@ -91,8 +92,8 @@ def test_pause_and_resume_stay_on_the_path(kind: str) -> None:
     """A paused arm comes to rest on its path, and goes on along it."""
     core = core_of('panda')
     goal = wave(robot('panda'), ready('panda'), kind)
-    core.follow(goal)
-    events = {0.7: lambda c, _: c.pause(), 1.6: lambda c, _: c.resume()}
+    core_commands.follow(core, goal)
+    events = {0.7: lambda c, _: core_commands.pause(c), 1.6: lambda c, _: core_commands.resume(c)}
     states = [point.state for point in stream(core, 6.0, events)]
     at_rest = [not state.moving for state in states]
     assert any(at_rest[round(0.8 / PERIOD) : round(1.6 / PERIOD)])
@@ -107,9 +108,9 @@ def test_pause_and_resume_stay_on_the_path(kind: str) -> None:
 def test_any_speed_at_any_time_stays_on_the_path(name: str, seed: int) -> None:
     """Speed overrides of 0 to 100 % at any time change the speed and not the path."""
     rng, core = np.random.default_rng(seed), core_of(name)
-    core.follow(wave(robot(name), ready(name), rng.choice(['l', 'c', 'q'])))
+    core_commands.follow(core, wave(robot(name), ready(name), rng.choice(['l', 'c', 'q'])))
     events = {
-        float(time): (lambda c, _, s=float(speed): c.override(s))
+        float(time): (lambda c, _, s=float(speed): core_commands.override(c, s))
         for time, speed in zip(rng.uniform(0, 3, 4), [*rng.random(3), 1.0], strict=True)
     }
     states = [point.state for point in stream(core, 6.0, events)]
@@ -120,8 +121,8 @@ def test_any_speed_at_any_time_stays_on_the_path(name: str, seed: int) -> None:
 def test_a_speed_override_takes_as_much_longer() -> None:
     """At 50 % a trajectory takes twice its time."""
     core = core_of('prbt')
-    core.override(0.5)
-    execution = core.follow(wave(robot('prbt'), ready('prbt'), 'q'))
+    core_commands.override(core, 0.5)
+    execution = core_commands.follow(core, wave(robot('prbt'), ready('prbt'), 'q'))
     states = follow_to_the_end(core, execution)
     assert len(states) * PERIOD == pytest.approx(9.0, abs=0.05)
 
@@ -131,8 +132,8 @@ def test_a_speed_override_takes_as_much_longer() -> None:
 def test_cancel_stops_on_the_path(name: str, time: float) -> None:
     """A cancelled trajectory comes to rest on its path, within the limits, and says so."""
     core = core_of(name)
-    execution = core.follow(wave(robot(name), ready(name), 'q'))
-    points = stream(core, time + 1.5, {time: lambda c, _: c.stop('canceled')})
+    execution = core_commands.follow(core, wave(robot(name), ready(name), 'q'))
+    points = stream(core, time + 1.5, {time: lambda c, _: core_commands.stop(c, 'canceled')})
     states = [point.state for point in points]
     assert execution.ending == Outcome(GoalCode.SUCCESSFUL, 'canceled', canceled=True)
     assert execution.phase is Phase.DONE
@@ -147,10 +148,10 @@ def test_cancel_stops_on_the_path(name: str, time: float) -> None:
 def test_a_new_goal_is_spliced_in(name: str, seed: int) -> None:
     """A goal that replaces another at any moment is reached without a jump."""
     rng, core = np.random.default_rng(seed), core_of(name)
-    first = core.follow(wave(robot(name), ready(name), rng.choice(['l', 'c', 'q'])))
+    first = core_commands.follow(core, wave(robot(name), ready(name), rng.choice(['l', 'c', 'q'])))
     states = [point.state for point in stream(core, float(rng.uniform(0.05, 2.5)))]
     goal = wave(robot(name), ready(name), rng.choice(['l', 'c', 'q']))
-    second = core.follow(goal)
+    second = core_commands.follow(core, goal)
     assert first.ending is not None
     assert 'new trajectory' in first.ending.reason
     states += follow_to_the_end(core, second)[1:]
@@ -163,7 +164,9 @@ def test_a_first_point_without_time_is_caught_up_with() -> None:
     core = core_of('gp110')
     start = ready('gp110')
     points = [GoalPoint(0.0, tuple(start + 0.03)), GoalPoint(2.0, tuple(start + 0.4))]
-    states = follow_to_the_end(core, core.follow(TrajectoryGoal(robot('gp110').joints, points)))
+    states = follow_to_the_end(
+        core, core_commands.follow(core, TrajectoryGoal(robot('gp110').joints, points))
+    )
     assert states[-1].position == pytest.approx(start + 0.4, abs=1e-6)
     assert off_the_path(states[len(states) // 2 :], path_of(core)) < 1e-4
     kept(robot('gp110').limits, states)
@@ -172,9 +175,9 @@ def test_a_first_point_without_time_is_caught_up_with() -> None:
 def test_the_way_to_a_first_point_heeds_the_speed_override() -> None:
     """Where the arm begins beside a path, it gets there at the speed that is set."""
     core, start = core_of('panda'), ready('panda')
-    core.override(0.05)
+    core_commands.override(core, 0.05)
     points = [GoalPoint(0.0, tuple(start + 0.049)), GoalPoint(5.0, tuple(start + 0.15))]
-    core.follow(TrajectoryGoal(robot('panda').joints, points))
+    core_commands.follow(core, TrajectoryGoal(robot('panda').joints, points))
     states = [point.state for point in stream(core, 8.0)]
     speeds = np.max([np.abs(state.velocity) for state in states], axis=0)
     assert np.all(speeds <= 0.051 * robot('panda').limits.velocity)
@@ -186,7 +189,7 @@ def test_a_trajectory_is_joined_at_any_time(age: float) -> None:
     """A point that passes in a moment is no reason to refuse the rest."""
     core = core_of('prbt')
     goal = wave(robot('prbt'), ready('prbt'), 'q', step=1.0)
-    states = follow_to_the_end(core, core.follow(replace(goal, age=age)))
+    states = follow_to_the_end(core, core_commands.follow(core, replace(goal, age=age)))
     assert states[-1].position == pytest.approx(goal.points[-1].positions, abs=1e-6)
     kept(robot('prbt').limits, states)
 
@@ -199,7 +202,7 @@ def test_continuous_joints_take_the_short_way() -> None:
     goal = TrajectoryGoal(
         model.joints, [GoalPoint(1.5, (-3.0 - 4 * math.pi, 0.0, 0.5, 0.0, 0.5, 0.0))]
     )
-    states = follow_to_the_end(core, core.follow(goal))
+    states = follow_to_the_end(core, core_commands.follow(core, goal))
     assert states[-1].position[0] == pytest.approx(2 * math.pi - 3.0, abs=1e-6)
 
 
@@ -208,18 +211,20 @@ def test_a_velocity_at_the_end_is_run_out() -> None:
     core = core_of('prbt', ExecutionSettings(rules=GoalRules(end_velocity=True)))
     start, joints = ready('prbt'), robot('prbt').joints
     point = GoalPoint(1.0, tuple(start + 0.2), (0.4,) * 6)
-    states = follow_to_the_end(core, core.follow(TrajectoryGoal(joints, [point])))
+    states = follow_to_the_end(core, core_commands.follow(core, TrajectoryGoal(joints, [point])))
     assert np.all(states[-1].position > start + 0.2)
     assert not states[-1].moving
     kept(robot('prbt').limits, states)
     with pytest.raises(GoalError, match=r'prbt_joint_1 has 0\.4000 rad/s at the last point'):
-        core_of('prbt').follow(TrajectoryGoal(joints, [point]))
+        core_commands.follow(core_of('prbt'), TrajectoryGoal(joints, [point]))
 
 
 def test_a_trajectory_may_begin_later() -> None:
     """A start in the future is waited for at rest."""
     core = core_of('prbt')
-    execution = core.follow(replace(wave(robot('prbt'), ready('prbt'), 'q'), age=-0.5))
+    execution = core_commands.follow(
+        core, replace(wave(robot('prbt'), ready('prbt'), 'q'), age=-0.5)
+    )
     states = [point.state for point in stream(core, 0.48)]
     assert not any(state.moving for state in states)
     follow_to_the_end(core, execution)
@@ -234,12 +239,12 @@ def test_a_later_begin_is_planned_before_it(name: str, seed: int, ahead: float) 
     """A stamp ahead plans nothing in the cycle, whatever moves; the end is met at its time."""
     rng, core = np.random.default_rng(seed), core_of(name)
     if seed % 2:
-        core.follow(wave(robot(name), ready(name), 'q'))
+        core_commands.follow(core, wave(robot(name), ready(name), 'q'))
     else:
-        core.jog({robot(name).joints[0]: 0.3}, 0.0, 30.0)
+        core_commands.jog(core, {robot(name).joints[0]: 0.3}, 0.0, 30.0)
     states = [point.state for point in stream(core, float(rng.uniform(0.05, 1.0)))]
     goal = replace(wave(robot(name), ready(name), 'q'), age=-ahead)
-    execution = core.follow(goal)
+    execution = core_commands.follow(core, goal)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr('arm_servo.core.execution.build_path', None)
         followed = follow_to_the_end(core, execution)
@@ -254,10 +259,14 @@ def test_an_arm_that_waits_for_a_later_begin_slows_down_on_its_line() -> None:
     """Joints in motion along a straight line come to rest on it, before the new path begins."""
     core, start = core_of('panda'), ready('panda')
     line = np.array([0.6, 0.3, -0.2, 0.1, 0.5, -0.3, 0.2])
-    core.follow(TrajectoryGoal(robot('panda').joints, [GoalPoint(2.0, tuple(start + line))]))
+    core_commands.follow(
+        core, TrajectoryGoal(robot('panda').joints, [GoalPoint(2.0, tuple(start + line))])
+    )
     stream(core, 1.0)
     end = tuple(start + 0.1)
-    core.follow(TrajectoryGoal(robot('panda').joints, [GoalPoint(2.0, end)], age=-1.0))
+    core_commands.follow(
+        core, TrajectoryGoal(robot('panda').joints, [GoalPoint(2.0, end)], age=-1.0)
+    )
     ways = np.array([point.state.position - start for point in stream(core, 0.99)])
     off = ways - np.outer(ways @ line, line) / float(line @ line)
     assert float(np.abs(off).max()) < 2e-3
@@ -267,7 +276,7 @@ def test_a_trajectory_that_has_begun_is_joined() -> None:
     """Points that have passed are left out; the next one is met in its time."""
     core = core_of('prbt')
     goal = replace(wave(robot('prbt'), ready('prbt'), 'q'), age=2.0)
-    states = follow_to_the_end(core, core.follow(goal))
+    states = follow_to_the_end(core, core_commands.follow(core, goal))
     assert len(states) * PERIOD == pytest.approx(2.5, abs=0.05)
     assert states[-1].position == pytest.approx(goal.points[-1].positions, abs=1e-6)
 
@@ -275,8 +284,10 @@ def test_a_trajectory_that_has_begun_is_joined() -> None:
 def test_a_trajectory_that_waits_can_be_canceled() -> None:
     """A cancel before the begin ends it at once, at rest."""
     core = core_of('prbt')
-    execution = core.follow(replace(wave(robot('prbt'), ready('prbt'), 'q'), age=-0.5))
-    points = stream(core, 0.3, {0.1: lambda c, _: c.stop('canceled')})
+    execution = core_commands.follow(
+        core, replace(wave(robot('prbt'), ready('prbt'), 'q'), age=-0.5)
+    )
+    points = stream(core, 0.3, {0.1: lambda c, _: core_commands.stop(c, 'canceled')})
     assert execution.ending == Outcome(GoalCode.SUCCESSFUL, 'canceled', canceled=True)
     assert execution.phase is Phase.DONE
     assert not any(point.state.moving for point in points)
@@ -285,10 +296,10 @@ def test_a_trajectory_that_waits_can_be_canceled() -> None:
 def test_a_trajectory_can_begin_paused() -> None:
     """At a speed of 0 a trajectory waits; with speed it is followed to its end."""
     core = core_of('prbt')
-    core.override(0.0)
-    execution = core.follow(wave(robot('prbt'), ready('prbt'), 'q'))
+    core_commands.override(core, 0.0)
+    execution = core_commands.follow(core, wave(robot('prbt'), ready('prbt'), 'q'))
     assert not any(point.state.moving for point in stream(core, 0.3))
-    core.override(1.0)
+    core_commands.override(core, 1.0)
     states = follow_to_the_end(core, execution)
     assert execution.ending is not None
     assert execution.ending.code is GoalCode.SUCCESSFUL
@@ -307,7 +318,7 @@ def test_a_path_violation_names_joint_amount_and_time() -> None:
     """A joint off its path ends the trajectory on the path, with joint, amount and time."""
     settings_ = ExecutionSettings(path=JointTolerance(0.05))
     core = core_of('prbt', settings_)
-    execution = core.follow(wave(robot('prbt'), ready('prbt'), 'q'))
+    execution = core_commands.follow(core, wave(robot('prbt'), ready('prbt'), 'q'))
     lagging(core, np.zeros(6), 100)
     lagging(core, np.array([0, 0, 0.08, 0, 0, 0]), 400)
     assert execution.ending is not None
@@ -325,7 +336,7 @@ def test_a_goals_own_tolerance_counts() -> None:
     for tolerance, expected in ((0.1, None), (-1.0, None), (0.02, 'tolerance 0.0200')):
         core = core_of('prbt', ExecutionSettings(path=JointTolerance(0.05)))
         asked = {'prbt_joint_3': JointTolerance(tolerance)}
-        execution = core.follow(replace(goal, path_tolerance=asked))
+        execution = core_commands.follow(core, replace(goal, path_tolerance=asked))
         lagging(core, lag, 50)
         ending = execution.ending
         assert (ending is None) == (expected is None)
@@ -335,7 +346,7 @@ def test_a_goals_own_tolerance_counts() -> None:
 def test_a_goal_that_is_not_reached_in_time_says_so() -> None:
     """A joint that stays off at the end ends with its name, amount and the time."""
     core = core_of('prbt', ExecutionSettings(goal=JointTolerance(0.01), goal_time=0.3))
-    execution = core.follow(wave(robot('prbt'), ready('prbt'), 'q', step=0.8))
+    execution = core_commands.follow(core, wave(robot('prbt'), ready('prbt'), 'q', step=0.8))
     lagging(core, np.array([0, 0.02, 0, 0, 0, 0]), 800)
     assert execution.ending is not None
     assert execution.ending.code is GoalCode.GOAL_TOLERANCE_VIOLATED
@@ -398,9 +409,9 @@ REFUSED = {
 def test_bad_goals_are_refused_with_reasons(goal: TrajectoryGoal, code: int, words: str) -> None:
     """A goal that cannot be followed is refused with code and reason, and nothing moves."""
     core = core_of('prbt')
-    running = core.follow(GOOD)
+    running = core_commands.follow(core, GOOD)
     with pytest.raises(GoalError, match=words) as refused:
-        core.follow(goal)
+        core_commands.follow(core, goal)
     assert refused.value.code == code
     assert running.phase is Phase.FOLLOWING
 
@@ -411,7 +422,7 @@ def test_joints_in_any_order_and_some_of_them() -> None:
     names = robot('prbt').joints
     core = core_of('prbt', ExecutionSettings(rules=GoalRules(partial=True)))
     goal = TrajectoryGoal([names[4], names[1]], [GoalPoint(1.5, (start[4] + 0.3, start[1] - 0.2))])
-    states = follow_to_the_end(core, core.follow(goal))
+    states = follow_to_the_end(core, core_commands.follow(core, goal))
     expected = np.array(start)
     expected[[4, 1]] += (0.3, -0.2)
     assert states[-1].position == pytest.approx(expected, abs=1e-6)
@@ -424,7 +435,9 @@ def test_a_turn_of_a_continuous_joint_is_no_error() -> None:
     tight = dict.fromkeys(core.model.joints, JointTolerance(0.01))
     there = [3.6, 0.2, 1.5, 0.9, 1.1, 0.8]
     goal = TrajectoryGoal(core.model.joints, [GoalPoint(2.0, there)])
-    execution = core.follow(replace(goal, path_tolerance=tight, goal_tolerance=tight))
+    execution = core_commands.follow(
+        core, replace(goal, path_tolerance=tight, goal_tolerance=tight)
+    )
     for step in range(600):
         state = core.state
         wrapped = np.array(state.position)
@@ -446,14 +459,14 @@ def test_a_trajectory_that_is_paused_before_its_begin_does_not_move_the_arm(
     points = [GoalPoint(0.0, (begin + 0.0009).tolist()), GoalPoint(2.0, (begin + 0.2).tolist())]
     goal = TrajectoryGoal(core.model.joints, points, age=age)
     if is_paused_later:
-        core.follow(goal)
-        core.pause()
+        core_commands.follow(core, goal)
+        core_commands.pause(core)
     else:
-        core.pause()
-        core.follow(goal)
+        core_commands.pause(core)
+        core_commands.follow(core, goal)
     for step in range(300):
         assert core.step(step * PERIOD, PERIOD).state.position.tolist() == begin.tolist()
-    core.resume()
+    core_commands.resume(core)
     for step in range(300, 900):
         core.step(step * PERIOD, PERIOD)
     assert core.state.position == pytest.approx(begin + 0.2, abs=1e-6)
@@ -463,12 +476,14 @@ def test_a_canceled_trajectory_that_waits_in_a_pause_ends() -> None:
     """Where it is: at rest, before its begin."""
     core = MotionCore(robot('panda'))
     core.reset(ready('panda'))
-    core.pause()
+    core_commands.pause(core)
     there = (ready('panda') + 0.2).tolist()
-    execution = core.follow(TrajectoryGoal(core.model.joints, [GoalPoint(2.0, there)]))
+    execution = core_commands.follow(
+        core, TrajectoryGoal(core.model.joints, [GoalPoint(2.0, there)])
+    )
     core.step(0.0, PERIOD)
-    core.stop()
-    core.resume()
+    core_commands.stop(core)
+    core_commands.resume(core)
     for step in range(1, 20):
         core.step(step * PERIOD, PERIOD)
     assert execution.phase is Phase.DONE

@@ -8,6 +8,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import core_commands
 from isolation import Isolation
 from model_robots import FOLDER, ready, robot, texts
 import pytest
@@ -334,12 +335,12 @@ def test_jogs_come_to_rest_at_the_margins_of_the_joint_limits(
     core, upper = MotionCore(robot('panda'), settings), robot('panda').limits.upper[0]
     core.reset([upper - 0.5, *ready('panda')[1:].tolist()])
     for cycle in range(300):
-        core.jog({'panda_joint1': 1.0}, 0.01 * cycle)
+        core_commands.jog(core, {'panda_joint1': 1.0}, 0.01 * cycle)
         core.step(0.01 * cycle, 0.01)
     assert upper - core.state.position[0] == pytest.approx(margin, abs=2e-3)
     core.reset([upper - 0.05, *ready('panda')[1:].tolist()])
     for cycle in range(100):
-        core.jog({'panda_joint1': -1.0}, 0.01 * cycle)
+        core_commands.jog(core, {'panda_joint1': -1.0}, 0.01 * cycle)
         core.step(0.01 * cycle, 0.01)
     assert core.state.position[0] < upper - 0.5
 
@@ -353,7 +354,7 @@ def test_jogs_come_to_rest_at_the_proximity_threshold(threshold: float) -> None:
     )
     core.reset(ready('panda'))
     for cycle in range(400):
-        core.jog({'panda_joint6': -1.0}, 0.01 * cycle)
+        core_commands.jog(core, {'panda_joint6': -1.0}, 0.01 * cycle)
         core.step(0.01 * cycle, 0.01)
     assert core.model.clearance(core.state.position) == pytest.approx(threshold, abs=2e-3)
 

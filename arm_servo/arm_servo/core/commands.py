@@ -4,13 +4,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
-import math
 
 import numpy as np
 
-from arm_model import Array, checked, combined, CommandError, Mask, Pose, RobotModel
+from arm_model import Array, checked, combined, CommandError, Mask, RobotModel
 
 from ..jog.servo_source import Command, JointCommand, PoseCommand, TwistCommand
 from .requests import JogRequest
@@ -42,43 +41,27 @@ def by_joint(model: RobotModel, values: Mapping[str, float], what: str) -> tuple
     return ordered, mask
 
 
-def twist_command(
-    model: RobotModel, twist: Sequence[float] | Array, link: str | None, axes: Array | None
-) -> TwistCommand:
-    """Check a speed of the tool.
+def check_command(model: RobotModel, command: Command) -> None:
+    """Check a jog.
 
     Args:
         model: The arm.
-        twist: Linear [m/s], then angular [rad/s] (6).
-        link: Link along whose axes it is given; the base when None.
-        axes: Rotation (3, 3) from other axes to the base, in place of a link.
+        command: What the arm is to do.
 
     Raises:
-        CommandError: A number is not finite, the count is wrong, the link is unknown, or the
-            axes are no rotation.
+        CommandError: A number is not finite, the count is wrong, the link is unknown, or the axes
+            are no rotation.
     """
-    values = checked(twist, 6, 'twist')
-    model.check_link(link)
-    return TwistCommand(values, link, None if axes is None else _rotation(axes, 'axes'))
-
-
-def pose_command(pose: Pose, linear_speed: float = 0.4, angular_speed: float = 0.8) -> PoseCommand:
-    """Check a pose.
-
-    Args:
-        pose: Pose of the tip in the base.
-        linear_speed: Greatest speed of the tip on the way there in [m/s].
-        angular_speed: Greatest angular speed of the tip on the way there in [rad/s].
-
-    Raises:
-        CommandError: A number is not finite, or the rotation is none.
-    """
-    position = checked(pose.position, 3, 'position')
-    return PoseCommand(
-        Pose(_rotation(pose.rotation, 'rotation'), position),
-        linear_speed,
-        angular_speed,
-    )
+    if isinstance(command, TwistCommand):
+        checked(command.twist, 6, 'twist')
+        model.check_link(command.link)
+        if command.axes is not None:
+            _check_rotation(command.axes, 'axes')
+    elif isinstance(command, PoseCommand):
+        checked(command.pose.position, 3, 'position')
+        _check_rotation(command.pose.rotation, 'rotation')
+    else:
+        checked(command.velocity, len(model), 'velocities')
 
 
 def in_base(model: RobotModel, positions: Array, request: JogRequest) -> Command:
@@ -100,26 +83,8 @@ def in_base(model: RobotModel, positions: Array, request: JogRequest) -> Command
     return TwistCommand(np.concatenate((linear + np.cross(angular, lever), angular)))
 
 
-def duration_of(duration: float | None, default: float) -> float:
-    """Check how long a command counts.
-
-    Args:
-        duration: Asked time in [s]; None for the default.
-        default: The default in [s].
-
-    Raises:
-        CommandError: It is negative, infinite or not a number: a command must run out.
-    """
-    if duration is None:
-        return default
-    if not (math.isfinite(duration) and duration >= 0.0):
-        raise CommandError(f'duration {duration} s: it must be finite, and 0 or more')
-    return duration
-
-
-def _rotation(values: Array, what: str) -> Array:
+def _check_rotation(values: Array, what: str) -> None:
     rotation = checked(np.ravel(values), 9, what).reshape(3, 3)
     off = float(np.abs(rotation @ rotation.T - np.eye(3)).max())
     if off > ROTATION_TOLERANCE or np.linalg.det(rotation) < 0.0:
         raise CommandError(f'{what}: it is no rotation; is the quaternion of unit length?')
-    return rotation

@@ -27,7 +27,7 @@ import threading
 import time
 from typing import Any
 
-from arm_model import Array, RobotModel, RobotState
+from arm_model import ArmError, Array, RobotModel, RobotState
 from arm_trajectory import GoalCode, StateMovedError, TrajectoryGoal
 
 from ..exceptions import NotReadyError
@@ -36,7 +36,7 @@ from .execution import Execution
 from .motion_core import MotionCore
 from .outcome import Outcome, refused
 from .preparation import CommandBasis, Prepared
-from .requests import JogRequest, MotionRequest
+from .requests import ImmediateRequest, JogRequest, MotionRequest, PauseRequest, StopRequest
 from .set_point import SetPoint, Source
 from .snapshot import MAX_CYCLE_AGE, Snapshot
 
@@ -182,33 +182,44 @@ class CommandGateway:
         """What the core did in the last cycle."""
         return self._snapshot
 
-    def jog(self, request: JogRequest) -> Future[None]:
-        """Have the arm jogged from the next cycle on.
+    def command(self, request: ImmediateRequest) -> Future[None]:
+        """Have a jog, a stop, a pause or a speed override count from the next cycle on.
+
+        A stop refuses from the moment of the call what was requested before it, a pause what jogs.
 
         Args:
-            request: What is asked.
+            request: The request.
 
         Returns:
             Nothing once it counts; the ArmError with which it was refused.
         """
         future: Future[None] = Future()
-        if len(self._orders) >= MAX_QUEUED_JOGS:
-            future.set_exception(NotReadyError(f'{MAX_QUEUED_JOGS} commands wait for the cycle'))
+        try:
+            prepared = self._core.prepare(request)
+            if isinstance(request, JogRequest) and len(self._orders) >= MAX_QUEUED_JOGS:
+                raise NotReadyError(f'{MAX_QUEUED_JOGS} commands wait for the cycle')
+        except ArmError as error:
+            future.set_exception(error)
             return future
         with self._lock:
             number, since = next(self._numbers), self._clock()
+        if isinstance(request, StopRequest):
+            self._void(request.sources or MOTIONS, request.reason)
+        elif isinstance(request, PauseRequest) and request.is_paused:
+            self._void(JOGGING, 'the arm was paused')
 
         def commit(cycle: _Cycle) -> bool:
             try:
-                if not self._core.ignores(request):
+                if isinstance(request, JogRequest) and not self._core.ignores(request):
                     self._admit(Source.JOG, number, since, cycle)
-                    self._core.commit_jog(request, cycle.now)
-                    if not request.is_zero:  # the newest command counts: older ones never begin
-                        self._void((Source.TARGET, Source.TRAJECTORY), 'a jog took over', number)
+                self._core.commit(prepared, cycle.now)
             except Exception as error:  # noqa: BLE001  # whoever commanded it is told
                 future.set_exception(error)
-            else:
-                future.set_result(None)
+                return True
+            if isinstance(request, JogRequest) and not request.is_zero:
+                # the newest command counts: older ones never begin
+                self._void((Source.TARGET, Source.TRAJECTORY), 'a jog took over', number)
+            future.set_result(None)
             return True
 
         self._orders.append(commit)
@@ -241,9 +252,9 @@ class CommandGateway:
             reason: Why, for the outcome of a trajectory.
         """
 
-        def stop(_cycle: _Cycle) -> bool:
-            if command.motion is not None and command.motion is self._core.motion:
-                self._core.stop(reason)
+        def stop(cycle: _Cycle) -> bool:
+            if command.motion is not None:
+                self._stop_now(StopRequest(reason, motion=command.motion), cycle)
             return True
 
         # the mark first: a commit that has missed it comes before the order
@@ -252,61 +263,8 @@ class CommandGateway:
             command.end(CANCELED)
         self._orders.append(stop)
 
-    def stop(self, sources: Iterable[Source], reason: str) -> None:
-        """Bring what some sources move to rest, and refuse what was requested for them so far.
-
-        Args:
-            sources: The sources; others go on.
-            reason: Why, for a trajectory that this ends.
-        """
-        stopped = tuple(sources)
-        self._void(stopped, reason)
-
-        def stop(_cycle: _Cycle) -> bool:
-            if self._core.source in stopped:
-                self._core.stop(reason)
-            return True
-
-        self._orders.append(stop)
-
-    def pause(self) -> None:
-        """Bring the arm to rest; trajectories and targets go on after :meth:`resume`."""
-        self._void(JOGGING, 'the arm was paused')
-
-        def pause(_cycle: _Cycle) -> bool:
-            self._core.pause()
-            return True
-
-        self._orders.append(pause)
-
-    def resume(self) -> None:
-        """Go on after a pause."""
-
-        def resume(_cycle: _Cycle) -> bool:
-            self._core.resume()
-            return True
-
-        self._orders.append(resume)
-
-    def override(self, speed: float) -> Future[None]:
-        """Set the speed of trajectories and targets.
-
-        Args:
-            speed: 0 to 1; 0 is a pause.
-        """
-        future: Future[None] = Future()
-
-        def override(_cycle: _Cycle) -> bool:
-            try:
-                self._core.override(speed)
-            except Exception as error:  # noqa: BLE001  # whoever commanded it is told
-                future.set_exception(error)
-            else:
-                future.set_result(None)
-            return True
-
-        self._orders.append(override)
-        return future
+    def _stop_now(self, request: StopRequest, cycle: _Cycle) -> None:
+        self._core.commit(self._core.prepare(request), cycle.now)
 
     def begin(self, positions: Array) -> None:
         """Begin to command the arm where it stands.
@@ -500,7 +458,7 @@ class CommandGateway:
             ):
                 return True
             if not is_stopped:
-                self._core.stop('a trajectory takes over')
+                self._stop_now(StopRequest('a trajectory takes over'), cycle)
                 is_stopped = True
             if self._core.source is Source.NONE and not self._core.state.moving:
                 self._guarded(command, lambda: self._hand_out(command, cycle.now, cycle))
@@ -525,7 +483,7 @@ class CommandGateway:
 
         def begin(cycle: _Cycle) -> None:
             self._admit(command.source, command.number, ordered, cycle)
-            self._core.commit(prepared, cycle.now - planned)
+            self._core.commit(prepared, cycle.now, cycle.now - planned)
             command.motion = prepared.motion
             self._begun.append(command)
             # canceled in this moment: the order behind it stops it

@@ -5,30 +5,36 @@
 Every source starts from the commanded state, and every step passes the same filter, so a hand-over
 is no event: positions, velocities and accelerations go on from where they are.
 
-Every motion comes in by one contract: :meth:`MotionCore.prepare` plans and checks a request beside
-the cycle, :meth:`MotionCore.commit` begins it in the cycle, and refuses what was prepared for
+Every command comes in by one contract, be it a jog, a motion, a pause or a stop:
+:meth:`MotionCore.prepare` checks a request and plans a motion beside the cycle,
+:meth:`MotionCore.commit` lets it count in the cycle, and refuses a motion that was prepared for
 another state or before another command or stop.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-import math
+from collections.abc import Sequence
 
 import numpy as np
 
-from arm_model import Array, checked, CommandError, ModelError, Pose, RobotModel, RobotState
-from arm_trajectory import GoalCode, OnlineTrajectoryGenerator, StateMovedError, TrajectoryGoal
+from arm_model import Array, checked, CommandError, ModelError, RobotModel, RobotState
+from arm_trajectory import GoalCode, OnlineTrajectoryGenerator, StateMovedError
 
 from ..exceptions import NotReadyError
-from ..jog.servo_source import Command, JointCommand
 from ..report import Cause, Limiter
 from .arbiter import CommandArbiter, Motion
-from .commands import by_joint, duration_of, in_base, pose_command, twist_command
+from .commands import in_base
 from .execution import Execution, Feedback
 from .outcome import Outcome
 from .preparation import CommandBasis, Preparation, Prepared
-from .requests import DisplacementRequest, JogRequest, MotionRequest, TargetRequest
+from .requests import (
+    ImmediateRequest,
+    JogRequest,
+    MotionRequest,
+    PauseRequest,
+    SpeedRequest,
+    StopRequest,
+)
 from .safety_filter import SafetyFilter
 from .set_point import SetPoint, Source
 from .settings import CoreSettings
@@ -168,198 +174,62 @@ class MotionCore:
         self._state = RobotState.at_rest(where)
         self._filter.reset(self._state)
 
-    def prepare(self, request: MotionRequest, basis: CommandBasis) -> Prepared:
-        """Plan a request and check its path; nothing moves. For any one thread at a time.
+    def prepare(
+        self, request: MotionRequest | ImmediateRequest, basis: CommandBasis | None = None
+    ) -> Prepared:
+        """Check a request; plan a motion, and check its path. Nothing moves.
+
+        Motions are for one thread at a time, whichever; other requests for any thread.
 
         Args:
-            request: What is asked.
-            basis: The arm where the motion begins: :attr:`basis`, or foreseen from it.
+            request: The request.
+            basis: The arm where a motion begins: :attr:`basis`, or foreseen from it.
 
         Raises:
             CommandError: The request is refused.
         """
         return self._preparation.prepare(request, basis)
 
-    def commit(self, prepared: Prepared, elapsed: float = 0.0) -> None:
-        """Begin a motion; where it is off, the arm catches up smoothly.
+    def commit(self, prepared: Prepared, now: float, elapsed: float = 0.0) -> None:
+        """Let a request count from now on; where a motion is off, the arm catches up smoothly.
 
         Args:
             prepared: What :meth:`prepare` returned.
-            elapsed: Time since its basis in [s], by which one that begins later waits less.
+            now: Steady time in [s].
+            elapsed: Time since its basis in [s], by which a motion that begins later waits less.
 
         Raises:
-            StateMovedError: Another command or a stop came after it was prepared, or the arm is
-                elsewhere than where a trajectory was: it may begin when it is prepared again.
-            CommandError: The arm is paused, and a single target would begin later, by surprise.
-            NotReadyError: The position of the arm is not known yet.
+            StateMovedError: Another command or a stop came after a motion was prepared, or the arm
+                is elsewhere than where a trajectory was: prepared again it may begin.
+            CommandError: The arm is paused, and a jog or a single target would begin later, by
+                surprise.
+            NotReadyError: A jog has expired, or the position of the arm is not known yet.
         """
-        state, motion = self.state, prepared.motion
-        if motion is None:
-            return
-        if prepared.basis.sequence != self._sequence:
-            raise StateMovedError(
-                GoalCode.INVALID_GOAL,
-                f'{self._last_change} before this command had begun; send it again',
-            )
-        if isinstance(motion, Execution):
-            self._check_place(prepared.basis.state, state)
-            self._changed('another command came')
-            motion.elapse(elapsed)
-            self._arbiter.follow(motion)
-        else:
-            self._check_held()
-            self._changed('another command came')
-            self._arbiter.aim(motion)
+        request = prepared.request
+        if isinstance(request, JogRequest):
+            self._jog(request, now)
+        elif isinstance(request, StopRequest):
+            self._stop(request)
+        elif isinstance(request, PauseRequest):
+            self._pause(request)
+        elif isinstance(request, SpeedRequest):
+            self._speed = request.speed
+        elif prepared.motion is not None and prepared.basis is not None:
+            self._begin(prepared.motion, prepared.basis, elapsed)
 
     def ignores(self, request: JogRequest) -> bool:
         """Whether a jog asks for standing still, and its client is not jogging."""
         jogs = self.source is Source.JOG and self._arbiter.jogger == request.client
         return request.is_zero and not jogs
 
-    def commit_jog(self, request: JogRequest, now: float) -> None:
-        """Jog from now on; there is nothing to prepare, the safety filter sees every step.
-
-        Args:
-            request: What is asked.
-            now: Steady time in [s].
-
-        Raises:
-            CommandError: The arm is paused.
-            NotReadyError: The request has expired, or the position of the arm is not known yet.
-        """
-        state = self.state
-        if self.ignores(request):
-            return
-        if now > request.expires:
-            raise NotReadyError(
-                f'expired {now - request.expires:.2f} s before the cycle; send commands more'
-                ' often than they expire (incoming_command_timeout)'
-            )
-        if self._paused:
-            raise CommandError(PAUSED)
-        command = in_base(self._model, state.position, request)
-        if not request.is_zero:  # that ends the jog, and no other command
-            self._changed('a jog took over')
-        self._arbiter.jog(command, request.expires, request.client)
-
-    def twist(
-        self,
-        twist: Sequence[float] | Array,
-        now: float,
-        *,
-        link: str | None = None,
-        axes: Array | None = None,
-        duration: float | None = None,
-    ) -> None:
-        """Move the tool at a speed.
-
-        Args:
-            twist: Linear [m/s], then angular [rad/s] (6).
-            now: Steady time in [s].
-            link: Link along whose axes the twist is given; the base when None.
-            axes: Rotation (3, 3) from other axes to the base, in place of a link.
-            duration: How long it counts in [s]; by default the time-out.
-
-        Raises:
-            CommandError: A number is not finite, the count is wrong, the link is unknown, or the
-                axes are no rotation.
-            NotReadyError: The position of the arm is not known yet.
-        """
-        self._jog(twist_command(self._model, twist, link, axes), now, duration)
-
-    def jog(
-        self, velocities: Mapping[str, float], now: float, duration: float | None = None
-    ) -> None:
-        """Move joints at speeds; the others are held.
-
-        Args:
-            velocities: Speeds in [rad/s] by joint.
-            now: Steady time in [s].
-            duration: How long it counts in [s]; by default the time-out.
-
-        Raises:
-            CommandError: A joint is unknown, or a number is not finite.
-            NotReadyError: The position of the arm is not known yet.
-        """
-        values, commanded = by_joint(self._model, velocities, 'velocities')
-        self._jog(JointCommand(values, commanded), now, duration)
-
-    def track(self, pose: Pose, now: float, duration: float | None = None) -> None:
-        """Go to a pose, and track it when it moves.
-
-        Args:
-            pose: Pose of the tip in the base.
-            now: Steady time in [s].
-            duration: How long it counts in [s]; by default the time-out.
-
-        Raises:
-            CommandError: A number is not finite, or the rotation is none.
-            NotReadyError: The position of the arm is not known yet.
-        """
-        self._jog(pose_command(pose), now, duration)
-
-    def follow(self, goal: TrajectoryGoal) -> Execution:
-        """Follow a trajectory, from the commanded state on.
-
-        Args:
-            goal: The trajectory.
-
-        Returns:
-            Its execution, which says where it is and how it ends.
-
-        Raises:
-            GoalError: It is refused; what moves the arm goes on.
-            NotReadyError: The position of the arm is not known yet.
-        """
-        basis = self.basis
-        execution = self._preparation.trajectory(goal, basis)
-        self.commit(Prepared(execution, basis))
-        return execution
-
-    def move_to(self, positions: Mapping[str, float], max_speed: float = math.inf) -> None:
-        """Move joints to positions in the shortest time, and rest there.
-
-        Args:
-            positions: Targets in [rad] by joint; the others come to rest.
-            max_speed: Greatest speed of a joint in [rad/s].
-
-        Raises:
-            CommandError: A joint is unknown, a number is not finite or beyond a limit, or links
-                meet on the way.
-            NotReadyError: The position of the arm is not known yet.
-        """
-        self.commit(self.prepare(TargetRequest(positions, max_speed), self.basis))
-
-    def move_by(self, displacements: Mapping[str, float], max_speed: float = math.inf) -> None:
-        """Move joints on by amounts, and rest there; they add up while they are carried out.
-
-        Args:
-            displacements: How far in [rad] by joint.
-            max_speed: Greatest speed of a joint in [rad/s].
-
-        Raises:
-            CommandError: A joint is unknown, the end is not finite or beyond a limit, or links
-                meet on the way.
-            NotReadyError: The position of the arm is not known yet.
-        """
-        self.commit(self.prepare(DisplacementRequest(displacements, max_speed), self.basis))
-
-    def stop(self, reason: str = 'stopped') -> None:
-        """Come to rest: a trajectory on its path, anything else in the shortest time.
-
-        Args:
-            reason: Why, for the motion that this ends.
-        """
-        self._stop(Outcome(GoalCode.SUCCESSFUL, reason, canceled=True))
-
     def fail(self, reason: str, code: GoalCode = GoalCode.INVALID_GOAL) -> None:
-        """Come to rest as by :meth:`stop`, because something has gone wrong.
+        """Come to rest, a trajectory on its path, because something has gone wrong.
 
         Args:
             reason: What, for the motion that this ends.
             code: Code of its outcome.
         """
-        self._stop(Outcome(code, reason))
+        self._end(Outcome(code, reason))
 
     def abandon(self, reason: str) -> None:
         """End at once what moves the arm, which does not follow any more.
@@ -370,28 +240,6 @@ class MotionCore:
         if self.source is not Source.NONE:
             self._changed('the arm did not follow')
             self._arbiter.release(reason)
-
-    def pause(self) -> None:
-        """Come to rest, a trajectory on its path; jogging is refused until :meth:`resume`."""
-        self._changed('the arm was paused')
-        self._paused = True
-
-    def resume(self) -> None:
-        """Go on after a pause."""
-        self._paused = False
-
-    def override(self, speed: float) -> None:
-        """Set the speed of trajectories and targets.
-
-        Args:
-            speed: 0 to 1; 0 is a pause.
-
-        Raises:
-            CommandError: It is not between 0 and 1.
-        """
-        if not 0.0 <= speed <= 1.0:
-            raise CommandError(f'speed override {speed}: it must be between 0 and 1')
-        self._speed = speed
 
     def step(self, now: float, period: float, measured: RobotState | None = None) -> SetPoint:
         """Return the set-point of a cycle.
@@ -453,7 +301,53 @@ class MotionCore:
         elif is_target and is_at_rest:
             self._arbiter.end(Outcome(code, f'no way to the target from here: {limiter}'))
 
-    def _stop(self, outcome: Outcome) -> None:
+    def _jog(self, request: JogRequest, now: float) -> None:
+        """Jog from now on; the safety filter sees every step."""
+        state = self.state
+        if self.ignores(request):
+            return
+        if now > request.expires:
+            raise NotReadyError(
+                f'expired {now - request.expires:.2f} s before the cycle; send commands more'
+                ' often than they expire (incoming_command_timeout)'
+            )
+        if self._paused:
+            raise CommandError(PAUSED)
+        command = in_base(self._model, state.position, request)
+        if not request.is_zero:  # that ends the jog, and no other command
+            self._changed('a jog took over')
+        self._arbiter.jog(command, request.expires, request.client)
+
+    def _begin(self, motion: Motion, basis: CommandBasis, elapsed: float) -> None:
+        state = self.state
+        if basis.sequence != self._sequence:
+            raise StateMovedError(
+                GoalCode.INVALID_GOAL,
+                f'{self._last_change} before this command had begun; send it again',
+            )
+        if isinstance(motion, Execution):
+            self._check_place(basis.state, state)
+            self._changed('another command came')
+            motion.elapse(elapsed)
+            self._arbiter.follow(motion)
+        else:
+            self._check_held()
+            self._changed('another command came')
+            self._arbiter.aim(motion)
+
+    def _pause(self, request: PauseRequest) -> None:
+        if request.is_paused:
+            self._changed('the arm was paused')
+        self._paused = request.is_paused
+
+    def _stop(self, request: StopRequest) -> None:
+        if request.motion is not None and request.motion is not self.motion:
+            return
+        if request.sources is None or self.source in request.sources:
+            self._end(Outcome(GoalCode.SUCCESSFUL, request.reason, canceled=True))
+
+    def _end(self, outcome: Outcome) -> None:
+        """Bring the arm to rest; what moves it ends so."""
         self._changed('the arm was stopped')
         self._arbiter.stop(outcome)
 
@@ -480,7 +374,3 @@ class MotionCore:
                 ' trajectory was planned, and its path was checked from there only; send it'
                 ' again, or end what moves the arm first',
             )
-
-    def _jog(self, command: Command, now: float, duration: float | None) -> None:
-        counts = duration_of(duration, self._settings.timeout)
-        self.commit_jog(JogRequest(command, now + counts), now)

@@ -1,16 +1,17 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What is found out about a motion before it begins, beside the cycle.
+"""The first half of the command contract: requests planned and checked, beside the cycle.
 
-``prepare(request, basis) -> Prepared`` plans and checks a request from a state of the arm; it
-moves nothing, and takes as long as it needs. ``MotionCore.commit(prepared)`` begins the motion in
-the cycle, and refuses what was prepared for another state or before another command.
+``prepare(request, basis) -> Prepared`` moves nothing, and takes as long as it needs.
+``MotionCore.commit(prepared)`` lets it count in the cycle, and refuses what was prepared for
+another state or before another command.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+import math
 
 import numpy as np
 
@@ -26,9 +27,15 @@ from arm_trajectory import (
 )
 
 from .arbiter import Motion
-from .commands import by_joint
+from .commands import by_joint, check_command
 from .execution import Execution
-from .requests import DisplacementRequest, MotionRequest
+from .requests import (
+    DisplacementRequest,
+    ImmediateRequest,
+    JogRequest,
+    MotionRequest,
+    SpeedRequest,
+)
 from .set_point import Source
 from .settings import CoreSettings
 from .single_target import SingleTarget
@@ -71,15 +78,18 @@ class CommandBasis:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Prepared:
-    """A motion whose path is clear.
+    """A request that was checked; of a motion, one whose path is clear.
 
     Attributes:
-        motion: What begins; None for a displacement by nothing, which is no command.
-        basis: From what it was planned; it does not begin from anything else.
+        request: The request.
+        motion: What begins; None for a displacement by nothing, and where nothing is planned.
+        basis: From what it was planned: it does not begin from anything else. None where nothing
+            is planned.
     """
 
-    motion: Motion | None
-    basis: CommandBasis
+    request: MotionRequest | ImmediateRequest
+    motion: Motion | None = None
+    basis: CommandBasis | None = None
 
 
 class Preparation:
@@ -107,25 +117,40 @@ class Preparation:
         )  # that of the cycle is for the cycle
         self._check = PathCheck(model.scene) if settings.check_self_collision else None
 
-    def prepare(self, request: MotionRequest, basis: CommandBasis) -> Prepared:
-        """Plan a request and check its path.
+    def prepare(
+        self, request: MotionRequest | ImmediateRequest, basis: CommandBasis | None
+    ) -> Prepared:
+        """Check a request; plan a motion, and check its path.
 
         Args:
-            request: What is asked.
-            basis: The arm where the motion begins.
+            request: The request.
+            basis: The arm where a motion begins; None where nothing is planned.
 
         Raises:
             CommandError: The request is refused.
         """
+        if isinstance(request, JogRequest):
+            check_command(self._model, request.command)
+            if not math.isfinite(request.expires):
+                raise CommandError(f'a jog expires at {request.expires} s: it must be finite')
+        elif isinstance(request, SpeedRequest) and not 0.0 <= request.speed <= 1.0:
+            raise CommandError(f'speed override {request.speed}: it must be between 0 and 1')
+        if isinstance(request, ImmediateRequest):
+            return Prepared(request)
+        if basis is None:
+            raise ValueError('a motion is prepared from a state of the arm: MotionCore.basis')
+        return Prepared(request, self._motion(request, basis), basis)
+
+    def _motion(self, request: MotionRequest, basis: CommandBasis) -> Motion | None:
         if isinstance(request, TrajectoryGoal):
-            return Prepared(self.trajectory(request, basis), basis)
+            return self._trajectory(request, basis)
         if isinstance(request, DisplacementRequest):
             target = self._displaced(request.displacements, basis)
             if request.is_zero:
-                return Prepared(None, basis)
+                return None
         else:
             target = self._aimed(*self._by_joint(request.positions, 'positions'), basis)
-        return Prepared(self._single_target(target, request.max_speed, basis), basis)
+        return self._single_target(target, request.max_speed, basis)
 
     def _by_joint(self, values: Mapping[str, float], what: str) -> tuple[Array, Mask]:
         return by_joint(self._model, values, what)
@@ -176,7 +201,7 @@ class Preparation:
                 ' to the target; go around that (check_self_collision switches this off)'
             )
 
-    def trajectory(self, goal: TrajectoryGoal, basis: CommandBasis) -> Execution:
+    def _trajectory(self, goal: TrajectoryGoal, basis: CommandBasis) -> Execution:
         """Plan a trajectory and check its path.
 
         Raises:

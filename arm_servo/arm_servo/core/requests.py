@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What a client asks of the arm, as values; nothing in them moves anything.
+"""Requests to the motion core, as values; nothing in them moves anything.
 
-A trajectory is asked for by a :class:`~.goal.TrajectoryGoal`.
+A trajectory is requested by a :class:`arm_trajectory.TrajectoryGoal`.
 """
 
 from __future__ import annotations
@@ -15,6 +15,8 @@ from arm_model import Pose
 from arm_trajectory import TrajectoryGoal
 
 from ..jog.servo_source import Command, JointCommand, TwistCommand
+from .arbiter import Motion
+from .set_point import Source
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,5 +75,45 @@ class TargetRequest:
     max_speed: float = math.inf
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class StopRequest:
+    """Come to rest: a trajectory on its path, anything else in the shortest time.
+
+    Attributes:
+        reason: Why, for the outcome of the motion that this ends.
+        sources: What is stopped; other sources go on. None for whatever moves the arm.
+        motion: The motion that is stopped; another one goes on. None for any.
+    """
+
+    reason: str = 'stopped'
+    sources: tuple[Source, ...] | None = None
+    motion: Motion | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class PauseRequest:
+    """Come to rest, a trajectory on its path, and refuse jogging; or go on after that.
+
+    Attributes:
+        is_paused: Whether to come to rest; else to go on.
+    """
+
+    is_paused: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class SpeedRequest:
+    """Set the speed override of trajectories and targets.
+
+    Attributes:
+        speed: 0 to 1; 0 is a pause.
+    """
+
+    speed: float
+
+
 MotionRequest = DisplacementRequest | TargetRequest | TrajectoryGoal
-"""What is planned and checked for collisions before it may begin."""
+"""Requests that are planned, and checked for collisions, before they may begin."""
+
+ImmediateRequest = JogRequest | StopRequest | PauseRequest | SpeedRequest
+"""Requests for which nothing is planned: they count from the next cycle on."""

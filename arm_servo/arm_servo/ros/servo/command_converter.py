@@ -12,9 +12,9 @@ import numpy as np
 from arm_model import Array, checked, CommandError, Pose, RobotModel, rotation_of
 from arm_model.ros import xyz, xyzw
 
-from ...core.commands import by_joint, pose_command, twist_command
+from ...core.commands import by_joint
 from ...core.requests import DisplacementRequest, JogRequest
-from ...jog.servo_source import JointCommand
+from ...jog.servo_source import JointCommand, PoseCommand, TwistCommand
 from .parameters import DEFAULT_ANGULAR_SPEED, DEFAULT_LINEAR_SPEED, Scales, ServoParameters, Units
 
 MAX_DURATION = 60.0
@@ -75,7 +75,7 @@ class CommandConverter:
             link = None if named == self._model.base else named
         elif frame:
             axes = self._frames.pose(frame).rotation
-        return JogRequest(twist_command(self._model, twist, link, axes), expires, about)
+        return JogRequest(TwistCommand(twist, link, axes), expires, about)
 
     def jog(self, message: Any, sent: float) -> JogRequest | DisplacementRequest:  # noqa: ANN401
         """Return the request of a JointJog: speeds for a duration, or displacements.
@@ -119,7 +119,7 @@ class CommandConverter:
         frame = message.header.frame_id or self._parameters.default_frame
         self.capped = ''
         scales = self.scales
-        command = pose_command(
+        command = PoseCommand(
             goal,
             scales.override * (scales.linear or DEFAULT_LINEAR_SPEED),
             scales.override * (scales.rotational or DEFAULT_ANGULAR_SPEED),

@@ -25,7 +25,7 @@ from arm_trajectory import GoalCode
 
 from ...core.gateway import CommandGateway, JOGGING
 from ...core.outcome import Outcome
-from ...core.requests import DisplacementRequest, JogRequest
+from ...core.requests import DisplacementRequest, JogRequest, StopRequest
 from ...exceptions import NotReadyError
 from ..refusals import Refusals
 from .command_converter import CommandConverter
@@ -105,7 +105,7 @@ class Servo:
         if isinstance(request, JogRequest):
             # the events executor hands out no publisher, so topic and frame tell who asks
             request = replace(request, client=(kind, message.header.frame_id))
-            self._gateway.jog(request).add_done_callback(self._note)
+            self._gateway.command(request).add_done_callback(self._note)
             return
         command = self._gateway.request(request)
         command.future.add_done_callback(self._note)
@@ -143,7 +143,7 @@ class Servo:
         self._refusals.note(reason, time.monotonic())
 
     def _stop(self, reason: str) -> None:
-        self._gateway.stop(JOGGING, reason)
+        self._gateway.command(StopRequest(reason, JOGGING))
 
     def _check_scales(self, parameters: list[Parameter]) -> SetParametersResult:
         for parameter in parameters:

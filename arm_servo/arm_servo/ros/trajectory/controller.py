@@ -24,6 +24,7 @@ from arm_trajectory import TrajectoryGoal
 
 from ...core.execution import Execution
 from ...core.gateway import CommandGateway, MotionCommand
+from ...core.requests import SpeedRequest, StopRequest
 from ...core.set_point import Source
 from ...exceptions import NotReadyError
 from .action import TrajectoryAction
@@ -83,7 +84,8 @@ class TrajectoryController:
         """Take trajectories, or stop on the path and take none."""
         self.active = active
         if not active:
-            self._gateway.stop([Source.TRAJECTORY], 'the controller was deactivated')
+            stop = StopRequest('the controller was deactivated', (Source.TRAJECTORY,))
+            self._gateway.command(stop)
 
     @property
     def _now(self) -> float:
@@ -123,7 +125,7 @@ class TrajectoryController:
         self._override(message.factor)
 
     def _override(self, speed: float) -> None:
-        self._gateway.override(speed).add_done_callback(self._tell_refusal)
+        self._gateway.command(SpeedRequest(speed)).add_done_callback(self._tell_refusal)
 
     def _tell_refusal(self, future: Future[Any]) -> None:
         if not future.cancelled() and (error := future.exception()) is not None:

@@ -12,6 +12,7 @@ from rclpy.node import Node
 from std_srvs.srv import Trigger
 
 from ...core.gateway import CommandGateway
+from ...core.requests import PauseRequest
 from ...core.set_point import Source
 from ...core.snapshot import Snapshot
 
@@ -53,10 +54,7 @@ class TrajectoryPause:
         response.message = snapshot.stale(time.monotonic() - snapshot.time)
         if response.message:
             return response
-        if paused:
-            self._gateway.pause()
-        else:
-            self._gateway.resume()
+        self._gateway.command(PauseRequest(paused))
         response.success, response.message = True, words(replace(snapshot, paused=self._paused))
         self._paused = paused
         return response
