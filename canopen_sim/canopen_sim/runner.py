@@ -8,12 +8,11 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 import logging
 import math
-from queue import SimpleQueue
-import threading
 import time
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from arm_canopen.can.bus import Bus
+from arm_canopen.can.bus_thread import BusThread
 from arm_canopen.can.frame import Frame
 from arm_canopen.exceptions import BusError
 from arm_canopen.standard.cob_id import CobId, NODE_ID_MAX
@@ -24,7 +23,6 @@ from .host import DeviceHost
 Result = TypeVar('Result')
 
 IDLE_WAIT = 1.0  # [s] longest wait when no device has a deadline
-RETRY_PAUSE = 0.1  # [s] between two looks at a bus that went away
 STALL = 0.1  # [s] that a frame has waited when devices count as having stood still
 
 logger = logging.getLogger(__name__)
@@ -49,13 +47,7 @@ class DeviceRunner:
         """
         self.host = DeviceHost(self._send, _log_defect)
         self._bus = bus
-        self._lock = threading.Lock()
-        self._ended = False
-        self._calls: SimpleQueue[tuple[Callable[[], None], Future[Any]]] = SimpleQueue()
-        self._stopping = False
-        self._bus_failed = False
-        self._begin: Callable[[], None] = lambda: None
-        self._thread = threading.Thread(target=self.run, name='devices', daemon=True)
+        self._thread = BusThread(bus, 'devices', self._serve, 'the simulation')
 
     @property
     def bus_name(self) -> str:
@@ -68,15 +60,11 @@ class DeviceRunner:
         Args:
             begin: Called first in the thread, which may want a priority.
         """
-        self._begin = begin
-        self._thread.start()
+        self._thread.start(begin)
 
     def stop(self) -> None:
         """Fall silent, as if the power of all devices was cut, and end the thread."""
-        self._stopping = True
-        self._bus.wake()
-        if self._thread.is_alive():
-            self._thread.join()
+        self._thread.stop()
 
     def call(self, function: Callable[[], Result]) -> Future[Result]:
         """Have a function run in the thread of the devices, between two of their steps.
@@ -85,56 +73,21 @@ class DeviceRunner:
             function: May use :attr:`host` and its devices; it must not wait for anything.
 
         Returns:
-            Its result or its exception; cancelled when the thread has ended or ends before.
+            Its result or its exception; a BusError when the thread has ended or ends before.
         """
-        future: Future[Result] = Future()
+        return self._thread.call(function)
 
-        def work() -> None:
-            if not future.set_running_or_notify_cancel():
-                return
-            try:
-                future.set_result(function())
-            except Exception as error:  # noqa: BLE001  # it belongs to the caller
-                future.set_exception(error)
-
-        with self._lock:
-            if self._ended:
-                future.cancel()
-                return future
-            self._calls.put((work, future))
-        self._bus.wake()
-        return future
-
-    def run(self) -> None:
-        """Run the devices in this thread, until :meth:`stop` is called from another one."""
-        try:
-            self._begin()
-            while not self._stopping:
-                self._step()
-        finally:
-            with self._lock:
-                self._ended = True
-            while not self._calls.empty():
-                self._calls.get()[1].cancel()
-
-    def _step(self) -> None:
+    def _serve(self) -> None:
         host = self.host
-        host.advance(time.monotonic())
-        while not self._calls.empty():
-            self._calls.get()[0]()
-        wait = min(host.deadline - time.monotonic(), IDLE_WAIT)
-        for frame in self._receive(max(0.0, wait)):
-            host.receive(frame, frame.timestamp or time.monotonic())
+        while not self._thread.stopping:
+            host.advance(time.monotonic())
+            self._thread.do_work()
+            wait = min(host.deadline - time.monotonic(), IDLE_WAIT)
+            for frame in self._receive(max(0.0, wait)):
+                host.receive(frame, frame.timestamp or time.monotonic())
 
     def _receive(self, timeout: float) -> list[Frame]:
-        try:
-            frames = self._bus.receive(timeout)
-        except BusError as error:
-            if not self._stopping:
-                self._log_failure(error)
-                time.sleep(RETRY_PAUSE)
-            return []
-        self._bus_failed = self._bus_failed and not frames
+        frames = self._thread.receive(timeout)
         if frames and time.monotonic() - (frames[0].timestamp or math.inf) > STALL:
             return newest_process_data(frames)
         return frames
@@ -143,13 +96,7 @@ class DeviceRunner:
         try:
             self._bus.send(frame)
         except BusError as error:
-            self._log_failure(error)
-
-    def _log_failure(self, error: BusError) -> None:
-        """Log the first failure; the next one after frames have arrived again."""
-        if not self._bus_failed:
-            self._bus_failed = True
-            logger.error('%s', error)
+            self._thread.note_failure(error)
 
 
 def newest_process_data(frames: Sequence[Frame]) -> list[Frame]:

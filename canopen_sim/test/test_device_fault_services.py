@@ -187,7 +187,7 @@ def test_services_of_devices_that_have_ended(services: Services) -> None:
     services.runner.stop()
     answer = services.call(Trigger, 'power_cycle')
     assert not answer.success
-    assert 'do not run' in answer.message
+    assert 'has ended' in answer.message
 
 
 def test_the_readme_lists_every_fault_with_its_settings() -> None:

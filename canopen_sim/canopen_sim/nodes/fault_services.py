@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from concurrent.futures import CancelledError
 from concurrent.futures import TimeoutError as FutureTimeoutError
 from functools import partial
 import re
@@ -15,6 +14,7 @@ from typing import Any
 from rclpy.node import Node
 from std_srvs.srv import SetBool, Trigger
 
+from arm_canopen.exceptions import BusError
 from arm_msgs.srv import InjectFault
 
 from ..device import Device
@@ -110,7 +110,7 @@ class FaultServices:
         try:
             response.message = work()
             response.success = True
-        except (ValueError, FutureTimeoutError, CancelledError) as error:
+        except (ValueError, FutureTimeoutError, BusError) as error:
             response.message = str(error) or 'the simulated devices do not run'
             response.success = False
         logger = self._node.get_logger()

@@ -1,0 +1,151 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""A thread that owns a bus: of a master and its cycle, or of simulated devices."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from concurrent.futures import Future
+import logging
+import threading
+import time
+from typing import Any, TypeVar
+
+from ..exceptions import BusError
+from .bus import Bus
+from .frame import Frame
+
+T = TypeVar('T')
+
+REOPEN_PAUSE = 0.1  # [s] between two attempts to read a bus that went away
+
+logger = logging.getLogger(__name__)
+
+
+class BusThread:
+    """Reads a bus, and runs what other threads hand over, between two steps of its owner.
+
+    Other threads get a future for what they hand over; nothing is locked.
+
+    Attributes:
+        stopping: The end is wanted.
+    """
+
+    def __init__(self, bus: Bus, name: str, serve: Callable[[], None], owner: str) -> None:
+        """Prepare; the thread starts with :meth:`start`.
+
+        Args:
+            bus: An open bus; it stays the caller's to close.
+            name: Name of the thread.
+            serve: The owner's loop, until :attr:`stopping`.
+            owner: Who that is, for messages.
+        """
+        self.stopping = False
+        self._bus = bus
+        self._serve = serve
+        self._owner = owner
+        self._work: deque[tuple[Future[Any], Callable[[], None]]] = deque()
+        self._open: set[Future[Any]] = set()
+        self._ended = False
+        self._failed = False
+        self._begin: Callable[[], None] = lambda: None
+        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+
+    def start(self, begin: Callable[[], None] = lambda: None) -> None:
+        """Start the thread.
+
+        Args:
+            begin: Called first in the thread, which may want a priority.
+        """
+        self._begin = begin
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End the thread after the step that runs, and wait for it."""
+        self.stopping = True
+        self._bus.wake()
+        if self._thread.is_alive():
+            self._thread.join()
+
+    def call(self, function: Callable[[], T]) -> Future[T]:
+        """Run a function in the thread; it must not wait.
+
+        Returns:
+            Its result or its error; a BusError where the thread has ended or ends before.
+        """
+        future: Future[T] = Future()
+        self._hand_over(future, lambda: future.set_result(function()))
+        return future
+
+    def run(self, begin: Callable[[Future[T]], None]) -> Future[T]:
+        """Start something in the thread that ends later.
+
+        Args:
+            begin: Gets the future, whose result is set in the thread.
+
+        Returns:
+            The future; a BusError where the thread ends before.
+        """
+        future: Future[T] = Future()
+
+        def start() -> None:
+            self._open.add(future)
+            future.add_done_callback(self._open.discard)
+            begin(future)
+
+        self._hand_over(future, start)
+        return future
+
+    def receive(self, timeout: float) -> list[Frame]:
+        """Wait for frames; a bus that went away is waited for."""
+        try:
+            frames = self._bus.receive(timeout)
+        except BusError as error:
+            self.note_failure(error)
+            time.sleep(min(REOPEN_PAUSE, timeout))
+            return []
+        self._failed = self._failed and not frames
+        return frames
+
+    def note_failure(self, error: BusError) -> None:
+        """Log the first failure of the bus; the next one after frames have arrived again."""
+        if not self._failed and not self.stopping:
+            self._failed = True
+            logger.error('%s', error)
+
+    def do_work(self) -> None:
+        """Run what was handed over; for the owner, in the thread."""
+        while self._work:
+            future, work = self._work.popleft()
+            if future.set_running_or_notify_cancel():
+                try:
+                    work()
+                except Exception as error:  # noqa: BLE001  # belongs to whoever holds the future
+                    future.set_exception(error)
+
+    def _hand_over(self, future: Future[Any], work: Callable[[], None]) -> None:
+        self._work.append((future, work))
+        if self._ended:
+            self._refuse_work()
+        else:
+            self._bus.wake()
+
+    def _refuse_work(self) -> None:
+        """Leave nobody waiting for what will not be done any more."""
+        while self._work:
+            future, _ = self._work.popleft()
+            if future.set_running_or_notify_cancel():
+                future.set_exception(BusError(f'{self._owner} has ended'))
+
+    def _run(self) -> None:
+        try:
+            self._begin()
+            self._serve()
+        except Exception:
+            logger.exception('%s has ended by a defect', self._owner)
+        finally:
+            self._ended = True
+            self._refuse_work()
+            for future in list(self._open):
+                future.set_exception(BusError(f'{self._owner} has ended'))
