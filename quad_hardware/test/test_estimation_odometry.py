@@ -16,7 +16,7 @@ import pytest
 from quad_description import FootPose, movable_joints, quadruped, robot_urdf
 from quad_description.rotations import from_roll_pitch_yaw, IDENTITY, yaw_of
 from quad_hardware.estimation import Estimator, EstimatorSettings
-from quad_hardware.estimation.odometry import LegOdometry, OdometrySettings
+from quad_hardware.estimation.odometry import ground_normal, LegOdometry, OdometrySettings
 from quad_hardware.exceptions import CommandError
 from quad_hardware.joints import JointMap, servo_of
 from quad_hardware.protocol import LEG_MOTORS
@@ -50,6 +50,38 @@ def test_a_rolling_foot_counts(yaw: float) -> None:
     assert state.x == pytest.approx(0.5 * 0.01, rel=1e-3)
     assert state.y == pytest.approx(0.0, abs=1e-9)
     assert state.height == pytest.approx(0.11)
+
+
+@pytest.mark.parametrize('degrees', [0.0, 8.0, -15.0])
+def test_both_feet_of_a_diagonal_stand_on_a_slope(degrees: float) -> None:
+    """Though one of them is the lower one, seen from the horizon."""
+    odometry, pitched = LegOdometry(OdometrySettings(), 0.0), math.radians(-degrees)
+    for tick in range(60):
+        lifted = {0, 3} if tick // 10 % 2 else {1, 2}
+        feet = [
+            (x, y, -0.1 + 0.02 * (leg in lifted))
+            for leg, (x, y) in enumerate(((0.1, 0.1), (0.1, -0.1), (-0.1, 0.1), (-0.1, -0.1)))
+        ]
+        odometry.command(tick * PERIOD, feet)
+        attitude = from_roll_pitch_yaw(0.0, pitched, 0.0)
+        poses = [FootPose(foot, IDENTITY) for foot in feet]
+        state = odometry.update(tick * PERIOD, poses, attitude)
+        if tick > 20 and tick % 10 == 5:
+            assert state.standing == tuple(leg not in lifted for leg in range(4))
+
+
+def test_a_foot_that_is_held_up_does_not_tilt_the_ground() -> None:
+    """Where the feet are in no plane, up is where the attitude has it."""
+    flat = ((0.1, 0.1, -0.1), (0.1, -0.1, -0.1), (-0.1, 0.1, -0.1), (-0.1, -0.1, -0.1))
+    assert ground_normal([flat], 0.002) == pytest.approx((0.0, 0.0, 1.0))
+    assert ground_normal([((0.1, 0.1, -0.05), *flat[1:])], 0.002) is None
+    odometry = LegOdometry(OdometrySettings(), 0.0)
+    feet = ((0.1, 0.1, -0.05), *flat[1:])
+    for tick in range(60):
+        odometry.command(tick * PERIOD, feet)
+        poses = [FootPose(foot, IDENTITY) for foot in feet]
+        state = odometry.update(tick * PERIOD, poses, IDENTITY)
+    assert state.standing == (False, True, True, True)
 
 
 def test_commands_may_come_from_another_thread() -> None:

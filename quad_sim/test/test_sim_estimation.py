@@ -14,7 +14,9 @@ import pytest
 from quad_description import Pose, pose_positions, quadruped, raised_feet, robot_urdf
 from quad_description.rotations import from_roll_pitch_yaw, rotate
 from quad_hardware.estimation.odometry import LegOdometry, OdometrySettings, OdometryState
+from quad_sim import Terrain
 from quad_sim.physics import Robot
+from quad_sim.plant.terrain import FLAT
 
 Array = NDArray[np.float64]
 
@@ -41,9 +43,11 @@ def trot(phase: float, velocity: tuple[float, float], neutral: Array) -> Array:
     return feet
 
 
-def walk(velocity: tuple[float, float], duration: float) -> tuple[Array, OdometryState, float]:
+def walk(
+    velocity: tuple[float, float], duration: float, terrain: Terrain = FLAT
+) -> tuple[Array, OdometryState, float]:
     """Trot in physics; return the true way in the first heading, the estimate, the height."""
-    robot, rng = Robot(URDF), random.Random(1)
+    robot, rng = Robot(URDF, terrain=terrain), random.Random(1)
     odometry = LegOdometry(OdometrySettings(), ROBOT.foot_radius)
     standing = [STAND[name] for name in NAMES]
     neutral = np.array(ROBOT.feet(standing))
@@ -81,6 +85,14 @@ def test_a_trot_is_followed(velocity: tuple[float, float]) -> None:
     assert math.hypot(state.x - true[0], state.y - true[1]) < 0.1 * way
     assert state.height == pytest.approx(height, abs=0.005)
     assert state.position_variance > (0.05 * way) ** 2
+
+
+@pytest.mark.parametrize('degrees', [8.0, -8.0])
+def test_a_trot_is_followed_up_and_down_a_slope(degrees: float) -> None:
+    """Feet stand on the ground and not on the horizon; they creep downhill, which no leg feels."""
+    true, state, _ = walk((0.2, 0.0), 4.0, Terrain.slope(math.radians(degrees)))
+    assert true[0] > 0.4
+    assert state.x == pytest.approx(true[0], rel=0.2)
 
 
 def test_feet_are_where_physics_has_them() -> None:

@@ -3,7 +3,8 @@
 """Where the body has walked to, from the legs that stand: heading from the attitude.
 
 There are no contact switches. A foot is taken to stand where its *commanded* height was the
-lowest, a servo's lag ago; without commands, where its measured height is. The body moves opposite
+lowest, a servo's lag ago; without commands, where its measured height is. Heights are those above
+the ground that the feet were sent to, which may slope. The body moves opposite
 to the feet that stood at both ends of a period; without any the last velocity is held. The feet
 are balls that roll on the ground while the leg swings over them: their centres go a little way
 along, which is more than a tenth of the way (radius over height of the hip).
@@ -14,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 import math
+from operator import itemgetter
 
 from quad_description import FootPose
 from quad_description.rotations import (
@@ -34,7 +36,9 @@ LONGEST_GAP = 0.2  # [s] more than that cannot be bridged: the body may have bee
 DRIFT = 0.07  # share of the way that is the standard deviation of the position
 LEAST_VARIANCE = 1e-4  # [m²]
 KEPT_COMMANDS = 32
+GROUND_TIME = 1.0  # [s] in which every foot stands, whatever the gait
 REST = (0.0, 0.0)
+_Z = itemgetter(2)
 
 
 SCALES = (0.1, 10.0)
@@ -103,6 +107,7 @@ class LegOdometry:
         self._radius = foot_radius
         # replaced as a whole: commands come from another thread than measurements
         self._commands: tuple[tuple[float, Sequence[Vector]], ...] = ()
+        self._ground: Vector | None = None  # its normal in the body, where that is known
         self._last: tuple[float, Sequence[FootPose], Flags] | None = None
         self._yaw0: float | None = None
         self._heading = 0.0  # [rad] of the last update
@@ -118,6 +123,8 @@ class LegOdometry:
             feet: Their centres in base_link [m].
         """
         self._commands = (*self._commands, (time, feet))[-KEPT_COMMANDS:]
+        lately = [places for t, places in self._commands if time - t <= GROUND_TIME]
+        self._ground = ground_normal(lately, self._settings.tolerance)
 
     def keep_heading(self) -> None:
         """Go on with the last heading: the next attitude counts its yaw from elsewhere."""
@@ -154,13 +161,14 @@ class LegOdometry:
         )
 
     def _standing(self, time: float, feet: Sequence[FootPose], rotation: Quaternion) -> Flags:
-        settings, commands = self._settings, self._commands
+        settings, commands, ground = self._settings, self._commands, self._ground
         at = time - settings.delay
         recent = [places for t, places in commands if abs(t - at) <= settings.margin]
         if not recent:
-            older = [places for t, places in commands if at - settings.command_age <= t <= at]
-            recent = older[-1:] or [[foot.position for foot in feet]]
-        x, y, z = rotate(conjugate(rotation), (0.0, 0.0, 1.0))  # up, in the body
+            recent = [p for t, p in commands if at - settings.command_age <= t <= at][-1:]
+        if not recent:
+            recent, ground = [[foot.position for foot in feet]], None
+        x, y, z = ground or rotate(conjugate(rotation), (0.0, 0.0, 1.0))
         standing = (True,) * len(feet)
         for places in recent:
             heights = [x * px + y * py + z * pz for px, py, pz in places]
@@ -214,3 +222,25 @@ class LegOdometry:
         heights = [foot.position[2] for foot, stands in zip(feet, standing, strict=True) if stands]
         heights = heights or [foot.position[2] for foot in feet]
         return self._radius - sum(heights) / len(heights)
+
+
+def ground_normal(commands: Sequence[Sequence[Vector]], tolerance: float) -> Vector | None:
+    """Return the unit normal of the ground in the body, from where the feet were sent lately.
+
+    None when their lowest places are not in a plane: a foot was in the air all the time.
+
+    Args:
+        commands: Feet in base_link, in the order of the legs [m]; one at least.
+        tolerance: How far from a plane they may be [m].
+    """
+    fl, fr, bl, br = (min(places, key=_Z) for places in zip(*commands, strict=True))
+    # across both diagonals
+    ax, ay, az = fl[0] - br[0], fl[1] - br[1], fl[2] - br[2]
+    bx, by, bz = fr[0] - bl[0], fr[1] - bl[1], fr[2] - bl[2]
+    x, y, z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+    length = math.copysign(math.sqrt(x * x + y * y + z * z), z)
+    if length == 0.0:
+        return None
+    x, y, z = x / length, y / length, z / length
+    between = x * (fl[0] - fr[0]) + y * (fl[1] - fr[1]) + z * (fl[2] - fr[2])
+    return (x, y, z) if abs(between) <= tolerance else None
