@@ -51,7 +51,7 @@ class Device:
         node_id: CANopen node id; 255 while it has none.
         first_id: The one that it was made with; LSS may have changed it.
         store: Present values of all objects.
-        drives: Its axes; none when the device is no drive.
+        drives: Its axes; none when the device is not a drive.
         clock: What it knows of the network's time.
         faults: What it does wrong on purpose.
         handlers: What it does with the frames of each identifier, in its present NMT state;
@@ -125,7 +125,7 @@ class Device:
         self._lss = LssSlave(node_id, store, self._memory, send, nmt.initialise)
         self.clock = TimeConsumer(store, self._subscribe)
         self._rpdos = RpdoEngine(
-            store, self._on_pdo_changed, self._errors.tell, self._sync.window_closed
+            store, self._on_pdo_changed, self._errors.set_error, self._sync.window_closed
         )
         self._tpdos = TpdoEngine(store, self._on_pdo_changed, send)
         self._services = Services(
@@ -155,7 +155,7 @@ class Device:
 
     @property
     def drive(self) -> Drive | None:
-        """The first axis, None when the device is no drive."""
+        """The first axis, None when the device is not a drive."""
         return self.drives[0] if self.drives else None
 
     @property
@@ -267,7 +267,7 @@ class Device:
         self._subscribe()
 
     def nmt_changed(self, previous: NmtState, now: float) -> None:
-        """Start and stop services as the NMT state asks (from NMT; CiA 301, table 46)."""
+        """Start and stop services as the NMT state requires (from NMT; CiA 301, table 46)."""
         state = self._nmt.state
         if previous is NmtState.BOOT_UP:
             self._send(boot_up_frame(self.node_id))
@@ -337,7 +337,7 @@ class Device:
         self._tpdos.poll(now)
 
     def _on_sync_length(self, wrong: bool, now: float) -> None:
-        self._errors.tell(SYNC_LENGTH_ERROR, wrong, now)
+        self._errors.set_error(SYNC_LENGTH_ERROR, wrong, now)
 
     def _on_pdo_changed(self, _now: float) -> None:
         self._subscribe()

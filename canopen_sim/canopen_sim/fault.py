@@ -36,7 +36,7 @@ class FaultKind:
         frames: Which frames it hits: their service, and whether the device sends them.
         of_drive: It belongs to an axis of a drive.
         code: Error code for 0x603F and EMCY (CiA 402-2); 0 for none.
-        at_once: The torque is gone at once, whatever fault reaction 0x605E asks for.
+        at_once: The torque is gone at once, whatever fault reaction 0x605E selects.
         lasting: Without a duration it goes on until it is ended; otherwise it is a moment, and a
             fault reset ends it.
     """
@@ -100,7 +100,7 @@ FAULTS: dict[str, Fault] = {fault.label: fault for fault in Fault}
 
 @dataclass(frozen=True, slots=True)
 class FaultInjection:
-    """One fault, with all that says how it shows.
+    """One fault with its settings.
 
     Attributes:
         fault: What goes wrong.

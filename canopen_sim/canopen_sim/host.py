@@ -21,7 +21,7 @@ DEFECT_PAUSE = 0.1  # [s] after a defect in a device, before it is looked at aga
 
 
 class DeviceHost:
-    """Devices that share a connection to a bus; they hear each other too.
+    """Devices that share a connection to a bus; they receive each other too.
 
     A bus object never receives what it sent itself, so the frames of one device are handed to
     the others here. Each frame goes straight to those who want its identifier.
@@ -40,7 +40,7 @@ class DeviceHost:
 
         Args:
             send: Takes the frames for the bus.
-            on_defect: Told of an exception in a device, while the others go on; without it
+            on_defect: Called with an exception in a device, while the others go on; without it
                 the exception leaves the host.
         """
         self.devices: list[Device] = []

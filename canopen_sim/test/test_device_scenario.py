@@ -181,12 +181,12 @@ WRONG: dict[str, tuple[str, str, str]] = {
     ),
     'fault of a drive without that axis number': (
         'steps:\n  - {device: joint1, fault: over_current, axis: first}',
-        "axis is 'first', expected a whole number",
+        "axis is 'first'; expected a whole number",
         'correct it',
     ),
     'value of a setting': (
         'steps:\n  - {device: joint1, fault: tpdo_loss, probability: often}',
-        "probability is 'often', expected a number of 0 to 1",
+        "probability is 'often'; expected a number of 0 to 1",
         'correct it',
     ),
     'value out of range': (
@@ -210,12 +210,12 @@ WRONG: dict[str, tuple[str, str, str]] = {
         "'fault' or 'end'",
         'write one of them',
     ),
-    'no steps': ('seed: 3', "there is no list 'steps'", 'steps:'),
+    'no steps': ('seed: 3', "no list 'steps'", 'steps:'),
     'step is a word': ('steps:\n  - reboot', 'expected a step', '- after'),
     'unknown top-level key': ('stesp: []\nsteps: []', "unknown key 'stesp'", "'steps'"),
     'event of nothing': (
         'steps:\n  - {device: joint1, fault: reboot, when: {device: joint1}}',
-        'nothing says what happens',
+        'the event has no condition',
         'nmt, drive, position_above',
     ),
     'event of all': (
@@ -266,7 +266,7 @@ def test_position_of_what_is_no_drive(tmp_path: Path) -> None:
         'steps: [{device: joint1, fault: reboot, when: {device: joint1, position_above: 1}}]',
         encoding='utf-8',
     )
-    with pytest.raises(ConfigError, match='no drive'):
+    with pytest.raises(ConfigError, match='not a drive'):
         load_scenario(path, DEVICES, frozenset())
 
 
@@ -274,7 +274,7 @@ def test_drive_fault_of_what_is_no_drive(tmp_path: Path) -> None:
     """A device without a drive cannot have a fault of one."""
     path = tmp_path / 'scenario.yaml'
     path.write_text('steps: [{device: joint1, fault: over_current}]', encoding='utf-8')
-    with pytest.raises(ConfigError, match='device 2 is no drive'):
+    with pytest.raises(ConfigError, match='device 2 is not a drive'):
         load_scenario(path, DEVICES, frozenset())
 
 
@@ -297,7 +297,7 @@ def test_settings_as_text() -> None:
 @pytest.mark.parametrize('lines', [['delay'], ['=3'], ['delay=1', 'delay=2']])
 def test_settings_that_are_none(lines: list[str]) -> None:
     """Texts without a name or a value, and repetitions, are refused."""
-    with pytest.raises(ValueError, match=r'no setting|stands twice'):
+    with pytest.raises(ValueError, match=r'not a setting|stands twice'):
         split_settings(lines)
 
 

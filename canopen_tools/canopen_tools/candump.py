@@ -41,7 +41,7 @@ _NODE_WIDTH = len('all nodes')
 
 
 class Listener:
-    """Receives batches of frames until it is told to stop or its time is over."""
+    """Receives batches of frames until it is stopped or its time is over."""
 
     def __init__(self, bus: Bus, timeout: float) -> None:
         """Listen.

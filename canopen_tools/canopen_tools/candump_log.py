@@ -7,7 +7,7 @@
 - ``.log`` and all others: as ``candump -L`` writes it (can-utils: canplayer, log2asc)
 
 python-can writes all of them, and reads the first two. What candump has written is read here:
-python-can takes its error frames for data frames, and does not say in which line a log is damaged.
+python-can takes its error frames for data frames, and names no line where a log is damaged.
 """
 
 from __future__ import annotations
@@ -92,7 +92,7 @@ def read_log(path: Path) -> Iterator[Frame]:
     """Yield the frames of a log; their time stamps are on the wall clock.
 
     Raises:
-        CodecError: The log is damaged or has CAN FD frames; the message says where.
+        CodecError: The log is damaged or has CAN FD frames; the message names the place.
         OSError: It cannot be read.
     """
     reader = _READERS.get(path.suffix.lower())
@@ -127,7 +127,7 @@ def parse_line(line: str) -> Frame:
     match = _LINE.fullmatch(line.strip())
     if match is None:
         raise CodecError(
-            f'{line.strip()!r} is no line such as `(1700000000.123456) can0 181#2706`'
+            f'{line.strip()!r} is not a line such as `(1700000000.123456) can0 181#2706`'
         )
     digits = match['id']
     can_id = int(digits, 16)

@@ -13,7 +13,7 @@ from arm_canopen.standard.datatypes import DataType, encode
 from arm_canopen.standard.dictionary import ObjectDictionary
 
 FROM_EDS = ('device_type', 'vendor_id', 'product_code')
-"""What the EDS says of the identity; the rest is in bus.yml."""
+"""The identity that the EDS has; the rest is in bus.yml."""
 
 
 def expected_objects(
@@ -24,7 +24,7 @@ def expected_objects(
     Args:
         config: The bus.
         node: The device.
-        consumers: What the device has in 0x1016, by sub-index; None: what its EDS says.
+        consumers: What the device has in 0x1016, by sub-index; None: those of its EDS.
     """
     return [*_identity(node), *held_after_boot(config, node, consumers)]
 

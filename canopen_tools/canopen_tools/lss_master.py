@@ -96,12 +96,12 @@ class LssMaster:
             raise LssError(f'no device has the LSS address {address}')
 
     async def has_unconfigured(self) -> bool:
-        """Tell whether there is a device without a node id."""
+        """Return whether there is a device without a node id."""
         self._put(lss_bytes(LssCommand.IDENTIFY_UNCONFIGURED), LssCommand.UNCONFIGURED_IDENTIFIED)
         return await self._answered(self._scan_timeout)
 
     async def identify(self, low: LssAddress, high: LssAddress) -> bool:
-        """Tell whether there is a device in a range of revision and serial numbers.
+        """Return whether there is a device in a range of revision and serial numbers.
 
         Args:
             low: Vendor id, product code, and the lowest revision and serial number.
@@ -121,7 +121,7 @@ class LssMaster:
     async def fast_scan(self) -> LssAddress | None:
         """Find a device without a node id, and switch it to the configuration state.
 
-        Each bit of its address is asked for: silence means that it is set. Of several devices the
+        Each bit of its address is tested: silence means that it is set. Of several devices the
         one with the lowest number is found; the next call finds the next one. An answer that
         comes too late spoils the search, which is then made again with twice the time.
 
@@ -160,7 +160,7 @@ class LssMaster:
         return LssAddress(*numbers)
 
     async def inquire_address(self) -> LssAddress:
-        """Ask the device in the configuration state for its address.
+        """Query the device in the configuration state for its address.
 
         Raises:
             LssError: None answers, or several do.
@@ -172,7 +172,7 @@ class LssMaster:
         return LssAddress(*numbers)
 
     async def inquire_node_id(self) -> int:
-        """Ask the device in the configuration state for its node id; 255 for none.
+        """Query the device in the configuration state for its node id; 255 for none.
 
         Raises:
             LssError: None answers, or several do.
@@ -239,7 +239,7 @@ class LssMaster:
             raise LssError(f'{title}: {ERROR_TEXTS.get(code, "error")} (LSS error {code})')
 
     async def _only_answer(self, message: LssMessage, title: str) -> LssMessage:
-        """Ask, and make sure that it is one device that answers.
+        """Send a request, and make sure that it is one device that answers.
 
         Raises:
             LssError: None answers, or several do.

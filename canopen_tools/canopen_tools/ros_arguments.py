@@ -53,7 +53,7 @@ def split_ros_arguments(argv: Sequence[str]) -> Arguments:
         elif word in _PARAMETER | _WITH_VALUE:
             value = next(words, None)
             if value is None:
-                raise ValueError(f'{word} needs something behind it')
+                raise ValueError(f'{word} needs a value')
             if word in _PARAMETER:
                 name, text = _parameter(value)
                 arguments.parameters[name] = text
@@ -63,5 +63,5 @@ def split_ros_arguments(argv: Sequence[str]) -> Arguments:
 def _parameter(rule: str) -> tuple[str, str]:
     name, assigned, value = rule.partition(':=')
     if not assigned or not name:
-        raise ValueError(f'{rule!r} is no parameter; write name:=value')
+        raise ValueError(f'{rule!r} is not a parameter; write name:=value')
     return name.rpartition(':')[2], value

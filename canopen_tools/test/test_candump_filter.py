@@ -54,5 +54,5 @@ def test_terms_choose_frames(terms: list[str], shown: set[str]) -> None:
 @pytest.mark.parametrize('term', ['tpdos', '18x', '180:', ':7FF', '^', '^foo', '123456789'])
 def test_a_wrong_term_lists_what_would_be_right(term: str) -> None:
     """A typing mistake is not silently a filter that shows nothing."""
-    with pytest.raises(ValueError, match=r'no filter; take one of nmt, .*180:780'):
+    with pytest.raises(ValueError, match=r'unknown filter .*; choose one of nmt, .*180:780'):
         FrameFilter([term])

@@ -140,7 +140,7 @@ def test_scan_leaves_the_sdo_channels_to_a_master(
 ) -> None:
     """Beside a master it only listens, and says so; --ask asks, with a warning."""
     assert main(['scan', '--can', name, *LISTEN]) == 1
-    assert 'no device was heard' in capsys.readouterr().err
+    assert 'no device has sent a frame' in capsys.readouterr().err
     main(['write', '3', '0x1017', '50', '--type', 'u16', '--can', name])
     witness.receive(0.0)
     capsys.readouterr()
@@ -148,7 +148,7 @@ def test_scan_leaves_the_sdo_channels_to_a_master(
     assert {frame.can_id for frame in witness.receive(0.0)} == {0x080, 0x703}
     captured = capsys.readouterr()
     assert captured.out.splitlines()[1].split() == ['3', 'pre-operational']
-    assert 'a master is on this bus (SYNC), so devices are not asked' in captured.err
+    assert 'a master is on this bus (SYNC), so devices are not queried' in captured.err
     assert main(['scan', '--can', name, *LISTEN, '--ask']) == 0
     assert 'its transfers may fail' in capsys.readouterr().err
     assert {frame.can_id for frame in witness.receive(0.0)} >= {0x602, 0x582, 0x603, 0x583}
@@ -200,7 +200,7 @@ def test_objects_without_any_file(name: str, capsys: pytest.CaptureFixture[str])
         (['write', 'left', '0x6041', '1', '--type', 'u16'], 1, 'write a read-only object'),
         (['write', 'left', '0x6060', '300'], 2, 'does not fit INTEGER8'),
         (['read', '9', '0x1000'], 1, 'did not answer the SDO for object 0x1000:00'),
-        (['diff', '9'], 2, 'no file says what the device should hold'),
+        (['diff', '9'], 2, 'no file describes the device'),
     ],
 )
 @pytest.mark.usefixtures('runner')
@@ -224,7 +224,7 @@ def test_an_unknown_type_is_not_guessed_in_writing(
 ) -> None:
     """Without a file, an object that no standard describes needs its type."""
     assert main(['write', '2', '0x2000', '1', '--can', name]) == 2
-    assert 'say it with --type' in capsys.readouterr().err
+    assert 'name it with --type' in capsys.readouterr().err
 
 
 def test_a_device_that_holds_something_else_is_told(

@@ -94,7 +94,7 @@ def test_units_are_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
         (['check', 'bus.yml', '--bitrate', '500'], '500 bit/s is not 10k to 1M; 500k perhaps'),
         (['check', 'bus.yml', '--bitrate', '2M'], '2M bit/s is not 10k to 1M'),
         (['check', 'bus.yml', '--bitrate', 'fast'], "'fast' is no bit rate"),
-        (['check', 'bus.yml', '--ros-args', '-p'], '-p needs something behind it'),
+        (['check', 'bus.yml', '--ros-args', '-p'], '-p needs a value'),
     ],
 )
 def test_wrong_usage_is_2(

@@ -65,7 +65,7 @@ def test_a_scan_of_the_bus_mentions_devices_without_node_id(
     """They answer nothing else; once all have a node id, nothing is said."""
     assert main(['scan', '--can', name, '--listen', '0.2']) == 0
     captured = capsys.readouterr()
-    assert 'canopen lss scan tells which' in captured.err
+    assert 'canopen lss scan lists it' in captured.err
     assert [line.split()[0] for line in captured.out.splitlines()] == ['node', '5', '1']
     assert main(['lss', 'set', '--node-id', '6', '--can', name]) == 0
     capsys.readouterr()
@@ -88,14 +88,14 @@ def test_a_device_is_found_and_numbered(
     assert main(['lss', 'set', '--node-id', '10', '--store', '--can', name]) == 0
     assert capsys.readouterr().out.splitlines() == [
         'device 0x00000001 0x00000002 0x00000004 0x00000100, node id none',
-        'node id 10: taken',
+        'node id 10: accepted',
         'stored',
         'node 10 has booted',
     ]
     assert main(['lss', 'scan', '--can', name]) == 1
     assert capsys.readouterr().out == '0 devices without node id\n'
     assert main(['lss', 'set', '--node-id', '12', '--can', name]) == 1
-    assert 'no device without node id; --address or --only' in capsys.readouterr().err
+    assert 'no device is without node id; choose one' in capsys.readouterr().err
     ids = runner.call(lambda: [device.node_id for device in runner.host.devices])
     assert ids.result(DEADLINE) == [10, 5]
 
@@ -111,7 +111,7 @@ def test_a_device_with_an_id_is_selected_by_its_address(
         main(['lss', 'set', *ADDRESS, '--node-id', '6', '--bitrate', '250k', '--can', name]) == 0
     )
     captured = capsys.readouterr()
-    assert 'node id 6: taken\nbit rate 250 kbit/s: taken\n' in captured.out
+    assert 'node id 6: accepted\nbit rate 250 kbit/s: accepted\n' in captured.out
     assert 'not stored' in captured.err
     assert 'takes effect with the next reset' in captured.err
     assert set(states(runner)) == {LssState.WAITING}

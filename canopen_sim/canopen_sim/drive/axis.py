@@ -109,7 +109,7 @@ class Axis:
     def stop(self, deceleration: float) -> None:
         """Ramp down to a stop, from where the motor is rather than from a demand far ahead."""
         start = self.demand
-        if self._servo.limited or self.arrived:  # a cyclic set-point says nothing of the speed
+        if self._servo.limited or self.arrived:  # a cyclic set-point has no speed
             start = Point(self._servo.setpoint, self._servo.velocity, 0.0)
         limits = Limits(self.speed, deceleration, deceleration)
         self.follow(plan_velocity(start, 0.0, limits, self.time))

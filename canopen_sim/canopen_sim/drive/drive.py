@@ -65,7 +65,7 @@ class Drive:
 
         Args:
             store: Objects of the device.
-            errors: Told of faults.
+            errors: Reports faults on the network.
             clock: What is known of SYNC.
             model: Time constants of the motor.
             number: Of the axis in its device, from 0.
@@ -163,7 +163,7 @@ class Drive:
         Args:
             code: Error code for 0x603F and EMCY.
             now: Steady time in [s]; by default when the drive last looked at its axis.
-            at_once: It leaves no torque to brake with, whatever 0x605E says.
+            at_once: It leaves no torque to brake with, whatever 0x605E selects.
         """
         now = self._axis.time if now is None else now
         self._move(now)
@@ -263,7 +263,7 @@ class Drive:
         self._publish(now)
 
     def connection_lost(self, now: float) -> None:
-        """React as 0x6007 says to the loss of the master, if the motor has torque."""
+        """React to the loss of the master as 0x6007 selects, if the motor has torque."""
         if self._machine.state not in POWERED_STATES:
             return
         self._move(now)
@@ -324,12 +324,12 @@ class Drive:
             self._reset_fault(now)
         self._machine.command(word, now)
         if self._machine.operating:
-            self._obey_halt(now)
+            self._apply_halt(now)
             self._mode.command(word, previous, now)
             self._mode.update(now)
         self._publish(now)
 
-    def _obey_halt(self, now: float) -> None:
+    def _apply_halt(self, now: float) -> None:
         halted = bool(self._word & HALT)
         if halted is self._mode.halted:
             return
@@ -402,7 +402,7 @@ class Drive:
         if state is State.OPERATION_ENABLED:
             word |= self._mode.status()
             if self._mode.halted:
-                # during halt "target reached" says that the axis stands (CiA 402-2, table 30)
+                # during halt "target reached" means that the axis stands (CiA 402-2, table 30)
                 word = word & ~TARGET_REACHED | (TARGET_REACHED if self._axis.settled else 0)
         elif state is State.QUICK_STOP_ACTIVE and self._axis.settled:
             word |= TARGET_REACHED

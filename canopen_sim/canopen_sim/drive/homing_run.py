@@ -21,7 +21,7 @@ class Phase(Enum):
 
 
 class HomingRun:
-    """One search for home. It is told where the axis is, and says where to go.
+    """One search for home: from the position of the axis it derives the direction.
 
     Attributes:
         phase: What it does.

@@ -39,7 +39,7 @@ class MotorModel:
         return acceleration / self.gain + dry + self.viscous * velocity + load
 
     def rests(self, torque: float, load: float) -> bool:
-        """Tell whether friction holds a standing motor."""
+        """Return whether friction holds a standing motor."""
         return abs(torque - load) <= self.friction
 
     def acceleration(self, torque: float, velocity: float, load: float) -> float:

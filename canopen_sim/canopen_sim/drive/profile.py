@@ -67,7 +67,7 @@ class Limits:
 
 
 class Motion:
-    """A sequence of segments; the last one goes on for ever, at constant velocity.
+    """A sequence of segments; the last one continues without end, at constant velocity.
 
     Attributes:
         segments: In the order of time.

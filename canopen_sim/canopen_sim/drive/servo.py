@@ -12,7 +12,7 @@ On a stretch where :math:`r(s) = r_0 + v s + \frac{1}{2} a s^2` this has the sol
 .. math::
     y(s) = q(s) + (y_0 - q(0))\, e^{-s/\tau}, \qquad q(s) = r(s) - \tau r'(s) + \tau^2 a,
 
-so the state at any time does not depend on how often it was asked for. Without torque the motor
+so the state at any time does not depend on how often it is evaluated. Without torque the motor
 coasts against its brake: the velocity decays with another time constant.
 Positions are in [inc], velocities in [inc/s], times in [s].
 """

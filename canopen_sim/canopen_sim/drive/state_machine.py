@@ -59,7 +59,7 @@ class StateMachine:
         Args:
             objects: Objects of the drive.
             axis: What it moves.
-            enabled: Told the time when operation is enabled, also again.
+            enabled: Called with the time when operation is enabled, also again.
         """
         self.state = State.NOT_READY_TO_SWITCH_ON
         self.voltage = True
@@ -103,7 +103,7 @@ class StateMachine:
         self._power_off(State.NOT_READY_TO_SWITCH_ON)
 
     def command(self, word: int, now: float) -> None:
-        """Obey a controlword, through as many states as it leads."""
+        """Execute a controlword, through as many states as it leads."""
         self._word = word
         command = decode_command(word)
         if command is DriveCommand.ENABLE_OPERATION and self._pending is not None:
@@ -126,7 +126,7 @@ class StateMachine:
         """Pass transition 13, and 14 when there is nothing to be stopped.
 
         Args:
-            at_once: The fault leaves no torque to brake with, whatever 0x605E says.
+            at_once: The fault leaves no torque to brake with, whatever 0x605E selects.
         """
         if self.state is State.FAULT_REACTION_ACTIVE and at_once:
             self._power_off(State.FAULT)

@@ -13,7 +13,7 @@ FAULT_RESET_BIT = 0x80
 
 
 class DriveCommand(Enum):
-    """What a controlword asks of the state machine (CiA 402-2, table 26)."""
+    """Command of a controlword to the state machine (CiA 402-2, table 26)."""
 
     NONE = auto()
     SHUTDOWN = auto()

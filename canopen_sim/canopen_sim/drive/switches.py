@@ -50,7 +50,7 @@ class Switches:
     index_period: float = 1000.0
 
     def active(self, switch: Switch, position: float) -> bool:
-        """Tell whether a switch is active at a mechanical position."""
+        """Return whether a switch is active at a mechanical position."""
         match switch:
             case Switch.NEGATIVE_LIMIT:
                 return position <= self.negative_limit
@@ -59,7 +59,7 @@ class Switches:
         return self.home[0] <= position <= self.home[1]
 
     def limit_ahead(self, direction: int, position: float) -> bool:
-        """Tell whether the limit switch is active that lies in a direction."""
+        """Return whether the limit switch is active that lies in a direction."""
         ahead = Switch.POSITIVE_LIMIT if direction > 0 else Switch.NEGATIVE_LIMIT
         return self.active(ahead, position)
 

@@ -22,7 +22,7 @@ IDENTITY_OBJECTS: dict[str, tuple[int, int]] = {
     'revision': (Index.IDENTITY, 3),
     'serial': (Index.IDENTITY, 4),
 }
-"""Where a device says who it is, by the field of the injection (CiA 301, 7.5.2.2 and 7.5.2.18)."""
+"""Objects of the identity, by the field of the injection (CiA 301, 7.5.2.2 and 7.5.2.18)."""
 
 POWER_FAULTS = frozenset({Fault.POWER_OFF, Fault.REBOOT})
 REBOOT_TIME_MIN = 1e-6  # [s] so that off comes before on
@@ -64,7 +64,7 @@ class ActiveFault:
     """A fault that goes on.
 
     Attributes:
-        injection: What was asked for.
+        injection: Its description.
         end: Steady time in [s] at which it ends.
         line: Its part on the line, None when it has none.
     """
@@ -177,7 +177,7 @@ class FaultInjector:
         duration = injection.duration
         if injection.fault is Fault.REBOOT:
             duration = max(duration, REBOOT_TIME_MIN)
-        for fault in POWER_FAULTS:  # off is off, however often it is asked for
+        for fault in POWER_FAULTS:  # off is off, however often it is requested
             self._active.pop(replace(injection, fault=fault).key, None)
         self._device.switch_off(now)
         end = now + duration if duration else NEVER

@@ -44,7 +44,7 @@ class LineFault:
     """A fault of the line while it goes on.
 
     Attributes:
-        injection: What was asked for.
+        injection: Its description.
         exhausted: It hit as many frames as it was to hit.
     """
 
@@ -61,7 +61,7 @@ class LineFault:
         return self._left == 0
 
     def hits(self, frame: Frame, traffic: Traffic) -> bool:
-        """Tell whether it strikes a frame, and count it."""
+        """Return whether it strikes a frame, and count it."""
         if self.exhausted or not self._concerns(frame, traffic):
             return False
         probability = self.injection.probability
@@ -90,7 +90,7 @@ def sdo_object(data: bytes) -> tuple[int, int] | None:
 
 
 class FaultLine:
-    """Passes frames on, unless a fault says otherwise.
+    """Passes frames on, unless a fault prevents it.
 
     Attributes:
         faults: The faults of the line that go on.
@@ -108,7 +108,7 @@ class FaultLine:
         Args:
             send: Takes the frames that reach the bus.
             abort: Sends an SDO abort, on the line.
-            identify: Says what a frame is, given whether it is outgoing.
+            identify: Returns what a frame is, given whether it is outgoing.
         """
         self.faults: list[LineFault] = []
         self.now = 0.0

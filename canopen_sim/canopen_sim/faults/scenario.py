@@ -38,11 +38,11 @@ class Event:
 
     @property
     def needs_position(self) -> bool:
-        """It is about a position, which changes without anybody being told."""
+        """It is about a position, which changes without any notification."""
         return self.above is not None or self.below is not None
 
     def holds(self, device: Device, now: float) -> bool:
-        """Tell whether it is so at steady time ``now`` in [s]."""
+        """Return whether it is so at steady time ``now`` in [s]."""
         if self.nmt is not None and device.nmt_state is not self.nmt:
             return False
         if self.drive is None and not self.needs_position:
@@ -105,7 +105,7 @@ class ScenarioPlayer:
         Args:
             host: The devices; all that the steps name are there.
             steps: What to do.
-            report: Told each step when it is done.
+            report: Called with each step when it is done.
         """
         self.deadline = 0.0
         self._host = host

@@ -98,7 +98,7 @@ class _Reader:
         steps = document.entries.get('steps')
         if not isinstance(steps, YamlList):
             place = steps.place if steps is not None else document.place
-            self._findings.error(place, "there is no list 'steps'", KIND.beginning)
+            self._findings.error(place, "no list 'steps'", KIND.beginning)
             return ()
         read = [self._step(item) for item in steps.items]
         return tuple(step for step in read if step is not None)
@@ -128,7 +128,7 @@ class _Reader:
         others = [str(node_id) for node_id in node_ids if node_id not in self._drives]
         if others:
             place = step.entries['fault'].place
-            message = f'device {", ".join(others)} is no drive and cannot have this fault'
+            message = f'device {", ".join(others)} is not a drive and cannot have this fault'
             self._findings.error(place, message, 'name drives')
 
     def _injection(self, step: YamlMap) -> FaultInjection | None:
@@ -148,12 +148,12 @@ class _Reader:
         entries = item.entries
         if not entries.keys() & set(EVENT_KEYS[1:]):
             remedy = f'add one of {", ".join(EVENT_KEYS[1:])}'
-            self._findings.error(item.place, 'nothing says what happens', remedy)
+            self._findings.error(item.place, 'the event has no condition', remedy)
         node_ids = self._concerned(item)
         if len(node_ids) > 1:
             self._findings.error(item.place, 'an event belongs to one device', 'name one')
         elif entries.keys() & set(DRIVE_KEYS) and not self._drives.issuperset(node_ids):
-            self._findings.error(item.place, 'this device is no drive', "it has 'nmt' only")
+            self._findings.error(item.place, 'this device is not a drive', "it has 'nmt' only")
         return Event(
             node_ids[0] if node_ids else 0,
             self._read(entries.get('nmt'), lambda value: _member(value, NMT_NAMES)),

@@ -32,7 +32,7 @@ def fault_named(name: str) -> Fault:
     """Return the fault with a name.
 
     Raises:
-        ValueError: There is none; the message says which there are.
+        ValueError: There is none; the message lists all.
     """
     fault = FAULTS.get(name)
     if fault is None:
@@ -72,7 +72,7 @@ def split_settings(lines: Iterable[str]) -> dict[str, str]:
         name, equals, value = line.partition('=')
         name = name.strip()
         if not equals or not name:
-            raise ValueError(f"{line!r} is no setting; write 'name=value'")
+            raise ValueError(f"{line!r} is not a setting; write 'name=value'")
         if name in settings:
             raise ValueError(f'{name!r} stands twice')
         settings[name] = value
@@ -84,7 +84,7 @@ def _read(setting: str, text: str) -> object:
     try:
         return reader(text)
     except ValueError:
-        raise ValueError(f'{setting} is {text!r}, expected {wanted}') from None
+        raise ValueError(f'{setting} is {text!r}; expected {wanted}') from None
 
 
 def _whole(text: str) -> int:

@@ -56,12 +56,12 @@ def _populate(node: Node, host: DeviceHost) -> SimulatedDevices:
         'node_id',
         DEFAULT_NODE_ID,
         (NODE_ID_MIN, UNCONFIGURED),
-        'CANopen node id of the device; 255: LSS has to give it one',
+        'CANopen node id of the device; 255: LSS assigns it',
     )
     if not NODE_ID_MIN <= node_id <= NODE_ID_MAX and node_id != UNCONFIGURED:
         raise CanopenError(
             f'node_id {node_id} is not {NODE_ID_MIN} to {NODE_ID_MAX}; {UNCONFIGURED} makes a '
-            'device that LSS has to give an id'
+            'device to which LSS assigns one'
         )
     path = read.text('slave_config', '', 'EDS of the device; empty for our own drive')
     eds = load_eds(path or default_eds())

@@ -89,12 +89,12 @@ class FaultServices:
         def run() -> list[str]:
             now = time.monotonic()
             host = self._runner.host
-            said = [work(host.device(node_id), now) for node_id in node_ids]
-            return list(dict.fromkeys(said))
+            results = [work(host.device(node_id), now) for node_id in node_ids]
+            return list(dict.fromkeys(results))
 
-        said = self._runner.call(run).result(ANSWER_TIMEOUT)
+        results = self._runner.call(run).result(ANSWER_TIMEOUT)
         who = f'{len(node_ids)} devices' if len(node_ids) != 1 else name or next(iter(self._names))
-        return f'{who}: {"; ".join(said)}'
+        return f'{who}: {"; ".join(results)}'
 
     def _node_ids(self, name: str) -> list[int]:
         if not name:
@@ -129,7 +129,7 @@ def service_part(name: str) -> str:
 
 
 def requested(fault: str, settings: list[str], duration: float) -> Work:
-    """Return what a request of ``~/fault`` asks to be done with a device.
+    """Return what a request of ``~/fault`` does with a device.
 
     Raises:
         ValueError: The fault or a setting makes no sense; an unknown fault is answered with all.
@@ -157,19 +157,19 @@ def end_faults(device: Device, now: float) -> str:
     """End all faults of a device."""
     ended = [injection.fault.label for injection in device.faults.active]
     device.faults.end(now)
-    return f'ended: {", ".join(ended)}' if ended else 'no fault went on'
+    return f'ended: {", ".join(ended)}' if ended else 'no fault was active'
 
 
 def switch_sto(active: bool, device: Device, now: float) -> str:
     """Request safe torque off of a drive, or release it.
 
     Raises:
-        ValueError: The device is no drive.
+        ValueError: The device is not a drive.
     """
     if active:
         device.faults.inject(FaultInjection(Fault.STO), now)
         return 'STO is active, the motor has no torque'
     if not device.drives:
-        raise ValueError(f'device {device.node_id} is no drive')
+        raise ValueError(f'device {device.node_id} is not a drive')
     device.faults.end(now, Fault.STO)
     return 'STO is released'

@@ -42,11 +42,11 @@ class Variable:
     """The present value of one sub-index.
 
     Attributes:
-        entry: What the dictionary says of it.
+        entry: Its entry in the dictionary.
         value: What it holds.
         check: Called with a value that an SDO wants to write; raises SdoAbortError to refuse.
         before_read: Called before an SDO reads it; raises SdoAbortError to refuse.
-        listener: Told the steady time in [s] after an SDO or an RPDO wrote it.
+        listener: Called with the steady time in [s] after an SDO or an RPDO wrote it.
     """
 
     __slots__ = ('before_read', 'check', 'entry', 'listener', 'value')
@@ -159,7 +159,7 @@ def default_value(entry: ObjectEntry) -> Value:
 
 
 def make_variable(entry: ObjectEntry) -> Variable:
-    """Return a variable of the kind that the entry's type asks for."""
+    """Return a variable of the kind that the entry's type needs."""
     if integer_range(entry.data_type) is not None:
         return Integer(entry)
     return Scalar(entry) if entry.data_type in REAL_FORMATS else Variable(entry)
@@ -186,7 +186,7 @@ class ObjectStore:
         return iter(self._variables.values())
 
     def __contains__(self, address: tuple[int, int]) -> bool:
-        """Tell whether the device has this sub-index."""
+        """Return whether the device has this sub-index."""
         return address in self._variables
 
     def find(self, index: int, subindex: int = 0) -> Variable:
@@ -259,7 +259,7 @@ class ObjectStore:
         return variable
 
     def write(self, index: int, subindex: int, data: bytes, now: float) -> None:
-        """Do what an SDO download asks.
+        """Execute an SDO download.
 
         Args:
             index: Object index.

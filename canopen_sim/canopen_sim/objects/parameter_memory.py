@@ -50,7 +50,7 @@ class ParameterFile(ParameterMemory):
             pass
         except (OSError, ValueError, TypeError, KeyError, AttributeError) as error:
             self.values.clear()
-            logger.error('%s is no stored parameters, defaults count: %s', path, error)
+            logger.error('%s holds no stored parameters, the defaults are used: %s', path, error)
 
     def commit(self) -> None:
         """Write the file: all of it, or nothing."""

@@ -76,7 +76,7 @@ class ParameterStorage:
         self._store.saved = saved
 
     def _obey(self, variable: Integer, act: object, _now: float) -> None:
-        variable.restore()  # reading tells the abilities, not the signature
+        variable.restore()  # reading returns the abilities, not the signature
         first, last = GROUPS.get(variable.entry.subindex, MANUFACTURER)
         if callable(act):
             act(first, last)

@@ -42,7 +42,7 @@ def register_bits(code: int) -> int:
 
 
 class EmcyProducer:
-    """Keeps the active errors of a device and tells the network about them.
+    """Keeps the active errors of a device and reports them on the network.
 
     Attributes:
         deadline: Steady time in [s] at which a message that is held back may be sent.
@@ -90,7 +90,7 @@ class EmcyProducer:
         self._flush(now)
 
     def report(self, code: int, now: float, vendor: bytes = bytes(5)) -> None:
-        """Say that an error occurred; an error that is there already is not repeated.
+        """Report that an error occurred; one that is active already is not repeated.
 
         Args:
             code: Error code of CiA 301 or CiA 402.
@@ -104,7 +104,7 @@ class EmcyProducer:
         self._record(code)
         self._queue(Emergency(code, self._register.value, vendor), now)
 
-    def tell(self, code: int, present: bool, now: float) -> None:
+    def set_error(self, code: int, present: bool, now: float) -> None:
         """Report an error that is present at a time in [s], or clear one that is not."""
         if present:
             self.report(code, now)
@@ -112,7 +112,7 @@ class EmcyProducer:
             self.clear(code, now)
 
     def clear(self, code: int, now: float) -> None:
-        """Say that an error is gone; the message tells in its register what remains."""
+        """Report that an error is gone; the error register of the message has what remains."""
         if code not in self._active:
             return
         self._active.discard(code)

@@ -57,7 +57,7 @@ class ErrorControl:
             store: Objects of the device.
             nmt: Its NMT state.
             errors: Takes its errors.
-            drives: Its axes, which stop as 0x6007 says.
+            drives: Its axes, which stop as 0x6007 selects.
             send: Takes the frames.
             subscribe: Called when other identifiers are listened to.
         """
@@ -73,7 +73,7 @@ class ErrorControl:
         )
 
     def reset(self) -> None:
-        """Watch nobody until they are heard again."""
+        """Watch no node before its next heartbeat."""
         self.consumer.reset()
         self.guarding.reset()
 
@@ -90,7 +90,7 @@ class ErrorControl:
             self._regain(now)
 
     def _lose(self, now: float, node_id: int = 0) -> None:
-        """React to a communication error as 0x1029:01 and the drive's 0x6007 say."""
+        """React to a communication error as 0x1029:01 and 0x6007 of the drive select."""
         self._errors.report(HEARTBEAT_ERROR, now, bytes((node_id, 0, 0, 0, 0)))
         for drive in self._drives:
             drive.connection_lost(now)

@@ -95,16 +95,16 @@ class HeartbeatConsumer:
 
         Args:
             store: Objects of the device.
-            lost: Told the node id and the time when a heartbeat stayed away.
-            returned: Told the node id and the time when a lost one is there again.
-            changed: Told that other frames are of interest from now on.
+            lost: Called with the node id and the time when a heartbeat stayed away.
+            returned: Called with the node id and the time when a lost one is there again.
+            changed: Called when other frames are of interest from now on.
         """
         self.deadline = NEVER
         self._lost = lost
         self._returned = returned
         self._changed = changed
         self._periods: dict[int, float] = {}  # [s] by node id
-        self._deadlines: dict[int, float] = {}  # of those heard of
+        self._deadlines: dict[int, float] = {}  # of those that have sent one
         self.missing: set[int] = set()
         self._entries = [
             store.integer(entry.index, entry.subindex)
@@ -121,7 +121,7 @@ class HeartbeatConsumer:
         return [CobId.HEARTBEAT + node_id for node_id in self._periods]
 
     def reset(self) -> None:
-        """Watch what 0x1016 says, from the next heartbeats on."""
+        """Watch the nodes of 0x1016, from the next heartbeats on."""
         entries = (_consumer(variable.value) for variable in self._entries)
         self._periods = {node_id: period for node_id, period in entries if period}
         self._deadlines.clear()

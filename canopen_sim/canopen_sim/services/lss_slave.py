@@ -53,7 +53,7 @@ class LssSlave:
             store: Objects of the device, for its identity.
             memory: What lasts without power.
             send: Takes the frames.
-            apply: Told the time when a device without node id has got one.
+            apply: Called with the time when a device without node id has got one.
         """
         self.state = LssState.WAITING
         self.node_id = node_id

@@ -31,7 +31,7 @@ class NmtObserver(Protocol):
 
 
 class NmtSlave:
-    """NMT state of one device; it obeys commands to its id and to all.
+    """NMT state of one device; it executes commands for its id and for all.
 
     Attributes:
         node_id: Id of the device, 255 while it has none and stays in Initialisation.
@@ -44,7 +44,7 @@ class NmtSlave:
 
         Args:
             node_id: Id of the device.
-            observer: Told about resets and new states.
+            observer: Notified of resets and new states.
             boot_time: How long Initialisation takes in [s].
         """
         self.state = NmtState.BOOT_UP
@@ -55,7 +55,7 @@ class NmtSlave:
         self._powered = False
 
     def receive(self, frame: Frame, now: float) -> None:
-        """Obey a command; anything that is none is ignored."""
+        """Execute a command; unknown ones are ignored."""
         parsed = parse_nmt(frame.data)
         if parsed is None or parsed[1] not in (ALL_NODES, self.node_id):
             return
@@ -103,5 +103,5 @@ class NmtSlave:
 
 
 def boot_up_frame(node_id: int) -> Frame:
-    """Return the frame by which a device says that Initialisation is over."""
+    """Return the frame by which a device reports that Initialisation is over."""
     return Frame(CobId.HEARTBEAT + node_id, bytes((NmtState.BOOT_UP,)))

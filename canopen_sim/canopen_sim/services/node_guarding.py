@@ -45,7 +45,7 @@ class GuardedNode:
             store: Its objects.
             state: Answers the NMT state.
             send: Takes the frames.
-            changed: Told whether the master is lost, and the time.
+            changed: Called with whether the master is lost, and the time.
         """
         self.node_id = node_id
         self.deadline = NEVER

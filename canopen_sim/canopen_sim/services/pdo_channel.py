@@ -55,7 +55,7 @@ class PdoChannel(ABC):
             store: Objects of the device.
             communication: Index of its communication record.
             mapping: Index of its mapping record.
-            changed: Told the PDO and the time when a client changed it.
+            changed: Called with the PDO and the time when a client changed it.
         """
         self._store = store
         self._cob_id = store.integer(communication, 1, default=COB_ID_INVALID)
@@ -98,7 +98,7 @@ class PdoChannel(ABC):
 
     @property
     def rtr_allowed(self) -> bool:
-        """It may be asked for by a remote frame."""
+        """It may be requested by a remote frame."""
         return not self._cob_id.value & RTR_FORBIDDEN
 
     def configure(self) -> None:
@@ -146,7 +146,7 @@ class PdoChannel(ABC):
     @staticmethod
     @abstractmethod
     def _is_mappable(entry: ObjectEntry) -> bool:
-        """Tell whether an object may travel in this direction."""
+        """Return whether an object may travel in this direction."""
 
     def _find(self, index: int, subindex: int) -> Variable:
         return self._store.find(index, subindex)

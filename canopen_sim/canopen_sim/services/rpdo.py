@@ -46,9 +46,9 @@ class Rpdo(PdoChannel):
         Args:
             store: Objects of the device.
             number: Offset of its records from 0x1400 and 0x1600.
-            changed: Told the PDO and the time when a client changed it.
-            report: Told the PDO, a code, whether that error is there, and the time.
-            too_late: Tells whether the synchronous window is over at a time.
+            changed: Called with the PDO and the time when a client changed it.
+            report: Called with the PDO, a code, whether that error is there, and the time.
+            too_late: Returns whether the synchronous window is over at a time.
         """
         self.deadline = NEVER
         self._short = self._late = False
@@ -92,18 +92,18 @@ class Rpdo(PdoChannel):
                 self._held = frame.data
         else:
             self._write_objects(frame.data)
-            self.tell(now)
+            self.notify_listeners(now)
 
     def store_held(self) -> bool:
-        """Put what came since the last SYNC into the dictionary; tells whether there was any."""
+        """Put what came since the last SYNC into the dictionary; return whether there was any."""
         if self._held is None:
             return False
         data, self._held = self._held, None
         self._write_objects(data)
         return True
 
-    def tell(self, now: float) -> None:
-        """Tell those who use the objects of this PDO that they were written."""
+    def notify_listeners(self, now: float) -> None:
+        """Call the listeners of the objects of this PDO: they were written."""
         for listener in self._listeners:
             listener(now)
 
@@ -178,9 +178,9 @@ class RpdoEngine:
 
         Args:
             store: Objects of the device.
-            changed: Told the time when a client changed one of them.
-            report: Told a code, whether that error is there, and the time.
-            too_late: Tells whether the synchronous window is over at a time.
+            changed: Called with the time when a client changed one of them.
+            report: Called with a code, whether that error is there, and the time.
+            too_late: Returns whether the synchronous window is over at a time.
         """
         first = int(Index.RPDO_COMMUNICATION)
         self.active: list[Rpdo] = []
@@ -222,11 +222,11 @@ class RpdoEngine:
     def sync(self, now: float) -> None:
         """Put the synchronous ones into the dictionary.
 
-        Every value is stored before anyone is told: what one SYNC makes valid belongs together,
-        such as a controlword in one PDO and its target in another.
+        Every value is stored before any listener is called: what one SYNC makes valid belongs
+        together, such as a controlword in one PDO and its target in another.
         """
         for rpdo in [rpdo for rpdo in self.active if rpdo.store_held()]:
-            rpdo.tell(now)
+            rpdo.notify_listeners(now)
 
     def advance(self, now: float) -> None:
         """Report those that are overdue."""

@@ -118,7 +118,7 @@ class BlockUpload:
             data: The object's value.
 
         Raises:
-            SdoAbortError: The client asks for blocks of no length.
+            SdoAbortError: The client requests blocks of no length.
         """
         command, self.index, self.subindex, segments = struct.unpack_from('<BHBB', request)
         self.finished = False
@@ -136,7 +136,7 @@ class BlockUpload:
         return struct.pack('<BHBI', command, self.index, self.subindex, len(self._data))
 
     def proceed(self, request: bytes) -> list[bytes]:
-        """Take what the client says in the course of the transfer; return what to send.
+        """Process a frame of the client within the transfer; return the answer.
 
         Raises:
             SdoAbortError: It makes no sense at this point.

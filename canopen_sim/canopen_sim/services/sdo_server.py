@@ -50,7 +50,7 @@ class Transfer:
         subindex: Sub-index.
         is_download: The client writes.
         data: What is sent, or was received so far.
-        size: Announced length of a download in [byte], None when it was not told.
+        size: Announced length of a download in [byte], None when it was not announced.
         position: Number of bytes of an upload that were sent.
         toggle: Toggle bit of the next segment.
     """
@@ -130,7 +130,7 @@ class SdoServer:
         return int(index), int(subindex)
 
     def _is_block(self, data: bytes) -> bool:
-        """Tell whether a frame is of a block transfer; an abort is of any transfer."""
+        """Return whether a frame is of a block transfer; an abort is of any transfer."""
         transfer = self._transfer
         if isinstance(transfer, BlockDownload) and transfer.streaming:
             return data[0] != ABORT

@@ -39,7 +39,7 @@ class SdoServers:
             node_id: Id of the device.
             store: Its objects.
             send: Takes the frames.
-            changed: Told that requests have other identifiers from now on.
+            changed: Called when requests have other identifiers from now on.
         """
         self._store = store
         self._send = send

@@ -57,11 +57,11 @@ class Services:
         return handlers
 
     def identify(self, frame: Frame, outgoing: bool) -> Traffic:
-        """Say what a frame is to the device, which sends it or not."""
+        """Return what a frame is to the device, which sends it or not."""
         can_id = frame.can_id
         if can_id in (self.sdo.response_ids if outgoing else self.sdo.can_ids):
             return Traffic(Service.SDO, outgoing)
-        if can_id == CobId.HEARTBEAT + self.nmt.node_id and any(frame.data):  # 0 says boot-up
+        if can_id == CobId.HEARTBEAT + self.nmt.node_id and any(frame.data):  # 0 is boot-up
             return Traffic(Service.HEARTBEAT, outgoing)
         engine = self.tpdos if outgoing else self.rpdos
         number = 0 if frame.is_remote else engine.number_of(can_id)

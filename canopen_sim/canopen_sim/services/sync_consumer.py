@@ -40,9 +40,9 @@ class SyncConsumer:
 
         Args:
             store: Objects of the device.
-            handle: Told the counter (0 without one) and the time of each SYNC.
-            length_error: Told whether the length of a SYNC was wrong, and the time.
-            changed: Told that SYNC has another identifier from now on.
+            handle: Called with the counter (0 without one) and the time of each SYNC.
+            length_error: Called with whether the length of a SYNC was wrong, and the time.
+            changed: Called when SYNC has another identifier from now on.
         """
         self.period = 0.0
         self.last_time = float('-inf')
@@ -64,11 +64,11 @@ class SyncConsumer:
         return self._cob_id.value & CAN_ID_MASK
 
     def alive(self, now: float) -> bool:
-        """Tell whether SYNC comes regularly at this time."""
+        """Return whether SYNC comes regularly at this time."""
         return self.period > 0.0 and now - self.last_time < LOST_PERIODS * self.period
 
     def window_closed(self, now: float) -> bool:
-        """Tell whether it is too late for synchronous PDOs of this period (0x1007)."""
+        """Return whether it is too late for synchronous PDOs of this period (0x1007)."""
         window = self._window.value * MICROSECOND
         return window > 0.0 and now - self.last_time > window
 
@@ -79,7 +79,7 @@ class SyncConsumer:
         self._paused = False
 
     def receive(self, frame: Frame, now: float) -> None:
-        """Take a SYNC; one of the wrong length is reported, and obeyed all the same."""
+        """Take a SYNC; one of the wrong length is reported, and processed nevertheless."""
         self._length_error(len(frame.data) != bool(self._overflow.value), now)
         if not self._cycle.value:
             self._measure(now)

@@ -29,7 +29,7 @@ class TimeConsumer:
 
         Args:
             store: Objects of the device.
-            changed: Told that TIME is wanted from now on, or under another identifier.
+            changed: Called when TIME is wanted from now on, or under another identifier.
         """
         self._cob_id = store.integer(Index.TIME_COB_ID)
         self._cob_id.check = self._check

@@ -49,7 +49,7 @@ class Tpdo(PdoChannel):
         Args:
             store: Objects of the device.
             number: Offset of its records from 0x1800 and 0x1A00.
-            changed: Told the PDO and the time when a client changed it.
+            changed: Called with the PDO and the time when a client changed it.
             send: Takes the frames.
         """
         self.deadline = NEVER
@@ -153,7 +153,7 @@ class TpdoEngine:
 
         Args:
             store: Objects of the device.
-            changed: Told the time when a client changed one of them.
+            changed: Called with the time when a client changed one of them.
             send: Takes the frames.
         """
         first = int(Index.TPDO_COMMUNICATION)

@@ -18,7 +18,7 @@ else:
 
 
 class UsageError(CanopenError):
-    """The command line asks for something that there is not; nothing was sent yet."""
+    """The command line names something that does not exist; nothing was sent yet."""
 
 
 BITRATE_MIN, BITRATE_MAX = 10_000, 1_000_000  # [bit/s] CiA 301, table 1

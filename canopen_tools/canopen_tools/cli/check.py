@@ -21,8 +21,8 @@ def add_parser(parsers: SubParsers) -> None:
     """Add the verb."""
     parser = parsers.add_parser(
         'check',
-        help='tell everything that is wrong with a bus.yml and its EDS files',
-        description='Tell everything that is wrong with a bus.yml and its EDS files, and what '
+        help='report everything that is wrong with a bus.yml and its EDS files',
+        description='Report everything that is wrong with a bus.yml and its EDS files, and what '
         'the bus will carry. Exit code: 0, 1 with errors, 2 wrong usage.',
     )
     parser.add_argument('bus_yml', metavar='BUS.yml', type=Path)

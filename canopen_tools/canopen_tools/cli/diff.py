@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""``canopen diff NODE``: what a device holds, against what the files say."""
+"""``canopen diff NODE``: what a device holds, against its files."""
 
 from __future__ import annotations
 
@@ -60,7 +60,9 @@ def add_parser(parsers: SubParsers) -> None:
 def run(options: argparse.Namespace) -> int:
     """Compare a device; return the exit code."""
     target = find_target(options)
-    _objects(target, {}, defaults=options.defaults)  # what cannot be is said before the bus opens
+    _objects(
+        target, {}, defaults=options.defaults
+    )  # what cannot be is reported before the bus opens
     with open_bus(options.can) as bus:
         session = Session(bus, target.bus)
         warn_of_master(session, target)
@@ -70,7 +72,7 @@ def run(options: argparse.Namespace) -> int:
     if shown:
         names = ObjectNames(target.dictionary)
         print_table(
-            ('', 'object', 'file', 'device', 'said by'),
+            ('', 'object', 'file', 'device', 'source'),
             [_cells(target, names, row) for row in shown],
         )
     different = sum(not row.is_equal for row in rows)
@@ -100,14 +102,14 @@ def _objects(target: Target, consumers: HeldConsumers, *, defaults: bool) -> lis
         defaults: Compare other objects with their defaults, too.
 
     Raises:
-        UsageError: No file says anything of the device.
+        UsageError: No file describes the device.
     """
     configured: list[BootWrite] = []
     if target.bus is not None and target.config is not None:
         configured = expected_objects(target.bus, target.config, consumers)
     if not configured and not target.described:
         raise UsageError(
-            f'no file says what {target.name} should hold; give --bus-config BUS.yml with this '
+            f'no file describes {target.name}; give --bus-config BUS.yml with this '
             'device in it, or --eds FILE'
         )
     if configured and not defaults:

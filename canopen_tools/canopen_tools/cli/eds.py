@@ -19,8 +19,8 @@ def add_parser(parsers: SubParsers) -> None:
     """Add the verb."""
     parser = parsers.add_parser(
         'eds',
-        help='tell what is wrong with EDS and DCF files',
-        description='Tell what is wrong with EDS and DCF files (CiA 306), and what reading them '
+        help='report what is wrong with EDS and DCF files',
+        description='Report what is wrong with EDS and DCF files (CiA 306), and what reading them '
         'passes over. Exit code: 0, 1 with errors, 2 wrong usage.',
     )
     parser.add_argument('files', metavar='FILE', type=Path, nargs='+')

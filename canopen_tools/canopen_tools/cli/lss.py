@@ -51,7 +51,7 @@ def add_parser(parsers: SubParsers) -> None:
         'there is none, 2 wrong usage.',
     )
     scan.set_defaults(run=run_scan)
-    inquire = verbs.add_parser('inquire', help='ask a device for its address and node id')
+    inquire = verbs.add_parser('inquire', help='read the address and node id of a device')
     inquire.set_defaults(run=run_inquire)
     setting = verbs.add_parser(
         'set',
@@ -72,7 +72,7 @@ def add_parser(parsers: SubParsers) -> None:
 
 def _add_settings(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        '--node-id', type=node_id, metavar='N', help='1 to 127; it must not be taken'
+        '--node-id', type=node_id, metavar='N', help='1 to 127; not used by another device'
     )
     parser.add_argument('--bitrate', type=bitrate, help='in bit/s, e.g. 500000 or 500k')
     parser.add_argument('--store', action='store_true', help='keep it without power')
@@ -111,7 +111,7 @@ def run_scan(options: argparse.Namespace) -> int:
 
 
 def run_inquire(options: argparse.Namespace) -> int:
-    """Ask a device; return the exit code."""
+    """Query a device; return the exit code."""
     with _lss(options) as (session, master):
         _select(session, master, options)
         address = session.run(master.inquire_address())
@@ -183,17 +183,17 @@ def _select(session: Session, master: LssMaster, options: argparse.Namespace) ->
         session.listen(PAUSE)
     elif session.run(master.fast_scan()) is None:
         raise LssError(
-            'there is no device without node id; --address or --only takes one that has an id'
+            'no device is without node id; choose one that has an id by --address or --only'
         )
 
 
 def _configure(session: Session, master: LssMaster, options: argparse.Namespace) -> None:
     if options.node_id is not None:
         session.run(master.set_node_id(options.node_id))
-        print_line(f'node id {options.node_id}: taken')
+        print_line(f'node id {options.node_id}: accepted')
     if options.bitrate is not None:
         session.run(master.set_bit_rate(options.bitrate))
-        print_line(f'bit rate {options.bitrate / 1000:g} kbit/s: taken')
+        print_line(f'bit rate {options.bitrate / 1000:g} kbit/s: accepted')
     if options.store:
         session.run(master.store())
         print_line('stored')

@@ -34,7 +34,7 @@ SHORT_TYPES: dict[str, DataType] = {
 LONG_TYPES = frozenset({DataType.DOMAIN, DataType.VISIBLE_STRING, DataType.OCTET_STRING})
 
 COMMANDS = frozenset({Index.STORE_PARAMETERS, Index.RESTORE_PARAMETERS})
-"""Objects that tell something else than what is written to them (CiA 301, 7.5.2.13)."""
+"""Objects that return something else than what is written to them (CiA 301, 7.5.2.13)."""
 
 
 def add_parser(parsers: SubParsers) -> None:
@@ -61,7 +61,7 @@ def add_parser(parsers: SubParsers) -> None:
     writer.set_defaults(run=write)
     for parser in (reader, writer):
         parser.add_argument(
-            '--type', choices=SHORT_TYPES, help='type of the object, when no file says it'
+            '--type', choices=SHORT_TYPES, help='type of the object, when no file has it'
         )
 
 
@@ -129,7 +129,7 @@ def _data(target: Target, entry: ObjectEntry, options: argparse.Namespace) -> by
         )
     if entry.data_type is DataType.DOMAIN and not target.described and options.type is None:
         raise UsageError(
-            f'the type of {entry} is unknown; say it with --type, --eds or --bus-config'
+            f'the type of {entry} is unknown; name it with --type, --eds or --bus-config'
         )
     try:
         return bytes_from_text(entry.data_type, options.value)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Writing results and tables to the terminal; remarks go beside them, to stderr."""
+"""Writing results and tables to the terminal; warnings go to stderr."""
 
 from __future__ import annotations
 

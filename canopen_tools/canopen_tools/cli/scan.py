@@ -25,7 +25,7 @@ from .session import Session
 
 LISTEN = 1.5  # [s] many devices send a heartbeat each second
 ANSWER = 0.3  # [s]
-GROUP = 8  # devices that are asked at a time, so that no transmit queue fills up
+GROUP = 8  # devices that are queried at a time, so that no transmit queue fills up
 GROUP_PAUSE = 0.01  # [s]
 
 IDENTITY: tuple[tuple[str, str, int, int], ...] = (
@@ -53,13 +53,13 @@ PROFILES: dict[int, str] = {
 
 @dataclass(slots=True)
 class Found:
-    """A device that was heard or has answered.
+    """A device that has sent a frame or answered.
 
     Attributes:
         node_id: Its node id.
-        state: NMT state as it was heard, None when it sends no heartbeat.
-        numbers: What it says of itself, by attribute of Identity; None where it refuses.
-        config: What bus.yml says of it.
+        state: NMT state of its heartbeat, None when it sends no heartbeat.
+        numbers: Its identity, by attribute of Identity; None where it refuses.
+        config: Its entry in bus.yml.
         answers: It has answered an SDO.
     """
 
@@ -71,7 +71,7 @@ class Found:
 
     @property
     def is_there(self) -> bool:
-        """It was heard or has answered."""
+        """It has sent a frame or answered."""
         return self.state is not None or self.answers
 
 
@@ -79,10 +79,10 @@ def add_parser(parsers: SubParsers) -> None:
     """Add the verb."""
     parser = parsers.add_parser(
         'scan',
-        help='tell who is on a bus',
-        description='Tell who is on a bus. It listens first; when no master is heard, every node '
-        'id is asked for its identity. Exit code: 0, 1 when nobody is there, or with --bus-config '
-        'when a device is missing or another one, 2 wrong usage.',
+        help='list the devices on a bus',
+        description='List the devices on a bus. It listens first; without a master on the bus it '
+        'reads the identity of every node id. Exit code: 0; 1 when there is no device, or with '
+        '--bus-config when one is missing or another one; 2 wrong usage.',
     )
     add_bus_arguments(parser)
     parser.add_argument(
@@ -93,7 +93,7 @@ def add_parser(parsers: SubParsers) -> None:
         help=f'how long to listen first in s (default: {LISTEN})',
     )
     parser.add_argument(
-        '--ask', action='store_true', help='ask the devices, also beside a running master'
+        '--ask', action='store_true', help='read the identities, also beside a running master'
     )
     parser.set_defaults(run=run)
 
@@ -105,16 +105,16 @@ def run(options: argparse.Namespace) -> int:
         session = Session(bus, config)
         warn(f'listening on {bus.name} for {options.listen:g} s')
         session.listen(options.listen)
-        found = _heard(session, config)
-        if _may_ask(session, ask=options.ask):
+        found = _frames(session, config)
+        if _may_query(session, ask=options.ask):
             _find_silent(session, found)
             for device in found.values():
                 _identify(session, device)
             _find_unconfigured(session)
-        return _show(found, config, asked=options.ask or not session.masters)
+        return _show(found, config, queried=options.ask or not session.masters)
 
 
-def _heard(session: Session, config: BusConfig | None) -> dict[int, Found]:
+def _frames(session: Session, config: BusConfig | None) -> dict[int, Found]:
     nodes = {node.node_id: node for node in config.nodes} if config is not None else {}
     return {
         node_id: Found(node_id, session.states.get(node_id), config=nodes.get(node_id))
@@ -122,22 +122,24 @@ def _heard(session: Session, config: BusConfig | None) -> dict[int, Found]:
     }
 
 
-def _may_ask(session: Session, *, ask: bool) -> bool:
+def _may_query(session: Session, *, ask: bool) -> bool:
     if not session.masters:
         return True
-    heard = ', '.join(sorted(session.masters))
+    signs = ', '.join(sorted(session.masters))
     if ask:
-        warn(f'a master is on this bus ({heard}); while devices are asked, its transfers may fail')
+        warn(
+            f'a master is on this bus ({signs}); while devices are queried, its transfers may fail'
+        )
         return True
     warn(
-        f'a master is on this bus ({heard}), so devices are not asked for their identity: each '
-        "has one SDO channel, which is the master's; --ask asks all the same"
+        f'a master is on this bus ({signs}), so devices are not queried for their identity: each '
+        "has one SDO channel, which is the master's; --ask queries them nevertheless"
     )
     return False
 
 
 def _find_silent(session: Session, found: dict[int, Found]) -> None:
-    """Ask every other node id for 0x1000; devices without heartbeat are found by their answer."""
+    """Read 0x1000 of every other node id; devices without heartbeat are found by their answer."""
     answered: set[int] = set()
 
     def note(frame: Frame) -> None:
@@ -147,8 +149,8 @@ def _find_silent(session: Session, found: dict[int, Found]) -> None:
     session.listeners.append(note)
     beside_master = bool(session.masters)
     request = UploadRequest(Index.DEVICE_TYPE, 0).encode()
-    asked = [i for i in range(NODE_ID_MIN, NODE_ID_MAX + 1) if i not in session.states]
-    for position, node_id in enumerate(asked):
+    others = [i for i in range(NODE_ID_MIN, NODE_ID_MAX + 1) if i not in session.states]
+    for position, node_id in enumerate(others):
         if beside_master:
             session.await_quiet(node_id)
         session.send(Frame(CobId.SDO_REQUEST + node_id, request))
@@ -156,16 +158,16 @@ def _find_silent(session: Session, found: dict[int, Found]) -> None:
             session.listen(GROUP_PAUSE)
     session.listen(ANSWER)
     session.listeners.remove(note)
-    for node_id in sorted(answered & set(asked)):
+    for node_id in sorted(answered & set(others)):
         found.setdefault(node_id, Found(node_id, session.states.get(node_id))).answers = True
 
 
 def _find_unconfigured(session: Session) -> None:
-    """Say it when there is a device that no node id reaches, as it has none (CiA 305)."""
+    """Report that there is a device that no node id reaches, as it has none (CiA 305)."""
     master = LssMaster(session.scheduler, session.send)
     session.listeners.append(master.receive)
     if session.run(master.has_unconfigured()):
-        warn('there is a device without node id; canopen lss scan tells which')
+        warn('there is a device without node id; canopen lss scan lists it')
     session.listeners.remove(master.receive)
 
 
@@ -192,21 +194,21 @@ def _identify(session: Session, device: Found) -> None:
             device.numbers[attribute] = int.from_bytes(data, 'little')
 
 
-def _show(found: dict[int, Found], config: BusConfig | None, *, asked: bool) -> int:
+def _show(found: dict[int, Found], config: BusConfig | None, *, queried: bool) -> int:
     devices = sorted(found.values(), key=lambda device: device.node_id)
     present = [device for device in devices if device.is_there]
     if not present and config is None:
         hint = 'is the bus powered, wired and terminated, and is this its bit rate?'
-        warn(f'no device answers: {hint}' if asked else 'no device was heard')
+        warn(f'no device answers: {hint}' if queried else 'no device has sent a frame')
         return 1
     named = config is not None
     head = ('node', *(('name',) if named else ()), 'state', *(t for _, t, _, _ in IDENTITY))
-    remarks = {device.node_id: list(_differences(device, asked=asked)) for device in devices}
+    remarks = {device.node_id: list(_differences(device, queried=queried)) for device in devices}
     rows = [
         (
             str(device.node_id),
             *((device.config.name if device.config else '',) if named else ()),
-            _state(device, asked=asked),
+            _state(device, queried=queried),
             *_cells(device),
             *(('; '.join(remarks[device.node_id]),) if named else ()),
         )
@@ -217,12 +219,12 @@ def _show(found: dict[int, Found], config: BusConfig | None, *, asked: bool) -> 
     return 1 if not present or any(remarks.values()) else 0
 
 
-def _state(device: Found, *, asked: bool) -> str:
+def _state(device: Found, *, queried: bool) -> str:
     if device.state is not None:
         return device.state.name.lower().replace('_', '-')
     if device.answers:
         return 'no heartbeat'
-    return 'absent' if asked else 'not heard'
+    return 'absent' if queried else 'not seen'
 
 
 def _cells(device: Found) -> Iterable[str]:
@@ -239,11 +241,11 @@ def _cells(device: Found) -> Iterable[str]:
             yield f'0x{number:08X}'
 
 
-def _differences(device: Found, *, asked: bool) -> Iterator[str]:
-    """Say how a device differs from what bus.yml says of it."""
+def _differences(device: Found, *, queried: bool) -> Iterator[str]:
+    """Yield how a device differs from bus.yml."""
     if device.config is None:
         return
-    if asked and not device.is_there:
+    if queried and not device.is_there:
         yield 'not on the bus'
     expected: Identity = device.config.identity
     for attribute, title, _, _ in IDENTITY:

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A connection to a bus for as long as a verb runs: one loop, one thread, no background.
 
-Beside a running master it only listens, until it is told otherwise: a device has one SDO channel
+Beside a running master it only listens, unless `--ask` is given: a device has one SDO channel
 by default, which belongs to the master (CiA 301, 7.2.4.1).
 """
 
@@ -31,8 +31,8 @@ class Session:
     Attributes:
         bus: The bus.
         scheduler: Time.
-        states: NMT states by node id, as they were heard.
-        masters: What was heard that only a master sends.
+        states: NMT states by node id, from their heartbeats.
+        masters: Frames on the bus that only a master sends.
         listeners: Called with every frame.
     """
 

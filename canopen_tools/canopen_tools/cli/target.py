@@ -23,7 +23,7 @@ from .output import warn
 from .session import Session
 
 TIMEOUT = 0.5  # [s]
-LISTEN = 0.15  # [s] before something is asked; a master sends SYNC more often
+LISTEN = 0.15  # [s] before the first request; a master sends SYNC more often
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +53,7 @@ class Target:
 
         Args:
             path: As described in ``standard/object_path.py``.
-            data_type: Its type, whatever the file says; then it need not be in the file.
+            data_type: Its type, whatever the file has; then it need not be in the file.
 
         Raises:
             UsageError: There is none; the message names similar ones.
@@ -130,9 +130,9 @@ def warn_of_master(session: Session, target: Target) -> None:
     """Listen for a master, and wait for a pause in its transfers with a device."""
     session.listen(LISTEN)
     if session.masters:
-        heard = ', '.join(sorted(session.masters))
+        signs = ', '.join(sorted(session.masters))
         warn(
-            f'a master is on this bus ({heard}), and shares the SDO channel of {target.name}: one '
+            f'a master is on this bus ({signs}), and shares the SDO channel of {target.name}: one '
             "of its transfers may fail; the master's services ~/read_object and ~/write_object "
             'take turns'
         )

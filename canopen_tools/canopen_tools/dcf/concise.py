@@ -74,7 +74,7 @@ def _u32(index: int, subindex: int, value: int) -> SdoWrite:
 
 
 def _is_needed(node: NodeConfig, write: BootWrite, *, complete: bool) -> bool:
-    """Tell whether dcfgen writes it: no mapping or timer of our own, and no defaults.
+    """Return whether dcfgen writes it: no mapping or timer of our own, and no defaults.
 
     Our boot tries those, and goes on where the device refuses them; another master would fail.
     """

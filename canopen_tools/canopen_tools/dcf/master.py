@@ -4,7 +4,7 @@
 
 What the devices send is mirrored: the n-th TPDO of all devices is RPDO n of the master and ends
 up in 0x2000 + n - 1, the n-th RPDO is TPDO n and comes from 0x2200 + n - 1. The objects 0x5800 to
-0x5FFF say which object of which device each is (Lely's remote PDO mapping).
+0x5FFF hold which object of which device each is (Lely's remote PDO mapping).
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class Side:
     Attributes:
         own: The direction as the master sees it.
         values: First object with the values.
-        remote_number: First object that says whose PDO it is.
+        remote_number: First object that holds whose PDO it is.
         remote_mapping: First object with the mapping of the device.
         access: Access of the values.
     """
@@ -86,7 +86,7 @@ def master_dcf(config: BusConfig, upload_files: Mapping[int, str]) -> str:
         pdos = list(_pdos(config, direction))
         if len(pdos) > PDO_COUNT_MAX:
             raise CodecError(
-                f'the devices have {len(pdos)} {direction.title}s, a master takes {PDO_COUNT_MAX}'
+                f'{len(pdos)} {direction.title}s of the devices; a master has {PDO_COUNT_MAX}'
             )
         counts[direction.name] = len(pdos)
         objects |= dict(_mirrored(direction, pdos))
@@ -268,7 +268,7 @@ def _mapping(name: str, words: list[str]) -> DcfArray:
 def _remote(
     direction: Direction, position: int, node: NodeConfig, pdo: PdoConfig
 ) -> Iterator[tuple[int, DcfObject]]:
-    """Say which PDO of which device it is, and its mapping there."""
+    """Return which PDO of which device it is, and its mapping there."""
     side = SIDES[direction.name]
     whose = f'0x{pdo.number << 8 | node.node_id:08X}'
     title = f'Remote {direction.title}'

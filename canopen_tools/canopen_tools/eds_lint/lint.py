@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is wrong with an EDS or DCF file, by CiA 306-1 and by the objects that it describes.
 
-Reading is tolerant, as vendors' files are what they are. Here is told what other tools stumble
+Reading is tolerant, as vendors' files are what they are. Here is reported what other tools stumble
 over, and what misleads a master: an object that cannot be mapped although it has to be.
 """
 
@@ -88,7 +88,7 @@ class _Linter:
                     Place(self._path),
                     f'0x{address[0]:04X}:{address[1]:02X} ({title}) is missing; every device has '
                     'it',
-                    'add it, or ask the vendor for a complete file',
+                    'add it, or request from the vendor a complete file',
                 )
         indices = dict.fromkeys(entry.index for entry in self._dictionary)
         for index in indices:
@@ -127,7 +127,7 @@ class _Linter:
             )
 
     def _check_standard(self, entry: ObjectEntry) -> None:
-        """Compare with what CiA 301 and the profile of the device say of the object."""
+        """Compare with what CiA 301 and the profile of the device define for the object."""
         standard = self._standard.get(entry.address)
         if standard is None:
             return
@@ -141,7 +141,7 @@ class _Linter:
             )
         if entry.access not in ACCESS[standard.role]:
             wanted = {
-                Role.VALUE: 'read-only: the device says what it is',
+                Role.VALUE: 'read-only: the device sets it',
                 Role.SETTING: 'written by the master',
                 Role.EITHER: 'readable',
             }[standard.role]
@@ -149,7 +149,7 @@ class _Linter:
                 entry,
                 'accesstype',
                 f'AccessType is {entry.access.value}, but the object is {wanted}',
-                'correct AccessType, or the master takes the object for what it is not',
+                'correct AccessType, on which the master relies',
             )
 
     def _check_limits(self, entry: ObjectEntry) -> None:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Checks of what an EDS says about itself: its head and its lists of objects (CiA 306-1, 4.5)."""
+"""Checks of the head of an EDS and of its lists of objects (CiA 306-1, 4.5)."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def check_info(path: Path, ini: IniFile, dictionary: ObjectDictionary, findings:
     """
     for name, title in (('fileinfo', 'FileInfo'), ('deviceinfo', 'DeviceInfo')):
         if name not in ini.sections:
-            findings.warning(Place(path), f'there is no section [{title}]', 'add it')
+            findings.warning(Place(path), f'no section [{title}]', 'add it')
     info = ini.sections.get('deviceinfo')
     if info is None:
         return
@@ -55,12 +55,12 @@ def check_info(path: Path, ini: IniFile, dictionary: ObjectDictionary, findings:
                 f'write {title}={number}',
             )
     for key, title, subindex in IDENTITY_KEYS:
-        said, entry = _number(info, key), dictionary.get(Index.IDENTITY, subindex)
+        named, entry = _number(info, key), dictionary.get(Index.IDENTITY, subindex)
         default = entry.default if entry is not None else None
-        if said and isinstance(default, int) and default and said != default:
+        if named and isinstance(default, int) and default and named != default:
             findings.warning(
                 Place(path, info.line_of(key), key='[DeviceInfo]'),
-                f'{title} is 0x{said:X}, but 0x1018:{subindex:02X} has 0x{default:X} as default; '
+                f'{title} is 0x{named:X}, but 0x1018:{subindex:02X} has 0x{default:X} as default; '
                 'the latter is checked at boot',
                 'correct the wrong one of them',
             )
@@ -86,7 +86,7 @@ def check_lists(path: Path, ini: IniFile, findings: Findings) -> None:
         section = ini.sections.get(name)
         if section is None:
             if name == 'mandatoryobjects':
-                findings.warning(Place(path), f'there is no section [{title}]', 'add it')
+                findings.warning(Place(path), f'no section [{title}]', 'add it')
             continue
         for key, value in section.values.items():
             if key == 'supportedobjects':

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What the standards say of objects that devices share: data type and access."""
+"""What the standards define for objects that devices share: data type and access."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from arm_canopen.standard.objects import Index
 class Role(Enum):
     """Who has to be able to do what."""
 
-    VALUE = 'the device says it'
+    VALUE = 'set by the device'
     SETTING = 'somebody writes it'
     EITHER = 'writing is optional'
 
@@ -110,7 +110,7 @@ _PROFILES: dict[int, Rows] = {
 
 
 def standard_objects(dictionary: ObjectDictionary) -> dict[tuple[int, int], StandardObject]:
-    """Return what CiA 301 and the profile of a device say, by index and sub-index."""
+    """Return what CiA 301 and the profile of a device define, by index and sub-index."""
     number = DeviceProfile.DRIVE if is_drive(dictionary) else profile_number(dictionary)
     return {
         (index, subindex): StandardObject(data_type, role)

@@ -36,7 +36,7 @@ _PDO_FUNCTIONS: dict[int, str] = {
 class FrameDescriber:
     """Puts frames into words, in the order in which they were on the bus.
 
-    It remembers SDO transfers, so that segments are told with their object and the value as a
+    It remembers SDO transfers, so that segments are shown with their object and the value as a
     whole. COB-IDs that bus.yml assigns count before those of the pre-defined connection set.
     """
 
@@ -82,7 +82,7 @@ class FrameDescriber:
                     self._handlers[pdo.cob_id] = describer.describe
 
     def describe(self, frame: Frame) -> Description:
-        """Say what a frame means; unknown ones are told as such, and none is an error."""
+        """Return what a frame means; unknown ones are shown as such, and none is an error."""
         if frame.is_error:
             return Description(FrameKind.ERROR, 'CAN error', '', error_text(frame), is_alert=True)
         if frame.is_extended:
@@ -166,14 +166,14 @@ class FrameDescriber:
         )
 
     def _sdo_request(self, node_id: int, frame: Frame) -> Description:
-        said = self._follower(node_id).request(frame.data)
+        step = self._follower(node_id).request(frame.data)
         node = self.node_name(node_id)
-        return Description(FrameKind.SDO, 'SDO >', node, said.text, said.is_abort, node_id)
+        return Description(FrameKind.SDO, 'SDO >', node, step.text, step.is_abort, node_id)
 
     def _sdo_response(self, node_id: int, frame: Frame) -> Description:
-        said = self._follower(node_id).response(frame.data)
+        step = self._follower(node_id).response(frame.data)
         node = self.node_name(node_id)
-        return Description(FrameKind.SDO, 'SDO <', node, said.text, said.is_abort, node_id)
+        return Description(FrameKind.SDO, 'SDO <', node, step.text, step.is_abort, node_id)
 
     def _follower(self, node_id: int) -> SdoFollower:
         follower = self._sdo.get(node_id)

@@ -33,7 +33,7 @@ class Description:
             ``SDO <`` comes from it.
         node: Name of the device it comes from or goes to, empty when it is for all.
         text: The content in words, empty when there is nothing to add.
-        is_alert: It tells of something wrong: an emergency, an abort, an error.
+        is_alert: It reports something wrong: an emergency, an abort, an error.
         node_id: Id of the device, 0 when it is for all.
     """
 

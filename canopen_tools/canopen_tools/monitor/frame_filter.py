@@ -42,7 +42,7 @@ class FrameFilter:
         self._unwanted = [_test(word[1:]) for word in words if word.startswith(_NOT)]
 
     def shows(self, frame: Frame, description: Description) -> bool:
-        """Tell whether a frame is to be shown."""
+        """Return whether a frame is to be shown."""
         if any(test(frame, description) for test in self._unwanted):
             return False
         return not self._wanted or any(test(frame, description) for test in self._wanted)
@@ -61,7 +61,7 @@ def _test(word: str) -> _Test:
     match = _IDENTIFIER.fullmatch(word)
     if match is None:
         raise ValueError(
-            f'{word!r} is no filter; take one of {", ".join(kinds)}, `node:NAME`, '
+            f'unknown filter {word!r}; choose one of {", ".join(kinds)}, `node:NAME`, '
             'or an identifier such as 181 or 180:780'
         )
     can_id = int(match[1], 16)

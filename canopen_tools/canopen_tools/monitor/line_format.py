@@ -19,7 +19,7 @@ _RESET = '\x1b[0m'
 _COLORS: dict[FrameKind, str] = {
     FrameKind.NMT: '\x1b[35m',
     FrameKind.SYNC: '\x1b[2m',
-    FrameKind.EMCY: '\x1b[33m',  # one that tells of an error is an alert, and red
+    FrameKind.EMCY: '\x1b[33m',  # one that reports an error is an alert, and red
     FrameKind.TIME: '\x1b[2m',
     FrameKind.PDO: '\x1b[36m',
     FrameKind.SDO: '\x1b[32m',
@@ -29,7 +29,7 @@ _COLORS: dict[FrameKind, str] = {
 
 
 class TimeStyle(Enum):
-    """How a line tells the time; the letters are those of can-utils' candump."""
+    """How a line shows the time; the letters are those of can-utils' candump."""
 
     ABSOLUTE = 'a'  # [s] since 1970
     DATE = 'A'  # local date and time
@@ -47,7 +47,7 @@ class LineFormat:
         """Prepare the columns.
 
         Args:
-            style: How to tell the time.
+            style: How to show the time.
             wall_offset: Wall clock minus the clock of the time stamps in [s].
             color: Paint the meaning by its service, and alerts in red.
             node_width: Characters that the name of a device takes.

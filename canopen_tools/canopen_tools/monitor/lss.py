@@ -8,5 +8,5 @@ from arm_canopen.standard.lss import LssMessage
 
 
 def lss_text(data: bytes) -> str:
-    """Say an LSS message in words, also one of a wrong length; its parameters stay bytes."""
+    """Return an LSS message in words, also one of a wrong length; its parameters stay bytes."""
     return LssMessage(data[0], data[1:]).text if data else 'empty message'

@@ -17,14 +17,14 @@ _FRAME_SIZE = 8  # [byte]
 
 
 class BlockFollower:
-    """Tells block transfers of one device; frames of others it leaves alone."""
+    """Describes block transfers of one device; frames of others it ignores."""
 
     def __init__(self, names: ObjectNames) -> None:
         """Begin with no transfer on."""
         self._names = names
         self._title = ''
         self._block_size = 0
-        self._last_number: int | None = None  # of the segment that says it is the last
+        self._last_number: int | None = None  # of the segment that is marked as the last
         self._client_streams = False
         self._server_streams = False
 

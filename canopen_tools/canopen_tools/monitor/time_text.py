@@ -9,7 +9,7 @@ from arm_canopen.standard.time_of_day import decode_time_of_day
 
 
 def time_of_day_text(data: bytes) -> str:
-    """Say a TIME_OF_DAY as date and time, or why it is none."""
+    """Return a TIME_OF_DAY as date and time, or why it is none."""
     try:
         moment = decode_time_of_day(data)
     except CodecError as error:

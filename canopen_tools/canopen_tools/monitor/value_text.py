@@ -46,13 +46,13 @@ _SIGNED_OBJECTS = frozenset(
         Index.TARGET_VELOCITY,
     }
 )
-"""Objects that are signed, for when there is no EDS to say so (CiA 402-2)."""
+"""Objects that are signed, for when there is no EDS (CiA 402-2)."""
 
 _COB_ID_SUBINDEX = 1  # of a PDO communication parameter (CiA 301, 7.5.2.35)
 
 
 def controlword_text(word: int) -> str:
-    """Say a controlword in words: its command, halt, and the bits whose meaning the mode gives."""
+    """Return a controlword in words: its command, halt, and the bits that depend on the mode."""
     command = next(
         (text for mask, value, text in CONTROLWORD_COMMANDS if word & mask == value), ''
     )

@@ -21,14 +21,14 @@ class SyncClock(Protocol):
         """Time between two SYNCs in [s], 0 when unknown."""
 
     def alive(self, now: float) -> bool:
-        """Tell whether SYNC comes regularly at this time."""
+        """Return whether SYNC comes regularly at this time."""
 
 
 class Mode:
     """A mode of operation. Without anything overridden, the axis is held where it is.
 
     The drive calls it only while operation is enabled, with the axis at the time ``now`` unless
-    a method says otherwise.
+    a method documents otherwise.
 
     Attributes:
         number: Its value of 0x6060.
@@ -120,7 +120,7 @@ class NoMode(Mode):
 
 
 class Dwell:
-    """Tells when a condition has held for a time.
+    """Detects when a condition has held for a time.
 
     Attributes:
         reached: It has.

@@ -102,7 +102,7 @@ class ProfilePosition(Mode):
         elif self._next is None:
             self._next = setpoint
             self._pass_target(now)
-        else:  # no room: the acknowledge bit still says so
+        else:  # no room: the acknowledge bit stays set
             return
         self._offered = True
         self._preceding = setpoint.target
@@ -130,7 +130,7 @@ class ProfilePosition(Mode):
             self.axis.stop(setpoint.limits.deceleration)
 
     def _pass_target(self, now: float) -> None:
-        """Go through the present target to the next one, if that was asked for."""
+        """Go through the present target to the next one, if that was requested."""
         active, following = self._active, self._next
         if active is None or following is None or not following.blended or self.halted:
             return

@@ -37,7 +37,7 @@ class ModeSelection:
     """The modes of a drive.
 
     A mode is there when it is simulated and 0x6502 of the dictionary names it; where the
-    dictionary says nothing, when it has the objects of the mode. Another one is refused to an
+    dictionary does not list it, when it has the objects of the mode. Another one is refused to an
     SDO; from an RPDO it is ignored, and 0x6061 goes on showing the present mode.
 
     Attributes:
@@ -64,7 +64,7 @@ class ModeSelection:
         self.select()
 
     def select(self) -> bool:
-        """Select and display what 0x6060 asks for; return whether that is another mode."""
+        """Select and display the mode of 0x6060; return whether that is another mode."""
         number = self._objects.mode.value
         changed = number != self.current.number and self._supports(number)
         if changed:

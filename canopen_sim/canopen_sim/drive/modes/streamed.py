@@ -35,7 +35,7 @@ class Streamed(Mode):
 
     @property
     def following(self) -> bool:
-        """Set-points are obeyed."""
+        """Set-points are applied."""
         return not self.halted
 
     def start(self, word: int, now: float) -> None:
@@ -67,7 +67,7 @@ class Streamed(Mode):
 
     @abstractmethod
     def take(self, period: float, now: float) -> bool:
-        """Obey the set-point.
+        """Apply the set-point.
 
         Args:
             period: When the next one is due in [s].

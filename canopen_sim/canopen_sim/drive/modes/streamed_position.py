@@ -80,7 +80,7 @@ class InterpolatedPosition(StreamedPosition):
 
     @property
     def following(self) -> bool:
-        """Set-points are obeyed."""
+        """Set-points are applied."""
         return self._enabled and not self.halted
 
     def start(self, word: int, now: float) -> None:

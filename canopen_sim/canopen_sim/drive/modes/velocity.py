@@ -40,14 +40,14 @@ class Velocity(Mode):
             self.resume(now)
 
     def command(self, word: int, previous: int, now: float) -> None:
-        """Obey the ramp bits."""
+        """Apply the ramp bits."""
         changed = (word ^ self._word) & (ENABLE_RAMP | UNLOCK_RAMP | REFERENCE_RAMP)
         self._word = word
         if changed and not self.halted:
             self.resume(now)
 
     def resume(self, now: float) -> None:
-        """Ramp to where the controlword and the target say."""
+        """Ramp to the velocity that controlword and target select."""
         limits = self.objects.velocity_mode_limits
         self._wanted = self._reference(limits.velocity)
         if not self._word & ENABLE_RAMP:
