@@ -48,6 +48,8 @@ parameters:
   can_interface_name  can0, vcan0, udp_multicast:239.x.y.z[:port], auto, or
                       INTERFACE:CHANNEL[@BITRATE]; one for each bus.yml, with commas
                       (default auto: vcan0 where it exists, otherwise multicast on this host)
+  robot_joint_states  publish the joints of all drives as /joint_states (default false)
+  robot_description   URDF as XML text, for /joint_states (default: the topic robot_description)
   diagnostics_period  time between two /diagnostics messages in [s] (default 1.0)
   thread_priority     SCHED_FIFO priority of the thread of the cycle, 0 for none
                       (default {THREAD_PRIORITY})
