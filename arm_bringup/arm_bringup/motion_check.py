@@ -95,6 +95,9 @@ def _note(robot: Robot, note: str) -> tuple[str, str, str]:
         return robot.semantic.name, note, 'add disable_collisions for these pairs'
     if 'SRDF' in note:
         return robot.semantic.name, note, 'mend the pose, or leave it out'
+    if 'is not installed' in note:
+        remedy = f'or give the folder of the package in {SETTINGS} (packages: {{NAME: FOLDER}})'
+        return robot.description.name, note, remedy
     return robot.description.name, note, 'see README of arm_model: what it reads'
 
 

@@ -117,6 +117,20 @@ def test_a_hull_is_around_all_points(points: list[tuple[float, float, float]]) -
     assert (np.ptp(hull, axis=0) <= np.ptp(points, axis=0) + 2.1 * meshes.MIN_THICKNESS).all()
 
 
+@pytest.mark.parametrize('length', [0.001, 0.2, 3.0])
+def test_a_hull_of_a_finely_rounded_part_is_around_it(length: float) -> None:
+    """Coal counts 255 neighbours of a corner at most: a disc of CAD has more on its rim."""
+    turns = np.linspace(0.0, 2.0 * math.pi, 1000, endpoint=False)
+    rim = 0.1 * np.stack((np.cos(turns), np.sin(turns)), axis=1)
+    points = np.array([(x, y, z) for x, y in rim for z in (0.0, length)])
+    hull = meshes.convex(points)
+    assert hull.num_points <= meshes.MAX_CORNERS
+    outside = points @ np.array(hull.normals()).T + np.array(hull.offsets())
+    assert outside.max() < 1e-9
+    assert np.array(hull.points())[:, 2].max() < 1.02 * length
+    assert np.linalg.norm(np.array(hull.points())[:, :2], axis=1).max() < 0.1 * 1.02
+
+
 def test_meshes_are_found_as_ros_finds_them(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -28,6 +28,12 @@ from ..arrays import Array, frozen, Native
 MIN_THICKNESS = 1e-3
 """Thickness that a flat mesh is given in [m]: a hull needs a volume."""
 
+MAX_CORNERS = 250
+"""Corners of a hull that coal refuses for the number of neighbours of a corner: 255 at most."""
+
+GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
+"""Turns by this angle in [rad] spread directions evenly."""
+
 FORMAT = 'v1'
 """Version of the files in the cache: part of their names."""
 
@@ -182,10 +188,39 @@ def convex(points: Array) -> Native:
     """
     if not len(points) or not np.isfinite(points).all():
         raise MeshError('a mesh needs corners, and finite ones')
+    solid = _with_volume(np.asarray(points, dtype=np.float64))
+    try:
+        return _convex(solid)
+    except RuntimeError:  # a corner has more neighbours than coal can count
+        return _convex(_around(solid))
+
+
+def _convex(points: Array) -> Native:
     corners = coal.StdVec_Vec3s()
-    for point in _with_volume(np.asarray(points, dtype=np.float64)):
+    for point in points:
         corners.append(point)
     return coal.Convex.convexHull(corners, True, 'Qt')
+
+
+def _around(points: Array) -> Array:
+    """Return few points whose hull is around many, and hardly larger.
+
+    They are the outermost ones in evenly spread directions, moved away from their middle until
+    all others are within.
+    """
+    steps = np.arange(MAX_CORNERS)
+    height = 1.0 - 2.0 * (steps + 0.5) / MAX_CORNERS
+    width, turns = np.sqrt(1.0 - height**2), GOLDEN_ANGLE * steps
+    directions = np.stack((width * np.cos(turns), width * np.sin(turns), height))
+    scale = np.ptp(points, axis=0)  # of a long thing the sides count as well as the ends
+    outermost = points[np.unique((points / scale @ directions).argmax(axis=0))]
+    inner = _convex(outermost)
+    normals, offsets = np.array(inner.normals()), np.array(inner.offsets())
+    middle = outermost.mean(axis=0)
+    depths = -(normals @ middle + offsets)
+    beyond = (points @ normals.T + offsets).max(axis=0)
+    grown: Array = middle + (1.0 + max((beyond / depths).max(), 0.0)) * (outermost - middle)
+    return grown
 
 
 def _with_volume(points: Array) -> Array:
