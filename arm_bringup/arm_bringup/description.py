@@ -26,6 +26,8 @@ from .robots import Robot, SETTINGS
 OTHER_HARDWARE = ('ros2_control', 'gazebo')
 """Files and macros with these words in their names are for other drivers and simulators."""
 NOT_FOUND = re.compile(r"package '(?P<package>[^']+)' not found")
+RELATIVE_MESH = re.compile(r'(<mesh\b[^>]*\bfilename\s*=\s*["\'])(?![a-z]+://|/)([^"\']+)')
+"""Meshes beside the description, which the nodes that read it would not find."""
 UNDEFINED = re.compile(r'Undefined substitution argument (?P<argument>\S+)')
 
 
@@ -38,7 +40,10 @@ def read_description(robot: Robot) -> str:
     Raises:
         DescriptionError: The file cannot be read or expanded.
     """
-    return _located(_read(robot.description, robot), robot.packages)
+    urdf = _located(_read(robot.description, robot), robot.packages)
+    return RELATIVE_MESH.sub(
+        lambda found: found[1] + (robot.description.parent / found[2]).resolve().as_uri(), urdf
+    )
 
 
 def read_semantic(robot: Robot) -> str:

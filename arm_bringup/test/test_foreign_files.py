@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+import re
 
 import pytest
 
@@ -120,6 +121,20 @@ def test_a_package_that_is_not_installed_is_given_a_folder(folder: Path, tmp_pat
     urdf = read_description(found(folder))
     assert f'"{shared.as_uri()}/base.stl"' in urdf
     assert os.environ['AMENT_PREFIX_PATH'] == before
+
+
+def test_meshes_beside_the_description_are_found_by_every_node(folder: Path) -> None:
+    """A relative path counts from the description; others stay as they are."""
+    names = ['meshes/a b.stl', 'package://vendor/c.stl', 'file:///d.stl', '/e.stl']
+    shapes = ''.join(
+        f'<collision><geometry><mesh scale="1 1 1" filename="{name}"/></geometry></collision>'
+        for name in names
+    )
+    (folder / 'arm.urdf').write_text(
+        f'<robot name="arm"><link name="base">{shapes}</link></robot>'
+    )
+    located = re.findall('filename="(.*?)"', read_description(found(folder)))
+    assert located == [f'{folder.as_uri()}/meshes/a%20b.stl', *names[1:]]
 
 
 def test_an_argument_without_a_value_says_how_to_give_it(tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ import pinocchio as pin
 from urdf_reader import EndEffector, parse_srdf, read_urdf
 
 from .arrays import Array, frozen, Native
-from .exceptions import CommandError, description_refused, ModelError
+from .exceptions import CommandError, description_refused, ModelError, SceneError
 from .groups import find_group
 from .kinematics import Kinematics
 from .limits import JointLimits, merge_limits
@@ -43,7 +43,7 @@ class RobotModel:
         end_effectors: Tools of the SRDF that are fixed to a link of the group.
         notes: What was passed over in description and SRDF, in words.
         kinematics: The joints of the group, and those that follow them; for any thread.
-        scene: The shapes and the pairs of them that are checked; for any thread.
+        scene: What distances are measured in, at first the robot alone; for any thread.
         reach: Greatest distance of the tip from the first joint's axis frame in [m].
     """
 
@@ -219,9 +219,24 @@ class RobotModel:
         """Return what measures distances for another thread than the owner's.
 
         Args:
-            scene: What to measure; by default the robot alone.
+            scene: What to measure; by default the present one.
         """
         return Clearances(self.scene if scene is None else scene)
+
+    def use_scene(self, clearances: Clearances) -> None:
+        """Measure all distances in another scene from now on; for the loop that owns the model.
+
+        Args:
+            clearances: Of a scene with this model's kinematics; made, and asked once, beside the
+                loop: the first look measures every pair.
+
+        Raises:
+            SceneError: The scene is of another group or robot.
+        """
+        if clearances.scene.kinematics.joints != self.joints:
+            joints = ', '.join(clearances.scene.kinematics.joints)
+            raise SceneError(f'the scene is not that of {self.group}: its joints are {joints}')
+        self.scene, self._clearances = clearances.scene, clearances
 
     def kinematics_at(self, others: Mapping[str, float]) -> Kinematics:
         """Return the kinematics with joints beside the group at other places, for a scene.

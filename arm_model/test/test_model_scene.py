@@ -307,6 +307,21 @@ def test_an_arm_beside_the_group_is_an_obstacle_where_it_is() -> None:
     assert distances(turned, at)[pair] != pytest.approx(distances(left.scene, at)[pair], abs=1e-3)
 
 
+def test_a_model_measures_in_the_scene_that_it_is_given() -> None:
+    """From then on an object counts in all its answers."""
+    model, at = two_arms('right', 'torso_link'), np.zeros(2)
+    alone = model.clearance(at)
+    scene = model.scene.with_object(CollisionObject('floor', Plane(offset=0.2)))
+    clearances = Clearances(scene)
+    model.use_scene(clearances)
+    assert model.scene is clearances.scene
+    assert model.clearance(at) < alone
+    assert 'floor' in model.nearest(at, math.inf, 1)[0].links
+    assert 'floor' in model.least_clearance(at[None], math.inf).links
+    with pytest.raises(SceneError, match='not that of right'):
+        model.use_scene(Clearances(MODEL.scene))
+
+
 def test_a_mimic_joint_follows() -> None:
     """In poses, Jacobians, distances and their gradients."""
     model = gripper()
