@@ -23,7 +23,7 @@ from ..config.checks import check_bus
 from ..config.model import BusConfig
 from ..exceptions import BootError, BusError, DriveError
 from ..master.events import Event, EventKind, Report, Severity
-from ..master.runner import ENDED
+from ..master.runner import OWNER
 from .bus_master import BusMaster, THREAD_PRIORITY
 from .canopen_drive import CanopenDrive
 from .device import CanopenDevice, DeviceSdo
@@ -151,7 +151,7 @@ class CanopenMaster:
             BusError: The master has ended.
         """
         if self._closed:
-            raise BusError(ENDED)
+            raise BusError(f'{OWNER} has ended')
         if not self._master.started:
             if heard := self._master.listen():
                 logger.warning('going on beside another master: %s', heard)

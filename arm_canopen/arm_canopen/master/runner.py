@@ -25,6 +25,8 @@ T = TypeVar('T')
 
 REPORTED_LATENESS = 0.1  # [s] lateness of a cycle that is worth a word
 
+OWNER = 'the CANopen master'  # of the thread, for messages
+
 logger = logging.getLogger(__name__)
 
 
@@ -49,7 +51,7 @@ class NetworkThread:
         self.period = network.config.master.cycle_period
         self._statistics = CycleStatistics(self.period)
         self._cycle_time = 0.0
-        self._thread = BusThread(bus, 'canopen', self._serve, 'the CANopen master')
+        self._thread = BusThread(bus, 'canopen', self._serve, OWNER)
 
     def start(self, begin: Callable[[], None] = lambda: None) -> None:
         """Start the network and its cycle.
