@@ -7,6 +7,7 @@ from __future__ import annotations
 from itertools import product
 import math
 from pathlib import Path
+import re
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -220,6 +221,14 @@ def test_a_damaged_mesh_is_one_note(content: str, tmp_path: Path) -> None:
     (tmp_path / 'link.stl').write_text(stl(), encoding='utf-8')
     with pytest.raises(ModelError, match='scale'):
         arm('<mesh filename="link.stl" scale="1 1"/>', tmp_path)
+
+
+def test_an_arm_without_any_shape_says_so() -> None:
+    """Nobody should believe that it is checked."""
+    urdf, srdf, limits = chain_texts('zyy')
+    bare = re.sub('<collision>.*?</collision>', '', urdf)
+    model = RobotModel(bare, srdf, limits)
+    assert model.notes == ('no link has a <collision>, so self-collision is not checked',)
 
 
 def test_the_other_links_are_checked_all_the_same() -> None:

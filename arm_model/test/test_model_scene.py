@@ -301,7 +301,7 @@ def test_an_arm_beside_the_group_is_an_obstacle_where_it_is() -> None:
     pairs = [pair for pair in left.pairs if 'right_2_link' in pair]
     assert pairs
     at = np.zeros(len(left))
-    turned = left.scene.with_positions(left.kinematics_at({'right_1': 1.0}))
+    turned = left.scene.with_kinematics(left.kinematics_at({'right_1': 1.0}))
     assert turned.pairs == left.pairs
     pair = ('left_3_link', 'right_2_link', 0)
     assert distances(turned, at)[pair] != pytest.approx(distances(left.scene, at)[pair], abs=1e-3)

@@ -70,13 +70,13 @@ def link_shapes(tree: KinematicTree, folder: Path | None = None) -> LinkShapes:
         placed = PlacedShape(shape, _pose(collision))
         found.setdefault(collision.link, []).append(placed)
     shapes = {link: _with_capsules(each) for link, each in found.items()}
-    return LinkShapes(shapes, [*_left_out(unusable), *_loose(loose)])
+    return LinkShapes(shapes, [*_left_out(unusable, bool(found)), *_loose(loose)])
 
 
-def _left_out(unusable: Mapping[str, Sequence[str]]) -> Sequence[str]:
+def _left_out(unusable: Mapping[str, Sequence[str]], found: bool) -> Sequence[str]:
     """Say in one line of which links collisions are not checked, and why."""
     if not unusable:
-        return ()
+        return () if found else ('no link has a <collision>, so self-collision is not checked',)
     reasons = '; '.join(f'{", ".join(links)}: {reason}' for reason, links in unusable.items())
     return (f'self-collision is not checked for these collision shapes: {reasons}',)
 

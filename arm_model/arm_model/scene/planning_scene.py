@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
-from itertools import combinations
+from itertools import combinations, product
 from types import MappingProxyType
 
 import numpy as np
@@ -99,7 +99,7 @@ class PlanningScene:
         extents = np.array([_extent(each) for each in self.geometry.geometryObjects])
         pairs = [
             (first, second)
-            for first, second in combinations(range(len(bodies)), 2)
+            for first, second in _candidates(bodies)
             if self._checks(bodies[first], bodies[second])
         ]
         for pair in pairs:
@@ -233,7 +233,7 @@ class PlanningScene:
         pairs = [frozenset((one, other)) for one in ones for other in others if one != other]
         return self.with_allowed(self.allowed.with_entries(pairs, allowed))
 
-    def with_positions(self, kinematics: Kinematics) -> PlanningScene:
+    def with_kinematics(self, kinematics: Kinematics) -> PlanningScene:
         """Return the scene with the joints beside the group at other places.
 
         Args:
@@ -354,6 +354,14 @@ class PlanningScene:
         ends = ((bodies[first].joint, bodies[second].joint) for first, second in pairs)
         signs = np.array([kinematics.relative_motion(*joints).sign for joints in ends])
         return signs, kinematics.bounded(np.minimum(*bounds))
+
+
+def _candidates(bodies: Sequence[_Body]) -> Sequence[tuple[int, int]]:
+    """Return the pairs of bodies of which one moves at least."""
+    moving = [number for number, body in enumerate(bodies) if body.joint]
+    still = [number for number, body in enumerate(bodies) if not body.joint]
+    mixed = ((min(pair), max(pair)) for pair in product(moving, still))
+    return sorted([*combinations(moving, 2), *mixed])
 
 
 def _se3(pose: Pose) -> Native:
