@@ -7,6 +7,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 import contextlib
+from functools import partial
 from pathlib import Path
 import sys
 import tempfile
@@ -25,6 +26,7 @@ from process_supervisor.arguments import apply_network
 from .description import read_description
 from .enabling import enabling
 from .exceptions import BringupError, RobotError
+from .groups import moved_groups, MovedGroups
 from .motion import choose_master, motion_files
 from .session import (
     add_arguments,
@@ -107,7 +109,9 @@ def _arm(arguments: argparse.Namespace, ros: RosOptions) -> int:
     master, no_motion = MASTER, '--drives-only'
     if not arguments.drives_only:
         master, no_motion = choose_master(locate(arguments), find_executable)
-    files = no_files if no_motion else motion_files
+    files = no_files
+    if not no_motion:
+        files = partial(motion_files, groups=moved_groups(locate(arguments)))
     with session(
         arguments, ros, simulate=arguments.simulate, master=master, master_files=files
     ) as arm:
@@ -134,7 +138,7 @@ def _controllers(arguments: argparse.Namespace, ros: RosOptions) -> int:
     with tempfile.TemporaryDirectory(prefix='arm_bringup-') as folder:
         parameters = Path(folder) / 'robot_description.yaml'
         write_parameters(parameters, read_description(robot))
-        files = motion_files(robot, Path(folder), ros)
+        files = motion_files(robot, Path(folder), ros, MovedGroups(moved_groups(robot).arms[:1]))
         _say(f'{robot.name}: trajectories and jogging for drives of another process')
         process = controller_process(files, parameters, arguments.timeout, find_executable, ros)
         return supervise([process]).exit_code

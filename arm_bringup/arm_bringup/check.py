@@ -52,7 +52,10 @@ def check_robot(robot: Robot) -> list[Finding]:
     found, semantic = check_semantic(robot, tree)
     if semantic is None:
         return [*findings, *found]
-    return [*findings, *found, *check_motion(robot, urdf, tree, semantic)]
+    moving = [joint.name for joint in tree.joints if joint.independent]
+    if not drives or set(drives) - set(moving):
+        drives = moving  # what is wrong with the names of drives is told already
+    return [*findings, *found, *check_motion(robot, urdf, tree, semantic, drives)]
 
 
 def _bus(robot: Robot) -> tuple[list[Finding], list[str]]:

@@ -4,19 +4,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import urdf_reader
-from urdf_reader import parse_srdf, SemanticDescription
+from urdf_reader import find_group, KinematicTree, parse_srdf, read_urdf, SemanticDescription
 
-from .description import read_semantic
+from .description import read_description, read_semantic
 from .exceptions import DescriptionError, RobotError
 from .robots import Robot, SETTINGS
+from .session import read_bus
 
 
 @dataclass(frozen=True, slots=True)
 class MovedGroups:
-    """The groups of a robot that are moved.
+    """The groups of a robot that are moved; no two have a joint in common.
 
     Attributes:
         arms: Groups that are jogged and follow trajectories; the first is the main one.
@@ -24,7 +26,12 @@ class MovedGroups:
     """
 
     arms: tuple[str, ...]
-    tools: tuple[str, ...]
+    tools: tuple[str, ...] = ()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All of them."""
+        return (*self.arms, *self.tools)
 
 
 def moved_groups(robot: Robot) -> MovedGroups:
@@ -34,31 +41,72 @@ def moved_groups(robot: Robot) -> MovedGroups:
         robot: A robot with an SRDF.
 
     Raises:
-        RobotError: The SRDF cannot be read, or has no such group.
+        RobotError: A file cannot be read, or there is no such group.
     """
+    drives = read_bus(robot).joints
     try:
         semantic = parse_srdf(read_semantic(robot))
+        return choose_groups(robot, semantic, read_urdf(read_description(robot)), drives)
     except (DescriptionError, urdf_reader.DescriptionError) as error:
-        raise RobotError(f'{robot.semantic}: {error}') from error
-    return choose_groups(robot, semantic)
+        raise RobotError(f'{robot.folder}: {error}') from error
 
 
-def choose_groups(robot: Robot, semantic: SemanticDescription) -> MovedGroups:
-    """Choose the groups that are moved: what the robot folder names, else all arms of the SRDF.
+def choose_groups(
+    robot: Robot, semantic: SemanticDescription, tree: KinematicTree, drives: Collection[str]
+) -> MovedGroups:
+    """Choose the groups that are moved.
+
+    Arms are what the robot folder names; else all groups of the SRDF that have drives, are
+    neither end effectors nor made of groups, and share no joint with a group before them. Tools
+    are the end effectors that have drives.
 
     Args:
         robot: The robot.
         semantic: Its SRDF.
+        tree: Its description.
+        drives: Joints with a drive.
 
     Raises:
-        RobotError: The SRDF has no such group, or none at all.
+        RobotError: The SRDF has no such group, none with drives, or two share a joint.
     """
-    chosen = (robot.group,) if robot.group else semantic.arms or tuple(semantic.groups)
-    lost = [name for name in chosen if name not in semantic.groups]
-    if lost or not chosen:
-        known = ', '.join(semantic.groups) or 'none'
-        raise RobotError(
-            f'{robot.semantic.name} has no group {", ".join(lost) or "to move"}; groups: {known}. '
-            f'Choose with group in {SETTINGS}, or --group NAME'
-        )
-    return MovedGroups(chosen, tuple(name for name in semantic.tools if name not in chosen))
+    known = ', '.join(semantic.groups) or 'none'
+    hint = f'groups: {known}. Choose with group in {SETTINGS}, or --group NAME'
+    if lost := [name for name in robot.groups if name not in semantic.groups]:
+        raise RobotError(f'{robot.semantic.name} has no group {", ".join(lost)}; {hint}')
+    joints = {name: _joints(name, semantic, tree) for name in semantic.groups}
+    for name in robot.groups:
+        try:
+            find_group(tree, semantic, name)
+        except urdf_reader.DescriptionError as error:
+            raise RobotError(f'{robot.semantic.name}: {error}; {hint}') from error
+        if idle := [joint for joint in joints[name] if joint not in drives]:
+            raise RobotError(f'bus.yml has no drive for {", ".join(idle)} of group {name}; {hint}')
+    driven = [name for name, each in joints.items() if each and set(each) <= set(drives)]
+    arms = robot.groups or _disjoint([name for name in semantic.arms if name in driven], joints)
+    arms = arms or tuple(driven[:1])
+    if not arms:
+        raise RobotError(f'no group of {robot.semantic.name} has a drive for each joint; {hint}')
+    tools = [name for name in semantic.tools if name in driven]
+    chosen = _disjoint([*arms, *tools], joints)
+    if shared := [name for name in arms if name not in chosen]:
+        raise RobotError(f'group {shared[0]} shares joints with {chosen[0]}; {hint}')
+    return MovedGroups(arms, chosen[len(arms) :])
+
+
+def _joints(name: str, semantic: SemanticDescription, tree: KinematicTree) -> Sequence[str]:
+    """Return the joints of a group; none where it cannot be moved."""
+    try:
+        return find_group(tree, semantic, name).joints
+    except urdf_reader.DescriptionError:
+        return ()
+
+
+def _disjoint(names: Sequence[str], joints: Mapping[str, Sequence[str]]) -> tuple[str, ...]:
+    """Return the groups that share no joint with one before them."""
+    taken: set[str] = set()
+    found = []
+    for name in names:
+        if taken.isdisjoint(joints[name]):
+            taken.update(joints[name])
+            found.append(name)
+    return tuple(found)

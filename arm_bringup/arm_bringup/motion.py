@@ -24,20 +24,23 @@ from process_supervisor import (
 
 from .description import read_semantic
 from .exceptions import RobotError
-from .groups import moved_groups
+from .groups import MovedGroups
 from .robots import Robot
 from .stack import MASTER, MOTION_MASTER
 
 MAKE_MOVE = 'build arm_servo (make build) for trajectories and jogging'
 
 
-def motion_files(robot: Robot, folder: Path, ros: RosOptions) -> Sequence[Path]:
+def motion_files(
+    robot: Robot, folder: Path, ros: RosOptions, groups: MovedGroups
+) -> Sequence[Path]:
     """Write the parameter file for the nodes of arm_servo.
 
     Args:
         robot: A robot with an SRDF and limits.
         folder: Where to.
         ros: Options of all nodes.
+        groups: Its groups that are moved.
 
     Returns:
         The files to hand over.
@@ -45,16 +48,23 @@ def motion_files(robot: Robot, folder: Path, ros: RosOptions) -> Sequence[Path]:
     values = {
         'robot_description_semantic': read_semantic(robot),
         'joint_limits': str(robot.limits),
-        'group': moved_groups(robot).arms[0],
+        'group': groups.names[0],
+        'other_groups': list(groups.names[1:]),
         'tip_link': robot.tip_link,
     }
     moveit_servo = {'frame_prefix': ros.frame_prefix}
+    servos = {'servo_node': {'ros__parameters': {'moveit_servo': moveit_servo}}} | {
+        f'{arm}_servo_node': {
+            'ros__parameters': {'group': arm, 'tip_link': '', 'moveit_servo': moveit_servo}
+        }
+        for arm in groups.arms[1:]
+    }
     path = folder / 'motion.yaml'  # JSON is YAML, whatever characters are in it
     path.write_text(
         json.dumps(
             {
                 EVERY_NODE: {'ros__parameters': values},
-                f'{EVERY_NODE}/servo_node': {'ros__parameters': {'moveit_servo': moveit_servo}},
+                **{f'{EVERY_NODE}/{name}': values for name, values in servos.items()},
             }
         ),
         encoding='utf-8',
@@ -64,12 +74,13 @@ def motion_files(robot: Robot, folder: Path, ros: RosOptions) -> Sequence[Path]:
     return [path, namespaced_parameters(robot.controllers, ros, folder)]
 
 
-def controller_name(robot: Robot) -> str:
+def controller_name(robot: Robot, groups: MovedGroups) -> str:
     """Return the name of a robot's trajectory controller.
 
     Args:
-        robot: A robot with an SRDF; without a name in controllers.yaml, that of its group is
-            used.
+        robot: A robot with an SRDF; without a name in controllers.yaml, that of its first group
+            is used.
+        groups: Its groups that are moved.
 
     Raises:
         RobotError: A file cannot be read as what it should be.
@@ -80,7 +91,7 @@ def controller_name(robot: Robot) -> str:
         raise RobotError(f'{robot.folder}: {error}') from error
     manager = table.get('controller_manager', {}).get('ros__parameters', {})
     named = manager.get('controller_name')
-    return str(named or f'{moved_groups(robot).arms[0]}_controller')
+    return str(named or f'{groups.names[0]}_controller')
 
 
 def choose_master(robot: Robot, find: FindExecutable) -> tuple[Executable, str]:

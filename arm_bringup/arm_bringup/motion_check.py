@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from typing import Any, TYPE_CHECKING
 
 from urdf_reader import KinematicTree, SemanticDescription
@@ -31,7 +31,11 @@ MARGIN = 0.02
 
 
 def check_motion(
-    robot: Robot, urdf: str, tree: KinematicTree, semantic: SemanticDescription
+    robot: Robot,
+    urdf: str,
+    tree: KinematicTree,
+    semantic: SemanticDescription,
+    drives: Collection[str],
 ) -> list[Finding]:
     """Look at the files that trajectories and jogging need.
 
@@ -40,6 +44,7 @@ def check_motion(
         urdf: Its description as XML text.
         tree: The same.
         semantic: Its SRDF.
+        drives: Joints with a drive.
     """
     try:
         from arm_model import LimitsError, load_limits, ModelError, RobotModel
@@ -54,7 +59,7 @@ def check_motion(
         ]
     try:
         limits = load_limits(robot.limits)
-        groups = choose_groups(robot, semantic)
+        groups = choose_groups(robot, semantic, tree, drives)
     except LimitsError as problem:
         return [error(robot.limits.name, str(problem), 'write it as robots/gp110/limits.yaml is')]
     except RobotError as problem:

@@ -41,8 +41,10 @@ FILES: Mapping[str, Sequence[str]] = {
     'controllers': ('controllers.yaml',),
 }
 """Names of each file of a robot folder; the first that exists is taken."""
-TABLES, WORDS = ('xacro_args', 'packages'), ('group', 'tip_link')
-"""Keys of :data:`SETTINGS` beside those of :data:`FILES`."""
+TABLES, WORDS = ('xacro_args', 'packages'), ('tip_link',)
+"""Keys of :data:`SETTINGS` beside those of :data:`FILES` and :data:`GROUP`."""
+GROUP = 'group'
+"""Key of one group, or of a list."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,8 +60,8 @@ class Robot:
         controllers: Parameters of the nodes that move it, if they are there.
         xacro_args: Values for the xacro arguments of description and SRDF.
         packages: Folders of packages that are not in AMENT_PREFIX_PATH, by name.
-        group: Group of the SRDF that is moved; empty takes the only one.
-        tip_link: Link that is moved; empty takes the end of the group.
+        groups: Groups of the SRDF that are moved; empty takes all arms of it.
+        tip_link: Link that is moved; empty takes the end of the first group.
     """
 
     name: str
@@ -70,7 +72,7 @@ class Robot:
     controllers: Path = Path()
     xacro_args: Mapping[str, str] = field(default_factory=dict)
     packages: Mapping[str, Path] = field(default_factory=dict)
-    group: str = ''
+    groups: tuple[str, ...] = ()
     tip_link: str = ''
 
     @property
@@ -184,11 +186,14 @@ def _settings(path: Path) -> dict[str, Any]:
         raise RobotError(f'{path}: it is no table of keys')
     settings: dict[str, Any] = {}
     for key, value in (document or {}).items():
-        if key not in (*FILES, *TABLES, *WORDS):
-            known = ', '.join((*FILES, *TABLES, *WORDS))
+        if key not in (*FILES, *TABLES, *WORDS, GROUP):
+            known = ', '.join((*FILES, *TABLES, *WORDS, GROUP))
             raise RobotError(f'{path}: unknown key {key!r}; keys: {known}')
         if key in TABLES and isinstance(value, dict):
             settings[key] = {str(name): _word(path, key, word) for name, word in value.items()}
+        elif key == GROUP:
+            names = value if isinstance(value, list) else [value]
+            settings['groups'] = tuple(_word(path, key, name) for name in names)
         elif key in TABLES:
             raise RobotError(f'{path}: {key}: a table of names and values is needed')
         else:

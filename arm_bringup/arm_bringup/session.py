@@ -101,7 +101,10 @@ def add_robot(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--group',
         metavar='NAME',
-        help='group of the SRDF to move (default: group of robot.yaml, else the only one)',
+        action='append',
+        default=[],
+        help='group of the SRDF to move; may be given several times, the first is the main one '
+        '(default: group of robot.yaml, else all arms that have drives)',
     )
     parser.add_argument(
         '--xacro-arg',
@@ -141,7 +144,7 @@ def locate(arguments: argparse.Namespace) -> Robot:
     robot = find_robot(arguments.robot, folder)
     return replace(
         robot,
-        group=arguments.group or robot.group,
+        groups=tuple(arguments.group) or robot.groups,
         xacro_args={**robot.xacro_args, **dict(arguments.xacro_arg)},
     )
 

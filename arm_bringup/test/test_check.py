@@ -13,6 +13,7 @@ import yaml
 from arm_bringup.check import check_robot, main
 from arm_bringup.exceptions import RobotError
 from arm_bringup.findings import Severity
+from arm_bringup.groups import moved_groups
 from arm_bringup.motion import controller_name
 from arm_bringup.robots import find_robot, Robot
 from arm_bringup.session import in_namespace_of_bus, read_bus
@@ -130,7 +131,7 @@ def test_without_the_files_of_motion(robot: Robot) -> None:
 @pytest.mark.parametrize('name', ['/left/{}', '/**/{}', 'cell/left/{}'])
 def test_nodes_of_controllers_yaml_may_have_a_namespace(robot: Robot, name: str) -> None:
     """They are looked at all the same, and the controller keeps its name."""
-    plain = controller_name(robot)
+    plain = controller_name(robot, moved_groups(robot))
     table = yaml.safe_load(robot.controllers.read_text())
     named = {name.format(node): values for node, values in table.items()}
     robot.controllers.write_text(yaml.safe_dump(named))
@@ -138,7 +139,7 @@ def test_nodes_of_controllers_yaml_may_have_a_namespace(robot: Robot, name: str)
     replace(robot.controllers, 'goal_time', 'goal_tim')
     assert [finding.severity for finding in check_robot(robot)] == [ERROR]
     replace(robot.controllers, f'controller_name: {plain}', 'controller_name: arm')
-    assert controller_name(robot) == 'arm'
+    assert controller_name(robot, moved_groups(robot)) == 'arm'
 
 
 def test_channels_of_a_drive_are_joints(robot: Robot) -> None:

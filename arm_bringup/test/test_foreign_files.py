@@ -9,11 +9,12 @@ from pathlib import Path
 import re
 
 import pytest
+from urdf_reader import parse_srdf, read_urdf
 
 from arm_bringup.bringup import parse
 from arm_bringup.description import expand_xacro, read_description, read_semantic
 from arm_bringup.exceptions import DescriptionError, RobotError
-from arm_bringup.groups import moved_groups, MovedGroups
+from arm_bringup.groups import choose_groups, MovedGroups
 from arm_bringup.robots import find_robot, Robot
 from arm_bringup.session import locate
 
@@ -56,7 +57,7 @@ def test_robot_yaml_names_files_elsewhere(folder: Path, tmp_path: Path) -> None:
     )
     robot = found(folder)
     assert 'vendor' in read_semantic(robot)
-    assert (robot.group, robot.tip_link) == ('manipulator', 'tool0')
+    assert (robot.groups, robot.tip_link) == (('manipulator',), 'tool0')
 
 
 @pytest.mark.parametrize(
@@ -67,7 +68,7 @@ def test_robot_yaml_names_files_elsewhere(folder: Path, tmp_path: Path) -> None:
         ('semantic: lost.srdf', r'semantic: there is no file .*lost.srdf'),
         ('packages: {vendor: lost}', 'packages: vendor: there is no folder'),
         ('xacro_args: [name]', 'xacro_args: a table'),
-        ('group: [left, right]', 'no text'),
+        ('group: [[left]]', 'no text'),
         ('group: {', 'robot.yaml'),
     ],
 )
@@ -90,7 +91,7 @@ def test_xacro_arguments_of_the_folder_and_of_the_command_line(folder: Path) -> 
     for read in (read_description, read_semantic):
         assert '<robot name="arm">' in read(robot)
         assert '<link name="ur10e_true"/>' in read(robot)
-    assert robot.group == 'left'
+    assert robot.groups == ('left',)
     with pytest.raises(SystemExit):
         parse([f'{folder}{os.sep}', '--xacro-arg', 'kind=ur10e'])
 
@@ -179,21 +180,51 @@ def test_one_that_is_there_and_wrong_is_told(tmp_path: Path) -> None:
         expand_xacro(file)
 
 
+JOINT = (
+    '<link name="{0}_link"/><joint name="{0}" type="revolute"><parent link="base"/>'
+    '<child link="{0}_link"/><limit lower="-1" upper="1" velocity="1" effort="1"/></joint>'
+)
 TWO_ARMS = (
     '<robot name="arm"><group name="left"><joint name="a"/></group>'
-    '<group name="right"><joint name="b"/></group>'
+    '<group name="right"><joint name="b"/></group><group name="bare"><link name="base"/></group>'
     '<group name="both"><group name="left"/><group name="right"/></group>'
-    '<group name="hand"><link name="c"/></group>'
-    '<end_effector name="hand" parent_link="a" group="hand" parent_group="left"/></robot>'
+    '<group name="wide"><joint name="a"/><joint name="d"/></group>'
+    '<group name="hand"><link name="c_link"/></group>'
+    '<end_effector name="hand" parent_link="a_link" group="hand" parent_group="left"/></robot>'
 )
 
 
-def test_arms_and_tools_of_an_srdf(folder: Path) -> None:
-    """All arms are moved unless one is named; groups of groups only by name."""
-    (folder / 'arm.srdf').write_text(TWO_ARMS)
-    assert moved_groups(found(folder)) == MovedGroups(('left', 'right'), ('hand',))
-    (folder / 'robot.yaml').write_text('group: both')
-    assert moved_groups(found(folder)) == MovedGroups(('both',), ('hand',))
-    (folder / 'robot.yaml').write_text('group: bath')
-    with pytest.raises(RobotError, match=r'group bath; groups: left, .*robot.yaml, or --group'):
-        moved_groups(found(folder))
+def groups(folder: Path, drives: str, settings: str = '') -> MovedGroups:
+    """Return the groups of TWO_ARMS that are moved."""
+    (folder / 'robot.yaml').write_text(settings)
+    tree = read_urdf(
+        f'<robot name="arm"><link name="base"/>{"".join(map(JOINT.format, "abcd"))}</robot>'
+    )
+    return choose_groups(found(folder), parse_srdf(TWO_ARMS), tree, drives)
+
+
+def test_all_arms_and_tools_with_drives_are_moved(folder: Path) -> None:
+    """Unless one is named; groups of groups, and what overlaps, only by name."""
+    assert groups(folder, 'abcd') == MovedGroups(('left', 'right'), ('hand',))
+    assert groups(folder, 'ab') == MovedGroups(('left', 'right'))
+    assert groups(folder, 'bc') == MovedGroups(('right',), ('hand',))
+    assert groups(folder, 'abc', 'group: both') == MovedGroups(('both',), ('hand',))
+    assert groups(folder, 'abcd', 'group: [wide, right]').arms == ('wide', 'right')
+    assert groups(folder, 'c').arms == ('hand',)
+
+
+@pytest.mark.parametrize(
+    ('drives', 'settings', 'words'),
+    [
+        ('abc', 'group: bath', r'no group bath; groups: left, .*group in robot.yaml, or --group'),
+        ('abc', 'group: wide', 'no drive for d of group wide'),
+        ('abcd', 'group: [left, wide]', 'group wide shares joints with left'),
+        ('d', '', 'no group of arm.srdf has a drive for each joint'),
+    ],
+)
+def test_groups_that_cannot_be_moved_are_told(
+    folder: Path, drives: str, settings: str, words: str
+) -> None:
+    """With those that there are, and where one is chosen."""
+    with pytest.raises(RobotError, match=words):
+        groups(folder, drives, settings)

@@ -12,6 +12,7 @@ from rclpy.context import Context
 from rclpy.node import Node
 import yaml
 
+from arm_bringup.groups import MovedGroups
 from arm_bringup.motion import choose_master, MAKE_MOVE, motion_files
 from arm_bringup.robots import Robot
 from arm_bringup.stack import arm_processes, controller_process, MASTER, MOTION_MASTER, Stack
@@ -99,7 +100,7 @@ def test_rcl_takes_what_a_person_says(tmp_path: Path, spelling: str, namespace: 
     )
     said = ['-p', 'rate:=9'] if spelling == '/**' else ['--params-file', str(user)]
     ros = RosOptions(namespace, tuple(said))
-    files = motion_files(robot, tmp_path, ros)
+    files = motion_files(robot, tmp_path, ros, MovedGroups(('arm',)))
     find = Underlay(tmp_path, 'arm_servo').find
     argv = controller_process(files[:-1], files[-1], 1.0, find, ros).argv
     context = Context()
@@ -123,7 +124,7 @@ def test_master_without_arm_servo(tmp_path: Path) -> None:
     srdf = '<robot name="my"><group name="arm"/></robot>'
     robot.semantic.write_text(srdf)
     assert choose_master(robot, full) == (MOTION_MASTER, '')
-    (file,) = motion_files(robot, tmp_path, RosOptions())
+    (file,) = motion_files(robot, tmp_path, RosOptions(), MovedGroups(('arm',)))
     values = yaml.safe_load(file.read_text())[EVERY_NODE]['ros__parameters']
     assert (values['robot_description_semantic'], values['group']) == (srdf, 'arm')
 

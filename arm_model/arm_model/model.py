@@ -4,18 +4,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from itertools import combinations
 import math
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from urdf_reader import EndEffector, parse_srdf, read_urdf
+from urdf_reader import EndEffector, find_group, KinematicTree, Pair, parse_srdf, read_urdf
 
 from .arrays import Array, frozen, Native
 from .exceptions import CommandError, description_refused, ModelError, SceneError
-from .groups import find_group
 from .kinematics import Kinematics
 from .limits import JointLimits, merge_limits
 from .pose import Pose, turned_twists
@@ -24,6 +24,9 @@ from .scene.clearances import Clearances, LeastClearance, Proximity
 from .scene.default_collisions import with_default_collisions
 from .scene.link_shapes import link_shapes
 from .scene.planning_scene import PlanningScene
+
+MIN_REACH = 0.01
+"""Reach of a group that is shorter, such as a finger that slides, in [m]."""
 
 
 class RobotModel:
@@ -57,6 +60,7 @@ class RobotModel:
         tip: str | None = None,
         *,
         folder: Path | None = None,
+        moved_by_others: Collection[str] = (),
     ) -> None:
         """Build and check the arm.
 
@@ -67,6 +71,8 @@ class RobotModel:
             group: The group; by default the only one of the SRDF that is no tool.
             tip: The tip link; by default the end of the group's chain.
             folder: Folder of the URDF, where names of mesh files are relative.
+            moved_by_others: Joints of which nothing is known here: links that they move against
+                each other are not checked.
 
         Raises:
             ModelError: The three do not fit together; the message names what to mend.
@@ -101,6 +107,13 @@ class RobotModel:
         self.scene = with_default_collisions(
             PlanningScene(self.kinematics, shapes.by_link, allowed), tree, self.limits, notes
         )
+        if moved_by_others:
+            unknown = _moved_by(self._tree, self.scene.link_shapes, moved_by_others)
+            self.scene = self.scene.with_allowed(self.scene.allowed.with_entries(unknown, True))
+            notes.append(
+                f'group {self.group}: no collision check against links that other groups move, by'
+                f' {", ".join(moved_by_others)}'
+            )
         self.notes = tuple(notes)
         self._clearances = Clearances(self.scene)
         self.reach = self._reach()
@@ -307,7 +320,19 @@ class RobotModel:
             for joint in self._trunk()[1:]
         ]
         tip = self._model.frames[self._tip_frame].placement.translation
-        return float(sum(lengths) + np.linalg.norm(tip))
+        return max(float(sum(lengths) + np.linalg.norm(tip)), MIN_REACH)
+
+
+def _moved_by(
+    tree: KinematicTree, links: Iterable[str], joints: Collection[str]
+) -> Iterator[Pair]:
+    """Return the pairs of links that some joints move against each other."""
+    above = {
+        link: {joint.name for joint in tree.chain(tree.root, link)} & set(joints) for link in links
+    }
+    for first, second in combinations(above, 2):
+        if above[first] != above[second]:
+            yield frozenset((first, second))
 
 
 def _poses(

@@ -6,10 +6,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from urdf_reader import KinematicTree, parse_srdf, read_urdf
+from urdf_reader import find_group, KinematicTree, parse_srdf, read_urdf
 
 from .exceptions import description_refused
-from .groups import find_group
 
 
 @dataclass(frozen=True, slots=True)

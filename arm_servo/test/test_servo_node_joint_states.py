@@ -15,6 +15,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from servo_drives import Drives, PERIOD
+from urdf_reader import Mimic
 
 from arm_servo.ros.joint_state_broadcaster import (
     JointSample,
@@ -31,7 +32,7 @@ def ready() -> tuple[Drives, JointSamples]:
     drives = Drives()
     drives.attach()
     drives.run(2)
-    return drives, JointSamples(drives.gateway.model.joints)
+    return drives, JointSamples(drives.gateway.model.joints, {})
 
 
 def test_a_cycle_that_stands_still_makes_no_new_states() -> None:
@@ -76,7 +77,9 @@ def test_a_gripper_is_published_with_the_arm(isolation: Isolation) -> None:
     nodes: list[Any] = [Node('joint_state_broadcaster'), Node('gripper')]
     node, gripper = nodes
     try:
-        JointStateBroadcaster(node, drives.gateway, ['gripper'], active=True)
+        JointStateBroadcaster(
+            node, drives.gateway, ['gripper'], {'finger': Mimic('gripper', -2.0, 1.0)}, active=True
+        )
         publisher = gripper.create_publisher(JointState, 'gripper/joint_states', 10)
         gripper.create_subscription(JointState, 'joint_states', heard.append, 10)
         executor = SingleThreadedExecutor()
@@ -94,7 +97,7 @@ def test_a_gripper_is_published_with_the_arm(isolation: Isolation) -> None:
             each.destroy_node()
         rclpy.shutdown()
     whole = next(message for message in heard if 'gripper' in message.name)
-    assert [*whole.name] == [*drives.source.axes, 'gripper']
-    assert whole.position[-1] == 0.04
+    assert [*whole.name] == [*drives.source.axes, 'gripper', 'finger']
+    assert [*whole.position[-2:]] == pytest.approx([0.04, 0.92])
     age = time.time() - (whole.header.stamp.sec + 1e-9 * whole.header.stamp.nanosec)
     assert age >= 0.3

@@ -3,11 +3,13 @@
 """The robot model in ROS: from parameters, and its frames beside those of TF."""
 
 from .numbers import duration_fields, seconds, xyz, xyzw
-from .robot_parameters import declare_robot, same_robot
+from .robot_parameters import declare_groups, declare_robot, GroupModels, same_robot
 from .tf_listener import TfListener
 
 __all__ = [
+    'GroupModels',
     'TfListener',
+    'declare_groups',
     'declare_robot',
     'duration_fields',
     'same_robot',

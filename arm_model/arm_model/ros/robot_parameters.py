@@ -4,15 +4,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
 from pathlib import Path
 
 from rclpy.node import Node
+from urdf_reader import find_group, parse_srdf, read_urdf
 
 from node_runner import ParameterReader
 
-from ..exceptions import ModelError
+from ..exceptions import description_refused, ModelError
 from ..limits import load_limits
 from ..model import RobotModel
+
+
+@dataclass(frozen=True, slots=True)
+class GroupModels:
+    """The groups of a robot that are moved, each by itself.
+
+    Attributes:
+        arms: Arms; the first is that of the parameter ``group``.
+        tools: End effectors.
+    """
+
+    arms: Sequence[RobotModel]
+    tools: Sequence[RobotModel] = ()
 
 
 def declare_robot(node: Node) -> RobotModel:
@@ -24,6 +41,45 @@ def declare_robot(node: Node) -> RobotModel:
     Raises:
         ModelError: A parameter is missing, or they do not make an arm.
     """
+    urdf, srdf, limits, group, tip = _given(node)
+    return RobotModel(urdf, srdf, load_limits(Path(limits)), group or None, tip or None)
+
+
+def declare_groups(node: Node) -> GroupModels:
+    """Declare what describes a robot of several groups that are moved, and build them.
+
+    Args:
+        node: The node.
+
+    Raises:
+        ModelError: A parameter is missing, they do not make an arm, or groups share a joint.
+    """
+    names = ParameterReader(node).texts(
+        'other_groups', [], 'groups of the SRDF that are moved beside group, each by itself'
+    )
+    if not names:
+        return GroupModels([declare_robot(node)])
+    urdf, srdf, limits, group, tip = _given(node)
+    with description_refused():
+        semantic, tree = parse_srdf(srdf), read_urdf(urdf)
+        joints = {name: find_group(tree, semantic, name).joints for name in (group, *names)}
+    for first, second in combinations(joints, 2):
+        if shared := set(joints[first]) & set(joints[second]):
+            raise ModelError(f'groups {first} and {second} share the joint {min(shared)}')
+    table = load_limits(Path(limits))
+    arms = [name for name in joints if name == group or name not in semantic.tools]
+
+    def arm(name: str) -> RobotModel:
+        others = [joint for other in arms if other != name for joint in joints[other]]
+        tip_link = tip if name == group else ''
+        return RobotModel(urdf, srdf, table, name, tip_link or None, moved_by_others=others)
+
+    tools = [RobotModel(urdf, srdf, table, name) for name in joints if name not in arms]
+    return GroupModels([arm(name) for name in arms], tools)
+
+
+def _given(node: Node) -> tuple[str, str, str, str, str]:
+    """Declare what describes an arm, and make sure that it is given."""
     urdf, srdf, limits, group, tip = _declare(node)
     for name, value in (
         ('robot_description', urdf),
@@ -32,7 +88,7 @@ def declare_robot(node: Node) -> RobotModel:
     ):
         if not value:
             raise ModelError(f'no {name}: give it with --ros-args -p {name}:=... or a params file')
-    return RobotModel(urdf, srdf, load_limits(Path(limits)), group or None, tip or None)
+    return urdf, srdf, limits, group, tip
 
 
 def same_robot(node: Node, model: RobotModel) -> None:

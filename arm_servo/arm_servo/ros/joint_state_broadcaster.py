@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 import math
@@ -15,6 +15,7 @@ import numpy as np
 from rclpy.duration import Duration
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
+from urdf_reader import Mimic
 
 from node_runner import ParameterReader
 
@@ -43,10 +44,10 @@ class JointSample:
 
 
 class JointSamples:
-    """What is known of the arm's joints, and of drives beside them such as a gripper."""
+    """What is known of the arm's joints, of drives beside them, and of joints that mimic these."""
 
-    def __init__(self, joints: Sequence[str]) -> None:
-        self._joints = list(joints)
+    def __init__(self, joints: Sequence[str], mimics: Mapping[str, Mimic]) -> None:
+        self._joints, self._mimics = list(joints), mimics
         self._heard: dict[str, JointSample] = {}
 
     def hear(self, joint: str, sample: JointSample) -> None:
@@ -60,11 +61,15 @@ class JointSamples:
             snapshot: What the core does.
             now: Steady time in [s].
         """
-        return {
+        fresh = {
             name: sample
             for name, sample in (self._of_the_arm(snapshot) | self._heard).items()
             if now - sample.time <= MAX_AGE
         }
+        for name, mimic in self._mimics.items():
+            if mimic.source in fresh and name not in fresh:
+                fresh[name] = _mimicked(mimic, fresh[mimic.source])
+        return fresh
 
     def _of_the_arm(self, snapshot: Snapshot) -> dict[str, JointSample]:
         measured = snapshot.measured
@@ -76,6 +81,12 @@ class JointSamples:
             name: JointSample(float(position), float(velocity), snapshot.time - float(age))
             for name, position, velocity, age in rows
         }
+
+
+def _mimicked(mimic: Mimic, source: JointSample) -> JointSample:
+    """Return what a joint does that follows another."""
+    position = mimic.multiplier * source.position + mimic.offset
+    return JointSample(position, mimic.multiplier * source.velocity, source.time)
 
 
 def declare_broadcaster(node: Node) -> tuple[str, float, bool]:
@@ -103,7 +114,13 @@ class JointStateBroadcaster:
     """
 
     def __init__(
-        self, node: Node, gateway: CommandGateway, others: Sequence[str], *, active: bool
+        self,
+        node: Node,
+        gateway: CommandGateway,
+        others: Sequence[str],
+        mimics: Mapping[str, Mimic],
+        *,
+        active: bool,
     ) -> None:
         """Advertise.
 
@@ -111,12 +128,13 @@ class JointStateBroadcaster:
             node: The node ``joint_state_broadcaster``.
             gateway: Commands to the core.
             others: Drives that are no joints of the arm; they publish ``<drive>/joint_states``.
+            mimics: Joints that follow one that has a drive.
             active: Whether it publishes from the start.
         """
         self.active = active
         self._node, self._gateway = node, gateway
         self._frame, self.rate, self._is_dynamic = declare_broadcaster(node)
-        self._samples = JointSamples(gateway.model.joints)
+        self._samples = JointSamples(gateway.model.joints, mimics)
         self._states = node.create_publisher(JointState, 'joint_states', 10)
         self._dynamic = node.create_publisher(DynamicJointState, 'dynamic_joint_states', 10)
         for name in others:

@@ -7,28 +7,22 @@ It takes what ``ros2 run arm_canopen master`` takes, and what describes the arm.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import ExitStack
 import sys
 from typing import TYPE_CHECKING
 
 from rclpy.node import Node
+from urdf_reader import Mimic, read_urdf
 
 from arm_canopen import run_master
-from arm_model import ArmError, ModelError
-from arm_model.ros import declare_robot, same_robot
+from arm_model import ArmError
+from arm_model.ros import declare_groups
 from node_runner import destroyed_if_refused
 
-from ..core.gateway import CommandGateway, start_worker
-from ..core.motion_core import MotionCore
-from ..core.settings import CoreSettings
-from ..io.drive_source import DriveSource
-from .controller_manager import ControllerManager, declare_manager, trajectory_entry
+from .controller_manager import ControllerManager, declare_manager
+from .group_motion import ArmMotion, check_drives, ToolMotion
 from .joint_state_broadcaster import JointStateBroadcaster
-from .servo.node import Servo
-from .servo.parameters import declare_servo
-from .trajectory.controller import TrajectoryController
-from .trajectory.parameters import declare_trajectory
 from .upstream_parameters import check_names
 
 if TYPE_CHECKING:
@@ -39,7 +33,7 @@ ATTACH_PERIOD = 0.2
 
 
 class Motion:
-    """The nodes of an arm whose drives are on one bus.
+    """The nodes of a robot whose drives are on one bus.
 
     Attributes:
         nodes: The nodes, for the executor of the master.
@@ -61,66 +55,56 @@ class Motion:
 
     def _build(self, make_node: Callable[[str], Node]) -> None:
         self._manager = manager = make_node('controller_manager')
-        model = declare_robot(manager)
-        name, broadcasts = declare_manager(manager, model)
-        self._check_drives(self._master, model.joints)
-        controller, servo = make_node(name), make_node('servo_node')
+        models = declare_groups(manager)
+        main, *others = models.arms
+        name, broadcasts = declare_manager(manager, main)
+        for model in (*models.arms, *models.tools):
+            check_drives(self._master, model)
+        self._groups: list[ArmMotion | ToolMotion] = [
+            ArmMotion(self._master, main, make_node(name), make_node('servo_node'))
+        ]
+        for model in others:
+            controller = make_node(f'{model.group}_controller')
+            servo = make_node(f'{model.group}_servo_node')
+            self._groups.append(ArmMotion(self._master, model, controller, servo))
+        for model in models.tools:
+            controller = make_node(f'{model.group}_controller')
+            self._groups.append(ToolMotion(self._master, model, controller))
         broadcaster = make_node('joint_state_broadcaster')
-        self.nodes = [manager, controller, servo, broadcaster]
-        same_robot(servo, model)
-        trajectory = declare_trajectory(controller, model.joints)
-        jogging = declare_servo(servo, model)
-        settings = CoreSettings(
-            jogging.settings,
-            trajectory.execution,
-            jogging.timeout,
-            jogging.clearance,
-            check_self_collision=trajectory.check,
-        )
-        self._gateway = CommandGateway(MotionCore(model, settings), start_worker())
-        self._source = DriveSource(self._gateway)
-        self._servo = Servo(servo, self._gateway, jogging, self._prepare)
-        self._controller = TrajectoryController(
-            controller, self._gateway, trajectory, self._prepare
-        )
         self._broadcaster = JointStateBroadcaster(
             broadcaster,
-            self._gateway,
-            [name for name in self._master.bus.joints if name not in model.joints],
+            self._groups[0].drives.gateway,
+            [name for name in self._master.bus.joints if name not in main.joints],
+            _mimics(manager),
             active=broadcasts,
         )
-        period = self._master.bus.master.sync_period
-        self._switch = ControllerManager(
+        self.nodes = [
             manager,
-            [
-                trajectory_entry(name, model.joints, period, self._controller.set_active),
-                self._broadcaster.entry(),
-            ],
-        )
+            *(node for group in self._groups for node in group.nodes),
+            broadcaster,
+        ]
+        period = self._master.bus.master.sync_period
+        entries = [group.entry(period) for group in self._groups]
+        self._switch = ControllerManager(manager, [*entries, self._broadcaster.entry()])
         for node in self.nodes:
             check_names(node)
-        for note in model.notes:
+        notes = (note for model in (*models.arms, *models.tools) for note in model.notes)
+        for note in dict.fromkeys(notes):
             manager.get_logger().warning(note)
         self._attaching = manager.create_timer(ATTACH_PERIOD, self._attach_first)
 
-    def _check_drives(self, master: MasterProcess, joints: Sequence[str]) -> None:
-        drives = master.bus.joints
-        missing = [name for name in joints if name not in drives]
-        if missing:
-            raise ModelError(
-                f'{master.bus.file} has no drive {missing[0]!r}; drives have the names of the'
-                f' joints, and there are: {", ".join(drives) or "none"}'
-            )
-
     def _attach_first(self) -> None:
-        self._prepare()
-        if self._gateway.snapshot.time:  # the cycle asks for set-points
+        waiting = [group.drives for group in self._groups if not group.drives.running]
+        for drives in waiting:
+            drives.prepare()
+        if not waiting:  # the cycle asks for set-points
             self._manager.destroy_timer(self._attaching)
 
-    def _prepare(self) -> None:
-        """Get back the drives that were taken away, for the motion that follows."""
-        if self._source.detached:
-            self._source.attach(self._master.attach)
+
+def _mimics(node: Node) -> dict[str, Mimic]:
+    """Return the joints of the description that follow others."""
+    tree = read_urdf(node.get_parameter('robot_description').value)
+    return {joint.name: joint.mimic for joint in tree.movable() if joint.mimic is not None}
 
 
 def main(argv: list[str] | None = None) -> int:

@@ -7,6 +7,7 @@ model of an arm, publishers of joint states and of /tf, bring-ups.
 """
 
 from .exceptions import DescriptionError
+from .groups import find_group, JointGroup
 from .srdf import EndEffector, Group, Pair, parse_srdf, SemanticDescription
 from .transforms import about, from_rpy, multiply, Quaternion, rotate, Transform, Vector
 from .urdf import Collision, Joint, JointKind, JointRange, KinematicTree, Mimic, MOVABLE, read_urdf
@@ -18,6 +19,7 @@ __all__ = [
     'EndEffector',
     'Group',
     'Joint',
+    'JointGroup',
     'JointKind',
     'JointRange',
     'KinematicTree',
@@ -28,6 +30,7 @@ __all__ = [
     'Transform',
     'Vector',
     'about',
+    'find_group',
     'from_rpy',
     'multiply',
     'parse_srdf',

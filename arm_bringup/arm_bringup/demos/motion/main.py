@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from functools import partial
 import json
 from pathlib import Path
 import sys
@@ -23,7 +24,7 @@ from process_supervisor.arguments import seconds_from
 
 from ...description import joint_limits, read_semantic
 from ...exceptions import BringupError, RobotError
-from ...groups import moved_groups
+from ...groups import moved_groups, MovedGroups
 from ...motion import controller_name, motion_files
 from ...robots import Robot
 from ...session import (
@@ -71,16 +72,17 @@ def parse(argv: Sequence[str]) -> tuple[argparse.Namespace, RosOptions]:
     return parse_with_ros(parser, argv)
 
 
-def demo_files(robot: Robot, folder: Path, ros: RosOptions) -> Sequence[Path]:
+def demo_files(robot: Robot, folder: Path, ros: RosOptions, groups: MovedGroups) -> Sequence[Path]:
     """Write the parameter files of the demo: the robot's own, and what the demo relies on.
 
     Args:
         robot: A robot with an SRDF and limits.
         folder: Where to.
         ros: Options of all nodes.
+        groups: Its groups that are moved.
     """
     values = {
-        controller_name(robot): {'ros__parameters': {'state_publish_rate': RATE}},
+        controller_name(robot, groups): {'ros__parameters': {'state_publish_rate': RATE}},
         'servo_node': {
             'ros__parameters': {
                 'moveit_servo': {
@@ -93,15 +95,16 @@ def demo_files(robot: Robot, folder: Path, ros: RosOptions) -> Sequence[Path]:
     path = folder / 'demo.yaml'
     path.write_text(json.dumps(values), encoding='utf-8')
     # the later of two equal names wins; a pattern of an earlier file loses to any name
-    return [*motion_files(robot, folder, ros), namespaced_parameters(path, ros, folder)]
+    return [*motion_files(robot, folder, ros, groups), namespaced_parameters(path, ros, folder)]
 
 
-def build_model(robot: Robot, urdf: str) -> RobotModel:
+def build_model(robot: Robot, urdf: str, group: str) -> RobotModel:
     """Build the arm, for where its tool is.
 
     Args:
         robot: The robot.
         urdf: Its description.
+        group: The group that is moved.
 
     Raises:
         ModelError: Its files do not make an arm.
@@ -110,16 +113,17 @@ def build_model(robot: Robot, urdf: str) -> RobotModel:
         urdf,
         read_semantic(robot),
         load_limits(robot.limits),
-        moved_groups(robot).arms[0],
+        group,
         robot.tip_link or None,
     )
 
 
-def run(arm: Session, duration: float | None) -> int:
+def run(arm: Session, groups: MovedGroups, duration: float | None) -> int:
     """Run the demo.
 
     Args:
         arm: The arm, prepared.
+        groups: Its groups that are moved; the first shows what it can.
         duration: How long it is repeated in [s]; None until Ctrl-C.
 
     Returns:
@@ -130,10 +134,10 @@ def run(arm: Session, duration: float | None) -> int:
     """
     from arm_canopen import load_bus
 
-    model = build_model(arm.robot, arm.urdf)
+    model = build_model(arm.robot, arm.urdf, groups.arms[0])
     start = start_pose(model)
     period = load_bus(arm.robot.bus_config).master.sync_period
-    controller = controller_name(arm.robot)
+    controller = controller_name(arm.robot, groups)
     limits = {name: each for name, each in joint_limits(arm.urdf).items() if name in arm.drives}
     title = f'{arm.robot.name}: {len(arm.drives)} simulated drives on {arm.bus}'
 
@@ -189,15 +193,16 @@ def main(argv: Sequence[str] | None = None) -> int:
                 f'{robot.name} lacks {robot.lacking}: '
                 f'ros2 run arm_bringup check {arguments.robot} tells more'
             )
+        groups = moved_groups(robot)
         with session(
             arguments,
             ros,
             simulate=True,
             master=MOTION_MASTER,
             master_parameters={'diagnostics_period': '0.2'},
-            master_files=demo_files,
+            master_files=partial(demo_files, groups=groups),
         ) as arm:
-            return run(arm, arguments.duration)
+            return run(arm, groups, arguments.duration)
     except (BringupError, SupervisorError, ArmError) as error:
         sys.stderr.write(f'{error}\n')
         return USAGE_ERROR

@@ -7,14 +7,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from urdf_reader import (
-    DescriptionError,
-    Group,
-    Joint,
-    JointKind,
-    KinematicTree,
-    SemanticDescription,
-)
+from .exceptions import DescriptionError
+from .srdf import Group, SemanticDescription
+from .urdf import Joint, JointKind, KinematicTree
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,133 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Two arms and a gripper of one description, brought up from files that nobody edited."""
+
+from __future__ import annotations
+
+from typing import Any, TYPE_CHECKING
+
+from control_msgs.action import FollowJointTrajectory, GripperCommand, ParallelGripperCommand
+from control_msgs.msg import JointJog
+from controller_manager_msgs.srv import ListControllers
+from processes import RunningProcess
+import pytest
+from ros_client import RosClient
+from sensor_msgs.msg import JointState
+from tf2_msgs.msg import TFMessage
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+from two_arms import ARMS, DRIVES, FOLLOWER, GRIPPER, write_two_arms
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+    from pathlib import Path
+
+    from isolation import Isolation
+
+pytestmark = pytest.mark.scenario
+
+SUCCEEDED, ABORTED = 4, 6
+TARGETS = {'left': [0.4, -0.3, 0.5], 'right': [-0.4, 0.1]}
+
+
+class Robot:
+    """The robot, brought up with its drives enabled.
+
+    Attributes:
+        client: The test's own node.
+        at: Newest position of each joint.
+    """
+
+    def __init__(self, client: RosClient) -> None:
+        """Listen to its joints."""
+        self.client = client
+        self.at: dict[str, float] = {}
+        client.node.create_subscription(JointState, '/joint_states', self._take, 10)
+
+    def _take(self, message: JointState) -> None:
+        self.at.update(zip(message.name, message.position, strict=True))
+
+    def send(self, action: Any, name: str, goal: Any) -> Any:
+        """Send a goal; return the future of its result."""
+        client: Any = self.client.action(action, name)
+        self.client.spin_until(client.server_is_ready, 60.0, name)
+        sent = client.send_goal_async(goal)
+        self.client.spin_until(sent.done, 60.0, f'an answer of {name}')
+        return sent.result().get_result_async()
+
+    def follow(self, arm: str, seconds: int) -> Any:
+        """Send an arm to its target."""
+        point = JointTrajectoryPoint(positions=TARGETS[arm])
+        point.time_from_start.sec = seconds
+        trajectory = JointTrajectory(joint_names=list(ARMS[arm]), points=[point])
+        goal = FollowJointTrajectory.Goal(trajectory=trajectory)
+        return self.send(FollowJointTrajectory, f'/{arm}_controller/follow_joint_trajectory', goal)
+
+    def grip(self, position: float) -> Any:
+        """Move the gripper, by the action of grippers of one joint."""
+        goal = GripperCommand.Goal()
+        goal.command.position = position
+        return self.send(GripperCommand, '/hand_controller/gripper_cmd', goal)
+
+    def results(self, futures: Sequence[Any]) -> list[Any]:
+        """Wait for the end of goals."""
+        self.client.spin_until(lambda: all(each.done() for each in futures), 60.0, 'results')
+        return [each.result() for each in futures]
+
+
+@pytest.fixture
+def robot(isolation: Isolation, tmp_path: Path) -> Iterator[Robot]:
+    """Bring the robot up."""
+    folder = write_two_arms(tmp_path / 'two_arms')
+    command = ['ros2', 'run', 'arm_bringup', 'bringup', f'{folder}/', '--simulate', '--enable']
+    with (
+        RunningProcess([*command, '--can', isolation.bus], isolation.env) as bringup,
+        RosClient(isolation.domain_id) as client,
+    ):
+        bringup.wait_for(f'all {len(DRIVES)} drives are enabled', 90.0)
+        yield Robot(client)
+        assert bringup.stop(30.0) == 0, bringup.output
+
+
+def test_both_arms_and_the_gripper_move_at_the_same_time(robot: Robot) -> None:
+    """Each by its own controller; /joint_states and /tf have all that has a drive."""
+    transforms = robot.client.listen(TFMessage, '/tf')
+    listing = robot.client.call(
+        ListControllers, '/controller_manager/list_controllers', ListControllers.Request()
+    )
+    names = {each.name for each in listing.controller}
+    assert {'left_controller', 'right_controller', 'hand_controller'} <= names
+    runs = [robot.follow('left', 4), robot.follow('right', 4), robot.grip(0.03)]
+    left, right, hand = robot.results(runs)
+    assert [left.status, right.status, hand.status] == [SUCCEEDED] * 3, (left, right, hand)
+    assert hand.result.reached_goal
+    for arm, joints in ARMS.items():
+        assert [robot.at[name] for name in joints] == pytest.approx(TARGETS[arm], abs=1e-3)
+    assert robot.at[GRIPPER] == pytest.approx(0.03, abs=1e-3)
+    assert robot.at[FOLLOWER] == robot.at[GRIPPER]
+    assert set(robot.at) == {*DRIVES, FOLLOWER}
+
+    def frames() -> set[str]:
+        return {each.child_frame_id for message in transforms for each in message.transforms}
+
+    wanted = {f'{name}_link' for name in (*DRIVES, FOLLOWER)}
+    robot.client.spin_until(lambda: frames() >= wanted, 60.0, 'frames of all joints')
+
+
+def test_a_gripper_takes_goals_of_either_kind_and_the_newer_one_counts(robot: Robot) -> None:
+    """A goal beyond the range is refused; a second arm is jogged by a servo of its own."""
+    robot.client.spin_until(lambda: GRIPPER in robot.at, 60.0, 'joint states')
+    beyond = robot.results([robot.grip(0.2)])[0]
+    assert (beyond.status, beyond.result.reached_goal) == (ABORTED, False)
+    goal = ParallelGripperCommand.Goal()
+    goal.command.name, goal.command.position = [GRIPPER], [0.035]
+    goal.command.velocity = [0.005]  # slow enough for another one in between
+    first = robot.send(ParallelGripperCommand, '/hand_controller/parallel_gripper_cmd', goal)
+    robot.client.spin_until(lambda: robot.at[GRIPPER] > 0.002, 60.0, 'motion of the gripper')
+    old, new = robot.results([first, robot.grip(0.001)])
+    assert (old.status, new.status) == (ABORTED, SUCCEEDED)
+    assert robot.at[GRIPPER] == pytest.approx(0.001, abs=2e-3)
+    jogs = robot.client.node.create_publisher(JointJog, '/right_servo_node/delta_joint_cmds', 10)
+    jog = JointJog(joint_names=['right_slide'], velocities=[1.0])
+    robot.client.node.create_timer(0.02, lambda: jogs.publish(jog))
+    robot.client.spin_until(lambda: robot.at['right_slide'] > 0.05, 60.0, 'motion of the slide')
+    assert [robot.at[name] for name in ARMS['left']] == pytest.approx([0.0] * 3, abs=1e-3)
