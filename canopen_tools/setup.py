@@ -37,7 +37,7 @@ setup(
         ('share/ament_index/resource_index/packages', ['resource/canopen_tools']),
         ('share/canopen_tools', ['package.xml']),
     ],
-    install_requires=[sibling('arm_canopen')],
+    install_requires=['python-can>=4.3', sibling('arm_canopen')],
     zip_safe=True,
     maintainer='The arm and quad developers',
     maintainer_email='developers@example.org',

@@ -16,6 +16,7 @@ import time
 
 from isolation import Isolation
 import pytest
+from readme_folder import READMES, run_examples
 
 from arm_canopen import open_bus
 from arm_canopen.can.frame import Frame
@@ -152,7 +153,7 @@ def environment(tmp_path_factory: pytest.TempPathFactory) -> Environment:
     variables['PATH'] = f'{folder / "bin"}:/usr/bin:/bin'
     variables['PYTHONUNBUFFERED'] = '1'
     made = Environment(folder, variables)
-    _install(made, ['setuptools>=70'])
+    _install(made, ['setuptools>=70', 'sybil'])
     # an environment for each of twenty builds would take half a minute
     _install(made, ['--no-build-isolation', *(f'{source}/{name}' for name in INSTALLED)])
     return made
@@ -271,3 +272,14 @@ def test_a_model_is_printed(environment: Environment) -> None:
     done = environment.run('quad-urdf')
     assert done.returncode == 0, done.stderr
     assert '<robot' in done.stdout
+
+
+@pytest.mark.parametrize('package', READMES)
+def test_examples_of_the_readmes_run(
+    environment: Environment, package: str, tmp_path: Path, isolation: Isolation
+) -> None:
+    """Here, too, and not only where ROS is."""
+    variables = {**environment.variables, 'ROS_DOMAIN_ID': str(isolation.domain_id)}
+    python = environment.folder / 'bin' / 'python'
+    done = run_examples(package, tmp_path, python, variables)
+    assert done.returncode == 0, done.stderr

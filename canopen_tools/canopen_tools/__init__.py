@@ -1,3 +1,13 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The `canopen` command, `candump` in words, EDS lint, DCF export, LSS; without ROS."""
+"""The `canopen` command, `candump` in words, EDS lint, DCF export, LSS; without ROS.
+
+The names here are the public API.
+"""
+
+from .candump_log import read_log
+from .eds_lint.lint import EdsReport, lint_eds
+from .monitor.describe import FrameDescriber
+from .monitor.description import Description
+
+__all__ = ['Description', 'EdsReport', 'FrameDescriber', 'lint_eds', 'read_log']

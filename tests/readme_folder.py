@@ -1,0 +1,68 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The files and the robot that the examples of the READMEs are written for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from contextlib import ExitStack
+from pathlib import Path
+import shutil
+import subprocess
+import sys
+
+from arm_bringup.description import expand_xacro
+
+CHECKOUT = Path(__file__).parents[1]
+READMES = (
+    'arm_canopen',
+    'arm_model',
+    'arm_servo',
+    'arm_trajectory',
+    'canopen_sim',
+    'canopen_tools',
+    'quad_controller',
+    'quad_description',
+    'quad_hardware',
+    'quad_sim',
+    'robot_viewer',
+)
+"""Packages that are libraries without ROS, too."""
+PANDA = CHECKOUT / 'arm_bringup' / 'robots' / 'panda'
+PORT = '/dev/ttyAMA0'  # of the robot, in the READMEs
+PATIENCE = 120.0  # [s]
+
+
+def run_examples(
+    package: str, folder: Path, python: str | Path, env: Mapping[str, str]
+) -> subprocess.CompletedProcess[str]:
+    """Run the examples of a README in a folder with the files of an arm, beside a simulated XGO.
+
+    Args:
+        package: The package.
+        folder: An empty folder.
+        python: The interpreter whose packages are used.
+        env: Environment of the processes; its ROS domain chooses the CAN bus.
+    """
+    for file in ('bus.yml', 'cia402_slave.eds', 'panda.srdf', 'limits.yaml'):
+        shutil.copy(PANDA / file, folder)
+    (folder / 'panda.urdf').write_text(expand_xacro(PANDA / 'panda.urdf.xacro'))
+    text = (CHECKOUT / package / 'README.md').read_text()
+    readme, port = folder / 'README.md', folder / 'xgo'
+    readme.write_text(text.replace(PORT, str(port)))
+    with ExitStack() as stack:
+        if PORT in text:
+            board = [sys.executable, '-m', 'quad_sim.fake_xgo', '--no-ros', '--link', str(port)]
+            process = stack.enter_context(subprocess.Popen(board, stdout=subprocess.PIPE))
+            stack.callback(process.terminate)
+            assert process.stdout is not None
+            assert process.stdout.readline()  # it is there
+        return subprocess.run(
+            [python, Path(__file__).with_name('readme_examples.py'), readme],
+            cwd=folder,
+            env=env,
+            capture_output=True,
+            text=True,
+            timeout=PATIENCE,
+            check=False,
+        )
