@@ -45,13 +45,14 @@ def motion_files(
     Returns:
         The files to hand over.
     """
-    values = {
+    values: dict[str, str | list[str]] = {
         'robot_description_semantic': read_semantic(robot),
         'joint_limits': str(robot.limits),
         'group': groups.names[0],
-        'other_groups': list(groups.names[1:]),
         'tip_link': robot.tip_link,
     }
+    if others := groups.names[1:]:  # an empty list has no type in a parameter file
+        values['other_groups'] = list(others)
     moveit_servo = {'frame_prefix': ros.frame_prefix}
     servos = {'servo_node': {'ros__parameters': {'moveit_servo': moveit_servo}}} | {
         f'{arm}_servo_node': {

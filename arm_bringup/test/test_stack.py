@@ -127,6 +127,7 @@ def test_master_without_arm_servo(tmp_path: Path) -> None:
     (file,) = motion_files(robot, tmp_path, RosOptions(), MovedGroups(('arm',)))
     values = yaml.safe_load(file.read_text())[EVERY_NODE]['ros__parameters']
     assert (values['robot_description_semantic'], values['group']) == (srdf, 'arm')
+    assert 'other_groups' not in values  # rcl has no type for an empty list
 
 
 def test_hardware_has_no_slaves_and_simulation_has(tmp_path: Path) -> None:
