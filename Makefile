@@ -30,7 +30,7 @@ help:
 	@echo 'make lint       ruff, its formatter, mypy, who imports whom, dead code, spelling'
 	@echo 'make bench      print the figures'
 	@echo 'make chaos      disturb arm and quadruped in motion at random (DURATION=600, SEED=1)'
-	@echo 'make soak       run both for long, and tell whether anything is lost or grows (DURATION=3600)'
+	@echo 'make soak       run both for long, and check that nothing is lost or grows (DURATION=3600)'
 	@echo 'make setup      make the environment only'
 	@echo 'make pins       renew the pinned requirements'
 	@echo 'make clean      remove what was built'

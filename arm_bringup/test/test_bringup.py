@@ -13,7 +13,7 @@ import signal
 from isolation import Isolation
 import pytest
 from small_bringup import read_until, SmallWorkspace
-from small_processes import PATIENCE, service_manager
+from small_processes import service_manager, TIMEOUT
 
 pytestmark = pytest.mark.slow
 
@@ -43,7 +43,7 @@ def test_ctrl_c_ends_it_with_0_after_the_master_and_the_slaves(
     with workspace.bringup('panda', '--simulate', '--can', 'auto') as process:
         seen = read_until(process, 'all is ready')
         process.send_signal(signal.SIGINT)
-        rest, _ = process.communicate(timeout=PATIENCE)
+        rest, _ = process.communicate(timeout=TIMEOUT)
     assert process.returncode == 0, rest
     assert 'panda on CAN bus udp_multicast' in seen
     byes = [line.split()[0] for line in rest.splitlines() if line.endswith('| bye')]
@@ -56,7 +56,7 @@ def test_hardware_is_on_can0_unless_said_otherwise(workspace: SmallWorkspace) ->
     with workspace.bringup('panda') as process:
         seen = read_until(process, 'all is ready')
         process.send_signal(signal.SIGTERM)
-        process.communicate(timeout=PATIENCE)
+        process.communicate(timeout=TIMEOUT)
     assert process.returncode == 0
     assert 'panda on CAN bus can0' in seen
     assert 'slaves' not in seen
@@ -143,7 +143,7 @@ def test_a_second_bring_up_on_the_same_is_refused(
         assert f'process {first.pid}' in output
         assert isolation.bus in output if what == 'bus' else '--namespace' in output
         first.send_signal(signal.SIGINT)
-        assert 'bye' in first.communicate(timeout=PATIENCE)[0]
+        assert 'bye' in first.communicate(timeout=TIMEOUT)[0]
         assert first.returncode == 0
 
 
@@ -163,7 +163,7 @@ def test_a_second_simulated_arm_has_a_bus_of_its_own(workspace: SmallWorkspace) 
         assert len(buses) == 2
         for process in running:
             process.send_signal(signal.SIGINT)
-            process.communicate(timeout=PATIENCE)
+            process.communicate(timeout=TIMEOUT)
             assert process.returncode == 0
 
 
@@ -183,7 +183,7 @@ def test_the_namespace_of_bus_yml_is_that_of_all_nodes(
     with workspace.bringup(f'{folder}/', '--simulate') as process:
         seen = read_until(process, 'all is ready')
         process.send_signal(signal.SIGINT)
-        process.communicate(timeout=PATIENCE)
+        process.communicate(timeout=TIMEOUT)
     assert 'in namespace /cell' in seen
     assert len(re.findall(' in /cell$', seen, re.MULTILINE)) == len(LINES)
 
@@ -196,7 +196,7 @@ def test_help_names_the_robots(workspace: SmallWorkspace) -> None:
         assert words in output
 
 
-def test_systemd_hears_when_the_robot_is_up_and_when_it_goes_down(
+def test_systemd_gets_readiness_and_the_stop(
     workspace: SmallWorkspace,
 ) -> None:
     """``Type=notify`` of a unit waits for the whole bring-up."""
@@ -206,6 +206,6 @@ def test_systemd_hears_when_the_robot_is_up_and_when_it_goes_down(
             read_until(process, 'all is ready')
             assert manager.recv(100) == b'READY=1'
             process.send_signal(signal.SIGTERM)
-            process.communicate(timeout=PATIENCE)
+            process.communicate(timeout=TIMEOUT)
             assert manager.recv(100) == b'STOPPING=1'
         assert process.returncode == 0

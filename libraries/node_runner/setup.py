@@ -28,6 +28,6 @@ setup(
     zip_safe=True,
     maintainer='The arm and quad developers',
     maintainer_email='developers@example.org',
-    description='Runs ROS nodes until they are told to end, and reads their parameters',
+    description='Runs ROS nodes until they are to end, and reads their parameters',
     license='Apache-2.0',
 )

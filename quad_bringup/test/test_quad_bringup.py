@@ -12,7 +12,7 @@ import signal
 from isolation import Isolation
 import pytest
 from small_bringup import read_until, SmallWorkspace
-from small_processes import PATIENCE, service_manager
+from small_processes import service_manager, TIMEOUT
 
 pytestmark = pytest.mark.slow
 
@@ -48,7 +48,7 @@ def test_ctrl_c_ends_it_with_0_in_order(workspace: SmallWorkspace) -> None:
     with workspace.bringup('--simulate') as process:
         seen = read_until(process, 'all is ready')
         process.send_signal(signal.SIGINT)
-        rest, _ = process.communicate(timeout=PATIENCE)
+        rest, _ = process.communicate(timeout=TIMEOUT)
     assert process.returncode == 0, rest
     assert 'XGO lite, simulated' in seen
     assert 'robot_state is ready' in seen
@@ -64,7 +64,7 @@ def test_a_real_robot_is_on_the_port_that_was_named(workspace: SmallWorkspace) -
     with workspace.bringup('--port', '/dev/ttyAMA0', '--preset', 'mini', '--hold') as process:
         seen = read_until(process, 'all is ready')
         process.send_signal(signal.SIGTERM)
-        process.communicate(timeout=PATIENCE)
+        process.communicate(timeout=TIMEOUT)
     assert process.returncode == 0
     assert 'XGO mini on /dev/ttyAMA0' in seen
     assert 'running: /dev/ttyAMA0' in seen
@@ -125,7 +125,7 @@ def test_a_second_bring_up_on_the_same_port_is_refused(workspace: SmallWorkspace
             assert f'process {first.pid}' in output
             assert what in output
         first.send_signal(signal.SIGINT)
-        first.communicate(timeout=PATIENCE)
+        first.communicate(timeout=TIMEOUT)
         assert first.returncode == 0
 
 
@@ -141,11 +141,11 @@ def test_simulations_in_other_namespaces_run_side_by_side(workspace: SmallWorksp
         assert len(ports) == 2
         for process in running:
             process.send_signal(signal.SIGINT)
-            process.communicate(timeout=PATIENCE)
+            process.communicate(timeout=TIMEOUT)
             assert process.returncode == 0
 
 
-def test_systemd_hears_when_the_robot_is_up_and_when_it_goes_down(
+def test_systemd_gets_readiness_and_the_stop(
     workspace: SmallWorkspace,
 ) -> None:
     """``Type=notify`` of a unit waits for the whole bring-up."""
@@ -155,6 +155,6 @@ def test_systemd_hears_when_the_robot_is_up_and_when_it_goes_down(
             read_until(process, 'all is ready')
             assert manager.recv(100) == b'READY=1'
             process.send_signal(signal.SIGTERM)
-            process.communicate(timeout=PATIENCE)
+            process.communicate(timeout=TIMEOUT)
             assert manager.recv(100) == b'STOPPING=1'
         assert process.returncode == 0

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Why a robot falls apart in a viewer: joints nobody tells of, and names nobody knows."""
+"""Why a robot falls apart in a viewer: joints in no message, and names in no description."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from collections.abc import Iterable
 
 from urdf_reader import KinematicTree
 
-PATIENCE = 5.0
-"""Time in [s] after which a joint that was never heard of is told."""
+SILENCE_TIMEOUT = 5.0
+"""Time in [s] after which a joint that was in no message is reported."""
 
 
 class JointWatch:
-    """Compares the joints of a description with those of the messages; tells each once."""
+    """Compares the joints of a description with those of the messages; reports each once."""
 
     def __init__(self, model: KinematicTree, now: float) -> None:
         """Begin to watch.
@@ -24,10 +24,10 @@ class JointWatch:
         """
         self._silent = {joint.name for joint in model.movable() if joint.mimic is None}
         self._known = {joint.name for joint in model.joints}
-        self._strangers: set[str] = set()
-        self._told: set[str] = set()
-        self._heard = False
-        self._due = now + PATIENCE
+        self._unknown: set[str] = set()
+        self._reported: set[str] = set()
+        self._received = False
+        self._due = now + SILENCE_TIMEOUT
 
     def take(self, names: Iterable[str]) -> None:
         """Take in the names of a message.
@@ -35,12 +35,12 @@ class JointWatch:
         Args:
             names: Names of joints.
         """
-        self._heard = True
+        self._received = True
         self._silent.difference_update(names)
-        self._strangers.update(name for name in names if name not in self._known)
+        self._unknown.update(name for name in names if name not in self._known)
 
     def warnings(self, now: float, topic: str) -> list[str]:
-        """Say what is wrong and was not told yet.
+        """Return what is wrong and was not reported yet.
 
         Args:
             now: Steady time in [s].
@@ -48,30 +48,28 @@ class JointWatch:
         """
         if now < self._due:
             return []
-        if not self._heard:
+        if not self._received:
             return self._once(
-                f'nothing heard on {topic} for {PATIENCE:g} s: there is no /tf of moving joints; '
-                f'does anybody publish (ros2 topic info {topic}), and in this ROS_DOMAIN_ID?'
+                f'no message on {topic} for {SILENCE_TIMEOUT:g} s, so no /tf of moving joints; '
+                f'check the publisher (ros2 topic info {topic}) and ROS_DOMAIN_ID'
                 if self._silent
                 else ''
             )
-        silent, strangers = ', '.join(sorted(self._silent)), ', '.join(sorted(self._strangers))
+        silent, unknown = ', '.join(sorted(self._silent)), ', '.join(sorted(self._unknown))
         return [
             *self._once(
-                f'never heard on {topic}: {silent}; there is no /tf below these joints of the '
-                'robot description'
+                f'no message on {topic} has {silent}: no /tf below these joints of the robot '
+                'description'
                 if silent
                 else ''
             ),
             *self._once(
-                f'heard on {topic}, but not in the robot description: {strangers}'
-                if strangers
-                else ''
+                f'on {topic}, but not in the robot description: {unknown}' if unknown else ''
             ),
         ]
 
     def _once(self, text: str) -> list[str]:
-        if not text or text in self._told:
+        if not text or text in self._reported:
             return []
-        self._told.add(text)
+        self._reported.add(text)
         return [text]

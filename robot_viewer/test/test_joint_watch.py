@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Joints that are missing are told once, by name."""
+"""Joints that are missing are reported once, by name."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from urdf_reader import read_urdf
 from urdf_robots import ARM, POSITIONS
 
 from robot_viewer import JointWatch
-from robot_viewer.joint_watch import PATIENCE
+from robot_viewer.joint_watch import SILENCE_TIMEOUT
 
-SOON, LATE, LATER = 0.5 * PATIENCE, 1.1 * PATIENCE, 5 * PATIENCE
+SOON, LATE, LATER = 0.5 * SILENCE_TIMEOUT, 1.1 * SILENCE_TIMEOUT, 5 * SILENCE_TIMEOUT
 TOPIC = '/dog/joint_states'
 
 
@@ -27,7 +27,9 @@ def test_a_complete_robot_is_no_reason_to_speak(watch: JointWatch) -> None:
     assert watch.warnings(LATE, TOPIC) == []
 
 
-def test_joints_that_are_never_heard_of_are_told_once_and_not_too_early(watch: JointWatch) -> None:
+def test_joints_in_no_message_are_reported_once_and_not_too_early(
+    watch: JointWatch,
+) -> None:
     """By name; messages may be partial, so they are put together."""
     watch.take(['shoulder'])
     watch.take(['roll', 'finger_joint'])
@@ -38,15 +40,15 @@ def test_joints_that_are_never_heard_of_are_told_once_and_not_too_early(watch: J
     assert watch.warnings(LATER, TOPIC) == []
 
 
-def test_names_that_the_description_does_not_know_are_told(watch: JointWatch) -> None:
+def test_names_that_the_description_does_not_have_are_reported(watch: JointWatch) -> None:
     """The usual case: all of them are spelt otherwise."""
     watch.take(['Shoulder', *list(POSITIONS)[1:]])
-    silent, strangers = watch.warnings(LATE, TOPIC)
-    assert 'never heard on /dog/joint_states: shoulder;' in silent
-    assert strangers.endswith(': Shoulder')
+    silent, unknown = watch.warnings(LATE, TOPIC)
+    assert 'no message on /dog/joint_states has shoulder:' in silent
+    assert unknown.endswith(': Shoulder')
 
 
-def test_silence_is_told_with_what_to_look_at(watch: JointWatch) -> None:
+def test_silence_is_reported_with_what_to_look_at(watch: JointWatch) -> None:
     """Nobody publishes, or in another domain."""
     (text,) = watch.warnings(LATE, TOPIC)
     assert f'ros2 topic info {TOPIC}' in text

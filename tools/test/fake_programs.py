@@ -35,7 +35,7 @@ class FakeRunner(Runner):
 
 
 def imitate_colcon(layout: Layout, arguments: list[str]) -> None:
-    """Leave behind what colcon does for the packages that it is told to build."""
+    """Leave behind what colcon does for the packages that it is to build."""
     if 'colcon' not in arguments:
         return
     begin, end = arguments.index('--packages-select') + 1, arguments.index('--cmake-args')

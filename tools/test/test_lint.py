@@ -50,7 +50,7 @@ def test_checks_run_side_by_side(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert shown.index('seen by check') < shown.index('seen by format')
 
 
-def test_a_check_that_fails_is_told_and_the_others_run(
+def test_a_check_that_fails_is_reported_and_the_others_run(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """The exit code is 1, and what both said is shown."""
@@ -62,7 +62,7 @@ def test_a_check_that_fails_is_told_and_the_others_run(
 
 
 def test_every_package_is_in_the_contracts() -> None:
-    """import-linter looks only at packages that it is told of."""
+    """import-linter looks only at packages that are listed."""
     root = this_checkout().root
     configuration = read_configuration(str(root / 'pyproject.toml'))
     named = configuration['session_options']['root_packages']

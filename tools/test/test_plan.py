@@ -14,13 +14,13 @@ from workspace.environment import choose_python, Environment
 from workspace.errors import ForeignFolderError, NetworkError, StepFailedError
 from workspace.interpreter import Interpreter, probe
 from workspace.layout import Layout
-from workspace.plan import carry_out, plan, Wish
+from workspace.plan import carry_out, plan, Target
 from workspace.state import EnvironmentState, read_state
 from workspace.underlay import Underlay, UnderlayKind
 
 Add = Callable[..., Path]
 Fake = Callable[..., FakeRunner]
-ALL = Wish(dev=True)
+ALL = Target(dev=True)
 
 
 @pytest.fixture(autouse=True)
@@ -37,9 +37,9 @@ def packages(add_package: Add) -> None:
     add_package('quad_msgs', 'arm_msgs', build_type='ament_cmake')
 
 
-def titles(environment: Environment, wish: Wish = ALL) -> list[str]:
+def titles(environment: Environment, target: Target = ALL) -> list[str]:
     """What would be done, in words."""
-    return [step.title for step in plan(environment, wish)]
+    return [step.title for step in plan(environment, target)]
 
 
 @pytest.mark.usefixtures('packages')
@@ -71,19 +71,19 @@ def test_interrupted_change_makes_the_environment_new(
     environment: Environment, fake: Fake
 ) -> None:
     """Half-installed test tools may have left anything, so nothing of it is kept."""
-    carry_out(plan(environment, Wish()), fake())
+    carry_out(plan(environment, Target()), fake())
     with pytest.raises(KeyboardInterrupt):
         carry_out(plan(environment, ALL), fake(1))
     assert read_state(environment.layout.state) is None
-    assert titles(environment, Wish(build=False))[1].startswith('Making .venv')
+    assert titles(environment, Target(build=False))[1].startswith('Making .venv')
 
 
 @pytest.mark.usefixtures('packages')
 def test_a_target_builds_only_what_it_needs(environment: Environment, fake: Fake) -> None:
     """The demo does not wait for the quadruped's messages, nor for the test tools."""
-    wish = Wish(packages=('arm',))
-    assert titles(environment, wish)[-1] == 'Building arm_msgs, arm'
-    carry_out(plan(environment, wish), fake())
+    target = Target(packages=('arm',))
+    assert titles(environment, target)[-1] == 'Building arm_msgs, arm'
+    carry_out(plan(environment, target), fake())
     assert titles(environment, ALL)[-1] == 'Building quad_msgs'
 
 
@@ -126,9 +126,9 @@ def test_other_ros_replaces_environment_and_packages(
     carry_out(plan(environment, ALL), fake())
     system = replace(environment, underlay=Underlay(UnderlayKind.SYSTEM, tmp_path / 'ros'))
     runner = fake()
-    carry_out(plan(system, Wish(packages=('arm',))), runner)
+    carry_out(plan(system, Target(packages=('arm',))), runner)
     assert not (layout.install / 'quad_msgs').exists()
-    assert titles(system, Wish(packages=('arm',))) == []
+    assert titles(system, Target(packages=('arm',))) == []
 
 
 @pytest.mark.parametrize('name', ['uv.txt', 'ros-wheels.txt', 'dev.txt'])
@@ -136,10 +136,10 @@ def test_new_pins_are_installed(
     environment: Environment, layout: Layout, fake: Fake, name: str
 ) -> None:
     """A changed requirement leads to work, and of dev.txt only to its own."""
-    wish = Wish(dev=True, build=False)
-    carry_out(plan(environment, wish), fake())
+    target = Target(dev=True, build=False)
+    carry_out(plan(environment, target), fake())
     (layout.requirements / name).write_text('new==2\n')
-    assert len(titles(environment, wish)) == (1 if name == 'dev.txt' else 5)
+    assert len(titles(environment, target)) == (1 if name == 'dev.txt' else 5)
 
 
 @pytest.mark.usefixtures('packages')
@@ -148,24 +148,24 @@ def test_a_package_brings_what_it_imports(
 ) -> None:
     """Its requirements are installed when it, or what stands on it, is first built."""
     (layout.requirements / 'arm_msgs.txt').write_text('heavy==1\n')
-    assert 'Installing what arm_msgs imports' in titles(environment, Wish(packages=('arm',)))
+    assert 'Installing what arm_msgs imports' in titles(environment, Target(packages=('arm',)))
     carry_out(plan(environment, ALL), fake())
-    assert titles(environment) == titles(environment, Wish(packages=('arm',))) == []
+    assert titles(environment) == titles(environment, Target(packages=('arm',))) == []
     (layout.requirements / 'arm.txt').write_text('light==1\n')
     assert titles(environment) == ['Installing what arm imports']
-    assert titles(environment, Wish(packages=('arm_msgs',))) == []
+    assert titles(environment, Target(packages=('arm_msgs',))) == []
 
 
 def test_old_environment_stays_while_the_new_is_out_of_reach(
     environment: Environment, layout: Layout, fake: Fake
 ) -> None:
     """Without a network new pins do not cost the environment that works."""
-    wish = Wish(build=False)
-    carry_out(plan(environment, wish), fake())
+    target = Target(build=False)
+    carry_out(plan(environment, target), fake())
     before = read_state(layout.state)
     (layout.requirements / 'ros-wheels.txt').write_text('new==2\n')
     with pytest.raises(KeyboardInterrupt):
-        carry_out(plan(environment, wish), fake(1))
+        carry_out(plan(environment, target), fake(1))
     assert read_state(layout.state) == before is not None
 
 
@@ -173,7 +173,7 @@ def test_missing_network_costs_no_environment(
     environment: Environment, layout: Layout, fake: Fake
 ) -> None:
     """Test tools that cannot be downloaded leave the environment as it was."""
-    carry_out(plan(environment, Wish(build=False)), fake())
+    carry_out(plan(environment, Target(build=False)), fake())
     before = read_state(layout.state)
 
     def unreachable(_arguments: list[str]) -> None:
@@ -188,8 +188,8 @@ def test_old_tools_that_fail_do_not_keep_the_old_environment(
     environment: Environment, layout: Layout, fake: Fake
 ) -> None:
     """An environment whose own pip or uv is damaged is replaced."""
-    wish = Wish(build=False)
-    carry_out(plan(environment, wish), fake())
+    target = Target(build=False)
+    carry_out(plan(environment, target), fake())
     (layout.requirements / 'ros-wheels.txt').write_text('new==2\n')
     runner = fake()
 
@@ -198,8 +198,8 @@ def test_old_tools_that_fail_do_not_keep_the_old_environment(
             raise StepFailedError('pip', 1, '')
         runner.effect(arguments)
 
-    carry_out(plan(environment, wish), replace(runner, effect=damaged))
-    assert titles(environment, wish) == []
+    carry_out(plan(environment, target), replace(runner, effect=damaged))
+    assert titles(environment, target) == []
 
 
 def test_foreign_venv_is_not_touched(environment: Environment, layout: Layout, fake: Fake) -> None:
@@ -207,7 +207,7 @@ def test_foreign_venv_is_not_touched(environment: Environment, layout: Layout, f
     theirs = layout.venv / 'their' / 'work'
     theirs.mkdir(parents=True)
     with pytest.raises(ForeignFolderError, match='not made by this set-up'):
-        carry_out(plan(environment, Wish(build=False)), fake())
+        carry_out(plan(environment, Target(build=False)), fake())
     assert theirs.exists()
 
 
@@ -216,7 +216,7 @@ def test_one_failed_package_does_not_cost_the_others(
     environment: Environment, layout: Layout, fake: Fake
 ) -> None:
     """What colcon built before an error is kept; the failed one is tried again."""
-    carry_out(plan(environment, Wish(build=False)), fake())
+    carry_out(plan(environment, Target(build=False)), fake())
     runner = fake()
 
     def effect(arguments: list[str]) -> None:
@@ -224,8 +224,8 @@ def test_one_failed_package_does_not_cost_the_others(
         (layout.build / 'quad_msgs' / 'colcon_build.rc').write_text('1\n')
 
     with pytest.raises(StepFailedError, match='quad_msgs'):
-        carry_out(plan(environment, Wish()), replace(runner, effect=effect))
-    assert titles(environment, Wish()) == ['Building quad_msgs']
+        carry_out(plan(environment, Target()), replace(runner, effect=effect))
+    assert titles(environment, Target()) == ['Building quad_msgs']
 
 
 def test_interpreter_is_kept(environment: Environment, tmp_path: Path) -> None:

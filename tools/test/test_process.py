@@ -46,7 +46,7 @@ def test_failure_shows_the_last_lines(runner: Runner) -> None:
         'Temporary failure in name resolution',
     ],
 )
-def test_missing_network_is_told_apart(runner: Runner, said: str) -> None:
+def test_missing_network_is_distinguished(runner: Runner, said: str) -> None:
     """What pip and uv say without a network becomes one clear sentence."""
     with pytest.raises(NetworkError, match='No network: it could not be downloaded'):
         runner.run('it', [sys.executable, '-c', f'import sys; sys.exit({said!r})'])

@@ -84,12 +84,12 @@ def test_discovery_stays_on_this_host_unless_asked(checkout: Path) -> None:
         closed = package / 'dds_network_localhost.xml'
         assert found['FASTRTPS_DEFAULT_PROFILES_FILE'] == str(closed)
         assert found['ROS_AUTOMATIC_DISCOVERY_RANGE'] == 'SYSTEM_DEFAULT'
-        # what does not open anything is told
+        # what does not open anything is reported
         assert bool(done.stderr) == any('ROS_' in name for name in asked)
 
 
 def test_an_interface_that_is_not_there_keeps_the_shell_closed(checkout: Path) -> None:
-    """The status of `source` tells it, and nothing is open."""
+    """The status of `source` shows it, and nothing is open."""
     script = '. ./env.sh; echo "status $?"; env'
     done = shell('bash', script, checkout, DDS_NETWORK='no.such.interface.invalid')
     assert 'status 1' in done.stdout

@@ -16,7 +16,7 @@ NEWEST = (3, 14)
 
 
 def _works(path: str) -> bool:
-    """Tell whether a candidate is a supported Python and not an empty shim."""
+    """Return whether a candidate is a supported Python and not an empty shim."""
     code = f'import sys; sys.exit(not {OLDEST} <= sys.version_info[:2] <= {NEWEST})'
     try:
         return subprocess.call([path, '-c', code], stderr=subprocess.DEVNULL) == 0

@@ -17,7 +17,7 @@ from .layout import Layout, this_checkout
 from .lint import lint
 from .lock import exclusive
 from .pins import renew
-from .plan import carry_out, plan, Wish
+from .plan import carry_out, plan, Target
 from .process import Runner
 from .state import read_state
 from .system import missing_packages
@@ -46,10 +46,10 @@ def _environment(layout: Layout, asked: str) -> Environment:
     return Environment(layout, underlay, path)
 
 
-def _wish(options: argparse.Namespace) -> Wish:
+def _target(options: argparse.Namespace) -> Target:
     if options.command == 'build':
-        return Wish(dev=options.dev, packages=tuple(options.packages))
-    return Wish(dev=options.command in {'lint', 'pins'} or options.dev, build=False)
+        return Target(dev=options.dev, packages=tuple(options.packages))
+    return Target(dev=options.command in {'lint', 'pins'} or options.dev, build=False)
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -60,7 +60,7 @@ def _run(options: argparse.Namespace) -> int:
         return 0
     with exclusive(layout.lock) as lock:
         runner = Runner(os.environ, layout.root, lock)
-        steps = plan(environment, _wish(options))
+        steps = plan(environment, _target(options))
         carry_out(steps, runner)
         if not steps and options.command in {'setup', 'build'}:
             print('All is up to date.')

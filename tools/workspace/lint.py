@@ -60,6 +60,7 @@ def lint(layout: Layout, environ: Mapping[str, str]) -> int:
         [bin_folder / 'lint-imports', '--no-cache'],
         [bin_folder / 'vulture', *packages, tools, tests, layout.root / 'conftest.py'],
         [bin_folder / 'codespell'],
+        [bin_folder / 'codespell', '--toml', layout.root / 'tools' / 'words.toml'],
     ]
     for name, folders in type_check_units(layout.root).items():
         cache = layout.root / '.mypy_cache' / name

@@ -16,7 +16,7 @@ from .state import read_state
 
 
 @dataclass(frozen=True, slots=True)
-class Wish:
+class Target:
     """What a target needs.
 
     Attributes:
@@ -30,18 +30,18 @@ class Wish:
     packages: tuple[str, ...] = ()
 
 
-def plan(environment: Environment, wish: Wish) -> list[Step]:
-    """List the steps from what is there to what is wished for.
+def plan(environment: Environment, target: Target) -> list[Step]:
+    """List the steps from what is there to what is wanted.
 
     Raises:
-        UnknownPackageError: A package is wished for that the workspace does not have.
+        UnknownPackageError: The workspace does not have a package that is wanted.
     """
     layout = environment.layout
     found = find_packages(layout.root)
-    packages = needed_packages(found, wish.packages, environment.underlay)
-    names = [DEV, *sorted(found)] if wish.dev else sorted(packages) if wish.build else []
+    packages = needed_packages(found, target.packages, environment.underlay)
+    names = [DEV, *sorted(found)] if target.dev else sorted(packages) if target.build else []
     steps = environment.steps(read_state(layout.state), names)
-    if not wish.build:
+    if not target.build:
         return steps
     builder = Builder(layout, environment.base, environment.underlay.kind)
     stale = builder.stale(builder.fingerprints(packages))

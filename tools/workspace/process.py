@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Runs the programs of the set-up, and tells a missing network from another failure."""
+"""Runs the programs of the set-up, and distinguishes a missing network from another failure."""
 
 from __future__ import annotations
 

@@ -34,12 +34,12 @@ class Underlay:
     prefix: Path
 
     def has_package(self, name: str) -> bool:
-        """Tell whether the ament index of the installation lists a package."""
+        """Return whether the ament index of the installation lists a package."""
         index = self.prefix / 'share' / 'ament_index' / 'resource_index' / 'packages'
         return (index / name).exists()
 
     def has_command(self, name: str) -> bool:
-        """Tell whether the installation brings a program."""
+        """Return whether the installation brings a program."""
         return (self.prefix / 'bin' / name).exists()
 
     @property

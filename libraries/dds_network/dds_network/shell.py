@@ -26,7 +26,7 @@ _SUBNET = 'SUBNET'
 
 
 def notices(environ: Mapping[str, str], reach: Reach) -> Iterator[str]:
-    """Tell a person what is open, and which of his settings does not open anything.
+    """Report what is open, and which of his settings does not open anything.
 
     Args:
         environ: The environment before it is changed.

@@ -40,13 +40,13 @@ class DemoClient(Protocol):
 
     @property
     def figures(self) -> Any:  # noqa: ANN401  # each demo has its own
-        """What was heard last, for the display."""
+        """What was received last, for the display."""
 
     def wait_until(self, condition: Callable[[], bool], timeout: float, what: str) -> None:
         """Wait for something."""
 
     def listen(self, duration: float) -> None:
-        """Hear what comes in."""
+        """Process what comes in."""
 
     def close(self) -> None:
         """Leave the ROS graph."""

@@ -75,7 +75,7 @@ def test_the_table_is_for_terminals_that_have_room_for_it(
     monkeypatch: pytest.MonkeyPatch,
     case: tuple[io.StringIO, bool, str, tuple[int, int], bool],
 ) -> None:
-    """Everything else gets lines; a terminal that is too small is told so."""
+    """Everything else gets lines; a warning says so where the terminal is too small."""
     file, terminal, term, size, table = case
     monkeypatch.setenv('TERM', term)
     width, height = size
@@ -87,7 +87,7 @@ def test_the_table_is_for_terminals_that_have_room_for_it(
     assert ('too few' in lines.getvalue()) == (size != (80, 24))
 
 
-def test_lines_tell_phases_warnings_and_notices() -> None:
+def test_lines_show_phases_warnings_and_notices() -> None:
     """Information of the processes is left out: it would bury the rest."""
     lines = io.StringIO()
     display = LineDisplay(SETTING, LineWriter(lines))

@@ -34,9 +34,9 @@ class View:
 
 
 class Client:
-    """A client that waits for a condition, and hears nothing."""
+    """A client that waits for a condition, and receives nothing."""
 
-    figures = 'heard'
+    figures = 'received'
     closed = False
 
     def __init__(self, given_up: Callable[[], bool]) -> None:
@@ -57,7 +57,7 @@ class Client:
 
 
 class Dance(DemoScenario[Client]):
-    """Waits for the processes, and ends as it is told to."""
+    """Waits for the processes, and ends as it is to."""
 
     error = ''
     problems: tuple[str, ...] = ()
@@ -84,7 +84,7 @@ def dance(scenario: type[Dance]) -> int:
 
 
 def test_a_demo_ends_with_its_summary_and_0(capsys: pytest.CaptureFixture[str]) -> None:
-    """Phases, the end of the process, summary and warnings are told."""
+    """Phases, the end of the process, summary and warnings are reported."""
     assert dance(Dance) == 0
     out = capsys.readouterr().out
     assert Client.closed
@@ -100,7 +100,7 @@ def test_a_demo_ends_with_its_summary_and_0(capsys: pytest.CaptureFixture[str]) 
         ({'error': 'no music'}, 'error: no music\n'),
     ],
 )
-def test_what_went_wrong_is_told_and_ends_with_1(
+def test_what_went_wrong_is_reported_and_ends_with_1(
     faults: dict[str, object], words: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Both what the scenario found, and what it could not go on without."""

@@ -22,10 +22,10 @@ from rclpy.publisher import Publisher
 from rclpy.serialization import deserialize_message, serialize_message
 
 NANOSECONDS = 1_000_000_000  # in a second
-PATIENCE = 3  # messages of another form one after the other, until forms are not looked for
+MISSES_MAX = 3  # messages of another form one after the other, until forms are not looked for
 _MARK = -1.2345678901234567e30  # times 1, 2, 3...: numbers that no message holds by itself
 _SECONDS_MARK, _NANOSECONDS_MARK = 0x5EC0ABCD, 0xA0ABCDEF
-_ENCAPSULATION, _LITTLE_ENDIAN = 1, 1  # byte of a serialized message that tells its order [B]
+_ENCAPSULATION, _LITTLE_ENDIAN = 1, 1  # byte of a serialized message of its order [B]
 
 
 class MessageTemplate(Hashable, Protocol):
@@ -196,7 +196,7 @@ class FastReader:
         message = deserialize_message(data, self._kind)
         numbers = [number for path in self._paths for number in _floats(message, path)]
         self._misses += 1
-        if self._misses <= PATIENCE:
+        if self._misses <= MISSES_MAX:
             self._learn(data, message, len(numbers))
         return message, numbers
 

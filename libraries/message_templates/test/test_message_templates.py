@@ -37,7 +37,7 @@ class Pair:
 
 
 @given(TEXTS, STAMPS, st.floats(allow_nan=False), st.floats(allow_nan=False))
-def test_a_template_is_heard_as_its_message(
+def test_a_template_is_received_as_its_message(
     frame: str, stamp: Time, one: float, two: float
 ) -> None:
     """Whatever its numbers and stamp; a number may stand in several places."""

@@ -30,7 +30,7 @@ class LogRateLimit:
         self._windows: dict[Hashable, _Window] = {}
 
     def admit(self, source: Hashable, now: float) -> bool:
-        """Tell whether a record may be logged.
+        """Return whether a record may be logged.
 
         Args:
             source: What logs, such as file and line.

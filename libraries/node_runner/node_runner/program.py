@@ -41,14 +41,14 @@ def run_program(
     """Run a program until it returns; signals end it, and never tear it in the middle.
 
     Parameters that are refused, arguments that ROS does not understand and the errors named here
-    are told in one line of the log. Everything else is a defect, and has its traceback. Records of
+    are one line of the log. Everything else is a defect, and has its traceback. Records of
     Python's ``logging`` appear in the log of ROS, see :class:`.RosLogBridge`.
 
     Args:
         name: Name for the log.
         body: Makes the nodes and serves them; ends soon after the event is set, by Ctrl-C, SIGTERM
             or the closing of the terminal. May return an exit code.
-        *errors: What else is told in a line.
+        *errors: What else is logged as one line.
         args: Command line; None for the process's own.
         patient: As in :func:`.stop_on_signals`.
         help_text: Printed for ``--help``, which starts nothing.
@@ -68,7 +68,7 @@ def run_program(
     except RuntimeError as error:  # rcl has no finer class for all of them
         get_logger(name).fatal(f'ROS does not take these arguments: {error}')
         return REFUSED
-    told: tuple[type[Exception], ...] = (
+    refusals: tuple[type[Exception], ...] = (
         ParameterError,
         ParameterException,
         NameValidationException,
@@ -78,7 +78,7 @@ def run_program(
     bridge.start()
     try:
         return body(stop) or 0
-    except told as error:
+    except refusals as error:
         get_logger(name).fatal(str(error))
         return REFUSED
     finally:
@@ -98,7 +98,7 @@ def run_node(
     Args:
         name: Name for the log.
         make: Makes the node.
-        *errors: What is told in a line when it cannot be made.
+        *errors: What is logged as one line when it cannot be made.
         args: Command line; None for the process's own.
 
     Returns:

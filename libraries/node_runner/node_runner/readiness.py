@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Tell whoever started this process that it is ready."""
+"""Report to the supervisor of this process that it is ready."""
 
 from __future__ import annotations
 

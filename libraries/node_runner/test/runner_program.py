@@ -27,7 +27,7 @@ class Careful(Node):
 
 
 def say(word: str) -> None:
-    """Tell the test."""
+    """Report to the test."""
     sys.stdout.write(f'{word}\n')
     sys.stdout.flush()
 

@@ -13,7 +13,7 @@ from tf2_msgs.action import LookupTransform
 
 from node_runner import action_goals
 
-PATIENCE = 20.0  # [s]
+TIMEOUT = 20.0  # [s]
 
 
 def test_a_goal_goes_on_after_its_callback_and_is_forgotten_after_its_end(
@@ -37,21 +37,21 @@ def test_a_goal_goes_on_after_its_callback_and_is_forgotten_after_its_end(
             cancel=lambda _: CancelResponse.REJECT,
         )
         caller = client.action(LookupTransform, 'look_up')
-        assert caller.wait_for_server(PATIENCE)  # type: ignore[no-untyped-call]
+        assert caller.wait_for_server(TIMEOUT)  # type: ignore[no-untyped-call]
 
         def result_of(goal: Any) -> Any:
             asked = goal.get_result_async()
-            client.spin_until(asked.done, PATIENCE, 'a result')
+            client.spin_until(asked.done, TIMEOUT, 'a result')
             return asked.result()
 
         sent = caller.send_goal_async(LookupTransform.Goal())  # type: ignore[no-untyped-call]
-        client.spin_until(sent.done, PATIENCE, 'acceptance')
+        client.spin_until(sent.done, TIMEOUT, 'acceptance')
         goal = sent.result()
-        client.spin_until(lambda: bool(begun), PATIENCE, 'the start')
+        client.spin_until(lambda: bool(begun), TIMEOUT, 'the start')
         assert begun[0].status == GoalStatus.STATUS_EXECUTING
         server.notify_execute(begun[0], None)  # type: ignore[no-untyped-call]
         assert result_of(goal).status == GoalStatus.STATUS_SUCCEEDED
         client.spin_until(
-            lambda: result_of(goal).status == GoalStatus.STATUS_UNKNOWN, PATIENCE, 'its end'
+            lambda: result_of(goal).status == GoalStatus.STATUS_UNKNOWN, TIMEOUT, 'its end'
         )
         server.destroy()  # type: ignore[no-untyped-call]

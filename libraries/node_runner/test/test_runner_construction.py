@@ -17,7 +17,7 @@ from std_msgs.msg import String
 
 from node_runner import destroyed_if_refused, destroyed_when_refused, ParameterError
 
-PATIENCE = 20.0  # [s]
+TIMEOUT = 20.0  # [s]
 
 
 class Late(Node):
@@ -64,7 +64,7 @@ def until(node: Node, condition: Callable[[], bool]) -> None:
     """Serve a node until something is true of it."""
     executor = SingleThreadedExecutor(context=node.context)
     executor.add_node(node)
-    deadline = time.monotonic() + PATIENCE
+    deadline = time.monotonic() + TIMEOUT
     while not condition():
         assert time.monotonic() < deadline, node.get_node_names()
         executor.spin_once(0.05)

@@ -22,7 +22,7 @@ from node_runner.log_bridge import QUEUE_LENGTH
 from node_runner.log_rate import LogRateLimit
 from node_runner.signals import ENDING
 
-PATIENCE = 30.0  # [s]
+TIMEOUT = 30.0  # [s]
 
 
 def test_the_first_records_of_a_source_are_admitted_and_the_others_counted() -> None:
@@ -47,7 +47,7 @@ class Sink:
         self.lines: list[tuple[str, str]] = []
 
     def _take(self, level: str, message: str) -> None:
-        assert self.open.wait(PATIENCE)
+        assert self.open.wait(TIMEOUT)
         self.lines.append((level, message))
 
     def info(self, message: str) -> None:
@@ -129,7 +129,7 @@ def test_severity_and_traceback_are_kept(bridge: RosLogBridge, sink: Sink) -> No
     assert 'ZeroDivisionError' in sink.lines[1][1]
 
 
-def test_a_flood_is_cut_and_told() -> None:
+def test_a_flood_is_cut_and_counted() -> None:
     """A defect in each cycle logs a burst, and then how often it came."""
     sink = Sink()
     sink.open.set()
@@ -158,12 +158,12 @@ def signal_handlers() -> Iterator[None]:
 )
 def test_what_the_layers_below_log_reaches_rosout(isolation: Isolation, source: str) -> None:
     """A record of any package's logger, in any thread, is a message of the node on /rosout."""
-    heard: list[Log] = []
+    received: list[Log] = []
     context = Context()
     rclpy.init(context=context, domain_id=isolation.domain_id)
     listener = Node('listener', context=context, enable_rosout=False)
     qos = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)  # type: ignore[no-untyped-call]
-    listener.create_subscription(Log, '/rosout', heard.append, qos)
+    listener.create_subscription(Log, '/rosout', received.append, qos)
     executor = SingleThreadedExecutor(context=context)
     executor.add_node(listener)
 
@@ -173,9 +173,9 @@ def test_what_the_layers_below_log_reaches_rosout(isolation: Isolation, source: 
         thread = threading.Thread(target=logging.getLogger(source).error, args=('bus %s', 'down'))
         thread.start()
         thread.join()
-        deadline = time.monotonic() + PATIENCE
-        while not any(each.msg == 'bus down' for each in heard):
-            assert time.monotonic() < deadline, heard
+        deadline = time.monotonic() + TIMEOUT
+        while not any(each.msg == 'bus down' for each in received):
+            assert time.monotonic() < deadline, received
             executor.spin_once(0.05)
         node.destroy_node()  # type: ignore[no-untyped-call]
 
@@ -184,7 +184,7 @@ def test_what_the_layers_below_log_reaches_rosout(isolation: Isolation, source: 
         with pytest.MonkeyPatch.context() as patch:
             patch.setenv('ROS_DOMAIN_ID', str(isolation.domain_id))
             assert run_program('worker', body, args=arguments) == 0
-        (found,) = (each for each in heard if each.msg == 'bus down')
+        (found,) = (each for each in received if each.msg == 'bus down')
         assert (found.name, found.level) == ('left.worker', 40)
     finally:
         executor.shutdown()

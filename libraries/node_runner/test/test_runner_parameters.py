@@ -64,8 +64,8 @@ def test_what_is_given_is_read(isolation: Isolation, rule: str, value: object) -
     with node_with(isolation, rule) as node:
         read = READS[name](ParameterReader(node))
         assert (read, type(read)) == (value, type(value))
-        told = node.get_parameter(name).value
-        assert name == 'choice' or list(_many(told)) == list(_many(value))
+        given = node.get_parameter(name).value
+        assert name == 'choice' or list(_many(given)) == list(_many(value))
 
 
 def _many(value: Any) -> Any:

@@ -17,7 +17,7 @@ import pytest
 pytestmark = pytest.mark.slow
 
 PROGRAM = Path(__file__).with_name('runner_program.py')
-PATIENCE = 30.0  # [s]
+TIMEOUT = 30.0  # [s]
 
 
 @contextmanager
@@ -45,7 +45,7 @@ def running(
 def said(process: subprocess.Popen[str]) -> str:
     """Return the next line of a process."""
     assert process.stdout is not None
-    assert select.select([process.stdout], [], [], PATIENCE)[0], 'nothing more is said'
+    assert select.select([process.stdout], [], [], TIMEOUT)[0], 'nothing more is said'
     return process.stdout.readline().strip()
 
 
@@ -74,14 +74,14 @@ def test_the_first_signal_ends_it_and_a_sigterm_does_not_cut_the_end_short(
         assert said(process) == 'stopping'
         process.send_signal(signal.SIGTERM)
         process.send_signal(signal.SIGHUP)
-        output, errors = process.communicate('go on\n', timeout=PATIENCE)
+        output, errors = process.communicate('go on\n', timeout=TIMEOUT)
         assert (output.strip(), process.returncode) == ('ended', 0), errors
 
 
 @pytest.mark.scenario
 def test_a_second_ctrl_c_ends_it_at_once(isolation: Isolation) -> None:
     """A program that hangs in its end is left with a second SIGINT, which is in its exit code."""
-    deadline = monotonic() + PATIENCE
+    deadline = monotonic() + TIMEOUT
     with running(isolation) as process:
         assert said(process) == 'ready'
         process.send_signal(signal.SIGINT)
@@ -101,7 +101,7 @@ def test_a_patient_program_takes_a_second_ctrl_c(isolation: Isolation) -> None:
         process.send_signal(signal.SIGINT)
         assert said(process) == 'stopping'
         process.send_signal(signal.SIGINT)
-        output, _ = process.communicate('go on\n', timeout=PATIENCE)
+        output, _ = process.communicate('go on\n', timeout=TIMEOUT)
         assert (output.strip(), process.returncode) == ('ended', 0)
 
 
@@ -113,7 +113,7 @@ def test_nohup_is_respected(isolation: Isolation) -> None:
         assert ignores(process, signal.SIGHUP)
         process.send_signal(signal.SIGTERM)
         assert said(process) == 'stopping'
-        process.communicate('go on\n', timeout=PATIENCE)
+        process.communicate('go on\n', timeout=TIMEOUT)
         assert process.returncode == 0
 
 
@@ -123,7 +123,7 @@ def test_the_exit_code_is_that_of_the_body(isolation: Isolation) -> None:
     with running(isolation, '--ros-args', '-p', 'code:=7') as process:
         assert said(process) == 'ready'
         process.send_signal(signal.SIGTERM)
-        process.communicate('go on\n', timeout=PATIENCE)
+        process.communicate('go on\n', timeout=TIMEOUT)
         assert process.returncode == 7
 
 
@@ -143,7 +143,7 @@ def test_what_is_refused_is_one_line(isolation: Isolation, case: str) -> None:
     """Parameters and arguments that are wrong end it with 1 and a line, without a traceback."""
     words, reason = WRONG[case]
     with running(isolation, '--ros-args', *words) as process:
-        output, errors = process.communicate(timeout=PATIENCE)
+        output, errors = process.communicate(timeout=TIMEOUT)
         assert process.returncode == 1
         assert reason in errors
         assert errors.count('[FATAL]') == 1

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What a process tells whoever started it."""
+"""What a process reports to its supervisor."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def test_readiness_is_reported_once(
 
 
 @pytest.mark.parametrize('address', ['', '@nobody', '/nowhere/notify'])
-def test_nobody_to_tell_is_no_error(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_supervisor_is_no_error(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """A node that was started by hand, and one whose supervisor has ended."""
     monkeypatch.setenv('NOTIFY_SOCKET', address)
     notify_ready()

@@ -11,7 +11,7 @@ from node_runner.signals import ENDING
 
 
 def test_an_echo_of_a_ctrl_c_is_no_second_one() -> None:
-    """Two signals a few milliseconds apart are one wish: drives come to rest and are disabled."""
+    """Two signals a few milliseconds apart are one: drives come to rest and are disabled."""
     before = {number: signal.getsignal(number) for number in ENDING}
     times = iter([5.0, 5.003, 5.49])
     try:

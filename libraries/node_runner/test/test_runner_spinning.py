@@ -13,7 +13,7 @@ from rclpy.utilities import try_shutdown
 
 from node_runner import make_executor, spin
 
-PATIENCE = 20.0  # [s]
+TIMEOUT = 20.0  # [s]
 
 
 @pytest.mark.parametrize('make', [make_executor, SingleThreadedExecutor])
@@ -29,7 +29,7 @@ def test_spin_serves_until_the_end(
         node.create_timer(0.005, called.set)
 
         def finish() -> None:
-            called.wait(PATIENCE)
+            called.wait(TIMEOUT)
             stop.set() if end == 'event' else rclpy.shutdown()
 
         finisher = threading.Thread(target=finish)
@@ -52,7 +52,7 @@ def test_spin_lingers(isolation: Isolation) -> None:
         node.create_timer(0.01, called.set)
         spin([node], stop)
         assert not called.is_set()
-        spin([node], stop, linger=PATIENCE / 20)
+        spin([node], stop, linger=TIMEOUT / 20)
         assert called.is_set()
         node.destroy_node()
     finally:

@@ -56,7 +56,7 @@ class AutoRepeat:
     def is_new_stroke(self, gap: float) -> bool:
         """Say whether the same character came from a finger, not from the keyboard's repeat.
 
-        Only a learned delay can tell: what comes much before it is no repeat.
+        Only a learned delay can decide: what comes much before it is no repeat.
 
         Args:
             gap: Time since the first character of the key [s].

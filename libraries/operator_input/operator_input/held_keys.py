@@ -78,7 +78,7 @@ class HeldKeys:
         return first == last
 
     def deadline(self, now: float) -> float:
-        """Return when a held key is up unless it is heard of before [s]; may be infinite.
+        """Return when a held key is up unless an event of it comes before [s]; may be infinite.
 
         Args:
             now: Time [s]; the deadline is later.

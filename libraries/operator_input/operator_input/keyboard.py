@@ -56,7 +56,7 @@ class Keyboard:
         Args:
             path: Device of the terminal.
             devices: Input devices; those of this machine when it is None.
-            environment: Tells whether the terminal is on this machine.
+            environment: Shows whether the terminal is on this machine.
             kitty: Ask the terminal for releases.
             evdev: Ask this machine's keyboards for releases, if the terminal has none.
         """
@@ -96,7 +96,7 @@ class Keyboard:
         if self._watch_keyboards and self._terminal.stage is not Stage.ACTIVE:
             self._keyboards.scan(time.monotonic())
         waiting = [self._terminal.fileno(), *self._keyboards.filenos(), *others]
-        select.select(waiting, [], [], max(min(timeout, self._terminal.patience()), 0.0))
+        select.select(waiting, [], [], max(min(timeout, self._terminal.escape_timeout()), 0.0))
         # the keyboard first: its press explains the character of the terminal
         events = self._keyboards.read(time.monotonic())
         for event in self._terminal.read():

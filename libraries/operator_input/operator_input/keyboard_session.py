@@ -34,7 +34,7 @@ class KeyboardSession(Session[Command], Generic[Command, Asked]):
 
     Attributes:
         keyboard: What is read.
-        line: Where the person is told something.
+        line: Where messages and the status are shown.
         colour: Whether the person likes colours (https://no-color.org).
     """
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Note:
-    """Tell the person something.
+    """Show the person a message.
 
     Attributes:
         text: What.

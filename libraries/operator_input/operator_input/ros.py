@@ -105,7 +105,7 @@ def declare_gamepad(node: Node, devices: InputDevices | None = None) -> Gamepad:
         preset=read.text('preset', AUTO, 'auto, xbox, ps or generic'),
         device=read.text('device', '', 'path, or expression for the name; empty for any'),
         dead_zone=read.number('deadzone', 0.08, (0.0, 0.9), 'share of the way that is rest'),
-        say=node.get_logger().info,
+        log=node.get_logger().info,
     )
 
 
@@ -179,7 +179,7 @@ def run_keyboard(
         name: Name for the log.
         make_node: Makes the node.
         make_session: Makes what reads the keyboard and publishes.
-        *errors: What is told in a line when it cannot be made.
+        *errors: What is logged as one line when it cannot be made.
     """
 
     def serve(stop: threading.Event) -> None:
@@ -204,7 +204,7 @@ def run_gamepad(
         name: Name for the log.
         make_node: Makes the node.
         make_session: Makes what reads the gamepad and publishes.
-        *errors: What is told in a line when it cannot be made.
+        *errors: What is logged as one line when it cannot be made.
     """
 
     def serve(stop: threading.Event) -> None:

@@ -32,7 +32,7 @@ class Teleop(Protocol[Command_co]):
 
 
 class Session(ABC, Generic[Command]):
-    """One person and one robot, in one thread; whatever ends it, the robot is told to rest.
+    """One person and one robot, in one thread; whatever ends it, the robot gets commands to rest.
 
     Subclasses read from somewhere and publish to someone.
 

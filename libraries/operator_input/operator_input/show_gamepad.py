@@ -28,7 +28,7 @@ def main() -> None:
     options = parser.parse_args()
     try:
         gamepad = Gamepad(
-            KernelDevices(), preset=options.preset, device=options.device, say=_print
+            KernelDevices(), preset=options.preset, device=options.device, log=_print
         )
     except PresetError as error:
         sys.exit(f'error: {error}')

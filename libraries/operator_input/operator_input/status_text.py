@@ -14,7 +14,7 @@ RELEASE_WORDS: Mapping[ReleaseSource, str] = {
     ReleaseSource.KEYBOARD: 'true releases (evdev)',
     ReleaseSource.TIME_OUT: 'timed releases',
 }
-"""What the person is told of who says that a key went up."""
+"""What is shown of where key releases come from."""
 
 RESET = '\x1b[0m'
 

@@ -135,10 +135,10 @@ class ScriptedTerminal:
         end = 0
         for match in _SEQUENCES.finditer(data):
             end = match.end()
-            self._obey(match)
+            self._handle(match)
         return data[end:][-16:]
 
-    def _obey(self, match: re.Match[bytes]) -> None:
+    def _handle(self, match: re.Match[bytes]) -> None:
         sequence = match[0]
         if match[2]:
             change = self.modes.add if match[3] == b'h' else self.modes.discard

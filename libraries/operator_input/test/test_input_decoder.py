@@ -88,7 +88,7 @@ def test_kitty_presses(text: str, name: str) -> None:
 
 
 def test_kitty_press_repeat_release() -> None:
-    """The three events of a key are told apart, in both forms of the protocol."""
+    """The three events of a key are distinguished, in both forms of the protocol."""
     text = '\x1b[105;1:1;105u\x1b[105;1:2;105u\x1b[105;1:3u'
     assert decode(text, kitty=True) == [('i', PRESSED), ('i', REPEATED), ('i', RELEASED)]
     text = '\x1b[1;1:1A\x1b[1;1:2A\x1b[1;1:3A'
@@ -148,7 +148,7 @@ def test_strings_are_skipped(text: str) -> None:
     assert not set(keys) - {'k', 'alt+\\'}
 
 
-def test_escape_key_comes_with_patience() -> None:
+def test_escape_key_comes_after_a_timeout() -> None:
     """An escape alone is the key, but only when nothing follows it."""
     decoder = KeyDecoder()
     assert decoder.feed(b'\x1b', 1.0) == []

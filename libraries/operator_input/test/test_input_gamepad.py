@@ -180,7 +180,7 @@ def test_unplugged_gamepad_is_at_rest() -> None:
     """Pulled out with the stick forward: the last state is rest, and that stays so."""
     device = xbox()
     said: list[str] = []
-    gamepad = Gamepad(InjectedDevices(device), say=said.append)
+    gamepad = Gamepad(InjectedDevices(device), log=said.append)
     gamepad.scan(0.0)
     device.press(BTN_TL)
     device.move(ABS_Y, -32768)

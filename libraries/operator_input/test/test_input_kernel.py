@@ -43,7 +43,7 @@ def test_devices_are_in_the_order_of_their_numbers(tmp_path: Path) -> None:
 
 
 def test_file_that_is_no_device(tmp_path: Path) -> None:
-    """What cannot be opened is told with its path and the remedy."""
+    """What cannot be opened is reported with its path and the remedy."""
     file = tmp_path / 'event0'
     file.touch()
     with pytest.raises(DeviceError, match=r'event0.*group input'):
@@ -56,7 +56,7 @@ def test_vanished_device(tmp_path: Path) -> None:
         KernelDevices(str(tmp_path)).open(str(tmp_path / 'event3'))
 
 
-def test_problems_are_told_with_their_remedy(
+def test_problems_are_reported_with_their_remedy(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """No package, no devices, no permission: each has words of its own; else there is none."""

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from operator_input.terminal.liveness import Liveness, PATIENCE, PERIOD
+from operator_input.terminal.liveness import Liveness, PERIOD, TIMEOUT
 from operator_input.terminal.negotiation import KittyNegotiation, POP, PUSH, QUERY, Stage
 from operator_input.terminal.reports import Kitty, Report, ReportKind
 
@@ -81,20 +81,20 @@ def test_every_push_is_popped(reports: list[Report]) -> None:
 
 
 def test_silent_terminal_is_lost() -> None:
-    """A terminal that answers no probe is given up after the patience, and not before."""
+    """A terminal that answers no probe is given up after the time-out, and not before."""
     liveness = Liveness()
     assert liveness.probe_due(10.0)
     assert not liveness.probe_due(10.0 + PERIOD / 2)
-    assert not liveness.is_lost(10.0 + PATIENCE)
-    assert liveness.is_lost(10.1 + PATIENCE)
+    assert not liveness.is_lost(10.0 + TIMEOUT)
+    assert liveness.is_lost(10.1 + TIMEOUT)
 
 
-def test_sign_of_life_resets_the_patience() -> None:
+def test_sign_of_life_resets_the_timeout() -> None:
     """Any byte from the terminal counts."""
     liveness = Liveness()
     now = 10.0
     for _ in range(100):
         assert liveness.probe_due(now)
-        liveness.heard()
+        liveness.received()
         now += PERIOD
         assert not liveness.is_lost(now)

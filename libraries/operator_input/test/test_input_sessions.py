@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The loops of the programs, with a robot that only writes down what it is told."""
+"""The loops of the programs, with a robot that only records its commands."""
 
 from __future__ import annotations
 
@@ -39,29 +39,29 @@ from operator_input.gamepad import (
     Grip,
 )
 
-PATIENCE = 10.0  # [s]
+TIMEOUT = 10.0  # [s]
 PERIOD = 0.01  # [s]
 ABS_Y, LEFT_SHOULDER, SOUTH = 1, 0x136, 0x130
 STICKS = (0, ABS_Y, 3, 4)
 
 
 class Record:
-    """What a robot is told, with a bell for who waits for something."""
+    """The commands of a robot, with a condition to wait for."""
 
     def __init__(self) -> None:
-        self.told: list[Any] = []
+        self.commands: list[Any] = []
         self._changed = threading.Condition()
 
     def add(self, what: object) -> None:
         """Write something down."""
         with self._changed:
-            self.told.append(what)
+            self.commands.append(what)
             self._changed.notify_all()
 
     def wait_for(self, condition: Callable[[list[Any]], bool]) -> None:
-        """Wait until something was told."""
+        """Wait until a condition holds."""
         with self._changed:
-            assert self._changed.wait_for(lambda: condition(self.told), PATIENCE), self.told
+            assert self._changed.wait_for(lambda: condition(self.commands), TIMEOUT), self.commands
 
 
 class Keys:
@@ -149,7 +149,7 @@ def at_terminal() -> Any:
             yield terminal, session, record, ended, thread
         finally:
             stop.set()
-            thread.join(PATIENCE)
+            thread.join(TIMEOUT)
 
 
 END = ['rest'] * RESTS + ['flush']
@@ -159,15 +159,15 @@ def test_a_key_moves_as_long_as_it_is_held() -> None:
     """The command is published again and again, then rests; requests go to the robot."""
     with at_terminal() as (terminal, _, record, _, thread):
         terminal.key('i', 1)
-        record.wait_for(lambda told: told.count('i') >= 3)
+        record.wait_for(lambda commands: commands.count('i') >= 3)
         terminal.key('i', 3)
-        record.wait_for(lambda told: told[-RESTS:] == ['rest'] * RESTS)
+        record.wait_for(lambda commands: commands[-RESTS:] == ['rest'] * RESTS)
         terminal.send('a?')
-        record.wait_for(lambda told: told[-1] == 'ask')
+        record.wait_for(lambda commands: commands[-1] == 'ask')
         terminal.wait_written(b'nobody helps')
         terminal.send('q')
-        thread.join(PATIENCE)
-        assert record.told[-RESTS - 1 :] == END
+        thread.join(TIMEOUT)
+        assert record.commands[-RESTS - 1 :] == END
 
 
 @pytest.mark.parametrize('how', ['robot', 'window'])
@@ -175,16 +175,16 @@ def test_whatever_ends_it_the_robot_rests(how: str) -> None:
     """An error while a key is held is passed on after the rests."""
     with at_terminal() as (terminal, session, record, ended, thread):
         terminal.key('i', 1)
-        record.wait_for(lambda told: told.count('i') >= 2)
+        record.wait_for(lambda commands: commands.count('i') >= 2)
         if how == 'robot':
             session.fails = True
         else:
             terminal.hang_up()
-        thread.join(PATIENCE)
+        thread.join(TIMEOUT)
         assert [type(error) for error in ended] == [
             RuntimeError if how == 'robot' else TerminalError
         ]
-        assert [each for each in record.told if each != 'i'] == END
+        assert [each for each in record.commands if each != 'i'] == END
 
 
 def test_ctrl_z_rests_before_the_shell_has_the_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -192,13 +192,13 @@ def test_ctrl_z_rests_before_the_shell_has_the_terminal(monkeypatch: pytest.Monk
     with at_terminal() as (terminal, _, record, _, _):
         monkeypatch.setattr(os, 'killpg', lambda group, number: record.add((group, number)))
         terminal.key('i', 1)
-        record.wait_for(lambda told: 'i' in told)
+        record.wait_for(lambda commands: 'i' in commands)
         terminal.send('z')
         terminal.wait_written(b'going on')
-        stopped = record.told.index((0, signal.SIGTSTP))
-        assert record.told[stopped - RESTS - 1 : stopped] == END
+        stopped = record.commands.index((0, signal.SIGTSTP))
+        assert record.commands[stopped - RESTS - 1 : stopped] == END
         terminal.key('k', 1)
-        record.wait_for(lambda told: 'k' in told)
+        record.wait_for(lambda commands: 'k' in commands)
 
 
 class Sticks(DeadmanTeleop[float]):
@@ -270,10 +270,10 @@ def test_a_gamepad_that_does_not_change_names_the_timeout(position: int, paramet
         pad.move(ABS_Y, position)
         pad.press(LEFT_SHOULDER)
         said = f'the gamepad has not changed for 0.05 s ({parameter}), so the motion ended'
-        record.wait_for(lambda told: any(str(one).startswith(said) for one in told))
+        record.wait_for(lambda commands: any(str(one).startswith(said) for one in commands))
     finally:
         stop.set()
-        thread.join(PATIENCE)
+        thread.join(TIMEOUT)
 
 
 @pytest.mark.parametrize('unplugged', [False, True])
@@ -286,25 +286,25 @@ def test_a_gamepad_moves_with_its_deadman(unplugged: bool) -> None:
     try:
         pad.move(ABS_Y, -32768)
         pad.press(SOUTH)
-        record.wait_for(lambda told: told == [Button.SOUTH])
+        record.wait_for(lambda commands: commands == [Button.SOUTH])
         pad.press(LEFT_SHOULDER)
-        record.wait_for(lambda told: told.count(1.0) >= 3)
+        record.wait_for(lambda commands: commands.count(1.0) >= 3)
         if unplugged:
             pad.unplug()
         else:
             pad.release(LEFT_SHOULDER)
-        record.wait_for(lambda told: told[-RESTS:] == [0.0] * RESTS)
+        record.wait_for(lambda commands: commands[-RESTS:] == [0.0] * RESTS)
     finally:
         stop.set()
-        thread.join(PATIENCE)
-    assert record.told[-1] == 'flush'
+        thread.join(TIMEOUT)
+    assert record.commands[-1] == 'flush'
     assert pad.is_closed
 
 
 def test_without_a_gamepad_it_says_so() -> None:
-    """The person is told what to do; nothing is published, and it ends as usual."""
+    """A message says what to do; nothing is published, and it ends as usual."""
     record, stop = Record(), threading.Event()
     stop.set()
     WithPad(Gamepad(InjectedDevices()), record, stop).run()
-    assert record.told[0].startswith('no gamepad yet: ')
-    assert record.told[1:] == ['flush']
+    assert record.commands[0].startswith('no gamepad yet: ')
+    assert record.commands[1:] == ['flush']

@@ -23,7 +23,7 @@ from operator_input import (
 )
 from operator_input.terminal.negotiation import Stage
 
-PATIENCE = 10.0  # [s] of a test on a busy machine
+TIMEOUT = 10.0  # [s] of a test on a busy machine
 KEY_Q, KEY_I, KEY_SPACE = 16, 23, 57
 
 
@@ -32,7 +32,7 @@ def read_until(
 ) -> list[KeyEvent]:
     """Read keys until a condition holds."""
     events: list[KeyEvent] = []
-    deadline = time.monotonic() + PATIENCE
+    deadline = time.monotonic() + TIMEOUT
     while not enough(events):
         assert time.monotonic() < deadline, f'only {events}'
         events += (
@@ -159,7 +159,7 @@ def test_cut_line_releases_the_held_key() -> None:
 
 
 def test_live_line_keeps_the_held_key() -> None:
-    """A terminal that answers keeps a silent key held well beyond the patience."""
+    """A terminal that answers keeps a silent key held well beyond the time-out."""
     with ScriptedTerminal(kitty=True) as terminal, TerminalKeyboard(terminal.path) as keyboard:
         negotiate(keyboard)
         terminal.key('i', 1)
@@ -170,7 +170,7 @@ def test_live_line_keeps_the_held_key() -> None:
     assert actions(events) == [('i', KeyAction.PRESSED)]
 
 
-def test_closed_window_is_told() -> None:
+def test_closed_window_is_reported() -> None:
     """Reading from a window that was closed raises, instead of waiting for ever."""
     with (
         ScriptedTerminal(kitty=False) as terminal,
@@ -205,7 +205,7 @@ def test_no_terminal(path: str) -> None:
         pass
 
 
-def test_process_without_a_terminal_is_told_the_remedy() -> None:
+def test_process_without_a_terminal_names_the_remedy() -> None:
     """Started as a service, without a controlling terminal, the message says what to do."""
     result = subprocess.run(
         [sys.executable, '-c', 'from operator_input.show_keys import main; main()'],
@@ -213,7 +213,7 @@ def test_process_without_a_terminal_is_told_the_remedy() -> None:
         stdin=subprocess.DEVNULL,
         capture_output=True,
         text=True,
-        timeout=PATIENCE * 3,
+        timeout=TIMEOUT * 3,
         env={'PYTHONPATH': ':'.join(sys.path)},
         check=False,
     )
@@ -226,7 +226,7 @@ def test_stuck_terminal_does_not_hold_the_writer_up() -> None:
     """Writing more than a terminal takes returns; the robot's loop goes on."""
     with ScriptedTerminal(kitty=False) as terminal, TerminalKeyboard(terminal.path) as keyboard:
         negotiate(keyboard)
-        signal.alarm(int(PATIENCE))
+        signal.alarm(int(TIMEOUT))
         try:
             for _ in range(100):
                 keyboard.line.write('x' * 4096)

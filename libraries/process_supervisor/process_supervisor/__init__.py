@@ -3,7 +3,7 @@
 """A process supervisor: starts processes, waits until they are ready, stops them in order.
 
 The decisions are in :mod:`.supervision` and :mod:`.stopping`, which know no process, no clock and
-no signal handler: they are told what happened and when, and say what to do through callables.
+no signal handler: they get what happened and when, and act through callables.
 :mod:`.runner` does it with real processes; :mod:`.guardian` does it when the runner was killed.
 
 Around it stands what the bring-ups of all robots need: :mod:`.nodes` finds the executables of ROS

@@ -20,7 +20,7 @@ USAGE_ERROR = 2
 """Exit code of a bring-up when nothing was started."""
 
 REPORTED_STATES = {Phase.RUNNING: 'READY=1', Phase.STOPPING: 'STOPPING=1'}
-"""What the service manager of a bring-up hears of its phases, in the words of sd_notify(3)."""
+"""What is reported to the service manager of a bring-up, as in sd_notify(3)."""
 
 
 class Shutdown(Protocol):
@@ -30,7 +30,7 @@ class Shutdown(Protocol):
         """Do it; everything is stopped when this returns.
 
         Args:
-            say: Takes what the user is told.
+            say: Shows the user a message.
             given_up: True when it is no longer wanted: Ctrl-C again, or a process has ended.
         """
 
@@ -106,7 +106,7 @@ class _ShutdownThread:
         return True
 
     def join(self) -> None:
-        """Wait until it has ended; it is told when it is no longer wanted."""
+        """Wait until it has ended; ``given_up`` shows it when it is no longer wanted."""
         if self._thread is not None:
             self._thread.join()
 

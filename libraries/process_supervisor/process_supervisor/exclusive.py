@@ -47,7 +47,7 @@ def exclusive(thing: str, remedy: str) -> Iterator[None]:
 
 
 def _process_of(name: bytes) -> str:
-    """Tell whose socket it is; nothing when it has just been closed."""
+    """Return whose socket it is; nothing when it has just been closed."""
     with socket.socket(socket.AF_UNIX) as probe:
         probe.setblocking(False)
         try:

@@ -26,7 +26,7 @@ class GraphClient:
     """A node of its own, in a context of its own; use it in one thread.
 
     Attributes:
-        node: The node, for what is published, heard and called.
+        node: The node, for publishers, subscriptions and clients.
     """
 
     def __init__(self, name: str, given_up: Callable[[], bool], namespace: str = '') -> None:
@@ -53,7 +53,7 @@ class GraphClient:
         self._context.try_shutdown()
 
     def listen(self, duration: float) -> None:
-        """Hear what comes in.
+        """Process what comes in.
 
         Args:
             duration: For how long in [s].

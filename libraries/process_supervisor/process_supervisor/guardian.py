@@ -4,8 +4,8 @@
 
 A supervisor that gets SIGKILL (or is the victim of the memory killer) cannot stop anybody, and its
 processes would go on: a master with enabled drives. So the supervisor starts this process first
-and keeps one end of a pipe to it. When the pipe ends without a good-bye, the supervisor is gone,
-and the guardian stops what it was told of in the same order and by the same signals.
+and keeps one end of a pipe to it. When the pipe ends without ``bye``, the supervisor is gone,
+and the guardian stops the processes in the same order and by the same signals.
 
 It runs ``python -I -S``, so it needs the standard library only and starts in a few milliseconds,
 in its own session, so that no Ctrl-C reaches it.
@@ -64,7 +64,7 @@ class Guardian:
         with contextlib.suppress(ProcessLookupError):  # it has already ended
             self._pidfds[name] = os.pidfd_open(message['pid'])
             self._pids[name] = message['pid']
-            steps = [(Signals(number), patience) for number, patience in message['steps']]
+            steps = [(Signals(number), timeout) for number, timeout in message['steps']]
             self._sequence.add(name, message['order'], steps)
 
     def _forget(self, name: str) -> None:
@@ -93,7 +93,7 @@ class Guardian:
 
 
 def main() -> None:
-    """Watch over the processes that standard input tells of, until it ends."""
+    """Watch over the processes that standard input names, until it ends."""
     for number in (Signals.SIGINT, Signals.SIGTERM, Signals.SIGHUP, Signals.SIGPIPE):
         signal(number, SIG_IGN)
     guardian = Guardian()
@@ -106,7 +106,7 @@ def main() -> None:
 
 
 class GuardianLink:
-    """The supervisor's end: starts the guardian and tells it what runs."""
+    """The supervisor's end: starts the guardian and sends it what runs."""
 
     def __init__(self) -> None:
         """Start the guardian."""
@@ -128,13 +128,13 @@ class GuardianLink:
         """Its process id."""
         return self._process.pid
 
-    def _tell(self, **message: object) -> None:
+    def _send(self, **message: object) -> None:
         if self._process.stdin is not None:
             with contextlib.suppress(BrokenPipeError):  # killed; the supervisor goes on without it
                 self._process.stdin.write(json.dumps(message) + '\n')
 
     def watch(self, name: str, pid: int, order: int, steps: list[tuple[Signals, float]]) -> None:
-        """Tell of a process that has been started as the leader of its own group.
+        """Report a process that has been started as the leader of its own group.
 
         Args:
             name: Its name.
@@ -142,15 +142,15 @@ class GuardianLink:
             order: Place in the order of stopping.
             steps: Signals and the time in [s] that each is given.
         """
-        self._tell(pid=pid, name=name, order=order, steps=steps)
+        self._send(pid=pid, name=name, order=order, steps=steps)
 
     def gone(self, name: str) -> None:
-        """Tell that a process has ended."""
-        self._tell(gone=name)
+        """Report that a process has ended."""
+        self._send(gone=name)
 
     def dismiss(self) -> None:
         """Everything has ended: the guardian may go."""
-        self._tell(bye=True)
+        self._send(bye=True)
         if self._process.stdin is not None:
             with contextlib.suppress(BrokenPipeError):
                 self._process.stdin.close()

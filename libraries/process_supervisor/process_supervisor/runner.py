@@ -36,7 +36,7 @@ LEAVE_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class _Child:
-    """A running process with its pipe and the handle that tells its end."""
+    """A running process with its pipe and the handle that becomes readable at its end."""
 
     def __init__(self, spec: ProcessSpec) -> None:
         self.readiness = ReadinessSocket() if spec.notifies_ready else None
@@ -184,20 +184,20 @@ class Runner:
 
     def _loop(self) -> None:
         while self._supervision.phase is not Phase.STOPPED:
-            for key, _ in self._selector.select(self._patience()):
+            for key, _ in self._selector.select(self._time_left()):
                 # an earlier handler of this round may have closed it
                 if self._selector.get_map().get(key.fd) is key:
                     key.data()
             self._supervision.advance(time.monotonic())
 
-    def _patience(self) -> float | None:
+    def _time_left(self) -> float | None:
         deadline = self._supervision.next_deadline()
         return None if deadline is None else max(0.0, deadline - time.monotonic())
 
     def _start(self, spec: ProcessSpec) -> None:
         child = _Child(spec)
         if self._guardian is not None:
-            steps = [(step.signal, step.patience) for step in spec.stop_steps]
+            steps = [(step.signal, step.timeout) for step in spec.stop_steps]
             self._guardian.watch(spec.name, child.process.pid, spec.stop_order, steps)
         self._children[spec.name] = child
         self._selector.register(child.output, selectors.EVENT_READ, lambda: self._read(child))

@@ -15,11 +15,11 @@ class StopStep:
 
     Attributes:
         signal: The signal that is sent to its process group.
-        patience: How long it may take to end before the next step, in [s].
+        timeout: How long it may take to end before the next step, in [s].
     """
 
     signal: Signals
-    patience: float
+    timeout: float
 
 
 STOP_STEPS = (

@@ -23,7 +23,7 @@ class _Member:
 class StopSequence:
     """Stops the processes of one order after those of the order before.
 
-    It is told what happened (:meth:`exited`) and what time it is (:meth:`advance`), and sends
+    It gets what happened (:meth:`exited`) and what time it is (:meth:`advance`), and sends
     signals through the callable it was given.
 
     Attributes:
@@ -86,8 +86,8 @@ class StopSequence:
             self.abandoned.append(name)
             del self._members[name]
             return
-        signal, patience = member.steps[member.step]
-        member.deadline = now + patience
+        signal, timeout = member.steps[member.step]
+        member.deadline = now + timeout
         self._send(name, signal)
 
     def next_deadline(self) -> float | None:

@@ -46,7 +46,7 @@ class Severity(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Notice:
-    """Something the user is told.
+    """A message to the user.
 
     Attributes:
         severity: How loud.
@@ -107,7 +107,7 @@ class Supervision:
             specs: The processes, started in this order.
             start: Starts one; raises :class:`.StartError` when that is not possible.
             send: Sends a signal to a running one.
-            notify: Tells the user something.
+            notify: Shows the user a notice.
             on_interrupt: Asked at the first interrupt before everything is stopped; true when it
                 takes care of stopping, false or None to stop at once.
             on_phase: Called when another phase begins.
@@ -247,7 +247,7 @@ class Supervision:
         self._enter(Phase.STOPPING)
         for name in self.running:
             spec = self._children[name].spec
-            steps = [(step.signal, step.patience) for step in spec.stop_steps]
+            steps = [(step.signal, step.timeout) for step in spec.stop_steps]
             self._stopping.add(name, spec.stop_order, steps)
         self._advance_stop(now)
 

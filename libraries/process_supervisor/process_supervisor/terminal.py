@@ -41,7 +41,7 @@ def wants_colour(stream: TextIO, environment: Mapping[str, str]) -> bool:
 
     Args:
         stream: Where it goes.
-        environment: Variables: NO_COLOR (https://no-color.org) and TERM are heard.
+        environment: Variables: NO_COLOR (https://no-color.org) and TERM count.
     """
     return stream.isatty() and not environment.get('NO_COLOR') and is_smart(environment)
 
@@ -50,7 +50,7 @@ def is_smart(environment: Mapping[str, str]) -> bool:
     """Say whether the terminal understands more than plain text.
 
     Args:
-        environment: Variables: TERM is heard.
+        environment: Variables: TERM counts.
     """
     return environment.get('TERM', 'dumb') not in {'dumb', 'unknown', ''}
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import subprocess
 import sys
 
-from small_processes import NOTIFY, PATIENCE
+from small_processes import NOTIFY, TIMEOUT
 
 SOURCES = Path(__file__).parents[3]
 """The checkout."""
@@ -122,7 +122,7 @@ class SmallWorkspace:
     def run(self, *arguments: str) -> tuple[int, str]:
         """Run a bring-up to its end."""
         with self.bringup(*arguments) as process:
-            output, _ = process.communicate(timeout=PATIENCE)
+            output, _ = process.communicate(timeout=TIMEOUT)
             return process.returncode, output
 
 

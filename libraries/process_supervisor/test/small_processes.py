@@ -15,14 +15,14 @@ import time
 
 from process_supervisor import ProcessSpec, StopStep
 
-PATIENCE = 30.0
+TIMEOUT = 30.0
 """Longest time in [s] that a test waits for something that should happen at once."""
 
 QUICK = tuple(
-    StopStep(signal, patience)
-    for signal, patience in [(Signals.SIGTERM, 0.3), (Signals.SIGINT, 0.3), (Signals.SIGKILL, 9)]
+    StopStep(signal, timeout)
+    for signal, timeout in [(Signals.SIGTERM, 0.3), (Signals.SIGINT, 0.3), (Signals.SIGKILL, 9)]
 )
-"""A ladder with little patience, for processes that do not hear."""
+"""A ladder with short time-outs, for processes that ignore signals."""
 
 NOTIFY = """
 def notify():
@@ -40,7 +40,7 @@ PROGRAMS = {
         print('waiting', flush=True)
         while True: signal.pause()
     """,
-    # says ready, and good-bye when it is stopped
+    # reports that it is ready, and writes bye when it is stopped
     'good': """
         def leave(number, frame):
             os.write(1, b'bye\\n')  # print is not re-entrant
@@ -99,7 +99,7 @@ def program(kind: str, name: str = '', **options: object) -> ProcessSpec:
     code = f'import os, signal, sys\n{NOTIFY}' + '\n'.join(line[8:] for line in lines)
     # isolated and without site: it starts in milliseconds
     argv = (sys.executable, '-I', '-S', '-c', code)
-    values: dict[str, object] = {'stop_steps': QUICK, 'ready_timeout': PATIENCE, **options}
+    values: dict[str, object] = {'stop_steps': QUICK, 'ready_timeout': TIMEOUT, **options}
     return ProcessSpec(name or kind, argv, **values)  # type: ignore[arg-type]
 
 
@@ -108,13 +108,13 @@ def service_manager() -> Iterator[tuple[str, socket.socket]]:
     """Open a socket as systemd has it; its address is for NOTIFY_SOCKET."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
         manager.bind('')  # the kernel chooses a name
-        manager.settimeout(PATIENCE)
+        manager.settimeout(TIMEOUT)
         yield f'@{manager.getsockname()[1:].decode()}', manager
 
 
 def wait_for_end(pids: Iterable[int]) -> list[int]:
-    """Wait until processes have ended; return those that have not when the patience is over."""
-    deadline = time.monotonic() + PATIENCE
+    """Wait until processes have ended; return those that have not after the time-out."""
+    deadline = time.monotonic() + TIMEOUT
     left = []
     for pid in pids:
         try:

@@ -161,7 +161,7 @@ def test_a_second_interrupt_kills_everybody_and_is_no_success() -> None:
 
 
 def test_an_echo_of_an_interrupt_kills_nobody() -> None:
-    """Two signals a few milliseconds apart are one wish: drives come to rest and are disabled."""
+    """Two signals a few milliseconds apart are one: drives come to rest and are disabled."""
     bench = Bench(SLAVES, MASTER)
     bench.supervision.interrupt(5.0)
     bench.supervision.interrupt(5.003)

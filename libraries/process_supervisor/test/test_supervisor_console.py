@@ -9,7 +9,7 @@ import signal
 import threading
 
 import pytest
-from small_processes import PATIENCE, program, service_manager
+from small_processes import program, service_manager, TIMEOUT
 
 from process_supervisor import LineWriter, Outcome, Shutdown, supervise
 
@@ -25,7 +25,7 @@ def ctrl_c() -> None:
 def run_until(
     capsys: pytest.CaptureFixture[str], *kinds: str, shutdown: Shutdown | None
 ) -> tuple[Outcome, list[str]]:
-    """Run small processes; they say good-bye by themselves when they are stopped."""
+    """Run small processes; they write bye when they are stopped."""
     outcome = supervise([program(kind, notifies_ready=True) for kind in kinds], shutdown=shutdown)
     return outcome, capsys.readouterr().out.splitlines()
 
@@ -47,26 +47,26 @@ class CtrlC:
             ctrl_c()
 
 
-def test_systemd_hears_when_all_are_ready_and_when_they_are_stopped(
+def test_systemd_gets_readiness_and_the_stop(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Before the shutdown; each once, and none of its processes reports to systemd itself."""
 
     def shutdown(say: Say, given_up: GivenUp) -> None:
-        heard.extend(manager.recv(100) for _ in range(2))
+        received.extend(manager.recv(100) for _ in range(2))
 
-    heard: list[bytes] = []
+    received: list[bytes] = []
     CtrlC(monkeypatch, 'all is ready')
     with service_manager() as (address, manager):
         monkeypatch.setenv('NOTIFY_SOCKET', address)
         run_until(capsys, 'good', shutdown=shutdown)
-        assert heard == [b'READY=1', b'STOPPING=1']
+        assert received == [b'READY=1', b'STOPPING=1']
         manager.setblocking(False)
         with pytest.raises(BlockingIOError):
             manager.recv(100)
 
 
-def test_systemd_hears_of_no_readiness_when_one_is_missing(
+def test_systemd_gets_no_readiness_when_one_is_missing(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Only that everything is stopped."""
@@ -97,12 +97,12 @@ def test_a_shutdown_is_done_before_anybody_is_stopped(
 def test_ctrl_c_again_ends_a_shutdown(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """It is told that it is no longer wanted, and everything is stopped at once."""
+    """``given_up`` says that it is no longer wanted, and everything is stopped at once."""
     given_up_in_time = threading.Event()
 
     def shutdown(say: Say, given_up: GivenUp) -> None:
         wait = threading.Event()
-        for _ in range(round(PATIENCE / 0.1)):
+        for _ in range(round(TIMEOUT / 0.1)):
             signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
             if given_up():
                 given_up_in_time.set()

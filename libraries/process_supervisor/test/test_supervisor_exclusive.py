@@ -53,7 +53,7 @@ def another_process(bus: str, user: int) -> Iterator[tuple[subprocess.Popen[str]
 
 
 def test_the_second_on_a_bus_is_refused_with_the_first_ones_process(bus: str) -> None:
-    """And told what to do; another bus is free; after the first has left, so is this one."""
+    """With the remedy; another bus is free; after the first has left, so is this one."""
     with exclusive(bus, REMEDY):
         for _ in range(3):  # being refused must not spoil what the next one reads
             words = rf'process {os.getpid()} of user {os.getuid()}.*{bus}.*--can'

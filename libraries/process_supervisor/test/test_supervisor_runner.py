@@ -16,7 +16,7 @@ import textwrap
 import threading
 
 import pytest
-from small_processes import PATIENCE, program, wait_for_end
+from small_processes import program, TIMEOUT, wait_for_end
 
 from process_supervisor import Notice, Outcome, ProcessSpec, Runner
 from process_supervisor.runner import LEAVE_SIGNALS
@@ -56,7 +56,7 @@ def nothing(_: Runner) -> None:
 
 
 def test_ctrl_c_stops_in_order_and_exits_0() -> None:
-    """The lower stop order says good-bye first, whatever the order of starting."""
+    """The lower stop order ends first, whatever the order of starting."""
     watch = Watch(
         program('good', 'slaves', notifies_ready=True, stop_order=2),
         program('good', 'master', notifies_ready=True, stop_order=0),
@@ -127,16 +127,16 @@ def test_a_last_line_without_an_end_is_a_line() -> None:
 
 def test_lines_come_before_the_end_of_their_process() -> None:
     """However late they are read: the end is handled after the last line."""
-    heard: list[str] = []
+    lines: list[str] = []
 
     def write_slowly(_: str, line: str) -> None:
-        heard.append(line)
-        select.select([runner._children['dies'].pidfd], [], [], PATIENCE)
+        lines.append(line)
+        select.select([runner._children['dies'].pidfd], [], [], TIMEOUT)
 
-    with Runner([program('dies')], write_slowly, lambda note: heard.append(note.text)) as runner:
+    with Runner([program('dies')], write_slowly, lambda note: lines.append(note.text)) as runner:
         outcome = runner.run()
     end = 'dies ended with exit code 7'
-    assert heard[-3:] == ['first words', 'last words', end]
+    assert lines[-3:] == ['first words', 'last words', end]
     assert outcome == Outcome(1, end, 'dies', ('first words', 'last words'))
 
 
@@ -238,7 +238,7 @@ SUPERVISOR = textwrap.dedent("""
 
 @pytest.mark.parametrize('number', [signal.SIGKILL, signal.SIGTERM], ids=['killed', 'terminated'])
 def test_no_process_outlives_its_supervisor(number: signal.Signals, tmp_path: Path) -> None:
-    """Not even when the supervisor is SIGKILLed, and a process hears nothing but SIGKILL."""
+    """Not even when the supervisor is SIGKILLed, and a process ends by nothing but SIGKILL."""
     folders = [str(Path(__file__).parent), str(Path(__file__).parents[1])]
     environment = {**os.environ, 'PYTHONPATH': os.pathsep.join(folders)}
     with subprocess.Popen(
@@ -249,7 +249,7 @@ def test_no_process_outlives_its_supervisor(number: signal.Signals, tmp_path: Pa
         env=environment,
         start_new_session=True,
     ) as supervisor:
-        watchdog = threading.Timer(PATIENCE, supervisor.kill)
+        watchdog = threading.Timer(TIMEOUT, supervisor.kill)
         watchdog.start()
         try:
             assert supervisor.stdout is not None

@@ -77,14 +77,14 @@ def test_lower_orders_are_gone_before_higher_ones_are_asked(
 def test_each_signal_is_sent_once_and_only_as_long_as_needed(
     death: tuple[Signals | None, float],
 ) -> None:
-    """The ladder is climbed up to the signal that the process dies of, with the patience given."""
+    """The ladder is climbed up to the signal that the process dies of, after the time-outs."""
     play = Play({'master': death})
     play.run({'master': 0}, STEPS)
     signals = [signal for _, _, signal in play.sent]
     last = [step[0] for step in STEPS].index(death[0]) if death[0] else len(STEPS) - 1
     assert signals == [signal for signal, _ in STEPS[: last + 1]]
     times = [when for when, _, _ in play.sent]
-    assert times == [sum(patience for _, patience in STEPS[:i]) for i in range(last + 1)]
+    assert times == [sum(timeout for _, timeout in STEPS[:i]) for i in range(last + 1)]
 
 
 def test_force_kills_everybody_at_once_whatever_the_order() -> None:

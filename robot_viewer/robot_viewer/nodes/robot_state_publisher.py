@@ -112,7 +112,7 @@ class RobotStatePublisher(Node):
         elif remark is Remark.BACKWARDS:
             self.get_logger().warning(remark.value)
         else:
-            self.get_logger().warning(f'{text} (told once)', once=True)
+            self.get_logger().warning(f'{text} (logged once)', once=True)
 
     def _watch_joints(self) -> None:
         topic = self._subscription.topic_name

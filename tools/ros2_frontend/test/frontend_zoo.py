@@ -36,7 +36,7 @@ class Talker(Node):
         """Make everything."""
         super().__init__('talker')
         self._count = 0
-        self._heard = ''
+        self._received = ''
         self._chatter = self.create_publisher(String, 'chatter', 10)
         self._hidden = self.create_publisher(String, '_hidden_chatter', 10)
         self._joints = self.create_publisher(JointState, 'joint_states', 10)
@@ -45,10 +45,10 @@ class Talker(Node):
         self._latched.publish(String(data='kept'))
         self.create_timer(0.02, self._publish)
         # keeps what comes while it is being connected, so that the tests need no luck
-        self.create_subscription(String, 'listener/input', self._hear, KEPT)
-        self.create_subscription(JointState, 'listener/stamped', self._hear_stamped, KEPT)
+        self.create_subscription(String, 'listener/input', self._receive, KEPT)
+        self.create_subscription(JointState, 'listener/stamped', self._receive_stamped, KEPT)
         self.create_service(Trigger, 'trigger', self._trigger)
-        self.create_service(Trigger, 'last_heard', self._tell_heard)
+        self.create_service(Trigger, 'last_received', self._answer_received)
         self.create_service(SetBool, 'set_bool', self._set_bool)
         self.create_service(Trigger, '_hidden_service', self._trigger)
 
@@ -61,18 +61,18 @@ class Talker(Node):
         joints.header.frame_id = 'base'
         self._joints.publish(joints)
 
-    def _hear(self, message: String) -> None:
-        self._heard += message.data + ';'
+    def _receive(self, message: String) -> None:
+        self._received += message.data + ';'
 
-    def _hear_stamped(self, message: JointState) -> None:
-        self._heard += f'stamp {message.header.stamp.sec};'
+    def _receive_stamped(self, message: JointState) -> None:
+        self._received += f'stamp {message.header.stamp.sec};'
 
     def _trigger(self, _: Any, response: Any) -> Any:
         response.success, response.message = True, 'done'
         return response
 
-    def _tell_heard(self, _: Any, response: Any) -> Any:
-        response.success, response.message = True, self._heard
+    def _answer_received(self, _: Any, response: Any) -> Any:
+        response.success, response.message = True, self._received
         return response
 
     def _set_bool(self, request: Any, response: Any) -> Any:

@@ -80,7 +80,7 @@ def test_node_info_names_actions(run: Ros2) -> None:
 
 
 def test_a_goal_that_succeeds(run: Ros2) -> None:
-    """Each step is told, as ros2cli tells it."""
+    """Each step is printed, as ros2cli does."""
     outcome = run('action', 'send_goal', '/count', TYPE, '{order: 2}')
     assert (outcome.code, outcome.err) == (0, '')
     assert re.fullmatch(SUCCESS, outcome.out), outcome.out
@@ -96,7 +96,7 @@ def test_feedback_on_request(run: Ros2) -> None:
 
 
 def test_goals_that_do_not_succeed(run: Ros2) -> None:
-    """A rejected and an aborted goal are told, with exit code 0, as ros2cli."""
+    """A rejected and an aborted goal are reported, with exit code 0, as ros2cli."""
     rejected = run('action', 'send_goal', '/count', TYPE, '{order: -1}')
     assert (rejected.code, rejected.out.splitlines()[-1]) == (0, 'Goal was rejected.')
     aborted = run('action', 'send_goal', '/count', TYPE)  # without YAML: order 0

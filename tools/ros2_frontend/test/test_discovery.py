@@ -12,7 +12,7 @@ import pytest
 
 from ros2_frontend.aliases import Endpoint, NamesAndTypes
 from ros2_frontend.ros import discovery
-from ros2_frontend.ros.discovery import Patience, take_census, wait
+from ros2_frontend.ros.discovery import take_census, wait, WaitLimits
 from ros2_frontend.ros.participants import DiscoveryPorts
 
 UNKNOWN = '_NODE_NAME_UNKNOWN_'
@@ -87,14 +87,14 @@ def test_census_counts_endpoints_of_unknown_nodes() -> None:
 def test_what_is_there_is_answered_at_once(count: dict[str, int]) -> None:
     """Even when the view is not complete."""
     count['count'] = 9
-    assert wait(lambda: 'found', FakeView({}), Patience(60.0, 60.0)) == 'found'
+    assert wait(lambda: 'found', FakeView({}), WaitLimits(60.0, 60.0)) == 'found'
 
 
 def test_a_complete_view_ends_the_wait(count: dict[str, int]) -> None:
     """Long before the limit, once nothing changes any more."""
     count['count'] = 1
     view = FakeView({'/rosout': [(1, 'a')]}, changes=4)
-    assert wait(lambda: None, view, Patience(60.0, 0.02)) is None
+    assert wait(lambda: None, view, WaitLimits(60.0, 0.02)) is None
     assert view.looks > view.changes
 
 
@@ -107,22 +107,22 @@ def test_an_incomplete_view_is_waited_for(
     """Beyond the quiet time, until the limit."""
     count['count'] = expected
     view = FakeView({'/rosout': nodes})
-    wait(lambda: None, view, Patience(0.1, 0.0))
+    wait(lambda: None, view, WaitLimits(0.1, 0.0))
     assert view.looks > 2  # with a complete view, two looks are enough
 
 
 def test_what_appears_late_is_found(count: dict[str, int]) -> None:
     """The look is repeated."""
     answers = iter([None, None, None, 'late'])
-    assert wait(lambda: next(answers), FakeView({}), Patience(60.0, 60.0)) == 'late'
+    assert wait(lambda: next(answers), FakeView({}), WaitLimits(60.0, 60.0)) == 'late'
 
 
-def test_patience_follows_the_user_and_the_reach(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_limits_follow_the_user_and_the_reach(monkeypatch: pytest.MonkeyPatch) -> None:
     """`--spin-time` is the limit; for a name it is also how long nothing may happen."""
     monkeypatch.setattr('ros2_frontend.ros.discovery.is_this_host', lambda environ: True)
-    near = Patience.for_lists(None)
-    assert Patience.for_lists(2.0).limit == 2.0
-    assert Patience.for_names(2.0) == Patience(2.0, 2.0)
-    assert Patience.for_names(None).quiet < Patience.for_names(None).limit
+    near = WaitLimits.for_lists(None)
+    assert WaitLimits.for_lists(2.0).limit == 2.0
+    assert WaitLimits.for_names(2.0) == WaitLimits(2.0, 2.0)
+    assert WaitLimits.for_names(None).quiet < WaitLimits.for_names(None).limit
     monkeypatch.setattr('ros2_frontend.ros.discovery.is_this_host', lambda environ: False)
-    assert Patience.for_lists(None).quiet > near.quiet
+    assert WaitLimits.for_lists(None).quiet > near.quiet

@@ -86,7 +86,7 @@ def test_doctor_over_dds(ros2: Ros2) -> None:
 @pytest.mark.scenario
 @pytest.mark.usefixtures('zoo')
 def test_doctor_report(ros2: Ros2) -> None:
-    """All tables; the QoS of a pair that does not connect is told."""
+    """All tables; the QoS of a pair that does not connect is reported."""
     out = ros2('doctor', '--report').out
     heads = [line.strip() for line in out.splitlines() if line.startswith('   ')]
     assert heads == [

@@ -177,7 +177,7 @@ def test_service_list(ros2: Ros2) -> None:
 def test_service_type_and_find(ros2: Ros2) -> None:
     """The type of a name and the names of a type."""
     assert ros2('service', 'type', '/set_bool').out == 'std_srvs/srv/SetBool\n'
-    assert ros2('service', 'find', 'std_srvs/srv/Trigger').lines == ['/last_heard', '/trigger']
+    assert ros2('service', 'find', 'std_srvs/srv/Trigger').lines == ['/last_received', '/trigger']
     unknown = ros2('service', 'type', '/set_boll')
     assert (unknown.code, unknown.out) == (1, '')
     assert "'/set_bool'" in unknown.err

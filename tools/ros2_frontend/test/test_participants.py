@@ -39,7 +39,7 @@ def test_every_participant_has_one_port(domain: int, participants: set[int]) -> 
     assert found.count == len(found.own) + len(found.others)
 
 
-def test_own_sockets_are_told_from_others() -> None:
+def test_own_sockets_are_distinguished() -> None:
     """A port that this process binds counts as its own."""
     domain = 101  # the last one that nobody's test reserves
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as bound:

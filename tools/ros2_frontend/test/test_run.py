@@ -16,7 +16,7 @@ from processes import RunningProcess
 import pytest
 
 PRINT_ARGUMENTS = '#!/bin/sh\nfor word in "$@"; do echo "[$word]"; done\nexit 7\n'
-EVERYTHING = 'broken, count_signals, print_arguments, tell_ignored, twice, twice'
+EVERYTHING = 'broken, count_signals, print_arguments, print_ignored, twice, twice'
 COUNT_SIGNALS = """\
 #!/usr/bin/env python3
 import signal, sys
@@ -33,7 +33,7 @@ print('ready', flush=True)
 while True:
     signal.pause()
 """
-TELL_IGNORED = '#!/bin/sh\ngrep SigIgn /proc/self/status\n'
+PRINT_IGNORED = '#!/bin/sh\ngrep SigIgn /proc/self/status\n'
 
 
 @pytest.fixture
@@ -42,7 +42,7 @@ def env(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Mapping[str, str]:
     programs = {
         'print_arguments': PRINT_ARGUMENTS,
         'count_signals': COUNT_SIGNALS,
-        'tell_ignored': TELL_IGNORED,
+        'print_ignored': PRINT_IGNORED,
         'broken': '#!/no/such/interpreter\n',
         'a/twice': '#!/bin/sh\n',
         'b/twice': '#!/bin/sh\n',
@@ -116,7 +116,7 @@ def test_killing_the_command_leaves_no_node(env: Mapping[str, str]) -> None:
 
 def test_sigpipe_is_as_the_shell_gave_it(env: Mapping[str, str]) -> None:
     """Python ignores SIGPIPE; a program started from a shell does not."""
-    ignored = run(env, 'demo', 'tell_ignored').stdout
+    ignored = run(env, 'demo', 'print_ignored').stdout
     assert not int(ignored.split()[1], 16) & 1 << (signal.SIGPIPE - 1)
 
 

@@ -22,7 +22,7 @@ def reports(periods: Periods, arrivals: list[int]) -> list[str]:
     return [text for text in found if text]
 
 
-def test_a_steady_rate_is_told_once_a_second() -> None:
+def test_a_steady_rate_is_reported_once_a_second() -> None:
     """50 Hz for 3 s: reports at the second messages of seconds, of ever more periods."""
     arrivals = [START + index * NANOSECONDS // 50 for index in range(151)]
     first, second = reports(Periods(10_000), arrivals)

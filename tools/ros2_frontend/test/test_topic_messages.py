@@ -92,13 +92,13 @@ def test_echo_of_what_is_not_there(
 
 
 @pytest.fixture
-def heard(ros2: Ros2) -> Callable[[str], None]:
-    """Wait until the listener has heard something."""
+def received(ros2: Ros2) -> Callable[[str], None]:
+    """Wait until the listener has received something."""
 
     def wait(text: str) -> None:
         deadline = time.monotonic() + 20.0
         while text not in (
-            answer := ros2('service', 'call', '/last_heard', 'std_srvs/Trigger').out
+            answer := ros2('service', 'call', '/last_received', 'std_srvs/Trigger').out
         ):
             assert time.monotonic() < deadline, answer
 
@@ -112,37 +112,37 @@ def publish(zoo: Mapping[str, str], *words: str) -> RunningProcess:
 
 
 def test_pub_once_waits_for_the_subscription(
-    zoo: Mapping[str, str], heard: Callable[[str], None]
+    zoo: Mapping[str, str], received: Callable[[str], None]
 ) -> None:
     """It begins when the subscription matches, and says what it sends."""
     words = ('--once', '/listener/input', 'std_msgs/msg/String', '{data: foo}')
     with publish(zoo, *words) as process:
         process.wait_for('^publisher: beginning loop$')
         process.wait_for(r"^publishing #1: std_msgs\.msg\.String\(data='foo'\)$")
-        heard('foo;')
+        received('foo;')
         assert process.stop() == 2
         assert not any('#2' in line for line in process.lines)
 
 
 def test_pub_counts_and_prints_every_nth(
-    zoo: Mapping[str, str], heard: Callable[[str], None]
+    zoo: Mapping[str, str], received: Callable[[str], None]
 ) -> None:
     """Four messages, every second is printed."""
     words = ('-t', '4', '-p', '2', '-r', '100', '/listener/input', 'std_msgs/String', 'data: a')
     with publish(zoo, *words) as process:
-        heard('a;a;a;a;')
+        received('a;a;a;a;')
         printed = [line.split()[1] for line in process.lines if '#' in line]
         assert printed == ['#2:', '#4:']
 
 
 def test_pub_stamps_at_the_moment_of_sending(
-    zoo: Mapping[str, str], heard: Callable[[str], None]
+    zoo: Mapping[str, str], received: Callable[[str], None]
 ) -> None:
     """`header: auto` arrives with the time that is printed."""
     words = ('--once', '/listener/stamped', 'sensor_msgs/msg/JointState', '{header: auto}')
     with publish(zoo, *words) as process:
         line = process.wait_for(r'Time\(sec=[1-9]\d+')
-        heard(f'stamp {line.split("Time(sec=")[1].split(",")[0]};')
+        received(f'stamp {line.split("Time(sec=")[1].split(",")[0]};')
 
 
 def test_pub_once_ends_by_itself(ros2: Ros2) -> None:

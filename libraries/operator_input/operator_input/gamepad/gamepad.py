@@ -32,7 +32,7 @@ class Gamepad:
         preset: str = AUTO,
         device: str = '',
         dead_zone: float = 0.05,
-        say: Callable[[str], None] = lambda _: None,
+        log: Callable[[str], None] = lambda _: None,
     ) -> None:
         """Start without one; the first scan() opens it.
 
@@ -41,7 +41,7 @@ class Gamepad:
             preset: Name of a preset, or ``auto``.
             device: Path of a device, or expression that its name has to match; empty for any.
             dead_zone: Share of the way about the middle that counts as rest.
-            say: Is told when a gamepad comes and goes.
+            log: Called with a message when a gamepad comes and goes.
 
         Raises:
             PresetError: There is no preset of that name, or the expression is none.
@@ -61,7 +61,7 @@ class Gamepad:
         self._devices = devices
         self._preset = preset
         self._dead_zone = dead_zone
-        self._say = say
+        self._log = log
         self._device: InputDevice | None = None
         self._reading: GamepadReading | None = None
         self._next_scan = float('-inf')
@@ -138,9 +138,9 @@ class Gamepad:
         reading.reset(device.state())
         self._device, self._reading = device, reading
         self.name = f'{info.name} ({preset.name})'
-        self._say(f'gamepad: {info.name}, preset {preset.name}, {info.path}')
+        self._log(f'gamepad: {info.name}, preset {preset.name}, {info.path}')
         return True
 
     def _lose(self, reason: str) -> None:
         self.close()
-        self._say(f'{reason}; everything counts as released, waiting for a gamepad')
+        self._log(f'{reason}; everything counts as released, waiting for a gamepad')

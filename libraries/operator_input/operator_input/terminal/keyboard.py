@@ -21,8 +21,8 @@ from .reports import Report
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-ESCAPE_PATIENCE = 0.05  # [s] after which an escape is the key, not the begin of a sequence
-DRAIN_PATIENCE = 0.3  # [s] at the end for answers that would otherwise appear in the shell
+ESCAPE_TIMEOUT = 0.05  # [s] after which an escape is the key, not the begin of a sequence
+DRAIN_TIMEOUT = 0.3  # [s] at the end for answers that would otherwise appear in the shell
 _MODES = '?1004', '?2004'  # focus reports and bracketed paste (xterm)
 _MODES_ON = ''.join(f'\x1b[{mode}h' for mode in _MODES)
 _MODES_OFF = ''.join(f'\x1b[{mode}l' for mode in _MODES)
@@ -87,13 +87,13 @@ class TerminalKeyboard:
         Raises:
             TerminalError: The terminal was closed. All keys count as released.
         """
-        data = self.line.read(min(timeout, self.patience()))
+        data = self.line.read(min(timeout, self.escape_timeout()))
         now = self._clock()
         if data:
-            self._liveness.heard()
+            self._liveness.received()
             self._last_data = now
             found = self._decoder.feed(data, now)
-        elif self._decoder.is_pending and now - self._last_data >= ESCAPE_PATIENCE:
+        elif self._decoder.is_pending and now - self._last_data >= ESCAPE_TIMEOUT:
             found = self._decoder.flush(now)
         else:
             found = []
@@ -103,10 +103,10 @@ class TerminalKeyboard:
                 self._answer(report)
         return [*events, *self._check_line(now)]
 
-    def patience(self) -> float:
+    def escape_timeout(self) -> float:
         """Return after which time read() wants to be called again [s], whatever happens."""
         if self._decoder.is_pending:
-            return ESCAPE_PATIENCE
+            return ESCAPE_TIMEOUT
         return PERIOD if self._decoder.is_holding else 60.0
 
     def __enter__(self) -> Self:
@@ -147,13 +147,13 @@ class TerminalKeyboard:
 
     def _end(self) -> None:
         self.line.write(_MODES_OFF + self._negotiation.stop())
-        deadline = self._clock() + DRAIN_PATIENCE
+        deadline = self._clock() + DRAIN_TIMEOUT
         with contextlib.suppress(TerminalError):
             while self._negotiation.is_waiting or self._liveness.is_waiting:
                 data = self.line.read(deadline - self._clock())
                 if not data:
                     return
-                self._liveness.heard()
+                self._liveness.received()
                 for report in self._decoder.feed(data, 0.0):
                     if isinstance(report, Report):
                         self._negotiation.take(report)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 PROBE = '\x1b[5n'  # device status report (ECMA-48, 8.3.35): every terminal answers CSI 0 n
 PERIOD = 0.25  # [s] between two probes
-PATIENCE = 1.0  # [s] without any sign
+TIMEOUT = 1.0  # [s] without any sign
 
 
 class Liveness:
@@ -20,7 +20,7 @@ class Liveness:
         self._asked = 0.0  # [s] when the last probe was sent
         self._unanswered_since: float | None = None
 
-    def heard(self) -> None:
+    def received(self) -> None:
         """Take notice of anything that the terminal sent."""
         self._unanswered_since = None
 
@@ -48,4 +48,4 @@ class Liveness:
         Args:
             now: Time [s].
         """
-        return self._unanswered_since is not None and now - self._unanswered_since > PATIENCE
+        return self._unanswered_since is not None and now - self._unanswered_since > TIMEOUT

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What a check found and what a report tells."""
+"""What a check found and what a report contains."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The graph: topics that nobody hears or feeds, and pairs whose QoS keeps them apart."""
+"""The graph: topics without a publisher or subscription, and pairs whose QoS does not fit."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def read_topics(graph: Graph) -> list[Topic]:
 
 
 def check_topics(topics: list[Topic]) -> Iterator[Finding]:
-    """Check that every topic is fed and heard, and has one type.
+    """Check that every topic has publishers, subscriptions and one type.
 
     Args:
         topics: The topics.
@@ -100,7 +100,7 @@ def _pairs(topics: list[Topic]) -> Iterator[tuple[Topic, Endpoint, Endpoint, Han
 
 
 def report_topics(topics: list[Topic]) -> Report:
-    """The topics and how many feed and hear them.
+    """The topics and how many publish and subscribe them.
 
     Args:
         topics: The topics.

@@ -29,7 +29,7 @@ _POLL = 0.01  # [s]; one look costs below 1 ms with 30 topics
 _LIMIT = 4.0  # [s]; without an inquiry, a participant announces itself every 3 s
 _QUIET_FOR_LISTS = 0.25  # [s]; the endpoints of a participant come in bursts, 60 ms apart and more
 _QUIET_FOR_NAMES = 0.3  # [s]; a node that is just starting gets its chance
-_QUIET_FOR_NETWORK = 0.5  # [s]; participants that the kernel does not tell cannot be counted
+_QUIET_FOR_NETWORK = 0.5  # [s]; participants that the kernel does not list cannot be counted
 _INQUIRY_PERIOD = 0.3  # [s]; an answer with all endpoints takes 0.1 s
 
 _PREFIX = 12  # [byte] of an endpoint's GUID that name its participant
@@ -60,7 +60,7 @@ class Endpoints(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Patience:
+class WaitLimits:
     """How long to wait.
 
     Attributes:
@@ -72,40 +72,40 @@ class Patience:
     quiet: float
 
     @classmethod
-    def for_lists(cls, spin_time: float | None) -> Patience:
+    def for_lists(cls, spin_time: float | None) -> WaitLimits:
         """For a command that wants all there is.
 
         Args:
             spin_time: What the user asked for [s], or None.
 
         Returns:
-            The patience; never beyond what the user asked for.
+            The limits; never beyond what the user asked for.
         """
         quiet = _QUIET_FOR_LISTS if is_this_host(os.environ) else _QUIET_FOR_NETWORK
         return cls(_LIMIT if spin_time is None else spin_time, quiet)
 
     @classmethod
-    def for_names(cls, spin_time: float | None) -> Patience:
+    def for_names(cls, spin_time: float | None) -> WaitLimits:
         """For a command that wants one name, which may be about to appear.
 
         Args:
             spin_time: What the user asked for [s], or None.
 
         Returns:
-            The patience; all that the user asked for.
+            The limits; all that the user asked for.
         """
         return cls(_LIMIT, _QUIET_FOR_NAMES) if spin_time is None else cls(spin_time, spin_time)
 
-    def at_most(self, limit: float) -> Patience:
+    def at_most(self, limit: float) -> WaitLimits:
         """The same with an upper bound.
 
         Args:
             limit: Longest time of all [s].
 
         Returns:
-            The patience.
+            The limits.
         """
-        return Patience(min(limit, self.limit), self.quiet)
+        return WaitLimits(min(limit, self.limit), self.quiet)
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,13 +143,13 @@ def take_census(graph: Endpoints, ports: DiscoveryPorts) -> Census:
     return Census(max(ports.count - len(known), 0), unnamed)
 
 
-def wait(look: Callable[[], T | None], graph: Endpoints, patience: Patience) -> T | None:
+def wait(look: Callable[[], T | None], graph: Endpoints, limits: WaitLimits) -> T | None:
     """Wait until something is found, or until the view is complete without it.
 
     Args:
         look: Answers what was looked for, or None as long as it is not there.
         graph: The view.
-        patience: How long to wait.
+        limits: How long to wait.
 
     Returns:
         What `look` found, or None.
@@ -161,14 +161,14 @@ def wait(look: Callable[[], T | None], graph: Endpoints, patience: Patience) -> 
         while True:
             found = look()
             now = time.monotonic()
-            if found is not None or now - start >= patience.limit:
+            if found is not None or now - start >= limits.limit:
                 return found
             ports, view = read_ports(graph.domain_id), graph.view()
             census = take_census(graph, ports)
             if census.missing and now - asked >= _INQUIRY_PERIOD:
                 inquiry.ask(ports)
                 asked = now
-            quiet = patience.quiet if ports.own else max(patience.quiet, _QUIET_FOR_NETWORK)
+            quiet = limits.quiet if ports.own else max(limits.quiet, _QUIET_FOR_NETWORK)
             if census.missing or census.unnamed or view != before:
                 before, changed = view, now
             elif now - changed >= quiet:

@@ -14,7 +14,7 @@ from typing import TypeVar
 from ..aliases import Endpoint, NamesAndTypes
 from ..cli.arguments import GRAPH_ARGUMENTS
 from ..cli.verb import Argument, Verb
-from .discovery import Patience, wait
+from .discovery import wait, WaitLimits
 from .names import is_hidden, NodeName
 from .session import open_session, Session
 
@@ -113,7 +113,7 @@ class Graph:
         return list(self._node.get_subscriptions_info_by_topic(topic))
 
     def view(self) -> Hashable:
-        """All names and types together, to tell whether something changed."""
+        """All names and types together, to see whether something changed."""
         pairs = [*self.topics(hidden=True), *self.services(hidden=True)]
         return (
             tuple(sorted(self.nodes(hidden=True))),
@@ -122,7 +122,7 @@ class Graph:
 
     def settle(self) -> None:
         """Wait until the view is complete."""
-        wait(lambda: None, self, Patience.for_lists(self._spin_time))
+        wait(lambda: None, self, WaitLimits.for_lists(self._spin_time))
 
     def wait_for(self, look: Callable[[], T | None], limit: float = math.inf) -> T | None:
         """Wait until something is there.
@@ -134,7 +134,7 @@ class Graph:
         Returns:
             What `look` found; None when the view is complete without it.
         """
-        return wait(look, self, Patience.for_names(self._spin_time).at_most(limit))
+        return wait(look, self, WaitLimits.for_names(self._spin_time).at_most(limit))
 
     def wait_until(self, look: Callable[[], T | None], timeout: float | None = None) -> T | None:
         """Wait until something is there, however long it takes.

@@ -3,7 +3,7 @@
 """The DDS participants of a domain on this host, as the kernel knows them.
 
 Every participant listens for discovery traffic on one UDP port whose number follows from the
-domain (DDSI-RTPS 2.2, 9.6.1.1). Counting these ports tells whether discovery is complete, which
+domain (DDSI-RTPS 2.2, 9.6.1.1). Counting these ports shows whether discovery is complete, which
 DDS itself cannot say.
 """
 
@@ -37,7 +37,7 @@ class DiscoveryPorts:
 
     @property
     def count(self) -> int:
-        """How many participants there are; 0 where the kernel does not tell (no procfs)."""
+        """How many participants there are; 0 where the kernel does not list them (no procfs)."""
         return len(self.own) + len(self.others)
 
 

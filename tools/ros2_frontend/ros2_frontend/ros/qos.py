@@ -126,7 +126,7 @@ def matching_profile(
         args: Parsed arguments of `add_qos_arguments`.
         graph: The graph with the publishers.
         topic: The topic's absolute name.
-        say: Told when the publishers differ.
+        say: Called with a message when the publishers differ.
 
     Returns:
         Reliable when all publishers are, transient local when all are; else what connects to all.

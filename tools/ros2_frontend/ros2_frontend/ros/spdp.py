@@ -7,7 +7,7 @@ DDS 2.14 drops these answers, because it registers its receivers only after its 
 others speak again by themselves up to 3 s later. (Seen in 7 of 10 starts on two cores; the same
 delay makes `ros2 node list` come out empty now and then.)
 
-The cure is in the protocol: who hears of a new participant answers it. So once our participant
+The cure is in the protocol: a new participant is answered by those that discover it. So once ours
 listens, a message from a short-lived participant that exists only in these bytes, and that has our
 address, makes all of them answer to us. It is taken back as soon as discovery is complete, and
 its lease ends after a second in any case. DDSI-RTPS 2.2: SPDP 8.5.3, message 8.3, parameters

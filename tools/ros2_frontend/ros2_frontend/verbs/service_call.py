@@ -87,7 +87,7 @@ def _await(client: Client, graph: Graph, args: Namespace) -> None:
 
 
 def _explain(name: str, wanted: str, services: dict[str, list[str]]) -> None:
-    """Tell on stderr why the wait may be in vain."""
+    """Print on stderr why the wait may be in vain."""
     if name in services:
         offered = ', '.join(services[name])
         print(f"Service '{name}' has the type {offered}, not {wanted}", file=sys.stderr)

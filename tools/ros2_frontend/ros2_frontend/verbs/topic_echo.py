@@ -92,7 +92,7 @@ def echo(args: Namespace) -> None:
     """Print messages until Ctrl-C, `--once` or `--timeout`.
 
     Raises:
-        FrontendError: When the topic's type cannot be told or imported.
+        FrontendError: When the topic's type is unknown or cannot be imported.
     """
     from rclpy.event_handler import SubscriptionEventCallbacks
 
