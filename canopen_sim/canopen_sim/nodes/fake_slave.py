@@ -69,7 +69,8 @@ def _populate(node: Node, host: DeviceHost) -> SimulatedDevices:
         node.get_logger().warning(str(warning))
     device = host.add(node_id, eds.dictionary, memory=memories(node)(node_id))
     kind = 'drive' if device.drive is not None else 'device'
-    return SimulatedDevices(f'simulated {kind} {node_id} of {eds.path}', {'slave': node_id})
+    which = 'without node id' if node_id == UNCONFIGURED else str(node_id)
+    return SimulatedDevices(f'simulated {kind} {which} of {eds.path}', {'slave': node_id})
 
 
 if __name__ == '__main__':
