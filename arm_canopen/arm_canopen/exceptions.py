@@ -10,10 +10,10 @@
     ├── OtherMasterError             another master leads this bus already
     ├── CodecError (ValueError)      a value does not fit its type, or bytes are no message
     ├── ObjectError (LookupError)    a device has no object of that name or number
-    ├── SdoError                     a device did not do what an SDO asked
+    ├── SdoError                     a device did not do what an SDO requested
     │   ├── SdoAbortError            the device (or we) aborted the transfer with a code
     │   └── SdoTimeoutError (TimeoutError)   the device did not answer
-    ├── LssError                     a device did not do what LSS asked of it
+    ├── LssError                     a device did not do what LSS requested
     ├── BootError                    a device did not come up; names the phase
     ├── DriveError                   a drive refused a command or did not reach a state in time
     └── LifecycleError               a managed node cannot make this transition now
@@ -81,7 +81,7 @@ class BusError(CanopenError, OSError):
 
 
 class OtherMasterError(CanopenError):
-    """Another master leads this bus already; the message says by which frames it is known."""
+    """Another master leads this bus already; the message names its frames."""
 
 
 class CodecError(CanopenError, ValueError):
@@ -93,7 +93,7 @@ class ObjectError(CanopenError, LookupError):
 
 
 class SdoError(CanopenError):
-    """A device did not do what an SDO request asked of it."""
+    """A device did not do what an SDO requested."""
 
 
 class SdoTimeoutError(SdoError, TimeoutError):
@@ -114,7 +114,7 @@ class SdoAbortError(SdoError):
 
 
 class LssError(CanopenError):
-    """A device did not do what layer setting services asked of it.
+    """A device did not do what layer setting services requested.
 
     Scenarios: no device answers, several do, a node id or bit rate is refused.
     """
@@ -132,4 +132,4 @@ class DriveError(CanopenError):
 
 
 class LifecycleError(CanopenError):
-    """A managed node cannot make this transition now; the message says which it can."""
+    """A managed node cannot make this transition now; the message names others."""

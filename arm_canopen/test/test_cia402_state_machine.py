@@ -118,7 +118,7 @@ def test_a_target_that_is_held_stays() -> None:
 @pytest.mark.parametrize('target', [state for state in S if state not in TARGETS])
 def test_states_that_a_drive_enters_by_itself_are_no_targets(target: DriveState) -> None:
     """Asking for a fault, or for the start-up states, is a mistake of the program."""
-    with pytest.raises(ValueError, match='cannot be asked for'):
+    with pytest.raises(ValueError, match='cannot be commanded'):
         next_command(S.SWITCHED_ON, target)
 
 

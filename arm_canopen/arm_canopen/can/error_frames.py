@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What the error frames of a CAN controller say (linux/can/error.h)."""
+"""The error frames of a CAN controller (linux/can/error.h)."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class ControllerState(Enum):
 
 
 def controller_state(frame: Frame) -> ControllerState | None:
-    """Return the state that an error frame tells of, None when it tells of none."""
+    """Return the state that an error frame reports, None when it reports none."""
     if frame.can_id & _BUS_OFF:
         return ControllerState.BUS_OFF
     if frame.can_id & _RESTARTED:
@@ -84,7 +84,7 @@ def error_counters(frame: Frame) -> tuple[int, int] | None:
 
 
 def is_unacknowledged(frame: Frame) -> bool:
-    """Whether an error frame says that no other station has acknowledged a frame."""
+    """Whether an error frame reports that no other station has acknowledged a frame."""
     return bool(frame.can_id & _NO_ACKNOWLEDGE)
 
 

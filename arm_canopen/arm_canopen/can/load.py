@@ -74,7 +74,7 @@ class _Sample:
 class BusLoad:
     """Estimates the load from the frames that are sent and received.
 
-    Counting a frame is one addition; the arithmetic is left to whoever asks.
+    Counting a frame is one addition; the arithmetic is done when the figures are read.
     """
 
     def __init__(self, bitrate: int, now: float, window: float = 1.0) -> None:
@@ -83,7 +83,7 @@ class BusLoad:
         Args:
             bitrate: Bit rate of the bus in [bit/s].
             now: Steady time in [s].
-            window: How far the figures look back in [s], when they are asked for often enough.
+            window: How far the figures look back in [s], when they are read often enough.
 
         Raises:
             ValueError: Bit rate or window is not positive.

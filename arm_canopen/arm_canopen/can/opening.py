@@ -41,7 +41,7 @@ def open_bus(name: str) -> Bus:
         name: See the table above; ``auto`` picks one, logs which, and the bus carries its name.
 
     Raises:
-        BusError: No such interface, or it is down; the message says what to do.
+        BusError: No such interface, or it is down; the message names the remedy.
     """
     resolved = resolve_name(name)
     if resolved != name:

@@ -42,7 +42,7 @@ class ArmCanopenBus(can.BusABC):
             receive_own_messages: Refused; these buses never do.
 
         Raises:
-            can.CanInitializationError: It cannot be opened, or own messages were asked for.
+            can.CanInitializationError: It cannot be opened, or own messages were requested.
         """
         if receive_own_messages:
             raise can.CanInitializationError('these buses never receive own messages')

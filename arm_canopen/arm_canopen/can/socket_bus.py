@@ -34,7 +34,7 @@ _log = logging.getLogger(__name__)
 
 
 def prepare_receiver(sock: socket.socket) -> None:
-    """Raise the receive buffer, and ask for time stamps and the count of dropped frames."""
+    """Raise the receive buffer, and request time stamps and the count of dropped frames."""
     try:
         sock.setsockopt(socket.SOL_SOCKET, SO_RCVBUFFORCE, RECEIVE_BUFFER)
     except PermissionError:
@@ -105,7 +105,7 @@ class TimestampReader:
 
 
 class SocketBus(Bus):
-    """A bus that reads datagrams from a socket; subclasses say what is in them."""
+    """A bus that reads datagrams from a socket; subclasses define their content."""
 
     def __init__(self, name: str, receiver: socket.socket) -> None:
         """Take over a prepared, non-blocking socket."""
@@ -178,7 +178,7 @@ class SocketBus(Bus):
         return frames
 
     def _granted_buffer(self) -> int:
-        # the kernel doubles what was asked for, for its own bookkeeping, and tells the double
+        # the kernel doubles the size for its own bookkeeping, and returns the double
         return self._receiver.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF) // 2
 
     def wake(self) -> None:

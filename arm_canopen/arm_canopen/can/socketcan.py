@@ -59,8 +59,8 @@ class SocketCanBus(SocketBus):
     def send(self, frame: Frame) -> None:
         """Put the frame into the interface's transmit queue.
 
-        A full queue is told and not waited for: a cyclic frame is outdated by its successor, and
-        a request is repeated by who waits for the answer.
+        A full queue is reported and not waited for: a cyclic frame is outdated by its successor,
+        and a request is repeated by who waits for the answer.
 
         Raises:
             BusError: The queue is full, or the interface is down or gone.

@@ -91,7 +91,7 @@ class Drive:
         node.on_failed.append(self.fail)
 
     def describe(self) -> str:
-        """Say in a sentence how the drive is."""
+        """Describe the drive in a sentence."""
         node, view = self.node, self.view
         if not node.online:
             detail = f' ({node.phase_detail})' if node.phase_detail else ''

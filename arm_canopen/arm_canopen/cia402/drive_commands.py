@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What a person or client asks of a drive: sequences of many cycles, each with a spoken answer."""
+"""Commands to a drive: sequences of many cycles, each answered with a sentence."""
 
 from __future__ import annotations
 
@@ -87,27 +87,27 @@ class DriveCommands:
         """Move to a position, at a velocity or with a torque, in the mode that is selected.
 
         Raises:
-            DriveError: The drive cannot take it; the message says why.
+            DriveError: The drive cannot take it; the message has the reason.
         """
         answer = self._set(target)
         self._stream.end('a single target')
         return answer
 
-    def give(self, command: Callable[[], str]) -> Promise[str]:
-        """Give a target or a move; the promise ends when the drive has it, and no halt keeps it.
+    def deliver(self, command: Callable[[], str]) -> Promise[str]:
+        """Command a target or a move; done when the drive has it, and no halt keeps it.
 
         Args:
             command: Calls :meth:`set_target` or :meth:`move`, and returns its answer.
         """
-        return self._scheduler.spawn(self._given(command))
+        return self._scheduler.spawn(self._delivered(command))
 
-    async def _given(self, command: Callable[[], str]) -> str:
+    async def _delivered(self, command: Callable[[], str]) -> str:
         control = self.drive.control
         mode, answer = control.mode, command()
         delivery = self._delivery
         try:
             await self._taken(mode, delivery)
-        except DriveError as error:  # what is said to have failed must not move it later
+        except DriveError as error:  # a target that was reported as failed must not move it later
             if delivery.done and not isinstance(delivery.error, SdoTimeoutError):
                 raise
             if mode.withdraw(delivery, error):
@@ -171,7 +171,7 @@ class DriveCommands:
         """Take one of a stream of targets; when the stream pauses for too long, the drive stops.
 
         Raises:
-            DriveError: The drive cannot take it; the message says why.
+            DriveError: The drive cannot take it; the message has the reason.
         """
         self._stream.admit()
         self._set(target)
@@ -186,7 +186,7 @@ class DriveCommands:
         drive, mode = self.drive, self.drive.control.mode
         if not isinstance(mode, ProfilePosition):
             raise self._steps.refused('moves only in mode 1; call ~/position_mode first')
-        self._require_obedience()
+        self._require_acceptance()
         if drive.control.halted and not drive.control.halt.leaving:
             move = replace(move, immediate=True)  # the halt has ended the moves before it
         destination = self._named(lambda: mode.destination(move))
@@ -200,7 +200,7 @@ class DriveCommands:
         return f'to {destination:g}, {how}'
 
     async def init(self) -> str:
-        """Reset a fault, enable, home where bus.yml asks for it, and select no mode."""
+        """Reset a fault, enable, home where bus.yml has a method, and select no mode."""
         drive, steps = self.drive, self._steps
         await steps.ready()
         drive.released(Refusal(RefusalCause.COMMANDED, 'init'))
@@ -278,7 +278,7 @@ class DriveCommands:
         return f'{drive.describe()}{hint}'
 
     async def _home_at_init(self) -> str:
-        """Home where bus.yml asks for it; return what was done, or what could be."""
+        """Home where bus.yml has a method; return what was done, or what could be."""
         drive = self.drive
         if method := method_at_init(drive):
             return f', {await home(self._steps, method)}'
@@ -292,19 +292,19 @@ class DriveCommands:
 
     def _set(self, target: float) -> str:
         drive = self.drive
-        self._require_obedience()
+        self._require_acceptance()
         drive.control.check_target(target)
         self._resume(self._named(lambda: drive.control.mode.set_target(target)))
         return f'target {target:g} in mode {drive.control.mode.number.title}'
 
-    def _named(self, ask: Callable[[], T]) -> T:
-        """Ask the mode for something; what it refuses gets the name of the drive."""
+    def _named(self, command: Callable[[], T]) -> T:
+        """Command the mode; what it refuses gets the name of the drive."""
         try:
-            return ask()
+            return command()
         except DriveError as error:
             raise DriveError(f'{self.drive.name}: {error}') from error
 
-    def _require_obedience(self) -> None:
+    def _require_acceptance(self) -> None:
         drive, steps = self.drive, self._steps
         if self._busy:
             raise steps.refused(f'takes no target while {self._running} is running')
@@ -314,7 +314,7 @@ class DriveCommands:
         if refusal.cause in (RefusalCause.FAULT, RefusalCause.NOT_ENABLED):
             raise steps.refused(f'takes no target; call {steps.way_to_enable()}')
         if refusal.cause is RefusalCause.MODE_CHANGE and isinstance(drive.control.mode, NoMode):
-            return  # which says itself that it has no target
+            return  # which refuses every target itself
         raise steps.refused(f'takes no target: it {refusal}')
 
     def _resume(self, delivery: Promise[None]) -> None:

@@ -29,7 +29,7 @@ class DriveControl:
     """The goal, the modes and the controlword of an axis.
 
     Attributes:
-        goal: State that the cycle leads to, None while nobody asked for one.
+        goal: State that the cycle leads to, None before the first command.
         modes: The modes that this bus.yml makes possible.
         mode: The mode that is commanded.
         halt: What keeps it halted.

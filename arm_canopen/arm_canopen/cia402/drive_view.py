@@ -27,7 +27,7 @@ REST_MIN, REST_MAX = 0.002, 0.02  # [unit/s] between which that lies: noise, and
 
 
 class DriveView:
-    """What the master knows of an axis; everybody who needs its state asks here.
+    """What the master knows of an axis; everybody who needs its state reads it here.
 
     Attributes:
         node: The device.
@@ -117,7 +117,7 @@ class DriveView:
     def stands(self) -> bool:
         """Whether the axis stands; a real encoder is never quite still.
 
-        Both what 0x606C says and what the position shows have to be slow, and fresh.
+        Both 0x606C and the rate of the position have to be slow, and fresh.
         """
         rest = max(REST_MIN, min(REST_MAX, REST_SHARE * self.parameters.profile.velocity))
         return self.fresh and self.speed <= rest
@@ -133,7 +133,7 @@ class DriveView:
         return self.state is not DriveState.UNKNOWN and self.cache.known and self.fresh
 
     async def read_error_code(self) -> None:
-        """Read 0x603F, so that the answer can say what is wrong."""
+        """Read 0x603F, so that the answer can name the error."""
         index = self.objects.at(Index.ERROR_CODE)
         if self.state not in FAULTY or (index, 0) not in self.node.config.dictionary:
             return
@@ -167,7 +167,7 @@ class DriveView:
     def actual(self) -> Actual:
         """Return where the drive is, and the velocity from which it has to be braked.
 
-        The velocity is the lesser of what 0x606C says and what 0x6064 shows: a wrong one must not
+        The velocity is the lesser of 0x606C and the rate of 0x6064: a wrong one must not
         set an axis in motion that stands.
 
         Raises:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What a stream of positions tells ahead: velocity 0x60B1, torque 0x60B2 (CiA 402-2, clause 13).
+"""Feed-forward of a stream of positions: velocity 0x60B1, torque 0x60B2 (CiA 402-2, clause 13).
 
 In mode 8 a drive adds them to what its own control makes of the position. In the modes 9 and 10
 it adds them to the target, so none may be left over from a stream.

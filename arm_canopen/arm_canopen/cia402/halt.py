@@ -76,7 +76,7 @@ class Halt:
         return HALT_BIT if holds else NO_BITS
 
     def advance(self, now: float, period: float, mode: Mode) -> bool:
-        """End it where that is due, for a drive that obeys a mode.
+        """End it where that is due, for a drive that acts on a mode.
 
         Args:
             now: Steady time in [s].

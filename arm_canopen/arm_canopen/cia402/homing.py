@@ -42,7 +42,7 @@ async def home(
     Args:
         steps: Steps of the drive.
         method: Value for 0x6098; None takes what is in the drive.
-        on_progress: Told each phase when it begins.
+        on_progress: Called with each phase when it begins.
 
     Returns:
         What was done, in words.
@@ -51,26 +51,26 @@ async def home(
         DriveError: The drive has no homing, refuses the method, or fails.
     """
     drive = steps.drive
-    tell = on_progress or (lambda progress: None)
+    notify = on_progress or (lambda progress: None)
     homing = _homing_mode(steps)
     stored = await _stored_method(steps)
     method = await _choose(steps, method, stored)
     try:
-        tell(HomingProgress.SWITCHING)
+        notify(HomingProgress.SWITCHING)
         await steps.switch(homing)
-        tell(HomingProgress.HOMING)
+        notify(HomingProgress.HOMING)
         await _run(steps, homing, f'the end of homing {method}')
     finally:
         if method != stored:
             _put_back(steps, stored)
     if drive.objects.statusword & Statusword.HOMING_ERROR:
         raise steps.refused(f'failed to home by method {method}')
-    tell(HomingProgress.DONE)
+    notify(HomingProgress.DONE)
     return f'homed by method {method}'
 
 
 def method_at_init(drive: Drive) -> int:
-    """Return the homing method that bus.yml writes to 0x6098; 0 where it asks for no homing."""
+    """Return the homing method that bus.yml writes to 0x6098; 0 where it has no homing."""
     write = drive.node.config.write_of(drive.objects.at(Index.HOMING_METHOD), 0)
     return int.from_bytes(write.data, 'little', signed=True) if write is not None else 0
 
@@ -86,7 +86,7 @@ def _homing_mode(steps: DriveSequences) -> Homing:
 
 
 async def _run(steps: DriveSequences, homing: Homing, what: str) -> None:
-    """Set bit 4 until the drive says that it has ended, well or not."""
+    """Set bit 4 until the drive shows that it has ended, well or not."""
     # without a falling edge of bit 4 before, the drive would miss the start, and the bits of the
     # last homing would pass for those of this one
     await steps.pause(EDGE_CYCLES * steps.drive.period)

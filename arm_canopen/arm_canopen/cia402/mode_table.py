@@ -28,7 +28,7 @@ def build_modes(
     Args:
         objects: Its objects.
         units: Its units.
-        parameters: Gives what it told about itself.
+        parameters: Returns what it has reported about itself.
         warn: Takes a warning in words.
     """
     modes: list[Mode] = [NoMode(), Homing()]

@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """What an operation mode is to the master (CiA 402-2, clauses 10 to 16).
 
-A mode writes its target object and says which mode bits the controlword gets. Every mode is
+A mode writes its target object and returns its bits of the controlword. Every mode is
 preloaded with the actual value before the drive is enabled or the mode switched, so that nothing
-moves before it was asked to. The modes that move are in ``position_modes.py`` and
+moves before a command. The modes that move are in ``position_modes.py`` and
 ``rate_modes.py``.
 """
 
@@ -26,10 +26,10 @@ class Actual(NamedTuple):
     """Where a drive is, or is held.
 
     Attributes:
-        position_inc: In [inc], as the drive says it itself, so that no factor in bus.yml can make
+        position_inc: In [inc], as the drive reports it, so that no factor in bus.yml can make
             the target another one.
         velocity: In user units per second; a moving drive is braked from it.
-        velocity_dev: The same in device units, as the drive says it itself.
+        velocity_dev: The same in device units, as the drive reports it.
         torque: 0x6077 in device units, 0 when it is unknown.
     """
 
@@ -93,7 +93,7 @@ class Mode(ABC):
 
     @abstractmethod
     def step(self, now: float, period: float, statusword: int) -> int:
-        """Advance one cycle in which the drive obeys, and return the bits of this mode.
+        """Advance one cycle in which the drive accepts targets, and return the bits of this mode.
 
         Args:
             now: Steady time in [s].
@@ -122,7 +122,7 @@ class Mode(ABC):
         return True
 
     def reached(self, statusword: int) -> bool:
-        """Whether the drive is where the last target is, as far as the mode can say so.
+        """Whether the drive is where the last target is, as far as the mode knows.
 
         Args:
             statusword: 0x6041 as the drive sent it.

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Motion sources: what asks the drives to move, once a cycle, in step with SYNC."""
+"""Motion sources: what moves the drives, once a cycle, in step with SYNC."""
 
 from __future__ import annotations
 

@@ -18,9 +18,7 @@ from .refusal import Refusal, RefusalCause
 
 HAND_OVER_MARGIN = 2.0  # cycles of profile velocity from the set-point that a stream may start
 SPEED_MARGIN = 1.5  # share of the greatest speed (0x607F) above which a step is a jump
-DEFAULT_SPEED_MARGIN = (
-    10.0  # the same of the profile velocity, for drives that tell no greatest speed
-)
+DEFAULT_SPEED_MARGIN = 10.0  # the same of the profile velocity, for drives without one
 
 
 @dataclass(slots=True)
@@ -89,7 +87,7 @@ class MotionGroup:
             now: Steady time in [s].
             period: Time to the next cycle in [s].
         """
-        # whatever is wrong with one drive is told, and stops it; the others are served
+        # whatever is wrong with one drive is reported, and stops it; the others are served
         for drive in self.drives.values():
             try:
                 drive.read()
@@ -111,8 +109,8 @@ class MotionGroup:
             self._fail(attachment, f'raised {type(error).__name__}: {error}')
             return
         if len(setpoints) != len(feedback):
-            told = f'answered {len(setpoints)} set-points for {len(feedback)} axes'
-            self._fail(attachment, told)
+            reason = f'answered {len(setpoints)} set-points for {len(feedback)} axes'
+            self._fail(attachment, reason)
             return
         for drive, axis, setpoint in zip(attachment.drives, feedback, setpoints, strict=True):
             if setpoint is None or not axis.followable or drive not in attachment.owned:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Keeps what a drive told about itself true: asked after each boot, and after each change."""
+"""The parameters of a drive: read after each boot, and again after each change."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ..standard.objects import AXIS_OFFSET
 from .parameters import DriveParameters, ParameterReader, REFRESHED
 from .units import Units
 
-RETRY_PERIOD = 1.0  # [s] after which a drive is asked again for what it did not answer
+RETRY_PERIOD = 1.0  # [s] after which what a drive did not answer is read again
 
 
 class ParameterCache:
@@ -57,7 +57,7 @@ class ParameterCache:
         node.sdo.on_download.append(self._object_downloaded)
 
     def begin(self) -> None:
-        """Ask a device that was booted."""
+        """Read those of a device that was booted."""
         self._reading = self._scheduler.background(self._keep_reading())
 
     def forget(self, reason: str) -> None:
@@ -84,7 +84,7 @@ class ParameterCache:
     async def _keep_reading(self) -> None:
         reason = await self._read()
         if reason and self.known:
-            self._warn(f'its limits were changed, and it does not tell the new ones: {reason}')
+            self._warn(f'its limits were changed, and the new ones cannot be read: {reason}')
         elif reason:
             self._warn(f'its parameters are unknown, so it takes no commands: {reason}')
         while reason or self._outdated:

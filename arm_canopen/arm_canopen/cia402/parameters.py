@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What the master asks a drive about itself once it is booted, by SDO."""
+"""Parameters that the master reads from a drive once it is booted, by SDO."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ REFRESHED = frozenset(
 
 @dataclass(frozen=True, slots=True)
 class DriveParameters:
-    """Parameters of one drive; None where the drive does not tell.
+    """Parameters of one drive; None where the drive does not have them.
 
     Attributes:
         supported_modes: Bits of 0x6502.
@@ -72,12 +72,12 @@ class DriveParameters:
     units: str = 'bus.yml'
 
     def supports(self, mode: OperationMode) -> bool:
-        """Whether the drive has a mode; one that does not tell is believed to have all."""
+        """Whether the drive has a mode; one without 0x6502 is believed to have all."""
         return self.supported_modes is None or bool(self.supported_modes & mode.support_bit)
 
 
 class ParameterReader:
-    """Asks one axis of a drive for everything that its EDS knows of these objects."""
+    """Reads these objects of one axis, as far as its EDS has them."""
 
     def __init__(self, node: RemoteNode, config: DriveConfig, units: Units) -> None:
         """Take the axis.
@@ -161,13 +161,13 @@ class ParameterReader:
         return abs(self._units.velocity_commanded(value)) if value else default
 
     async def _read_units(self) -> str:
-        """Take the units of the factor group (CiA 402-2, clause 8); say where they are from."""
+        """Take the units of the factor group (CiA 402-2, clause 8); report where they are from."""
         ratios = {name: await self._ratio(index) for name, index in FACTOR_OBJECTS.items()}
         factors = FactorGroup(**ratios)
         scale, velocity_scale = factors.position_scale, factors.velocity_scale
         if not scale:
             raise SdoError(
-                'scale_from_factor_group is true in bus.yml, and the drive tells neither 0x6092 '
+                'scale_from_factor_group is true in bus.yml, and the drive has neither 0x6092 '
                 'nor 0x608F; write scale_pos_to_dev and the other scales instead'
             )
         self._units.use(

@@ -44,7 +44,7 @@ class Move:
 
     @property
     def bits(self) -> int:
-        """Bits of the controlword that say so."""
+        """Its bits in the controlword."""
         bits = Controlword(0)
         if self.relative:
             bits |= Controlword.RELATIVE
@@ -237,8 +237,8 @@ class ProfilePosition(Mode):
         elif self.handshake in (Handshake.WITHDRAWN, Handshake.FORCED):
             self._show_edge(now)
         elif self.handshake is Handshake.AWAITED:
-            patience = max(FULL_AFTER, EDGE_CYCLES * period)
-            self._watch_emptied(now, patience, acknowledged=acknowledged)
+            timeout = max(FULL_AFTER, EDGE_CYCLES * period)
+            self._watch_emptied(now, timeout, acknowledged=acknowledged)
         elif acknowledged:
             self._watch_full(now)
         elif self._follows_at_once or statusword & TARGET_REACHED:
@@ -341,13 +341,13 @@ class ProfilePosition(Mode):
                 'handed over; it will be when the drive takes the bit back'
             )
 
-    def _watch_emptied(self, now: float, patience: float, *, acknowledged: bool) -> None:
+    def _watch_emptied(self, now: float, timeout: float, *, acknowledged: bool) -> None:
         """See whether a full drive has taken an immediate move; else it is handed over later."""
         imposed = self._imposed
         if not acknowledged:
             self._taken, self._imposed = True, None
             self._hand_over(now, acknowledged=False)
-        elif now - self._offered_at > patience:
+        elif now - self._offered_at > timeout:
             self.handshake = Handshake.RELEASED
             if imposed is not None and not self._queue:
                 self._queue.append(imposed)

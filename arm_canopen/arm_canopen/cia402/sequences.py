@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The steps that commands of a drive are made of: each waits for something, and says what not."""
+"""The steps that commands of a drive are made of: each waits, and names what did not come."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class DriveSequences:
             to_stop: A drive whose state is not fresh is ready, too.
 
         Raises:
-            DriveError: It is offline, is being stopped or could not be, or does not tell them.
+            DriveError: It is offline, is being stopped or could not be, or does not send them.
         """
         drive = self.drive
         self._require_operational()
@@ -264,7 +264,7 @@ class DriveSequences:
             raise self.refused('is faulted; call ~/recover first')
 
     def refused(self, what: str) -> DriveError:
-        """Return an error that says what, and how the drive is."""
+        """Return an error with what went wrong, and the state of the drive."""
         return DriveError(f'{self.drive.name} {what}: {self.drive.describe()}')
 
     def way_to_enable(self) -> str:
@@ -272,7 +272,7 @@ class DriveSequences:
         return '~/recover' if self.drive.view.state in FAULTY else '~/init or ~/enable'
 
     def _why(self) -> str:
-        """Say which condition outside of the bus keeps the drive from being enabled."""
+        """Name the condition outside of the bus keeps the drive from being enabled."""
         word = self.drive.objects.statusword
         if not word & Statusword.VOLTAGE_ENABLED:
             return (

@@ -39,7 +39,7 @@ TARGETS: tuple[DriveState, ...] = (
     _S.OPERATION_ENABLED,
     _S.QUICK_STOP_ACTIVE,
 )
-"""States that a master can ask for; the others the drive enters by itself."""
+"""States that a master can command; the others the drive enters by itself."""
 
 _UP: dict[DriveState, Command] = {
     _S.SWITCH_ON_DISABLED: Command.SHUTDOWN,  # transition 2
@@ -78,10 +78,10 @@ def next_command(state: DriveState, target: DriveState) -> Command:
         target: One of :data:`TARGETS`.
 
     Raises:
-        ValueError: The target cannot be asked for.
+        ValueError: The target cannot be commanded.
     """
     if target not in TARGETS:
-        raise ValueError(f'{target.title} cannot be asked for; possible: {TARGETS}')
+        raise ValueError(f'{target.title} cannot be commanded; possible: {TARGETS}')
     if state in _UNCONTROLLED:
         return Command.DISABLE_VOLTAGE
     if state is target:
@@ -106,7 +106,7 @@ def fault_reset(state: DriveState, elapsed: float) -> int:
 
     Args:
         state: State that the drive shows.
-        elapsed: Time since the reset was asked for in [s].
+        elapsed: Time since the begin of the reset in [s].
     """
     if state is not DriveState.FAULT or int(elapsed / RESET_PULSE) % 2:
         return Command.DISABLE_VOLTAGE

@@ -79,7 +79,7 @@ class TargetStream:
             await self._scheduler.timer(self._goes_on_until - self._scheduler.now)
         drive = self._drive
         if not drive.control.accepts_targets:
-            return  # what has taken it away has said so
+            return  # what has taken it away has reported it
         paused = f'the stream of targets has paused for {drive.config.target_timeout * 1000:g} ms'
         if drive.control.mode.setpoint is not None and not drive.control.mode.cyclic:
             drive.warn(f'{paused}: it goes on to the last target, and rests there')
@@ -89,9 +89,9 @@ class TargetStream:
         self._scheduler.background(self._report_rest(paused, speed))
 
     async def _report_rest(self, paused: str, speed: float) -> None:
-        """Report the stop when the axis stands, not when it is asked to."""
+        """Report the stop when the axis stands, not when the halt begins."""
         drive, steps = self._drive, self._steps
-        patience = STOP_TIMEOUT + speed / drive.view.parameters.profile.deceleration
+        timeout = STOP_TIMEOUT + speed / drive.view.parameters.profile.deceleration
         halted = drive.control.halt
 
         def ended() -> bool:
@@ -100,11 +100,11 @@ class TargetStream:
 
         await steps.settle()
         try:
-            await self._scheduler.until(ended, patience)
+            await self._scheduler.until(ended, timeout)
         except TimeoutError:
             drive.report(
                 Severity.ERROR,
-                f'{paused}: it was halted, but has not come to rest within {patience:.1f} s and '
+                f'{paused}: it was halted, but has not come to rest within {timeout:.1f} s and '
                 f'moves at {drive.view.velocity:g} per second',
             )
             return

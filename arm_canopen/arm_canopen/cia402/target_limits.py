@@ -38,7 +38,7 @@ def check_target(
         target: The target in user units.
 
     Raises:
-        DriveError: It is such a target; the message says why.
+        DriveError: It is such a target; the message has the reason.
     """
     if mode.setpoint is not None:
         _check_position(name, parameters.position_limits, target)
@@ -87,7 +87,7 @@ def _check_rounding(name: str, units: Units, target: float) -> None:
 
 
 def _check_effect(name: str, scaled: float, target: float, key: str) -> None:
-    """Refuse a velocity or torque that asks for something and would become 0."""
+    """Refuse a velocity or torque that is none and would become 0."""
     if abs(target) > NEGLIGIBLE and math.isfinite(scaled) and round(scaled) == 0:
         raise DriveError(
             f'{name}: target {target:g} is {scaled:g} device units, of which the object has whole '

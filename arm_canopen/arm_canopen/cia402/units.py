@@ -36,7 +36,7 @@ class Units:
         self._config = config
 
     def use(self, config: DriveConfig) -> None:
-        """Take other factors, because the drive has told its own."""
+        """Take other factors, those of the drive itself."""
         self._config = config
 
     def position_to_device(self, position: float) -> int:

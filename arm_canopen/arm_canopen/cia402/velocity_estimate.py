@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""How fast an axis really goes: what 0x606C tells is optional, and may be wrong."""
+"""How fast an axis really goes: 0x606C is optional, and may be wrong."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class VelocityEstimate:
         """Begin without positions.
 
         Args:
-            poll_period: Time between two positions that are asked for by SDO in [s]; 0 where a PDO
+            poll_period: Time between two positions that are read by SDO in [s]; 0 where a PDO
                 carries them.
         """
         self._window = max(WINDOW, 2.5 * poll_period)

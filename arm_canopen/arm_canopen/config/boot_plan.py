@@ -44,8 +44,8 @@ class BootWrite:
         index: Object index.
         subindex: Sub-index.
         data: Its value as an SDO carries it.
-        key: Key of bus.yml, or file, that says so.
-        requested: bus.yml asks for it; what nobody asks for is tried.
+        key: Key of bus.yml, or file, that it comes from.
+        requested: bus.yml has it; a refusal of other writes is no error.
         mask: Bits that count, None for all; the device keeps the others.
         temporary: It makes room for the writes that follow, and does not stay.
         unless_default: An exported DCF leaves it out where the EDS has it as default.
@@ -74,7 +74,7 @@ class BootWrite:
 
     @property
     def is_own_timer(self) -> bool:
-        """Whether it sets the event timer of a TPDO that nobody has asked for."""
+        """Whether it sets the event timer of a TPDO without a request of bus.yml."""
         number = self.index - TPDO.communication
         is_timer = 0 <= number < PDO_COUNT_MAX and self.subindex == EVENT_TIMER_SUBINDEX
         return is_timer and not self.requested
@@ -110,7 +110,7 @@ def boot_writes(
         bus: The bus.
         node: The device.
         consumers: What the device holds in 0x1016, read while :func:`consumer_to_read` names an
-            entry; None: what its EDS says.
+            entry; None: as in its EDS.
     """
     return list(_Plan(bus, node, consumers).writes())
 

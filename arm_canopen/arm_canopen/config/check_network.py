@@ -49,7 +49,7 @@ def check_heartbeats(subject: Subject) -> None:
     if not producer and not node.uses_node_guarding:
         subject.findings.warning(
             subject.place('heartbeat_producer'),
-            'the device sends no heartbeat, nor is it asked: nobody notices when it is gone',
+            'the device sends no heartbeat, and has no guard_time: nobody notices its loss',
             'write heartbeat_producer: 100',
         )
     elif producer and not node.heartbeat_timeout:

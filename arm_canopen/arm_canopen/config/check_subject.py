@@ -18,12 +18,12 @@ from .shared_keys import HUNDRED_MICROSECONDS, MILLISECONDS
 
 @dataclass(frozen=True, slots=True)
 class UsedMode:
-    """A mode that bus.yml says an axis is used in.
+    """A mode in which an axis is used by bus.yml.
 
     Attributes:
         axis: The axis.
         mode: The mode.
-        key: Key of bus.yml that says so.
+        key: Key of bus.yml that names it.
     """
 
     axis: DriveConfig
@@ -59,7 +59,7 @@ class Subject:
         return self.place(direction.name, str(pdo.number), *([key] if key else []))
 
     def object_place(self, index: int, subindex: int) -> Place:
-        """Return the place that says what an object holds: the sdo list, or else the EDS."""
+        """Return the place of the value of an object: the sdo list, or else the EDS."""
         write = self.node.write_of(index, subindex)
         if write is not None:
             return Place(self.bus.file, write.location.line, key=write.location.key)
@@ -68,7 +68,7 @@ class Subject:
         return Place(self.node.eds, line, key=f'[{index:04X}sub{subindex:X}]')
 
     def value(self, index: int, subindex: int = 0) -> int | None:
-        """Return the number that an object holds after boot, None when nobody says."""
+        """Return the number that an object holds after boot, None when no file has it."""
         if self.node.dictionary.get(index, subindex) is None:
             return None
         value = self.node.value_after_boot(index, subindex)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What a bus.yml says that each file by itself allows, and that does not work as a whole.
+"""Checks of a bus.yml as a whole, beyond what each file by itself allows.
 
 ``load_bus`` refuses what cannot be understood or cannot run. Here is looked for what runs and
 disappoints: times that do not fit each other, objects that no PDO carries, a bus that is full.
@@ -70,7 +70,7 @@ def check_bus(config: BusConfig, bitrate: int | None = None) -> Report:
 
 
 def check_file(path: str | os.PathLike[str], bitrate: int | None = None) -> Report:
-    """Read a bus.yml and tell everything that is wrong with it and its EDS files at once.
+    """Read a bus.yml and report everything that is wrong with it and its EDS files at once.
 
     Args:
         path: The bus.yml.

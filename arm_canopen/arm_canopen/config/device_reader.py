@@ -31,7 +31,7 @@ class DeviceDraft:
     Attributes:
         config: Its configuration without PDOs; None when its EDS or its node id is missing.
         section: Its section, defaults merged.
-        settings: What the section says.
+        settings: The values of the section.
         pdos: Its PDOs, TPDOs first.
     """
 

@@ -82,7 +82,7 @@ Item: TypeAlias = Scalar | YamlList | YamlMap
 
 @dataclass(frozen=True, slots=True)
 class DocumentKind:
-    """What a kind of file is told when it is wrong as a whole.
+    """The messages for a kind of file that is wrong as a whole.
 
     Attributes:
         name: What it is called.
@@ -265,7 +265,7 @@ class _Converter:
 
 
 def reindent(
-    pairs: list[tuple[yaml.Node, yaml.Node]], tell: Callable[[yaml.Node], None]
+    pairs: list[tuple[yaml.Node, yaml.Node]], report: Callable[[yaml.Node], None]
 ) -> list[tuple[yaml.Node, yaml.Node]]:
     """Put keys below the number that they follow, where a listing has lost their indentation.
 
@@ -273,7 +273,7 @@ def reindent(
 
     Args:
         pairs: Keys and values of a mapping as they are written.
-        tell: Told each number to which keys were put.
+        report: Called with each number to which keys were put.
     """
     result: list[tuple[yaml.Node, yaml.Node]] = []
     for key, value in pairs:
@@ -283,7 +283,7 @@ def reindent(
         elif isinstance(above[1], yaml.MappingNode) and above[1].tag == SLIPPED_TAG:
             above[1].value.append((key, value))
         elif _is_empty(above[1]):
-            tell(above[0])
+            report(above[0])
             slipped = yaml.MappingNode(SLIPPED_TAG, [(key, value)], key.start_mark)
             result[-1] = (above[0], slipped)
         else:
@@ -301,6 +301,6 @@ def _key_text(key: yaml.ScalarNode) -> str:
     if key.tag == INTEGER_TAG:
         try:
             return str(int(text, 0))
-        except ValueError:  # '010' or '1:30', told where the number is used
+        except ValueError:  # '010' or '1:30', reported where the number is used
             return text
     return text

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The axes of a drive: what bus.yml says of all of them, and of each channel."""
+"""The axes of a drive: keys of bus.yml for all of them, and for each channel."""
 
 from __future__ import annotations
 

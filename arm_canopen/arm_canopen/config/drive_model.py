@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The typed model of one axis of a drive: what bus.yml says of its units and sequences."""
+"""The typed model of one axis of a drive: its units and sequences."""
 
 from __future__ import annotations
 

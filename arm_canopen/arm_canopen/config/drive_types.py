@@ -14,7 +14,7 @@ from .pdo_resolution import PdoDraft
 
 
 def check_drive_types(pdos: Sequence[PdoDraft], findings: Findings) -> None:
-    """Refuse mapped objects that cannot tell one direction from the other.
+    """Refuse mapped objects that have no sign for the direction.
 
     Args:
         pdos: The PDOs of a drive.

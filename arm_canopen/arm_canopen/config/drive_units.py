@@ -39,10 +39,10 @@ class AxisUnits:
     Attributes:
         name: Name of the axis.
         rule: Where its scale comes from.
-        increments: Position increments of 1.0; 0 when nobody says.
+        increments: Position increments of 1.0; 0 when it is unknown.
         velocity: Device velocity units of 1.0 per second.
         radians: Angle of the shaft of 1.0 in [rad], by the factor group of the EDS; None when it
-            does not tell.
+            does not have it.
     """
 
     name: str

@@ -24,7 +24,7 @@ TOLERATED = 'the file is read all the same; correct it when a value is missing'
 
 @dataclass(frozen=True, slots=True)
 class Eds:
-    """What an EDS or DCF says of a device.
+    """The content of an EDS or DCF.
 
     Attributes:
         path: The file.

@@ -3,7 +3,7 @@
 """Splitting an EDS or DCF file into sections and values with their lines (CiA 306-1, 4.2).
 
 Takes what vendors' files hold: any case, blanks around names, CRLF, UTF-8, UTF-16 or Latin-1 text,
-comments with ``;`` or ``#``. Odd lines are told and skipped, never fatal.
+comments with ``;`` or ``#``. Odd lines are reported and skipped, never fatal.
 """
 
 from __future__ import annotations

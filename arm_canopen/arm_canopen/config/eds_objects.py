@@ -40,7 +40,7 @@ class ObjectReader:
                     self._parts.setdefault(index, {})[int(match[2], 16)] = section
 
     def entries(self) -> Iterator[ObjectEntry]:
-        """Yield all entries; what cannot be understood is told in ``oddities``."""
+        """Yield all entries; what cannot be understood is in ``oddities``."""
         self._check_lists()
         for index, section in self._objects.items():
             yield from self._object(index, section)

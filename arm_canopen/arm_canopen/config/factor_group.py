@@ -38,7 +38,7 @@ class FactorGroup:
 
     @property
     def position_scale(self) -> float:
-        """Position units per rad; 0 when the drive does not tell."""
+        """Position units per rad; 0 when the drive does not have it."""
         # position = internal [inc] * feed / (resolution * gear); without a feed constant
         # the drive counts increments of its encoder
         counts = self.feed if self.feed is not None else (self.resolution or 0.0) * self._gear
@@ -46,7 +46,7 @@ class FactorGroup:
 
     @property
     def velocity_scale(self) -> float:
-        """Velocity units per rad/s; 0 when the drive does not tell."""
+        """Velocity units per rad/s; 0 when the drive does not have it."""
         return self.position_scale * (self.velocity_factor or 1.0)
 
     @property
@@ -55,5 +55,5 @@ class FactorGroup:
 
 
 def ratio(numerator: int | None, denominator: int | None) -> float | None:
-    """Return a ratio of the factor group, None when the drive does not tell it."""
+    """Return a ratio of the factor group, None when the drive does not have it."""
     return numerator / denominator if numerator and denominator else None

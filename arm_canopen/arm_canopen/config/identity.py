@@ -12,7 +12,7 @@ from ..standard.objects import Index
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """What a device says of itself in 0x1000 and 0x1018; 0 is not checked."""
+    """The identity of a device, 0x1000 and 0x1018; 0 is not checked."""
 
     device_type: int = 0
     vendor_id: int = 0

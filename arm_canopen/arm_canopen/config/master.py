@@ -15,7 +15,7 @@ from .settings import MasterSettings, Options, remappings
 from .shared_keys import MILLISECONDS, U8_MAX, U16_MAX
 
 TIME_PRODUCER = 0x4000_0000  # bit 30 of 0x1012
-TIME_PERIOD = 1.0  # [s] when only that bit asks for it
+TIME_PERIOD = 1.0  # [s] when only that bit requests it
 TAKEN_OVER = (
     'driver',
     'namespace',
@@ -48,7 +48,7 @@ def build_master(
 
     Args:
         section: Section ``master``.
-        settings: What it says.
+        settings: Its values.
         options: Section ``options``.
         device_periods: ``period`` of every device in [s]; they count when there is no SYNC.
         findings: Gets times that do not fit together.
@@ -93,7 +93,7 @@ def _heartbeat_timeout(
 
 
 def _time_period(settings: MasterSettings) -> float:
-    """Return how often TIME is sent in [s]; bit 30 of its COB-ID asks for it, too."""
+    """Return how often TIME is sent in [s]; bit 30 of its COB-ID requests it, too."""
     if settings.time_period is not None:
         return settings.time_period
     return TIME_PERIOD if settings.time_cob_id & TIME_PRODUCER else 0.0

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The typed model of the master: what bus.yml says of it."""
+"""The typed model of the master."""
 
 from __future__ import annotations
 

@@ -45,7 +45,7 @@ def _merge_sdo(common: YamlList, special: YamlList) -> YamlList:
 
 
 def _address(item: Item) -> tuple[int, int] | None:
-    """Return which object an entry writes; None when that cannot be read (told elsewhere)."""
+    """Return which object an entry writes; None when that cannot be read (reported elsewhere)."""
     if not isinstance(item, YamlMap) or 'index' not in item.entries:
         return None
     subindex = item.entries.get('sub_index')

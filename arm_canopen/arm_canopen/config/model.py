@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The typed model of a bus: what bus.yml and the EDS files say, checked and in SI units."""
+"""The typed model of a bus: bus.yml and the EDS files, checked and in SI units."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ class SdoWrite:
         index: Object index.
         subindex: Sub-index.
         data: The value as it is sent.
-        location: Where bus.yml asks for it.
+        location: Where bus.yml has it.
     """
 
     index: int
@@ -151,7 +151,7 @@ class NodeConfig:
     line: int = 0
 
     def write_of(self, index: int, subindex: int) -> SdoWrite | None:
-        """Return the last write of an object that bus.yml asks for."""
+        """Return the last write of an object in bus.yml."""
         for write in reversed(self.sdo_writes):
             if (write.index, write.subindex) == (index, subindex):
                 return write
@@ -160,7 +160,7 @@ class NodeConfig:
     def value_after_boot(
         self, index: int, subindex: int = 0, data_type: DataType | None = None
     ) -> Value | None:
-        """Return what an object holds after boot by the files; None where none says it.
+        """Return what an object holds after boot by the files; None where no file has it.
 
         Args:
             index: Object index.
@@ -183,7 +183,7 @@ class NodeConfig:
 
     @property
     def uses_node_guarding(self) -> bool:
-        """The master asks for its NMT state; never together with a heartbeat (CiA 301)."""
+        """The master requests its NMT state; never together with a heartbeat (CiA 301)."""
         return self.guard_time > 0.0 and not self.heartbeat_producer
 
     @property

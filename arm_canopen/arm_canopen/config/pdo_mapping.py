@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""PDO mappings: what the EDS says, and what bus.yml wants (CiA 301, 7.5.2.36 and 7.5.2.38)."""
+"""PDO mappings: of the EDS, and of bus.yml (CiA 301, 7.5.2.36 and 7.5.2.38)."""
 
 from __future__ import annotations
 

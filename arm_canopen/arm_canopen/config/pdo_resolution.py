@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The PDOs of a device: those of its EDS, changed by what bus.yml says."""
+"""The PDOs of a device: those of its EDS, changed by bus.yml."""
 
 from __future__ import annotations
 
@@ -140,7 +140,7 @@ class PdoReader:
         return entry.default if entry is not None and isinstance(entry.default, int) else None
 
     def _configured(self, draft: PdoDraft, section: YamlMap) -> PdoDraft:
-        """Lay what bus.yml says over a PDO of the EDS."""
+        """Lay the values of bus.yml over a PDO of the EDS."""
         values = read_section(section, draft.direction.keys, self._findings)
         self._check_parameters(draft, section, values)
         config = replace(draft.config, configured=True, **values)

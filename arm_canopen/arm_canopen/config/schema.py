@@ -28,8 +28,8 @@ class Use(Enum):
     """What is made of a key."""
 
     READ = auto()  # fills a field of the model
-    IGNORED = auto()  # accepted: what it asks for is so anyway
-    UNUSED = auto()  # told in a warning: known, not used yet; a field is for other tools' files
+    IGNORED = auto()  # accepted: what it requests is so anyway
+    UNUSED = auto()  # warned of: known, not used yet; a field is for other tools' files
     REFUSED = auto()  # ignoring it would change motion or safety, so only its default is accepted
 
 
@@ -55,7 +55,7 @@ class Key:
         zero: True allows 0 beside the range, False refuses it within the range.
         choices: The only values allowed, with their meaning.
         default: Value of an absent key in units of the file, where no record of settings has it.
-        neutral: Value with which a key that is not used, or refused, asks for nothing.
+        neutral: Value with which a key that is not used, or refused, requests nothing.
         use: What is made of it.
         why: Reason for the default, the range or the use, as the user reads it.
     """

@@ -37,7 +37,7 @@ OWN_KEYS: dict[tuple[int, int], str] = {
     (Index.PRODUCER_HEARTBEAT, 0): 'heartbeat_producer',
     (Index.CONSUMER_HEARTBEAT, 1): 'heartbeat_consumer',
 }
-"""Objects that the master writes, with the key that says what."""
+"""Objects that the master writes, with the key of their value."""
 
 
 class SdoReader:
@@ -105,7 +105,7 @@ def read_address(item: Item, keys: tuple[Key, ...], findings: Findings) -> tuple
     """Read ``{index, sub_index}`` of an entry of ``sdo`` or ``mapping``.
 
     Returns:
-        Index and sub-index, None when the findings say what is wrong.
+        Index and sub-index, None when the findings have the reason.
     """
     example = '{index: 0x6081, sub_index: 0}'
     if not isinstance(item, YamlMap):

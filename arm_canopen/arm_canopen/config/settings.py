@@ -27,7 +27,7 @@ from .section import read_section, texts
 
 MASTER = MasterConfig(node_id=0)
 DEVICE = NodeConfig('', 0, '', eds=Path(), dictionary=ObjectDictionary(()))
-"""Master and device of which no key says anything."""
+"""Master and device without keys."""
 NAMESPACE = re.compile(r'/?([A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*)?')
 
 

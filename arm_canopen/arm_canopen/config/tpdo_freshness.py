@@ -46,7 +46,7 @@ def with_event_timer(pdo: PdoConfig, dictionary: ObjectDictionary) -> PdoConfig:
 
 
 def longest_silence(pdo: PdoConfig, sync_period: float) -> float:
-    """Return the time in [s] after which a TPDO counts as lost; infinite where nobody can tell.
+    """Return the time in [s] after which a TPDO counts as lost; infinite where that is unknown.
 
     Args:
         pdo: The TPDO.

@@ -53,7 +53,7 @@ class JointAggregator:
         """
         self._joints = list(joints)
         self._samples: dict[str, JointSample] = {}
-        self._heard: dict[str, float] = {}  # steady time in [s]
+        self._arrivals: dict[str, float] = {}  # steady time in [s]
         self._stamp = 0
         self._round: set[str] = set()
         self._expected: set[str] = set()
@@ -83,7 +83,7 @@ class JointAggregator:
             self._round, self._stamp, self._published = set(), stamp, False
         self._round.add(name)
         self._samples[name] = sample
-        self._heard[name] = now
+        self._arrivals[name] = now
         if not self._published and self._round >= self._expected and self._may_publish(now):
             ready.append(self._close(now))
         return ready
@@ -97,11 +97,11 @@ class JointAggregator:
         return [
             joint.name
             for joint in self._joints
-            if joint.mimic is None and not self._is_heard(joint.name, now)
+            if joint.mimic is None and not self._is_recent(joint.name, now)
         ]
 
     def _may_publish(self, now: float) -> bool:
-        """Whether every joint was heard, or has had its time to be."""
+        """Whether every joint has come, or has had its time."""
         began = now if self._began is None else self._began
         return now - began > STALE_AFTER or not self.silent(now)
 
@@ -117,13 +117,13 @@ class JointAggregator:
 
     def _sample_of(self, joint: RobotJoint, now: float) -> JointSample | None:
         mimic = joint.mimic
-        if mimic is None or self._is_heard(joint.name, now):
-            return self._samples[joint.name] if self._is_heard(joint.name, now) else None
-        if not self._is_heard(mimic.source, now):
+        if mimic is None or self._is_recent(joint.name, now):
+            return self._samples[joint.name] if self._is_recent(joint.name, now) else None
+        if not self._is_recent(mimic.source, now):
             return None
         leader = self._samples[mimic.source]
         position = mimic.multiplier * leader.position + mimic.offset
         return JointSample(position, mimic.multiplier * leader.velocity, 0.0)
 
-    def _is_heard(self, name: str, now: float) -> bool:
-        return name in self._heard and now - self._heard[name] <= STALE_AFTER
+    def _is_recent(self, name: str, now: float) -> bool:
+        return name in self._arrivals and now - self._arrivals[name] <= STALE_AFTER

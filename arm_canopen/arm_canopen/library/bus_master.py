@@ -102,7 +102,7 @@ class BusMaster:
             The other master, where the bus is led beside it; else empty.
 
         Raises:
-            OtherMasterError: There is one, and nobody said to go on beside it.
+            OtherMasterError: There is one, and beside_master is not set.
         """
         if not self._beside_master:
             refuse_other_master(self.can, self.config)

@@ -132,7 +132,7 @@ class CanopenDrive:
         Args:
             target: In user units.
         """
-        return self._give(lambda: self._commands.set_target(target))
+        return self._deliver(lambda: self._commands.set_target(target))
 
     def move_to(
         self, position: float, *, relative: bool = False, timeout: float = MOVE_TIMEOUT
@@ -156,12 +156,12 @@ class CanopenDrive:
                 return commands.move(Move(position, relative=relative))
             return commands.set_target(control.setpoint + position if relative else position)
 
-        self._give(give)
+        self._deliver(give)
         return self._thread.run_coroutine(partial(commands.arrive, timeout)).result()
 
     def _run(self, name: str, sequence: Sequence, *, preempt: bool = False) -> str:
         commands = self._commands
         return self._thread.run(lambda: commands.run(name, sequence(), preempt=preempt)).result()
 
-    def _give(self, command: Callable[[], str]) -> str:
-        return self._thread.run(lambda: self._commands.give(command)).result()
+    def _deliver(self, command: Callable[[], str]) -> str:
+        return self._thread.run(lambda: self._commands.deliver(command)).result()

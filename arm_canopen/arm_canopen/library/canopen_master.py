@@ -147,7 +147,7 @@ class CanopenMaster:
 
         Raises:
             OtherMasterError: Another master leads this bus.
-            BootError: Devices are missing; the message says how far each has come.
+            BootError: Devices are missing; the message has the phase of each.
             BusError: The master has ended.
         """
         if self._closed:

@@ -105,7 +105,7 @@ class CanopenDevice:
 
     @property
     def config(self) -> NodeConfig:
-        """What bus.yml and its EDS say."""
+        """Its configuration, from bus.yml and its EDS."""
         return self._device.config
 
     def status(self) -> NodeStatus:

@@ -102,7 +102,7 @@ class SdoWriter:
         self._address = (index, subindex)
         self._queue: deque[QueuedWrite] = deque()
         self._busy = False
-        self._last: Number | None = None  # that was asked for
+        self._last: Number | None = None  # that was requested
         self._failed = False  # its transfer
         self._failures = 0  # in a row
         self._write_again_at = 0.0

@@ -48,7 +48,7 @@ class BootProcess:
         send_nmt: SendNmt,
         startup: Startup,
         *,
-        ask_state: Callable[[int], None],
+        request_state: Callable[[int], None],
     ) -> None:
         """Take what is needed of the network.
 
@@ -57,14 +57,14 @@ class BootProcess:
             bus: The bus that it belongs to.
             scheduler: Time.
             send_nmt: Sends an NMT command to a node id.
-            startup: Says when a device may be started.
-            ask_state: Asks a node id for its NMT state, as node guarding does.
+            startup: Decides when a device may be started.
+            request_state: Requests the NMT state of a node id, as node guarding does.
         """
         self._node = node
         self._scheduler = scheduler
         self._send_nmt = send_nmt
         self._startup = startup
-        self._ask_state = ask_state
+        self._request_state = request_state
         self._start = bus.master.start_nodes
         self._sdo_timeout = bus.master.boot_timeout
         self._configurator = Configurator(
@@ -117,7 +117,7 @@ class BootProcess:
             )
 
     async def _answers(self) -> bool:
-        """Ask for 0x1000; any answer will do."""
+        """Read 0x1000; any answer will do."""
         try:
             await self._node.sdo.read(Index.DEVICE_TYPE, 0, self._node.config.boot_timeout)
         except SdoTimeoutError:
@@ -186,21 +186,21 @@ class BootProcess:
         node = self._node
         self._fault = BootFault.NO_HEARTBEAT
         self._enter(BootPhase.STATE)
-        self._ask_state(node.config.node_id)
-        patience = node.config.heartbeat_producer + STATE_TIMEOUT
+        self._request_state(node.config.node_id)
+        timeout = node.config.heartbeat_producer + STATE_TIMEOUT
         try:
-            await self._scheduler.until(lambda: node.nmt_state is not None, patience)
+            await self._scheduler.until(lambda: node.nmt_state is not None, timeout)
         except TimeoutError:
             raise BootError(
                 f'{node.name} (node {node.config.node_id}) is to be kept alive '
-                '(reset_communication: false), but does not tell its NMT state: neither by a '
-                'heartbeat nor when it is asked (node guarding); it is left alone. Reset it by '
+                '(reset_communication: false), but does not send its NMT state: neither by a '
+                'heartbeat nor as an answer to node guarding; it is left alone. Reset it by '
                 '~/nmt_reset_node, or give it a heartbeat'
             ) from None
         return node.nmt_state is NmtState.OPERATIONAL
 
     async def _take_over(self) -> None:
-        """Go on with a device as it runs, without a word that could disturb it."""
+        """Go on with a device as it runs, without a frame that could disturb it."""
         node = self._node
         self._enter(BootPhase.IDENTITY)
         await self._check_identity(node.config.identity)
@@ -238,18 +238,18 @@ class BootProcess:
                 )
 
     async def _await_answer_to_guarding(self) -> None:
-        """Ask before anything is written, so that a device that never answers is left in peace."""
+        """Request the state before anything is written, which could not be watched without it."""
         node = self._node
         self._fault = BootFault.NO_GUARDING
         self._enter(BootPhase.ERROR_CONTROL)
         since = self._scheduler.now
-        self._ask_state(node.config.node_id)
+        self._request_state(node.config.node_id)
         try:
             await self._scheduler.until(lambda: node.life.last > since, STATE_TIMEOUT)
         except TimeoutError:
             raise BootError(
                 f'{node.name} (node {node.config.node_id}) has never answered node guarding; it '
-                'is not started, because its loss would go unnoticed. It is asked again every '
+                'is not started, because its loss would go unnoticed. It is requested again every '
                 f'{node.config.boot_timeout + STATE_TIMEOUT:g} s; give it a heartbeat_producer '
                 'instead of guard_time, or guard_time: 0 if it has neither'
             ) from None

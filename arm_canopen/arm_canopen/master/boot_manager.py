@@ -51,7 +51,7 @@ class BootManager:
                 scheduler,
                 send_nmt,
                 startup,
-                ask_state=lambda node_id: send(guarding_request(node_id)),
+                request_state=lambda node_id: send(guarding_request(node_id)),
             )
             node.on_boot_up = partial(self._restarted, node)
             node.on_dropped_out = partial(self._dropped_out, node)

@@ -12,7 +12,7 @@ from .events import Event, EventKind, Report, Severity
 
 
 class BusSender:
-    """Sends frames; a bus that refuses them is told once, until it works again."""
+    """Sends frames; a bus that refuses them is reported once, until it works again."""
 
     def __init__(self, send: Callable[[Frame], None], report: Report) -> None:
         """Begin with a bus that works.

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Brings the boot plan into a device, or tells whether the device has it already."""
+"""Writes the boot plan to a device, or compares the two."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from .events import EventKind, Severity
 from .remote_node import RemoteNode
 
 ONCE = (Index.STORE_PARAMETERS, Index.RESTORE_PARAMETERS)
-"""A device would store or restore its parameters as often as it is asked."""
+"""Written once: a device stores or restores its parameters with each write."""
 PDO_OBJECTS = frozenset(
     first + number
     for first in (
@@ -43,7 +43,7 @@ UNWATCHED = (
 
 
 class Configurator:
-    """Brings the boot plan into one device, or compares the two."""
+    """Writes the boot plan to one device, or compares the two."""
 
     def __init__(
         self,
@@ -57,7 +57,7 @@ class Configurator:
         Args:
             node: The device.
             bus: The bus that it belongs to.
-            on_write: Told each object before it is written.
+            on_write: Called with each object before it is written.
         """
         self._node = node
         self._bus = bus
@@ -125,7 +125,7 @@ class Configurator:
     async def _bring(self, write: BootWrite) -> None:
         """Write an object, unless the device has what is wanted, or cannot take it."""
         data = write.data
-        if write.mask is not None:  # a COB-ID, whose value is not enough to tell what is right
+        if write.mask is not None:  # a COB-ID, of which the device keeps some bits
             present = await self.read_number(*write.address)
             data = write.over(present)
             if present == int.from_bytes(data, 'little'):
@@ -143,7 +143,7 @@ class Configurator:
             self._node.watch_slot = write.subindex if any(data) else 0
 
     def _refused(self, write: BootWrite, error: SdoAbortError) -> None:
-        """Go on without what nobody asked for; raise an SdoError for what bus.yml wants."""
+        """Go on without what bus.yml does not request; raise an SdoError for what it does."""
         if write.key == WATCH_KEY:
             reason = f'{error}: it does not take {write.text()}, {UNWATCHED}'
             if write.requested and any(write.data):

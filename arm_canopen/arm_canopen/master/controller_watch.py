@@ -34,11 +34,11 @@ _TOLD: dict[ControllerState, tuple[Severity, str]] = {
 
 
 class ControllerWatch:
-    """Follows the error state of the controller, and says when it changes.
+    """Follows the error state of the controller, and reports changes.
 
     Attributes:
-        state: Its state, error active until it says something else.
-        transmit_errors: Its transmit error counter, as far as it tells it.
+        state: Its state, error active until a frame shows another.
+        transmit_errors: Its transmit error counter, as far as it reports it.
         receive_errors: Its receive error counter.
         error_frames: Number of error frames.
         last_error: The last one in words, empty before the first.

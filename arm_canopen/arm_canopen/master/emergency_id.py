@@ -11,7 +11,7 @@ from ..standard.objects import Index
 
 
 def emergency_can_id(config: NodeConfig) -> int | None:
-    """Return the identifier: as bus.yml writes 0x1014, else as the EDS says, else the usual one.
+    """Return the identifier: as bus.yml writes 0x1014, else as in the EDS, else the usual one.
 
     None when the device shall send none.
     """

@@ -27,7 +27,7 @@ class EmergencyLog:
         """Begin without any.
 
         Args:
-            report: Takes what the device says.
+            report: Takes the events of the device.
         """
         self.history: deque[tuple[float, Emergency]] = deque(maxlen=HISTORY)
         self.last: Emergency | None = None

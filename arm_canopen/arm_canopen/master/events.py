@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What the network tells its owner: events in words, with the device that they are about."""
+"""Events that the network reports to its owner: in words, with the device concerned."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Node guarding: the master asks a device without heartbeat (CiA 301, 7.2.8.3.2.1)."""
+"""Node guarding: requests for the state of a device without heartbeat (CiA 301, 7.2.8.3.2.1)."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ TOGGLE = 0x80  # bit of an answer that changes with each
 
 
 def guarding_request(node_id: int) -> Frame:
-    """Return the remote frame that asks a device for its NMT state."""
+    """Return the remote frame that requests the NMT state of a device."""
     return Frame(CobId.HEARTBEAT + node_id, is_remote=True)
 
 
@@ -23,7 +23,7 @@ class Guarding:
     def __init__(
         self, node_id: int, guard_time: float, retry_factor: int, send: Callable[[Frame], None]
     ) -> None:
-        """Prepare; nothing is asked before :meth:`start`.
+        """Prepare; nothing is sent before :meth:`start`.
 
         Args:
             node_id: The device.
@@ -40,7 +40,7 @@ class Guarding:
         self._toggle: int | None = None
 
     def start(self, now: float) -> None:
-        """Begin to ask at a time in [s]; the first answer may have either toggle bit."""
+        """Begin to send requests at a time in [s]; the first answer may have either toggle bit."""
         self._due, self._unanswered, self._toggle = now, 0, None
 
     def stop(self) -> None:
@@ -48,7 +48,7 @@ class Guarding:
         self._due = None
 
     def receive(self, data: bytes) -> bool:
-        """Take an answer; tells whether its toggle bit makes it a new one."""
+        """Take an answer; return whether its toggle bit makes it a new one."""
         toggle = data[0] & TOGGLE
         if toggle == self._toggle:
             return False
@@ -57,7 +57,7 @@ class Guarding:
         return True
 
     def advance(self, now: float) -> bool:
-        """Ask when it is time; tells whether the device counts as lost.
+        """Send a request when it is due; return whether the device counts as lost.
 
         Args:
             now: Steady time in [s].

@@ -54,7 +54,7 @@ class LifeSigns:
             self._guarding.stop()
 
     def take(self, state: NmtState, frame: Frame, *, supervised: bool) -> bool:
-        """Take a sign; tells whether it is a new one, by the toggle bit of node guarding.
+        """Take a sign; return whether it is a new one, by the toggle bit of node guarding.
 
         Args:
             state: The NMT state in it.

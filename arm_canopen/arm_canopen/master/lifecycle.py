@@ -55,7 +55,7 @@ class Verb(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Transition:
-    """A transition that somebody may ask for.
+    """A transition that a client may request.
 
     Attributes:
         number: Its id in lifecycle_msgs/Transition.
@@ -114,14 +114,14 @@ class Managed:
 
     @property
     def possible(self) -> tuple[Transition, ...]:
-        """Transitions that can be asked for now."""
+        """Transitions that are possible now."""
         return tuple(entry for entry in TRANSITIONS if entry.start is self.state)
 
     def find(self, number: int, label: str = '') -> Transition:
         """Return a transition by label, or by number when there is no label.
 
         Raises:
-            LifecycleError: It does not exist, or is not possible now; the message says what is.
+            LifecycleError: It does not exist, or not now; the message names those that do.
         """
         for entry in self.possible:
             if (entry.verb.label == label) if label else (entry.number == number):
@@ -165,7 +165,7 @@ class Supervisor:
     """Brings a master and its devices up and down in order, as ros2_canopen's manager does.
 
     The devices change side by side. When one of them cannot be activated, the others are brought
-    down again, so that there is no half of a robot that obeys.
+    down again, so that no half of a robot takes commands.
     """
 
     def __init__(self, master: Managed, devices: Sequence[Managed], scheduler: Scheduler) -> None:

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The CANopen network of one bus, as an object without threads, clock or I/O of its own.
 
-Its owner hands it every received frame, tells it the time and starts its cycles; it sends through
+Its owner hands it every received frame and the time, and starts its cycles; it sends through
 a function. See ``runner.py`` for the thread that does so on a real bus.
 """
 
@@ -53,7 +53,7 @@ class Network:
             drives have taken.
         next_update: When :meth:`update` is due in [s]; infinite when it is done in this cycle.
         on_frame: Called with each received frame, for statistics.
-        send: Sends a frame; a bus that refuses it is told once until it works again.
+        send: Sends a frame; a bus that refuses it is reported once until it works again.
         missed_pdos: TPDOs that did not answer a SYNC, over all devices.
         controller: The CAN controller as its error frames show it.
         unknown_frames: Frames with an identifier that nobody on this bus should use.
@@ -266,7 +266,7 @@ class Network:
         return self._nmt.send(command, node_id)
 
     def publish_object(self, node: RemoteNode, index: int, subindex: int, value: Number) -> None:
-        """Send an object by the RPDOs that carry it, as ``~/tpdo`` asks.
+        """Send an object by the RPDOs that carry it, for ``~/tpdo``.
 
         An event-driven RPDO leaves at once, one that waits for SYNC with the next cycle, and those
         of a drive in every cycle anyway.

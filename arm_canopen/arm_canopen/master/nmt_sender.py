@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""NMT commands one after another, as far apart as the inhibit time says (CiA 301, 0x102A)."""
+"""NMT commands one after another, as far apart as the inhibit time demands (CiA 301, 0x102A)."""
 
 from __future__ import annotations
 

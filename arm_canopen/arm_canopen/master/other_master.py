@@ -3,7 +3,7 @@
 """Another master on the bus: the frames by which it is known, and looking for it beforehand.
 
 Two masters command the same drives, and the first thing that a master does is to reset them. So it
-listens before it says a word.
+listens before it sends a frame.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ FRAMES_REPORTED = 3
 
 
 class Evidence(IntEnum):
-    """How clearly a frame says who sends it, the clearest first."""
+    """How clearly a frame shows its sender, the clearest first."""
 
     COMMAND = 0
     HEARTBEAT = 1
@@ -45,7 +45,7 @@ class MasterFrame:
     """A kind of frame that only the master of a bus sends.
 
     Attributes:
-        evidence: How clearly it says who sends it.
+        evidence: How clearly it shows its sender.
         text: What it is, in words.
     """
 
@@ -60,7 +60,7 @@ class MasterFrames:
         """Note which frames are those of the master.
 
         Args:
-            config: The bus; None where no file says what is on it.
+            config: The bus; None where no file describes it.
         """
         self._frames: dict[int, MasterFrame] = {}
         sync = MasterFrame(Evidence.SYNC, f'SYNC (0x{CobId.SYNC:03X})')
@@ -84,7 +84,7 @@ class MasterFrames:
             self._frames[CobId.SYNC] = sync
 
     def read(self, frame: Frame) -> MasterFrame | None:
-        """Return what a frame of somebody else says, None when any device may send it."""
+        """Return what a frame of another station means, None when any device may send it."""
         if frame.is_extended or frame.is_remote or frame.is_error:
             return None
         if frame.can_id == CobId.NMT:
@@ -96,7 +96,7 @@ class OtherMasterWatch:
     """Says once of each kind of frame that somebody else sends what only the master sends."""
 
     def __init__(self, config: BusConfig, report: Report, *, expected: bool) -> None:
-        """Begin with nobody heard.
+        """Begin without frames.
 
         Args:
             config: The bus.
@@ -131,39 +131,39 @@ def listen(
         clock: The steady clock in [s].
 
     Returns:
-        What was heard of it, and how often; empty when nobody is there.
+        Its frames by kind, and how many of each; empty when there is none.
     """
-    known, heard = MasterFrames(config), Counter[MasterFrame]()
+    known, found = MasterFrames(config), Counter[MasterFrame]()
     begin = clock()
     end = begin + LISTENING_TIME
     while (left := end - clock()) > 0.0:
         try:
             frames = bus.receive(left)
-        except BusError:  # nobody can be heard on it now; it says so itself when it is used
+        except BusError:  # nothing can be received now; it raises again when it is used
             break
         # what came before may be the last words of a master that has ended since
         fresh = (known.read(frame) for frame in frames if frame.timestamp >= begin)
-        heard.update(kind for kind in fresh if kind is not None)
-    return heard
+        found.update(kind for kind in fresh if kind is not None)
+    return found
 
 
-def describe(heard: Counter[MasterFrame]) -> str:
-    """Name what was heard of another master, the clearest first."""
+def describe(found: Counter[MasterFrame]) -> str:
+    """Name the frames of another master, the clearest first."""
     return ', '.join(
-        f'{kind.text} {heard[kind]} times' for kind in sorted(heard)[:FRAMES_REPORTED]
+        f'{kind.text} {found[kind]} times' for kind in sorted(found)[:FRAMES_REPORTED]
     )
 
 
 def refuse_other_master(bus: Bus, config: BusConfig) -> None:
-    """Listen, and refuse a bus on which another master is heard.
+    """Listen, and refuse a bus that another master leads.
 
     Raises:
-        OtherMasterError: There is one; the message says by which frames it is known.
+        OtherMasterError: There is one; the message names its frames.
     """
-    heard = listen(bus, config)
-    if heard:
+    found = listen(bus, config)
+    if found:
         raise OtherMasterError(
-            f'another master is on {bus.name}: it sent {describe(heard)} in '
+            f'another master is on {bus.name}: it sent {describe(found)} in '
             f'{LISTENING_TIME:g} s. Nothing was sent, as a start resets the '
             'devices that it leads. End it, choose another can_interface_name, or, if it has '
             'devices of its own, go on beside it with -p beside_master:=true'

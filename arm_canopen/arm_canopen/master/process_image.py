@@ -61,7 +61,7 @@ class SyncRound:
         self._sync_time = 0.0
 
     def start(self, now: float) -> None:
-        """A SYNC is about to be sent; each :class:`ReceivedTpdo` says whether it is expected.
+        """A SYNC is about to be sent; each :class:`ReceivedTpdo` returns whether it is expected.
 
         Args:
             now: Steady time in [s].

@@ -43,7 +43,7 @@ class RemoteNode:
     """One device on the bus.
 
     Attributes:
-        config: What bus.yml and its EDS say.
+        config: Its configuration, from bus.yml and its EDS.
         name: Name in bus.yml.
         objects: Its objects, by PDO and SDO.
         image: Its process image.
@@ -63,7 +63,7 @@ class RemoteNode:
         emergencies: Its EMCYs.
         pdos: Whether its TPDOs come.
         on_boot_up: Called when it has restarted.
-        on_lost: Its drivers, which stop; each is told why.
+        on_lost: Its drivers, which stop; each gets the reason.
         on_failed: Its drivers, which stop because a step of the cycle failed for this device; each
             gets the error, and the RPDO that cannot be sent for it, if it is one.
         on_dropped_out: Called when it has to be booted again, though it did not restart, with the
@@ -81,7 +81,7 @@ class RemoteNode:
         """Build the device from its configuration.
 
         Args:
-            config: What bus.yml and its EDS say.
+            config: Its configuration, from bus.yml and its EDS.
             scheduler: Time.
             sync: The SYNC round of the bus.
             send: Hands a frame to the bus.
@@ -128,7 +128,7 @@ class RemoteNode:
         return f'{self.phase.value} {self.phase_detail}'.rstrip()
 
     def report(self, kind: EventKind, severity: Severity, text: str) -> None:
-        """Tell the owner of the network something about this device."""
+        """Report something about this device to the owner of the network."""
         self._report(Event(kind, severity, self.name, text))
 
     def expect_answers(self) -> None:
@@ -159,7 +159,7 @@ class RemoteNode:
             self.on_dropped_out(pause)
 
     def note_command(self, command: NmtCommand) -> None:
-        """An NMT command for this device is on the bus, from us or from somebody else."""
+        """An NMT command for this device is on the bus, from this master or from another."""
         self.wanted = COMMANDED_STATES.get(command)
         self._commanded = command
         self._commanded_at = self._scheduler.now
@@ -174,7 +174,7 @@ class RemoteNode:
             taken_over: It was in operation already, and was not disturbed.
         """
         self.taken_over = taken_over
-        self.image.clear()  # what it sent before it was configured says nothing about now
+        self.image.clear()  # what it sent before it was configured is no longer true
         self.online = True
         self._failed = False
         self._backoff.booted(now)
@@ -184,7 +184,7 @@ class RemoteNode:
             self.pdos.warn_of_losses()
 
     def watch(self, now: float) -> bool:
-        """Look for life signs and PDOs that are overdue; tells whether the device was lost now.
+        """Look for life signs and PDOs that are overdue; return whether the device was lost now.
 
         Args:
             now: Steady time in [s].
@@ -220,12 +220,12 @@ class RemoteNode:
         self.sdo.restarted()
 
     def lost(self, reason: str, severity: Severity = Severity.ERROR) -> None:
-        """The device is gone: forget what it said and tell whoever drives it."""
+        """The device is gone: forget its values, and stop its drivers."""
         self.report(EventKind.HEARTBEAT_LOST, severity, reason)
         self.loss = reason
         self.nmt_state = None
         self.online = False
-        self._stop_drivers(reason)  # first, so that nobody asks it again when its SDOs end
+        self._stop_drivers(reason)  # first, so that nobody sends new SDOs when these end
         self.offline(reason)
 
     def offline(self, reason: str) -> None:
@@ -247,13 +247,13 @@ class RemoteNode:
 
     @property
     def _being_reset(self) -> bool:
-        """Whether somebody on this bus has just told it to restart."""
+        """Whether an NMT command of anybody on this bus has just reset it."""
         recent = self._scheduler.now - self._commanded_at <= RESET_TIME
         return self._commanded in RESETS and recent
 
     @property
     def _is_mute(self) -> bool:
-        """Whether it never tells its NMT state, so that it is taken to be in the commanded one."""
+        """Whether it never sends its NMT state, so that it counts as in the commanded one."""
         return not self.config.heartbeat_producer and not self.config.uses_node_guarding
 
     def _why_dropped(self) -> str:
@@ -262,7 +262,7 @@ class RemoteNode:
             return f'its last EMCY is {emergency}'
         return (
             'it sent no EMCY; it has missed the master or the start, or its error behaviour '
-            '0x1029 says so'
+            '0x1029 demands it'
         )
 
     def _drops_text(self) -> str:
@@ -270,9 +270,9 @@ class RemoteNode:
         return f', as it has done so {drops} times in a row' if drops > 1 else ''
 
     def _gone(self, reason: str) -> None:
-        """It is gone by itself, unless it was told to restart."""
+        """It is gone by itself, unless it was reset."""
         if self._being_reset and self._commanded is not None:
-            text = f'restarts, as the NMT command {self._commanded.name} told it'
+            text = f'restarts, by the NMT command {self._commanded.name}'
             self.lost(text, Severity.INFO)
         else:
             self.lost(reason)
@@ -290,11 +290,11 @@ class RemoteNode:
             and state is not NmtState.OPERATIONAL
             and (left_before or before is NmtState.OPERATIONAL)
         )
-        told = state is NmtState.BOOT_UP and self._being_reset
-        severity = Severity.WARNING if self.left_operational and not told else Severity.INFO
+        was_reset = state is NmtState.BOOT_UP and self._being_reset
+        severity = Severity.WARNING if self.left_operational and not was_reset else Severity.INFO
         self.report(EventKind.NMT_STATE, severity, f'NMT state {state.name}')
         if self.left_operational and not left_before and state is not NmtState.BOOT_UP:
-            # it hears no PDO any more: what it said before is no longer true, and whoever drives
+            # it processes no PDO any more: its values are no longer true, and whoever drives
             # it must not go on as if it followed
             self.image.clear()
             itself = self.wanted is NmtState.OPERATIONAL
@@ -302,6 +302,6 @@ class RemoteNode:
             self._stop_drivers(f'{who} NMT state {state.name}')
 
     def _stop_drivers(self, reason: str) -> None:
-        self.taken_over = False  # whatever it did, from now on it is led anew
+        self.taken_over = False  # from now on it is commanded anew
         for driver_stops in self.on_lost:
             driver_stops(reason)

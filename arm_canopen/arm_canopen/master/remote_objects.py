@@ -29,7 +29,7 @@ class RemoteObjects:
     """A device as a set of objects.
 
     Attributes:
-        config: What bus.yml and its EDS say.
+        config: Its configuration, from bus.yml and its EDS.
         name: Name in bus.yml.
         image: Its process image.
         sdo: Its SDO client.
@@ -49,7 +49,7 @@ class RemoteObjects:
         """Build the objects from the configuration of the device.
 
         Args:
-            config: What bus.yml and its EDS say.
+            config: Its configuration, from bus.yml and its EDS.
             scheduler: Time.
             sync: The SYNC round of the bus.
             send: Hands a frame to the bus.
@@ -112,10 +112,10 @@ class RemoteObjects:
             await self._scheduler.timer(period)
 
     def entry(self, index: int, subindex: int = 0) -> ObjectEntry:
-        """Return what the EDS says of an object.
+        """Return the entry of an object in the EDS.
 
         Raises:
-            SdoError: The EDS does not know it.
+            SdoError: It is not in the EDS.
         """
         entry = self.config.dictionary.get(index, subindex)
         if entry is None:
@@ -139,15 +139,15 @@ class RemoteObjects:
         Args:
             index: Object index.
             subindex: Sub-index.
-            timeout: How long each answer may take in [s]; by default what bus.yml says.
+            timeout: How long each answer may take in [s]; by default that of bus.yml.
 
         Raises:
-            SdoError: The device did not answer or aborted, or the EDS does not know the object.
+            SdoError: The device did not answer or aborted, or the object is not in the EDS.
             CodecError: The answer does not fit the type.
         """
         entry = self.entry(index, subindex)
-        patience = self.config.sdo_timeout if timeout is None else timeout
-        return decode(entry.data_type, await self.sdo.read(index, subindex, patience))
+        limit = self.config.sdo_timeout if timeout is None else timeout
+        return decode(entry.data_type, await self.sdo.read(index, subindex, limit))
 
     def write_object(
         self, index: int, subindex: int, value: Value, *, urgent: bool = False
@@ -195,7 +195,7 @@ class RemoteObjects:
         end.when_done(set_back)
 
     def forget(self, reason: str) -> None:
-        """The device went away, or restarted: what it said and was told is no longer true."""
+        """The device went away, or restarted: values that were sent or received are outdated."""
         self.image.clear()
         self.sdo.cancel_all(reason)
         for entry in self._polled.values():

@@ -4,7 +4,7 @@
 
 A boot-up or a mode switch takes many frames and waits in between. Written as a coroutine it reads
 from top to bottom; the scheduler resumes it when its SDO is answered, its condition holds or its
-time is up. Time is what ``advance`` was last told, so tests run hours in milliseconds.
+time is up. Time is what ``advance`` got last, so tests run hours in milliseconds.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class Promise(Generic[T]):
         other.when_done(finish)
 
     def abandon(self) -> None:
-        """Be done without a result, and without telling those who wait; nobody does any more."""
+        """Be done without a result, and without a call of those who wait; nobody does any more."""
         self.done = True
         self._callbacks.clear()
 
@@ -182,7 +182,7 @@ class Scheduler:
         return Task(coroutine)
 
     def background(self, coroutine: Coroutine[Promise[Any], None, None]) -> Task[None]:
-        """Start a coroutine that nobody awaits; an error in it is a defect and is told."""
+        """Start a coroutine that nobody awaits; an error in it is a defect and is reported."""
         task = Task(coroutine)
         task.when_done(self._check_background)
         return task

@@ -135,7 +135,7 @@ def _command(command: int, *, mask: int = 0xFF) -> Match[bytes]:
 
 
 def _addressed(channel: SdoChannel, command: int) -> Match[bytes]:
-    """Return what reads the answer to an initiation; its bits say what the server can do."""
+    """Return what reads the answer to an initiation; its bits show what the server supports."""
 
     def match(data: bytes) -> bytes | None:
         if len(data) != 8 or data[0] & ~(CRC_BIT | SIZE_BIT) != command:

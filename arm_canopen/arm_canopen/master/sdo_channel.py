@@ -28,7 +28,7 @@ Answer = TypeVar('Answer', UploadResponse, Segment, DownloadResponse, DownloadSe
 Address: TypeAlias = tuple[int, int]
 Match: TypeAlias = Callable[[bytes], T | None]
 
-REPEAT_AFTER = 0.25  # [s] before a question that may be repeated is asked again
+REPEAT_AFTER = 0.25  # [s] before a request that may be repeated is sent again
 MARKERS: tuple[Address, ...] = ((0x1000, 0), (0x1001, 0), *((0x1018, sub) for sub in range(5)))
 """Objects that a device has or refuses (CiA 301, table 65); the answer shows where others end."""
 PENDING_MAX = 16  # answers to remember that never came
@@ -44,14 +44,14 @@ class SdoCounters:
     aborted: int = 0
     timed_out: int = 0
     stale: int = 0  # answers that belong to no open request
-    repeated: int = 0  # questions that were asked again
+    repeated: int = 0  # requests that were sent again
 
 
 class SdoChannel:
     """Sends questions to the SDO server of one device and finds their answers.
 
-    An answer does not say which question it belongs to, only its object. So answers that are
-    still owed are remembered: before their object is asked for again, another one is read, and
+    An answer carries its object, and not the request that it belongs to. So answers that are
+    still owed are remembered: before their object is read again, another one is read, and
     since a server answers in order, what comes after that is new.
 
     Attributes:
@@ -119,7 +119,7 @@ class SdoChannel:
         """Tell the device that the transfer is over, whether or not a question is open."""
         if self._answered is not None:
             self._answered = None
-            self._owe(1)
+            self._await_late_replies(1)
         self._send_abort(AbortCode.GENERAL)
 
     def restarted(self) -> None:
@@ -139,11 +139,11 @@ class SdoChannel:
             question: The frame; None only waits for the next answer.
             match: Reads an answer; None when the frame is none to this question.
             timeout: Longest time to wait in [s].
-            repeat: Asking twice does no harm, so it is asked again when no answer comes.
+            repeat: The request may be sent twice; it is when no answer comes.
 
         Raises:
             SdoAbortError: The device refused.
-            SdoTimeoutError: It did not answer; it was told that the transfer is over.
+            SdoTimeoutError: It did not answer; it got an abort.
             SdoError: The transfer was cancelled.
         """
         answer = await self._request(question, match, timeout, repeat=repeat)
@@ -156,26 +156,26 @@ class SdoChannel:
     async def _request(
         self, question: bytes | None, match: Match[T], timeout: float, *, repeat: bool
     ) -> T | Abort:
-        self._match, self._strays, asked = match, 0, 0
+        self._match, self._strays, sent = match, 0, 0
         promise: Promise[T | Abort] = Promise()
         self._answered = promise
         begin = self._scheduler.now
         for end in _ends_of_waits(timeout, repeat=repeat):
-            patience = begin + end - self._scheduler.now
-            if patience <= 0.0:  # time went by in one leap
+            left = begin + end - self._scheduler.now
+            if left <= 0.0:  # time went by in one leap
                 continue
             if question is not None:
                 self.send(question)
-            asked += 1
+            sent += 1
             try:
-                answer = await self._scheduler.wait(promise, patience)
+                answer = await self._scheduler.wait(promise, left)
             except TimeoutError:
                 continue
-            self.counters.repeated += asked - 1
-            self._pending_replies = [self.address] * (asked - 1)
+            self.counters.repeated += sent - 1
+            self._pending_replies = [self.address] * (sent - 1)
             return answer
         self._answered = None
-        self._owe(asked)
+        self._await_late_replies(sent)
         self.counters.timed_out += 1
         self._send_abort(AbortCode.TIMED_OUT)
         raise SdoTimeoutError(self._silence(self.address, timeout))
@@ -203,8 +203,8 @@ class SdoChannel:
         except SdoTimeoutError:
             raise SdoTimeoutError(self._silence((index, subindex), timeout)) from None
 
-    def _owe(self, asked: int) -> None:
-        self._pending_replies = [*self._pending_replies, *[self.address] * asked][-PENDING_MAX:]
+    def _await_late_replies(self, sent: int) -> None:
+        self._pending_replies = [*self._pending_replies, *[self.address] * sent][-PENDING_MAX:]
 
     def _abort_of(self, data: bytes) -> Abort | None:
         if len(data) != _FRAME_SIZE or data[0] != _ABORT:

@@ -132,7 +132,7 @@ class SdoClient:
             promise.reject(SdoError(f'{self._name}: {reason}'))
 
     def restarted(self) -> None:
-        """The device has restarted; what is asked from now on is answered anew."""
+        """The device has restarted; requests from now on are answered anew."""
         self._channel.restarted()
 
     def receive(self, frame: Frame) -> None:
@@ -163,7 +163,7 @@ class SdoClient:
                 # a task of its own, so that it can be ended wherever it waits
                 self._running = self._scheduler.spawn(transfer())
                 result = await self._running
-            except Exception as error:  # noqa: BLE001  # belongs to whoever asked
+            except Exception as error:  # noqa: BLE001  # belongs to the caller
                 promise.reject(error)
             else:
                 self.counters.done += 1

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What an RPDO carries before the device was asked, or of an object that cannot be read."""
+"""What an RPDO carries before the device was read, or of an object that cannot be read."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ..standard.pdo import MappedObject, Number, PdoCodec
 
 
 def start_value(config: NodeConfig, mapped: MappedObject) -> Number:
-    """Return the value that the files say an object has when the device is booted.
+    """Return the value that an object has by the files when the device is booted.
 
     An object that nobody commands (a torque limit, a profile velocity, digital outputs) must keep
     what bus.yml wrote or else what its EDS has as default.
@@ -20,7 +20,7 @@ def start_value(config: NodeConfig, mapped: MappedObject) -> Number:
         mapped: The object in one of its RPDOs.
 
     Returns:
-        The value; 0 when neither tells one that fits the object.
+        The value; 0 when neither has one that fits the object.
     """
     value = config.value_after_boot(mapped.index, mapped.subindex, mapped.data_type)
     if isinstance(value, (int, float)):

@@ -95,7 +95,7 @@ class Startup:
 
     def _release(self) -> None:
         self.complete = True
-        # one frame starts who is there: a device that is still being configured must not hear it
+        # one frame starts who is there: a device that is still being configured must not get it
         together = self._config.start_all_nodes and len(self._waiting) == len(self._nodes)
         waiting, self._waiting = self._waiting, {}
 

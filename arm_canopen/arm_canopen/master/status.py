@@ -51,7 +51,7 @@ def node_status(node: RemoteNode, now: float) -> NodeStatus:
         node: The device.
         now: Steady time in [s].
     """
-    heard = node.config.heartbeat_timeout > 0 and node.life.last > 0
+    seen = node.config.heartbeat_timeout > 0 and node.life.last > 0
     return NodeStatus(
         name=node.name,
         node_id=node.config.node_id,
@@ -59,7 +59,7 @@ def node_status(node: RemoteNode, now: float) -> NodeStatus:
         nmt_state=node.nmt_state,
         phase=node.phase,
         phase_detail=node.phase_detail,
-        heartbeat_age=now - node.life.last if heard else None,
+        heartbeat_age=now - node.life.last if seen else None,
         emergency=node.emergencies.last,
         emergencies=tuple(
             f'{now - time:.1f} s ago {emergency}'

@@ -47,7 +47,7 @@ async def read_outputs(node: RemoteNode, timeout: float) -> None:
 
     What its driver commands is left to the driver, except for the mode of operation, as the drive
     may be one that must not be sent mode 0, and for the position targets: they are where the drive
-    is, before any TPDO says so. What cannot be read is taken from bus.yml or the EDS.
+    is, before any TPDO shows it. What cannot be read is taken from bus.yml or the EDS.
 
     Args:
         node: The device.
@@ -75,7 +75,7 @@ def _is_readable(node: RemoteNode, mapped: MappedObject) -> bool:
 
 
 def _source(node: RemoteNode, mapped: MappedObject) -> MappedObject | None:
-    """Return the object with the value that an RPDO starts with; None where the driver says it."""
+    """Return the object with the first value of an RPDO; None where the driver has it."""
     index = mapped.index
     axis = (index - AXES_START) // AXIS_OFFSET * AXIS_OFFSET
     first_axis = index - axis

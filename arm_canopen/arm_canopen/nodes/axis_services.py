@@ -87,7 +87,7 @@ class AxisServices:
         self._offer(name, lambda: self._commands.select_mode(mode))
 
     def _set_target(self, request: COTargetDouble.Request) -> Future[str]:
-        return self._give(lambda: self._commands.set_target(request.target))
+        return self._deliver(lambda: self._commands.set_target(request.target))
 
     def _answer_target(self, response: COTargetDouble.Response, future: Future[str]) -> None:
         error = future.exception()
@@ -102,7 +102,7 @@ class AxisServices:
             immediate=not request.queue,
             blend=request.blend,
         )
-        return self._give(lambda: self._commands.move(move))
+        return self._deliver(lambda: self._commands.move(move))
 
     def _answer_move(self, response: MoveService.Response, future: Future[str]) -> None:
         error = future.exception()
@@ -115,7 +115,7 @@ class AxisServices:
         )
 
     def _note_refusal(self, future: Future[None]) -> None:
-        """Say why a stream is refused, once until the reason changes."""
+        """Log why a stream is refused, once until the reason changes."""
         error = future.exception()
         reason = '' if error is None else str(error)
         if reason and reason != self._refusal:
@@ -124,10 +124,10 @@ class AxisServices:
             )
         self._refusal = reason
 
-    def _give(self, command: Callable[[], str]) -> Future[str]:
+    def _deliver(self, command: Callable[[], str]) -> Future[str]:
         def run() -> Promise[str]:
             self._node.admit()
-            return self._commands.give(command)
+            return self._commands.deliver(command)
 
         return self._thread.run(run)
 

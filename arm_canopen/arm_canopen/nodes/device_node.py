@@ -36,7 +36,7 @@ NMT_STATE_WORDS: dict[NmtState, str] = {
     NmtState.OPERATIONAL: 'START',
     NmtState.STOPPED: 'STOP',
 }
-"""What ~/nmt_state says, in ros2_canopen's words; ERROR stands for a device that was lost."""
+"""The states of ~/nmt_state, in ros2_canopen's words; ERROR stands for a device that was lost."""
 
 NMT_SERVICES: dict[str, NmtCommand] = {
     'nmt_start_node': NmtCommand.START,

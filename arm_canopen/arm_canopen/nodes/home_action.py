@@ -43,7 +43,7 @@ class HomeAction:
     """The action ``~/home`` of one axis.
 
     rclpy runs a goal in a callback or coroutine, which would keep the executor from everything
-    else; here the goal is told its end when the sequence in the thread of the network has ended.
+    else; here the goal ends when the sequence in the thread of the network has ended.
     """
 
     def __init__(

@@ -25,7 +25,7 @@ BOOT_ATTEMPTS = 3  # boot time-outs that an activation waits, as ros2_canopen do
 class ManagedBus:
     """The lifecycle of a master and its devices.
 
-    A device that is not active obeys nothing. Deactivating a drive stops and disables it.
+    A device that is not active takes no commands. Deactivating a drive stops and disables it.
 
     Attributes:
         manager: The node ``lifecycle_manager``, in the namespace of the master.

@@ -73,7 +73,7 @@ def run_master(
         args: Command line; None for the process's own.
         extend: Called with the process of each bus before it starts; returns further nodes for
             the executor, which may attach motion sources.
-        errors: What it may raise then, to be told in one line.
+        errors: What it may raise then, to be logged in one line.
 
     Returns:
         Exit code: 0, or 1 when the bus could not be configured or opened, or has a master.
@@ -102,7 +102,7 @@ class Parameters:
         bus_configs: Paths of the bus.yml files, one for each bus.
         can_names: Names of the CAN interfaces, in the same order.
         diagnostics_period: Time between two /diagnostics messages in [s].
-        thread_priority: SCHED_FIFO priority of the thread of the cycle; 0 asks for none.
+        thread_priority: SCHED_FIFO priority of the thread of the cycle; 0 for none.
         beside_master: Start although another master is heard on the bus.
         robot_joint_states: Publish the joints of all drives as ``joint_states``.
         robot_description: URDF as XML text; empty to take it from the topic.
@@ -180,7 +180,7 @@ def _serve(
 
 
 def _stop(processes: Sequence[MasterProcess], others: Sequence[Node]) -> None:
-    """Stop the drives; meanwhile the other nodes tell their clients how what they do ends."""
+    """Stop the drives; meanwhile the other nodes end the goals and requests of their clients."""
     stopped = threading.Event()
 
     def stop() -> None:

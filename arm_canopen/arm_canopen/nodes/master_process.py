@@ -29,7 +29,7 @@ from .managed_bus import ManagedBus
 from .master_node import MasterServices
 from .output_thread import OutputThread
 
-LISTENER_PERIOD = 0.1  # [s] how soon a new subscriber hears something
+LISTENER_PERIOD = 0.1  # [s] in which a new subscriber gets its first message
 LAST_WORD_TIMEOUT = 0.5  # [s] for the last /diagnostics
 
 
@@ -58,7 +58,7 @@ class MasterProcess:
             config: The bus.
             can: The open CAN interface; it stays the caller's to close.
             diagnostics_period: Time between two /diagnostics messages in [s].
-            thread_priority: SCHED_FIFO priority of the thread of the cycle; 0 asks for none.
+            thread_priority: SCHED_FIFO priority of the thread of the cycle; 0 for none.
             beside_master: Start although another master is heard, and command no device of its.
         """
         self.bus = config
@@ -83,7 +83,7 @@ class MasterProcess:
         services = MasterServices(node, self._thread, self._output)
         services.check_owner = self._check_owner
         self._diagnostics = node.create_publisher(DiagnosticArray, 'diagnostics', 10)
-        node.create_timer(diagnostics_period, self._ask_diagnostics)
+        node.create_timer(diagnostics_period, self._request_diagnostics)
         node.create_timer(LISTENER_PERIOD, self._update_listeners)
         self.nodes: list[Node] = [node, *self._devices.values()]
         if config.master.is_lifecycle:
@@ -97,11 +97,11 @@ class MasterProcess:
         """Listen for another master before the first word; call it right before :meth:`start`.
 
         Raises:
-            OtherMasterError: There is one, and nobody said to go on beside it.
+            OtherMasterError: There is one, and beside_master is not set.
         """
         if heard := self._master.listen():
             self._node.get_logger().warning(
-                f'going on beside another master, as beside_master says: {heard}'
+                f'going on beside another master, by beside_master: {heard}'
             )
 
     def start(self) -> None:
@@ -119,7 +119,7 @@ class MasterProcess:
         except CanopenError as error:
             self._node.get_logger().error(str(error))
         finally:
-            last = self._ask_diagnostics()  # in which states the drives are left
+            last = self._request_diagnostics()  # in which states the drives are left
             wait([last], LAST_WORD_TIMEOUT)
             self._thread.stop()
             self._output.stop()
@@ -159,7 +159,7 @@ class MasterProcess:
                 node.check_owner(index)
 
     def _report(self, event: Event) -> None:
-        self._output.post_stream((event.kind, event.node), partial(self._tell, event))
+        self._output.post_stream((event.kind, event.node), partial(self._log_event, event))
 
     def _collect(self) -> list[DiagnosticStatus]:
         now = time.monotonic()
@@ -188,10 +188,10 @@ class MasterProcess:
             statuses += [drive_diagnostic(self._master.can.name, drive) for drive in drives]
         return statuses
 
-    def _tell(self, event: Event) -> None:
+    def _log_event(self, event: Event) -> None:
         logger = self._node.get_logger()
         if event.severity is Severity.INFO and event.kind is EventKind.NMT_STATE:
-            logger.debug(str(event))  # ~/nmt_state says it
+            logger.debug(str(event))  # ~/nmt_state has it
         elif event.severity is Severity.INFO:
             logger.info(str(event))
         elif event.severity is Severity.WARNING:
@@ -206,7 +206,7 @@ class MasterProcess:
         self._node.get_logger().info(f'all {len(self.bus.nodes)} devices operational')
         notify_ready()
 
-    def _ask_diagnostics(self) -> Future[list[DiagnosticStatus]]:
+    def _request_diagnostics(self) -> Future[list[DiagnosticStatus]]:
         future = self._thread.call(self._collect)
         future.add_done_callback(self._post_diagnostics)
         return future

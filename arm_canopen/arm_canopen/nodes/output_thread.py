@@ -96,9 +96,9 @@ class OutputThread:
 
     def _run(self) -> None:
         while (work := self._queue.get()) is not None:
-            self._guarded(work)
+            self._run_one(work)
 
-    def _guarded(self, work: Callable[[], None]) -> None:
+    def _run_one(self, work: Callable[[], None]) -> None:
         try:
             work()
         except Exception as error:  # noqa: BLE001  # one bad message must not end all others

@@ -12,7 +12,7 @@ NODE_ID_MAX = 127
 COB_ID_INVALID = 0x8000_0000  # bit 31 of a COB-ID object: the service does not exist
 COB_ID_EXTENDED = 0x2000_0000  # bit 29: 29-bit identifier
 SYNC_PRODUCER = 0x4000_0000  # bit 30 of 0x1005: the device generates SYNC
-RTR_FORBIDDEN = 0x4000_0000  # bit 30 of a TPDO's COB-ID: it cannot be asked for
+RTR_FORBIDDEN = 0x4000_0000  # bit 30 of a TPDO's COB-ID: no remote frame may request it
 CAN_ID_MASK = 0x7FF  # 11-bit identifier
 
 

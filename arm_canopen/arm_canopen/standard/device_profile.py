@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Which device profile a device follows: objects from 0x6000 on mean what that profile says."""
+"""Which device profile a device follows: objects from 0x6000 on are those of that profile."""
 
 from __future__ import annotations
 

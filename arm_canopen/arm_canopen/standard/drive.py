@@ -138,7 +138,7 @@ STATUS_TEXTS: tuple[tuple[Statusword, str], ...] = (
     (Statusword.TARGET_REACHED, 'target reached'),
     (Statusword.INTERNAL_LIMIT, 'internal limit active'),
 )
-"""Bits that say something beside the state, in the order of the word."""
+"""Bits beside the state, in the order of the word."""
 
 
 def statusword_text(statusword: int) -> str:

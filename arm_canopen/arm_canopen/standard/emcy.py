@@ -167,7 +167,7 @@ class Emergency:
     """An EMCY message.
 
     Attributes:
-        code: Emergency error code; 0x00xx says that an error went away.
+        code: Emergency error code; 0x00xx reports the end of an error.
         register: Error register 0x1001.
         vendor: Five manufacturer-specific bytes.
     """
@@ -178,7 +178,7 @@ class Emergency:
 
     @property
     def is_reset(self) -> bool:
-        """The message says that the error is gone (CiA 301, 7.2.7.1)."""
+        """The message reports that the error is gone (CiA 301, 7.2.7.1)."""
         return self.code >> 8 == 0
 
     def encode(self) -> bytes:

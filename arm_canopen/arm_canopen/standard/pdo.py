@@ -92,7 +92,7 @@ class PdoCodec:
 
         Raises:
             CodecError: The payload is shorter than the mapping; longer ones are read from their
-                start, as CiA 301, 7.2.2.5 asks.
+                start, as CiA 301, 7.2.2.5 requires.
         """
         if len(data) < self.size:
             raise CodecError(f'PDO of {len(data)} bytes is shorter than its mapping ({self.size})')

@@ -26,7 +26,7 @@ class DownloadRequest:
         index: Object index.
         subindex: Sub-index.
         data: The whole value of an expedited transfer, else None.
-        size: Length of the value in [byte] if the frame tells it; without it the server takes
+        size: Length of the value in [byte] if the frame has it; without it the server takes
             from expedited data as many bytes as its object has.
     """
 
@@ -52,7 +52,7 @@ class UploadResponse:
         index: Object index.
         subindex: Sub-index.
         data: The whole value of an expedited transfer, else None.
-        size: Length of the value in [byte] if the frame tells it.
+        size: Length of the value in [byte] if the frame has it.
     """
 
     index: int
@@ -162,8 +162,8 @@ def _encode_initiate(
     unused = EXPEDITED_MAX - len(data)
     if not 0 <= unused < EXPEDITED_MAX:
         raise CodecError(f'an expedited transfer carries 1 to 4 bytes, got {len(data)}')
-    told = unused << 2 | 0x01 if indicated else 0
-    return struct.pack('<BHB', specifier | 0x02 | told, index, subindex) + data + bytes(unused)
+    length = unused << 2 | 0x01 if indicated else 0
+    return struct.pack('<BHB', specifier | 0x02 | length, index, subindex) + data + bytes(unused)
 
 
 def _decode_initiate(data: bytes) -> tuple[int, int, bytes | None, int | None]:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""SDO abort codes and what they say (CiA 301, table 22)."""
+"""SDO abort codes and their texts (CiA 301, table 22)."""
 
 from __future__ import annotations
 

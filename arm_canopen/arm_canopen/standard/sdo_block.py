@@ -11,7 +11,7 @@ SEGMENT_BYTES = 7  # [byte] payload of a segment
 BLOCK_SEGMENTS_MAX = 127  # a sequence number has 7 bits
 LAST = 0x80  # bit of a segment: no further ones follow
 CRC_BIT = 0x04  # of both initiations: checksums are supported
-SIZE_BIT = 0x02  # of both initiations: the length is told
+SIZE_BIT = 0x02  # of both initiations: the length is given
 
 CLIENT_UPLOAD, CLIENT_DOWNLOAD = 5, 6  # client command specifiers
 DOWNLOAD_INITIATE, DOWNLOAD_END = 0xC0, 0xC1

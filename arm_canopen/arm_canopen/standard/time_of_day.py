@@ -29,7 +29,7 @@ def encode_time_of_day(moment: datetime) -> bytes:
 
 
 def decode_time_of_day(data: bytes) -> datetime:
-    """Return the moment in 6 bytes; the network says which time zone it means, UTC by default.
+    """Return the moment in 6 bytes; the time zone is that of the network, UTC by default.
 
     Raises:
         CodecError: It has not 6 bytes.

@@ -142,7 +142,7 @@ def test_a_move_that_was_answered_as_failed_does_not_follow_later() -> None:
     commands = net.commands[JOINT]
     for turn in (3.0, 6.0, 9.0):
         commands.move(Move(turn, immediate=False))
-    failed = commands.give(lambda: commands.move(Move(0.5, relative=True)))
+    failed = commands.deliver(lambda: commands.move(Move(0.5, relative=True)))
     commands.move(Move(0.5, relative=True, immediate=False))
     with pytest.raises(DriveError, match='withdrawn'):
         net.result(failed)
@@ -213,7 +213,7 @@ def test_a_target_that_is_not_taken_does_not_end_the_halt() -> None:
     net.wire.alters = deaf
     commands, begin = net.commands[JOINT], motor(net)
     with pytest.raises(DriveError, match='stays halted'):
-        net.result(commands.give(lambda: commands.set_target(0.0)))
+        net.result(commands.deliver(lambda: commands.set_target(0.0)))
     net.run(0.2)
     assert abs(motor(net) - begin) < BRAKING_MAX / 5
     assert_rests(net, 4.0)

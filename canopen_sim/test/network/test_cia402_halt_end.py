@@ -109,7 +109,7 @@ def answer(net: VirtualNetwork, target: float) -> tuple[str, float]:
     begin = motor(net)
     allowed = max(0.0, target - begin)
     commands = net.commands[JOINT]
-    promise = commands.give(lambda: commands.set_target(target))
+    promise = commands.deliver(lambda: commands.set_target(target))
     beyond, last, still = 0.0, math.nan, 0
     for _ in range(round(ANSWER_MAX / PERIOD)):
         net.run(PERIOD)
@@ -161,7 +161,7 @@ def test_a_target_that_is_stopped_before_it_is_taken_is_an_error(verb: str) -> N
     net.do(JOINT, 'halt', preempt=True)
     net.run(0.5)
     commands = net.commands[JOINT]
-    promise = commands.give(lambda: commands.set_target(0.0))
+    promise = commands.deliver(lambda: commands.set_target(0.0))
     net.run(0.1)
     assert not promise.done
     if verb == 'select':
@@ -183,7 +183,7 @@ def test_only_the_first_target_waits_for_an_acknowledge_under_halt() -> None:
         net.run(0.3)
         net.do(JOINT, 'halt', preempt=True)
         begin = net.now
-        net.result(commands.give(partial(commands.set_target, target)))
+        net.result(commands.deliver(partial(commands.set_target, target)))
         waited.append(net.now - begin)
     assert waited[0] > UNDER_HALT_TIME
     assert waited[1] < 10 * PERIOD

@@ -89,7 +89,7 @@ def downloads(net: VirtualNetwork, since: float = 0.0) -> list[int]:
 def give(net: VirtualNetwork, target: float) -> Promise[str]:
     """Command a target as the service ~/target does."""
     commands = net.commands[JOINT]
-    return commands.give(lambda: commands.set_target(target))
+    return commands.deliver(lambda: commands.set_target(target))
 
 
 # ------------------------------------------------------------------ nothing stale acts
@@ -222,8 +222,8 @@ def test_moves_of_which_the_first_is_refused_leave_a_halted_axis_halted_at_once(
     net.do(JOINT, 'halt')
     refuse(net, POSITION)
     commands = net.commands[JOINT]
-    first = commands.give(lambda: commands.move(Move(0.1)))
-    second = commands.give(lambda: commands.move(Move(0.2, immediate=False)))
+    first = commands.deliver(lambda: commands.move(Move(0.1)))
+    second = commands.deliver(lambda: commands.move(Move(0.2, immediate=False)))
     net.run(0.5)
     assert isinstance(first.error, DriveError)
     assert second.done
@@ -501,14 +501,14 @@ class Client:
 
     def act(self) -> None:
         """Do one thing."""
-        often = (self._give, self._stop, self._select)
+        often = (self._deliver, self._stop, self._select)
         seldom = (self._enable, self._leave_behind, self._disturb, self._calm)
         act = self._random.choice((*often, *often, *seldom))
         self.log.append(act.__name__)
         with contextlib.suppress(DriveError):
             act()
 
-    def _give(self) -> None:
+    def _deliver(self) -> None:
         answered = give(self.net, self._random.uniform(-0.3, 0.3))
         self.net.run(self._random.choice((0.0, 0.005, 0.05, 0.3, 1.0)))
         self.commanded |= not answered.done or answered.error is None

@@ -128,7 +128,7 @@ def test_a_device_that_does_not_tell_its_state_is_left_alone() -> None:
     (told,) = network.net.told(Severity.WARNING)
     assert 'boot failed while' in told
     assert 'boot error K: no heartbeat' in told
-    assert 'does not tell its NMT state' in told
+    assert 'does not send its NMT state' in told
 
 
 def test_a_device_that_is_kept_alive_but_does_not_run_is_configured() -> None:

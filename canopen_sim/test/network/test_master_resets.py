@@ -47,7 +47,7 @@ def test_a_commanded_reset_is_no_error(
         net.send_as('tool', Frame(0x000, nmt_frame(command, NODE_ID)))
     back(net)
     assert [text for text in net.told(Severity.WARNING) if 'EMCY' not in text] == []
-    assert f'a: restarts, as the NMT command {command.name} told it' in net.told()
+    assert f'a: restarts, by the NMT command {command.name}' in net.told()
     assert 'a: operational' in net.told()
 
 
@@ -60,7 +60,7 @@ def test_a_device_that_restarts_slowly_is_no_error(net: VirtualNetwork) -> None:
     net.power_on(NODE)
     net.run_until(net.all_ready)
     assert net.told(Severity.ERROR) == []
-    assert sum('restarts, as the NMT command' in text for text in net.told()) == 1
+    assert sum('restarts, by the NMT command' in text for text in net.told()) == 1
 
 
 def test_a_reset_that_nobody_commanded_is_an_error(net: VirtualNetwork) -> None:
