@@ -8,7 +8,6 @@ from functools import partial
 import time
 
 from ..config.model import NodeConfig
-from ..exceptions import DriveError
 from ..master.remote_node import RemoteNode
 from ..master.runner import NetworkThread
 from ..master.status import node_status, NodeStatus
@@ -69,11 +68,7 @@ class DeviceSdo:
             BusError: The master has ended.
         """
         entry, device = self._entry(target, subindex), self._device
-        if entry.index in device.config.commanded_indices:
-            raise DriveError(
-                f'0x{entry.index:04X} of {device.name} is written by the master in each cycle; '
-                'use the commands of the drive'
-            )
+        device.objects.check_owner(entry.index)
         data = encode(entry.data_type, value)
         timeout = device.config.sdo_timeout
         self._thread.run(partial(device.sdo.write, *entry.address, data, timeout)).result()

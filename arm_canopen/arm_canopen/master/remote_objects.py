@@ -11,7 +11,7 @@ import math
 from ..can.frame import Frame
 from ..config.model import NodeConfig
 from ..config.tpdo_freshness import PERIODS_MISSED, STALE_AFTER
-from ..exceptions import CodecError, SdoError
+from ..exceptions import CodecError, DriveError, SdoError
 from ..standard.datatypes import decode, encode, Value
 from ..standard.dictionary import ObjectEntry
 from ..standard.objects import is_controlword
@@ -125,6 +125,18 @@ class RemoteObjects:
                 'the data type, reach it all the same'
             )
         return entry
+
+    def check_owner(self, index: int) -> None:
+        """Refuse to write what the driver of this device writes.
+
+        Raises:
+            DriveError: It writes the object itself in each cycle.
+        """
+        if index in self.config.commanded_indices:
+            raise DriveError(
+                f'0x{index:04X} of {self.name} is written by its driver in each cycle; use the '
+                'services or methods of the drive'
+            )
 
     def limits(self, index: int, subindex: int = 0) -> Limits:
         """Return the smallest and largest value that an object holds, by its type in the EDS."""

@@ -143,18 +143,6 @@ class DeviceNode(Node):
         for entry in self.device.image.tpdos:
             entry.listener = listener
 
-    def check_owner(self, index: int) -> None:
-        """Refuse to write what the driver of this device writes.
-
-        Raises:
-            CanopenError: It writes the object itself in each cycle.
-        """
-        if index in self.device.config.commanded_indices:
-            raise CanopenError(
-                f'0x{index:04X} of {self.device.name} is written by its driver in each cycle; '
-                'use the services of the drive'
-            )
-
     def _received(self, entry: ReceivedTpdo) -> None:
         values = entry.values or ()
         self.output.post_stream(entry, partial(self._publish_objects, entry, values))
@@ -176,7 +164,7 @@ class DeviceNode(Node):
             self.get_logger().warning(f'~/tpdo: {place} is in no RPDO of the device; map it')
             return
         try:
-            self.check_owner(message.index)
+            self.device.objects.check_owner(message.index)
             value = number_from_raw(mapped, message.data)
         except CanopenError as error:
             self.get_logger().warning(f'~/tpdo: {place}: {error}')
@@ -221,7 +209,7 @@ class DeviceNode(Node):
         device, index, subindex = self.device, request.index, request.subindex
 
         def write() -> Promise[None]:
-            self.check_owner(index)
+            device.objects.check_owner(index)
             data = bytes_from_raw(device.objects.entry(index, subindex).data_type, request.data)
             return device.sdo.write(index, subindex, data, device.config.sdo_timeout)
 

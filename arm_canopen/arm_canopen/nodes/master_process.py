@@ -154,9 +154,9 @@ class MasterProcess:
         return self._master.detach(source)
 
     def _check_owner(self, node_id: int, index: int) -> None:
-        for node in self._devices.values():
-            if node.device.config.node_id == node_id:
-                node.check_owner(index)
+        for device in self._network.nodes.values():
+            if device.config.node_id == node_id:
+                device.objects.check_owner(index)
 
     def _report(self, event: Event) -> None:
         self._output.post_stream((event.kind, event.node), partial(self._log_event, event))

@@ -30,9 +30,6 @@ class ServiceOwner(Protocol):
 
     device: RemoteNode
 
-    def check_owner(self, index: int) -> None:
-        """Refuse to write what the driver of this device writes."""
-
     def offer(
         self,
         service_type: Any,  # noqa: ANN401  # service classes have no type
@@ -86,7 +83,7 @@ class ObjectServices:
 
         async def write() -> Transfer:
             entry = find_object(device.config.dictionary, path)
-            self._node.check_owner(entry.index)
+            device.objects.check_owner(entry.index)
             data = bytes(request.data) or bytes_from_text(entry.data_type, request.value)
             text_from_bytes(entry.data_type, data)  # refuses raw bytes that are no such value
             await device.sdo.write(*entry.address, data, device.config.sdo_timeout)
