@@ -61,9 +61,11 @@ def start_pose(model: RobotModel) -> Array:
     qualities = [pose_quality(model, pose) for pose in named]
     if named and max(qualities) >= MIN_QUALITY:
         return named[int(np.argmax(qualities))]
-    tried = list(_samples(model))
-    best = max(tried, key=lambda pose: pose_quality(model, pose))
-    if not pose_quality(model, best) > 0.0:
+    best, quality = None, 0.0
+    for pose in _samples(model):
+        found = pose_quality(model, pose, quality)
+        best, quality = (pose, found) if found > quality else (best, quality)
+    if best is None:
         raise ModelError(
             f'group {model.group}: none of {SAMPLES} poses is free and not singular; give the SRDF'
             f' a group_state {PREFERRED!r}, and check collision shapes and limits'
@@ -71,19 +73,20 @@ def start_pose(model: RobotModel) -> Array:
     return frozen(best)
 
 
-def pose_quality(model: RobotModel, positions: Array) -> float:
+def pose_quality(model: RobotModel, positions: Array, least: float = 0.0) -> float:
     """Return how good a pose is to start from: 0 for a singular, colliding or extreme one.
 
     Args:
         model: The arm.
         positions: Joint positions in [rad].
+        least: Quality of interest: where it cannot be more, distances are not measured.
     """
     quality = _room(model, positions) * _dexterity(model, positions)
-    if not quality:
+    quality *= BELOW if model.lowest(positions) < 0.0 else 1.0
+    if quality <= least:
         return 0.0
     clearance = max(model.clearance(positions, GOOD_CLEARANCE), 0.0)
-    quality *= min(clearance / GOOD_CLEARANCE, 1.0)
-    return quality * (BELOW if model.lowest(positions) < 0.0 else 1.0)
+    return quality * min(clearance / GOOD_CLEARANCE, 1.0)
 
 
 def _dexterity(model: RobotModel, positions: Array) -> float:

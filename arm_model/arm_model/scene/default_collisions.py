@@ -29,6 +29,9 @@ SEED = 0
 
 HALF_TURN = np.pi
 
+MAX_NAMED = 12
+"""Pairs that one note names."""
+
 
 def with_default_collisions(
     scene: PlanningScene, tree: KinematicTree, limits: JointLimits, notes: list[str]
@@ -104,4 +107,6 @@ def always_in_contact(scene: PlanningScene, limits: JointLimits) -> frozenset[Pa
 
 
 def _words(pairs: list[list[str]]) -> str:
-    return ', '.join(f'{first} and {second}' for first, second in pairs)
+    shown = ', '.join(f'{first} and {second}' for first, second in pairs[:MAX_NAMED])
+    more = len(pairs) - MAX_NAMED
+    return f'{shown} and {more} pairs more' if more > 0 else shown

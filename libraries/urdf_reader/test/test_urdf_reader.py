@@ -94,3 +94,9 @@ def test_a_link_with_two_parents_and_a_mimic_of_a_mimic_of_itself_are_refused() 
     other = JOINT.format('revolute', 'a', 'c', '<mimic joint="j"/>').replace('"j" ', '"k" ')
     with pytest.raises(DescriptionError, match='mimics itself by way of'):
         read_urdf(f'<robot name="r">{links}{first}{other}</robot>')
+
+
+def test_a_fixed_joint_follows_nothing() -> None:
+    """Grippers are fixed by the type of their joints, and keep their <mimic>."""
+    (joint,) = read_urdf(two_links('fixed', inner='<mimic joint="elsewhere"/>')).joints
+    assert joint.mimic is None

@@ -303,7 +303,8 @@ def _joint(element: ET.Element) -> Joint:
     axis = _axis(element, name) if kind in MOVABLE else (1.0, 0.0, 0.0)
     origin, limit = _origin(element, f'joint {name}'), element.find('limit')
     limits = None if limit is None else dict(limit.attrib)
-    return Joint(name, kind, parent, child, origin, axis, _mimic(element, name), limits)
+    mimic = _mimic(element, name) if kind in MOVABLE else None  # some are fixed by a type only
+    return Joint(name, kind, parent, child, origin, axis, mimic, limits)
 
 
 def _link_of(element: ET.Element, end: str, joint: str) -> str:
