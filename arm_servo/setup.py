@@ -45,6 +45,7 @@ setup(
         sibling('arm_model'),
         sibling('arm_trajectory'),
         sibling('libraries/realtime_loop'),
+        sibling('libraries/urdf_reader'),
     ],
     extras_require={
         'ros': [sibling('libraries/node_runner'), sibling('libraries/operator_input')]

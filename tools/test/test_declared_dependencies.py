@@ -70,7 +70,10 @@ def test_what_is_imported_is_declared(name: str, monkeypatch: pytest.MonkeyPatch
     """Nothing is missing after `pip install`, and nothing is installed for no use."""
     used = {each for each in imported(PACKAGES[name].folder / name) if each != name}
     needed = {DISTRIBUTIONS.get(each, each) for each in used & {*ON_PYPI, *PACKAGES}}
-    assert {*declared(name, monkeypatch)} - PHYSICS == needed | STARTED.get(name, set())
+    needed |= STARTED.get(name, set())
+    found = {*declared(name, monkeypatch)} - PHYSICS
+    assert not needed - found, f'add to install_requires or extras_require of {name}/setup.py'
+    assert not found - needed, f'{name} imports none of these: remove them from its setup.py'
 
 
 @pytest.mark.parametrize('name', PACKAGES)
@@ -79,7 +82,8 @@ def test_packages_of_the_checkout_are_declared_for_colcon(
 ) -> None:
     """What setup.py names of them package.xml names, too, but for what is optional."""
     siblings = {*declared(name, monkeypatch)} & PACKAGES.keys()
-    assert siblings - PACKAGES[name].dependencies == OPTIONAL.get(name, set())
+    missing = siblings - PACKAGES[name].dependencies - OPTIONAL.get(name, set())
+    assert not missing, f'add an exec_depend to {name}/package.xml'
 
 
 @pytest.mark.parametrize('name', PACKAGES)
