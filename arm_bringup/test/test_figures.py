@@ -10,11 +10,13 @@ import math
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
+from urdf_reader import JointRange
 
 from arm_bringup.demos.figures import AxisFigures, BusFigures, DriveFigures, Figures
 from arm_bringup.demos.report import problems, progress_line, summary_lines, warnings
 
 JOINTS = ['joint1', 'joint2']
+RANGES = {name: JointRange(name, -2.0, 2.0, 1.0) for name in JOINTS}
 
 
 @dataclass
@@ -115,20 +117,20 @@ texts = st.dictionaries(
 def test_no_text_in_a_status_is_an_error(name: str, values: dict[str, str]) -> None:
     """What is missing or is no number is shown as unknown."""
     figures = Figures().updated([status(name, **values)])
-    lines = [progress_line(figures, JOINTS), *summary_lines(figures, JOINTS, 1.0)]
+    lines = [progress_line(figures, RANGES), *summary_lines(figures, RANGES, 1.0)]
     assert not any(word in line for line in lines for word in ('nan', 'inf'))
-    assert problems(figures, JOINTS)
+    assert problems(figures, RANGES)
 
 
 def test_a_good_demo_has_no_problems_and_a_summary_of_each_joint() -> None:
     """The summary names frames, losses, jitter, and range and path error of each joint."""
-    assert problems(GOOD, JOINTS) == []
+    assert problems(GOOD, RANGES) == []
     assert warnings(GOOD) == []
-    text = '\n'.join(summary_lines(GOOD, JOINTS, 12.0))
+    text = '\n'.join(summary_lines(GOOD, RANGES, 12.0))
     for words in ('2/2 joints enabled', '2912 frames/s', 'lost 0', '0.14/1.22 ms', '12.0 s'):
         assert words in text
     row = next(line for line in text.splitlines() if line.startswith('joint2')).split()
-    assert row == ['joint2', '-0.450', '0.450', '0.900', '12.00', '4.00']
+    assert row == ['joint2', '-0.450', '0.450', '0.900', 'rad', '12.00', 'mrad', '4.00']
 
 
 @pytest.mark.parametrize(
@@ -149,21 +151,41 @@ def test_a_joint_that_did_not_do_it_is_named(
     """Only that one, with the reason."""
     drives = GOOD.drives if drive is None else {**GOOD.drives, 'joint2': drive}
     figures = replace(GOOD, drives=drives, axes={**GOOD.axes, 'joint2': axis})
-    (problem,) = problems(figures, JOINTS)
+    (problem,) = problems(figures, RANGES)
     assert problem.startswith('joint2')
     assert words in problem
 
 
+@pytest.mark.parametrize(
+    ('limits', 'moved', 'error', 'words'),
+    [
+        (JointRange('joint2', 0.0, 0.04, 0.1, 'm'), 0.02, 0.001, ''),
+        (JointRange('joint2', 0.0, 0.04, 0.1, 'm'), 0.001, 0.0, 'did not move: 0.001 m, less'),
+        (JointRange('joint2', 0.0, 0.04, 0.1, 'm'), 0.02, 0.01, '0.010 m away from its path'),
+        (JointRange('joint2', 0.0, 0.35, 0.02, 'm'), 0.005, 0.001, ''),
+        (JointRange('joint2', -math.inf, math.inf, 0.0), 0.05, 0.0, 'did not move: 0.050 rad'),
+    ],
+    ids=['gripper', 'stuck gripper', 'astray gripper', 'slow lift', 'endless'],
+)
+def test_a_joint_is_judged_in_its_own_unit_and_range(
+    limits: JointRange, moved: float, error: float, words: str
+) -> None:
+    """A gripper has done it with 20 of its 40 mm, which is little for an arm."""
+    axes = {**GOOD.axes, 'joint2': AxisFigures(True, 0.0, moved, error, error)}
+    found = problems(replace(GOOD, axes=axes), {**RANGES, 'joint2': limits})
+    assert [words in text for text in found] == [True] * bool(words)
+
+
 def test_a_joint_never_heard_of_is_a_problem() -> None:
     """An empty /diagnostics is no success."""
-    assert [text.split()[0] for text in problems(Figures(), JOINTS)] == JOINTS
+    assert [text.split()[0] for text in problems(Figures(), RANGES)] == JOINTS
 
 
 def test_lost_frames_are_a_warning() -> None:
     """They are a matter of the host, not of the arm."""
     lost = replace(GOOD, bus=replace(GOOD.bus, lost=12))
     assert '12 frames were lost' in warnings(lost)[0]
-    assert problems(lost, JOINTS) == []
+    assert problems(lost, RANGES) == []
 
 
 def test_late_answers_are_a_warning_and_judge_no_path() -> None:
@@ -171,5 +193,5 @@ def test_late_answers_are_a_warning_and_judge_no_path() -> None:
     axes = {name: replace(axis, error_max=0.5) for name, axis in GOOD.axes.items()}
     late = replace(GOOD, axes=axes, bus=replace(GOOD.bus, missed_pdos=7))
     assert '7 PDOs of drives missed their cycle' in warnings(late)[0]
-    assert problems(late, JOINTS) == []
-    assert problems(replace(GOOD, axes=axes), JOINTS)
+    assert problems(late, RANGES) == []
+    assert problems(replace(GOOD, axes=axes), RANGES)

@@ -10,12 +10,14 @@ import time
 
 from demo_doubles import FakeDisplay, FakeSupervisor
 import pytest
+from urdf_reader import JointRange
 
 from arm_bringup.demos.figures import AxisFigures, DriveFigures, Figures
 from arm_bringup.demos.wave.scenario import WaveScenario
 from process_supervisor import CallError, GivenUpError, Outcome, Phase
 
 JOINTS = ['joint1', 'joint2']
+RANGES = {name: JointRange(name, -2.0, 2.0, 1.0) for name in JOINTS}
 DRIVE = DriveFigures(online=True, state='Operation enabled')
 MOVED = AxisFigures(True, -0.4, 0.4, 0.01, 0.005)
 GOOD = Figures(dict.fromkeys(JOINTS, DRIVE), axes=dict.fromkeys(JOINTS, MOVED), wave='running')
@@ -77,7 +79,7 @@ def run(scenario: WaveScenario, supervisor: FakeSupervisor, client: Client) -> N
 def test_all_joints_are_enabled_before_the_wave_and_the_wave_stops_before_the_processes() -> None:
     """Services of all joints are called side by side; at the end the supervisor stops."""
     display, supervisor, client = FakeDisplay(), FakeSupervisor(), Client()
-    scenario = WaveScenario(display, JOINTS, 'cyclic_position_mode', duration=0.01)
+    scenario = WaveScenario(display, RANGES, 'cyclic_position_mode', duration=0.01)
     run(scenario, supervisor, client)
     assert client.called == [
         'joint1/init',
@@ -100,7 +102,7 @@ def test_all_joints_are_enabled_before_the_wave_and_the_wave_stops_before_the_pr
 def test_a_drive_that_refuses_ends_the_demo_with_its_reason() -> None:
     """No wave is started, and there is no summary of one."""
     supervisor, client = FakeSupervisor(), Client(refuses='joint2/init')
-    scenario = WaveScenario(FakeDisplay(), JOINTS, 'cyclic_position_mode', duration=1.0)
+    scenario = WaveScenario(FakeDisplay(), RANGES, 'cyclic_position_mode', duration=1.0)
     run(scenario, supervisor, client)
     assert supervisor.outcome == Outcome(1, 'joint2/init: fault')
     assert 'wave/start' not in client.called
@@ -117,7 +119,7 @@ def test_ctrl_c_stops_the_wave_first() -> None:
             answers.append(scenario.leave())
 
     supervisor, client = FakeSupervisor(), Client(when=when)
-    scenario = WaveScenario(FakeDisplay(), JOINTS, 'cyclic_position_mode', duration=None)
+    scenario = WaveScenario(FakeDisplay(), RANGES, 'cyclic_position_mode', duration=None)
     run(scenario, supervisor, client)
     assert answers == [False, True]
     assert client.called[-1] == 'wave/stop'
@@ -134,7 +136,7 @@ def test_a_supervisor_that_stops_ends_the_demo(what: str) -> None:
 
     supervisor, client = FakeSupervisor(Phase.RUNNING), Client(when=when)
     run(
-        WaveScenario(FakeDisplay(), JOINTS, 'cyclic_position_mode', duration=None),
+        WaveScenario(FakeDisplay(), RANGES, 'cyclic_position_mode', duration=None),
         supervisor,
         client,
     )
@@ -152,7 +154,7 @@ def test_a_defect_in_the_demo_stops_the_processes(defect: type[BaseException]) -
     supervisor, client = FakeSupervisor(), Client(when=when)
     with pytest.raises(defect):
         run(
-            WaveScenario(FakeDisplay(), JOINTS, 'cyclic_position_mode', duration=1.0),
+            WaveScenario(FakeDisplay(), RANGES, 'cyclic_position_mode', duration=1.0),
             supervisor,
             client,
         )

@@ -83,7 +83,7 @@ class ArmView:
         Args:
             figures: The latest.
         """
-        return progress_line(figures, list(self.limits))
+        return progress_line(figures, self.limits)
 
     def render(
         self, figures: Figures, status: DemoStatus, width: int, height: int

@@ -61,12 +61,14 @@ class JointRange:
         lower: Least position in [rad]; minus infinity for a continuous joint.
         upper: Greatest position in [rad]; infinity for a continuous joint.
         velocity: Greatest speed in [rad/s]; 0 where the description gives none.
+        unit: Unit of its positions, rad or m.
     """
 
     name: str
     lower: float
     upper: float
     velocity: float
+    unit: str = 'rad'
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,7 +121,8 @@ class Joint:
             lower, upper = (float(self.limit.get(key, 0)) for key in ('lower', 'upper'))
         except (KeyError, ValueError) as error:
             raise DescriptionError(f'joint {self.name}: <limit> is not usable: {error}') from error
-        return JointRange(self.name, lower, upper, velocity)
+        unit = 'm' if self.kind is JointKind.PRISMATIC else 'rad'
+        return JointRange(self.name, lower, upper, velocity, unit)
 
 
 @dataclass(frozen=True, slots=True)

@@ -119,7 +119,7 @@ def run(arm: Session, duration: float | None) -> int:
         figures=Figures(),
         commands=commands(arm.drives[0], arm.mode_service, candump, arm.ros),
         make_scenario=lambda display: WaveScenario(
-            display, list(view.limits), arm.mode_service, duration
+            display, view.limits, arm.mode_service, duration
         ),
         make_client=partial(join_ros, arm.ros.namespace),
         endless=duration is None,

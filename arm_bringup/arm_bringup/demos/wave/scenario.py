@@ -4,11 +4,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping
 import itertools
 import math
 import time
 from typing import Protocol
+
+from urdf_reader import JointRange
 
 from demo_runner import DemoClient, DemoResult, DemoScenario, Display
 
@@ -44,7 +46,7 @@ class WaveScenario(DemoScenario[Client]):
     def __init__(
         self,
         display: Display[Figures],
-        joints: Sequence[str],
+        joints: Mapping[str, JointRange],
         mode_service: str,
         duration: float | None,
     ) -> None:
@@ -52,13 +54,13 @@ class WaveScenario(DemoScenario[Client]):
 
         Args:
             display: Where it is shown.
-            joints: Names of the joints with a drive.
+            joints: The joints with a drive.
             mode_service: Service of a drive that selects the mode of the wave.
             duration: How long the wave runs in [s]; None until :meth:`leave`.
         """
         super().__init__(display)
         self._joints = joints
-        self._enabling = enabling_services(joints, mode_service)
+        self._enabling = enabling_services(list(joints), mode_service)
         self._duration = math.inf if duration is None else duration
 
     def _prepare(self, client: Client) -> None:
