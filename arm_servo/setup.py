@@ -11,10 +11,11 @@ from setuptools import find_packages, setup
 FOR_ROS = not {'develop', 'install'}.isdisjoint(sys.argv)
 
 EXECUTABLES = [
-    'motion_controller = arm_servo.ros.motion_controller:main',
-    'motion_master = arm_servo.ros.motion_master:main',
-    'servo_node = arm_servo.ros.servo_node:main',
-    'trajectory_controller = arm_servo.ros.trajectory_program:main',
+    'motion_node = arm_servo.ros.motion_node:main',
+    'motion_controller = arm_servo.ros.motion_node:motion_controller',
+    'motion_master = arm_servo.ros.motion_node:motion_master',
+    'servo_node = arm_servo.ros.motion_node:servo_node',
+    'trajectory_controller = arm_servo.ros.motion_node:trajectory_controller',
     'servo_gamepad = arm_servo.teleop.servo_gamepad:main',
     'servo_keyboard_input = arm_servo.teleop.servo_keyboard_input:main',
 ]

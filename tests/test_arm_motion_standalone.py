@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""servo_node and trajectory_controller on their own, for drives that listen to topics."""
+"""motion_node, by its names, for drives that listen to topics."""
 
 from __future__ import annotations
 
@@ -43,9 +43,9 @@ def test_a_trajectory_goes_out_as_arrays(isolation: Isolation, tmp_path: Path) -
         refused = GoalRun(arm.client, goal_to(READY, 1.0)).wait()[1]
         assert 'inactive' in refused.error_string
         _switch(arm, ['panda_arm_controller'], [])
-        run = GoalRun(arm.client, goal_to(READY, 4.0))
+        run = GoalRun(arm.client, goal_to(READY, 8.0))
         arm.client.spin_until(lambda: len(run.feedback) > 8, 10.0, 'motion')
-        arm.client.node.destroy_timer(arm.speaking)
+        arm.publishes = False
         result = run.wait()[1]
         assert 'no joint states of panda_joint1' in result.error_string
         steps = [abs(b[0] - a[0]) for a, b in pairwise(arm.arrays)]
@@ -80,6 +80,21 @@ def test_a_goal_is_held_on_its_path_and_goes_on(isolation: Isolation, tmp_path: 
         assert arm.at[0] == pytest.approx(0.5, abs=1e-6)
 
 
+def test_one_program_is_chosen_by_its_back_end(isolation: Isolation, tmp_path: Path) -> None:
+    """motion_node jogs and follows trajectories; a second program is an error that it logs."""
+    command = standalone(tmp_path, 'motion_node', 'backend:=topics')
+    with TopicArm(isolation, command, READY_WORDS) as arm:
+        result = GoalRun(arm.client, goal_to([0.3, *READY[1:]], 1.0)).wait()[1]
+        assert result.error_code == RESULT.SUCCESSFUL, result.error_string
+        assert '/servo_node' in _names(arm)
+        assert 'another program' not in arm.process.output
+        assert 'without effect' not in arm.process.output
+        servo = standalone(tmp_path, 'servo_node')
+        with RunningProcess(servo, isolation.env) as other:
+            other.wait_for('is a trajectory controller of arm_servo')
+            arm.process.wait_for('another program has a node /servo_node')
+
+
 def test_a_goal_is_told_that_the_program_ends(isolation: Isolation, tmp_path: Path) -> None:
     """Ctrl-C in the middle of it: the arm comes to rest on the path, the client gets a result."""
     command = standalone(tmp_path, 'trajectory_controller')
@@ -108,6 +123,13 @@ def test_a_goal_that_the_arm_did_not_reach_is_no_success(
         far = GoalRun(arm.client, goal_to([1.0, *READY[1:]], 2.0)).wait()[1]
         assert far.error_code == RESULT.PATH_TOLERANCE_VIOLATED
         assert 'panda_joint1 does not follow' in far.error_string
+
+
+def _names(arm: TopicArm) -> set[str]:
+    return {
+        f'{namespace.rstrip("/")}/{name}'
+        for name, namespace in arm.client.node.get_node_names_and_namespaces()
+    }
 
 
 def _rests(arm: TopicArm) -> bool:
@@ -165,6 +187,8 @@ def test_jogging_goes_out_as_trajectories(isolation: Isolation, tmp_path: Path) 
 @pytest.mark.parametrize(
     ('program', 'arguments', 'words'),
     [
+        ('motion_node', ['backend:=can'], 'choose one of canopen, topics'),
+        ('motion_node', ['bus_config:=nowhere.yml'], 'nowhere.yml'),
         ('servo_node', ['group:=arm'], "'arm'"),
         ('servo_node', ['moveit_servo.scale.linaer:=0.2'], "did you mean 'moveit_servo.scale.lin"),
         ('servo_node', ['moveit_servo.command_out_type:=text'], 'std_msgs/Float64MultiArray'),

@@ -36,7 +36,7 @@ def real_time_threads(pid: int) -> list[int]:
 @pytest.mark.parametrize(
     ('package', 'arguments', 'programs'),
     [
-        ('arm_bringup', ['panda', '--simulate'], ['fake_slaves', 'motion_master']),
+        ('arm_bringup', ['panda', '--simulate'], ['fake_slaves', 'motion_node']),
         ('quad_bringup', ['--simulate'], ['hardware_node', 'controller_node']),
     ],
     ids=['arm', 'quadruped'],

@@ -42,7 +42,7 @@ def libraries(program: str, *arguments: str) -> set[str]:
     [
         ('arm_canopen.nodes.master', FOREIGN | MODEL),
         ('arm_bringup.demos.wave.master', FOREIGN | MODEL),
-        ('arm_servo.ros.motion_master', FOREIGN),
+        ('arm_servo.ros.canopen_backend', FOREIGN),
     ],
 )
 def test_a_master_loads_nothing_that_it_does_not_use(entry: str, unwanted: set[str]) -> None:

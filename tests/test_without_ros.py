@@ -85,6 +85,7 @@ FOR_ROS = [
     'hardware_node',
     'master',
     'motion_master',
+    'motion_node',
     'protocol',
     'robot_state_publisher',
     'servo_node',

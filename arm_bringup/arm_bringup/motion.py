@@ -26,7 +26,7 @@ from .description import read_semantic
 from .exceptions import RobotError
 from .groups import MovedGroups
 from .robots import Robot
-from .stack import MASTER, MOTION_MASTER
+from .stack import MASTER, MOTION_NODE
 
 MAKE_MOVE = 'build arm_servo (make build) for trajectories and jogging'
 
@@ -105,8 +105,8 @@ def choose_master(robot: Robot, find: FindExecutable) -> tuple[Executable, str]:
     Returns:
         The executable, and in words why it offers no motion; empty when it does.
     """
-    if find(MOTION_MASTER.package, MOTION_MASTER.name) is None:
+    if find(MOTION_NODE.package, MOTION_NODE.name) is None:
         return MASTER, MAKE_MOVE
     if robot.lacking:
         return MASTER, f'{robot.name} lacks {robot.lacking} for trajectories and jogging'
-    return MOTION_MASTER, ''
+    return MOTION_NODE, ''

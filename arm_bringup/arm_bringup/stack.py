@@ -23,10 +23,8 @@ from .robots import Robot
 
 MASTER = Executable('arm_canopen', 'master')
 """What runs the bus unless something else is asked for."""
-MOTION_MASTER = Executable('arm_servo', 'motion_master')
-"""The master with the motion core inside: trajectories, jogging and /joint_states."""
-MOTION_CONTROLLER = Executable('arm_servo', 'motion_controller')
-"""Trajectories and jogging for drives that another process has."""
+MOTION_NODE = Executable('arm_servo', 'motion_node')
+"""Trajectories and jogging: with the master in it, or for drives that another process has."""
 
 TF_RATE = '100.0'
 """Greatest rate of /tf in [Hz]; its default of 20 would halve what /joint_states has."""
@@ -99,7 +97,9 @@ def _slaves(stack: Stack, bus: Mapping[str, str], find: FindExecutable) -> Proce
 def _master(
     stack: Stack, bus: Mapping[str, str], parameters: Path, find: FindExecutable
 ) -> ProcessSpec:
-    own = {} if stack.master == MOTION_MASTER else {'robot_joint_states': 'true'}
+    own = {'robot_joint_states': 'true'}
+    if stack.master == MOTION_NODE:
+        own = {'backend': 'canopen'}
     return ProcessSpec(
         name='master',
         argv=node_argv(
@@ -137,7 +137,7 @@ def controller_process(
     """
     return ProcessSpec(
         name='controller',
-        argv=node_argv(MOTION_CONTROLLER, find, {}, (parameters, *files), ros),
+        argv=node_argv(MOTION_NODE, find, {'backend': 'topics'}, (parameters, *files), ros),
         environment=LOG_FORMAT,
         notifies_ready=True,
         ready_timeout=ready_timeout,

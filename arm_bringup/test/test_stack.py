@@ -15,7 +15,7 @@ import yaml
 from arm_bringup.groups import MovedGroups
 from arm_bringup.motion import choose_master, MAKE_MOVE, motion_files
 from arm_bringup.robots import Robot
-from arm_bringup.stack import arm_processes, controller_process, MASTER, MOTION_MASTER, Stack
+from arm_bringup.stack import arm_processes, controller_process, MASTER, MOTION_NODE, Stack
 from node_runner import init_ros
 from process_supervisor import EVERY_NODE, Executable, ProcessSpec, RosOptions, StartError
 
@@ -62,7 +62,7 @@ def processes(folder: Path, stack: Stack, *packages: str) -> dict[str, ProcessSp
 def test_the_master_of_motion_publishes_the_joints(tmp_path: Path) -> None:
     """It gets the files of the robot, later ones counting more, and needs no other publisher."""
     files = (Path('/r/motion.yaml'), Path('/r/controllers.yaml'))
-    stack = Stack(ROBOT, 'can0', simulate=True, master=MOTION_MASTER, master_files=files)
+    stack = Stack(ROBOT, 'can0', simulate=True, master=MOTION_NODE, master_files=files)
     found = processes(tmp_path, stack, 'arm_servo')
     assert set(found) == {'slaves', 'master'}
     argv = found['master'].argv
@@ -75,7 +75,7 @@ def test_what_a_person_says_counts_most(tmp_path: Path, words: tuple[str, str]) 
     """It comes behind all parameters and files of the bring-up."""
     files = (Path('/r/motion.yaml'), Path('/r/controllers.yaml'))
     ros = RosOptions('left', words)
-    stack = Stack(ROBOT, 'can0', True, master=MOTION_MASTER, master_files=files, ros=ros)
+    stack = Stack(ROBOT, 'can0', True, master=MOTION_NODE, master_files=files, ros=ros)
     names = ('arm_canopen', 'arm_bringup', 'arm_servo', 'canopen_sim', 'robot_viewer')
     find = Underlay(tmp_path, *names).find
     specs = [
@@ -123,7 +123,7 @@ def test_master_without_arm_servo(tmp_path: Path) -> None:
     assert 'my lacks my.srdf for' in choose_master(robot, full)[1]
     srdf = '<robot name="my"><group name="arm"/></robot>'
     robot.semantic.write_text(srdf)
-    assert choose_master(robot, full) == (MOTION_MASTER, '')
+    assert choose_master(robot, full) == (MOTION_NODE, '')
     (file,) = motion_files(robot, tmp_path, RosOptions(), MovedGroups(('arm',)))
     values = yaml.safe_load(file.read_text())[EVERY_NODE]['ros__parameters']
     assert (values['robot_description_semantic'], values['group']) == (srdf, 'arm')

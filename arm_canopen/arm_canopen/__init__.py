@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from .library.canopen_drive import CanopenDrive
     from .library.canopen_master import CanopenMaster
     from .library.device import CanopenDevice
-    from .nodes.master import run_master
+    from .nodes.master import run_master, serve_buses
     from .nodes.master_process import MasterProcess
 
 __all__ = [
@@ -45,6 +45,7 @@ __all__ = [
     'load_bus',
     'open_bus',
     'run_master',
+    'serve_buses',
 ]
 
 
@@ -54,6 +55,7 @@ _LATE = {
     'CanopenMaster': '.library.canopen_master',
     'MasterProcess': '.nodes.master_process',
     'run_master': '.nodes.master',
+    'serve_buses': '.nodes.master',
 }
 
 

@@ -12,3 +12,10 @@ class NotReadyError(ArmError):
 
     Scenarios: a command before the first joint state, or after the set-point was dropped.
     """
+
+
+class BackendError(ArmError):
+    """The back end cannot start; the message names the remedy.
+
+    Scenarios: a bus.yml with mistakes, a CAN interface that is not there, a bus with a master.
+    """

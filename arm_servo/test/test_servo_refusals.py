@@ -18,17 +18,18 @@ import rclpy
 from rclpy.node import Node
 
 from arm_model import ArmError
-from arm_servo.ros.motion_master import Motion
+from arm_servo.ros.canopen_backend import CanopenMotion
+from arm_servo.ros.group_motion import Offers
 from arm_servo.teleop.servo_gamepad import ServoGamepad
 from arm_servo.teleop.servo_keyboard_input import ServoKeyboardInput
 from node_runner import ParameterError
 from operator_input import OperatorInputError
 
 
-def motion() -> Motion:
+def motion() -> CanopenMotion:
     """Make the motion nodes on a bus without drives."""
     bus: Any = SimpleNamespace(bus=SimpleNamespace(nodes=[], joints=(), file='bus.yml'))
-    return Motion(bus)
+    return CanopenMotion(bus, Offers())
 
 
 def gamepad() -> Node:

@@ -18,10 +18,10 @@ import yaml
 
 from arm_model import ModelError
 from arm_servo import check_parameters, CoreSettings, MotionCore
-from arm_servo.ros.motion_controller import _build as build_motion_controller
+from arm_servo.ros.group_motion import Offers
 from arm_servo.ros.parameter_sheet import ParameterSheet
 from arm_servo.ros.servo.parameters import declare_servo, ServoParameters
-from arm_servo.ros.servo_node import _build as build_servo_node
+from arm_servo.ros.topics_backend import build_motion
 from arm_servo.ros.upstream_parameters import check_names
 
 JOINTS = list(robot('panda').joints)
@@ -263,9 +263,9 @@ def test_upstream_parameters_are_accepted(nodes: dict[str, dict[str, Any]]) -> N
     assert check_parameters(robot('panda'), document(**nodes)) == []
 
 
-@pytest.mark.parametrize('build', [build_servo_node, build_motion_controller])
+@pytest.mark.parametrize('offers', [Offers(trajectories=False), Offers()])
 def test_nodes_begin_with_upstream_parameters(
-    build: Any,
+    offers: Offers,
     tmp_path: Path,
     isolation: Isolation,
 ) -> None:
@@ -294,7 +294,7 @@ def test_nodes_begin_with_upstream_parameters(
         return node
 
     try:
-        build(make_node)
+        build_motion(make_node, offers)
         for node in made:
             sheet: Any = SimpleNamespace(
                 get_logger=lambda: SimpleNamespace(info=told.append),

@@ -81,7 +81,7 @@ def run_master(
     sys.setswitchinterval(SWITCH_INTERVAL)
     return run_program(
         'master',
-        lambda stop: _run(stop, extend),
+        lambda stop: serve_buses(stop, extend),
         CanopenError,
         *errors,
         args=args,
@@ -117,7 +117,16 @@ class Parameters:
     robot_description: str
 
 
-def _run(stop: threading.Event, extend: Extend | None) -> None:
+def serve_buses(stop: threading.Event, extend: Extend | None = None) -> None:
+    """Run the buses that the parameters name, in a program that has begun, until it is to end.
+
+    Args:
+        stop: Ends it, with all drives stopped and disabled.
+        extend: As of :func:`run_master`.
+
+    Raises:
+        CanopenError: A bus could not be configured or opened, or has a master.
+    """
     first = Node('master')
     try:
         parameters = _declare(first)

@@ -1,68 +1,60 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""One group of joints whose drives are on a bus: its core, and the nodes that command it."""
+"""One group of joints: its motion core, and the nodes that command it."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Generic, Protocol, TypeVar
 
 from rclpy.node import Node
 
-from arm_model import ModelError, RobotModel
-from arm_model.ros import same_robot
+from arm_model import RobotModel
+from node_runner import ParameterReader
 
-from ..core.gateway import CommandGateway, start_worker
-from ..core.motion_core import MotionCore
+from ..core.gateway import CommandGateway
 from ..core.settings import CoreSettings
-from ..io.drive_source import DriveSource
 from .controller_manager import Controller, trajectory_entry
 from .gripper.controller import GripperController
 from .gripper.parameters import declare_gripper
 from .servo.node import Servo
-from .servo.parameters import declare_servo
+from .servo.parameters import declare_servo, PREFIX, ServoParameters
 from .trajectory.controller import TrajectoryController
-from .trajectory.parameters import declare_trajectory
-
-if TYPE_CHECKING:
-    from arm_canopen import MasterProcess
+from .trajectory.parameters import declare_check, declare_trajectory, TrajectoryParameters
 
 
-class GroupDrives:
-    """The drives of a group under a core of their own.
+@dataclass(frozen=True, slots=True)
+class Offers:
+    """What is offered for an arm; one of it at least.
 
     Attributes:
-        gateway: Commands to the core.
+        jogging: servo_node.
+        trajectories: The trajectory controller.
     """
 
-    def __init__(self, master: MasterProcess, model: RobotModel, settings: CoreSettings) -> None:
-        """Build the core; nothing moves yet.
+    jogging: bool = True
+    trajectories: bool = True
 
-        Args:
-            master: The process that runs the bus.
-            model: The group.
-            settings: How the core behaves.
 
-        Raises:
-            ModelError: The core cannot move such a group.
-        """
-        self._master = master
-        self.gateway = CommandGateway(MotionCore(model, settings), start_worker())
-        self._source = DriveSource(self.gateway)
+class Drives(Protocol):
+    """The drives of a group under a core of their own."""
 
     @property
-    def running(self) -> bool:
-        """Whether the cycle asks for set-points."""
-        return bool(self.gateway.snapshot.time)
+    def gateway(self) -> CommandGateway:
+        """Commands to the core."""
 
     def prepare(self) -> None:
-        """Get back the drives that were taken away, for the motion that follows."""
-        if self._source.detached:
-            self._source.attach(self._master.attach)
+        """Get back drives that were taken away, for the motion that follows."""
 
 
-class ArmMotion:
-    """An arm: a trajectory controller and a servo.
+AnyDrives = TypeVar('AnyDrives', bound=Drives)
+MakeDrives = Callable[[RobotModel, CoreSettings], AnyDrives]
+"""Builds the core of a group over its drives."""
+
+
+class ArmMotion(Generic[AnyDrives]):
+    """An arm: a trajectory controller and a servo, or one of both.
 
     Attributes:
         drives: Its drives.
@@ -70,47 +62,67 @@ class ArmMotion:
     """
 
     def __init__(
-        self, master: MasterProcess, model: RobotModel, controller: Node, servo: Node
+        self,
+        model: RobotModel,
+        controller: Node | None,
+        servo: Node | None,
+        make_drives: MakeDrives[AnyDrives],
     ) -> None:
-        """Offer both.
+        """Offer what there are nodes for.
 
         Args:
-            master: The process that runs the bus.
             model: The arm.
-            controller: Node of the trajectory controller.
-            servo: Node of the servo.
+            controller: Node of the trajectory controller; None for none.
+            servo: Node of the servo, with the robot declared; None for none.
+            make_drives: Builds its core.
 
         Raises:
             ParameterError: A parameter is misspelt, of another kind or out of its range.
             ModelError: The parameters do not fit the arm.
         """
-        same_robot(servo, model)
-        trajectory = declare_trajectory(controller, model.joints)
-        jogging = declare_servo(servo, model)
-        settings = CoreSettings(
-            jogging.settings,
-            trajectory.execution,
-            jogging.timeout,
-            jogging.clearance,
-            check_self_collision=trajectory.check,
-        )
-        self.nodes: Sequence[Node] = (controller, servo)
-        self.drives = drives = GroupDrives(master, model, settings)
-        self._servo = Servo(servo, drives.gateway, jogging, drives.prepare)
-        self._controller = TrajectoryController(
-            controller, drives.gateway, trajectory, drives.prepare
-        )
+        self.nodes: Sequence[Node] = [node for node in (controller, servo) if node is not None]
+        trajectory = None if controller is None else declare_trajectory(controller, model.joints)
+        jogging = None if servo is None else declare_servo(servo, model)
+        check = trajectory.check if trajectory is not None else _check_of_servo(servo)
+        self.drives = drives = make_drives(model, _settings(trajectory, jogging, check=check))
+        if servo is not None and jogging is not None:
+            self._servo = Servo(servo, drives.gateway, jogging, drives.prepare)
+        self._controller: TrajectoryController | None = None
+        if controller is not None and trajectory is not None:
+            self._controller = TrajectoryController(
+                controller, drives.gateway, trajectory, drives.prepare
+            )
 
-    def entry(self, period: float) -> Controller:
-        """Return the trajectory controller as the manager shows it.
+    def entries(self, period: float) -> list[Controller]:
+        """Return the trajectory controller, if there is one, as the manager shows it.
 
         Args:
             period: Period of the cycle in [s].
         """
-        return _entry(self.nodes[0], self.drives, period, self._controller)
+        if self._controller is None:
+            return []
+        return [_entry(self.nodes[0], self.drives, period, self._controller)]
 
 
-class ToolMotion:
+def _check_of_servo(servo: Node | None) -> bool:
+    """Declare on a servo that is alone whether displacements are checked for collisions."""
+    return servo is None or declare_check(ParameterReader(servo, PREFIX))
+
+
+def _settings(
+    trajectory: TrajectoryParameters | None, jogging: ServoParameters | None, *, check: bool
+) -> CoreSettings:
+    default = CoreSettings()
+    return CoreSettings(
+        default.servo if jogging is None else jogging.settings,
+        default.execution if trajectory is None else trajectory.execution,
+        default.timeout if jogging is None else jogging.timeout,
+        default.clearance if jogging is None else jogging.clearance,
+        check_self_collision=check,
+    )
+
+
+class ToolMotion(Generic[AnyDrives]):
     """An end effector: a gripper and a trajectory controller on one node.
 
     Its links may touch: a gripper holds something.
@@ -120,13 +132,15 @@ class ToolMotion:
         nodes: Its node.
     """
 
-    def __init__(self, master: MasterProcess, model: RobotModel, controller: Node) -> None:
+    def __init__(
+        self, model: RobotModel, controller: Node, make_drives: MakeDrives[AnyDrives]
+    ) -> None:
         """Offer both.
 
         Args:
-            master: The process that runs the bus.
             model: The end effector.
             controller: The node.
+            make_drives: Builds its core.
 
         Raises:
             ParameterError: A parameter is misspelt, of another kind or out of its range.
@@ -138,41 +152,23 @@ class ToolMotion:
             execution=trajectory.execution, clearance=None, check_self_collision=False
         )
         self.nodes: Sequence[Node] = (controller,)
-        self.drives = drives = GroupDrives(master, model, settings)
+        self.drives = drives = make_drives(model, settings)
         self._controller = TrajectoryController(
             controller, drives.gateway, trajectory, drives.prepare
         )
         self._gripper = GripperController(controller, drives.gateway, gripper, drives.prepare)
 
-    def entry(self, period: float) -> Controller:
+    def entries(self, period: float) -> list[Controller]:
         """Return the controller as the manager shows it.
 
         Args:
             period: Period of the cycle in [s].
         """
-        return _entry(self.nodes[0], self.drives, period, self._controller)
+        return [_entry(self.nodes[0], self.drives, period, self._controller)]
 
 
 def _entry(
-    node: Node, drives: GroupDrives, period: float, controller: TrajectoryController
+    node: Node, drives: Drives, period: float, controller: TrajectoryController
 ) -> Controller:
     joints = drives.gateway.model.joints
     return trajectory_entry(node.get_name(), joints, period, controller.set_active)
-
-
-def check_drives(master: MasterProcess, model: RobotModel) -> None:
-    """Make sure that each joint of a group has a drive.
-
-    Args:
-        master: The process that runs the bus.
-        model: The group.
-
-    Raises:
-        ModelError: One has none.
-    """
-    drives = master.bus.joints
-    if missing := [name for name in model.joints if name not in drives]:
-        raise ModelError(
-            f'{master.bus.file} has no drive {missing[0]!r}; drives have the names of the'
-            f' joints, and there are: {", ".join(drives) or "none"}'
-        )

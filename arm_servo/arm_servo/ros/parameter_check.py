@@ -17,7 +17,7 @@ EVERY_NODE = '/**'
 
 
 def check_parameters(model: RobotModel, document: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Return what motion_master, trajectory_controller and servo_node would refuse.
+    """Return what motion_node would refuse.
 
     They are asked themselves: the parameters are declared by the same functions, on nodes that
     are not there. This needs rclpy, and starts nothing.
@@ -54,7 +54,7 @@ def _nodes(model: RobotModel, document: Mapping[str, Any]) -> dict[str, Callable
     from .controller_manager import declare_manager
     from .joint_state_broadcaster import declare_broadcaster
     from .servo.parameters import declare_servo, PREFIX
-    from .standalone import declare_loop
+    from .topics_backend import declare_loop
     from .trajectory.parameters import declare_check, declare_trajectory
 
     def manager(node: Node) -> None:

@@ -35,7 +35,7 @@ from ...session import (
     session,
     SIMULATED_BUS,
 )
-from ...stack import MOTION_MASTER
+from ...stack import MOTION_NODE
 from ..table import ArmView
 from .client import MotionClient
 from .figures import MotionFigures
@@ -198,7 +198,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             arguments,
             ros,
             simulate=True,
-            master=MOTION_MASTER,
+            master=MOTION_NODE,
             master_parameters={'diagnostics_period': '0.2'},
             master_files=partial(demo_files, groups=groups),
         ) as arm:

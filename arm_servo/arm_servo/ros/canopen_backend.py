@@ -1,0 +1,180 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The back end for drives on a CAN bus: arm_canopen's master with motion cores in its cycle."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import ExitStack
+from functools import partial
+import threading
+from typing import TYPE_CHECKING
+
+from rclpy.node import Node
+from urdf_reader import Mimic, read_urdf
+
+from arm_canopen import CanopenError, serve_buses
+from arm_model import ModelError, RobotModel
+from arm_model.ros import declare_groups, same_robot
+from node_runner import destroyed_if_refused
+
+from ..core.gateway import CommandGateway, start_worker
+from ..core.motion_core import MotionCore
+from ..core.settings import CoreSettings
+from ..exceptions import BackendError
+from ..io.drive_source import DriveSource
+from .controller_manager import ControllerManager, declare_manager
+from .group_motion import ArmMotion, Offers, ToolMotion
+from .joint_state_broadcaster import JointStateBroadcaster
+from .other_programs import watch_other_programs
+from .upstream_parameters import check_names
+
+if TYPE_CHECKING:
+    from arm_canopen import MasterProcess
+
+ATTACH_PERIOD = 0.2
+"""Time between two tries to attach when the bus starts in [s]."""
+
+
+def serve_canopen(stop: threading.Event, offers: Offers) -> None:
+    """Run the master with motion cores until stopped; the drives are disabled then.
+
+    Args:
+        stop: Set by Ctrl-C and SIGTERM.
+        offers: What is offered to clients.
+
+    Raises:
+        BackendError: The bus cannot be configured or opened, or has a master.
+    """
+    try:
+        serve_buses(stop, lambda master: CanopenMotion(master, offers).nodes)
+    except CanopenError as error:
+        raise BackendError(str(error)) from error
+
+
+class BusDrives:
+    """The drives of a group under a core of their own.
+
+    Attributes:
+        gateway: Commands to the core.
+    """
+
+    def __init__(self, master: MasterProcess, model: RobotModel, settings: CoreSettings) -> None:
+        """Build the core; nothing moves yet.
+
+        Args:
+            master: The process that runs the bus.
+            model: The group.
+            settings: How the core behaves.
+
+        Raises:
+            ModelError: A joint has no drive, or the core cannot move such a group.
+        """
+        _check_drives(master, model)
+        self._master = master
+        self.gateway = CommandGateway(MotionCore(model, settings), start_worker())
+        self._source = DriveSource(self.gateway)
+
+    @property
+    def running(self) -> bool:
+        """Whether the cycle asks for set-points."""
+        return bool(self.gateway.snapshot.time)
+
+    def prepare(self) -> None:
+        """Get back the drives that were taken away, for the motion that follows."""
+        if self._source.detached:
+            self._source.attach(self._master.attach)
+
+
+def _check_drives(master: MasterProcess, model: RobotModel) -> None:
+    """Make sure that each joint of a group has a drive."""
+    drives = master.bus.joints
+    if missing := [name for name in model.joints if name not in drives]:
+        raise ModelError(
+            f'{master.bus.file} has no drive {missing[0]!r}; drives have the names of the'
+            f' joints, and there are: {", ".join(drives) or "none"}'
+        )
+
+
+class CanopenMotion:
+    """The nodes of a robot whose drives are on one bus.
+
+    Attributes:
+        nodes: The nodes, for the executor of the master.
+    """
+
+    def __init__(self, master: MasterProcess, offers: Offers) -> None:
+        """Build cores and nodes; nothing moves yet.
+
+        Args:
+            master: The process that runs the bus.
+            offers: What is offered to clients.
+
+        Raises:
+            ParameterError: A parameter is misspelt, of another kind or out of its range.
+            ModelError: The parameters do not make an arm, or it has joints without a drive.
+        """
+        self._master = master
+        with ExitStack() as stack:
+            self._build(lambda name: stack.enter_context(destroyed_if_refused(Node(name))), offers)
+        watch_other_programs(self.nodes)
+        self._attaching = self._manager.create_timer(ATTACH_PERIOD, self._attach_first)
+
+    def _build(self, make_node: Callable[[str], Node], offers: Offers) -> None:
+        self._manager = manager = make_node('controller_manager')
+        models = declare_groups(manager)
+        main, *others = models.arms
+        name, broadcasts = declare_manager(manager, main)
+        on_bus = partial(BusDrives, self._master)
+
+        def make_arm(model: RobotModel, controller: str, servo: str) -> ArmMotion[BusDrives]:
+            trajectories = make_node(controller) if offers.trajectories else None
+            jogging = make_node(servo) if offers.jogging else None
+            if jogging is not None:
+                same_robot(jogging, model)
+            return ArmMotion(model, trajectories, jogging, on_bus)
+
+        arms = [make_arm(main, name, 'servo_node')]
+        arms += [
+            make_arm(model, f'{model.group}_controller', f'{model.group}_servo_node')
+            for model in others
+        ]
+        tools = [
+            ToolMotion(model, make_node(f'{model.group}_controller'), on_bus)
+            for model in models.tools
+        ]
+        self._groups: list[ArmMotion[BusDrives] | ToolMotion[BusDrives]] = [*arms, *tools]
+        broadcaster = make_node('joint_state_broadcaster')
+        self._broadcaster = JointStateBroadcaster(
+            broadcaster,
+            self._groups[0].drives.gateway,
+            [name for name in self._master.bus.joints if name not in main.joints],
+            _mimics(manager),
+            active=broadcasts,
+        )
+        self.nodes = [
+            manager,
+            *(node for group in self._groups for node in group.nodes),
+            broadcaster,
+        ]
+        period = self._master.bus.master.sync_period
+        entries = [entry for group in self._groups for entry in group.entries(period)]
+        self._switch = ControllerManager(manager, [*entries, self._broadcaster.entry()])
+        for node in self.nodes:
+            check_names(node)
+        notes = (note for model in (*models.arms, *models.tools) for note in model.notes)
+        for note in dict.fromkeys(notes):
+            manager.get_logger().warning(note)
+
+    def _attach_first(self) -> None:
+        waiting = [group.drives for group in self._groups if not group.drives.running]
+        for drives in waiting:
+            drives.prepare()
+        if not waiting:  # the cycle asks for set-points
+            self._manager.destroy_timer(self._attaching)
+
+
+def _mimics(node: Node) -> dict[str, Mimic]:
+    """Return the joints of the description that follow others."""
+    tree = read_urdf(node.get_parameter('robot_description').value)
+    return {joint.name: joint.mimic for joint in tree.movable() if joint.mimic is not None}

@@ -1,0 +1,211 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The back end for drives elsewhere: joint states in, a loop of its own, set-points out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass
+from functools import partial
+import threading
+import time
+
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
+
+from arm_model import RobotModel
+from arm_model.ros import declare_robot, same_robot
+from node_runner import (
+    declare_thread_priority,
+    LINGER,
+    notify_ready,
+    ParameterReader,
+    raise_thread_priority,
+    settle_process_memory,
+    spin,
+)
+
+from ..core.gateway import CommandGateway, start_worker
+from ..core.motion_core import MotionCore
+from ..core.settings import CoreSettings
+from ..io.following import FollowingLimits, FollowingWatch
+from ..io.joint_feedback import JointFeedback
+from ..io.motion_thread import MotionCycle, MotionThread
+from ..io.topic_output import ARRAY, declare_output, TopicOutput, TRAJECTORY
+from .controller_manager import ControllerManager, declare_manager
+from .group_motion import ArmMotion, Offers
+from .other_programs import watch_other_programs
+from .servo.parameters import PREFIX
+from .upstream_parameters import check_names
+
+THREAD_PRIORITY = 40
+"""SCHED_FIFO priority of the loop, unless a parameter says another; that of moveit_servo."""
+
+MakeNode = Callable[[str], Node]
+"""Makes the node of a name; it lives until the program ends."""
+
+ARRAY_TOPIC = 'forward_position_controller/commands'
+"""Default of command_out_topic, the name that ros2_controllers' examples use."""
+
+
+@dataclass(frozen=True, slots=True)
+class LoopParameters:
+    """How the loop runs.
+
+    Attributes:
+        period: Its period in [s].
+        joint_topic: Topic of the joint states.
+        joint_timeout: Age at which a joint state counts no more in [s].
+        priority: SCHED_FIFO priority of its thread; 0 is none.
+        following: When the arm counts as not following.
+    """
+
+    period: float
+    joint_topic: str
+    joint_timeout: float
+    priority: int
+    following: FollowingLimits
+
+
+def declare_loop(node: Node, prefix: str) -> LoopParameters:
+    """Declare how the loop runs.
+
+    Args:
+        node: The node.
+        prefix: Before each name, with its dot.
+    """
+    read = ParameterReader(node, prefix)
+    return LoopParameters(
+        read.number('publish_period', 0.01, (0.001, 0.1), 'period of the loop [s]'),
+        read.text('joint_topic', 'joint_states', 'topic of the joint states'),
+        read.number(
+            'joint_state_timeout',
+            0.5,
+            (0.02, 10.0),
+            'silence of a joint at which the arm comes to rest [s]',
+        ),
+        declare_thread_priority(read, THREAD_PRIORITY),
+        FollowingLimits(
+            read.number(
+                'following_error_limit',
+                0.2,
+                (0.0, 10.0),
+                'distance of a joint from where it was sent at which the arm comes to rest [rad];'
+                ' 0 is any',
+            ),
+            read.number(
+                'following_delay', 0.2, (0.0, 1.0), 'how late it may be where it was sent [s]'
+            ),
+        ),
+    )
+
+
+def serve_topics(stop: threading.Event, offers: Offers) -> None:
+    """Move an arm until stopped; it comes to rest before that ends.
+
+    Args:
+        stop: Set by Ctrl-C and SIGTERM.
+        offers: What is offered to clients.
+    """
+    nodes: list[Node] = []
+    with ExitStack() as stack:
+
+        def make_node(name: str) -> Node:
+            node = Node(name)
+            stack.callback(node.destroy_node)
+            nodes.append(node)
+            return node
+
+        thread = build_motion(make_node, offers)
+        for node in nodes:
+            check_names(node)
+        settle_process_memory(nodes[0])
+        thread.start(failed=stop.set)
+        stack.callback(thread.stop)
+        nodes[0].get_logger().info('ready for commands')
+        notify_ready()
+        spin(nodes, stop)
+        thread.end()
+        spin(nodes, thread.ended, linger=LINGER)  # goals get their results
+    if thread.error is not None:
+        raise thread.error
+
+
+def build_motion(make_node: MakeNode, offers: Offers) -> MotionThread:
+    """Put interfaces, core, feedback and output together; nothing runs yet.
+
+    Args:
+        make_node: Makes the nodes.
+        offers: What is offered to clients.
+    """
+    if not offers.trajectories:
+        servo = make_node('servo_node')
+        model = declare_robot(servo)
+        topic = f'{model.group}_controller/joint_trajectory'
+        make_drives = partial(TopicDrives, servo, PREFIX, (topic, TRAJECTORY))
+        drives = ArmMotion(model, None, servo, make_drives).drives
+        watch_other_programs([servo], drives.topic)
+        return drives.thread
+    manager = make_node('controller_manager')
+    model = declare_robot(manager)
+    name, _ = declare_manager(manager, model)
+    controller = make_node(name)
+    make_drives = partial(TopicDrives, controller, '', (ARRAY_TOPIC, ARRAY))
+    jogging = make_node('servo_node') if offers.jogging else None
+    if jogging is not None:
+        same_robot(jogging, model)
+    arm = ArmMotion(model, controller, jogging, make_drives)
+    ControllerManager(manager, arm.entries(arm.drives.period))
+    watch_other_programs([manager, *arm.nodes], arm.drives.topic)
+    return arm.drives.thread
+
+
+class TopicDrives:
+    """Drives elsewhere under a core: joint states in, set-points out.
+
+    Attributes:
+        gateway: Commands to the core.
+        thread: Steps the core; not started yet.
+        period: Period of its loop in [s].
+        topic: Where set-points leave.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        prefix: str,
+        output: tuple[str, str],
+        model: RobotModel,
+        settings: CoreSettings,
+    ) -> None:
+        """Declare how the loop runs, subscribe and advertise.
+
+        Args:
+            node: The node for that.
+            prefix: Before the names of its parameters, with its dot.
+            output: Default of topic and type of the set-points.
+            model: The arm.
+            settings: How the core behaves.
+        """
+        for note in model.notes:
+            node.get_logger().warning(note)
+        loop, wanted = declare_loop(node, prefix), declare_output(node, prefix, *output)
+        self.gateway = CommandGateway(MotionCore(model, settings), start_worker())
+        self.period, self.topic = loop.period, wanted.topic
+        feedback = JointFeedback(model.joints, loop.joint_timeout)
+
+        def take(message: JointState) -> None:
+            feedback.take(message.name, message.position, message.velocity, time.monotonic())
+
+        def begin() -> None:
+            raise_thread_priority(node, loop.priority, 'the motion loop')
+
+        node.create_subscription(JointState, loop.joint_topic, take, 10)
+        publish = TopicOutput(node, wanted, list(model.joints), loop.period)
+        watch = FollowingWatch(model.limits, loop.following, loop.period)
+        cycle = MotionCycle(self.gateway, feedback, publish, watch)
+        self.thread = MotionThread(cycle, loop.period, begin)
+
+    def prepare(self) -> None:
+        """Do nothing: whoever has the drives keeps them."""
