@@ -28,10 +28,22 @@ DISTRIBUTIONS |= {'mujoco': 'mujoco-core'}
 """Names on PyPI of what is imported under another one."""
 ON_PYPI = {*DISTRIBUTIONS, 'coal', 'daqp', 'evdev', 'msgpack', 'numpy', 'onnxruntime', 'psutil'}
 ON_PYPI |= {'rich', 'ruckig', 'xacro'}
+ROSDEP = {
+    'PyYAML': 'python3-yaml',
+    'evdev': 'python3-evdev',
+    'msgpack': 'python3-msgpack',
+    'numpy': 'python3-numpy',
+    'onnxruntime': 'python3-onnxruntime-pip',
+    'pyserial': 'python3-serial',
+    'python-can': 'python3-can',
+    'rich': 'python3-rich',
+    'xacro': 'xacro',
+}
+"""Keys of rosdep for those that have one."""
 STARTED = {'arm_bringup': {'canopen_sim', 'robot_viewer'}}
 STARTED |= {'quad_bringup': {'quad_hardware', 'quad_sim', 'quad_teleop', 'robot_viewer'}}
 """Packages whose executables a bring-up starts; it imports nothing of them."""
-OPTIONAL = {'arm_bringup': {'arm_model', 'arm_servo'}}
+OPTIONAL = {'arm_bringup': {'arm_model', 'arm_servo', 'python3-numpy'}}
 """Packages that are used where they are built, and that colcon need not build for this one."""
 PHYSICS = {'mujoco'}  # mujoco-core, or below Python 3.11 mujoco
 
@@ -77,12 +89,13 @@ def test_what_is_imported_is_declared(name: str, monkeypatch: pytest.MonkeyPatch
 
 
 @pytest.mark.parametrize('name', PACKAGES)
-def test_packages_of_the_checkout_are_declared_for_colcon(
+def test_what_pip_installs_is_declared_for_colcon_and_rosdep(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What setup.py names of them package.xml names, too, but for what is optional."""
-    siblings = {*declared(name, monkeypatch)} & PACKAGES.keys()
-    missing = siblings - PACKAGES[name].dependencies - OPTIONAL.get(name, set())
+    """What setup.py names package.xml names, too, but for what is optional or has no key."""
+    asked = {*declared(name, monkeypatch)}
+    keys = asked & PACKAGES.keys() | {ROSDEP[each] for each in asked & ROSDEP.keys()}
+    missing = keys - PACKAGES[name].dependencies - OPTIONAL.get(name, set())
     assert not missing, f'add an exec_depend to {name}/package.xml'
 
 
