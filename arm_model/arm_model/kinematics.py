@@ -70,14 +70,9 @@ class Kinematics:
         full = _full(tree)
         mimics = {joint.name: joint.mimic for joint in tree.joints if joint.mimic is not None}
         moving = {*group, *(name for name, mimic in mimics.items() if mimic.source in group)}
-        at = np.clip(pin.neutral(full), full.lowerPositionLimit, full.upperPositionLimit)
-        for name, position in (rest or {}).items():
-            at[full.idx_qs[full.getJointId(name)]] = position
-        for name, mimic in mimics.items():
-            source = at[full.idx_qs[full.getJointId(mimic.source)]]
-            at[full.idx_qs[full.getJointId(name)]] = mimic.multiplier * source + mimic.offset
         locked = [number for number in range(1, full.njoints) if full.names[number] not in moving]
-        self.native: Native = pin.buildReducedModel(full, locked, at)
+        places = _places(full, mimics, rest or {})
+        self.native: Native = pin.buildReducedModel(full, locked, places)
         self.root = tree.root
         self.frames: Mapping[str, int] = {
             frame.name.removeprefix(LINK): number
@@ -171,6 +166,17 @@ def _full(tree: KinematicTree) -> Native:
         if frame.type == pin.FrameType.BODY:
             frame.name = LINK + frame.name
     return model
+
+
+def _places(full: Native, mimics: Mapping[str, Mimic], rest: Mapping[str, float]) -> Array:
+    """Return where joints stand that do not move, for pinocchio."""
+    places: Array = np.clip(pin.neutral(full), full.lowerPositionLimit, full.upperPositionLimit)
+    index = {name: full.idx_qs[number] for number, name in enumerate(full.names)}
+    for name, position in rest.items():
+        places[index[name]] = position
+    for name, mimic in mimics.items():
+        places[index[name]] = mimic.multiplier * places[index[mimic.source]] + mimic.offset
+    return places
 
 
 def _between(model: Native, first: int, second: int) -> tuple[list[int], list[int]]:

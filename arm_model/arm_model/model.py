@@ -79,12 +79,8 @@ class RobotModel:
         """
         tree, semantic = read_urdf(urdf), parse_srdf(srdf)
         chosen = find_group(tree, semantic, group, tip)
-        self.name, self.group, self.base, self.tip = (
-            tree.name,
-            chosen.name,
-            chosen.base,
-            chosen.tip,
-        )
+        self.name, self.group = tree.name, chosen.name
+        self.base, self.tip = chosen.base, chosen.tip
         self._tree = tree
         self.kinematics = Kinematics(tree, chosen.joints)
         self._model = self.kinematics.native

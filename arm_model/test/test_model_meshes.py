@@ -198,7 +198,8 @@ def test_without_a_cache_hulls_are_made_all_the_same(
     [
         ('package://other_arm/link.stl', 'package other_arm is not installed; install it'),
         ('link.stl', 'the folder of a relative path is unknown'),
-        ('/nowhere/link.stl', 'no file /nowhere/link.stl'),
+        ('/nowhere/link.stl', 'no file /nowhere/link.stl; correct the name'),
+        ('package:///arm/link.stl', 'write package://PACKAGE/FILE'),
         ('http://x/link.stl', 'use package:// or file://'),
     ],
 )

@@ -70,7 +70,7 @@ def find_mesh(name: str, folder: Path | None = None) -> Path:
     """
     scheme, separator, rest = name.partition('://')
     if separator and scheme not in {'package', 'file'}:
-        raise MeshError(f'{name}: no file; use package:// or file://')
+        raise MeshError(f'{name}: not a file; use package:// or file://')
     rest = unquote(rest) if separator else name
     if scheme == 'package' and separator:
         package, _, inside = rest.partition('/')
@@ -82,12 +82,14 @@ def find_mesh(name: str, folder: Path | None = None) -> Path:
     else:
         path = folder / rest
     if not path.is_file():
-        raise MeshError(f'{name}: no file {path}')
+        raise MeshError(f'{name}: no file {path}; correct the name, or add the file')
     return path
 
 
 def _package(name: str, folder: Path | None) -> Path:
     """Find the folder of a package: beside the description, or installed."""
+    if not name:
+        raise MeshError('a mesh file without a package; write package://PACKAGE/FILE')
     for above in (folder, *folder.parents) if folder else ():
         if above.name == name:
             return above
@@ -160,7 +162,7 @@ def hull_of_file(path: Path) -> Hull:
         mesh = coal.MeshLoader().load(str(path), np.full(3, _unit(path)))
     except ValueError as error:  # the last line is assimp's
         reason = str(error).strip().splitlines()[-1]
-        raise MeshError(f'{path}: no mesh that can be read: {reason}') from error
+        raise MeshError(f'{path}: {reason}; export it as STL, DAE or OBJ') from error
     hull = convex(mesh.vertices())
     whole, solid = hull.computeVolume(), abs(mesh.computeVolume())
     return Hull(frozen(hull.points()), min(solid / whole, 1.0) if solid else 1.0)

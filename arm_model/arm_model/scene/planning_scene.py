@@ -239,22 +239,17 @@ class PlanningScene:
         Args:
             kinematics: The same links and group, see :meth:`RobotModel.kinematics_at`.
         """
-        return PlanningScene(
-            kinematics,
-            self.link_shapes,
-            self.allowed,
-            self.objects.values(),
-            self.attached_bodies.values(),
-        )
+        return self._with(kinematics=kinematics)
 
     def _with(
         self,
         objects: Mapping[str, CollisionObject] | None = None,
         attached: Mapping[str, AttachedBody] | None = None,
         allowed: AllowedCollisionMatrix | None = None,
+        kinematics: Kinematics | None = None,
     ) -> PlanningScene:
         return PlanningScene(
-            self.kinematics,
+            self.kinematics if kinematics is None else kinematics,
             self.link_shapes,
             self.allowed if allowed is None else allowed,
             (self.objects if objects is None else objects).values(),
