@@ -167,7 +167,7 @@ def merge_limits(
 
 @contextmanager
 def _collected(problems: list[str]) -> Iterator[None]:
-    """Keep what is wrong with one joint, to tell it with that of the others."""
+    """Keep what is wrong with one joint, to report it with that of the others."""
     try:
         yield
     except LimitsError as error:

@@ -184,7 +184,7 @@ BROKEN: dict[str, tuple[Broken, str]] = {
 
 
 @pytest.mark.parametrize(('broken', 'words'), BROKEN.values(), ids=BROKEN.keys())
-def test_broken_files_are_told(broken: Broken, words: str) -> None:
+def test_broken_files_are_refused(broken: Broken, words: str) -> None:
     """What does not make an arm is refused in words that name it."""
     with pytest.raises(ModelError, match=words):
         RobotModel(*broken(*chain_texts('zyy')))
@@ -210,7 +210,7 @@ def test_what_no_file_says_has_a_default_that_is_noted_once() -> None:
     assert joints == ['j1, j2', 'j1, j3', 'j1, j2, j3', 'j3']
 
 
-def test_unknown_names_are_told_with_the_known_ones() -> None:
+def test_unknown_names_are_refused_with_the_known_ones() -> None:
     """Unknown groups, joints and links are refused, and those that exist are listed."""
     with pytest.raises(ModelError, match=r"'leg'.*groups: arm"):
         RobotModel(*chain_texts('zyy'), group='leg')
@@ -277,7 +277,7 @@ def test_links_of_a_group_stand_for_the_joints_that_move_them() -> None:
 
 
 def test_a_limits_file_that_is_none(tmp_path: Any) -> None:
-    """A file without the table, or no file at all, is told with its path."""
+    """A file without the table, or no file at all, is refused with its path."""
     path = tmp_path / 'limits.yaml'
     with pytest.raises(ModelError, match=r'limits\.yaml'):
         load_limits(path)

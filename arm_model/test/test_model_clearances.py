@@ -32,10 +32,10 @@ def test_what_is_known_is_a_lower_bound_and_exact_where_it_matters(
     for _ in range(150):
         at = np.clip(at + stride * rng.uniform(-1.0, 1.0, len(at)), lower, upper)
         measured = model.clearances().least(at, math.inf)
-        told = known.least(at, within)
-        assert (told <= measured + ROUNDING).all()
+        bounds = known.least(at, within)
+        assert (bounds <= measured + ROUNDING).all()
         near = measured < within
-        assert told[near] == pytest.approx(measured[near], abs=ROUNDING)
+        assert bounds[near] == pytest.approx(measured[near], abs=ROUNDING)
 
 
 @pytest.mark.parametrize('model', ARMS, ids=lambda model: model.name)

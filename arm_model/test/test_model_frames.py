@@ -63,7 +63,7 @@ def test_what_is_old_or_not_connected_is_not_found() -> None:
     'numbers', [[0.0] * 4, [1.0, 1.0, 0.0, 0.0], [math.nan, 0.0, 0.0, 1.0], [math.inf] * 4]
 )
 def test_a_quaternion_that_is_none_is_refused(numbers: list[float]) -> None:
-    """Its length is told."""
+    """The message has its length."""
     with pytest.raises(CommandError, match='length'):
         rotation_of(numbers)
 
@@ -73,11 +73,11 @@ class TfNode:
 
     def __init__(self) -> None:
         """Remember who listens."""
-        self.heard: dict[str, Any] = {}
+        self.subscribed: dict[str, Any] = {}
 
     def create_subscription(self, _kind: object, topic: str, take: object, _qos: object) -> None:
         """Remember it."""
-        self.heard[topic] = take
+        self.subscribed[topic] = take
 
     def get_clock(self) -> Any:
         """Return a clock that stands at 100 s."""
@@ -89,7 +89,7 @@ class TfNode:
         transform.header.frame_id = 'base_link'
         transform.header.stamp.sec = sec
         transform.transform.translation.x = x
-        self.heard['/tf'](TFMessage(transforms=[transform]))
+        self.subscribed['/tf'](TFMessage(transforms=[transform]))
 
 
 def test_transforms_that_come_late_or_are_no_numbers_do_not_count() -> None:

@@ -24,7 +24,7 @@ def test_without_srdf_the_longest_chain(name: str) -> None:
 
 
 def test_refusals() -> None:
-    """Broken texts and a chain that is not there are told in words."""
+    """Broken texts and a chain that is not there are refused in words."""
     urdf, srdf, _ = chain_texts('xyz')
     with pytest.raises(ModelError, match='no XML'):
         names_of('<robot')

@@ -190,9 +190,9 @@ def test_what_is_known_is_a_lower_bound_with_objects_too(stride: float) -> None:
     known = Clearances(scene)
     for _ in range(200):
         at = np.clip(at + stride * rng.uniform(-1.0, 1.0, 4), -1.9, 1.9)
-        exact, told = Clearances(scene).least(at, math.inf), known.least(at, 0.05)
-        assert (told <= exact + 1e-4).all()
-        assert told[exact < 0.05] == pytest.approx(exact[exact < 0.05], abs=1e-4)
+        exact, bounds = Clearances(scene).least(at, math.inf), known.least(at, 0.05)
+        assert (bounds <= exact + 1e-4).all()
+        assert bounds[exact < 0.05] == pytest.approx(exact[exact < 0.05], abs=1e-4)
 
 
 def test_contacts_are_named_with_their_place_and_depth() -> None:

@@ -88,7 +88,7 @@ class TfListener:
             rotation = rotation_of(xyzw(transform.transform.rotation))
             position = checked(xyz(transform.transform.translation), 3, 'translation')
         except CommandError:
-            return  # whoever publishes it is told by others that use TF
+            return  # other listeners of TF report it to its publisher
         if self._tree is not None:
             child, parent = transform.child_frame_id, transform.header.frame_id
             self._tree.learn(child, parent, Pose(rotation, position), when)
