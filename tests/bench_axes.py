@@ -25,6 +25,7 @@ from sensor_msgs.msg import JointState
 from simulated_arm import panda_bus, SimulatedArm
 
 from arm_canopen.standard.cob_id import CobId
+from arm_canopen.standard.nmt import ALL_NODES
 
 if TYPE_CHECKING:
     from processes import RunningProcess
@@ -32,6 +33,8 @@ if TYPE_CHECKING:
 SECONDS = 15.0
 TARGETS = 40
 FIRST_NODE_ID = 2
+
+MASTER_ARGUMENTS = ('-p', 'robot_joint_states:=true')
 
 Rows = dict[str, str]
 
@@ -86,11 +89,15 @@ def measure(scenario: Scenario, seconds: float) -> Rows:
         bus = write_bus(Path(folder), scenario)
         with (
             BusRecorder(isolation.bus) as recorder,
-            SimulatedArm(isolation, bus, scenario.joints) as arm,
+            SimulatedArm(isolation, bus, scenario.joints, MASTER_ARGUMENTS) as arm,
         ):
             rows = boot_and_init(arm, recorder)
             rows |= reaction(arm, recorder)
-            rows |= joint_state_latency(arm, recorder)
+            rows |= joint_state_latency(arm, recorder, '/joint_states', 'master')
+            publisher = arm.start('canopen_joint_state_publisher', *aggregator(scenario))
+            publisher.wait_until_ready()
+            rows |= joint_state_latency(arm, recorder, '/aggregated', 'publisher')
+            publisher.stop()
             recorder.pause()
             return rows | steady_state(arm, seconds)
 
@@ -116,7 +123,7 @@ def boot_and_init(arm: SimulatedArm, recorder: BusRecorder) -> Rows:
     starts = [
         f.timestamp
         for f in recorder.frames
-        if f.can_id == CobId.NMT and f.data[0] == 1 and f.data[1] in nodes
+        if f.can_id == CobId.NMT and f.data[0] == 1 and f.data[1] in (ALL_NODES, *nodes)
     ]
     init = arm.init_all()
     return {
@@ -146,27 +153,29 @@ def reaction(arm: SimulatedArm, recorder: BusRecorder) -> Rows:
     return {'~/target call to RPDO p50 / max': f'{milliseconds(delays, 0.5)} / {longest:.1f} ms'}
 
 
-def joint_state_latency(arm: SimulatedArm, recorder: BusRecorder) -> Rows:
+def aggregator(scenario: Scenario) -> list[str]:
+    """Return the arguments of the publisher that needs no master, on a topic of its own."""
+    description = f'robot_description:={urdf(scenario.joints)}'
+    return ['-p', description, '-r', '/joint_states:=/aggregated']
+
+
+def joint_state_latency(arm: SimulatedArm, recorder: BusRecorder, topic: str, source: str) -> Rows:
     """Time from the last TPDO of a SYNC to the /joint_states message that carries it."""
-    publisher = arm.start(
-        'canopen_joint_state_publisher', '-p', f'robot_description:={urdf(arm.joints)}'
-    )
-    publisher.wait_until_ready()
     arrivals: list[tuple[float, int]] = []
 
     def take(message: JointState) -> None:
         stamp = message.header.stamp
         arrivals.append((time.monotonic(), stamp.sec * 10**9 + stamp.nanosec))
 
-    arm.client.node.create_subscription(JointState, '/joint_states', take, 10)
-    arm.client.spin_until(lambda: len(arrivals) >= 300, 20.0, '/joint_states')
+    arm.client.node.create_subscription(JointState, topic, take, 10)
+    arm.client.spin_until(lambda: len(arrivals) >= 300, 20.0, topic)
     delays = []
     for arrived, _ in arrivals[50:]:
         last = recorder.last_before(arrived, 0x280, 0x2FF)
         if last is not None:
             delays.append(arrived - last.timestamp)
     share = f'{milliseconds(delays, 0.5)} / {milliseconds(delays, 0.99)} ms'
-    return {'TPDO to /joint_states p50 / p99': share}
+    return {f'TPDO to /joint_states ({source})': share}
 
 
 def steady_state(arm: SimulatedArm, seconds: float) -> Rows:

@@ -18,7 +18,8 @@ from .parameter_values import parameter_writes
 from .pdo_direction import RPDO, TPDO
 from .pdo_resolution import PdoDraft, PdoReader
 from .sdo_list import SdoReader
-from .settings import DeviceSettings, Options, read_device_settings, remappings
+from .section import texts
+from .settings import DeviceSettings, Options, read_device_settings
 
 DRIVE_PROFILE = 'Cia402'  # in the names of the drivers of drives
 DRIVE_OBJECTS = (Index.CONTROLWORD, Index.STATUSWORD)
@@ -60,7 +61,7 @@ def read_device(
     """
     settings, axes = read_device_settings(name, section, findings)
     eds = _find_eds(section, settings, options, eds_files, findings)
-    names = remappings(section, findings)
+    names = texts(section, 'remappings', findings)
     node_id = settings.node_id or (eds.node_id if eds is not None else None)
     if not node_id and 'node_id' not in section.entries:
         findings.error(section.place, "no 'node_id'", "write 'node_id:' with 1 to 127")

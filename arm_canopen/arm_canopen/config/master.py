@@ -10,8 +10,8 @@ from .identity import Identity
 from .master_model import MasterConfig
 from .model import POLL_PERIOD
 from .scalars import integer, key_number
-from .section import block
-from .settings import MasterSettings, Options, remappings
+from .section import block, texts
+from .settings import MasterSettings, Options
 from .shared_keys import MILLISECONDS, U8_MAX, U16_MAX
 
 TIME_PRODUCER = 0x4000_0000  # bit 30 of 0x1012
@@ -57,7 +57,7 @@ def build_master(
     same = {field: getattr(settings, field) for field in TAKEN_OVER}
     return MasterConfig(
         node_id=settings.node_id or 0,
-        remappings=remappings(section, findings),
+        remappings=texts(section, 'remappings', findings),
         bitrate=round(settings.bitrate),
         time_cob_id=settings.time_cob_id | (TIME_PRODUCER if time_period else 0),
         time_period=time_period,

@@ -23,7 +23,7 @@ from .identity import ANY_DEVICE
 from .master_keys import MASTER_KEYS, OPTION_KEYS
 from .master_model import MasterConfig
 from .model import NodeConfig
-from .section import read_section, texts
+from .section import read_section
 
 MASTER = MasterConfig(node_id=0)
 DEVICE = NodeConfig('', 0, '', eds=Path(), dictionary=ObjectDictionary(()))
@@ -145,11 +145,6 @@ def read_device_settings(
     _check_names(section, settings.namespace, findings)
     check_driver(section, settings.driver, findings, for_master=False)
     return settings, read_axes(name, section, settings.num_channels, drive, findings)
-
-
-def remappings(section: YamlMap, findings: Findings) -> dict[str, str]:
-    """Read the ROS remappings of the master or a device."""
-    return texts(section, 'remappings', findings)
 
 
 def _check_names(section: YamlMap, namespace: str, findings: Findings) -> None:
