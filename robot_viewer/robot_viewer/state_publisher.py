@@ -152,7 +152,7 @@ class StatePublisher:
         """Return the transforms that never change.
 
         Planar joints are among them, at their origin, as in the public robot_state_publisher;
-        floating ones are not: somebody else knows where those are.
+        floating ones are not: another node publishes those.
         """
         moving = MOVABLE | {JointKind.FLOATING}
         fixed = (joint for joint in self._model.joints if joint.kind not in moving)

@@ -13,7 +13,7 @@ from workspace.process import Runner
 
 @dataclass(frozen=True)
 class FakeRunner(Runner):
-    """Notes what it is asked to run and, like the real programs, leaves the files behind.
+    """Notes what it is to run and, like the real programs, leaves the files behind.
 
     Attributes:
         seen: What was run so far.

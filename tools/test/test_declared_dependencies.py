@@ -49,7 +49,7 @@ PHYSICS = {'mujoco'}  # mujoco-core, or below Python 3.11 mujoco
 
 
 def declared(name: str, monkeypatch: pytest.MonkeyPatch) -> dict[str, str]:
-    """Return the requirements of a package, extras included: name and what is asked of it."""
+    """Return the requirements of a package, extras included: name and versions."""
     keywords: dict[str, Any] = {}
     monkeypatch.setattr('setuptools.setup', keywords.update)
     monkeypatch.chdir(PACKAGES[name].folder)
@@ -113,12 +113,12 @@ def test_packages_of_the_checkout_are_taken_from_it(
 def test_what_is_pinned_is_new_enough(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """The environment in which all is tested has versions that setup.py takes."""
     text = ''.join(path.read_text() for path in LAYOUT.requirements.glob('*.txt'))
-    for other, asked in declared(name, monkeypatch).items():
+    for other, versions in declared(name, monkeypatch).items():
         if other in PACKAGES:
             continue
         pinned = re.findall(rf'^{other}==([\d.]+)', text, re.MULTILINE | re.IGNORECASE)
         assert pinned, f'{other} is in no file of tools/requirements'
-        oldest = re.match(r'>=([\d.]+)$', asked)
+        oldest = re.match(r'>=([\d.]+)$', versions)
         if oldest is not None:
             assert all(number(version) >= number(oldest[1]) for version in pinned)
 

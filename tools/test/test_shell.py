@@ -69,15 +69,15 @@ def test_env_sh_from_any_folder_twice(
     assert not [key for key in first if key.startswith('_workspace')]
 
 
-def test_discovery_stays_on_this_host_unless_asked(checkout: Path) -> None:
-    """Whatever ROS's own variables ask for, the profile with loopback alone is named."""
-    for asked in (
+def test_discovery_stays_on_this_host_by_default(checkout: Path) -> None:
+    """Whatever ROS's own variables say, the profile with loopback alone is named."""
+    for outer in (
         {},
         {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SUBNET'},
         {'ROS_STATIC_PEERS': '10.0.0.1'},
         {'DDS_NETWORK': 'localhost'},
     ):
-        done = shell('bash', '. ./env.sh; env', checkout, **asked)
+        done = shell('bash', '. ./env.sh; env', checkout, **outer)
         assert done.returncode == 0
         found = variables(done.stdout)
         package = checkout / 'libraries' / 'dds_network' / 'dds_network'
@@ -85,7 +85,7 @@ def test_discovery_stays_on_this_host_unless_asked(checkout: Path) -> None:
         assert found['FASTRTPS_DEFAULT_PROFILES_FILE'] == str(closed)
         assert found['ROS_AUTOMATIC_DISCOVERY_RANGE'] == 'SYSTEM_DEFAULT'
         # what does not open anything is reported
-        assert bool(done.stderr) == any('ROS_' in name for name in asked)
+        assert bool(done.stderr) == any('ROS_' in name for name in outer)
 
 
 def test_an_interface_that_is_not_there_keeps_the_shell_closed(checkout: Path) -> None:

@@ -50,7 +50,7 @@ def test_packages_of_an_incomplete_system_ros_are_named(tmp_path: Path) -> None:
 
 
 def test_another_compiler_will_do() -> None:
-    """Clang alone is no reason to ask for g++."""
+    """Clang alone is no reason to require g++."""
     found = missing_packages(WHEELS, PYTHON, lambda name: None if 'g++' in name else name)
     assert found == ()
 

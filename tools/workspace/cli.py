@@ -39,9 +39,9 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _environment(layout: Layout, asked: str) -> Environment:
+def _environment(layout: Layout, python: str) -> Environment:
     underlay = find_underlay(os.environ, layout.venv)
-    chosen = choose_python(asked, underlay, read_state(layout.state), sys.executable)
+    chosen = choose_python(python, underlay, read_state(layout.state), sys.executable)
     path = chosen.path if isinstance(chosen, Interpreter) else chosen
     return Environment(layout, underlay, path)
 

@@ -197,12 +197,12 @@ def remove_environment(layout: Layout) -> None:
 
 
 def choose_python(
-    asked: str, underlay: Underlay, state: EnvironmentState | None, running: str
+    named: str, underlay: Underlay, state: EnvironmentState | None, running: str
 ) -> Interpreter | str:
     """Choose the interpreter for the environment.
 
     Args:
-        asked: What a person named, or empty.
+        named: What a person named, or empty.
         underlay: A system's ROS is built for one Python only.
         state: A finished environment keeps its interpreter while that is there.
         running: The interpreter that runs the set-up.
@@ -210,8 +210,8 @@ def choose_python(
     Returns:
         The interpreter, or just its path when an environment was made from it already.
     """
-    if asked:
-        return probe(asked)
+    if named:
+        return probe(named)
     wanted = underlay.python_name
     kept = Path(state.python) if state is not None else None
     if kept is not None and kept.exists() and wanted in {None, kept.resolve().name}:

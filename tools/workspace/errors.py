@@ -7,8 +7,8 @@ WorkspaceError
 ├── MissingPackagesError     system packages have to be installed first
 ├── NetworkError             a download failed for want of a connection
 ├── StepFailedError          a program that we started failed
-├── ForeignFolderError       a folder that we would replace was made by somebody else
-└── UnknownPackageError      a package was asked for that the workspace does not have
+├── ForeignFolderError       a folder that we would replace was made by another program
+└── UnknownPackageError      the workspace does not have the package
 """
 
 

@@ -56,7 +56,7 @@ class Interpreter:
 
 
 def probe(program: str) -> Interpreter:
-    """Ask an interpreter about itself.
+    """Query an interpreter.
 
     Args:
         program: Path, or a name on PATH.

@@ -58,7 +58,7 @@ def find_underlay(environ: Mapping[str, str], venv: Path) -> Underlay:
     """Take the system's ROS when it is there, else the wheels.
 
     Args:
-        environ: Environment; `WORKSPACE_ROS_PREFIX` replaces /opt/ros/jazzy, and empty it asks
+        environ: Environment; `WORKSPACE_ROS_PREFIX` replaces /opt/ros/jazzy, and empty it stands
             for the wheels.
         venv: Where the wheels are, or will be.
     """

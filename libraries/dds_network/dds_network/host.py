@@ -36,7 +36,7 @@ def resolve_host(name: str) -> str:
     """Return the IPv4 address of a host.
 
     Raises:
-        OSError: Nobody knows it.
+        OSError: Its name cannot be resolved.
     """
     return socket.gethostbyname(name)
 

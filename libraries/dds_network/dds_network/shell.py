@@ -35,7 +35,7 @@ def notices(environ: Mapping[str, str], reach: Reach) -> Iterator[str]:
     if own_transports(environ) or not reach.is_this_host:
         yield describe_dds(environ)
         return
-    asked = [
+    without_effect = [
         f'{name}={environ[name]}'
         for name, effective in (
             (PEERS_VARIABLE, bool(environ.get(PEERS_VARIABLE))),
@@ -43,9 +43,9 @@ def notices(environ: Mapping[str, str], reach: Reach) -> Iterator[str]:
         )
         if effective and environ.get(LOCALHOST_ONLY_VARIABLE) != '1'
     ]
-    if asked:
+    if without_effect:
         yield (
-            f'{" and ".join(asked)} has no effect, DDS stays on this host; to open it: '
+            f'{" and ".join(without_effect)} has no effect, DDS stays on this host; to open it: '
             f'export {NETWORK_VARIABLE}=INTERFACE or a peer, and source env.sh again'
         )
 

@@ -55,7 +55,7 @@ class DemoClient(Protocol):
 ClientT = TypeVar('ClientT', bound=DemoClient)
 
 MakeClient = Callable[[Callable[[], bool]], ClientT]
-"""Joins the ROS graph; the client asks the argument whether its waiting shall be given up."""
+"""Joins the ROS graph; the argument returns whether its waiting shall be given up."""
 
 
 class Supervisor(Protocol):
@@ -66,7 +66,7 @@ class Supervisor(Protocol):
         """What it is doing."""
 
     def stop(self, outcome: Outcome) -> None:
-        """Ask for an orderly end."""
+        """Request an orderly end."""
 
 
 class DemoScenario(ABC, Generic[ClientT]):
@@ -94,11 +94,11 @@ class DemoScenario(ABC, Generic[ClientT]):
 
     @property
     def left(self) -> bool:
-        """The user asked for the end."""
+        """The user requested the end."""
         return self._ending.is_set()
 
     def leave(self) -> bool:
-        """Ask for the end, from any thread.
+        """Request the end, from any thread.
 
         Returns:
             True when the robot moves: then the scenario brings it to rest before all is stopped.

@@ -31,7 +31,7 @@ class FakeDisplay:
 
 
 class FakeSupervisor:
-    """A supervisor that runs until it is asked to stop."""
+    """A supervisor that runs until a stop is requested."""
 
     def __init__(self, phase: Phase = Phase.RUNNING) -> None:
         self.phase = phase

@@ -12,7 +12,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 
 RESULT_TIMEOUT = 10.0
-"""Time in [s] that an ended goal is kept for who asks late, as by rcl; rclpy keeps it for 900."""
+"""Time in [s] that an ended goal is kept for late requests, as by rcl; rclpy keeps it for 900."""
 
 
 def serve_goals(

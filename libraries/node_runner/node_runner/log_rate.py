@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""How often one line of the code may log, so that a defect in a cycle floods nobody."""
+"""How often one line of the code may log, so that a defect in a cycle floods no log."""
 
 from __future__ import annotations
 

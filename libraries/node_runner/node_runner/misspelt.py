@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Names that nobody knows, because they are misspelt."""
+"""Unknown names that are misspelt."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def refuse_misspelt(node: Node, is_known: Callable[[str], bool] = lambda _: Fals
     Raises:
         ParameterError: There is one; the message says what was meant.
     """
-    given = node._parameter_overrides  # noqa: SLF001  # there is no public way to ask
+    given = node._parameter_overrides  # noqa: SLF001  # there is no public way to read it
     others = [name for name in given if not node.has_parameter(name)]
     elsewhere = [name for name in others if is_known(name)]
     unknown = [name for name in others if name not in elsewhere]
@@ -46,7 +46,7 @@ def refuse_similar(unknown: Iterable[str], known: Iterable[str]) -> None:
     """Refuse a name that looks like a known one.
 
     Args:
-        unknown: Names that nobody knows.
+        unknown: The unknown names.
         known: Names that there are.
 
     Raises:

@@ -109,7 +109,7 @@ class ParameterReader:
             former: Name that the parameter had.
             name: Name that it has.
         """
-        overrides = self._node._parameter_overrides  # noqa: SLF001  # no public way to ask
+        overrides = self._node._parameter_overrides  # noqa: SLF001  # no public way to read it
         given = overrides.pop(self._prefix + former, None)
         if given is not None:
             self._warn(f'parameter {self._prefix}{former} is called {self._prefix}{name} now')
@@ -123,7 +123,7 @@ class ParameterReader:
     def _given(self, name: str, default: object) -> tuple[str, object]:
         """Return the full name, and the value from outside or else the default."""
         name = self._prefix + name
-        given = self._node._parameter_overrides.get(name)  # noqa: SLF001  # no public way to ask
+        given = self._node._parameter_overrides.get(name)  # noqa: SLF001  # no public way to read it
         return name, default if given is None else given.value
 
     def _declare(

@@ -19,7 +19,7 @@ def declare_thread_priority(read: ParameterReader, default: int) -> int:
         'thread_priority',
         default,
         (0, PRIORITY_MAX),
-        'SCHED_FIFO priority of the thread of the cycle; 0 asks for none',
+        'SCHED_FIFO priority of the thread of the cycle; 0 for none',
     )
 
 

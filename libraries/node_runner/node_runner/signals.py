@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The end of a process: what signals ask for."""
+"""The end of a process by signals."""
 
 from __future__ import annotations
 

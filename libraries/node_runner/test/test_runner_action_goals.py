@@ -40,9 +40,9 @@ def test_a_goal_goes_on_after_its_callback_and_is_forgotten_after_its_end(
         assert caller.wait_for_server(TIMEOUT)  # type: ignore[no-untyped-call]
 
         def result_of(goal: Any) -> Any:
-            asked = goal.get_result_async()
-            client.spin_until(asked.done, TIMEOUT, 'a result')
-            return asked.result()
+            result = goal.get_result_async()
+            client.spin_until(result.done, TIMEOUT, 'a result')
+            return result.result()
 
         sent = caller.send_goal_async(LookupTransform.Goal())  # type: ignore[no-untyped-call]
         client.spin_until(sent.done, TIMEOUT, 'acceptance')

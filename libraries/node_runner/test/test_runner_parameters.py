@@ -59,7 +59,7 @@ def node_with(isolation: Isolation, *rules: str) -> Iterator[Node]:
     ],
 )
 def test_what_is_given_is_read(isolation: Isolation, rule: str, value: object) -> None:
-    """A value of the right kind is returned, and others that ask the node get it as well."""
+    """A value of the right kind is returned, and the node returns it to others as well."""
     name = rule.partition(':=')[0]
     with node_with(isolation, rule) as node:
         read = READS[name](ParameterReader(node))
@@ -73,7 +73,7 @@ def _many(value: Any) -> Any:
 
 
 def test_defaults_are_read_and_described(isolation: Isolation) -> None:
-    """Without a command line the defaults count; kind, range and meaning can be asked for."""
+    """Without a command line the defaults count; kind, range and meaning can be read."""
     with node_with(isolation) as node:
         read = ParameterReader(node, 'arm.')
         assert [each(read) for each in READS.values()] == [1.0, 1.0, 3, True, 'base', 1, (), ['a']]

@@ -17,7 +17,7 @@ from node_runner import notify_ready
 def test_readiness_is_reported_once(
     abstract: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """To a socket with a file or without one; programs that this one starts are not asked."""
+    """To a socket with a file or without one; not from programs that this one starts."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK) as supervisor:
         supervisor.bind('' if abstract else str(tmp_path / 'notify'))
         name = supervisor.getsockname()

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What signals ask for, in virtual time."""
+"""The end by signals, in virtual time."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""How long a key whose release nobody reports counts as held.
+"""How long a key whose release is not reported counts as held.
 
 A keyboard repeats a held key: once after a delay (250 ms to 660 ms, the user's setting), then
 every 20 ms to 50 ms. A terminal passes on the characters alone. So a key counts as held until its

@@ -55,7 +55,7 @@ class CommandStream(Generic[T]):
         return math.inf if self.is_idle else self._due
 
     def stop(self) -> None:
-        """Publish rests even if nothing moves: a person asked for a stop."""
+        """Publish rests even if nothing moves: a person requested a stop."""
         self._wanted, self._rests, self._due = None, RESTS, -math.inf
 
     def end(self) -> None:

@@ -35,7 +35,7 @@ class DeviceError(OperatorInputError, OSError):
 
 
 class PresetError(OperatorInputError, ValueError):
-    """No gamepad can be chosen by what was asked for.
+    """No gamepad can be chosen by preset or expression.
 
     Scenarios: a preset misspelt (the message lists what there is), a malformed expression.
     """

@@ -36,7 +36,7 @@ class ReleaseSource(Enum):
     """The keyboard itself, by evdev."""
 
     TIME_OUT = 'time-out'
-    """Nobody; a key is up when its next repeat is overdue."""
+    """No source; a key is up when its next repeat is overdue."""
 
 
 class Keyboard:
@@ -57,8 +57,8 @@ class Keyboard:
             path: Device of the terminal.
             devices: Input devices; those of this machine when it is None.
             environment: Shows whether the terminal is on this machine.
-            kitty: Ask the terminal for releases.
-            evdev: Ask this machine's keyboards for releases, if the terminal has none.
+            kitty: Use the releases that the terminal reports.
+            evdev: Use those of this machine's keyboards, if the terminal has none.
         """
         self._terminal = TerminalKeyboard(path, kitty=kitty)
         self._matcher = ReleaseMatcher()

@@ -18,18 +18,18 @@ from .requests import Note, Quit, Suspend
 from .session import Command, Command_co, LONGEST_WAIT, Session, Teleop
 from .terminal import StatusLine
 
-Asked = TypeVar('Asked')
-Asked_co = TypeVar('Asked_co', covariant=True)
+Request = TypeVar('Request')
+Request_co = TypeVar('Request_co', covariant=True)
 
 
-class KeyTeleop(Teleop[Command_co], Protocol[Command_co, Asked_co]):
-    """Decides what to publish, and what is asked for, by keys."""
+class KeyTeleop(Teleop[Command_co], Protocol[Command_co, Request_co]):
+    """Maps keys to commands and requests."""
 
-    def feed(self, event: KeyEvent) -> Iterable[Asked_co]:
-        """Take what happened to a key; return what the person asks for besides motion."""
+    def feed(self, event: KeyEvent) -> Iterable[Request_co]:
+        """Take what happened to a key; return the person's requests besides motion."""
 
 
-class KeyboardSession(Session[Command], Generic[Command, Asked]):
+class KeyboardSession(Session[Command], Generic[Command, Request]):
     """Keys, a status line, and Ctrl-Z.
 
     Attributes:
@@ -41,7 +41,7 @@ class KeyboardSession(Session[Command], Generic[Command, Asked]):
     def __init__(
         self,
         keyboard: Keyboard,
-        teleop: KeyTeleop[Command, Asked],
+        teleop: KeyTeleop[Command, Request],
         introduction: str,
         stop: threading.Event,
     ) -> None:
@@ -49,7 +49,7 @@ class KeyboardSession(Session[Command], Generic[Command, Asked]):
 
         Args:
             keyboard: Open keyboard.
-            teleop: Decides what to publish, and what is asked for.
+            teleop: Maps keys to commands and requests.
             introduction: What the person reads first.
             stop: Ends it.
         """
@@ -61,8 +61,8 @@ class KeyboardSession(Session[Command], Generic[Command, Asked]):
         self._introduction = introduction
 
     @abstractmethod
-    def handle(self, request: Asked) -> None:
-        """Do what the person asks for besides motion."""
+    def handle(self, request: Request) -> None:
+        """Handle a request besides motion."""
 
     @abstractmethod
     def show(self, now: float) -> None:
@@ -97,7 +97,7 @@ class KeyboardSession(Session[Command], Generic[Command, Asked]):
         self.show(time.monotonic())
         self.line.end()
 
-    def _do(self, request: Asked) -> None:
+    def _do(self, request: Request) -> None:
         match request:
             case Note(text):
                 self.line.say(text)

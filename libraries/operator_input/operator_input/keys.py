@@ -21,7 +21,7 @@ class KeyAction(Enum):
     """It went up."""
 
     TYPED = 'typed'
-    """It was pressed or repeated, which of both is not known; nobody will report its release."""
+    """It was pressed or repeated, which of both is not known; its release will not be reported."""
 
     ALL_RELEASED = 'all released'
     """Whatever was down counts as up: the window lost the focus, or the keyboard is gone."""

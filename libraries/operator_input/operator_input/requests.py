@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What a person at a terminal can ask of any program, besides moving the robot."""
+"""Requests of a person at a terminal to any program, besides motion."""
 
 from __future__ import annotations
 

@@ -29,9 +29,9 @@ class KeyboardSettings:
     """What the parameters say of the keyboard.
 
     Attributes:
-        auto_repeat: Time-outs of keys whose release nobody reports.
-        kitty: Ask the terminal for releases.
-        evdev: Ask this machine's keyboards for releases.
+        auto_repeat: Time-outs of keys whose release is not reported.
+        kitty: Use the releases that the terminal reports.
+        evdev: Use those of this machine's keyboards.
     """
 
     auto_repeat: AutoRepeat
@@ -57,8 +57,8 @@ def declare_keyboard(node: Node) -> KeyboardSettings:
     repeat = read.number('repeat_timeout', 0.15, (0.05, 1.0), 'time-out of its repeats [s]')
     return KeyboardSettings(
         AutoRepeat(max(first, repeat), repeat),
-        kitty=read.flag('kitty', 'ask the terminal for true key releases', default=True),
-        evdev=read.flag('evdev', "ask this machine's keyboards for them", default=True),
+        kitty=read.flag('kitty', 'true key releases from the terminal', default=True),
+        evdev=read.flag('evdev', "true key releases from this machine's keyboards", default=True),
     )
 
 

@@ -79,7 +79,7 @@ class Session(ABC, Generic[Command]):
 
     @abstractmethod
     def attend(self, now: float) -> None:
-        """Take what the robot says and ask what is to be asked, without waiting.
+        """Process answers of the robot and send requests to it, without waiting.
 
         Args:
             now: Time [s].

@@ -14,7 +14,7 @@ from .keyboard import Keyboard, ReleaseSource
 EXPLANATIONS = {
     ReleaseSource.TERMINAL: 'the terminal (Kitty protocol)',
     ReleaseSource.KEYBOARD: 'the keyboard itself (evdev)',
-    ReleaseSource.TIME_OUT: 'nobody: time-outs',
+    ReleaseSource.TIME_OUT: 'none: time-outs',
 }
 
 

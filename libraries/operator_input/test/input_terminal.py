@@ -22,7 +22,7 @@ _SEQUENCES = re.compile(rb'\x1b\[\?u|\x1b\[c|\x1b\[>(\d+)u|\x1b\[<u|\x1b\[5n|\x1
 
 
 class ScriptedTerminal:
-    """Answers what a program asks, as a terminal with or without the Kitty keyboard protocol.
+    """Answers requests of a program, as a terminal with or without the Kitty keyboard protocol.
 
     Attributes:
         path: Device that the program opens.

@@ -248,7 +248,7 @@ def test_other_devices_are_left_alone(other: InjectedDevice) -> None:
 
 
 def test_other_devices_are_not_opened_every_second() -> None:
-    """Opening a device wakes it; what is no gamepad is left alone for a while, not for ever."""
+    """Opening a device wakes it; what is no gamepad is left alone for a while only."""
     mouse = InjectedDevice('Mouse', {0x110})
     devices = InjectedDevices(mouse)
     gamepad = Gamepad(devices)

@@ -44,7 +44,7 @@ def test_terminal_without_the_protocol() -> None:
 
 @pytest.mark.parametrize('got', [Kitty.DISAMBIGUATE, Kitty.EVENT_TYPES, Kitty.ALL_KEYS])
 def test_half_a_protocol_is_none(got: Kitty) -> None:
-    """A terminal that does not report the releases of letters is asked to go back."""
+    """A terminal that does not report the releases of letters gets the protocol switched off."""
     negotiation = KittyNegotiation()
     negotiation.start()
     negotiation.take(flags(0))

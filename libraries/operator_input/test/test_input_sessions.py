@@ -76,9 +76,9 @@ class Keys:
         self._held.feed(event)
         if not event.is_stroke:
             return []
-        asked: dict[str, str | Note | Quit | Suspend]
-        asked = {'q': Quit(), '?': Note('nobody helps'), 'z': Suspend(), 'a': 'ask'}
-        return [asked[event.key]] if event.key in asked else []
+        requests: dict[str, str | Note | Quit | Suspend]
+        requests = {'q': Quit(), '?': Note('nobody helps'), 'z': Suspend(), 'a': 'request'}
+        return [requests[event.key]] if event.key in requests else []
 
     def step(self, now: float) -> str | None:
         """Publish the held key."""
@@ -163,7 +163,7 @@ def test_a_key_moves_as_long_as_it_is_held() -> None:
         terminal.key('i', 3)
         record.wait_for(lambda commands: commands[-RESTS:] == ['rest'] * RESTS)
         terminal.send('a?')
-        record.wait_for(lambda commands: commands[-1] == 'ask')
+        record.wait_for(lambda commands: commands[-1] == 'request')
         terminal.wait_written(b'nobody helps')
         terminal.send('q')
         thread.join(TIMEOUT)

@@ -171,7 +171,7 @@ def test_live_line_keeps_the_held_key() -> None:
 
 
 def test_closed_window_is_reported() -> None:
-    """Reading from a window that was closed raises, instead of waiting for ever."""
+    """Reading from a window that was closed raises, instead of blocking."""
     with (
         ScriptedTerminal(kitty=False) as terminal,
         TerminalKeyboard(terminal.path) as keyboard,
@@ -275,7 +275,7 @@ def test_unplugged_keyboard_lets_go() -> None:
     assert device.is_closed
 
 
-def test_keyboards_are_not_asked_over_ssh() -> None:
+def test_keyboards_are_not_read_over_ssh() -> None:
     """A person elsewhere is not at this machine's keyboard, which stays unopened."""
     device = InjectedDevice('AT keyboard', {KEY_Q, KEY_I, KEY_SPACE})
     with (

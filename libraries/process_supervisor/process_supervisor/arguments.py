@@ -20,7 +20,7 @@ def seconds_from(least: float, *, finite: bool = True) -> Callable[[str], float]
 
     Args:
         least: The shortest in [s]; 0 means anything above.
-        finite: Refuse ``inf``, which waits for ever.
+        finite: Refuse ``inf``, which waits without limit.
     """
 
     def read(text: str) -> float:
@@ -47,7 +47,7 @@ def add_timeout(parser: argparse.ArgumentParser) -> None:
         metavar='S',
         type=seconds_from(0.0, finite=False),
         default=30.0,
-        help='longest time until all is ready in [s]; inf waits for ever (default: %(default)s)',
+        help='longest time until all is ready in [s]; inf for no limit (default: %(default)s)',
     )
 
 

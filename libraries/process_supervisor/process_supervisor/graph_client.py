@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""A ROS client that waits: for programs that ask running nodes for something, step by step.
+"""A ROS client that waits: for programs that call running nodes, step by step.
 
 This module is not imported by the package: it loads rclpy, which a mere bring-up does not need.
 """
@@ -66,7 +66,7 @@ class GraphClient:
         """Wait for something.
 
         Args:
-            condition: True when it is there; asked after whatever comes in.
+            condition: True when it is there; checked after whatever comes in.
             timeout: Longest time in [s].
             what: What is waited for, for the message.
 

@@ -40,7 +40,7 @@ class Guardian:
     """What the guardian knows: the processes, by name, and how to stop them."""
 
     def __init__(self) -> None:
-        """Begin with nobody."""
+        """Begin with none."""
         self._pidfds: dict[str, int] = {}
         self._pids: dict[str, int] = {}
         self._sequence = StopSequence(self._send)

@@ -55,7 +55,7 @@ class ServiceManager:
         self._reported = ''
 
     def report(self, state: str) -> None:
-        """Report a state, if somebody waits for it; the same one again is no news.
+        """Report a state, if there is a service manager, once.
 
         Args:
             state: One of sd_notify(3), such as ``READY=1``.

@@ -29,10 +29,10 @@ CHUNK = 65536
 """Bytes read from a pipe at once."""
 
 LAST_CHUNKS = 64
-"""How often a pipe is read after its process has ended; what it left behind may write for ever."""
+"""How often a pipe is read after its process has ended; what it left behind may go on."""
 
 LEAVE_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-"""Signals that ask the supervisor to leave."""
+"""Signals that end the supervisor."""
 
 
 class _Child:
@@ -173,7 +173,7 @@ class Runner:
         return self._supervision.outcome or Outcome(0, 'nothing was to be run')
 
     def stop(self, outcome: Outcome) -> None:
-        """Ask for an orderly end, from any thread.
+        """Request an orderly end, from any thread.
 
         Args:
             outcome: Why, unless something else has already ended it.

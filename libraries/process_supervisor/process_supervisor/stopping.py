@@ -31,7 +31,7 @@ class StopSequence:
     """
 
     def __init__(self, send: Callable[[str, Signals], None]) -> None:
-        """Begin with nobody to stop.
+        """Begin with no process to stop.
 
         Args:
             send: Sends a signal to the process of that name.
@@ -52,7 +52,7 @@ class StopSequence:
 
     @property
     def finished(self) -> bool:
-        """Nobody is left."""
+        """No process is left."""
         return not self._members
 
     @property

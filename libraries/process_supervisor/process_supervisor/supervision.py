@@ -23,7 +23,7 @@ ECHO_TIME = 0.5
 a process and to its group."""
 
 GOOD_ENDS = (0, -Signals.SIGINT, -Signals.SIGTERM)
-"""Return codes of a process that did what it was asked to when it was stopped."""
+"""Return codes of a process that ended as it should when it was stopped."""
 
 
 class Phase(Enum):
@@ -62,7 +62,7 @@ class Outcome:
     """How a supervision ended.
 
     Attributes:
-        exit_code: 0 when it ended because it was asked to.
+        exit_code: 0 when it ended on request.
         reason: Why it ended.
         process: The process that ended it, empty when none did.
         last_lines: What that process wrote last.
@@ -108,7 +108,7 @@ class Supervision:
             start: Starts one; raises :class:`.StartError` when that is not possible.
             send: Sends a signal to a running one.
             notify: Shows the user a notice.
-            on_interrupt: Asked at the first interrupt before everything is stopped; true when it
+            on_interrupt: Called at the first interrupt before everything is stopped; true when it
                 takes care of stopping, false or None to stop at once.
             on_phase: Called when another phase begins.
 

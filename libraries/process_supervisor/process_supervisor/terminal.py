@@ -24,7 +24,7 @@ SEVERITY_COLOURS = {Severity.WARNING: YELLOW, Severity.ERROR: RED}
 """Colours of notices."""
 
 ROS_SEVERITY = re.compile(r'^\[(DEBUG|INFO|WARN|ERROR|FATAL)\]')
-"""Severity at the start of a line of rcutils logging, in the format that the bring-up asks for."""
+"""Severity at the start of a line of rcutils logging, in the format that the bring-up sets."""
 
 SEVERITIES = {
     'DEBUG': Severity.INFO,
@@ -112,7 +112,7 @@ class Painter:
 
 
 class LineWriter:
-    """Writes lines at once; goes on silently when nobody can read them any more."""
+    """Writes lines at once; goes on silently when their reader is gone."""
 
     def __init__(self, stream: TextIO) -> None:
         """Write to a stream.

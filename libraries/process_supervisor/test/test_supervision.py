@@ -171,19 +171,19 @@ def test_an_echo_of_an_interrupt_kills_nobody() -> None:
 
 def test_the_first_interrupt_can_be_taken_over() -> None:
     """Then its echo does nothing either; the next interrupt stops, and the one after it kills."""
-    asked: list[int] = []
+    calls: list[int] = []
 
     def take() -> bool:
-        asked.append(1)
+        calls.append(1)
         return True
 
     bench = Bench(MASTER, on_interrupt=take)
     bench.supervision.interrupt(5.0)
     bench.supervision.interrupt(5.003)
-    assert (asked, bench.sent) == ([1], [])
+    assert (calls, bench.sent) == ([1], [])
     bench.supervision.interrupt(6.0)
     bench.supervision.interrupt(6.003)
-    assert (asked, bench.sent) == ([1], [('master', Signals.SIGTERM)])
+    assert (calls, bench.sent) == ([1], [('master', Signals.SIGTERM)])
     bench.supervision.interrupt(7.0)
     assert bench.sent[-1] == ('master', Signals.SIGKILL)
 

@@ -177,7 +177,7 @@ def test_stop_works_from_another_thread() -> None:
 
 
 def test_the_first_ctrl_c_can_be_taken_over() -> None:
-    """Then nothing is stopped until the one who took it asks."""
+    """Then nothing is stopped until the one who took it stops them."""
 
     def notify(notice: Notice) -> None:
         if notice.text.startswith('all is ready'):

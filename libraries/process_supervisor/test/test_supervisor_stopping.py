@@ -58,7 +58,7 @@ deaths = st.tuples(
 
 
 @given(st.dictionaries(names, st.tuples(st.integers(0, 2), deaths), min_size=1))
-def test_lower_orders_are_gone_before_higher_ones_are_asked(
+def test_lower_orders_are_gone_before_higher_ones_are_signalled(
     plan: dict[str, tuple[int, tuple[Signals | None, float]]],
 ) -> None:
     """No process gets a signal while one of a lower order is there, and all are dealt with."""

@@ -31,7 +31,7 @@ class Outcome(NamedTuple):
 
     Attributes:
         granted: Whether the system has granted it.
-        text: The outcome in words; empty when nothing was asked for.
+        text: The outcome in words; empty when nothing was requested.
     """
 
     granted: bool
@@ -42,7 +42,7 @@ def raise_priority(priority: int, what: str) -> Outcome:
     """Give the calling thread a real-time priority; threads that it starts do not inherit it.
 
     Args:
-        priority: SCHED_FIFO priority; 0 asks for none.
+        priority: SCHED_FIFO priority; 0 for none.
         what: What the thread does, for the words.
     """
     if not priority:

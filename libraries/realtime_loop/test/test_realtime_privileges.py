@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Priority and memory: asked of the kernel in a process of its own, which may have them or not."""
+"""Priority and memory: requested in a process of its own, which may get them or not."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def test_what_is_refused_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> 
     assert '\n' not in outcome.text
 
 
-def test_none_is_asked_for() -> None:
+def test_none_is_requested() -> None:
     """Priority 0 leaves the thread alone, and says nothing."""
     before = os.sched_getscheduler(0)
     assert raise_priority(0, 'the cycle').text == ''

@@ -116,7 +116,7 @@ def _several_directions(group: str, joint: str, kind: str) -> str:
 
 def _check_range(joint: Joint) -> None:
     span = joint.range
-    if not (span.lower < span.upper and span.velocity >= 0.0):  # 0: nobody gives it
+    if not (span.lower < span.upper and span.velocity >= 0.0):  # 0: not given
         raise DescriptionError(
             f'joint {joint.name}: <limit> {span.lower:g}..{span.upper:g} at {span.velocity:g}'
             ' is empty'

@@ -59,7 +59,7 @@ class SemanticDescription:
         poses: Positions in [rad] or [m] by joint, by pose, by group.
         disabled: Pairs of links that need no collision check.
         unchecked: Links that need none with any other (``disable_default_collisions``).
-        enabled: Pairs of them that are checked all the same (``enable_collisions``).
+        enabled: Pairs of them that are checked nevertheless (``enable_collisions``).
         end_effectors: Tools at the ends of arms.
         passive: Joints without an actuator (``passive_joint``).
         virtual: Types of the joints between the world and the robot (``virtual_joint``), by name:

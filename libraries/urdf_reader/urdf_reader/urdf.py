@@ -3,7 +3,7 @@
 """The kinematic tree of a URDF: links and their shapes, joints, and which joints follow others.
 
 Format: http://wiki.ros.org/urdf/XML. Links, joints and their origins are checked at once, limits
-and collision shapes when they are asked for: a viewer does without.
+and collision shapes when they are read: a viewer does without.
 """
 
 from __future__ import annotations

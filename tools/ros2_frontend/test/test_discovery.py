@@ -26,7 +26,7 @@ class FakeView:
     domain_id: int = 0
     looks: int = 0
     changes: int = 0
-    asked_topics: list[str] = field(default_factory=list)
+    read_topics: list[str] = field(default_factory=list)
 
     def topics(self, hidden: bool = False) -> NamesAndTypes:
         """The topics."""
@@ -34,7 +34,7 @@ class FakeView:
 
     def publishers(self, topic: str) -> list[Endpoint]:
         """The endpoints."""
-        self.asked_topics.append(topic)
+        self.read_topics.append(topic)
         return [
             SimpleNamespace(node_name=node, endpoint_gid=[participant] * 16)
             for participant, node in self.publishing.get(topic, [])
@@ -75,7 +75,7 @@ def test_census_sees_participants_without_rosout_and_saves_work() -> None:
     """Other topics are looked at only when someone is missing."""
     view = FakeView({'/rosout': [(1, 'a')], '/x': [(2, 'b')], '/y': [(3, 'c')]})
     assert take_census(view, ports(2)).missing == 0
-    assert '/y' not in view.asked_topics
+    assert '/y' not in view.read_topics
 
 
 def test_census_counts_endpoints_of_unknown_nodes() -> None:

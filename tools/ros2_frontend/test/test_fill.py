@@ -145,7 +145,7 @@ def test_a_request_without_fields_says_so() -> None:
 
 
 def test_stamps_can_be_left_to_the_moment_of_sending() -> None:
-    """`auto` and `now` become setters, when asked for."""
+    """`auto` and `now` become setters, when requested."""
     message, filler = JointState(), Filler(expand_now=True)
     filler.fill(message, {'header': 'auto', 'name': ['a']})
     (set_stamp,) = filler.stamps

@@ -153,7 +153,7 @@ def test_topic_type_of_an_unknown_topic(ros2: Ros2) -> None:
 
 
 def test_topic_type_of_a_hidden_topic_needs_the_switch(ros2: Ros2) -> None:
-    """Hidden topics are unknown unless asked for."""
+    """Hidden topics are unknown by default."""
     assert ros2('topic', 'type', '/_hidden_chatter', '--spin-time', '0.2').code == 1
     assert ros2('topic', '--include-hidden-topics', 'type', '/_hidden_chatter').code == 0
 

@@ -91,7 +91,7 @@ def test_disposal_names_the_same_participant() -> None:
     assert inline[0x71] == bytes((0, 0, 0, 3))
 
 
-def test_an_inquiry_asks_all_others_and_takes_it_back() -> None:
+def test_an_inquiry_reaches_all_others_and_is_taken_back() -> None:
     """Each other port gets an announcement, and in the end the disposal of the same GUID."""
     with (
         socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as one,
@@ -102,17 +102,17 @@ def test_an_inquiry_asks_all_others_and_takes_it_back() -> None:
             receiver.settimeout(5.0)
         others = frozenset(receiver.getsockname()[1] for receiver in (one, two))
         inquiry = Inquiry()
-        inquiry.ask(DiscoveryPorts(frozenset({7410}), others))
-        asked = [receiver.recv(1000) for receiver in (one, two)]
+        inquiry.send(DiscoveryPorts(frozenset({7410}), others))
+        announced = [receiver.recv(1000) for receiver in (one, two)]
         inquiry.close()
         closed = [receiver.recv(1000) for receiver in (one, two)]
-    assert asked[0] == asked[1]
-    assert closed[0][8:20] == asked[0][8:20]
+    assert announced[0] == announced[1]
+    assert closed[0][8:20] == announced[0][8:20]
     assert closed[0][21] & 0x08  # with the key, not with data
 
 
-def test_nobody_is_asked_without_a_port_of_our_own() -> None:
+def test_nothing_is_sent_without_a_port_of_our_own() -> None:
     """Without procfs there is nowhere to answer to."""
     inquiry = Inquiry()
-    inquiry.ask(DiscoveryPorts(frozenset(), frozenset({os.getpid() % 1000 + 1})))
+    inquiry.send(DiscoveryPorts(frozenset(), frozenset({os.getpid() % 1000 + 1})))
     inquiry.close()

@@ -15,7 +15,7 @@ NAMES = st.lists(st.from_regex(r'/[a-z_]{1,8}(/[a-z_]{1,8})?', fullmatch=True), 
 
 @given(NAMES, st.text(max_size=8))
 def test_only_known_names_come_once_and_few(known: list[str], name: str) -> None:
-    """Whatever is asked, the answers are a few of the known names."""
+    """For any name, the answers are a few of the known names."""
     found = nearest(name, known)
     assert len(found) <= 3
     assert len(set(found)) == len(found)

@@ -12,7 +12,7 @@ _SSH = ('SSH_CONNECTION', 'SSH_TTY', 'SSH_CLIENT')
 
 def is_local(
     environment: Mapping[str, str],
-    ask_tmux: Callable[[], str] | None = None,
+    read_tmux: Callable[[], str] | None = None,
 ) -> bool:
     """Say whether keys come from a keyboard of this machine.
 
@@ -20,17 +20,17 @@ def is_local(
 
     Args:
         environment: Variables of this process.
-        ask_tmux: Returns tmux's record of SSH_CONNECTION; replaced in tests.
+        read_tmux: Returns tmux's record of SSH_CONNECTION; replaced in tests.
     """
     if environment.get('STY'):  # screen does not say who is attached
         return False
     if environment.get('TMUX'):
-        answer = (ask_tmux or _ask_tmux)()
+        answer = (read_tmux or _read_tmux)()
         return answer.startswith('-SSH_CONNECTION')
     return not any(environment.get(name) for name in _SSH)
 
 
-def _ask_tmux() -> str:
+def _read_tmux() -> str:
     try:
         return subprocess.run(
             ['tmux', 'show-environment', 'SSH_CONNECTION'],

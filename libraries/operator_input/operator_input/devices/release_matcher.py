@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Finds out when a key that was typed in a terminal goes up, from what the keyboard itself says.
 
-The keyboard knows nothing of windows and layouts, so it is never asked what was pressed: that
+The keyboard knows nothing of windows and layouts, so it is never read for what was pressed: that
 comes from the terminal, which has the focus. A character belongs to the key that went down just
 before it (or just after, when the two reports overtake each other); that key going up is its
 release. This is right for every layout, and what is typed elsewhere is never taken for a command.
@@ -39,7 +39,7 @@ class ReleaseMatcher:
         """
         if code in MODIFIERS:
             return []
-        # a second keyboard may have the same key down; then nobody knows whose character it was
+        # a second keyboard may have the same key down; then the origin of the character is unknown
         events = self.key_up(code, now) if code in self._matched else []
         self._down[code] = now
         typed, self._last_typed = self._last_typed, None

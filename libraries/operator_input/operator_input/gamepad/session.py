@@ -36,7 +36,7 @@ class GamepadSession(Session[Command]):
 
     @abstractmethod
     def take(self, state: GamepadState) -> None:
-        """Hand a state of the gamepad on, and do what is asked for besides motion."""
+        """Hand a state of the gamepad on, and handle requests besides motion."""
 
     @abstractmethod
     def warn(self, text: str) -> None:
@@ -70,6 +70,6 @@ class GamepadSession(Session[Command]):
         self.attend(time.monotonic())
 
     def end(self) -> None:
-        """Publish the last rests; nobody is listened to any more."""
+        """Publish the last rests; nothing is read any more."""
         self._gamepad.close()
         super().end()

@@ -46,7 +46,7 @@ class TerminalKeyboard:
 
         Args:
             path: Device of the terminal.
-            kitty: Ask for the Kitty keyboard protocol.
+            kitty: Request the Kitty keyboard protocol.
             clock: Returns the time [s].
         """
         self._path = path
@@ -110,7 +110,7 @@ class TerminalKeyboard:
         return PERIOD if self._decoder.is_holding else 60.0
 
     def __enter__(self) -> Self:
-        """Open the terminal and ask it."""
+        """Open the terminal and negotiate with it."""
         self._line = TerminalLine(self._path)
         self._begin()
         return self
@@ -165,7 +165,7 @@ class TerminalKeyboard:
             self.line.write(answer)
 
     def _check_line(self, now: float) -> list[KeyEvent]:
-        """Ask for a sign of life while a key is held, and let go when there is none."""
+        """Probe the terminal while a key is held, and let go when it is silent."""
         if not self._decoder.is_holding:
             return []
         if self._liveness.is_lost(now):

@@ -3,7 +3,7 @@
 """Notices that a terminal is gone while a key is held.
 
 A key whose release the terminal reports is held until then. Should the line to the terminal stall,
-the report never comes; so the terminal is asked for a sign of life as long as a key is held.
+the report never comes; so the terminal is probed as long as a key is held.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ TIMEOUT = 1.0  # [s] without any sign
 
 
 class Liveness:
-    """When to ask, and when to give up; pure, time is handed in."""
+    """When to probe, and when to give up; pure, time is handed in."""
 
     def __init__(self) -> None:
-        self._asked = 0.0  # [s] when the last probe was sent
+        self._probed = 0.0  # [s] when the last probe was sent
         self._unanswered_since: float | None = None
 
     def received(self) -> None:
@@ -35,9 +35,9 @@ class Liveness:
         Args:
             now: Time [s].
         """
-        if now - self._asked < PERIOD:
+        if now - self._probed < PERIOD:
             return False
-        self._asked = now
+        self._probed = now
         if self._unanswered_since is None:
             self._unanswered_since = now
         return True

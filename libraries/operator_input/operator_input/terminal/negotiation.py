@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Asks a terminal for true key releases, and makes sure that it means what it answers.
+"""Requests true key releases of a terminal, and verifies its answer.
 
 A terminal with the Kitty keyboard protocol answers ``CSI ? u``; every terminal answers ``CSI c``.
 If the second answer comes without the first, there is no such protocol. Nothing waits for either:
@@ -27,7 +27,7 @@ class Stage(Enum):
     """How far the negotiation is."""
 
     IDLE = 'idle'
-    ASKED = 'asked'
+    REQUESTED = 'requested'
     PUSHED = 'switched on, not confirmed'
     ACTIVE = 'active'
     ABSENT = 'absent'
@@ -51,7 +51,7 @@ class KittyNegotiation:
 
     def start(self) -> str:
         """Return the question."""
-        self.stage = Stage.ASKED
+        self.stage = Stage.REQUESTED
         self._attributes_due += 1
         return QUERY
 
@@ -76,7 +76,7 @@ class KittyNegotiation:
         return POP if was in {Stage.PUSHED, Stage.ACTIVE} else ''
 
     def _flags(self, flags: Kitty) -> str:
-        if self.stage is Stage.ASKED:
+        if self.stage is Stage.REQUESTED:
             self.stage = Stage.PUSHED
             self._attributes_due += 1
             return PUSH + QUERY
@@ -90,7 +90,7 @@ class KittyNegotiation:
 
     def _attributes(self) -> str:
         self._attributes_due = max(self._attributes_due - 1, 0)
-        if self._attributes_due or self.stage not in {Stage.ASKED, Stage.PUSHED}:
+        if self._attributes_due or self.stage not in {Stage.REQUESTED, Stage.PUSHED}:
             return ''  # an answer to the first of two questions, or all is settled
         was, self.stage = self.stage, Stage.ABSENT
         return POP if was is Stage.PUSHED else ''

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What a terminal answers when it is asked."""
+"""Answers of a terminal."""
 
 from __future__ import annotations
 

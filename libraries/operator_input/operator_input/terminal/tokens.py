@@ -141,7 +141,7 @@ class Tokenizer:
 
     def _string(self, character: str) -> Token | None:
         self._length += 1
-        if character == ESC:  # of ST, whose second half then is an Alt key that nobody has
+        if character == ESC:  # of ST, whose second half then is an Alt key that no keyboard has
             self._state = _State.ESCAPE
         elif character == '\a' or self._length > _LONGEST_SEQUENCE:
             self._state = _State.GROUND

@@ -21,7 +21,7 @@ class FrontendError(RuntimeError):
 
 
 class UnknownNameError(FrontendError, LookupError):
-    """Nothing has the name that was asked for, e.g. ``topic info /chater``."""
+    """Nothing has the name that was given, e.g. ``topic info /chater``."""
 
 
 class BadTypeError(FrontendError, TypeError):

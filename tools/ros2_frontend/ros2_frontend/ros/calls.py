@@ -28,7 +28,7 @@ class Client:
         """Look for a service.
 
         Args:
-            session: The session whose node asks.
+            session: The session whose node calls.
             service_type: The generated class of the service.
             name: Its name.
         """
@@ -44,7 +44,7 @@ class Client:
         """Wait until the service is there.
 
         Args:
-            timeout: Longest time [s]; None waits for ever.
+            timeout: Longest time [s]; None waits without limit.
 
         Returns:
             Whether it is.
@@ -62,7 +62,7 @@ class Client:
 
         Args:
             request: The request.
-            timeout: Longest time [s] to wait for the answer; None waits for ever.
+            timeout: Longest time [s] to wait for the answer; None waits without limit.
 
         Returns:
             The response.
@@ -83,7 +83,7 @@ def call(session: Session, type_name: str, name: str, **fields: object) -> Messa
     """Call a service that a node is known to offer.
 
     Args:
-        session: The session whose node asks.
+        session: The session whose node calls.
         type_name: The service's type, e.g. `rcl_interfaces/srv/GetParameters`.
         name: The service's name.
         fields: The fields of the request.

@@ -5,8 +5,8 @@
 There is no daemon: each command joins the graph anew. Where ros2cli waits a fixed 0.5 s, which is
 too long most of the time and too short now and then, this waits for what it needs: a name, or a
 complete view. Complete is a view with every participant of this host, with the name of the node of
-every endpoint, and without a change for a moment. Participants that are missing are asked to speak
-up (`spdp`).
+every endpoint, and without a change for a moment. Missing participants are made to announce
+themselves (`spdp`).
 """
 
 from __future__ import annotations
@@ -76,10 +76,10 @@ class WaitLimits:
         """For a command that wants all there is.
 
         Args:
-            spin_time: What the user asked for [s], or None.
+            spin_time: What the user set [s], or None.
 
         Returns:
-            The limits; never beyond what the user asked for.
+            The limits; never beyond what the user set.
         """
         quiet = _QUIET_FOR_LISTS if is_this_host(os.environ) else _QUIET_FOR_NETWORK
         return cls(_LIMIT if spin_time is None else spin_time, quiet)
@@ -89,10 +89,10 @@ class WaitLimits:
         """For a command that wants one name, which may be about to appear.
 
         Args:
-            spin_time: What the user asked for [s], or None.
+            spin_time: What the user set [s], or None.
 
         Returns:
-            The limits; all that the user asked for.
+            The limits; all that the user set.
         """
         return cls(_LIMIT, _QUIET_FOR_NAMES) if spin_time is None else cls(spin_time, spin_time)
 
@@ -155,7 +155,7 @@ def wait(look: Callable[[], T | None], graph: Endpoints, limits: WaitLimits) -> 
         What `look` found, or None.
     """
     start = changed = time.monotonic()
-    asked = start - _INQUIRY_PERIOD
+    sent = start - _INQUIRY_PERIOD
     before: Hashable = None
     with closing(Inquiry()) as inquiry:
         while True:
@@ -165,9 +165,9 @@ def wait(look: Callable[[], T | None], graph: Endpoints, limits: WaitLimits) -> 
                 return found
             ports, view = read_ports(graph.domain_id), graph.view()
             census = take_census(graph, ports)
-            if census.missing and now - asked >= _INQUIRY_PERIOD:
-                inquiry.ask(ports)
-                asked = now
+            if census.missing and now - sent >= _INQUIRY_PERIOD:
+                inquiry.send(ports)
+                sent = now
             quiet = limits.quiet if ports.own else max(limits.quiet, _QUIET_FOR_NETWORK)
             if census.missing or census.unnamed or view != before:
                 before, changed = view, now

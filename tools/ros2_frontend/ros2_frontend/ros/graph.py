@@ -141,7 +141,7 @@ class Graph:
 
         Args:
             look: Answers what was looked for, or None as long as it is not there.
-            timeout: Longest time [s]; None waits for ever.
+            timeout: Longest time [s]; None waits without limit.
 
         Returns:
             What `look` found; None only after `timeout`.

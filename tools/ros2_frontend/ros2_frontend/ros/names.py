@@ -50,7 +50,7 @@ class NodeName:
 
     @property
     def hidden(self) -> bool:
-        """Whether tools leave the node out unless asked (REP-144 style leading underscore)."""
+        """Whether tools leave the node out by default (REP-144 style leading underscore)."""
         return self.name.startswith('_')
 
 

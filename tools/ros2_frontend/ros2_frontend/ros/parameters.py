@@ -119,7 +119,7 @@ def list_names(session: Session, node: NodeName, prefixes: Sequence[str] = ()) -
     """The names of a node's parameters.
 
     Args:
-        session: The session whose node asks.
+        session: The session whose node calls.
         node: The node.
         prefixes: Only those below one of these; all when empty.
 
@@ -139,7 +139,7 @@ def get_values(session: Session, node: NodeName, names: Iterable[str]) -> list[M
     """The values of some parameters of a node.
 
     Args:
-        session: The session whose node asks.
+        session: The session whose node calls.
         node: The node.
         names: The parameters' names.
 
@@ -158,7 +158,7 @@ def set_values(session: Session, node: NodeName, parameters: Iterable[Message]) 
     """Set some parameters of a node, each by itself.
 
     Args:
-        session: The session whose node asks.
+        session: The session whose node calls.
         node: The node.
         parameters: `rcl_interfaces/msg/Parameter`.
 
@@ -177,7 +177,7 @@ def describe(session: Session, node: NodeName, names: Iterable[str]) -> list[Mes
     """The descriptions of some parameters of a node.
 
     Args:
-        session: The session whose node asks.
+        session: The session whose node calls.
         node: The node.
         names: The parameters' names.
 

@@ -85,7 +85,7 @@ def _help(what: str, verb: str, value: str, default: object) -> str:
 
 
 def profile_of(args: Namespace) -> QosProfile:
-    """The profile that the options ask for.
+    """The profile that the options set.
 
     Args:
         args: Parsed arguments of `add_qos_arguments`.

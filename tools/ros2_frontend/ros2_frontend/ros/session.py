@@ -52,7 +52,7 @@ class Session:
 
         Args:
             done: The condition; it is looked at after every callback.
-            timeout: Longest time [s]; None waits for ever.
+            timeout: Longest time [s]; None waits without limit.
 
         Returns:
             Whether the condition holds.

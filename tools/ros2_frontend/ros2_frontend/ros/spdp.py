@@ -123,28 +123,28 @@ def _ipv4(address: str) -> bytes:
 
 
 class Inquiry:
-    """Asks participants to announce themselves, and takes the question back in the end."""
+    """Makes participants announce themselves, and takes its announcement back in the end."""
 
     def __init__(self) -> None:
-        """Ask nobody yet."""
-        self._asked: list[tuple[ProbeParticipant, frozenset[int]]] = []
+        """Send nothing yet."""
+        self._sent: list[tuple[ProbeParticipant, frozenset[int]]] = []
 
-    def ask(self, ports: DiscoveryPorts) -> None:
-        """Ask everybody else on this host; the answers go to our own participant.
+    def send(self, ports: DiscoveryPorts) -> None:
+        """Announce a participant on this host; the answers go to our own participant.
 
         Args:
             ports: Where all of them listen.
         """
         for own in sorted(ports.own)[:1]:
             probe = ProbeParticipant(os.urandom(_PREFIX_SIZE), own)
-            self._asked.append((probe, ports.others))
+            self._sent.append((probe, ports.others))
             _send(probe.announcement(), ports.others)
 
     def close(self) -> None:
-        """Let everybody forget the participant that asked."""
-        for probe, ports in self._asked:
+        """Let everybody forget the participant."""
+        for probe, ports in self._sent:
             _send(probe.disposal(), ports)
-        self._asked.clear()
+        self._sent.clear()
 
 
 def _send(message: bytes, ports: frozenset[int]) -> None:

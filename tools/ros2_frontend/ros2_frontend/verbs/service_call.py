@@ -45,7 +45,7 @@ _GRACE = 0.02  # [s]; ros2cli, too, says nothing when the service is there at on
         metavar='N',
         type=positive_float,
         help='Longest time [s] to wait for the service, and then for its answer '
-        '(default: for ever)',
+        '(default: without limit)',
     ),
 )
 def call(args: Namespace) -> None:
