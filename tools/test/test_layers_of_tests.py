@@ -13,7 +13,11 @@ import pytest
 tomllib = pytest.importorskip('tomllib')
 
 ROOT = Path(__file__).parents[2]
-SHIPPED_ROBOTS = {'arm_servo/bench/servo_arms.py', 'arm_model/test/model_robots.py'}
+SHIPPED_ROBOTS = {
+    'arm_model/bench/bench_distances.py',
+    'arm_model/test/model_robots.py',
+    'arm_servo/bench/servo_arms.py',
+}
 """Files that find the robots of arm_bringup as data."""
 
 
