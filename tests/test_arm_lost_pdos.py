@@ -115,7 +115,7 @@ def test_a_silent_joint_stops_the_arm_on_its_path(mode: OperationMode, every: bo
     'mode', [OperationMode.CYCLIC_POSITION, OperationMode.INTERPOLATED_POSITION]
 )
 def test_a_joint_without_set_points_stops_the_arm(mode: OperationMode) -> None:
-    """It stands at once; the others stop on the path, and nothing jumps when it hears again."""
+    """It stands at once; the others stop on the path, and nothing jumps when it receives again."""
     arm = Arm(mode)
     arm.lose(RPDOS, LOST)
     arm.net.run(TIME_OUT + STOP_TIME)

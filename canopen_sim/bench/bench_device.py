@@ -41,7 +41,7 @@ NONE, VELOCITY, CYCLIC = 0, 3, 8
 
 
 class Network:
-    """Seven drives, and a master that sends what it is told to."""
+    """Seven drives, and a master that sends what it is given."""
 
     def __init__(self) -> None:
         """Boot and configure them."""

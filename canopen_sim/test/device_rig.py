@@ -142,7 +142,7 @@ class Rig:
         self.send(0x080)
 
     def nmt(self, command: NmtCommand, node_id: int | None = None) -> None:
-        """Send an NMT command, to the device unless told otherwise."""
+        """Send an NMT command, to the device unless another id is given."""
         self.send(0, nmt_frame(command, self.node_id if node_id is None else node_id))
 
     def take(self, can_id: int | None = None) -> list[bytes]:

@@ -31,7 +31,7 @@ from arm_canopen.exceptions import (
 )
 
 EDS = Path(__file__).parents[2] / 'arm_canopen' / 'eds' / 'cia402_drive.eds'
-PATIENCE = 30.0  # [s]
+TIMEOUT = 30.0  # [s]
 BUS_YML = f"""
 master:
   node_id: 1
@@ -96,7 +96,7 @@ def program(*argv: str | Path) -> Iterator[subprocess.Popen[str]]:
             yield process
         finally:
             process.terminate()
-            process.wait(PATIENCE)
+            process.wait(TIMEOUT)
 
 
 @pytest.fixture
@@ -110,7 +110,7 @@ def drives(bus_yml: Path, bus: str) -> Iterator[subprocess.Popen[str]]:
 def master(drives: object, bus_yml: Path, bus: str) -> Iterator[CanopenMaster]:
     """Boot the bus."""
     with CanopenMaster.from_bus_yml(bus_yml, bus) as made:
-        made.boot(PATIENCE)
+        made.boot(TIMEOUT)
         yield made
 
 
@@ -130,7 +130,7 @@ def independent_client(bus: str, monkeypatch: pytest.MonkeyPatch) -> Iterator[ca
 def statusword(network: canopen.Network, node_id: int) -> int:
     """Read 0x6041 by SDO."""
     node = network.add_node(node_id, str(EDS))
-    node.sdo.RESPONSE_TIMEOUT = PATIENCE
+    node.sdo.RESPONSE_TIMEOUT = TIMEOUT
     return int(node.sdo[0x6041].raw)
 
 
@@ -154,7 +154,7 @@ def test_a_drive_is_enabled_moved_and_read(
     assert drive.status().fresh
     with independent_client(bus, monkeypatch) as network:
         node = network.add_node(2, str(EDS))
-        node.sdo.RESPONSE_TIMEOUT = PATIENCE
+        node.sdo.RESPONSE_TIMEOUT = TIMEOUT
         assert node.sdo[0x6064].raw == pytest.approx(3000, abs=10)
         assert not is_enabled(statusword(network, 3))  # nobody asked for joint2
 
@@ -196,7 +196,7 @@ def test_names_that_are_none_are_answered_with_those_that_are(master: CanopenMas
 
 
 def test_a_late_motion_is_halted(master: CanopenMaster) -> None:
-    """It does not go on behind the back of who was told that it failed."""
+    """It does not go on after its failure was reported."""
     drive = master.drive('joint1')
     drive.enable()
     with pytest.raises(DriveError, match=r'not arrived within 0\.1 s and is halted'):
@@ -213,12 +213,12 @@ def test_a_stop_ends_a_motion(master: CanopenMaster) -> None:
     drive.select_mode(OperationMode.PROFILE_POSITION)
     with ThreadPoolExecutor(1) as pool:
         moving = pool.submit(drive.move_to, 1000.0)
-        deadline = time.monotonic() + PATIENCE
+        deadline = time.monotonic() + TIMEOUT
         while drive.velocity < 0.5:
             assert time.monotonic() < deadline
         drive.disable()
         with pytest.raises(DriveError):
-            moving.result(PATIENCE)
+            moving.result(TIMEOUT)
 
 
 @pytest.mark.parametrize('failing', [False, True])
@@ -231,7 +231,7 @@ def test_leaving_disables_the_drives(
 
     def work() -> None:
         with master:
-            master.boot(PATIENCE)
+            master.boot(TIMEOUT)
             drive = master.drive('joint1')
             drive.enable()
             drive.select_mode(OperationMode.PROFILE_POSITION)
@@ -259,7 +259,7 @@ def test_a_program_that_forgets_to_close_leaves_no_drive_enabled(
 ) -> None:
     """Its end stops them."""
     with program('-c', FORGETFUL, bus_yml, bus) as process:
-        assert process.wait(PATIENCE) == 0
+        assert process.wait(TIMEOUT) == 0
     with independent_client(bus, monkeypatch) as network:
         assert not is_enabled(statusword(network, 2))
 
@@ -272,7 +272,7 @@ def test_missing_devices_are_named(bus_yml: Path, bus: str) -> None:
         with pytest.raises(DriveError, match='offline'):
             master.drive('joint1').enable()
         with program('-m', 'canopen_sim.fake_slaves_command', bus_yml, '--can', bus):
-            master.boot(PATIENCE)
+            master.boot(TIMEOUT)
             master.drive('joint1').enable()
 
 
@@ -283,7 +283,7 @@ def test_a_second_master_is_refused(master: CanopenMaster, bus_yml: Path, bus: s
         CanopenMaster.from_bus_yml(bus_yml, bus) as second,
         pytest.raises(OtherMasterError),
     ):
-        second.boot(PATIENCE)
+        second.boot(TIMEOUT)
     assert master.drive('joint1').state is DriveState.OPERATION_ENABLED
 
 
@@ -319,6 +319,6 @@ def test_a_motion_source_leads_in_the_cycle(master: CanopenMaster) -> None:
     drive.enable()
     drive.select_mode(OperationMode.CYCLIC_POSITION)
     master.attach(ramp)
-    assert ramp.there.wait(PATIENCE)
+    assert ramp.there.wait(TIMEOUT)
     master.detach(ramp)
     assert drive.position == pytest.approx(0.1, abs=0.002)

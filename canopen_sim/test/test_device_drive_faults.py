@@ -17,7 +17,7 @@ FAULTS = [fault for fault in Fault if fault.value.code]
 @pytest.mark.parametrize('mode', [1, 2, 3, 4, 6, 7, 8, 9, 10])
 @pytest.mark.parametrize('fault', FAULTS)
 def test_fault_has_its_code_and_stays_while_its_cause_does(fault: Fault, mode: int) -> None:
-    """In each mode: EMCY and 0x603F tell the code; a reset helps after the cause is gone only."""
+    """In each mode: EMCY and 0x603F show the code; a reset helps after the cause is gone only."""
     rig = Rig()
     rig.enable(mode)
     rig.take()

@@ -48,7 +48,7 @@ def test_register_bits(code: int, register: int) -> None:
 
 
 def test_error_and_its_end(rig: Rig) -> None:
-    """An error is told with code and register, and its end with code 0."""
+    """An error is reported with code and register, and its end with code 0."""
     rig.drive.raise_fault(0x2310)
     assert emergencies(rig) == [(0x2310, 0x03)]
     assert (rig.get(0x1001), rig.get(0x603F)) == (0x03, 0x2310)
@@ -57,7 +57,7 @@ def test_error_and_its_end(rig: Rig) -> None:
     assert (rig.get(0x1001), rig.get(0x603F)) == (0, 0)
 
 
-def test_one_error_is_told_once(rig: Rig) -> None:
+def test_one_error_is_reported_once(rig: Rig) -> None:
     """An error that is there already is not repeated."""
     rig.drive.raise_fault(0x2310)
     rig.drive.raise_fault(0x2310)
@@ -125,8 +125,8 @@ def test_nothing_is_sent_in_stopped(rig: Rig) -> None:
     assert emergencies(rig) == [(0x2310, 0x03)]
 
 
-def test_fault_is_told_again_after_reset_of_communication(rig: Rig) -> None:
-    """A fault that lasts over a reset of communication is told to whoever comes."""
+def test_fault_is_reported_again_after_reset_of_communication(rig: Rig) -> None:
+    """A fault that lasts over a reset of communication is reported again."""
     rig.drive.raise_fault(0x2310)
     rig.take()
     rig.nmt(NmtCommand.RESET_COMMUNICATION)

@@ -33,7 +33,7 @@ def moving(mode: int = 3) -> Rig:
 
 
 def still(rig: Rig) -> bool:
-    """Tell whether the motor stands, and goes on standing."""
+    """Return whether the motor stands, and goes on standing."""
     rig.run(1.0)
     position = rig.position
     rig.run(5.0)
@@ -102,7 +102,7 @@ def test_pre_operational_is_no_loss(mode: int) -> None:
 
 
 def test_fault_shows_in_the_pdo_at_once() -> None:
-    """An event-driven statusword tells of the fault without waiting for SYNC."""
+    """An event-driven statusword shows the fault without waiting for SYNC."""
     rig = moving(1)
     rig.take()
     rig.drive.raise_fault(0x2310, rig.now)
@@ -112,7 +112,7 @@ def test_fault_shows_in_the_pdo_at_once() -> None:
 
 
 def test_second_fault_keeps_the_state() -> None:
-    """A fault during the reaction to another one is told, and the ramp goes on."""
+    """A fault during the reaction to another one is reported, and the ramp goes on."""
     rig = moving(3)
     rig.drive.raise_fault(0x2310, rig.now)
     rig.run(0.005)

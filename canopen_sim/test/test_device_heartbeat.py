@@ -62,7 +62,7 @@ def test_heartbeats_of_devices_are_spread() -> None:
 
 
 def test_heartbeat_carries_the_nmt_state(rig: Rig) -> None:
-    """Each heartbeat tells the state at its time, in every state."""
+    """Each heartbeat has the state at its time, in every state."""
     rig.put(0x1017, 100)
     for command, state in (
         (NmtCommand.START, NmtState.OPERATIONAL),
@@ -93,13 +93,13 @@ def test_no_burst_after_a_standstill(rig: Rig) -> None:
 
 
 def test_watch_begins_with_the_first_heartbeat(rig: Rig) -> None:
-    """A device that was never heard of is not lost."""
+    """A device that never sent a heartbeat is not lost."""
     watch(rig, 300)
     rig.run(10.0)
     assert rig.take() == []
 
 
-def test_loss_is_told_once(rig: Rig) -> None:
+def test_loss_is_reported_once(rig: Rig) -> None:
     """A lost heartbeat is one EMCY 0x8130; its return is an error reset."""
     watch(rig, 300)
     for _ in range(5):

@@ -39,7 +39,7 @@ def write(host: DeviceHost, node_id: int, index: int, subindex: int, data: bytes
     host.receive(Frame(0x600 + node_id, request), 1.0)
 
 
-def test_all_boot_and_obey_a_broadcast() -> None:
+def test_all_boot_and_execute_a_broadcast() -> None:
     """Each device sends its own boot-up frame, and all start at one command."""
     host, sent = host_of(*IDS)
     assert sent == [Frame(0x700 + node_id, b'\x00') for node_id in IDS]
@@ -63,7 +63,7 @@ def test_two_devices_with_one_id_are_refused() -> None:
             host.add(node_id, drive_dictionary())
 
 
-def test_devices_hear_each_other() -> None:
+def test_devices_receive_each_other() -> None:
     """A heartbeat of one device is watched by another one of the same process."""
     host, sent = host_of(2, 3)
     write(host, 2, 0x1017, 0, b'\x64\x00')
@@ -80,7 +80,7 @@ def test_devices_hear_each_other() -> None:
     assert Frame(0x083, b'\x30\x81\x11\x02\x00\x00\x00\x00') in sent
 
 
-def test_no_device_hears_itself() -> None:
+def test_no_device_receives_its_own_frames() -> None:
     """A device's own TPDO does not come back to it, but reaches the others at once."""
     host, sent = host_of(2, 3, 4)
     for node_id in (2, 3, 4):
@@ -176,7 +176,7 @@ class FlakyBus(Bus):
 
 
 def test_bus_that_goes_away_is_waited_for(caplog: pytest.LogCaptureFixture) -> None:
-    """A failing bus is told once; the devices serve it when it is back."""
+    """A failing bus is reported once; the devices serve it when it is back."""
     bus = FlakyBus()
     runner = DeviceRunner(bus)
     runner.host.add(5, drive_dictionary())

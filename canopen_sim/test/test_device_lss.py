@@ -25,7 +25,7 @@ DICTIONARY = with_defaults(
 
 
 def make_rig(node_id: int = 255) -> Rig:
-    """Return a device with a known identity; without a node id unless told otherwise."""
+    """Return a device with a known identity; without a node id by default."""
     return Rig(DICTIONARY, node_id=node_id)
 
 
@@ -111,7 +111,7 @@ def test_values_out_of_range() -> None:
         assert ask(rig, 0x13, table, rate) == bytes((0x13, error)) + bytes(6)
 
 
-def test_waiting_device_obeys_no_configuration() -> None:
+def test_waiting_device_applies_no_configuration() -> None:
     """Only the selected device answers configuration and inquiry commands."""
     rig = make_rig()
     assert select(rig, (0x555, 0x1234, 0x10002, 0xBABE)) is None

@@ -154,6 +154,6 @@ def test_acknowledged_set_points_are_not_lost(setpoints: list[tuple[int, bool]])
 
 
 def _between(seen: list[float], at: int, target: int) -> bool:
-    """Tell whether the motor was at a target from one look to the next."""
+    """Return whether the motor was at a target from one look to the next."""
     after = seen[min(at + 1, len(seen) - 1)]
     return min(seen[at], after) - 1.0 <= target <= max(seen[at], after) + 1.0

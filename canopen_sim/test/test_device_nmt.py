@@ -61,7 +61,7 @@ def test_every_state_and_command(before: NmtState, command: NmtCommand, broadcas
 
 @pytest.mark.parametrize('state', PATHS)
 def test_commands_to_others_are_ignored(state: NmtState) -> None:
-    """A device obeys its own id and 0, and nothing else."""
+    """A device executes commands for its own id and 0, and nothing else."""
     rig = rig_in(state)
     for command in NmtCommand:
         rig.nmt(command, NODE_ID + 1)
@@ -112,7 +112,7 @@ def test_reset_during_initialisation_starts_it_anew() -> None:
 
 
 def answers_sdo(rig: Rig) -> bool:
-    """Tell whether the device serves SDOs."""
+    """Return whether the device serves SDOs."""
     return rig.raw_sdo(b'\x40\x00\x10\x00\x00\x00\x00\x00') is not None
 
 
@@ -195,7 +195,7 @@ def test_node_id_out_of_range_is_refused(node_id: int) -> None:
 
 
 def test_device_without_any_object_lives() -> None:
-    """The smallest dictionary, none at all, still gives a device that boots and obeys NMT."""
+    """A device without any object boots and executes NMT commands."""
     rig = Rig(ObjectDictionary([]))
     assert rig.take(0x700 + NODE_ID) == BOOT_UP
     rig.nmt(START)

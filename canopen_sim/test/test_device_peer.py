@@ -74,7 +74,7 @@ class Wire:
 
 @pytest.fixture
 def wire() -> Wire:
-    """A device that was just switched on, and a network that heard nothing of it."""
+    """A device that was just switched on, and a network that received nothing of it."""
     rig = Rig()
     rig.sent.clear()
     return Wire(rig)
@@ -152,7 +152,7 @@ def test_block_transfers_of_python_canopen(node: Any) -> None:
 
 
 def test_nmt_and_heartbeat(wire: Wire, node: Any) -> None:
-    """Commands are obeyed, and heartbeats tell the state that python-canopen asked for."""
+    """Commands are executed, and heartbeats have the state that python-canopen requested."""
     node.sdo[0x1017].raw = 100
     for state in ('OPERATIONAL', 'STOPPED', 'PRE-OPERATIONAL'):
         node.nmt.state = state

@@ -16,7 +16,7 @@ from arm_canopen.standard.nmt import nmt_frame, NmtCommand
 from canopen_sim import runner
 from canopen_sim.runner import DeviceRunner, newest_process_data
 
-PATIENCE = 10.0  # [s]
+TIMEOUT = 10.0  # [s]
 
 
 def test_of_process_data_the_newest_is_kept_and_of_services_all() -> None:
@@ -43,14 +43,14 @@ def test_a_device_that_stood_still_does_not_live_through_what_it_missed(
         devices.start()
         gate = threading.Event()
         try:
-            devices.call(lambda: None).result(PATIENCE)
-            devices.call(lambda: gate.wait(PATIENCE))
+            devices.call(lambda: None).result(TIMEOUT)
+            devices.call(lambda: gate.wait(TIMEOUT))
             master.send(Frame(CobId.NMT, nmt_frame(NmtCommand.START, NODE_ID)))
             for _ in range(20):
                 master.send(Frame(CobId.SYNC))
             gate.set()
-            devices.call(lambda: None).result(PATIENCE)
-            devices.call(lambda: None).result(PATIENCE)
+            devices.call(lambda: None).result(TIMEOUT)
+            devices.call(lambda: None).result(TIMEOUT)
         finally:
             gate.set()
             devices.stop()

@@ -123,7 +123,7 @@ def test_reset_of_the_node_starts_anew() -> None:
 
 @pytest.mark.parametrize('state', [SOD, READY, ON, OE, QS])
 def test_fault_from_every_state(state: State) -> None:
-    """Transitions 13 and 14: a fault leads to Fault from everywhere, and is told."""
+    """Transitions 13 and 14: a fault leads to Fault from everywhere, and is reported."""
     rig = rig_in(state)
     rig.drive.raise_fault(0x4310)
     rig.run(0.1)
@@ -144,7 +144,7 @@ def test_fault_reset_is_an_edge() -> None:
 
 
 def test_held_reset_bit_is_no_command() -> None:
-    """After the reset the bit has to go before the drive obeys (CiA 402-2, table 26)."""
+    """After the reset the bit has to go before commands are accepted (CiA 402-2, table 26)."""
     rig = rig_in(FAULT)
     rig.command(FAULT_RESET | SHUTDOWN)
     assert rig.state is SOD

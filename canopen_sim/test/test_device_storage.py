@@ -82,7 +82,7 @@ def test_what_is_not_stored_is_forgotten(rig: StoringRig) -> None:
 
 @pytest.mark.parametrize('reset', ['power', NmtCommand.RESET_NODE])
 def test_what_is_stored_is_kept(rig: StoringRig, reset: object) -> None:
-    """Stored parameters survive power cuts and resets; reading 0x1010 tells the abilities."""
+    """Stored parameters survive power cuts and resets; reading 0x1010 returns the abilities."""
     rig.order(0x1010)
     rig.put(0x6083, 1)
     if isinstance(reset, NmtCommand):

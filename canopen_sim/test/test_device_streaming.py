@@ -295,7 +295,7 @@ def test_jump_is_a_following_error() -> None:
 
 
 def test_jump_within_the_window_is_caught_up() -> None:
-    """A jump that the motor makes good in time is no fault; bit 11 tells of the limit."""
+    """A jump that the motor makes good in time is no fault; bit 11 shows the limit."""
     rig = streaming(8)
     rig.put(0x6065, 1000)
     rig.put(0x6066, 50)

@@ -136,7 +136,7 @@ def bench_bursts(peer: Peer) -> list[str]:
             peer.send()
         got = peer.drain()
         texts.append(f'{got}' if got == burst else f'{got}!')
-    peer.send()  # the kernel tells the count with the next frame
+    peer.send()  # the kernel reports the count with the next frame
     peer.drain()
     lost = peer.lost()
     texts.append('?' if lost is None else f'{lost}')

@@ -27,7 +27,7 @@ class LssNetwork:
         master: The LSS master.
         host: The devices.
         delays: How late frames of the devices arrive in [s], one after another; 1 ms after these.
-        heard: Frames of the devices, without LSS answers.
+        received: Frames of the devices, without LSS answers.
     """
 
     def __init__(self, addresses: Iterable[LssAddress], node_ids: Iterable[int] = ()) -> None:
@@ -38,7 +38,7 @@ class LssNetwork:
             node_ids: Their node ids; without one a device has none.
         """
         self.delays: list[float] = []
-        self.heard: list[Frame] = []
+        self.received: list[Frame] = []
         self._scheduler = Scheduler(1.0)
         self._order = count()
         self._way: list[tuple[float, int, Frame]] = []
@@ -67,7 +67,7 @@ class LssNetwork:
                 frame = heapq.heappop(self._way)[2]
                 self.master.receive(frame._replace(timestamp=self.now))
                 if frame.can_id != 0x7E4:
-                    self.heard.append(frame)
+                    self.received.append(frame)
             self.host.advance(self.now)
             self._scheduler.advance(self.now)
         return task.result()

@@ -242,7 +242,7 @@ def test_wrong_arguments_are_refused(
     assert 'usage: ' in capsys.readouterr().err
 
 
-def test_an_interface_that_goes_away_is_told(
+def test_an_interface_that_goes_away_is_reported(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """When the bus dies the counters and the reason are printed, and the exit code is 1."""

@@ -34,6 +34,6 @@ def test_ros_arguments_are_taken_out(line: str, own: str, parameters: dict[str, 
 
 @pytest.mark.parametrize('line', ['--ros-args -p', '--ros-args -p a', '--ros-args -p :=1'])
 def test_a_parameter_without_name_or_value_is_refused(line: str) -> None:
-    """A forgotten half is told, as rcl does."""
+    """A forgotten half is reported, as rcl does."""
     with pytest.raises(ValueError, match=r'needs a value|not a parameter'):
         split_ros_arguments(line.split())

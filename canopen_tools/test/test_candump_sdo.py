@@ -137,7 +137,7 @@ CONVERSATIONS = {
 
 @pytest.mark.parametrize('name', CONVERSATIONS)
 def test_a_conversation_in_words(name: str) -> None:
-    """Each frame is told with its object, and a value when it is complete."""
+    """Each frame is reported with its object, and a value when it is complete."""
     describer = FrameDescriber(BUS)
     for arrow, data, text in CONVERSATIONS[name]:
         can_id = 0x602 if arrow == '>' else 0x582
@@ -164,7 +164,7 @@ WITHOUT_EDS = [
 
 @pytest.mark.parametrize(('arrow', 'data', 'text'), WITHOUT_EDS)
 def test_standard_objects_have_names_without_an_eds(arrow: str, data: str, text: str) -> None:
-    """What CiA 301 and 402 define is told for unknown devices too."""
+    """What CiA 301 and 402 define is reported for unknown devices too."""
     can_id = 0x605 if arrow == '>' else 0x585
     said = FrameDescriber().describe(Frame(can_id, bytes.fromhex(data)))
     assert str(said) == f'SDO {arrow} node 5  {text}'
@@ -187,7 +187,7 @@ def test_transfers_of_different_devices_are_kept_apart() -> None:
 
 @given(st.text(st.characters(min_codepoint=33, max_codepoint=126), min_size=5, max_size=100))
 def test_a_segmented_value_is_put_together(name: str) -> None:
-    """Read or written, the last segment tells the whole value."""
+    """Read or written, the last segment shows the whole value."""
     content = name.encode()
     parts = [content[at : at + 7] for at in range(0, len(content), 7)]
     reading, writing = (SdoFollower(ObjectNames(DRIVE_OBJECTS)) for _ in range(2))

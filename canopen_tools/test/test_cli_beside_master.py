@@ -35,7 +35,7 @@ class Robot:
         bus_yml: Its configuration.
         network: The master.
         thread: The master's thread.
-        events: What the master told.
+        events: What the master reported.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -59,7 +59,7 @@ class Robot:
 
     @property
     def complaints(self) -> list[str]:
-        """What the master told that was no good news, but for a computer that is too busy."""
+        """What the master reported as warnings or errors, but for a computer that is too busy."""
         return [
             str(event)
             for event in self.events
@@ -67,7 +67,7 @@ class Robot:
         ]
 
     def all_online(self) -> bool:
-        """Tell whether every device is booted and has not been lost."""
+        """Return whether every device is booted and has not been lost."""
         return all(node.online for node in self.network.nodes.values())
 
     def end(self) -> None:

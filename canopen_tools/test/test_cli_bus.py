@@ -90,7 +90,7 @@ def master(name: str) -> Iterator[None]:
 
 @pytest.fixture
 def witness(name: str) -> Iterator[Bus]:
-    """Somebody who hears everything."""
+    """A listener that receives everything."""
     with open_bus(name) as bus:
         yield bus
 
@@ -204,7 +204,7 @@ def test_objects_without_any_file(name: str, capsys: pytest.CaptureFixture[str])
     ],
 )
 @pytest.mark.usefixtures('runner')
-def test_what_does_not_work_is_told(
+def test_what_does_not_work_is_reported(
     name: str,
     bus_yml: str,
     *,
@@ -227,7 +227,7 @@ def test_an_unknown_type_is_not_guessed_in_writing(
     assert 'name it with --type' in capsys.readouterr().err
 
 
-def test_a_device_that_holds_something_else_is_told(
+def test_a_device_that_holds_something_else_is_reported(
     name: str, witness: Bus, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """A write is read back, as a device may round a value or ignore it."""
@@ -252,7 +252,7 @@ def test_a_device_that_holds_something_else_is_told(
 
 @pytest.mark.usefixtures('runner')
 def test_a_command_is_not_read_back(name: str, capsys: pytest.CaptureFixture[str]) -> None:
-    """0x1010 tells what the device can store, not what was written."""
+    """0x1010 returns what the device can store, not what was written."""
     assert main(['write', '2', '0x1010:1', '0x65766173', '--type', 'u32', '--can', name]) == 0
     assert capsys.readouterr().out.endswith('was written\n')
 

@@ -100,7 +100,7 @@ def test_units_are_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
 def test_wrong_usage_is_2(
     arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Wrong usage is told on stderr, with exit code 2."""
+    """Wrong usage is reported on stderr, with exit code 2."""
     with pytest.raises(SystemExit) as ending:
         main(arguments)
     assert ending.value.code == 2

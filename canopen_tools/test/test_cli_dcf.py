@@ -145,7 +145,7 @@ def test_files_of_an_earlier_run_are_no_longer_there(tmp_path: Path) -> None:
 def test_a_wrong_bus_yml_writes_nothing(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Errors of the file are told, exit code 1."""
+    """Errors of the file are reported, exit code 1."""
     path = write_bus(tmp_path, edited('node_id: 2', 'node_id: 200'))
     assert main(['dcf', str(path), '--out', str(tmp_path / 'out')]) == 1
     assert '200 is out of range' in capsys.readouterr().err
@@ -190,7 +190,7 @@ def test_everything_on_request(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize('entry', ['0x00010000', '0x00010064'])
-def test_a_device_that_watches_the_master_by_default_is_told_not_to(
+def test_a_device_that_watches_the_master_by_default_is_configured_not_to(
     tmp_path: Path, entry: str
 ) -> None:
     """Without heartbeat_consumer the entry for the master that the EDS has is cleared."""
@@ -216,9 +216,9 @@ def test_a_device_that_was_configured_by_the_file_is_as_bus_yml_wants_it() -> No
         assert wrong == []
 
 
-@pytest.mark.parametrize(('entry', 'told'), [('0x00090000', True), ('0x00090064', False)])
+@pytest.mark.parametrize(('entry', 'reported'), [('0x00090000', True), ('0x00090064', False)])
 def test_an_entry_that_watches_somebody_else_is_left_alone(
-    tmp_path: Path, entry: str, told: bool
+    tmp_path: Path, entry: str, reported: bool
 ) -> None:
     """The device watches the master in a free entry, or not at all."""
     eds = eds_text().splitlines()
@@ -226,9 +226,9 @@ def test_an_entry_that_watches_somebody_else_is_left_alone(
     eds[place] = f'DefaultValue={entry}'
     config = load_text(tmp_path, BUS, eds='\n'.join(eds))
     first = device_writes(config, config.nodes[0])[0]
-    assert (first == SdoWrite(0x1016, 1, b'\x2c\x01\x01\0')) is told
+    assert (first == SdoWrite(0x1016, 1, b'\x2c\x01\x01\0')) is reported
     watched = [e for e in expected_objects(config, config.nodes[0]) if e.index == 0x1016]
-    assert bool(watched) is told
+    assert bool(watched) is reported
 
 
 @given(

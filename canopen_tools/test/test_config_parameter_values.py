@@ -90,7 +90,7 @@ def test_an_eds_and_a_default_write_nothing(tmp_path: Path) -> None:
     ['1000', '1018sub1', '1017', '1800sub2', '1A00sub1'],
     ids=['const', 'identity', 'heartbeat', 'pdo', 'mapping'],
 )
-def test_what_is_told_otherwise_is_not_written_twice(tmp_path: Path, section: str) -> None:
+def test_what_another_key_configures_is_not_written_twice(tmp_path: Path, section: str) -> None:
     """Constants are compared, heartbeat and PDOs written by their own rules."""
     config = load(tmp_path, {section: '1' if section != '1A00sub1' else '0x60410010'})
     assert written(config) == {}
@@ -100,9 +100,9 @@ def test_commands_are_not_written_and_that_is_said(tmp_path: Path) -> None:
     """A controlword that somebody saved in a DCF must not move anything."""
     config = load(tmp_path, {'6040': '0xF', '6060': '1'})
     assert written(config) == {}
-    told = [str(warning) for warning in config.warnings if 'is a command' in warning.message]
-    assert len(told) == 2
-    assert 'device.dcf' in told[0]
+    reported = [str(warning) for warning in config.warnings if 'is a command' in warning.message]
+    assert len(reported) == 2
+    assert 'device.dcf' in reported[0]
 
 
 def test_the_heartbeat_of_a_dcf_counts(tmp_path: Path) -> None:
@@ -138,8 +138,8 @@ def test_a_value_that_the_device_refuses_names_the_dcf(tmp_path: Path) -> None:
     without = ObjectDictionary(entry for entry in plain.dictionary if entry.index != 0x2000)
     net = VirtualNetwork(bus_config(node), dictionaries={NAME: without})
     net.start()
-    net.run_until(lambda: bool(net.told(Severity.WARNING)))
-    assert 'ParameterValue of device.dcf' in net.told(Severity.WARNING)[0]
+    net.run_until(lambda: bool(net.reported(Severity.WARNING)))
+    assert 'ParameterValue of device.dcf' in net.reported(Severity.WARNING)[0]
 
 
 def test_the_other_tools_know_them_too(tmp_path: Path) -> None:

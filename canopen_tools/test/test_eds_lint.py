@@ -224,7 +224,7 @@ def lint(folder: Path, text: str) -> EdsReport:
 
 
 @pytest.mark.parametrize('name', [*ERRORS, *WARNINGS])
-def test_damage_is_told(tmp_path: Path, name: str) -> None:
+def test_damage_is_reported(tmp_path: Path, name: str) -> None:
     """Each kind of damage is an error or a warning at its line, with a remedy."""
     case = ERRORS[name] if name in ERRORS else WARNINGS[name]
     text = damaged(case)
@@ -238,7 +238,7 @@ def test_damage_is_told(tmp_path: Path, name: str) -> None:
         assert text.splitlines()[found[0].line - 1] == case.line
 
 
-def test_a_good_file_has_nothing_to_tell(tmp_path: Path) -> None:
+def test_a_good_file_has_nothing_to_report(tmp_path: Path) -> None:
     """The file that every case starts from is right."""
     report = lint(tmp_path, GOOD)
     assert report.errors == report.warnings == ()
@@ -252,7 +252,7 @@ def test_our_own_files_are_right(path: Path) -> None:
     assert report.errors == report.warnings == ()
 
 
-def test_the_verb_tells_a_summary(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_verb_prints_a_summary(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Several files, each with what it holds; exit code 1 when one has errors."""
     good, bad = tmp_path / 'good.eds', tmp_path / 'bad.eds'
     good.write_text(GOOD)

@@ -42,7 +42,7 @@ def test_bytes_of_messages(message: LssMessage, data: str) -> None:
 
 @given(st.binary(min_size=8, max_size=8))
 def test_any_8_bytes_are_a_message(data: bytes) -> None:
-    """Reading and writing are inverse; reserved specifiers are told as such."""
+    """Reading and writing are inverse; reserved specifiers are reported as such."""
     message = decode_lss(data)
     assert message is not None
     assert message.encode() == data

@@ -58,10 +58,10 @@ def test_a_device_gets_its_id_and_boots() -> None:
     network.run(master.set_node_id(17))
     network.run(master.set_bit_rate(500_000))
     network.run(master.store())
-    assert network.heard == []
+    assert network.received == []
     master.switch_all(LssState.WAITING)
     assert not network.run(master.has_unconfigured())
-    assert [frame.can_id for frame in network.heard] == [0x711]
+    assert [frame.can_id for frame in network.received] == [0x711]
     assert network.host.devices[0].node_id == 17
 
 
@@ -100,7 +100,7 @@ def test_several_devices_in_configuration_are_noticed() -> None:
         network.run(network.master.inquire_address())
 
 
-def test_refusals_are_told() -> None:
+def test_refusals_are_reported() -> None:
     """What no device can take is refused before it is sent, what this one cannot by its code."""
     network = LssNetwork([FIRST])
     master = network.master
@@ -138,7 +138,7 @@ def test_slow_devices_get_more_time() -> None:
     assert network.run(network.master.fast_scan()) == FIRST
 
 
-def test_a_device_that_is_too_slow_is_told() -> None:
+def test_a_device_that_is_too_slow_is_reported() -> None:
     """A scan that loses its device says which number it was at, and what may be the reason."""
     network = LssNetwork([FIRST])
     network.delays = [0.25] * 1000
@@ -164,7 +164,7 @@ def test_frames_that_are_no_answer_are_passed_over() -> None:
     assert task.result() is False
 
 
-def test_the_switch_of_the_bit_rate_tells_its_delay() -> None:
+def test_the_switch_of_the_bit_rate_has_its_delay() -> None:
     """In milliseconds, little-endian."""
     sent: list[Frame] = []
     LssMaster(Scheduler(), sent.append).activate_bit_rate(0.5)

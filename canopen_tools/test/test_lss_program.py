@@ -103,7 +103,7 @@ def test_a_device_is_found_and_numbered(
 def test_a_device_with_an_id_is_selected_by_its_address(
     name: str, runner: DeviceRunner, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """What it gets takes effect later, which is told."""
+    """What it gets takes effect later, which is reported."""
     assert main(['lss', 'inquire', *ADDRESS, '--can', name]) == 0
     row = capsys.readouterr().out.splitlines()[1]
     assert row.split() == ['0x00000001', '0x00000002', '0x00000004', '0x00000107', '5']

@@ -59,7 +59,7 @@ class ParameterStorage:
                 if entry.subindex:
                     variable = store.integer(index, entry.subindex)
                     variable.check = partial(_check, variable, signature)
-                    variable.listener = partial(self._obey, variable, act)
+                    variable.listener = partial(self._accept, variable, act)
 
     def load(self) -> None:
         """Let the saved values take effect at the next restoring of the store."""
@@ -75,7 +75,7 @@ class ParameterStorage:
                     continue
         self._store.saved = saved
 
-    def _obey(self, variable: Integer, act: object, _now: float) -> None:
+    def _accept(self, variable: Integer, act: object, _now: float) -> None:
         variable.restore()  # reading returns the abilities, not the signature
         first, last = GROUPS.get(variable.entry.subindex, MANUFACTURER)
         if callable(act):

@@ -77,7 +77,7 @@ class ScriptedDevice:
             self.send(Frame(0x700 + self.node_id, b'\0'))
 
     def receive(self, frame: Frame, now: float) -> None:
-        """Obey NMT commands and take SDO requests."""
+        """Execute NMT commands and answer SDO requests."""
         if frame.can_id == 0x000 and frame.data[1] in (0, self.node_id):
             self.commands.append(frame.data[0])
             if frame.data[0] in STATES:

@@ -19,13 +19,13 @@ class SdoByteServer:
 
     Attributes:
         values: The objects by index and sub-index; what is written is kept there.
-        tells_size: Initiate responses of uploads carry the length.
+        announces_size: Initiate responses of uploads carry the length.
         expedites: Uploads of up to 4 bytes fit into the initiate response.
         refuses: Abort codes by index and sub-index.
     """
 
     values: dict[tuple[int, int], bytes] = field(default_factory=dict)
-    tells_size: bool = True
+    announces_size: bool = True
     expedites: bool = True
     refuses: dict[tuple[int, int], int] = field(default_factory=dict)
     _address: tuple[int, int] = (0, 0)
@@ -82,11 +82,11 @@ class SdoByteServer:
             return self._abort(NO_OBJECT)
         value = self.values[self._address]
         if self.expedites and 1 <= len(value) <= 4:
-            command = 0x43 | (4 - len(value)) << 2 if self.tells_size else 0x42
+            command = 0x43 | (4 - len(value)) << 2 if self.announces_size else 0x42
             return bytes((command,)) + self._multiplexer() + value.ljust(4, b'\0')
         self._rest = value
-        size = len(value).to_bytes(4, 'little') if self.tells_size else bytes(4)
-        return bytes((0x41 if self.tells_size else 0x40,)) + self._multiplexer() + size
+        size = len(value).to_bytes(4, 'little') if self.announces_size else bytes(4)
+        return bytes((0x41 if self.announces_size else 0x40,)) + self._multiplexer() + size
 
     def _upload_segment(self, request: bytes) -> bytes:
         if (request[0] >> 4 & 1) != self._toggle:

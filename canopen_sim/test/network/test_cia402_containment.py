@@ -161,7 +161,7 @@ def test_a_failing_step_stops_its_drive_only(
     assert device is not None
     assert device.state is DriveState.SWITCH_ON_DISABLED, net.story()
     assert device.velocity == 0.0
-    errors = [text for text in net.told(Severity.ERROR) if 'injected' in text]
+    errors = [text for text in net.reported(Severity.ERROR) if 'injected' in text]
     assert len(errors) == 1, errors
     assert errors[0].startswith(f'{name}: stopped')
     assert arm.source.losses.keys() == {name}
@@ -185,7 +185,7 @@ def test_a_failing_hook_keeps_neither_sync_nor_rpdos_from_being_sent(
     arm.net.run(1.0)
     assert len(arm.net.frames(0x080, since=begin)) == pytest.approx(1.0 / PERIOD, abs=2)
     assert len(arm.net.frames(0x202, since=begin)) == pytest.approx(1.0 / PERIOD, abs=2)
-    assert len([text for text in arm.net.told(Severity.ERROR) if 'injected' in text]) == 1
+    assert len([text for text in arm.net.reported(Severity.ERROR) if 'injected' in text]) == 1
 
 
 def typed(config: NodeConfig, index: int, data_type: DataType) -> NodeConfig:
@@ -238,7 +238,7 @@ def test_a_target_beyond_the_type_of_its_object_is_refused_when_it_is_asked_for(
     commands.set_target(0.3)
     net.run(2.0)
     assert device.position > 0.25 * SCALE
-    assert not net.told(Severity.ERROR)
+    assert not net.reported(Severity.ERROR)
 
 
 def test_a_value_that_cannot_be_packed_keeps_nothing_else_from_being_sent() -> None:

@@ -25,7 +25,7 @@ MODE = OperationMode.CYCLIC_POSITION
 
 
 class Ramp:
-    """A source that moves at a constant speed and tells it ahead."""
+    """A source that moves at a constant speed and announces it."""
 
     axes = (JOINT,)
 
@@ -81,8 +81,8 @@ def test_feed_forward_goes_with_the_set_points() -> None:
     assert offsets(net) == (round(SPEED * SCALE), round(EFFORT))
     assert net.drives[JOINT].view.velocity == pytest.approx(SPEED, rel=0.05)
     node = net.network.nodes[JOINT]
-    told = net.result(net.network.scheduler.spawn(node.objects.read_object(0x60B1)))
-    assert told == round(SPEED * SCALE)
+    reported = net.result(net.network.scheduler.spawn(node.objects.read_object(0x60B1)))
+    assert reported == round(SPEED * SCALE)
 
 
 def test_it_ends_with_the_stream() -> None:

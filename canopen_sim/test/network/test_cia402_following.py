@@ -74,7 +74,7 @@ class Loaded:
     @property
     def errors(self) -> list[str]:
         """What was reported as an error."""
-        return self.net.told(Severity.ERROR)
+        return self.net.reported(Severity.ERROR)
 
 
 @MODES

@@ -36,18 +36,18 @@ def pair(mode: OperationMode, **scales: float) -> VirtualNetwork:
     return net
 
 
-def tell(net: VirtualNetwork, position: int | None, velocity: int | None) -> None:
+def report_actual(net: VirtualNetwork, position: int | None, velocity: int | None) -> None:
     """Have the second drive say another position or velocity than it has, in device units."""
 
     def alters(sender: str, frame: Frame) -> Frame:
         if frame.can_id != 0x280 + NODE_IDS[ODD]:
             return frame
-        told = struct.unpack('<ii', frame.data)
-        told = (
-            told[0] if position is None else position,
-            told[1] if velocity is None else velocity,
+        reported = struct.unpack('<ii', frame.data)
+        reported = (
+            reported[0] if position is None else position,
+            reported[1] if velocity is None else velocity,
         )
-        return frame._replace(data=struct.pack('<ii', *told))
+        return frame._replace(data=struct.pack('<ii', *reported))
 
     net.wire.alters = alters
 
@@ -60,7 +60,7 @@ def motor(net: VirtualNetwork, name: str) -> float:
 
 
 def assert_served(net: VirtualNetwork) -> None:
-    """Check that SYNC goes on and the first drive obeys."""
+    """Check that SYNC goes on and the first drive accepts targets."""
     begin = net.now
     net.commands[GOOD].set_target(0.3)
     net.run(2.0)
@@ -73,31 +73,31 @@ def assert_served(net: VirtualNetwork) -> None:
 def test_odd_values_of_a_disabled_drive_harm_nobody(
     mode: OperationMode, position: int | None, velocity: int | None
 ) -> None:
-    """The smallest number in 0x6064 or 0x606C: every SYNC leaves, the other drive obeys."""
+    """The smallest number in 0x6064 or 0x606C: SYNC goes on, the other drive accepts targets."""
     net = pair(mode)
     net.do(ODD, 'disable')
-    tell(net, position, velocity)
+    report_actual(net, position, velocity)
     net.run(0.1)
     assert_served(net)
-    assert not net.told(Severity.ERROR)
+    assert not net.reported(Severity.ERROR)
 
 
 def test_factors_that_are_not_reciprocal_harm_nobody() -> None:
     """A velocity that does not fit 0x60FF by these factors is clamped before it is written."""
     net = pair(OperationMode.PROFILE_POSITION, scale_vel_to_dev=1e7)
     net.do(ODD, 'disable')
-    tell(net, None, 3_000_000)
+    report_actual(net, None, 3_000_000)
     assert_served(net)
-    assert not net.told(Severity.ERROR)
+    assert not net.reported(Severity.ERROR)
 
 
 @pytest.mark.parametrize('mode', [OperationMode.CYCLIC_POSITION, OperationMode.CYCLIC_VELOCITY])
 @pytest.mark.parametrize('velocity', [LEAST, -50_000])
-def test_a_velocity_that_is_told_wrong_moves_nothing(mode: OperationMode, velocity: int) -> None:
+def test_a_wrong_actual_velocity_moves_nothing(mode: OperationMode, velocity: int) -> None:
     """An axis that stands is not braked from a speed that only 0x606C claims."""
     net = pair(mode)
     net.do(ODD, 'disable')
-    tell(net, None, velocity)
+    report_actual(net, None, velocity)
     net.run(0.3)
     begin = motor(net, ODD)
     net.do(ODD, 'enable')
@@ -110,13 +110,13 @@ def test_an_encoder_without_reference_is_held_where_it_is() -> None:
     """The smallest position is a legal target: what is preloaded is what the drive says."""
     net = pair(OperationMode.CYCLIC_POSITION)
     net.do(ODD, 'disable')
-    tell(net, LEAST, 0)
+    report_actual(net, LEAST, 0)
     net.run(0.1)
     assert 'Operation enabled' in net.do(ODD, 'enable')
     sent = net.frames(0x300 + NODE_IDS[ODD], since=net.now - 0.05)
     assert {struct.unpack_from('<i', data)[0] for data in sent} == {LEAST}
     assert_served(net)
-    assert not [text for text in net.told(Severity.ERROR) if 'stopped' in text]
+    assert not [text for text in net.reported(Severity.ERROR) if 'stopped' in text]
 
 
 @pytest.mark.parametrize(
@@ -150,9 +150,9 @@ def test_a_drive_whose_cycle_fails_is_stopped_alone(monkeypatch: pytest.MonkeyPa
     assert_served(net)
     assert net.drives[ODD].view.state is DriveState.SWITCH_ON_DISABLED
     assert net.drives[ODD].view.velocity == 0.0
-    told = [text for text in net.told(Severity.ERROR) if '1e9 does not fit' in text]
-    assert len(told) == 1
-    assert ODD in told[0]
+    reported = [text for text in net.reported(Severity.ERROR) if '1e9 does not fit' in text]
+    assert len(reported) == 1
+    assert ODD in reported[0]
     monkeypatch.undo()
     begin = motor(net, ODD)
     net.do(ODD, 'enable')
@@ -185,7 +185,9 @@ def test_a_source_that_fails_when_it_loses_its_axis_harms_nobody() -> None:
     net.run(1.0)
     assert_served(net)
     assert not net.network.nodes[ODD].online
-    assert any('Careless raised ZeroDivisionError' in text for text in net.told(Severity.ERROR))
+    assert any(
+        'Careless raised ZeroDivisionError' in text for text in net.reported(Severity.ERROR)
+    )
 
 
 class Script:
@@ -239,6 +241,6 @@ def test_a_source_that_answers_for_another_number_of_axes_is_detached(
     net = pair(OperationMode.CYCLIC_POSITION)
     net.group.attach(Script(*answers))
     net.run(0.5)
-    told = f'answered {len(answers)} set-points for 1 axes'
-    assert any(told in text for text in net.told(Severity.ERROR))
+    reported = f'answered {len(answers)} set-points for 1 axes'
+    assert any(reported in text for text in net.reported(Severity.ERROR))
     assert_served(net)

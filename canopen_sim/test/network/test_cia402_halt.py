@@ -133,7 +133,7 @@ def test_an_immediate_move_does_not_wait_for_a_full_drive() -> None:
     highest = go(net, 3.0)
     assert highest < 0.5
     assert motor(net) == pytest.approx(-0.2, abs=2e-3)
-    assert not net.told(Severity.WARNING)
+    assert not net.reported(Severity.WARNING)
 
 
 def test_a_move_that_was_answered_as_failed_does_not_follow_later() -> None:
@@ -146,7 +146,7 @@ def test_a_move_that_was_answered_as_failed_does_not_follow_later() -> None:
     commands.move(Move(0.5, relative=True, immediate=False))
     with pytest.raises(DriveError, match='withdrawn'):
         net.result(failed)
-    assert any('withdrawn, and 1 behind it' in text for text in net.told(Severity.WARNING))
+    assert any('withdrawn, and 1 behind it' in text for text in net.reported(Severity.WARNING))
     assert 'to 9.1,' in commands.move(Move(0.1, relative=True))
     go(net, 12.0)
     assert motor(net) == pytest.approx(9.1, abs=2e-3)
@@ -174,7 +174,7 @@ class DeafWhileFull:
         return frame._replace(data=bytes((word,)) + frame.data[1:])
 
 
-def test_a_full_drive_that_hears_nothing_gets_the_move_later() -> None:
+def test_a_full_drive_that_receives_nothing_gets_the_move_later() -> None:
     """A drive that ignores set-points while its buffer is full makes its moves, then the new."""
     net = running_in(OperationMode.PROFILE_POSITION)
     full(net)
@@ -218,7 +218,7 @@ def test_a_target_that_is_not_taken_does_not_end_the_halt() -> None:
     assert abs(motor(net) - begin) < BRAKING_MAX / 5
     assert_rests(net, 4.0)
     assert net.drives[JOINT].control.halted
-    assert any('stays halted' in text for text in net.told(Severity.WARNING))
+    assert any('stays halted' in text for text in net.reported(Severity.WARNING))
 
 
 def without_acknowledge(sender: str, frame: Frame) -> Frame:
@@ -262,7 +262,7 @@ def test_a_drive_without_acknowledge_is_reported_once() -> None:
         reached += [turn for turn in left[:1] if abs(motor(net) - turn) < 3e-3]
     assert reached == turns
     assert motor(net) == pytest.approx(turns[-1], abs=2e-3)
-    assert len([text for text in net.told(Severity.WARNING) if 'bit 12' in text]) == 1
+    assert len([text for text in net.reported(Severity.WARNING) if 'bit 12' in text]) == 1
 
 
 def test_relative_moves_count_from_what_the_drive_has_or_gets() -> None:
@@ -423,9 +423,12 @@ def test_a_stop_at_any_moment_of_init_is_answered_truly(verb: str) -> None:
         answer = net.do(JOINT, verb, preempt=True)
         net.run(0.1)
         drive = net.drives[JOINT]
-        told = 'Operation enabled' in answer
-        assert told == (drive.view.state is DriveState.OPERATION_ENABLED), (millisecond, answer)
-        assert told == (verb == 'halt' and drive.control.halted), (millisecond, answer)
+        reported = 'Operation enabled' in answer
+        assert reported == (drive.view.state is DriveState.OPERATION_ENABLED), (
+            millisecond,
+            answer,
+        )
+        assert reported == (verb == 'halt' and drive.control.halted), (millisecond, answer)
 
 
 @pytest.mark.parametrize('cycles', range(16))
@@ -441,7 +444,7 @@ def test_a_halt_in_a_mode_switch_is_answered_truly(cycles: int) -> None:
     net.run(0.2)
     enabled = net.drives[JOINT].view.state is DriveState.OPERATION_ENABLED
     assert ('Operation enabled' in answer) == enabled, answer
-    assert not net.told(Severity.ERROR)
+    assert not net.reported(Severity.ERROR)
 
 
 @pytest.mark.parametrize('verb', ['halt', 'quick_stop'])
@@ -460,7 +463,7 @@ def test_a_lesser_stop_does_not_end_a_quick_stop(verb: str) -> None:
 
 @pytest.mark.parametrize('verb', ['', 'disable', 'quick_stop', 'halt', 'shutdown'])
 def test_recovery_does_not_undo_a_stop(verb: str) -> None:
-    """A drive that somebody told to stop while it was away is not enabled when it comes back."""
+    """A drive that was commanded to stop while it was away is not enabled when it comes back."""
     drive = drive_config(JOINT, NODE_ID)
     axis = replace(drive.axes[0], recovery=RecoveryPolicy.AUTO)
     net = running_in(OperationMode.CYCLIC_POSITION, axes=(axis,))

@@ -138,8 +138,8 @@ def test_a_halt_ends_with_the_new_target_or_with_an_error(
     net.run(under_way)
     net.do(JOINT, 'halt', preempt=True)
     for target in (new, -new):  # what was learned of the drive holds the second time, too
-        told, beyond = answer(net, target)
-        if told:
+        reported, beyond = answer(net, target)
+        if reported:
             assert motor(net) == pytest.approx(target, abs=ACCURACY)
             assert beyond < ACCURACY
             assert not net.drives[JOINT].control.halted
@@ -187,4 +187,4 @@ def test_only_the_first_target_waits_for_an_acknowledge_under_halt() -> None:
         waited.append(net.now - begin)
     assert waited[0] > UNDER_HALT_TIME
     assert waited[1] < 10 * PERIOD
-    assert not net.told(Severity.WARNING)
+    assert not net.reported(Severity.WARNING)

@@ -42,7 +42,7 @@ def test_a_method_is_for_one_homing() -> None:
     assert 'homed by method 37' in net.result(begin(net, 37))
     assert 'homed by method 35' in net.result(begin(net, None))
     assert in_drive(net) == 35
-    assert net.told(Severity.WARNING) == []
+    assert net.reported(Severity.WARNING) == []
 
 
 def test_goals_without_a_pause_do_not_keep_each_others_method() -> None:
@@ -75,7 +75,7 @@ def test_the_method_that_somebody_wrote_is_used() -> None:
     assert 'homed by method 37' in net.result(begin(net, None))
 
 
-def test_a_method_that_cannot_be_put_back_is_told() -> None:
+def test_a_method_that_cannot_be_put_back_is_reported() -> None:
     """A drive that is lost in mid-homing keeps the method, which somebody has to know."""
     net = network(35)
     task = begin(net, 1)
@@ -85,5 +85,5 @@ def test_a_method_that_cannot_be_put_back_is_told() -> None:
     with pytest.raises(DriveError):
         net.result(task)
     net.run_until(
-        lambda: any('35 was not put back' in text for text in net.told(Severity.WARNING))
+        lambda: any('35 was not put back' in text for text in net.reported(Severity.WARNING))
     )

@@ -92,7 +92,7 @@ def test_nothing_moves_unasked(net: VirtualNetwork) -> None:
     assert position_inc(net) == pytest.approx(rest, abs=1)
 
 
-def test_targets_are_preloaded_before_the_drive_obeys(net: VirtualNetwork) -> None:
+def test_targets_are_preloaded_before_the_drive_accepts_targets(net: VirtualNetwork) -> None:
     """Until the enable, every position that leaves is the actual one."""
     enabled(net, OperationMode.CYCLIC_POSITION)
     net.commands[JOINT].set_target(0.3)
@@ -108,7 +108,7 @@ def test_targets_are_preloaded_before_the_drive_obeys(net: VirtualNetwork) -> No
 
 @pytest.mark.parametrize('mode', MODES, ids=lambda mode: mode.name)
 def test_a_fault_latches_and_speaks(net: VirtualNetwork, mode: OperationMode) -> None:
-    """A fault in motion stops it, is told in words, and lasts until recover."""
+    """A fault in motion stops it, is reported in words, and lasts until recover."""
     enabled(net, mode)
     net.commands[JOINT].set_target(0.4)
     net.run(0.3)
@@ -116,10 +116,10 @@ def test_a_fault_latches_and_speaks(net: VirtualNetwork, mode: OperationMode) ->
     assert drive is not None
     drive.raise_fault(0x4210, net.now)
     net.run(1.0)
-    told = '\n'.join(net.told(Severity.ERROR))
-    assert 'EMCY: 0x4210 excess device temperature' in told
-    assert 'FAULT' in told
-    assert 'call ~/recover' in told
+    reported = '\n'.join(net.reported(Severity.ERROR))
+    assert 'EMCY: 0x4210 excess device temperature' in reported
+    assert 'FAULT' in reported
+    assert 'call ~/recover' in reported
     rest = position_inc(net)
     for verb in ('enable', 'disable', 'halt', 'quick_stop', 'home'):
         with pytest.raises(DriveError, match=r'faulted.*recover.*Fault.*0x4210'):
@@ -134,7 +134,7 @@ def test_a_fault_latches_and_speaks(net: VirtualNetwork, mode: OperationMode) ->
     assert not net.drives[JOINT].view.error
 
 
-def test_a_position_that_is_not_known_is_never_told() -> None:
+def test_an_unknown_position_is_never_published() -> None:
     """NaN before the first one; while a drive is away or boots again, where it was."""
     net = VirtualNetwork(bus_config(drive_config(JOINT, 2)))
     assert math.isnan(net.drives[JOINT].feedback().position)
@@ -143,16 +143,16 @@ def test_a_position_that_is_not_known_is_never_told() -> None:
     net.commands[JOINT].set_target(0.5)
     net.run(3.0)
     net.power_off(JOINT)
-    drive, told = net.drives[JOINT], []
+    drive, reported = net.drives[JOINT], []
     for restart in (False, True):
         if restart:
             net.power_on(JOINT)
         for _ in range(300):
             net.run(PERIOD)
             if not drive.objects.fresh(net.now):  # no TPDOs of it
-                told.append(drive.feedback().position)
-    assert told == pytest.approx([0.5] * len(told), abs=2 / SCALE)
-    assert told
+                reported.append(drive.feedback().position)
+    assert reported == pytest.approx([0.5] * len(reported), abs=2 / SCALE)
+    assert reported
     assert drive.feedback().position == 0.0  # the new one counts from there
 
 
@@ -168,7 +168,7 @@ def test_a_lost_enable_stays_lost(net: VirtualNetwork) -> None:
     drive.set_voltage(True, net.now)
     net.run(1.0)
     assert net.drives[JOINT].view.state is not DriveState.OPERATION_ENABLED
-    assert any(JOINT in text for text in net.told(Severity.ERROR))
+    assert any(JOINT in text for text in net.reported(Severity.ERROR))
 
 
 def test_refusals_before_init(net: VirtualNetwork) -> None:
@@ -255,7 +255,7 @@ def test_a_device_that_restarts_in_motion_is_booted_and_left_disabled(
     net.run(0.1)
     net.run_until(net.all_ready)
     net.run(1.0)
-    assert any('restarted' in text for text in net.told(Severity.ERROR))
+    assert any('restarted' in text for text in net.reported(Severity.ERROR))
     assert net.drives[JOINT].view.state is DriveState.SWITCH_ON_DISABLED
     assert net.drives[JOINT].view.velocity == 0.0
 
@@ -269,12 +269,12 @@ def test_loss_ends_a_command_with_the_reason(net: VirtualNetwork) -> None:
 
 
 def test_somebody_else_stops_the_node(net: VirtualNetwork) -> None:
-    """A node sent to pre-operational from outside is told, with the service that starts it."""
+    """A node sent to pre-operational from outside is reported, with the service that starts it."""
     enabled(net, OperationMode.PROFILE_POSITION)
     net.run(0.3)
     net.network.send_nmt(NmtCommand.ENTER_PRE_OPERATIONAL, 2)
     net.run(0.5)
-    assert any('PRE_OPERATIONAL' in text for text in net.told(Severity.WARNING))
+    assert any('PRE_OPERATIONAL' in text for text in net.reported(Severity.WARNING))
     assert '~/nmt_start_node' in net.drives[JOINT].describe()
 
 
@@ -410,7 +410,7 @@ class Broken(Ramp):
 
 @pytest.mark.parametrize('bad', [math.nan, math.inf, 1e12])
 def test_bad_sources_move_nothing(net: VirtualNetwork, bad: float) -> None:
-    """NaN from a source, or an exception in it, is told and moves nothing."""
+    """NaN from a source, or an exception in it, is reported and moves nothing."""
     enabled(net, OperationMode.CYCLIC_POSITION)
     rest = position_inc(net)
     nan = Ramp(bad)
@@ -419,5 +419,5 @@ def test_bad_sources_move_nothing(net: VirtualNetwork, bad: float) -> None:
     assert len(nan.losses) == 1
     net.group.attach(Broken(0.1))
     net.run(0.2)
-    assert any('a defect' in text for text in net.told(Severity.ERROR))
+    assert any('a defect' in text for text in net.reported(Severity.ERROR))
     assert position_inc(net) == pytest.approx(rest, abs=1)

@@ -73,9 +73,9 @@ def test_limits_are_in_the_units_of_targets() -> None:
     scales = {'scale_pos_from_dev': 2 / SCALE, 'scale_vel_from_dev': 3 / SCALE}
     config = drive_config(JOINT, NODE_ID, sdo_writes=writes, scales=scales)
     net = enabled(config, OperationMode.PROFILE_POSITION)
-    told = net.drives[JOINT].view.parameters
-    assert told.position_limits == pytest.approx((-0.5, 0.5))
-    assert told.profile.velocity == pytest.approx(1.0)
+    reported = net.drives[JOINT].view.parameters
+    assert reported.position_limits == pytest.approx((-0.5, 0.5))
+    assert reported.profile.velocity == pytest.approx(1.0)
     with pytest.raises(DriveError, match='software limits'):
         net.commands[JOINT].set_target(0.9)
 
@@ -99,7 +99,7 @@ def test_a_long_quick_stop_is_waited_for(option: int) -> None:
     assert drive.state is DriveState.SWITCH_ON_DISABLED
     assert fastest < 0.03
     assert 6.0 < net.now - begin < SHUTDOWN_MAX
-    assert not [text for text in net.told() if 'did not come to rest' in text]
+    assert not [text for text in net.reported() if 'did not come to rest' in text]
 
 
 @pytest.mark.parametrize(
@@ -132,4 +132,4 @@ def test_a_stop_without_end_is_not_waited_for_for_ever() -> None:
     net.do(JOINT, 'shutdown', preempt=True)
     assert net.now - begin <= SHUTDOWN_MAX
     assert net.drives[JOINT].view.state is DriveState.SWITCH_ON_DISABLED
-    assert [text for text in net.told() if 'did not come to rest' in text]
+    assert [text for text in net.reported() if 'did not come to rest' in text]

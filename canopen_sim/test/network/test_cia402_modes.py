@@ -279,12 +279,14 @@ def test_a_stream_that_ends_is_a_smooth_stop(mode: OperationMode) -> None:
         assert speed(net) == pytest.approx(0.2, abs=0.06)
     net.run(2.0)
     assert speed(net) == pytest.approx(0.0, abs=0.01)
-    said = [text for text in net.told(Severity.WARNING) if 'stream of targets has paused' in text]
+    said = [
+        text for text in net.reported(Severity.WARNING) if 'stream of targets has paused' in text
+    ]
     assert len(said) == 1
     assert ('stopped' in said[0]) is (mode is not OperationMode.PROFILE_POSITION)
     net.commands[JOINT].set_target(0.1 if mode not in TORQUES else 0.0)
     net.run(2.0)
-    assert len([t for t in net.told(Severity.WARNING) if 'has paused' in t]) == 1
+    assert len([t for t in net.reported(Severity.WARNING) if 'has paused' in t]) == 1
 
 
 def test_a_stream_never_jumps() -> None:
@@ -315,7 +317,7 @@ def test_what_is_no_target_is_refused(mode: OperationMode, value: float) -> None
 
 
 def test_home_is_a_command_of_its_own() -> None:
-    """It enables, tells its phases, sets the reference and returns to the mode of before."""
+    """It enables, reports its phases, sets the reference and returns to the mode of before."""
     net = booted(sdo_writes=(*MOTION_WRITES, sdo_write(0x607C, 0, 2_000)))
     phases: list[HomingProgress] = []
     commands = net.commands[JOINT]
@@ -413,7 +415,7 @@ def test_recovery_after_a_power_cut_is_by_policy(policy: RecoveryPolicy) -> None
     again = policy is RecoveryPolicy.AUTO
     assert (net.drives[JOINT].view.state is DriveState.OPERATION_ENABLED) is again
     assert motor(net) == pytest.approx(rest, abs=1e-3)
-    assert any('enabled again (recovery: auto)' in text for text in net.told()) is again
+    assert any('enabled again (recovery: auto)' in text for text in net.reported()) is again
     if again:
         assert net.drives[JOINT].control.mode.number is OperationMode.CYCLIC_POSITION
 
@@ -433,7 +435,7 @@ def test_recovery_does_not_reset_a_fault() -> None:
     net.run_until(net.all_ready)
     net.run(1.0)
     assert net.drives[JOINT].view.state is DriveState.FAULT
-    assert any('not enabled again' in text for text in net.told())
+    assert any('not enabled again' in text for text in net.reported())
 
 
 def test_without_voltage_the_answer_names_the_safety_circuit() -> None:
@@ -497,11 +499,11 @@ def test_the_buffer_of_mode_7_is_emptied_first() -> None:
     assert last_write < first_seven
 
 
-@pytest.mark.parametrize('told', [0, 1, 3], ids='EDS default {}'.format)
+@pytest.mark.parametrize('reported', [0, 1, 3], ids='EDS default {}'.format)
 @pytest.mark.parametrize('mapped', [True, False], ids=['RPDO', 'SDO'])
-def test_a_drive_that_refuses_mode_zero_is_never_sent_it(told: int, mapped: bool) -> None:
+def test_a_drive_that_refuses_mode_zero_is_never_sent_it(reported: int, mapped: bool) -> None:
     """Quirk `no_mode_zero`: from boot on it is sent the mode that it has, not its EDS default."""
-    dictionary = with_defaults(drive_dictionary(), {(0x6060, 0): told}).for_node(NODE_ID)
+    dictionary = with_defaults(drive_dictionary(), {(0x6060, 0): reported}).for_node(NODE_ID)
     config = full_drive(dictionary=dictionary, scales={'quirks': 'no_mode_zero'})
     if not mapped:
         first = replace(config.rpdos[0], mapping=config.rpdos[0].mapping[:1])
@@ -569,4 +571,4 @@ def test_a_drive_that_interpolates_only_in_motion_is_no_warning() -> None:
         net.commands[JOINT].set_target(target)
         net.run(2.0)
         assert motor(net) == pytest.approx(target, abs=1e-3)
-    assert net.told(Severity.WARNING) == []
+    assert net.reported(Severity.WARNING) == []

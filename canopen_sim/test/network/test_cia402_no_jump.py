@@ -270,7 +270,7 @@ def test_shutdown_never_lets_a_moving_axis_go(
             fastest = max(fastest, abs(drive.velocity))
     assert drive.state is DriveState.SWITCH_ON_DISABLED
     assert fastest <= 0.02 * SCALE
-    assert not [text for text in loaded.net.told() if 'did not come to rest' in text]
+    assert not [text for text in loaded.net.reported() if 'did not come to rest' in text]
 
 
 def test_shutdown_of_a_drive_that_is_off_lost_or_faulted_ends_at_once() -> None:

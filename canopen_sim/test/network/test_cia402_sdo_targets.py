@@ -442,14 +442,14 @@ def test_a_controlword_that_is_refused_is_written_seldom() -> None:
     promise = net.begin(JOINT, 'disable')
     net.run(4.0)
     assert 2 <= downloads(net, since=begin).count(0x6040) <= 4
-    assert len([text for text in net.told(Severity.WARNING) if '0x6040' in text]) == 1
+    assert len([text for text in net.reported(Severity.WARNING) if '0x6040' in text]) == 1
     accept(net)
     net.run_until(lambda: promise.done, 10.0)
     net.run_until(lambda: net.drives[JOINT].view.state is not DriveState.OPERATION_ENABLED, 10.0)
 
 
 def test_of_values_behind_one_that_failed_only_the_newest_is_sent() -> None:
-    """Whoever delivered one that was dropped is told when the device has the newest."""
+    """Whoever delivered one that was dropped is notified when the device has the newest."""
     net = booted()
     node = net.network.nodes[JOINT]
     writer, sent = node.objects.writer(VELOCITY), []

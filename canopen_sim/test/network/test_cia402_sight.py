@@ -222,15 +222,15 @@ def test_a_drive_that_cannot_be_seen_is_not_enabled() -> None:
 def test_feedback_is_that_of_the_sync_it_is_stamped_with() -> None:
     """Position, velocity and effort of /joint_states come from the same TPDOs."""
     arm = Arm(OperationMode.CYCLIC_POSITION)
-    net, told, sent = arm.net, [], []
+    net, reported, sent = arm.net, [], []
 
     def note(sync_time: float) -> None:
-        told.append(net.drives['joint1'].view.position)
+        reported.append(net.drives['joint1'].view.position)
         (data,) = net.frames(0x282, since=sync_time)
         sent.append(struct.unpack_from('<i', data)[0] / SCALE)
 
     net.network.on_feedback = note
     net.run(0.3)
-    assert len(told) == pytest.approx(30, abs=1)
-    assert told[-1] - told[0] > 0.25  # it moves
-    assert told == pytest.approx(sent, abs=1e-9)
+    assert len(reported) == pytest.approx(30, abs=1)
+    assert reported[-1] - reported[0] > 0.25  # it moves
+    assert reported == pytest.approx(sent, abs=1e-9)

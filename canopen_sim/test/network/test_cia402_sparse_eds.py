@@ -39,10 +39,10 @@ def booted(dictionary: ObjectDictionary, **changes: object) -> VirtualNetwork:
 def test_a_simulated_drive_has_the_modes_that_its_objects_allow() -> None:
     """0x6502 of EPOS, Kollmorgen and Elmo has no default; the drive is of use all the same."""
     net = booted(without_default(0x6502))
-    told = net.drives[JOINT].view.parameters.supported_modes
+    reported = net.drives[JOINT].view.parameters.supported_modes
     wanted = (OperationMode.PROFILE_POSITION, OperationMode.HOMING, OperationMode.CYCLIC_TORQUE)
-    assert told
-    assert all(told & mode.support_bit for mode in wanted)
+    assert reported
+    assert all(reported & mode.support_bit for mode in wanted)
     net.do(JOINT, 'init')
     net.select(JOINT, OperationMode.PROFILE_POSITION)
     net.commands[JOINT].set_target(0.3)
@@ -55,11 +55,11 @@ def test_it_has_no_mode_whose_object_is_missing() -> None:
     dictionary = ObjectDictionary(
         entry for entry in without_default(0x6502) if entry.index not in (0x6071, 0x6042)
     )
-    told = booted(dictionary).drives[JOINT].view.parameters.supported_modes
-    assert told
+    reported = booted(dictionary).drives[JOINT].view.parameters.supported_modes
+    assert reported
     missing = (OperationMode.PROFILE_TORQUE, OperationMode.CYCLIC_TORQUE, OperationMode.VELOCITY)
-    assert not any(told & mode.support_bit for mode in missing)
-    assert told & OperationMode.PROFILE_VELOCITY.support_bit
+    assert not any(reported & mode.support_bit for mode in missing)
+    assert reported & OperationMode.PROFILE_VELOCITY.support_bit
 
 
 def unmapped() -> VirtualNetwork:
@@ -79,7 +79,7 @@ def test_a_target_without_an_rpdo_goes_by_sdo() -> None:
         net.commands[JOINT].set_target(target)
         net.run(5.0)
         assert net.drives[JOINT].view.position == pytest.approx(target, abs=1e-3)
-    assert net.told(Severity.WARNING) == []
+    assert net.reported(Severity.WARNING) == []
 
 
 def test_a_velocity_without_an_rpdo_goes_by_sdo() -> None:
@@ -121,4 +121,4 @@ def test_a_drive_moves_by_the_default_dictionary() -> None:
     net.commands['a'].set_target(0.5)
     net.run(10.0)
     assert net.drives['a'].view.position == pytest.approx(0.5, abs=1e-3)
-    assert net.told(Severity.ERROR) == []
+    assert net.reported(Severity.ERROR) == []

@@ -87,7 +87,7 @@ class Failing:
     @property
     def errors(self) -> list[str]:
         """What was reported as an error."""
-        return self.net.told(Severity.ERROR)
+        return self.net.reported(Severity.ERROR)
 
     @property
     def controlwords_by_sdo(self) -> list[int]:
@@ -113,7 +113,7 @@ def owner_of(failing: Failing, place: str) -> tuple[object, str]:
 
 
 def assert_stopped_once(failing: Failing) -> None:
-    """Quick stop, rest, disable; never without power at speed, and told once."""
+    """Quick stop, rest, disable; never without power at speed, and reported once."""
     assert failing.states == [
         DriveState.OPERATION_ENABLED,
         DriveState.QUICK_STOP_ACTIVE,
@@ -253,7 +253,7 @@ def test_a_shutdown_begins_by_rpdo_and_says_when_the_drive_keeps_its_power(
     assert failing.device.state is DriveState.SWITCH_ON_DISABLED
 
 
-@pytest.mark.parametrize('lost', [set(), {*RPDOS, 0x600 + NODE_ID}], ids=['heard', 'deaf'])
+@pytest.mark.parametrize('lost', [set(), {*RPDOS, 0x600 + NODE_ID}], ids=['receives', 'deaf'])
 def test_a_device_whose_drive_keeps_its_power_goes_on_to_watch_the_master(
     lost: set[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -296,7 +296,7 @@ def test_a_drive_that_could_not_be_stopped_is_not_said_to_be_enabled(
 def test_a_drive_that_keeps_its_power_is_stopped_again_and_again(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """As soon as an SDO reaches it the stop works; that it failed is told once."""
+    """As soon as an SDO reaches it the stop works; that it failed is reported once."""
     failing = Failing(6, monkeypatch)
     failing.fail(*owner_of(failing, 'controlword'))
     failing.net.wire.loses = lambda sender, frame: frame.can_id == 0x600 + NODE_ID

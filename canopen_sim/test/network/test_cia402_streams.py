@@ -153,24 +153,24 @@ def test_nothing_is_called_stopped_that_moves(mode: OperationMode) -> None:
         client.net.run(PERIOD)
     drive = client.net.drives[JOINT]
     assert drive.view.velocity > 0.5
-    while not (said := [text for text in client.net.told() if 'has paused' in text]):
+    while not (said := [text for text in client.net.reported() if 'has paused' in text]):
         client.net.run(PERIOD)
     moves = abs(drive.view.velocity) > 0.02
     assert ('stopped' in said[0]) is not moves
     assert moves is (mode is OperationMode.PROFILE_POSITION)
     client.net.run(5.0)
-    assert client.net.told(Severity.WARNING) == said
+    assert client.net.reported(Severity.WARNING) == said
     assert (client.motor == pytest.approx(3.0, abs=0.01)) is moves
 
 
 def test_an_axis_that_does_not_stop_is_reported() -> None:
-    """Its RPDOs are lost, so it goes on at the last velocity that it was told."""
+    """Its RPDOs are lost, so it goes on at the last velocity that it received."""
     client = Publisher(OperationMode.PROFILE_VELOCITY)
     for _ in range(60):
         client.commands.stream_target(0.8)
         client.net.run(PERIOD)
     client.net.wire.loses = lambda sender, frame: frame.can_id in (0x202, 0x302)
     client.net.run(4.0)
-    (error,) = client.net.told(Severity.ERROR)
+    (error,) = client.net.reported(Severity.ERROR)
     assert 'has not come to rest' in error
-    assert not [text for text in client.net.told() if 'stopped' in text]
+    assert not [text for text in client.net.reported() if 'stopped' in text]

@@ -58,7 +58,7 @@ def test_a_drive_that_holds_goes_on_holding(mode: OperationMode) -> None:
     assert drive.control.accepts_targets
     assert max(abs(position - at_rest) for position in seen) <= 1
     assert all(word & 0x0F == 0x0F for word in net.controlwords('a', since=begin))
-    assert any('taken over enabled' in text for text in net.told())
+    assert any('taken over enabled' in text for text in net.reported())
     net.commands['a'].set_target(0.5)
     net.run(3.0)
     assert drive.view.position == pytest.approx(0.5, abs=1e-3)
@@ -101,4 +101,4 @@ def test_what_was_taken_over_is_led_anew_after_a_stop() -> None:
     net.network.send_nmt(NmtCommand.START, 2)
     net.run(1.0)
     assert net.drives['a'].view.state is not DriveState.OPERATION_ENABLED
-    assert net.told(Severity.ERROR) == []
+    assert net.reported(Severity.ERROR) == []

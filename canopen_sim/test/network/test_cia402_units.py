@@ -68,7 +68,7 @@ def test_a_drive_with_profile_velocity_0_refuses_targets() -> None:
     writes = (*config.sdo_writes, sdo_write(0x6081, 0, 0))
     net = VirtualNetwork(bus_config(replace(config, sdo_writes=writes)))
     net.boot()
-    assert any('0x6081' in text for text in net.told(Severity.WARNING))
+    assert any('0x6081' in text for text in net.reported(Severity.WARNING))
     net.do(JOINT, 'init')
     net.select(JOINT, OperationMode.PROFILE_POSITION)
     with pytest.raises(DriveError, match='0x6081'):
@@ -92,4 +92,4 @@ def test_a_factor_group_that_the_drive_does_not_have_is_said() -> None:
     net.start()
     net.run(3.0)
     assert not net.drives[JOINT].view.ready
-    assert any('scale_from_factor_group' in text for text in net.told(Severity.WARNING))
+    assert any('scale_from_factor_group' in text for text in net.reported(Severity.WARNING))

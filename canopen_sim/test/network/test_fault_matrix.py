@@ -77,11 +77,11 @@ def target_of(mode: OperationMode) -> float:
 class Arm:
     """Two drives and their master."""
 
-    def __init__(self, patience: float = 0.3) -> None:
+    def __init__(self, heartbeat_timeout: float = 0.3) -> None:
         """Boot them; both sides watch each other's heartbeat, with this consumer time in [s]."""
         watching = {
             'heartbeat_consumer': True,
-            'heartbeat_timeout': patience,
+            'heartbeat_timeout': heartbeat_timeout,
             'sdo_writes': (*MOTION_WRITES, sdo_write(0x60C2, 1, round(1000 * CYCLE))),
         }
         self.net = VirtualNetwork(
@@ -89,7 +89,7 @@ class Arm:
                 every_mode(drive_config(FAULTY, 2, **watching)),
                 every_mode(drive_config(WITNESS, 3, **watching)),
                 heartbeat_producer=0.1,
-                heartbeat_timeout=patience,
+                heartbeat_timeout=heartbeat_timeout,
                 sync_period=CYCLE,
                 cycle_period=CYCLE,
             )
@@ -360,7 +360,7 @@ def test_fault_in_motion(fault: Fault, mode: OperationMode) -> None:
         arm.net.do(name, fault.way.value)
         arm.net.select(name, mode)
     arm.stands(FAULTY, WITNESS)
-    assert_obeys(arm, mode)
+    assert_accepts_targets(arm, mode)
 
 
 @pytest.mark.parametrize('fault', [f for f in FAULTS if not f.witness_stops], ids=str)
@@ -383,7 +383,7 @@ def test_fault_while_homing(fault: Fault) -> None:
     arm.stands(FAULTY)
 
 
-def assert_obeys(arm: Arm, mode: OperationMode) -> None:
+def assert_accepts_targets(arm: Arm, mode: OperationMode) -> None:
     """Check that the drive goes where it is sent now."""
     if mode not in POSITION_MODES:
         arm.net.commands[FAULTY].set_target(-target_of(mode))
@@ -406,7 +406,7 @@ STREAMED = (OperationMode.INTERPOLATED_POSITION, OperationMode.CYCLIC_POSITION)
 def test_lost_pdos_in_motion(
     lost: tuple[int, ...], names: tuple[str, ...], mode: OperationMode
 ) -> None:
-    """A drive that cannot be seen is halted and refuses targets, one that cannot be led is told.
+    """A drive that cannot be seen is halted and refuses targets; one without RPDOs is reported.
 
     Neither is disabled, and when the PDOs come again nothing moves before a new target.
     """
@@ -421,7 +421,7 @@ def test_lost_pdos_in_motion(
     arm.net.run(1.0)
     for name in names:
         drive = arm.net.drives[name]
-        causes = {text for text in arm.net.told(Severity.ERROR) if f'{name}: stopped' in text}
+        causes = {text for text in arm.net.reported(Severity.ERROR) if f'{name}: stopped' in text}
         assert drive.control.accepts_targets is not silent
         assert drive.control.halted is bool(causes) is (silent or mode in STREAMED), (
             arm.net.story()
@@ -434,19 +434,19 @@ def test_lost_pdos_in_motion(
     elif not silent:
         halts = [arm.net.begin(name, 'halt', preempt=True) for name in names]
         arm.net.run(0.5)
-        assert not any(halt.done for halt in halts)  # none is told to stand while it moves
+        assert not any(halt.done for halt in halts)  # none is commanded to stand while it moves
     mend_bus(arm)
     arm.net.run(0.7)
     arm.stands(FAULTY, WITNESS)
     for name in (FAULTY, WITNESS):
         assert arm.state(name) is DriveState.OPERATION_ENABLED
         assert arm.net.drives[name].control.accepts_targets
-    assert_obeys(arm, mode)
+    assert_accepts_targets(arm, mode)
 
 
 @pytest.mark.parametrize('mode', MODES, ids=lambda mode: mode.name)
 def test_sdo_time_outs_do_not_disturb_motion(mode: OperationMode) -> None:
-    """The cycle needs no SDO: only who asks for one hears of it, with object and device."""
+    """The cycle needs no SDO: only the caller of one gets the error, with object and device."""
     arm = Arm()
     arm.move(mode)
     stop_sdo(arm)
@@ -456,14 +456,14 @@ def test_sdo_time_outs_do_not_disturb_motion(mode: OperationMode) -> None:
     assert arm.state() is DriveState.OPERATION_ENABLED
     mend_bus(arm)
     arm.net.run(1.0)
-    assert_obeys(arm, mode)
+    assert_accepts_targets(arm, mode)
 
 
 @pytest.mark.parametrize('mode', MODES, ids=lambda mode: mode.name)
 def test_a_twentieth_of_all_frames_lost(mode: OperationMode) -> None:
     """Boot, enabling and motion succeed all the same, and what was lost is counted."""
     chance = random.Random(int(mode))
-    arm = Arm(patience=1.0)  # of three heartbeats all are lost too often
+    arm = Arm(heartbeat_timeout=1.0)  # of three heartbeats all are lost too often
 
     def loses(sender: str, frame: Frame) -> bool:
         del sender, frame
@@ -475,7 +475,7 @@ def test_a_twentieth_of_all_frames_lost(mode: OperationMode) -> None:
     arm.stop(WITNESS, mode)
     assert arm.state() is DriveState.OPERATION_ENABLED
     arm.stands(FAULTY, WITNESS)
-    assert_obeys(arm, mode)
+    assert_accepts_targets(arm, mode)
     assert arm.net.network.missed_pdos > 0
     assert arm.net.network.nodes[FAULTY].online
 
@@ -491,7 +491,7 @@ def test_another_device_than_expected_is_not_driven() -> None:
     net.start()
     net.run_until(lambda: net.drives[WITNESS].view.ready)
     net.run(2.0)
-    assert any('another device: vendor id 0x00001234' in text for text in net.told())
+    assert any('another device: vendor id 0x00001234' in text for text in net.reported())
     with pytest.raises(DriveError, match='vendor id'):
         net.do(FAULTY, 'init')
     net.do(WITNESS, 'init')

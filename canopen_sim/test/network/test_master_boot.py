@@ -95,7 +95,7 @@ class Scene:
         if there:
             self.net.connect(NODE, self.device)
 
-    def told(self, kind: EventKind) -> list[str]:
+    def reported(self, kind: EventKind) -> list[str]:
         """Return what was reported of a kind."""
         return [event.text for event in self.net.events if event.kind is kind]
 
@@ -141,11 +141,11 @@ def test_the_whole_configuration_in_its_order() -> None:
     assert scene.device.commands == [RESET_COMMUNICATION, PRE_OPERATIONAL, START]
     assert scene.device.state is NmtState.OPERATIONAL
     assert scene.node.phase is BootPhase.OPERATIONAL
-    assert scene.told(EventKind.BOOT) == ['operational']
+    assert scene.reported(EventKind.BOOT) == ['operational']
 
 
 def test_nothing_is_written_before_pre_operational_and_after_start() -> None:
-    """The device is configured while it processes no PDOs, also when it heard no reset."""
+    """The device is configured while it processes no PDOs, also when it received no reset."""
     scene = Scene()
     scene.device.state = NmtState.OPERATIONAL
     scene.device.deaf_to_reset = True
@@ -190,7 +190,7 @@ def test_constant_error_control_objects_are_not_written() -> None:
     assert not [write for write in scene.device.writes if write[0] in (0x1016, 0x1017)]
 
 
-def test_a_device_that_watches_the_master_is_told_how_long() -> None:
+def test_a_device_that_watches_the_master_gets_the_time() -> None:
     """0x1016:01 holds the master's id and its consumer time."""
     net_config = bus_config(
         io_config(heartbeat_consumer=True),
@@ -215,17 +215,17 @@ def test_devices_are_not_started_when_the_master_shall_not() -> None:
     net.boot()
     net.run(0.1)
     assert START not in device.commands
-    assert any('start_nodes' in text for text in net.told())
+    assert any('start_nodes' in text for text in net.reported())
 
 
 @pytest.mark.parametrize('name', IDENTITY_PLACES)
 def test_another_device_is_refused_with_the_remedy(name: str) -> None:
-    """Found and expected value, and the key of bus.yml; it is not configured, and told once."""
+    """Found and expected value, and the key of bus.yml; not configured, and reported once."""
     scene = Scene()
     scene.device.values[IDENTITY_PLACES[name]] = (0xBAD).to_bytes(4, 'little')
     scene.net.start()
     scene.run(30.0)
-    failures = scene.told(EventKind.BOOT_FAILED)
+    failures = scene.reported(EventKind.BOOT_FAILED)
     assert len(failures) == 1
     expected = getattr(IDENTITY, name)
     title = name.replace('_', ' ')
@@ -241,7 +241,7 @@ def test_another_device_is_refused_with_the_remedy(name: str) -> None:
 
 @pytest.mark.parametrize('name', IDENTITY_PLACES)
 def test_an_expected_0_is_not_checked(name: str) -> None:
-    """Any device will do where bus.yml and EDS tell nothing."""
+    """Any device will do where bus.yml and EDS have no value."""
     scene = Scene(io_config(identity=replace(IDENTITY, **{name: 0})))
     scene.device.values[IDENTITY_PLACES[name]] = (0xBAD).to_bytes(4, 'little')
     scene.boot()
@@ -258,13 +258,13 @@ def test_the_right_device_in_place_of_the_wrong_is_booted() -> None:
 
 
 @pytest.mark.parametrize('place', [(0x1800, 2), (0x1A00, 1), (0x6081, 0), (0x1017, 0)])
-def test_a_refused_configuration_is_told_with_place_and_reason(place: tuple[int, int]) -> None:
-    """The abort is said in words with the object; it is tried for ever, and told once."""
+def test_a_refused_configuration_is_reported_with_place_and_reason(place: tuple[int, int]) -> None:
+    """The abort is reported in words with the object, once; boot is repeated."""
     scene = Scene()
     scene.device.refuses[place] = 0x0609_0030
     scene.net.start()
     scene.run(30.0)
-    failures = scene.told(EventKind.BOOT_FAILED)
+    failures = scene.reported(EventKind.BOOT_FAILED)
     index, subindex = place
     assert len(failures) == 1
     assert 'while configuring' in failures[0]
@@ -275,8 +275,8 @@ def test_a_refused_configuration_is_told_with_place_and_reason(place: tuple[int,
     scene.net.run_until(scene.net.all_ready, 3.0)
 
 
-def test_another_reason_is_told_again() -> None:
-    """Told once does not mean that a new reason is kept secret."""
+def test_another_reason_is_reported_again() -> None:
+    """A new reason is reported, too."""
     scene = Scene()
     scene.device.refuses[0x6081, 0] = 0x0609_0030
     scene.net.start()
@@ -284,7 +284,7 @@ def test_another_reason_is_told_again() -> None:
     scene.device.refuses.clear()
     scene.device.refuses[0x6098, 0] = 0x0601_0002
     scene.run(5.0)
-    assert len(scene.told(EventKind.BOOT_FAILED)) == 2
+    assert len(scene.reported(EventKind.BOOT_FAILED)) == 2
 
 
 def test_a_device_that_misses_the_reset_is_found() -> None:
@@ -292,7 +292,7 @@ def test_a_device_that_misses_the_reset_is_found() -> None:
     scene = Scene()
     scene.device.announces = False
     scene.boot()
-    assert scene.told(EventKind.BOOT_FAILED) == []
+    assert scene.reported(EventKind.BOOT_FAILED) == []
 
 
 def test_a_device_that_knows_no_0x1000_is_found_by_its_abort() -> None:
@@ -304,12 +304,12 @@ def test_a_device_that_knows_no_0x1000_is_found_by_its_abort() -> None:
 
 
 @pytest.mark.parametrize('announces', [True, False])
-def test_an_absent_device_is_waited_for_and_told_once(announces: bool) -> None:
+def test_an_absent_device_is_waited_for_and_reported_once(announces: bool) -> None:
     """It joins whenever it comes, with a boot-up message or silently, within a poll."""
     scene = Scene(there=False)
     scene.net.start()
     scene.run(60.0)
-    failures = scene.told(EventKind.BOOT_FAILED)
+    failures = scene.reported(EventKind.BOOT_FAILED)
     assert len(failures) == 1
     assert 'power, wiring, termination' in failures[0]
     assert f'node id {NODE_ID} ' in failures[0]
@@ -352,7 +352,7 @@ def test_a_restart_in_the_middle_of_a_boot_starts_it_again(after: int) -> None:
     undisturbed.boot()
     assert scene.device.values == undisturbed.device.values
     assert scene.device.state is NmtState.OPERATIONAL
-    assert scene.told(EventKind.BOOT_FAILED) == []
+    assert scene.reported(EventKind.BOOT_FAILED) == []
     assert scene.node.online
 
 
@@ -378,7 +378,7 @@ def test_a_device_that_falls_silent_while_it_is_configured() -> None:
     scene.device.on_request = fall_silent
     scene.net.start()
     scene.run(20.0)
-    failures = scene.told(EventKind.BOOT_FAILED)
+    failures = scene.reported(EventKind.BOOT_FAILED)
     assert 'while configuring' in failures[0]
     assert '0x1A00:' in failures[0]
     assert 'no answer yet' in failures[1]
@@ -388,14 +388,14 @@ def test_a_device_that_falls_silent_while_it_is_configured() -> None:
     scene.net.run_until(scene.net.all_ready, 3.0)
 
 
-def test_a_device_without_heartbeat_is_told_and_not_started_again() -> None:
-    """Its loss would go unnoticed; the reasons are told once each, and nothing after that."""
+def test_a_device_without_heartbeat_is_reported_and_not_started_again() -> None:
+    """Its loss would go unnoticed; the reasons are reported once each, and nothing after that."""
     scene = Scene()
     scene.device.beats = False
     scene.boot()
     scene.run(60.0)
-    lost = scene.told(EventKind.HEARTBEAT_LOST)
-    failures = scene.told(EventKind.BOOT_FAILED)
+    lost = scene.reported(EventKind.HEARTBEAT_LOST)
+    failures = scene.reported(EventKind.BOOT_FAILED)
     assert len(lost) == 1
     assert '300 ms' in lost[0]
     assert len(failures) == 1
@@ -411,7 +411,7 @@ def test_slow_answers_do_not_fail_a_boot() -> None:
     scene = Scene()
     scene.device.answer_time = 0.03
     scene.boot()
-    assert scene.told(EventKind.BOOT_FAILED) == []
+    assert scene.reported(EventKind.BOOT_FAILED) == []
 
 
 def test_nothing_is_an_error_in_a_boot_that_goes_well() -> None:
@@ -419,6 +419,6 @@ def test_nothing_is_an_error_in_a_boot_that_goes_well() -> None:
     scene = Scene()
     scene.boot()
     scene.run(1.0)
-    assert scene.net.told(Severity.WARNING) == []
+    assert scene.net.reported(Severity.WARNING) == []
     assert scene.node.sdo.counters.aborted == 0
     assert scene.node.sdo.counters.timed_out == 0

@@ -52,14 +52,14 @@ class Refusing:
         self.net.boot()
         self.net.run(0.05)
         assert self.device.state is NmtState.OPERATIONAL
-        return self.net.told(Severity.WARNING)
+        return self.net.reported(Severity.WARNING)
 
     def fail(self) -> str:
         """Return why the device is not started."""
         self.net.start()
         self.net.run(3.0)
         assert START not in self.device.commands
-        (reason,) = self.net.told(Severity.WARNING)
+        (reason,) = self.net.reported(Severity.WARNING)
         return reason
 
 

@@ -55,7 +55,7 @@ class Network:
     """
 
     def __init__(self, *configs: NodeConfig, **master: object) -> None:
-        """Make the devices; they are switched on, and hear the master when it starts."""
+        """Make the devices; they are switched on, and receive the master when it starts."""
         names = [config.name for config in configs]
         self.net = VirtualNetwork(bus_config(*configs, **master), absent=names)
         self.devices = {config.name: self._device(config) for config in configs}
@@ -100,7 +100,7 @@ def test_a_device_in_operation_is_taken_over_without_a_word() -> None:
     assert network.net.frames(0x205) == []
     network.net.network.publish_object(node, 0x6060, 0, 9)
     assert network.net.frames(0x205) == [b'\x0f\x00\x09']
-    assert any('taken over' in text and 'error L' in text for text in network.net.told())
+    assert any('taken over' in text and 'error L' in text for text in network.net.reported())
 
 
 def test_a_device_with_other_pdos_is_left_alone() -> None:
@@ -110,25 +110,25 @@ def test_a_device_with_other_pdos_is_left_alone() -> None:
     network.start(3.0)
     assert device.commands == []
     assert network.net.frames(0x205) == []
-    (told,) = network.net.told(Severity.WARNING)
-    assert '0x1A00:02 is 0x606C0020 instead of 0x60640020' in told
-    assert '~/nmt_reset_node' in told
+    (reported,) = network.net.reported(Severity.WARNING)
+    assert '0x1A00:02 is 0x606C0020 instead of 0x60640020' in reported
+    assert '~/nmt_reset_node' in reported
     network.net.network.send_nmt(NmtCommand.RESET_NODE, NODE_ID)
     network.net.run(3.0)
     assert network.net.network.nodes[NODE].online
     assert device.commands == [RESET_NODE, PRE_OPERATIONAL, START]
 
 
-def test_a_device_that_does_not_tell_its_state_is_left_alone() -> None:
-    """It might be in operation; the reason and the way out are told."""
+def test_a_device_that_does_not_report_its_state_is_left_alone() -> None:
+    """It might be in operation; the reason and the remedy are reported."""
     network, device = running(reset_communication=False)
     device.guarded = False
     network.start(5.0)
     assert device.commands == []
-    (told,) = network.net.told(Severity.WARNING)
-    assert 'boot failed while' in told
-    assert 'boot error K: no heartbeat' in told
-    assert 'does not send its NMT state' in told
+    (reported,) = network.net.reported(Severity.WARNING)
+    assert 'boot failed while' in reported
+    assert 'boot error K: no heartbeat' in reported
+    assert 'does not send its NMT state' in reported
 
 
 def test_a_device_that_is_kept_alive_but_does_not_run_is_configured() -> None:
@@ -185,7 +185,7 @@ def two(**changes: object) -> tuple[NodeConfig, NodeConfig]:
 
 
 def test_nobody_is_started_without_the_mandatory_device() -> None:
-    """The others wait, configured; the time that is over is told with what is missing."""
+    """The others wait, configured; the time that is over is reported with what is missing."""
     network = Network(*two(), boot_time=2.0)
     network.devices[NODE].answers = network.devices[NODE].announces = False
     network.start(1.5)
@@ -195,7 +195,7 @@ def test_nobody_is_started_without_the_mandatory_device() -> None:
     network.net.run(1.0)
     assert any(
         'mandatory devices have not booted within 2 s' in text and NODE in text
-        for text in network.net.told(Severity.ERROR)
+        for text in network.net.reported(Severity.ERROR)
     )
     network.devices[NODE].answers = True
     network.net.run(3.0)
@@ -224,7 +224,7 @@ def test_all_are_started_by_one_frame() -> None:
 def test_the_loss_of_a_mandatory_device(
     master: dict[str, bool], command: int | None, message: str
 ) -> None:
-    """What the others do is what bus.yml says, and it is told."""
+    """The others do what bus.yml configures, and it is reported."""
     network = Network(*two(), **master)
     network.start(2.0)
     lost, other = network.devices[NODE], network.devices['other']
@@ -232,7 +232,7 @@ def test_the_loss_of_a_mandatory_device(
     lost.answers = lost.beats = lost.announces = False
     lost._beat_due = None
     network.net.run(0.6)
-    assert any(message in text for text in network.net.told(Severity.ERROR))
+    assert any(message in text for text in network.net.reported(Severity.ERROR))
     assert other.commands[:1] == ([] if command is None else [command])
 
 

@@ -35,7 +35,7 @@ def events(net: VirtualNetwork, kind: EventKind, node: str = '') -> list[str]:
     return [e.text for e in net.events if e.kind is kind and node in ('', e.node)]
 
 
-def test_a_lost_heartbeat_is_told_within_the_consumer_time() -> None:
+def test_a_lost_heartbeat_is_reported_within_the_consumer_time() -> None:
     """Each device by its name, not before its time and at the next look after it."""
     net = network('a', 'b', 'c')
     net.boot()
@@ -78,7 +78,7 @@ def test_a_device_that_returns_is_booted_again() -> None:
 
 
 def test_a_short_power_cut_is_noticed_by_the_boot_up_message() -> None:
-    """Also one shorter than the consumer time: the restart is told, and the device booted."""
+    """Also one shorter than the consumer time: the restart is reported, and the device booted."""
     net = network()
     net.boot()
     net.run(0.2)
@@ -112,7 +112,7 @@ def test_a_device_without_heartbeat_is_not_watched() -> None:
     assert node_status(net.network.nodes['a'], net.now).heartbeat_age is None
 
 
-def test_the_status_tells_the_age_of_the_heartbeat() -> None:
+def test_the_status_has_the_age_of_the_heartbeat() -> None:
     """It grows while nothing comes, and is small when one came."""
     net = network()
     net.boot()
@@ -125,7 +125,7 @@ def test_the_status_tells_the_age_of_the_heartbeat() -> None:
     assert later == pytest.approx(age + 0.2)
 
 
-def test_emergencies_are_told_in_words_until_they_end() -> None:
+def test_emergencies_are_reported_in_words_until_they_end() -> None:
     """The last one is kept until the device takes it back, or restarts."""
     net = network()
     net.boot()
@@ -133,9 +133,9 @@ def test_emergencies_are_told_in_words_until_they_end() -> None:
     for data in ('10 82 11 00 00 00 00 00', '20 43 09 01 02 03 04 05'):
         net.send_as('a', Frame(EMCY + 2, bytes.fromhex(data)))
     net.run(0.01)
-    told = events(net, EventKind.EMERGENCY, 'a')
-    assert '0x8210 PDO not processed, length error' in told[0]
-    assert '0x4320 too low drive temperature' in told[1]
+    reported = events(net, EventKind.EMERGENCY, 'a')
+    assert '0x8210 PDO not processed, length error' in reported[0]
+    assert '0x4320 too low drive temperature' in reported[1]
     assert node.emergencies.last is not None
     assert node.emergencies.last.code == 0x4320
     net.send_as('a', Frame(EMCY + 2, bytes(8)))
@@ -149,7 +149,7 @@ def test_emergencies_are_told_in_words_until_they_end() -> None:
     assert node.emergencies.last is None
 
 
-def test_an_odd_emergency_is_told_as_such() -> None:
+def test_an_odd_emergency_is_reported_as_such() -> None:
     """Too short a frame is no EMCY, but no reason to be silent."""
     net = network()
     net.boot()
@@ -169,7 +169,7 @@ def test_an_odd_heartbeat_is_no_heartbeat(data: bytes) -> None:
     assert (node.life.last, node.nmt_state) == before
 
 
-def test_states_are_told_when_they_change_only() -> None:
+def test_states_are_reported_when_they_change_only() -> None:
     """A heartbeat of the same state is no news."""
     net = network('a')
     net.boot()
@@ -188,7 +188,7 @@ def test_a_device_that_somebody_stops_is_warned_of_until_it_is_started() -> None
     net.run(0.2)
     node = net.network.nodes['a']
     assert node.left_operational
-    assert 'NMT state STOPPED' in str(net.told(Severity.WARNING))
+    assert 'NMT state STOPPED' in str(net.reported(Severity.WARNING))
     net.network.send_nmt(NmtCommand.START, 2)
     net.run(0.2)
     assert not node.left_operational
@@ -416,7 +416,7 @@ def test_heartbeats_do_not_crowd_after_a_pause() -> None:
     assert len(net.frames(HEARTBEAT + 1)) == 4
 
 
-def test_a_bus_that_refuses_frames_is_told_once_and_recovers() -> None:
+def test_a_bus_that_refuses_frames_is_reported_once_and_recovers() -> None:
     """The reason once, the recovery once; boots go on, and all is well in the end."""
     net = network()
     net.boot()
@@ -486,7 +486,7 @@ def test_all_are_reset_by_one_frame() -> None:
     assert net.frames(0x000) == [b'\x82\x00']
 
 
-def test_strangers_can_be_read_by_sdo() -> None:
+def test_unconfigured_devices_can_be_read_by_sdo() -> None:
     """A node id that bus.yml does not name has a client of its own; a known one has one only."""
     stranger = drive_config('c', 9)
     net = VirtualNetwork(bus_config(drive_config('a', 2), stranger))
@@ -556,12 +556,14 @@ def test_another_master_is_noticed(frame: Frame, what: str) -> None:
     for _ in range(5):
         net.send_as('rival', frame)
         net.run(0.01)
-    said = [text for text in net.told(Severity.ERROR) if 'another master is on this bus' in text]
+    said = [
+        text for text in net.reported(Severity.ERROR) if 'another master is on this bus' in text
+    ]
     assert len(said) == 1
     assert what in said[0]
 
 
-def test_a_device_that_does_not_answer_sync_is_told_before_its_heartbeat_is_missed() -> None:
+def test_a_device_that_does_not_answer_sync_is_reported_before_its_heartbeat_is_missed() -> None:
     """Once, and again when it falls silent again."""
     net = network('a')
     net.boot()
@@ -570,21 +572,23 @@ def test_a_device_that_does_not_answer_sync_is_told_before_its_heartbeat_is_miss
         net.wire.loses = lambda sender, frame: frame.can_id in (0x182, 0x282)
         net.run(1.0)
         assert not net.drives['a'].view.fresh
-        told = [text for text in net.told(Severity.WARNING) if 'has not answered SYNC' in text]
-        assert len(told) == count
+        reported = [
+            text for text in net.reported(Severity.WARNING) if 'has not answered SYNC' in text
+        ]
+        assert len(reported) == count
         net.wire.loses = lambda sender, frame: False
         net.run(0.2)
         assert net.drives['a'].view.fresh
 
 
-def test_a_pause_of_the_cycle_is_told_with_its_consequence() -> None:
+def test_a_pause_of_the_cycle_is_reported_with_its_consequence() -> None:
     """Whoever reads of faults afterwards shall know whose fault it was."""
     net = VirtualNetwork(
         bus_config(drive_config('a', 2), heartbeat_producer=0.1, heartbeat_timeout=0.3)
     )
     net.network.note_pause(0.2)
     net.network.note_pause(0.6)
-    short, long = net.told(Severity.WARNING)
+    short, long = net.reported(Severity.WARNING)
     assert 'held up for 200 ms' in short
     assert 'taken it for dead' not in short
     assert 'taken it for dead' in long
@@ -611,7 +615,7 @@ def test_devices_do_not_miss_a_master_that_has_taken_its_leave() -> None:
 CONTROLLER = 0x204  # a controller problem, with counters
 
 
-def test_the_state_of_the_controller_is_told_when_it_changes() -> None:
+def test_the_state_of_the_controller_is_reported_when_it_changes() -> None:
     """Error passive, bus off and the way back are said once each, with the counters."""
     net = network('a')
     net.boot()
@@ -624,21 +628,21 @@ def test_the_state_of_the_controller_is_told_when_it_changes() -> None:
     ]
     controller = net.network.controller
     for can_id, data, expected in story:
-        before = len(net.told(Severity.INFO))
+        before = len(net.reported(Severity.INFO))
         frame = Frame(can_id, bytes.fromhex(data), timestamp=net.now, is_error=True)
         net.network.receive(frame)
-        told = net.told(Severity.INFO)[before:]
-        assert [expected in text for text in told] == [True] * bool(expected)
+        reported = net.reported(Severity.INFO)[before:]
+        assert [expected in text for text in reported] == [True] * bool(expected)
     assert (controller.error_frames, controller.transmit_errors) == (5, 0)
     assert 'controller restarted' in controller.last_error
 
 
-def test_an_empty_bus_is_told_once() -> None:
+def test_an_empty_bus_is_reported_once() -> None:
     """Without anybody to acknowledge a frame each one is sent over and over."""
     net = network('a')
     for _ in range(100):
         net.network.receive(Frame(0x020, bytes(8), timestamp=net.now, is_error=True))
-    assert len([text for text in net.told(Severity.WARNING) if 'acknowledges' in text]) == 1
+    assert len([text for text in net.reported(Severity.WARNING) if 'acknowledges' in text]) == 1
 
 
 def test_rpdos_leave_when_the_tpdos_of_the_sync_have_come() -> None:

@@ -82,7 +82,7 @@ def test_devices_and_tools_are_no_master(frame: Frame) -> None:
 
 
 def test_the_last_words_of_a_master_that_ended_do_not_count() -> None:
-    """What waited in the interface before the listening began is not heard."""
+    """What waited in the interface before the listening began is ignored."""
     wire = VirtualWire()
     with VirtualBus('here', wire) as bus, VirtualBus('there', wire) as ended:
         for _ in range(20):
@@ -98,7 +98,7 @@ def test_a_sync_of_somebody_else_is_no_sign_where_the_master_sends_none() -> Non
 
 
 def test_the_virtual_master_shows_itself_within_the_listening_time() -> None:
-    """Whatever moment one looks at a running master, it is heard."""
+    """Whatever moment one looks at a running master, it is detected."""
     net = VirtualNetwork(BUS)
     net.boot()
     net.run(1.0)
@@ -124,16 +124,16 @@ def test_beside_another_master_no_command_is_for_all() -> None:
     net.send_as('other', Frame(0x080))
     net.run(0.05)
     assert all(command[1] for command in net.frames(0x000))
-    assert not net.told(Severity.ERROR)
-    assert any('another master is on this bus' in text for text in net.told(Severity.WARNING))
+    assert not net.reported(Severity.ERROR)
+    assert any('another master is on this bus' in text for text in net.reported(Severity.WARNING))
 
 
-def test_the_clearest_sign_is_told_first() -> None:
+def test_the_clearest_evidence_is_named_first() -> None:
     """Many RPDOs do not hide the SYNC, nor that an NMT command."""
     signs = MasterFrames(BUS)
     frames = [*[Frame(0x202, bytes(3))] * 9, *[Frame(0x080)] * 3, Frame(0x000, b'\x01\x00')]
-    heard = Counter(sign for frame in frames if (sign := signs.read(frame)) is not None)
-    assert describe(heard) == (
+    found = Counter(sign for frame in frames if (sign := signs.read(frame)) is not None)
+    assert describe(found) == (
         'the NMT command START to all nodes 1 times, SYNC (0x080) 3 times, '
         'RPDO 1 (0x202) of a 9 times'
     )

@@ -270,7 +270,7 @@ def test_a_deadline_is_kept_once_something_was_published() -> None:
     assert max(gaps) < 0.1
 
 
-def test_a_device_that_is_not_there_is_told() -> None:
+def test_a_device_that_is_not_there_is_reported() -> None:
     """Nothing is kept for later, when it would surprise."""
     net = VirtualNetwork(bus_config(module()), absent=[MODULE])
     net.start()

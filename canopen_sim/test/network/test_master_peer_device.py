@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A device by others: our master boots, configures and reads a LocalNode of python-canopen.
 
-A LocalNode answers SDOs, obeys NMT and sends heartbeats; it knows no boot-up after a reset and
-sends no PDOs by itself (python-canopen says so), hence the test goes as far as it does.
+A LocalNode answers SDOs, executes NMT commands and sends heartbeats; it has no boot-up after a
+reset and sends no PDOs by itself (python-canopen says so), hence the test goes as far as it does.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Devices that leave Operational by themselves, and devices that never tell their NMT state."""
+"""Devices that leave Operational by themselves, and devices that never report their NMT state."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ class Relapsing(ScriptedDevice):
     """A device that falls back to Pre-operational soon after each start.
 
     Attributes:
-        tells_why: It sends an EMCY before.
+        reports_why: It sends an EMCY before.
         relapses: It does so.
     """
 
-    tells_why: bool = True
+    reports_why: bool = True
     relapses: bool = True
     _falls_at: float | None = None
 
@@ -48,7 +48,7 @@ class Relapsing(ScriptedDevice):
         if self._falls_at is not None and self._falls_at <= now:
             self._falls_at = None
             self.state = NmtState.PRE_OPERATIONAL
-            if self.tells_why:
+            if self.reports_why:
                 self.send(Frame(0x80 + self.node_id, EMCY))
 
     def next_deadline(self) -> float | None:
@@ -80,7 +80,7 @@ def starts(net: VirtualNetwork) -> list[float]:
 
 
 def losses(net: VirtualNetwork) -> list[str]:
-    """Return what was told of its drops."""
+    """Return what was reported of its drops."""
     return [event.text for event in net.events if event.kind is EventKind.HEARTBEAT_LOST]
 
 
@@ -99,9 +99,9 @@ def test_the_reason_is_its_emcy() -> None:
     """Each drop names the EMCY, and when the device is booted again; so does the boot phase."""
     net, _ = relapsing()
     net.run(3.0)
-    told = losses(net)
-    assert len(told) >= 2
-    assert all('0x8130' in text for text in told)
+    reported = losses(net)
+    assert len(reported) >= 2
+    assert all('0x8130' in text for text in reported)
     node = net.network.nodes[NODE]
     net.run_until(lambda: not node.online, 60.0)
     assert '0x8130' in node.phase_text
@@ -109,7 +109,7 @@ def test_the_reason_is_its_emcy() -> None:
 
 def test_a_drop_without_emcy_says_so() -> None:
     """Then the likely causes are named."""
-    net, _ = relapsing(tells_why=False)
+    net, _ = relapsing(reports_why=False)
     net.run(1.0)
     assert 'no EMCY' in losses(net)[0]
 
@@ -152,7 +152,9 @@ def state(net: VirtualNetwork) -> NmtState | None:
     return net.network.nodes[NODE].nmt_state
 
 
-def test_a_device_that_never_tells_its_state_is_in_the_commanded_one(mute: VirtualNetwork) -> None:
+def test_a_device_that_never_reports_its_state_is_in_the_commanded_one(
+    mute: VirtualNetwork,
+) -> None:
     """Operational after its boot, and what somebody commands afterwards."""
     node = mute.network.nodes[NODE]
     assert state(mute) is NmtState.OPERATIONAL

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""A reset that somebody commanded is told as what it is, and one that nobody did as an error."""
+"""A reset by command is reported as what it is, and one without a command as an error."""
 
 from __future__ import annotations
 
@@ -40,27 +40,27 @@ def back(net: VirtualNetwork) -> None:
 def test_a_commanded_reset_is_no_error(
     net: VirtualNetwork, command: NmtCommand, *, ours: bool
 ) -> None:
-    """It is told by name, and nothing worse, but what the drive says itself: it was enabled."""
+    """It is reported by name, and nothing worse but what the drive itself reports."""
     if ours:
         net.network.send_nmt(command, NODE_ID)
     else:
         net.send_as('tool', Frame(0x000, nmt_frame(command, NODE_ID)))
     back(net)
-    assert [text for text in net.told(Severity.WARNING) if 'EMCY' not in text] == []
-    assert f'a: restarts, by the NMT command {command.name}' in net.told()
-    assert 'a: operational' in net.told()
+    assert [text for text in net.reported(Severity.WARNING) if 'EMCY' not in text] == []
+    assert f'a: restarts, by the NMT command {command.name}' in net.reported()
+    assert 'a: operational' in net.reported()
 
 
 def test_a_device_that_restarts_slowly_is_no_error(net: VirtualNetwork) -> None:
-    """It misses its heartbeat before its boot-up message comes; that is told as the reset."""
+    """It misses its heartbeat before its boot-up message comes; that is reported as the reset."""
     net.network.send_nmt(NmtCommand.RESET_NODE, NODE_ID)
     net.power_off(NODE)
     net.run(0.9)
     assert not net.network.nodes[NODE].online
     net.power_on(NODE)
     net.run_until(net.all_ready)
-    assert net.told(Severity.ERROR) == []
-    assert sum('restarts, by the NMT command' in text for text in net.told()) == 1
+    assert net.reported(Severity.ERROR) == []
+    assert sum('restarts, by the NMT command' in text for text in net.reported()) == 1
 
 
 def test_a_reset_that_nobody_commanded_is_an_error(net: VirtualNetwork) -> None:
@@ -72,7 +72,9 @@ def test_a_reset_that_nobody_commanded_is_an_error(net: VirtualNetwork) -> None:
     net.power_off(NODE)
     net.power_on(NODE)
     back(net)
-    assert any('restarted: a boot-up message came' in text for text in net.told(Severity.ERROR))
+    assert any(
+        'restarted: a boot-up message came' in text for text in net.reported(Severity.ERROR)
+    )
 
 
 def test_a_reset_that_is_not_obeyed_does_not_hide_a_later_loss(net: VirtualNetwork) -> None:
@@ -83,4 +85,4 @@ def test_a_reset_that_is_not_obeyed_does_not_hide_a_later_loss(net: VirtualNetwo
     assert net.network.nodes[NODE].online
     net.power_off(NODE)
     net.run(1.0)
-    assert any('heartbeat lost' in text for text in net.told(Severity.ERROR))
+    assert any('heartbeat lost' in text for text in net.reported(Severity.ERROR))

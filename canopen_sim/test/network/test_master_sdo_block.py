@@ -146,7 +146,7 @@ def test_one_lost_segment_costs_no_transfer() -> None:
 
 
 def test_changed_data_are_noticed_by_the_checksum() -> None:
-    """A value whose CRC is wrong is refused, and the server hears why."""
+    """A value whose CRC is wrong is refused, and the server receives the reason."""
     line = BlockLine()
     line.store.find(BLOB).value = bytes(300)
     line.spoil = lambda data: data[:1] + b'\1' + data[2:] if data[0] == 9 else data

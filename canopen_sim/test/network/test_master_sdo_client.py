@@ -95,7 +95,7 @@ UPLOADS: dict[str, tuple[Transcript, bytes]] = {
         [('40 18 10 01 00 00 00 00', '43 18 10 01 01 02 03 04')],
         b'\1\2\3\4',
     ),
-    'expedited, length not told': (
+    'expedited, length not announced': (
         [('40 18 10 01 00 00 00 00', '42 18 10 01 01 02 03 04')],
         b'\1\2\3\4',
     ),
@@ -107,7 +107,7 @@ UPLOADS: dict[str, tuple[Transcript, bytes]] = {
         ],
         b'0123456789',
     ),
-    'segmented, 7 bytes, length not told': (
+    'segmented, 7 bytes, length not announced': (
         [
             ('40 18 10 01 00 00 00 00', '40 18 10 01 00 00 00 00'),
             ('60 00 00 00 00 00 00 00', '01 30 31 32 33 34 35 36'),
@@ -179,7 +179,7 @@ def test_download_transcripts(transcript: Transcript, value: bytes) -> None:
     assert not line.sent
 
 
-SERVERS = st.builds(SdoByteServer, tells_size=st.booleans(), expedites=st.booleans())
+SERVERS = st.builds(SdoByteServer, announces_size=st.booleans(), expedites=st.booleans())
 
 
 @given(st.binary(max_size=100), SERVERS, st.integers(0, 0xFFFF), st.integers(0, 0xFF))
@@ -194,7 +194,7 @@ def test_any_value_survives_a_round_trip(
     assert server.values == {(index, subindex): value}
     back = read(line, index, subindex)
     line.serve(server.answer)
-    unknown_length = server.expedites and not server.tells_size and 1 <= len(value) <= 4
+    unknown_length = server.expedites and not server.announces_size and 1 <= len(value) <= 4
     assert back.result() == (value.ljust(4, b'\0') if unknown_length else value)
 
 
@@ -260,7 +260,7 @@ def test_an_abort_in_the_middle_of_segments_ends_the_transfer() -> None:
     assert second.result() == b'\x2a'
 
 
-def test_silence_ends_in_a_time_out_that_the_server_hears_of() -> None:
+def test_silence_ends_in_a_time_out_that_is_reported_to_the_server() -> None:
     """Not before the time-out; the server gets an abort, the caller the place and the time."""
     line = Line()
     promise = write(line, b'x')
@@ -370,7 +370,7 @@ def test_a_late_answer_is_not_taken_for_the_next_one_of_its_object() -> None:
 
 
 def test_a_silent_device_is_not_written_to_blindly() -> None:
-    """While it is not known what it has heard, the next write of the object waits for a sign."""
+    """While its state is unknown, the next write of the object waits for an answer."""
     line = Line()
     promises = [write(line, b'1'), write(line, b'2')]
     line.pass_time(TIMEOUT)
@@ -458,7 +458,7 @@ def test_a_segment_of_a_transfer_that_timed_out_is_not_taken_for_another() -> No
 
 
 def test_a_wrong_toggle_bit_ends_the_transfer() -> None:
-    """The server hears of it by an abort."""
+    """The server gets an abort."""
     line = Line()
     promise = read(line)
     line.receive('41 18 10 01 0A 00 00 00')
@@ -541,7 +541,7 @@ def test_cancelling_ends_all_and_leaves_the_client_ready(progress: int) -> None:
             line.receive(answer)
     line.sent.clear()
     line.client.cancel_all('the device restarted')
-    assert [data[0] for data in line.sent] == [0x80], 'the device was not told'
+    assert [data[0] for data in line.sent] == [0x80], 'the device got no abort'
     for promise in promises[1:] if progress == 3 else promises:
         with pytest.raises(SdoError, match='joint1: the device restarted'):
             promise.result()
@@ -556,7 +556,7 @@ def test_cancelling_ends_all_and_leaves_the_client_ready(progress: int) -> None:
 
 @pytest.mark.parametrize('progress', [0, 1, 2], ids=['asked', 'first segment', 'second segment'])
 def test_an_urgent_write_ends_what_runs_and_passes_what_waits(progress: int) -> None:
-    """Those that wait come after it; the one that ran is told why."""
+    """Those that wait come after it; the one that ran gets the reason."""
     line = Line()
     server = SdoByteServer(values={(0x1018, 1): b'0123456789abcdef', (0x1018, 2): b'*'})
     running, waiting = read(line), read(line, subindex=2)
@@ -580,7 +580,7 @@ def test_an_urgent_write_ends_what_runs_and_passes_what_waits(progress: int) -> 
 
 
 def test_an_urgent_write_leaves_while_an_answer_to_the_same_object_is_owed() -> None:
-    """The device may hear what it does not answer."""
+    """The device may receive what it does not answer."""
     line = Line()
     for data, request in (
         (b'\2\0', '2B 40 60 00 02 00 00 00'),

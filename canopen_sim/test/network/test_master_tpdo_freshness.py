@@ -94,7 +94,7 @@ def test_a_drive_whose_tpdos_stop_to_come_on_change_is_not_fresh(mode: Operation
     blind.net.wire.loses = lambda sender, frame: False
     blind.net.run(3.0)
     assert blind.net.drives[JOINT].control.accepts_targets
-    assert not [text for text in blind.net.told(Severity.WARNING) if 'nobody notices' in text]
+    assert not [text for text in blind.net.reported(Severity.WARNING) if 'nobody notices' in text]
 
 
 @STREAMED
@@ -104,9 +104,11 @@ def test_a_drive_whose_tpdos_stop_to_come_on_change_is_not_fresh(mode: Operation
 def test_an_axis_is_not_held_at_a_position_of_unknown_age(
     config: NodeConfig, mode: OperationMode
 ) -> None:
-    """Where nothing tells that it is old, the drive is stopped by its own ramp, and disabled."""
+    """Where nothing shows that it is old, the drive is stopped by its own ramp, and disabled."""
     blind = Blind(config, mode)
-    (warning,) = [text for text in blind.net.told(Severity.WARNING) if 'nobody notices' in text]
+    (warning,) = [
+        text for text in blind.net.reported(Severity.WARNING) if 'nobody notices' in text
+    ]
     assert 'TPDO 1, 2' in warning
     velocities = blind.lose_tpdos()
     assert min(velocities) > -0.02
@@ -123,13 +125,13 @@ def test_a_device_that_refuses_its_event_timer_is_named() -> None:
     net.boot()
     net.run(2.0)
     assert net.drives[JOINT].view.fresh
-    warnings = [text for text in net.told(Severity.WARNING) if 'nobody notices' in text]
+    warnings = [text for text in net.reported(Severity.WARNING) if 'nobody notices' in text]
     assert len(warnings) == 1
     net.power_off(JOINT)
     net.run(0.5)
     net.power_on(JOINT)
     net.run_until(net.all_ready)
-    assert len([text for text in net.told() if 'nobody notices' in text]) == 1
+    assert len([text for text in net.reported() if 'nobody notices' in text]) == 1
 
 
 def test_a_timer_that_is_taken_at_the_next_boot_counts_again() -> None:
@@ -138,15 +140,15 @@ def test_a_timer_that_is_taken_at_the_next_boot_counts_again() -> None:
     refused = FaultInjection(Fault.SDO_ABORT, object=(0x1800, 5), abort=0x06090030)
     net.start()
     for refuses in (True, False, True):
-        begin = len(net.told(Severity.WARNING))
+        begin = len(net.reported(Severity.WARNING))
         net.power_off(JOINT)
         net.run(0.5)
         device = net.power_on(JOINT)
         if refuses:
             device.faults.inject(refused, net.now)
         net.run_until(net.all_ready)
-        told = net.told(Severity.WARNING)[begin:]
-        assert any('TPDO 1: nobody notices' in text for text in told) is refuses
+        reported = net.reported(Severity.WARNING)[begin:]
+        assert any('TPDO 1: nobody notices' in text for text in reported) is refuses
         net.run(2.0)
         assert net.drives[JOINT].view.fresh
         net.wire.loses = lambda sender, frame: frame.can_id == 0x180 + NODE_ID

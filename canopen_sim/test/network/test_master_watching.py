@@ -35,7 +35,7 @@ def guarded_config(**changes: object) -> NodeConfig:
 
 
 def test_a_device_without_heartbeat_is_asked() -> None:
-    """Every guard time; its answers keep it online and tell its NMT state."""
+    """Every guard time; its answers keep it online and report its NMT state."""
     net = VirtualNetwork(bus_config(guarded_config()))
     net.boot()
     net.run(1.0)
@@ -44,7 +44,7 @@ def test_a_device_without_heartbeat_is_asked() -> None:
     assert node.online
     assert len(questions) == pytest.approx(1.0 / GUARD_TIME, abs=3)
     assert node.nmt_state is not None
-    assert net.told(Severity.WARNING) == []
+    assert net.reported(Severity.WARNING) == []
 
 
 def test_a_guarded_device_that_does_not_answer_is_lost_and_found() -> None:
@@ -56,12 +56,14 @@ def test_a_guarded_device_that_does_not_answer_is_lost_and_found() -> None:
     begin = net.now
     net.run_until(lambda: not net.network.nodes['a'].online)
     assert net.now - begin <= GUARD_TIME * 4 + 0.02
-    assert any('no answer to node guarding 3 times' in text for text in net.told(Severity.ERROR))
+    assert any(
+        'no answer to node guarding 3 times' in text for text in net.reported(Severity.ERROR)
+    )
     net.power_on('a')
     net.run_until(lambda: net.network.nodes['a'].online)
 
 
-def test_a_device_that_never_answers_guarding_is_told_once_and_left_in_peace() -> None:
+def test_a_device_that_never_answers_guarding_is_reported_once_and_left_in_peace() -> None:
     """It is not booted again and again: it has to answer before it is configured again."""
     net = VirtualNetwork(bus_config(guarded_config()))
     node = net.network.nodes['a']
@@ -73,10 +75,10 @@ def test_a_device_that_never_answers_guarding_is_told_once_and_left_in_peace() -
     begin = net.now
     net.run(30.0)
     assert not node.online
-    assert len(net.told(Severity.WARNING)) == 2, net.told(Severity.WARNING)
-    assert 'no answer to node guarding 3 times' in net.told(Severity.ERROR)[0]
-    assert 'has never answered node guarding' in net.told(Severity.WARNING)[-1]
-    assert 'guard_time: 0' in net.told(Severity.WARNING)[-1]
+    assert len(net.reported(Severity.WARNING)) == 2, net.reported(Severity.WARNING)
+    assert 'no answer to node guarding 3 times' in net.reported(Severity.ERROR)[0]
+    assert 'has never answered node guarding' in net.reported(Severity.WARNING)[-1]
+    assert 'guard_time: 0' in net.reported(Severity.WARNING)[-1]
     assert net.frames(0x000, since=begin + 2.0).count(b'\x01\x02') == 0
     questions = [s for s in net.wire.log if s.frame.is_remote and s.time > begin + 2.0]
     assert len(questions) <= 28
@@ -87,7 +89,7 @@ def test_a_device_that_never_answers_guarding_is_told_once_and_left_in_peace() -
 
 
 def test_an_answer_that_is_repeated_is_none() -> None:
-    """The toggle bit tells a new answer from an old one."""
+    """The toggle bit distinguishes a new answer from an old one."""
     asked: list[Frame] = []
     guarding = Guarding(5, 0.1, 2, asked.append)
     guarding.start(0.0)
@@ -102,7 +104,7 @@ def test_an_answer_that_is_repeated_is_none() -> None:
     assert asked == [Frame(0x705, is_remote=True)] * 3
 
 
-def test_an_emergency_is_heard_where_the_device_sends_it() -> None:
+def test_an_emergency_is_received_where_the_device_sends_it() -> None:
     """Under the identifier of 0x1014: as bus.yml writes it, else as the EDS has it."""
     written = drive_config('a', 2)
     written = replace(written, sdo_writes=(*written.sdo_writes, sdo_write(0x1014, 0, 0x0A2)))
@@ -113,8 +115,10 @@ def test_an_emergency_is_heard_where_the_device_sends_it() -> None:
     net = VirtualNetwork(bus_config(written, eds, silent), absent=['b', 'c'])
     for can_id in (0x0A2, 0x0B3, 0x084):
         net.network.receive(Frame(can_id, bytes.fromhex('10 23 01 00 00 00 00 00'), net.now))
-    heard = {name: node.emergencies.last is not None for name, node in net.network.nodes.items()}
-    assert heard == {'a': True, 'b': True, 'c': False}
+    received = {
+        name: node.emergencies.last is not None for name, node in net.network.nodes.items()
+    }
+    assert received == {'a': True, 'b': True, 'c': False}
 
 
 def test_the_last_emergencies_are_remembered() -> None:
@@ -128,17 +132,19 @@ def test_the_last_emergencies_are_remembered() -> None:
     assert [time - net.now for time, _ in history] == [0.0, 1.0, 2.0]
 
 
-def test_a_pdo_of_another_length_is_told_once() -> None:
+def test_a_pdo_of_another_length_is_reported_once() -> None:
     """With both lengths; a second one is counted only."""
     net = VirtualNetwork(bus_config(drive_config('a', 2)))
     net.boot()
     for _ in range(3):
         net.network.receive(Frame(0x182, b'\0', net.now))
-    told = [text for text in net.told(Severity.WARNING) if 'TPDO 1 (0x182) has 1 bytes' in text]
-    assert len(told) == 1
+    reported = [
+        text for text in net.reported(Severity.WARNING) if 'TPDO 1 (0x182) has 1 bytes' in text
+    ]
+    assert len(reported) == 1
 
 
-def test_a_pdo_with_an_event_time_that_stops_is_told() -> None:
+def test_a_pdo_with_an_event_time_that_stops_is_reported() -> None:
     """The device takes no targets until it comes again."""
     config = drive_config('a', 2)
     timed = replace(pdo(3, 0x382, (0x6077, 0), transmission=255), event_time=0.02)
@@ -151,7 +157,7 @@ def test_a_pdo_with_an_event_time_that_stops_is_told() -> None:
         net.network._handlers[handler] = lambda frame: None
     net.run(0.2)
     assert not net.drives['a'].view.fresh
-    assert any('TPDO 3 (0x382) has stopped: none for 60 ms' in text for text in net.told())
+    assert any('TPDO 3 (0x382) has stopped: none for 60 ms' in text for text in net.reported())
     node.image.tpdos[-1].receive(Frame(0x382, bytes(2), net.now))
     net.run(0.01)
     assert net.drives['a'].view.fresh

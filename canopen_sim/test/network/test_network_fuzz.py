@@ -24,7 +24,7 @@ NODE_IDS = (2, 3)
 COMMANDING = frozenset(
     base + node_id for base in (0x200, 0x300, 0x400, 0x500, 0x600) for node_id in NODE_IDS
 )
-"""Identifiers that tell a drive what to do: whoever sends there may move it."""
+"""Identifiers that command a drive: whoever sends there may move it."""
 
 
 def make_network() -> VirtualNetwork:

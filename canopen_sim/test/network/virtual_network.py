@@ -69,7 +69,7 @@ class VirtualWire:
 
     Attributes:
         log: Every frame that was sent, also those that got lost.
-        loses: Tells of a frame and its sender whether it gets lost.
+        loses: Returns of a frame and its sender whether it gets lost.
         alters: Gives what arrives of a frame of a sender.
         refuses: Why the interface of the master takes no frames, empty while it does.
     """
@@ -229,7 +229,7 @@ class VirtualNetwork:
         return self.run_until(self.all_ready)
 
     def all_ready(self) -> bool:
-        """Tell whether every device is booted and every drive knows its drive's state."""
+        """Return whether every device is booted and every drive knows its drive's state."""
         online = all(node.online for node in self.network.nodes.values())
         return online and all(drive.view.ready for drive in self.drives.values())
 
@@ -277,13 +277,13 @@ class VirtualNetwork:
             for data in self.frames(self._config.node(name).rpdos[1].cob_id, since=since)
         ]
 
-    def told(self, severity: Severity = Severity.INFO) -> list[str]:
+    def reported(self, severity: Severity = Severity.INFO) -> list[str]:
         """Return what the master reported, of this severity and above."""
         return [str(event) for event in self.events if event.severity >= severity]
 
     def story(self) -> str:
         """Say what was reported so far, for messages of failed tests."""
-        return '; '.join(self.told()) or 'nothing was reported'
+        return '; '.join(self.reported()) or 'nothing was reported'
 
     def _note(self, event: Event) -> None:
         self.events.append(event)
