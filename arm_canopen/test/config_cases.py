@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Wrong pieces of a bus.yml, and the check that each is told as it should be."""
+"""Wrong pieces of a bus.yml, and the check that each is reported as it should be."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def _without(lines: list[str], names: set[str]) -> list[str]:
 
 
 def check(folder: Path, case: Case, eds: str | None = None) -> None:
-    """Assert that a case is told with the marked line, its key, its message and its remedy."""
+    """Assert that a case is reported with the marked line, its key, its message and its remedy."""
     text = added(case.section, case.piece)
     line = next(i for i, line in enumerate(text.splitlines(), 1) if HERE in line)
     path = write_bus(folder, text, eds=eds)

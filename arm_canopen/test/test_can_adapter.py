@@ -117,7 +117,7 @@ def test_stamps_of_drivers_become_steady_time(opened_with: dict[str, object], ag
     assert expected - 1e-3 <= frame.timestamp <= monotonic()
 
 
-def test_a_refused_frame_is_counted_and_told(opened_with: dict[str, object]) -> None:
+def test_a_refused_frame_is_counted_and_reported(opened_with: dict[str, object]) -> None:
     """The driver's error becomes ours, with its reason."""
     with open_bus('pcan:X') as bus:
         with pytest.raises(BusError, match='bus off'):
@@ -134,7 +134,7 @@ def unplugged() -> Iterator[AdapterBus]:
     bus.close()
 
 
-def test_a_driver_that_goes_away_is_told(unplugged: AdapterBus) -> None:
+def test_a_driver_that_goes_away_is_reported(unplugged: AdapterBus) -> None:
     """Receiving from a dead driver is an error and no empty bus."""
     with pytest.raises(BusError, match='went away'):
         unplugged.receive(0.1)

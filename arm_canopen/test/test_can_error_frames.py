@@ -34,11 +34,11 @@ from arm_canopen.can.error_frames import error_text
     ],
 )
 def test_classes_and_details_are_named(can_id: int, data: bytes, text: str) -> None:
-    """What the controller reports is told as linux/can/error.h defines it."""
+    """What the controller reports is reported as linux/can/error.h defines it."""
     assert error_text(Frame(can_id, data, is_error=True)) == text
 
 
 @given(st.integers(0, 0x1FFF_FFFF), st.binary(max_size=8))
 def test_every_error_frame_has_a_text(can_id: int, data: bytes) -> None:
-    """Unknown bits and short frames are told too, and never crash."""
+    """Unknown bits and short frames are reported too, and never crash."""
     assert error_text(Frame(can_id, data, is_error=True))

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The multicast bus: python-can as its peer, losses, strangers and the loopback interface."""
+"""The multicast bus: python-can as its peer, losses, foreign frames, loopback interface."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def test_fd_frames_and_garbage_are_counted_and_dropped(bus: Bus, name: str) -> N
     assert bus.counters.malformed == 3
 
 
-def test_other_groups_on_the_same_port_are_not_heard(bus: Bus, name: str) -> None:
+def test_other_groups_on_the_same_port_are_not_received(bus: Bus, name: str) -> None:
     """Two robots may share a port as long as their groups differ."""
     kind, group, port = name.split(':')
     head, _, last = group.rpartition('.')
@@ -99,7 +99,7 @@ def test_other_groups_on_the_same_port_are_not_heard(bus: Bus, name: str) -> Non
     assert bus.receive(0.0) == []
 
 
-def test_losses_are_counted_and_told_once(name: str, caplog: pytest.LogCaptureFixture) -> None:
+def test_losses_are_counted_and_reported_once(name: str, caplog: pytest.LogCaptureFixture) -> None:
     """When the receive buffer is full the kernel drops, and the bus knows how many."""
     sent = 3000
     with open_bus(name) as sender, open_bus(name) as late:
@@ -109,7 +109,7 @@ def test_losses_are_counted_and_told_once(name: str, caplog: pytest.LogCaptureFi
             sender.send(Frame(1))
         got = len(late.receive(0.0))
         assert 0 < got < sent
-        sender.send(Frame(2))  # the kernel tells the count with the next frame
+        sender.send(Frame(2))  # the kernel reports the count with the next frame
         assert unstamped(receive_count(late, 1)) == [Frame(2)]
         assert late.counters.lost == sent - got
         for _ in range(sent):
@@ -178,6 +178,6 @@ def test_stamps_do_not_go_back_when_the_wall_clock_is_set(
     ],
 )
 def test_wrong_groups_and_ports_are_refused_with_the_reason(wrong: str, reason: str) -> None:
-    """Each mistake in the name is told, with what would be right."""
+    """Each mistake in the name is reported, with what would be right."""
     with pytest.raises(BusError, match=reason):
         open_bus(wrong)

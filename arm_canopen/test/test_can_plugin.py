@@ -46,7 +46,9 @@ def theirs(name: str, monkeypatch: pytest.MonkeyPatch) -> Iterator[can.BusABC]:
         yield bus
 
 
-def test_a_notifier_hears_our_frames_with_wall_clock_stamps(ours: Bus, theirs: can.BusABC) -> None:
+def test_a_notifier_receives_our_frames_with_wall_clock_stamps(
+    ours: Bus, theirs: can.BusABC
+) -> None:
     """Listeners of python-can get each frame, stamped near now."""
     reader = can.BufferedReader()
     notifier = can.Notifier(theirs, [reader], timeout=0.05)

@@ -54,7 +54,7 @@ def test_error_frames_are_read_and_never_sent() -> None:
         pack(read)
 
 
-def test_a_missing_interface_tells_which_exist_and_how_to_make_it() -> None:
+def test_a_missing_interface_names_which_exist_and_how_to_make_it() -> None:
     """The message names the present ones and the command, for virtual and for real ones."""
     existing = {'can1': CanInterface('can1', is_up=True, queue_length=10)}
     text = missing_interface_text('vcan0', existing)
@@ -96,7 +96,7 @@ def test_a_kernel_without_can_names_the_multicast_bus(monkeypatch: pytest.Monkey
         open_bus('can0')
 
 
-def test_a_full_transmit_queue_is_told_and_not_waited_for(
+def test_a_full_transmit_queue_is_reported_and_not_waited_for(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Refused frames are counted and raise at once; when there is room again sending goes on."""
@@ -183,7 +183,7 @@ def test_an_interface_may_go_down_and_come_back(vcan: str) -> None:
 
 @pytest.mark.vcan
 def test_an_interface_that_is_taken_away_is_named(vcan: str) -> None:
-    """An unplugged adapter is told by receive and by send."""
+    """An unplugged adapter is reported by receive and by send."""
     ip_link('set', 'up', vcan)
     with open_bus(vcan) as bus:
         ip_link('del', vcan)
@@ -216,7 +216,7 @@ def test_an_adapter_that_is_plugged_in_again_is_used_again(vcan: str) -> None:
 
 @pytest.mark.vcan
 def test_a_short_transmit_queue_is_warned_of(vcan: str, caplog: pytest.LogCaptureFixture) -> None:
-    """A queue shorter than one cycle of an arm is told with the command that mends it."""
+    """A queue shorter than one cycle of an arm is reported with the command that mends it."""
     ip_link('set', vcan, 'up', 'txqueuelen', '10')
     with caplog.at_level(logging.WARNING), open_bus(vcan):
         pass

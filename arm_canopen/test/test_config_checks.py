@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What a bus.yml may say and should not: each told at its line, and not told when it is right."""
+"""What a bus.yml may say and should not: each reported at its line, and only when it is wrong."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ nodes:
   joint2:
     node_id: 3
 """
-"""A bus without anything to tell; comments are where cases put their keys."""
+"""A bus without anything to report; comments are where cases put their keys."""
 
 
 class Case(NamedTuple):
@@ -367,8 +367,8 @@ def report_of(folder: Path, text: str, bitrate: int | None = None) -> Report:
     return check_file(write_bus(folder, text, eds=EDS), bitrate)
 
 
-def assert_told(problems: tuple[Problem, ...], text: str, case: Case) -> None:
-    """Assert that a case is told, at its marked line when it has one."""
+def assert_reported(problems: tuple[Problem, ...], text: str, case: Case) -> None:
+    """Assert that a case is reported, at its marked line when it has one."""
     line = next((i for i, row in enumerate(text.splitlines(), 1) if HERE in row), None)
     assert any(
         problem.line == (line or problem.line)
@@ -379,7 +379,7 @@ def assert_told(problems: tuple[Problem, ...], text: str, case: Case) -> None:
     ), '\n'.join(str(problem) for problem in problems)
 
 
-def test_a_good_bus_has_nothing_to_tell(tmp_path: Path) -> None:
+def test_a_good_bus_has_nothing_to_report(tmp_path: Path) -> None:
     """Every case below starts from a bus without errors and warnings."""
     report = report_of(tmp_path, CLEAN)
     assert report.errors == report.warnings == ()
@@ -391,7 +391,7 @@ def test_warnings(tmp_path: Path, name: str) -> None:
     text = edited(WARNINGS[name])
     report = report_of(tmp_path, text)
     assert report.errors == ()
-    assert_told(report.warnings, text, WARNINGS[name])
+    assert_reported(report.warnings, text, WARNINGS[name])
 
 
 @pytest.mark.parametrize('name', ERRORS)
@@ -400,7 +400,7 @@ def test_errors(tmp_path: Path, name: str) -> None:
     text = edited(ERRORS[name])
     if name == 'start value above the counter':
         text = text.replace('# tpdo 2', f'sync_start: 20 {HERE}')
-    assert_told(report_of(tmp_path, text).errors, text, ERRORS[name])
+    assert_reported(report_of(tmp_path, text).errors, text, ERRORS[name])
 
 
 def test_errors_and_warnings_of_reading_come_along(tmp_path: Path) -> None:
@@ -421,12 +421,12 @@ def test_a_missing_file_is_one_error(tmp_path: Path) -> None:
 
 
 def test_a_loaded_bus_can_be_checked(tmp_path: Path) -> None:
-    """What a master has loaded needs no second reading, and the same is told."""
+    """What a master has loaded needs no second reading, and the same is reported."""
     path = write_bus(tmp_path, edited(WARNINGS['interpolation period']), eds=EDS)
     assert check_bus(load_bus(path)).warnings == check_file(path).warnings != ()
 
 
-def test_warnings_of_defaults_are_told_once(tmp_path: Path) -> None:
+def test_warnings_of_defaults_are_reported_once(tmp_path: Path) -> None:
     """Seven joints with one mistake in their defaults are one warning."""
     report = report_of(tmp_path, edited(WARNINGS['target apart, at once']))
     assert sum('map both' in problem.remedy for problem in report.warnings) == 1
@@ -449,12 +449,12 @@ def test_load(tmp_path: Path, bitrate: int, kind: str | None) -> None:
     assert report.load.frames_per_second == pytest.approx(725)
     assert report.load.load == pytest.approx(bits / bitrate)
     assert report.load.load_worst > report.load.load
-    told = [
+    reported = [
         name
         for name, problems in (('error', report.errors), ('warning', report.warnings))
         if any('frames/s' in problem.message for problem in problems)
     ]
-    assert told == ([kind] if kind else [])
+    assert reported == ([kind] if kind else [])
 
 
 @pytest.mark.parametrize(
@@ -468,7 +468,7 @@ def test_load(tmp_path: Path, bitrate: int, kind: str | None) -> None:
     ],
 )
 def test_rates(tmp_path: Path, old: str, new: str, rate: float, reason: str) -> None:
-    """Each kind of TPDO has its rate, and the reason is told."""
+    """Each kind of TPDO has its rate, and the reason is reported."""
     report = report_of(tmp_path, CLEAN.replace(old, new))
     assert report.load is not None
     (item,) = [t for t in report.load.traffic if (t.device, t.service) == ('joint1', 'TPDO 2')]

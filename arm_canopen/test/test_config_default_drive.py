@@ -22,7 +22,7 @@ def without_eds(text: str = BUS) -> str:
 
 
 def test_a_drive_without_eds_is_a_drive_of_the_standard(tmp_path: Path) -> None:
-    """It is told, its identity is not checked, and it has no PDO that bus.yml does not name."""
+    """It is reported, its identity not checked, and it has no PDO that bus.yml does not name."""
     config = load_text(tmp_path, without_eds())
     (warning,) = [entry for entry in config.warnings if "no 'dcf'" in entry.message]
     assert 'joint1' in warning.key

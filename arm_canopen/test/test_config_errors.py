@@ -138,7 +138,7 @@ REFUSED = [
 
 @pytest.mark.parametrize('case', SCALARS + DRIVERS + REFUSED, ids=lambda case: case.piece.strip())
 def test_wrong_keys_are_refused(tmp_path: Path, case: Case) -> None:
-    """Each is told with its line, key, the value and what to write instead."""
+    """Each is reported with its line, key, the value and what to write instead."""
     check(tmp_path, case)
 
 
@@ -177,6 +177,6 @@ FILES = [
 
 @pytest.mark.parametrize('case', FILES, ids=lambda case: case.piece)
 def test_what_the_eds_lacks_is_refused(tmp_path: Path, case: Case) -> None:
-    """A missing EDS or object is told at the key that wants it."""
+    """A missing EDS or object is reported at the key that wants it."""
     eds = eds_text().replace('[1016', '[2F16').replace('[1017', '[2F17')
     check(tmp_path, case, eds=eds)

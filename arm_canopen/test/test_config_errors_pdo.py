@@ -172,5 +172,5 @@ PDO = [
 
 @pytest.mark.parametrize('case', PDO, ids=lambda case: case.piece.strip())
 def test_wrong_pdos_are_refused(tmp_path: Path, case: Case) -> None:
-    """Each is told with its line, key, the reason and what to write instead."""
+    """Each is reported with its line, key, the reason and what to write instead."""
     check(tmp_path, case)

@@ -120,5 +120,5 @@ SDO = [
 
 @pytest.mark.parametrize('case', SDO, ids=lambda case: case.piece.strip())
 def test_wrong_writes_are_refused(tmp_path: Path, case: Case) -> None:
-    """Each is told with its line, key, the object or value, and what to write instead."""
+    """Each is reported with its line, key, the object or value, and what to write instead."""
     check(tmp_path, case)

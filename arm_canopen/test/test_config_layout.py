@@ -81,7 +81,7 @@ NODES_LIST = BUS.replace('nodes:\n  joint1:\n    node_id: 2', 'nodes:\n  - joint
 def test_wrong_layouts_are_refused(
     tmp_path: Path, text: str, line: int, message: str, remedy: str
 ) -> None:
-    """Missing, doubled and misplaced sections and devices are told with line and remedy."""
+    """Missing, doubled and misplaced sections and devices are reported with line and remedy."""
     found = problems(tmp_path, text)
     assert any(
         line == at and message in said and remedy in advice for at, said, advice in found
@@ -89,15 +89,15 @@ def test_wrong_layouts_are_refused(
 
 
 def test_the_section_written_too_deep(tmp_path: Path) -> None:
-    """Sections below options, as one published example has them, are taken out, and told."""
+    """Sections below options, as one published example has them, are taken out, and reported."""
     text = 'options:\n' + ''.join(f'  {line}\n' for line in BUS.splitlines())
     bus = load_text(tmp_path, text)
     assert [node.name for node in bus.nodes] == ['joint1']
-    told = {(warning.line, warning.key.rpartition('.')[2]) for warning in bus.warnings}
-    assert told == {(2, 'master'), (8, 'defaults'), (21, 'nodes')}
+    reported = {(warning.line, warning.key.rpartition('.')[2]) for warning in bus.warnings}
+    assert reported == {(2, 'master'), (8, 'defaults'), (21, 'nodes')}
 
 
-def test_all_problems_are_told_at_once(tmp_path: Path) -> None:
+def test_all_problems_are_reported_at_once(tmp_path: Path) -> None:
     """Problems of all sections and files come together, in the order of the lines."""
     text = added('joint1', 'colour: red\nsdo: [{index: 0x6082}]\nmandatory: 7')
     text = text.replace('sync_period: 10000', 'sync_period: 1')
@@ -222,7 +222,7 @@ def test_where_the_eds_is_looked_for(
 
 
 def test_another_folder_for_the_variable(tmp_path: Path) -> None:
-    """@BUS_CONFIG_PATH@ may be told to stand for another folder."""
+    """@BUS_CONFIG_PATH@ may be made to stand for another folder."""
     other = tmp_path / 'other'
     other.mkdir()
     (other / 'drive.eds').write_text(eds_text(), encoding='utf-8')

@@ -120,7 +120,7 @@ def test_keys_of_the_master(tmp_path: Path, piece: str, attribute: str, value: o
 
 
 def test_supervision_of_heartbeats(tmp_path: Path) -> None:
-    """The options' multiplier counts for all; the master may be told not to supervise."""
+    """The options' multiplier counts for all; the master may leave the supervision out."""
     text = added('joint1', 'heartbeat_producer: 100')
     options = 'options: {heartbeat_multiplier: 10}\n'
     assert load_text(tmp_path, options + text).nodes[0].heartbeat_timeout == 1.0
@@ -383,7 +383,7 @@ def test_a_device_without_heartbeat_is_guarded(tmp_path: Path) -> None:
 
 
 def test_a_heartbeat_replaces_guarding(tmp_path: Path) -> None:
-    """Both at a time are forbidden by CiA 301; the heartbeat wins, and it is told."""
+    """Both at a time are forbidden by CiA 301; the heartbeat wins, and it is reported."""
     config = load_text(tmp_path, added('joint1', 'heartbeat_producer: 100\nguard_time: 150'))
     assert (config.nodes[0].guard_time, config.nodes[0].uses_node_guarding) == (0.0, False)
     assert any('sends a heartbeat every 100 ms' in str(warning) for warning in config.warnings)

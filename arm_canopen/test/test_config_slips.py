@@ -17,7 +17,7 @@ EDS = Path(__file__).parents[1] / 'eds' / 'cia402_drive.eds'
 
 
 def test_the_prbt_guide_loads_as_printed(tmp_path: Path) -> None:
-    """Sections below options, PDOs whose keys are not indented: each slip is told by its line."""
+    """Sections below options, PDOs whose keys are not indented: each slip is reported."""
     shutil.copy(EDS, tmp_path / 'prbt_0_1.dcf')
     path = shutil.copy(DATA / 'prbt_guide.yml', tmp_path / 'bus.yml')
     bus = load_bus(path)
@@ -30,8 +30,8 @@ def test_the_prbt_guide_loads_as_printed(tmp_path: Path) -> None:
         assert [mapped.index for mapped in node.rpdos[0].mapping] == [0x6040, 0x6060, 0x60C1]
         assert [mapped.index for mapped in node.tpdos[1].mapping] == [0x6064, 0x606C]
     slips = [w for w in bus.warnings if 'indented' in w.message]
-    told = {lines[slip.line - 1].strip() for slip in slips}
-    assert told == {'master:', 'defaults:', 'nodes:', '1:', '2:', '3:', '4:'}
+    reported = {lines[slip.line - 1].strip() for slip in slips}
+    assert reported == {'master:', 'defaults:', 'nodes:', '1:', '2:', '3:', '4:'}
     assert len(slips) == 3 + 4 + 2
 
 

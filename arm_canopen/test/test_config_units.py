@@ -69,7 +69,7 @@ def test_what_one_means(
     assert units.radians == pytest.approx(radians, rel=1e-6)
 
 
-def test_an_eds_without_factor_group_tells_no_radians(tmp_path: Path) -> None:
+def test_an_eds_without_factor_group_has_no_radians(tmp_path: Path) -> None:
     """Then nobody knows what an increment is, and the group cannot be asked for."""
     assert units_of(tmp_path, 'mandatory: false', eds=eds_text()).radians is None
     text = added(JOINT, 'scale_from_factor_group: true')
@@ -77,7 +77,7 @@ def test_an_eds_without_factor_group_tells_no_radians(tmp_path: Path) -> None:
     assert error.key.endswith('scale_from_factor_group')
 
 
-def test_the_default_is_told_where_the_drive_counts_otherwise(tmp_path: Path) -> None:
+def test_the_default_is_reported_where_the_drive_counts_otherwise(tmp_path: Path) -> None:
     """1.0 is 0.01 rad here, as with ros2_canopen; with the scale written nothing is said."""
     config = load_text(tmp_path, eds=EDS)
     assert ['0.01 rad' in warning.message for warning in check_bus(config).warnings].count(

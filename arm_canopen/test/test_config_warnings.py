@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What is taken, but told: unused keys, units that do not fit, PDOs without SYNC."""
+"""What is taken, but reported: unused keys, units that do not fit, PDOs without SYNC."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ import pytest
         ('master', 'error_behavior: {1: 1}', 'error_behavior', 'known, not used yet'),
     ],
 )
-def test_told_with_line_and_key(
+def test_reported_with_line_and_key(
     tmp_path: Path, section: str, piece: str, key: str, message: str
 ) -> None:
     """One warning at the key, which says what happens instead, and a remedy."""
@@ -67,7 +67,7 @@ def test_scales_of_a_channel_are_checked_as_those_of_a_device(tmp_path: Path) ->
     ],
 )
 def test_what_asks_for_nothing_is_no_warning(tmp_path: Path, section: str, piece: str) -> None:
-    """Keys whose wish is granted anyway, or that say the default, are taken silently."""
+    """Keys whose request is met anyway, or that say the default, are taken silently."""
     assert load_text(tmp_path, added(section, piece)).warnings == ()
 
 
@@ -95,7 +95,7 @@ def test_identifiers_of_an_eds_without_node_id(tmp_path: Path) -> None:
 
 
 def test_mappings_that_the_eds_does_not_know(tmp_path: Path) -> None:
-    """An enabled PDO whose default mapping names unknown objects is told at its EDS line."""
+    """An enabled PDO whose default mapping names unknown objects is reported at its EDS line."""
     lines = eds_text().splitlines()
     start = lines.index('[1A01sub0]')
     for offset, value in ((0, '1'), (1, '0x70000020')):
@@ -110,7 +110,7 @@ def test_mappings_that_the_eds_does_not_know(tmp_path: Path) -> None:
     assert bus.nodes[0].tpdos[1].mapping[0].word == 0x7000_0020
 
 
-def test_warnings_of_an_eds_are_told_once(tmp_path: Path) -> None:
+def test_warnings_of_an_eds_are_reported_once(tmp_path: Path) -> None:
     """Devices that share an odd EDS share its warnings."""
     text = f'{BUS}  joint2: {{node_id: 3}}\n'
     eds = eds_text().replace('DefaultValue=1.5', 'DefaultValue=one')

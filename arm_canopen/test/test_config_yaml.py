@@ -82,7 +82,7 @@ def test_anchors_aliases_and_merge_keys(tmp_path: Path) -> None:
     assert (joint1.heartbeat_producer, joint2.heartbeat_producer) == (0.1, 0.3)
 
 
-def test_a_mistake_in_a_template_is_told_once(tmp_path: Path) -> None:
+def test_a_mistake_in_a_template_is_reported_once(tmp_path: Path) -> None:
     """A wrong value that two devices share is one problem, at the line of the template."""
     path = write_bus(tmp_path, ANCHORS.replace('transmission: 7', 'transmission: 700'))
     (problem,) = errors_of(path)
@@ -115,7 +115,7 @@ def test_a_mistake_in_a_template_is_told_once(tmp_path: Path) -> None:
     ids=lambda value: str(value)[-20:],
 )
 def test_what_is_no_good_yaml(tmp_path: Path, text: str, line: int, message: str) -> None:
-    """Syntax, duplicate keys, recursion and tags are told with their line, not a traceback."""
+    """Syntax, duplicate keys, recursion and tags are reported with their line, not a traceback."""
     path = tmp_path / 'bus.yml'
     write_bus(tmp_path).write_text(text, encoding='utf-8')
     with pytest.raises(ConfigError, match=message) as caught:

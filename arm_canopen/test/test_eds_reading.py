@@ -144,7 +144,7 @@ ODDITIES: list[tuple[str, int, str]] = [
 def test_oddities_are_warnings_with_their_line(
     tmp_path: Path, text: str, line: int, message: str
 ) -> None:
-    """What is wrong is told with its line, and the rest of the file is read."""
+    """What is wrong is reported with its line, and the rest of the file is read."""
     lines = [*text.split('|'), '[1000]', 'DataType=7', 'AccessType=ro']
     eds = read(tmp_path, '\n'.join(lines))
     assert (0x1000, 0) in eds.dictionary

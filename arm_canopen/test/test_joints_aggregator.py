@@ -16,7 +16,7 @@ NAMES = ['elbow', 'wrist', 'base']  # URDF order, which is no alphabetical one
 
 
 def sample(value: float) -> JointSample:
-    """Return a state that can be told from others."""
+    """Return a state that can be distinguished from others."""
     return JointSample(value, -value, 2 * value)
 
 
@@ -28,7 +28,7 @@ class Publisher:
         self.aggregator = JointAggregator(joints or [RobotJoint(name) for name in NAMES])
         self.sets: list[JointSet] = []
 
-    def hear(self, name: str, cycle: int, value: float = 0.0) -> None:
+    def receive(self, name: str, cycle: int, value: float = 0.0) -> None:
         """Take the state of a joint at a cycle of 10 ms."""
         stamp, now = cycle * PERIOD_NS, cycle * PERIOD_NS * 1e-9
         self.sets += self.aggregator.update(name, stamp, sample(value), now)
@@ -37,7 +37,7 @@ class Publisher:
         """Let it learn who takes part, in two cycles."""
         for cycle in (1, 2):
             for name in NAMES:
-                self.hear(name, cycle)
+                self.receive(name, cycle)
         self.sets.clear()
 
 
@@ -48,7 +48,7 @@ def test_one_set_for_each_cycle_in_urdf_order(orders: list[list[str]]) -> None:
     publisher.settle()
     for cycle, order in enumerate(orders, start=3):
         for name in order:
-            publisher.hear(name, cycle, cycle + NAMES.index(name) / 10)
+            publisher.receive(name, cycle, cycle + NAMES.index(name) / 10)
     assert [state.stamp for state in publisher.sets] == [
         cycle * PERIOD_NS for cycle in range(3, 3 + len(orders))
     ]
@@ -61,10 +61,10 @@ def test_the_set_leaves_with_the_last_joint() -> None:
     """Not before, and not at the next cycle."""
     publisher = Publisher()
     publisher.settle()
-    publisher.hear('base', 3)
-    publisher.hear('elbow', 3)
+    publisher.receive('base', 3)
+    publisher.receive('elbow', 3)
     assert publisher.sets == []
-    publisher.hear('wrist', 3)
+    publisher.receive('wrist', 3)
     assert len(publisher.sets) == 1
 
 
@@ -73,8 +73,8 @@ def test_a_joint_that_is_lost_delays_one_cycle_only() -> None:
     publisher = Publisher()
     publisher.settle()
     for cycle in (3, 4, 5):
-        publisher.hear('elbow', cycle)
-        publisher.hear('base', cycle)
+        publisher.receive('elbow', cycle)
+        publisher.receive('base', cycle)
     assert [state.stamp // PERIOD_NS for state in publisher.sets] == [3, 4, 5]
 
 
@@ -84,8 +84,8 @@ def test_a_lost_joint_is_left_out_after_a_while_and_named() -> None:
     publisher.settle()
     last = 2 + round(STALE_AFTER * 1e9 / PERIOD_NS)
     for cycle in range(3, last + 3):
-        publisher.hear('elbow', cycle)
-        publisher.hear('base', cycle)
+        publisher.receive('elbow', cycle)
+        publisher.receive('base', cycle)
     with_wrist = [state.stamp // PERIOD_NS for state in publisher.sets if 'wrist' in state.names]
     assert max(with_wrist) in (last - 1, last)
     assert publisher.sets[-1].names == ['elbow', 'base']
@@ -98,23 +98,23 @@ def test_a_joint_that_comes_back_takes_part_again() -> None:
     publisher = Publisher()
     publisher.settle()
     for cycle in range(3, 90):
-        publisher.hear('elbow', cycle)
+        publisher.receive('elbow', cycle)
     for cycle in (90, 91, 92):
         for name in NAMES:
-            publisher.hear(name, cycle)
+            publisher.receive(name, cycle)
     assert [len(state.names) for state in publisher.sets[-2:]] == [3, 3]
     assert publisher.aggregator.silent(0.93) == []
 
 
-def test_joints_never_heard_of_are_silent_from_the_start() -> None:
+def test_joints_that_never_come_are_silent_from_the_start() -> None:
     """In URDF order, without those that follow others."""
     publisher = Publisher(RobotJoint('a'), RobotJoint('b', Mimic('a')), RobotJoint('c'))
     assert publisher.aggregator.silent(0.0) == ['a', 'c']
     waited = round(STALE_AFTER * 1e9 / PERIOD_NS) + 1
     for cycle in range(1, waited + 1):
-        publisher.hear('c', cycle)
+        publisher.receive('c', cycle)
     assert publisher.sets == []
-    publisher.hear('c', waited + 1)
+    publisher.receive('c', waited + 1)
     assert publisher.sets[-1].names == ['c']
     assert publisher.aggregator.silent(waited * 0.01) == ['a']
 
@@ -122,24 +122,24 @@ def test_joints_never_heard_of_are_silent_from_the_start() -> None:
 def test_nobody_sees_half_a_robot_at_the_start() -> None:
     """The first set that is published has every joint that has a drive."""
     publisher = Publisher()
-    publisher.hear('elbow', 1)
-    publisher.hear('elbow', 2)
-    publisher.hear('wrist', 2)
-    publisher.hear('base', 2)
+    publisher.receive('elbow', 1)
+    publisher.receive('elbow', 2)
+    publisher.receive('wrist', 2)
+    publisher.receive('base', 2)
     assert [state.names for state in publisher.sets] == [NAMES]
 
 
-def test_a_mimic_joint_follows_by_its_law_unless_it_is_heard_itself() -> None:
+def test_a_mimic_joint_follows_by_its_law_unless_it_is_received_itself() -> None:
     """It is multiplier * leader + offset; a drive of its own beats the law."""
     publisher = Publisher(RobotJoint('a'), RobotJoint('b', Mimic('a', -2.0, 0.5)))
-    publisher.hear('a', 1, 3.0)
+    publisher.receive('a', 1, 3.0)
     state = publisher.sets[-1]
     assert state.names == ['a', 'b']
     assert state.samples[1] == JointSample(-5.5, 6.0, 0.0)
-    publisher.hear('a', 2, 3.0)
-    publisher.hear('b', 2, 1.0)
+    publisher.receive('a', 2, 3.0)
+    publisher.receive('b', 2, 1.0)
     for name, value in (('a', 3.0), ('b', 1.0)):
-        publisher.hear(name, 3, value)
+        publisher.receive(name, 3, value)
     assert publisher.sets[-1].samples == [sample(3.0), sample(1.0)]
 
 
@@ -148,9 +148,9 @@ def test_a_clock_that_is_set_back_does_not_stop_the_sets() -> None:
     publisher = Publisher()
     for cycle in (1000, 1001):
         for name in NAMES:
-            publisher.hear(name, cycle)
+            publisher.receive(name, cycle)
     publisher.sets.clear()
     for cycle in (10, 11, 12):
         for name in NAMES:
-            publisher.hear(name, cycle)
+            publisher.receive(name, cycle)
     assert [state.stamp // PERIOD_NS for state in publisher.sets] == [10, 11, 12]

@@ -190,7 +190,7 @@ def test_start_values_are_those_that_the_device_has() -> None:
 
 
 def test_start_values_leave_with_the_first_frame() -> None:
-    """A device whose profile velocity is mapped is not told 0."""
+    """A device whose profile velocity is mapped does not get 0."""
     config = drive_config('joint1', 2, sdo_writes=(sdo_write(0x6081, 0, 1234),))
     entries = ProcessImage(
         (),
@@ -210,13 +210,13 @@ def test_a_listener_that_is_cleared_by_another_thread_harms_no_frame() -> None:
         @property
         def listener(self) -> Callable[[ReceivedTpdo], None] | None:
             self.looks += 1
-            return heard.append if self.looks == 1 else None
+            return received.append if self.looks == 1 else None
 
         @listener.setter
         def listener(self, value: object) -> None:
             self.looks = 0
 
-    heard: list[ReceivedTpdo] = []
+    received: list[ReceivedTpdo] = []
     entry = Cleared(TPDOS[0], SyncRound(lambda: None))
     entry.receive(Frame(TPDOS[0].cob_id, bytes(8)))
-    assert heard == [entry]
+    assert received == [entry]

@@ -24,7 +24,7 @@ from arm_canopen.master.runner import NetworkThread
 from arm_canopen.master.scheduler import Promise
 from arm_canopen.standard.cob_id import CobId
 
-PATIENCE = 10.0  # [s] deadline for what takes milliseconds
+TIMEOUT = 10.0  # [s] deadline for what takes milliseconds
 
 
 class Bench:
@@ -57,12 +57,12 @@ def bench() -> Iterator[Bench]:
 def test_a_caller_that_gives_up_does_not_hold_up_the_others(bench: Bench) -> None:
     """A cancelled future is passed over."""
     gate = threading.Event()
-    bench.thread.call(lambda: gate.wait(PATIENCE))
+    bench.thread.call(lambda: gate.wait(TIMEOUT))
     given_up: Future[None] = bench.thread.call(lambda: None)
     after = bench.thread.call(lambda: 42)
     assert given_up.cancel()
     gate.set()
-    assert after.result(PATIENCE) == 42
+    assert after.result(TIMEOUT) == 42
 
 
 def test_a_defect_at_one_frame_does_not_lose_the_next(
@@ -79,13 +79,13 @@ def test_a_defect_at_one_frame_does_not_lose_the_next(
         if frame.can_id == 0x183:
             done.set()
 
-    bench.thread.call(lambda: setattr(bench.network, 'on_frame', take)).result(PATIENCE)
+    bench.thread.call(lambda: setattr(bench.network, 'on_frame', take)).result(TIMEOUT)
     gate = threading.Event()
-    bench.thread.call(lambda: gate.wait(PATIENCE))
+    bench.thread.call(lambda: gate.wait(TIMEOUT))
     for number in (1, 2, 3):
         bench.other.send(Frame(0x180 + number, b''))
     gate.set()
-    assert done.wait(PATIENCE)
+    assert done.wait(TIMEOUT)
     assert seen == [0x181, 0x182, 0x183]
     assert 'a defect in the CANopen master, at the frame' in caplog.text
 
@@ -93,25 +93,25 @@ def test_a_defect_at_one_frame_does_not_lose_the_next(
 def test_an_error_of_a_call_belongs_to_its_caller(bench: Bench) -> None:
     """It reaches the future, and the thread goes on."""
     with pytest.raises(ZeroDivisionError):
-        bench.thread.call(lambda: 1 // 0).result(PATIENCE)
+        bench.thread.call(lambda: 1 // 0).result(TIMEOUT)
 
     def broken() -> Promise[None]:
         raise KeyError('x')
 
     with pytest.raises(KeyError):
-        bench.thread.run(broken).result(PATIENCE)
-    assert bench.thread.call(lambda: 1).result(PATIENCE) == 1
+        bench.thread.run(broken).result(TIMEOUT)
+    assert bench.thread.call(lambda: 1).result(TIMEOUT) == 1
 
 
 def test_nobody_waits_for_a_thread_that_has_ended(bench: Bench) -> None:
     """What runs, and what is asked for afterwards, ends with the reason."""
     never: Promise[None] = Promise()
     running = bench.thread.run(lambda: never)
-    bench.thread.call(lambda: None).result(PATIENCE)
+    bench.thread.call(lambda: None).result(TIMEOUT)
     bench.thread.stop()
     for future in (running, bench.thread.call(lambda: None)):
         with pytest.raises(BusError, match='the CANopen master has ended'):
-            future.result(PATIENCE)
+            future.result(TIMEOUT)
     never.resolve(None)
 
 
@@ -157,7 +157,7 @@ def test_each_cycle_that_begins_late_updates_the_set_points(
     network.on_cycle = lambda now, period: order.append('update')
     thread = NetworkThread(bus, network)
     thread.start()
-    assert done.wait(PATIENCE)
+    assert done.wait(TIMEOUT)
     thread.stop()
     assert order[:40] == ['sync', 'update'] * 20
 
@@ -184,10 +184,10 @@ def test_published_jitter_is_that_of_sync_on_the_bus() -> None:
     thread = NetworkThread(bus, network)
     thread.start()
     arrivals: list[float] = []
-    end = time.monotonic() + PATIENCE
+    end = time.monotonic() + TIMEOUT
     while len(arrivals) < 100 and time.monotonic() < end:
         arrivals += [f.timestamp for f in listener.receive(1.0) if f.can_id == CobId.SYNC]
-    figures = thread.call(thread.figures).result(PATIENCE)
+    figures = thread.call(thread.figures).result(TIMEOUT)
     thread.stop()
     arrivals += [f.timestamp for f in listener.receive(0.0) if f.can_id == CobId.SYNC]
     bus.close()

@@ -44,15 +44,15 @@ def test_a_promise_without_a_result_has_none_to_give() -> None:
 
 
 def test_callbacks_are_called_once_before_or_after() -> None:
-    """A callback hears of the end exactly once, in order, also when it comes too late."""
+    """A callback gets the end exactly once, in order, also when it comes too late."""
     promise: Promise[int] = Promise()
-    heard: list[str] = []
-    promise.when_done(lambda _: heard.append('first'))
-    promise.when_done(lambda _: heard.append('second'))
+    received: list[str] = []
+    promise.when_done(lambda _: received.append('first'))
+    promise.when_done(lambda _: received.append('second'))
     promise.resolve(1)
-    promise.when_done(lambda _: heard.append('late'))
+    promise.when_done(lambda _: received.append('late'))
     promise.resolve(2)
-    assert heard == ['first', 'second', 'late']
+    assert received == ['first', 'second', 'late']
 
 
 def test_a_callback_may_resolve_the_promise_again() -> None:
@@ -99,11 +99,11 @@ def test_an_error_in_a_coroutine_belongs_to_whoever_awaits() -> None:
     assert isinstance(Scheduler().spawn(inner()).error, SdoError)
 
 
-def test_an_error_in_the_background_is_told() -> None:
+def test_an_error_in_the_background_is_reported() -> None:
     """What nobody awaits does not die in silence, at its start or later."""
-    told: list[type[BaseException]] = []
+    reported: list[type[BaseException]] = []
     scheduler = Scheduler()
-    scheduler.on_defect = lambda error: told.append(type(error))
+    scheduler.on_defect = lambda error: reported.append(type(error))
     gate: Promise[None] = Promise()
 
     async def broken_at_once() -> None:
@@ -116,14 +116,14 @@ def test_an_error_in_the_background_is_told() -> None:
     scheduler.background(broken_at_once())
     scheduler.background(broken_later())
     gate.resolve(None)
-    assert told == [ZeroDivisionError, KeyError]
+    assert reported == [ZeroDivisionError, KeyError]
 
 
 def test_what_ends_well_or_on_purpose_in_the_background_is_no_defect() -> None:
-    """Neither a result nor a cancellation is told."""
-    told: list[BaseException] = []
+    """Neither a result nor a cancellation is reported."""
+    reported: list[BaseException] = []
     scheduler = Scheduler()
-    scheduler.on_defect = told.append
+    scheduler.on_defect = reported.append
 
     async def sleeper() -> None:
         await scheduler.timer(1.0)
@@ -131,7 +131,7 @@ def test_what_ends_well_or_on_purpose_in_the_background_is_no_defect() -> None:
     scheduler.background(sleeper()).cancel(SdoError('enough'))
     scheduler.background(sleeper())
     scheduler.advance(1.0)
-    assert told == []
+    assert reported == []
 
 
 def test_timers_resume_in_the_order_of_their_times() -> None:

@@ -28,12 +28,12 @@ CONFIG = BusConfig(Path('bus.yml'), MasterConfig(1, cycle_period=0.005), ())
 
 
 class BreakingBus(VirtualBus):
-    """A bus whose driver fails in a way that nobody expects, once it is told to."""
+    """A bus whose driver fails in a way that nobody expects, from a moment on."""
 
     broken = False
 
     def receive(self, timeout: float) -> list[Frame]:
-        """Fail when told to."""
+        """Fail from that moment on."""
         if self.broken:
             raise ZeroDivisionError('injected')
         return super().receive(timeout)

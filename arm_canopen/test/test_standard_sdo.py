@@ -120,7 +120,7 @@ def test_responses_are_those_of_the_standard(message: Response, frame: str) -> N
 
 
 def test_expedited_data_without_a_size_are_four_bytes() -> None:
-    """A frame that does not tell the size hands over all four bytes."""
+    """A frame that does not have the size hands over all four bytes."""
     message = decode_request(bytes.fromhex('22 40 60 00 0F 00 00 00'))
     assert message == DownloadRequest(0x6040, 0, b'\x0f\x00\x00\x00', None)
 

@@ -35,7 +35,7 @@ Made by `tools/make_key_table.py` from the tables by which bus.yml is read. Name
 defaults are those of ros2_canopen and of Lely's dcfgen; both formats of the file are read, with
 `options`, `master`, `defaults` and `nodes`, or with the devices at the top level. A device's own
 value beats that of `defaults`. An unknown key is refused with its line and the key that was
-probably meant; `canopen check` tells all that is wrong at once.
+probably meant; `canopen check` reports all that is wrong at once.
 """
 
 TEXTS: dict[str, str] = {
@@ -67,7 +67,7 @@ TEXTS: dict[str, str] = {
     'start_all_nodes': 'the first start is one frame to all, when all are configured',
     'reset_all_nodes': 'the loss of a mandatory device resets all devices',
     'stop_all_nodes': 'the loss of a mandatory device stops all devices',
-    'boot_time': 'time after which missing mandatory devices are told, 0 for never',
+    'boot_time': 'time after which missing mandatory devices are reported, 0 for never',
     'boot_timeout': 'time-out of each SDO of the boot',
     'dcf': 'EDS or DCF of the device; ParameterValues of a DCF that are not its defaults are '
     'written at boot, before all else; a drive without a file is taken as CiA 402 has it',
@@ -127,7 +127,7 @@ TEXTS: dict[str, str] = {
     'mapping': 'mapped objects, each with `index` and `sub_index`; without: that of the EDS',
     'sync_start': 'SYNC counter at which it begins',
     'inhibit_time': 'shortest time between two',
-    'event_timer': 'longest time between two; its end is told after three times as long; '
+    'event_timer': 'longest time between two; its end is reported after three times as long; '
     "100 for a drive's state on change",
     'event_deadline': 'longest time that the device waits for one',
     'index': 'object',

@@ -4,7 +4,7 @@
 
 The objects 0x6000 to 0x67FE come a second time, 0x800 further on; the second axis also gets four
 RPDOs and four TPDOs with the mapping of the first, which are switched off by default. 0x67FF and
-0x6FFF tell the device type of each axis (CiA 402-1). Run it after a change of cia402_drive.eds:
+0x6FFF hold the device type of each axis (CiA 402-1). Run it after a change of cia402_drive.eds:
 ``python3 tools/make_two_axes.py``.
 """
 

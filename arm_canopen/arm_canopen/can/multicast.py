@@ -177,7 +177,7 @@ def _not_opened(name: str, error: OSError) -> BusError:
 
 @lru_cache(maxsize=256)
 def _is_local(host: str) -> bool:
-    """Tell whether an address is one of this host's.
+    """Return whether an address is one of this host's.
 
     python-can sends to the group through the default route, so its frames carry another address
     of this host, and those of other hosts may arrive with them.

@@ -240,7 +240,7 @@ class DriveCommands:
 
         Args:
             method: Homing method for 0x6098; None takes what is in the drive.
-            on_progress: Told each phase when it begins.
+            on_progress: Called with each phase when it begins.
         """
         drive, steps = self.drive, self._steps
         await steps.ready()

@@ -58,7 +58,7 @@ class DriveObjects:
         return int(word), position
 
     def is_controlled_by(self, output: SentRpdo) -> bool:
-        """Tell whether an RPDO carries the controlword of this axis."""
+        """Return whether an RPDO carries the controlword of this axis."""
         return output in self._controlling
 
     @property
@@ -82,7 +82,7 @@ class DriveObjects:
             output.kept_back_by.discard(self)
 
     def can_send(self, controlword: int) -> bool:
-        """Set the controlword, and tell whether the RPDOs that carry it can be sent with it."""
+        """Set the controlword, and return whether the RPDOs that carry it can be sent with it."""
         try:
             self.controlword.write(controlword)
             for output in self._controlling:
@@ -92,7 +92,7 @@ class DriveObjects:
         return True
 
     def fresh(self, now: float) -> bool:
-        """Tell whether the state is known and young enough to act on, at a steady time in [s].
+        """Return whether the state is known and young enough to act on, at a steady time in [s].
 
         A mode of operation that is read by SDO does not count: the cycle needs no SDO.
         """

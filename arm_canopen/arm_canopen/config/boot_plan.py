@@ -93,7 +93,7 @@ class BootWrite:
         return value.to_bytes(len(self.data), 'little')
 
     def fits(self, held: bytes) -> bool:
-        """Tell whether a value of the device is what is wanted; padding does not matter."""
+        """Return whether a value of the device is what is wanted; padding does not matter."""
         if len(self.data) <= 4 and len(held) == 4:
             held = held[: len(self.data)]
         if self.mask is None or len(held) != len(self.data):
@@ -130,7 +130,7 @@ def held_after_boot(
 
 
 def is_requested(bus: BusConfig, node: NodeConfig, *keys: str) -> bool:
-    """Tell whether bus.yml has a key of a device; a bus that was built by a program has all."""
+    """Return whether bus.yml has a key of a device; a bus that was built by a program has all."""
     return not bus.locations or (node.name, *keys) in bus.locations
 
 
@@ -164,7 +164,7 @@ def _watch_slots(bus: BusConfig, node: NodeConfig) -> list[int]:
 
 
 def _is_free(held: HeldConsumers, subindex: int, master_id: int) -> bool:
-    """Tell whether the master may use an entry of 0x1016 of a device.
+    """Return whether the master may use an entry of 0x1016 of a device.
 
     The first entry counts as free where it cannot be read.
     """
@@ -173,7 +173,7 @@ def _is_free(held: HeldConsumers, subindex: int, master_id: int) -> bool:
 
 
 def _is_free_word(word: int, master_id: int) -> bool:
-    """Tell whether an entry of 0x1016 is unused, or the master's."""
+    """Return whether an entry of 0x1016 is unused, or the master's."""
     entry = ConsumerHeartbeatTime.parse(word)
     return entry.node_id == master_id or not entry.used
 
@@ -314,7 +314,7 @@ class _Plan:
             yield _number((index, 0), count, DataType.UNSIGNED8, key, requested=given)
 
     def _is_given(self, direction: Direction, pdo: PdoConfig, key: str) -> bool:
-        """Tell whether bus.yml gives a key of a PDO, or a DCF the object."""
+        """Return whether bus.yml gives a key of a PDO, or a DCF the object."""
         if is_requested(self._bus, self._node, direction.name, str(pdo.number), key):
             return True
         if key == TIMER_KEY:  # which a DCF may leave to its default beside other parameters

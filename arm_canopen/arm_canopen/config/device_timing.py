@@ -139,7 +139,7 @@ def _life_time_factor(draft: DeviceDraft, dictionary: ObjectDictionary) -> int:
 def _heartbeat_consumer(
     draft: DeviceDraft, dictionary: ObjectDictionary, master: MasterConfig, findings: Findings
 ) -> bool:
-    """Tell whether the device watches the master; by default it does if it can."""
+    """Return whether the device watches the master; by default it does if it can."""
     entry = dictionary.get(Index.CONSUMER_HEARTBEAT, 1)
     capable = entry is not None and entry.access.writable
     wanted = draft.settings.heartbeat_consumer

@@ -213,7 +213,7 @@ class _Converter:
         merged: dict[str, Item] = {}
         pairs = node.value
         if place.key.rpartition('.')[2] in NUMBERED:
-            pairs = reindent(pairs, lambda key: self._tell_slip(key, place))
+            pairs = reindent(pairs, lambda key: self._report_slip(key, place))
             self._kept.append(pairs)
         for key, value in pairs:
             if key.tag == MERGE_TAG:
@@ -222,7 +222,7 @@ class _Converter:
                 self._entry(key, value, place, own)
         return YamlMap(place, merged | own)
 
-    def _tell_slip(self, key: yaml.Node, place: Place) -> None:
+    def _report_slip(self, key: yaml.Node, place: Place) -> None:
         self._findings.warning(
             self._place(key, f'{place.key}.{key.value}'),
             f'the keys after {key.value!r} are not indented below it; taken as if they were',

@@ -104,7 +104,7 @@ def _old_devices(root: YamlMap, findings: Findings) -> dict[str, YamlMap]:
 
 
 def _is_misspelt(name: str, item: Item) -> bool:
-    """Tell a section with a typing error from a device, which has an EDS in this format."""
+    """Distinguish a section with a typing error from a device, which has an EDS in this format."""
     is_device = isinstance(item, YamlMap) and bool({'dcf', 'eds'} & item.entries.keys())
     return name not in TOP_LEVEL and not is_device and bool(_close_section(name))
 

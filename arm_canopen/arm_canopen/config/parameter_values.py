@@ -45,7 +45,7 @@ def parameter_writes(eds: Eds, findings: Findings) -> tuple[SdoWrite, ...]:
 
 
 def is_configured(dictionary: ObjectDictionary, *indices: int) -> bool:
-    """Tell whether a DCF gives any writable sub-index of some objects a value of its own."""
+    """Return whether a DCF gives any writable sub-index of some objects a value of its own."""
     return any(
         entry.configured and entry.access.writable
         for index in indices

@@ -42,7 +42,7 @@ def mapping_slots(direction: Direction, number: int, dictionary: ObjectDictionar
 
 
 def is_fixed(direction: Direction, number: int, dictionary: ObjectDictionary) -> bool:
-    """Tell whether the mapping cannot be written."""
+    """Return whether the mapping cannot be written."""
     entry = dictionary.get(direction.mapping + number - 1, 0)
     return entry is None or not entry.access.writable
 

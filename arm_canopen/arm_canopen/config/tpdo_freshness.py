@@ -60,7 +60,7 @@ def longest_silence(pdo: PdoConfig, sync_period: float) -> float:
 
 
 def loss_unnoticed(pdo: PdoConfig, silence: float) -> bool:
-    """Tell whether a TPDO carries state of a drive, and nothing shows that it got lost.
+    """Return whether a TPDO carries state of a drive, and nothing shows that it got lost.
 
     Args:
         pdo: The TPDO.

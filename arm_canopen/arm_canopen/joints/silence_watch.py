@@ -10,7 +10,7 @@ START_TIMEOUT = 30.0  # [s] in which the first state of a joint comes, or comes 
 
 
 class SilenceWatch:
-    """Tells a lost drive from a master that has not started yet, or has ended.
+    """Distinguishes a lost drive from a master that has not started yet, or has ended.
 
     A master that ends takes its publishers out of the graph; a drive that is lost does not.
     """

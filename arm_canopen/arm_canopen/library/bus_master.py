@@ -67,7 +67,7 @@ class BusMaster:
             config: The bus.
             can: The open CAN interface; it stays the caller's to close.
             report: Takes events, in the thread of the cycle.
-            beside_master: Start although another master is heard, and command no device of its.
+            beside_master: Start although another master is found, and command no device of its.
         """
         self.config = config
         self.can = can
@@ -107,8 +107,8 @@ class BusMaster:
         if not self._beside_master:
             refuse_other_master(self.can, self.config)
             return ''
-        heard = listen(self.can, self.config)
-        return describe(heard) if heard else ''
+        found = listen(self.can, self.config)
+        return describe(found) if found else ''
 
     def start(self, begin: Callable[[], None] = lambda: None) -> None:
         """Boot the devices and start the cycle.

@@ -77,7 +77,7 @@ class CanopenMaster:
             can: The open CAN interface; it stays the caller's to close.
             on_event: Takes what happens on the bus, in the thread of the cycle: it must not wait.
             thread_priority: SCHED_FIFO priority of the cycle, where it is allowed; 0 for none.
-            beside_master: Start although another master is heard, and command no device of its.
+            beside_master: Start although another master is found, and command no device of its.
         """
         self.bus = config
         self._thread_priority = thread_priority
@@ -115,7 +115,7 @@ class CanopenMaster:
                 ``INTERFACE:CHANNEL[@BITRATE]`` of python-can, or ``auto``.
             on_event: Takes what happens on the bus, in the thread of the cycle: it must not wait.
             thread_priority: SCHED_FIFO priority of the cycle, where it is allowed; 0 for none.
-            beside_master: Start although another master is heard, and command no device of its.
+            beside_master: Start although another master is found, and command no device of its.
 
         Raises:
             ConfigError: The bus.yml or an EDS is wrong; every problem is listed.
@@ -153,8 +153,8 @@ class CanopenMaster:
         if self._closed:
             raise BusError(f'{OWNER} has ended')
         if not self._master.started:
-            if heard := self._master.listen():
-                logger.warning('going on beside another master: %s', heard)
+            if other := self._master.listen():
+                logger.warning('going on beside another master: %s', other)
             atexit.register(self.close)
             self._master.start(self._raise_priority)
         if timeout is None:

@@ -43,7 +43,7 @@ class BackgroundReader:
         return self
 
     def stale(self, now: float) -> bool:
-        """Tell whether it is unknown, or too old to act on, at a steady time in [s]."""
+        """Return whether it is unknown, or too old to act on, at a steady time in [s]."""
         return self.value is None or now - self.timestamp > self._stale_after
 
 

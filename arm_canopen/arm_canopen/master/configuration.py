@@ -164,7 +164,7 @@ class Configurator:
                 entry.rely_on_timer(taken=taken)
 
     async def _holds(self, write: BootWrite) -> bool:
-        """Tell whether a device that refused to be written has the value already."""
+        """Return whether a device that refused to be written has the value already."""
         try:
             return write.fits(await self._node.sdo.read(*write.address, self._sdo_timeout))
         except SdoAbortError:

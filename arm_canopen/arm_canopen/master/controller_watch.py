@@ -19,7 +19,7 @@ _RESTART = (
     'up with `restart-ms 100`'
 )
 _CABLE = 'look at cable, termination, bit rate and ground'
-_TOLD: dict[ControllerState, tuple[Severity, str]] = {
+_REPORTS: dict[ControllerState, tuple[Severity, str]] = {
     ControllerState.ACTIVE: (Severity.INFO, 'the bus is free of errors again'),
     ControllerState.WARNING: (Severity.WARNING, f'frames are disturbed; {_CABLE}'),
     ControllerState.PASSIVE: (
@@ -68,13 +68,13 @@ class ControllerWatch:
         if is_unacknowledged(frame) and not self._alone:
             self._alone = True
             text = 'nobody on the bus acknowledges frames: is any device powered and connected?'
-            self._tell(Severity.WARNING, text)
+            self._log(Severity.WARNING, text)
         state = controller_state(frame)
         if state is not None and state is not self.state:
             self.state = state
             self._alone = self._alone and state is not ControllerState.ACTIVE
-            severity, text = _TOLD[state]
-            self._tell(severity, f'CAN controller {state.value} ({self.last_error}): {text}')
+            severity, text = _REPORTS[state]
+            self._log(severity, f'CAN controller {state.value} ({self.last_error}): {text}')
 
-    def _tell(self, severity: Severity, text: str) -> None:
+    def _log(self, severity: Severity, text: str) -> None:
         self._report(Event(EventKind.BUS, severity, '', text))

@@ -16,7 +16,7 @@ HISTORY = 16  # EMCYs that are remembered
 
 
 class EmergencyLog:
-    """Tells each EMCY in words, and remembers the last ones.
+    """Reports each EMCY in words, and remembers the last ones.
 
     Attributes:
         history: The last EMCYs, the newest at the end, with the steady time of each in [s].

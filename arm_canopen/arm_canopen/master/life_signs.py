@@ -33,7 +33,7 @@ class LifeSigns:
         self.owed = False
         self._config = config
         self._since = 0.0
-        self._patience = math.inf
+        self._timeout = math.inf
         self._guarding: Guarding | None = None
         if config.uses_node_guarding:
             timing = (config.guard_time, config.retry_factor)
@@ -43,13 +43,13 @@ class LifeSigns:
         """Supervise from a time in [s] on, from which the first sign is awaited."""
         self.last = self._since = now
         self.owed = False
-        self._patience = self._config.heartbeat_timeout or math.inf
+        self._timeout = self._config.heartbeat_timeout or math.inf
         if self._guarding is not None:
             self._guarding.start(now)
 
     def stop(self) -> None:
         """Supervise no more."""
-        self._patience = math.inf
+        self._timeout = math.inf
         if self._guarding is not None:
             self._guarding.stop()
 
@@ -69,9 +69,9 @@ class LifeSigns:
 
     def overdue(self, now: float) -> str:
         """Return in words what is missing at a time in [s], empty while nothing is."""
-        if now - self.last > self._patience:
+        if now - self.last > self._timeout:
             self.owed = self.last <= self._since
-            return f'heartbeat lost: none within its consumer time of {self._patience * 1000:g} ms'
+            return f'heartbeat lost: none within its consumer time of {self._timeout * 1000:g} ms'
         if self._guarding is not None and self._guarding.advance(now):
             self.owed = self.last <= self._since
             config = self._config

@@ -119,7 +119,7 @@ class ReceivedTpdo:
         return 1 <= self.config.transmission <= SYNCHRONOUS_MAX
 
     def stale(self, now: float) -> bool:
-        """Tell whether its values are missing, or too old to act on, at a steady time in [s]."""
+        """Return whether its values are missing, or too old to act on, at a steady time in [s]."""
         return self.values is None or now - self.timestamp > self.stale_after
 
     @property
@@ -191,7 +191,7 @@ class SentRpdo:
         return self.config.transmission <= SYNCHRONOUS_MAX
 
     def leaves(self, now: float) -> bool:
-        """Tell whether it leaves in this cycle, at a time in [s].
+        """Return whether it leaves in this cycle, at a time in [s].
 
         One with a deadline is repeated within it, once somebody has published it.
         """
@@ -227,7 +227,7 @@ class Source(Protocol):
     timestamp: float
 
     def stale(self, now: float) -> bool:
-        """Tell whether they are unknown, or too old to act on, at a steady time in [s]."""
+        """Return whether they are unknown, or too old to act on, at a steady time in [s]."""
 
 
 class Reader(Protocol):
@@ -357,9 +357,9 @@ class ProcessImage:
             tpdos: What the device sends.
             rpdos: What it receives.
             sync: The round that all TPDOs of the bus belong to.
-            start: Tells what an object in an RPDO carries until it is written.
+            start: Returns what an object in an RPDO carries until it is written.
             cyclic: RPDOs leave in every cycle; otherwise when they are published.
-            send_last: Tells of an index whether RPDOs with that object leave after the others:
+            send_last: Returns of an index whether RPDOs with that object leave after the others:
                 commands, which must not overtake their data.
         """
         self.tpdos = [ReceivedTpdo(pdo, sync) for pdo in tpdos if pdo.enabled and pdo.mapping]
@@ -398,7 +398,7 @@ class ProcessImage:
         return OutputWriter(places) if places else None
 
     def is_applied_first(self, index: int, subindex: int, *, command: int) -> bool:
-        """Tell whether a value takes effect no later than a command of the same cycle.
+        """Return whether a value takes effect no later than a command of the same cycle.
 
         That is so where one RPDO alone carries the command, and each RPDO with the value is that
         one or a faster one: event-driven, and sent before it. Several synchronous RPDOs are

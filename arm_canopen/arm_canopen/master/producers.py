@@ -22,7 +22,7 @@ def utc_now() -> datetime:
 
 
 class Periodic:
-    """Tells when something periodic is due; after a pause the series begins anew.
+    """Returns when something periodic is due; after a pause the series begins anew.
 
     So nothing is made up for, and nothing crowds.
     """
@@ -33,7 +33,7 @@ class Periodic:
         self._next = 0.0
 
     def is_due(self, now: float) -> bool:
-        """Tell whether it is time; then the next time is a period later."""
+        """Return whether it is time; then the next time is a period later."""
         if self._period <= 0.0 or now < self._next:
             return False
         due = self._next + self._period

@@ -54,7 +54,7 @@ class RemoteObjects:
             sync: The SYNC round of the bus.
             send: Hands a frame to the bus.
             report: Takes what goes wrong with an object.
-            is_online: Tells whether the device was booted, and not lost since.
+            is_online: Returns whether the device was booted, and not lost since.
         """
         self.config = config
         self.name = config.name

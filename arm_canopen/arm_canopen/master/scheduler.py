@@ -148,7 +148,7 @@ class Scheduler:
 
     Attributes:
         now: Steady time of the last ``advance`` in [s].
-        on_defect: Told the error of a coroutine that nobody awaits.
+        on_defect: Called with the error of a coroutine that nobody awaits.
     """
 
     def __init__(self, now: float = 0.0) -> None:

@@ -116,7 +116,7 @@ class SdoChannel:
         self._strays += 1
 
     def cancel(self) -> None:
-        """Tell the device that the transfer is over, whether or not a question is open."""
+        """Abort the transfer, whether or not a request is open."""
         if self._answered is not None:
             self._answered = None
             self._await_late_replies(1)

@@ -77,13 +77,13 @@ class HomeAction:
             FEEDBACK_PERIOD, partial(self._publish_feedback, goal, homing)
         )
 
-        def tell(progress: HomingProgress) -> None:
+        def notify(progress: HomingProgress) -> None:
             homing.phase = progress.value
 
         def run() -> Promise[str]:
             self._node.admit()
             method = goal.request.method or None
-            homing.task = self._commands.run('home', self._commands.home(method, tell))
+            homing.task = self._commands.run('home', self._commands.home(method, notify))
             return homing.task
 
         def finished(future: Future[str]) -> None:

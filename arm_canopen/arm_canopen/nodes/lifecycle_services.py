@@ -75,9 +75,9 @@ class LifecycleServices:
     ) -> None:
         # called in the thread of the network, which must not wait for DDS
         stamp = self._node.get_clock().now().nanoseconds
-        self._output.post(partial(self._tell, transition, before, after, ended, stamp))
+        self._output.post(partial(self._publish_event, transition, before, after, ended, stamp))
 
-    def _tell(
+    def _publish_event(
         self,
         transition: Transition,
         before: LifecycleState,

@@ -103,7 +103,7 @@ class Parameters:
         can_names: Names of the CAN interfaces, in the same order.
         diagnostics_period: Time between two /diagnostics messages in [s].
         thread_priority: SCHED_FIFO priority of the thread of the cycle; 0 for none.
-        beside_master: Start although another master is heard on the bus.
+        beside_master: Start although another master is found on the bus.
         robot_joint_states: Publish the joints of all drives as ``joint_states``.
         robot_description: URDF as XML text; empty to take it from the topic.
     """
@@ -247,7 +247,7 @@ def _declare(node: Node) -> Parameters:
     priority = declare_thread_priority(read, THREAD_PRIORITY)
     beside_master = read.flag(
         'beside_master',
-        'start although another master is heard, which leads other devices',
+        'start although another master is found, which leads other devices',
         default=False,
     )
     robot_joint_states = read.flag(

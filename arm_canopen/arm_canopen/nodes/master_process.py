@@ -59,7 +59,7 @@ class MasterProcess:
             can: The open CAN interface; it stays the caller's to close.
             diagnostics_period: Time between two /diagnostics messages in [s].
             thread_priority: SCHED_FIFO priority of the thread of the cycle; 0 for none.
-            beside_master: Start although another master is heard, and command no device of its.
+            beside_master: Start although another master is found, and command no device of its.
         """
         self.bus = config
         self._node = node
@@ -99,9 +99,9 @@ class MasterProcess:
         Raises:
             OtherMasterError: There is one, and beside_master is not set.
         """
-        if heard := self._master.listen():
+        if other := self._master.listen():
             self._node.get_logger().warning(
-                f'going on beside another master, by beside_master: {heard}'
+                f'going on beside another master, by beside_master: {other}'
             )
 
     def start(self) -> None:

@@ -28,7 +28,7 @@ def profile_number(dictionary: ObjectDictionary) -> int:
 
 
 def is_drive(dictionary: ObjectDictionary) -> bool:
-    """Tell whether 0x6040 and its like are those of CiA 402; other profiles have them, too."""
+    """Return whether 0x6040 and its like are those of CiA 402; other profiles have them, too."""
     number = profile_number(dictionary)
     if number:
         return number == DeviceProfile.DRIVE

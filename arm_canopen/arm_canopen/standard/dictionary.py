@@ -130,7 +130,7 @@ class ObjectDictionary:
         return len(self._entries)
 
     def __contains__(self, address: tuple[int, int]) -> bool:
-        """Tell whether the sub-index exists."""
+        """Return whether the sub-index exists."""
         return address in self._entries
 
     def get(self, index: int, subindex: int = 0) -> ObjectEntry | None:
@@ -138,7 +138,7 @@ class ObjectDictionary:
         return self._entries.get((index, subindex))
 
     def has_index(self, index: int) -> bool:
-        """Tell whether any sub-index of this index exists."""
+        """Return whether any sub-index of this index exists."""
         return index in self._indices
 
     def subindices(self, index: int) -> list[ObjectEntry]:

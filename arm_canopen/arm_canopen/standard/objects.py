@@ -157,17 +157,17 @@ _SIGNED = frozenset(
 
 
 def is_signed(index: int, subindex: int) -> bool:
-    """Tell whether an object of any axis is a position, velocity or torque, which has a sign."""
+    """Return whether an object of any axis is a position, velocity or torque, which has a sign."""
     axis, offset = divmod(index - _PROFILE_AREA, AXIS_OFFSET)
     return 0 <= axis < AXES_MAX and (_PROFILE_AREA + offset, subindex) in _SIGNED
 
 
 def is_state(index: int) -> bool:
-    """Tell whether an object shows how one of the axes of a drive is, as the cycle reads it."""
+    """Return whether an object shows how one of the axes of a drive is, as the cycle reads it."""
     axis, offset = divmod(index - _PROFILE_AREA, AXIS_OFFSET)
     return 0 <= axis < AXES_MAX and _PROFILE_AREA + offset in _STATE
 
 
 def is_controlword(index: int) -> bool:
-    """Tell whether an object is the controlword of one of the axes of a drive."""
+    """Return whether an object is the controlword of one of the axes of a drive."""
     return index in _CONTROLWORDS
