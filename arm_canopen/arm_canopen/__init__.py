@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from .library.canopen_drive import CanopenDrive
     from .library.canopen_master import CanopenMaster
     from .library.device import CanopenDevice
+    from .master.events import Event, EventKind, Severity
     from .nodes.master import run_master, serve_buses
     from .nodes.master_process import MasterProcess
 
@@ -35,6 +36,8 @@ __all__ = [
     'CanopenError',
     'CanopenMaster',
     'DriveState',
+    'Event',
+    'EventKind',
     'MasterProcess',
     'MotionSource',
     'NodeConfig',
@@ -42,6 +45,7 @@ __all__ = [
     'Refusal',
     'RefusalCause',
     'Setpoint',
+    'Severity',
     'load_bus',
     'open_bus',
     'run_master',
@@ -53,7 +57,10 @@ _LATE = {
     'CanopenDevice': '.library.device',
     'CanopenDrive': '.library.canopen_drive',
     'CanopenMaster': '.library.canopen_master',
+    'Event': '.master.events',
+    'EventKind': '.master.events',
     'MasterProcess': '.nodes.master_process',
+    'Severity': '.master.events',
     'run_master': '.nodes.master',
     'serve_buses': '.nodes.master',
 }

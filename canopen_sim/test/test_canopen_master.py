@@ -18,7 +18,15 @@ from can_addresses import free_multicast
 import canopen
 import pytest
 
-from arm_canopen import AxisFeedback, CanopenMaster, DriveState, OperationMode, Refusal
+from arm_canopen import (
+    AxisFeedback,
+    CanopenMaster,
+    DriveState,
+    Event,
+    EventKind,
+    OperationMode,
+    Refusal,
+)
 from arm_canopen.can.plugin import ArmCanopenBus
 from arm_canopen.exceptions import (
     BootError,
@@ -322,3 +330,45 @@ def test_a_motion_source_leads_in_the_cycle(master: CanopenMaster) -> None:
     assert ramp.there.wait(TIMEOUT)
     master.detach(ramp)
     assert drive.position == pytest.approx(0.1, abs=0.002)
+
+
+def test_drives_that_vanish_are_reported_and_keep_nobody_waiting(
+    drives: subprocess.Popen[str], bus_yml: Path, bus: str
+) -> None:
+    """The motion that waits for one ends, and so does the master, in a time of its own."""
+    with CanopenMaster.from_bus_yml(bus_yml, bus) as master:
+        master.boot(TIMEOUT)
+        drive = master.drive('joint1')
+        drive.enable()
+        drive.select_mode(OperationMode.PROFILE_POSITION)
+        with ThreadPoolExecutor(1) as pool:
+            moving = pool.submit(drive.move_to, 1000.0)
+            deadline = time.monotonic() + TIMEOUT
+            while drive.velocity < 0.5:
+                assert time.monotonic() < deadline
+            drives.kill()
+            with pytest.raises(DriveError, match='joint1'):
+                moving.result(TIMEOUT)
+        while drive.status().node.online:
+            assert time.monotonic() < deadline
+        with pytest.raises(DriveError, match='offline'):
+            drive.enable()
+        with pytest.raises(BootError, match='joint1'):
+            master.boot(0.1)
+
+
+def test_events_are_handed_over_and_one_that_fails_harms_nobody(
+    drives: object, bus_yml: Path, bus: str
+) -> None:
+    """The boot of each drive comes as an event, in the thread of the cycle."""
+    heard = []
+
+    def on_event(event: Event) -> None:
+        heard.append((event.kind, event.node, threading.current_thread().name))
+        raise ZeroDivisionError
+
+    with CanopenMaster.from_bus_yml(bus_yml, bus, on_event=on_event) as master:
+        master.boot(TIMEOUT)
+        master.drive('joint1').enable()
+    booted = {entry for entry in heard if entry[0] is EventKind.BOOT}
+    assert booted == {(EventKind.BOOT, name, 'canopen') for name in ('joint1', 'joint2')}

@@ -81,8 +81,9 @@ class CanopenMaster:
         """
         self.bus = config
         self._thread_priority = thread_priority
-        self._master = BusMaster(config, can, on_event, beside_master=beside_master)
+        self._on_event = on_event
         self._booted = threading.Event()
+        self._master = BusMaster(config, can, self._report, beside_master=beside_master)
         self._master.on_operational = self._booted.set
         self._closed = False
         self._exit = ExitStack()
@@ -252,6 +253,14 @@ class CanopenMaster:
             if exc is None:
                 raise
             logger.error('%s', error)  # its traceback says nothing
+
+    def _report(self, event: Event) -> None:
+        if event.kind is EventKind.HEARTBEAT_LOST:
+            self._booted.clear()
+        try:
+            self._on_event(event)
+        except Exception:
+            logger.exception('on_event failed, at: %s', event)
 
     def _raise_priority(self) -> None:
         outcome = raise_priority(self._thread_priority, 'the CANopen cycle')
